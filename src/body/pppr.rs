@@ -1,0 +1,163 @@
+//! PPPR: the parameters of every joint, and their gradients, which have the same shape.
+
+use crate::geometry::Vec3;
+
+/// A group of parameters: the unit of learning rates, gradients and npz keys; SPEC section 2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Group {
+    /// p, m, 3 a joint.
+    Position,
+    /// ln s, s in m, 3 a joint.
+    LogScale,
+    /// q = (w, x, y, z), normalised when used, 4 a joint.
+    Rotation,
+    /// v, m/s, 3 a joint.
+    Velocity,
+    /// β, opacity α = σ(β), 1 a joint.
+    Beta,
+    /// ω, Doppler features, rad·s/m², N_d a joint.
+    Omega,
+}
+
+impl Group {
+    /// Every group in the order of SPEC section 2.
+    pub const ALL: [Self; 6] =
+        [Self::Position, Self::LogScale, Self::Rotation, Self::Velocity, Self::Beta, Self::Omega];
+
+    /// The key in PPPR npz files.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Position => "position",
+            Self::LogScale => "log_scale",
+            Self::Rotation => "rotation",
+            Self::Velocity => "velocity",
+            Self::Beta => "beta",
+            Self::Omega => "omega",
+        }
+    }
+}
+
+/// Sizes of a [`Pppr`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PpprShape {
+    /// Persons.
+    pub persons: usize,
+    /// Joints a person.
+    pub joints: usize,
+    /// Doppler features N_d a joint.
+    pub doppler_features: usize,
+}
+
+impl PpprShape {
+    /// Numbers that one joint has in `group`.
+    pub fn width(self, group: Group) -> usize {
+        match group {
+            Group::Position | Group::LogScale | Group::Velocity => 3,
+            Group::Rotation => 4,
+            Group::Beta => 1,
+            Group::Omega => self.doppler_features,
+        }
+    }
+
+    /// Joints of all persons together.
+    pub fn total_joints(self) -> usize {
+        self.persons * self.joints
+    }
+
+    /// Numbers in all groups together.
+    pub fn total(self) -> usize {
+        Group::ALL.iter().map(|&g| self.width(g)).sum::<usize>() * self.total_joints()
+    }
+
+    /// The array shape of a group in an npz: (persons, joints) or (persons, joints, width).
+    pub fn array_shape(self, group: Group) -> Vec<usize> {
+        match group {
+            Group::Beta => vec![self.persons, self.joints],
+            _ => vec![self.persons, self.joints, self.width(group)],
+        }
+    }
+}
+
+/// The parameters of all joints of all persons (or their gradients, or Adam's moments): one flat array a group,
+/// ordered (person, joint, component); SPEC section 2.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pppr {
+    shape: PpprShape,
+    groups: [Vec<f64>; 6],
+}
+
+impl Pppr {
+    /// All zeros (the zero quaternion included): a gradient to be accumulated.
+    pub fn zeros(shape: PpprShape) -> Self {
+        Self { shape, groups: Group::ALL.map(|g| vec![0.0; shape.width(g) * shape.total_joints()]) }
+    }
+
+    /// The sizes.
+    pub fn shape(&self) -> PpprShape {
+        self.shape
+    }
+
+    /// The flat array of a group, (persons · joints · width).
+    pub fn group(&self, group: Group) -> &[f64] {
+        &self.groups[group as usize]
+    }
+
+    /// The flat array of a group, to be written.
+    pub fn group_mut(&mut self, group: Group) -> &mut [f64] {
+        &mut self.groups[group as usize]
+    }
+
+    /// The numbers of flat joint `joint` (person · joints + joint) in `group`.
+    pub fn joint(&self, group: Group, joint: usize) -> &[f64] {
+        let width = self.shape.width(group);
+        &self.groups[group as usize][joint * width..(joint + 1) * width]
+    }
+
+    /// The numbers of flat joint `joint` in `group`, to be written.
+    pub fn joint_mut(&mut self, group: Group, joint: usize) -> &mut [f64] {
+        let width = self.shape.width(group);
+        &mut self.groups[group as usize][joint * width..(joint + 1) * width]
+    }
+
+    /// A 3-vector group at flat joint `joint`.
+    pub fn vec3(&self, group: Group, joint: usize) -> Vec3 {
+        let v = self.joint(group, joint);
+        [v[0], v[1], v[2]]
+    }
+
+    /// Writes a 3-vector group at flat joint `joint`.
+    pub fn set_vec3(&mut self, group: Group, joint: usize, value: Vec3) {
+        self.joint_mut(group, joint).copy_from_slice(&value);
+    }
+
+    /// Position p of flat joint `joint`, m, world frame.
+    pub fn position(&self, joint: usize) -> Vec3 {
+        self.vec3(Group::Position, joint)
+    }
+
+    /// Velocity v of flat joint `joint`, m/s, world frame.
+    pub fn velocity(&self, joint: usize) -> Vec3 {
+        self.vec3(Group::Velocity, joint)
+    }
+
+    /// Scale s = exp(log_scale) of flat joint `joint`, m.
+    pub fn scale(&self, joint: usize) -> Vec3 {
+        self.vec3(Group::LogScale, joint).map(f64::exp)
+    }
+
+    /// Rotation quaternion (w, x, y, z) of flat joint `joint`, as stored (not normalised).
+    pub fn rotation(&self, joint: usize) -> [f64; 4] {
+        let q = self.joint(Group::Rotation, joint);
+        [q[0], q[1], q[2], q[3]]
+    }
+
+    /// Opacity α = σ(β) of flat joint `joint`.
+    pub fn opacity(&self, joint: usize) -> f64 {
+        1.0 / (1.0 + (-self.joint(Group::Beta, joint)[0]).exp())
+    }
+
+    /// True where every number of every group is finite.
+    pub fn is_finite(&self) -> bool {
+        self.groups.iter().flatten().all(|x| x.is_finite())
+    }
+}

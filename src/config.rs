@@ -1,0 +1,331 @@
+//! `FitConfig`: every number that steers a fit, with its default, range and explanation.
+//!
+//! This is the only source: the command line, the sliders, their tooltips and `FIT.toml` all read [`FIELDS`].
+
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// How the joints' returns are combined; SPEC section 3.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Summation {
+    /// |Σ A K e^{iψ}|.
+    #[default]
+    Coherent,
+    /// √Σ (A K)².
+    Incoherent,
+}
+
+/// Where the electromagnetic term is evaluated; SPEC section 4. A view's own `region` wins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum EmRegion {
+    /// The whole map.
+    Full,
+    /// A box of this half width, m, around the persons.
+    HalfWidth(f64),
+}
+
+impl Default for EmRegion {
+    fn default() -> Self {
+        Self::HalfWidth(1.25)
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum EmRegionText {
+    Word(String),
+    Table { half_width_m: f64 },
+}
+
+impl Serialize for EmRegion {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match *self {
+            Self::Full => EmRegionText::Word("full".into()),
+            Self::HalfWidth(half_width_m) => EmRegionText::Table { half_width_m },
+        }
+        .serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for EmRegion {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        use serde::de::Error;
+        match EmRegionText::deserialize(deserializer) {
+            Ok(EmRegionText::Word(word)) if word == "full" => Ok(Self::Full),
+            Ok(EmRegionText::Table { half_width_m }) if half_width_m > 0.0 && half_width_m.is_finite() => {
+                Ok(Self::HalfWidth(half_width_m))
+            }
+            _ => Err(D::Error::custom("em_region must be \"full\" or { half_width_m = METRES } with METRES > 0")),
+        }
+    }
+}
+
+/// The four operators of the paper's equation for H_sim; an operator that is off contributes factor 1 and phase 0, and
+/// its axis sees the joint at zero frequency (SPEC section 3).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Operators {
+    /// (r_max/d)⁴.
+    pub attenuation: bool,
+    /// Beat-frequency phase and the range axis.
+    pub range: bool,
+    /// Doppler phase, the phase ramp and the Doppler axis.
+    pub doppler: bool,
+    /// Array phase and the angular axes.
+    pub angle: bool,
+}
+
+impl Default for Operators {
+    fn default() -> Self {
+        Self { attenuation: true, range: true, doppler: true, angle: true }
+    }
+}
+
+/// Every setting of a fit; the keys of `FIT.toml` (SPEC section 7).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FitConfig {
+    /// Weight of L_EM.
+    pub w_em: f64,
+    /// Weight of the kinematic terms.
+    pub w_kine: f64,
+    /// Share of cells in a mask, percent.
+    pub tau_pct: f64,
+    /// Temperature T of the soft mask.
+    pub softness: f64,
+    /// Largest joint angle, degrees.
+    pub theta_max_deg: f64,
+    /// Smallest distance of two persons' centroids, m.
+    pub d_sep_m: f64,
+    /// Smallest distance of two persons' joints, m.
+    pub d_joint_m: f64,
+    /// Coherent or incoherent sum.
+    pub summation: Summation,
+    /// Where L_EM is evaluated.
+    pub em_region: EmRegion,
+    /// How far in front of the joint its echo comes from, m.
+    pub surface_offset_m: f64,
+    /// Iterations of a run.
+    pub iterations: usize,
+    /// Adam's learning rate.
+    pub learning_rate: f64,
+    /// Stop the run as soon as the convergence criterion holds.
+    pub stop_when_converged: bool,
+    /// The four operators.
+    pub operators: Operators,
+}
+
+impl Default for FitConfig {
+    fn default() -> Self {
+        Self {
+            w_em: 0.5,
+            w_kine: 0.5,
+            tau_pct: 10.0,
+            softness: 0.5,
+            theta_max_deg: 170.0,
+            d_sep_m: 0.5,
+            d_joint_m: 0.1,
+            summation: Summation::default(),
+            em_region: EmRegion::default(),
+            surface_offset_m: 0.0,
+            iterations: 100,
+            learning_rate: 1e-3,
+            stop_when_converged: false,
+            operators: Operators::default(),
+        }
+    }
+}
+
+/// How a number of [`FitConfig`] is edited and explained.
+pub struct Field {
+    /// The key in `FIT.toml`.
+    pub key: &'static str,
+    /// The label on screen, in the paper's notation.
+    pub label: &'static str,
+    /// Meaning and formula.
+    pub help: &'static str,
+    /// Unit, or "".
+    pub unit: &'static str,
+    /// Inclusive range that is accepted.
+    pub range: (f64, f64),
+    /// Whether the slider is logarithmic.
+    pub logarithmic: bool,
+    /// Reads the number.
+    pub get: fn(&FitConfig) -> f64,
+    /// Writes the number.
+    pub set: fn(&mut FitConfig, f64),
+}
+
+/// Every number of [`FitConfig`], in the order it is shown.
+pub const FIELDS: &[Field] = &[
+    Field {
+        key: "w_em",
+        label: "w_EM",
+        help: "Weight of the electromagnetic term: L = w_EM·L_EM + w_kine·L_kine, L_EM = 1 − soft IoU of the masks of H_sim and H_ori.",
+        unit: "",
+        range: (0.0, 1000.0),
+        logarithmic: true,
+        get: |c| c.w_em,
+        set: |c, x| c.w_em = x,
+    },
+    Field {
+        key: "w_kine",
+        label: "w_kine",
+        help: "Weight of the kinematic terms: bone lengths, rigid motion, joint angles, and for several people separation and collision.",
+        unit: "",
+        range: (0.0, 1000.0),
+        logarithmic: true,
+        get: |c| c.w_kine,
+        set: |c, x| c.w_kine = x,
+    },
+    Field {
+        key: "tau_pct",
+        label: "τ_pct",
+        help: "Share of the EM region's cells that a mask holds: B = [H > P_{100−τ}(H)].",
+        unit: "%",
+        range: (0.1, 99.9),
+        logarithmic: true,
+        get: |c| c.tau_pct,
+        set: |c, x| c.tau_pct = x,
+    },
+    Field {
+        key: "softness",
+        label: "T (softness)",
+        help: "Temperature of the soft mask m = σ((ln H_sim − ln P)/T): small is sharp, large spreads the gradient.",
+        unit: "",
+        range: (0.01, 10.0),
+        logarithmic: true,
+        get: |c| c.softness,
+        set: |c, x| c.softness = x,
+    },
+    Field {
+        key: "learning_rate",
+        label: "Learning rate",
+        help: "Adam's step size for every group (m, ln m, m/s, … a step).",
+        unit: "",
+        range: (1e-6, 1.0),
+        logarithmic: true,
+        get: |c| c.learning_rate,
+        set: |c, x| c.learning_rate = x,
+    },
+    Field {
+        key: "iterations",
+        label: "Iterations",
+        help: "Adam steps of a run.",
+        unit: "",
+        range: (1.0, 100_000.0),
+        logarithmic: true,
+        get: |c| c.iterations as f64,
+        set: |c, x| c.iterations = x.round().max(0.0) as usize,
+    },
+    Field {
+        key: "theta_max_deg",
+        label: "θ_max",
+        help: "Largest elbow and knee angle; beyond it L_joint = Σ max(0, θ − θ_max)² grows.",
+        unit: "°",
+        range: (0.0, 180.0),
+        logarithmic: false,
+        get: |c| c.theta_max_deg,
+        set: |c, x| c.theta_max_deg = x,
+    },
+    Field {
+        key: "surface_offset_m",
+        label: "δ (surface offset)",
+        help: "The echo of a body comes from its skin, not from the joint: p is moved this far towards the radar. 0 is the paper.",
+        unit: "m",
+        range: (0.0, 0.5),
+        logarithmic: false,
+        get: |c| c.surface_offset_m,
+        set: |c, x| c.surface_offset_m = x,
+    },
+    Field {
+        key: "d_sep_m",
+        label: "d_sep",
+        help: "Several people: centroids closer than this are pushed apart, L_sep = Σ max(0, d_sep − ‖c_s − c_t‖)².",
+        unit: "m",
+        range: (0.0, 5.0),
+        logarithmic: false,
+        get: |c| c.d_sep_m,
+        set: |c, x| c.d_sep_m = x,
+    },
+    Field {
+        key: "d_joint_m",
+        label: "d_joint",
+        help: "Several people: joints closer than this are pushed apart, L_coll = Σ max(0, d_joint − ‖p_sm − p_tn‖)².",
+        unit: "m",
+        range: (0.0, 1.0),
+        logarithmic: false,
+        get: |c| c.d_joint_m,
+        set: |c, x| c.d_joint_m = x,
+    },
+];
+
+/// What is wrong with a configuration.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// A number is outside its range.
+    #[error("{key} is {value}; expected a number in {lo} ..= {hi}")]
+    OutOfRange {
+        /// The key.
+        key: &'static str,
+        /// What was given.
+        value: f64,
+        /// Smallest accepted.
+        lo: f64,
+        /// Largest accepted.
+        hi: f64,
+    },
+    /// The text is not valid TOML or has a wrong key; the message names key and line.
+    #[error("{path}: not a valid fit configuration: {message}")]
+    Parse {
+        /// What the parser said.
+        message: String,
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file could not be read.
+    #[error("{path}: cannot be read: {source}")]
+    Read {
+        /// Why.
+        source: std::io::Error,
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl FitConfig {
+    /// Checks every number against its range.
+    ///
+    /// # Errors
+    /// Names the first key that is out of range or not finite.
+    pub fn validated(self) -> Result<Self, ConfigError> {
+        for field in FIELDS {
+            let (value, (lo, hi)) = ((field.get)(&self), field.range);
+            if !(lo..=hi).contains(&value) {
+                return Err(ConfigError::OutOfRange { key: field.key, value, lo, hi });
+            }
+        }
+        Ok(self)
+    }
+
+    /// Reads `FIT.toml`; missing keys take their defaults.
+    ///
+    /// # Errors
+    /// Where the file cannot be read, is not TOML, has an unknown key (named, with its line), or a number out of range.
+    pub fn from_file(path: &Path) -> Result<Self, ConfigError> {
+        let text =
+            std::fs::read_to_string(path).map_err(|source| ConfigError::Read { source, path: path.to_owned() })?;
+        toml::from_str::<Self>(&text)
+            .map_err(|error| ConfigError::Parse {
+                message: error.to_string().trim_end().to_owned(),
+                path: path.to_owned(),
+            })?
+            .validated()
+    }
+
+    /// The configuration as `FIT.toml`.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).unwrap_or_default()
+    }
+}

@@ -1,0 +1,57 @@
+//! `mhp-inspector`: fit parametric human models to mmWave radar heatmaps and watch it happen.
+//!
+//! **The problem.** A radar heatmap mixes a person with clutter. PPPR describes every joint of a person as a 3-D
+//! Gaussian with position `p`, scale `s`, rotation `q`, velocity `v`, opacity `β` and Doppler features `ω`. MHP
+//! initialises these from the peaks of the heatmap, simulates the radar into a synthetic heatmap `H_sim`, and refines
+//! them with Adam until the two maps agree and the skeleton is one that a human could have.
+//!
+//! **The mathematics in twenty lines.** For each joint `j` and each view, with the joint moved into the view frame:
+//!
+//! ```text
+//! Σ_j   = R S Sᵀ Rᵀ,  R from q, S = diag(s)                         the joint's Gaussian, m²
+//! Σ'_j  = R_view Σ_j R_viewᵀ + σ_r² u uᵀ + w_az² e_az e_azᵀ + w_el² e_el e_elᵀ     blurred by the point-spread function
+//! C_j   = G Σ'_j Gᵀ + diag(f) + I/12,  G = ∂b/∂p                     its covariance in bins of the view
+//! K_j   = (2π)^(−D/2) |C_j|^(−1/2) exp(−½ Δᵀ C_j⁻¹ Δ),  Δ = b − b_j
+//! A_j   = σ(β_j) (r_max/d_j)⁴                                        attenuation
+//! φ_j   = 2πSτ² + 2π(2v_r/λ)T + (2π/λ)(l_az sin θ_az + l_el sin θ_el)  range, Doppler and array phase
+//! H_sim = |Σ_j A_j K_j e^{i(φ_j + κ_j·Δ)}|                           (coherent; or the root of the summed powers)
+//! m     = σ((ln H_sim − ln P_{100−τ}(H_sim))/T)                      soft mask
+//! L_EM  = 1 − Σ m B_ori / Σ (m + B_ori − m B_ori)                    one minus the soft IoU with H_ori's mask
+//! L     = w_EM L_EM + w_kine (L_bone + L_rigid + L_joint + L_sep + L_coll)
+//! ```
+//!
+//! Every gradient is written by hand, [`mhp`] holds them; the forward model and its derivatives are checked against
+//! reference cases and central differences.
+//!
+//! **The rooms**, dependencies pointing down only:
+//!
+//! | room | what is in it |
+//! |---|---|
+//! | [`app`] | the window: layout, panes, command table, theme |
+//! | [`render`] | wgpu pictures: Gaussian splats, lines, colour maps with a CPU twin; knows no window |
+//! | [`cli`] | one file a subcommand |
+//! | [`session`] | the state behind the window and the only function that changes it |
+//! | [`worker`] | the thread that runs a fit, and its protocol |
+//! | [`diagnose`] | metrics: IoU, MAJPE, PA-MAJPE |
+//! | [`mhp`] | initialisation, forward model, objective, Adam, convergence, the fitter's one `step` |
+//! | [`dataset`] | frames, the generic manifest, MMVR, npz; lazy loading and a cache with a byte budget |
+//! | [`body`] | skeleton topologies, the PPPR parameters, a walking body |
+//! | [`radar`] | chirp, axes, views, point-spread functions, FMCW synthesis and the FFT chain |
+//! | [`config`] | `FitConfig`: defaults, ranges, help text; the only source for files, command line and sliders |
+//! | [`geometry`] | 3-vectors, 3×3 matrices, quaternions, the spherical triad |
+
+pub mod body;
+pub mod cli;
+pub mod config;
+pub mod dataset;
+pub mod diagnose;
+pub mod geometry;
+pub mod mhp;
+pub mod radar;
+pub mod worker;
+
+#[cfg(feature = "viewer")]
+pub mod app;
+#[cfg(feature = "viewer")]
+pub mod render;
+pub mod session;

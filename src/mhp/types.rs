@@ -1,0 +1,141 @@
+//! What an evaluation of the objective and a step of the fit answer.
+
+use crate::body::Pppr;
+use serde::{Deserialize, Serialize};
+
+/// Which scalar the per-cell kernel of the forward model computes in. Per-joint quantities are always f64.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// Double precision: the oracle.
+    #[default]
+    F64,
+    /// Single precision: the fast path.
+    F32,
+}
+
+/// The unweighted terms of the objective; SPEC section 4.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Terms {
+    /// L_EM, the mean over views of one minus the soft IoU.
+    pub em: f64,
+    /// Σ ψ(l − ℓ).
+    pub bone: f64,
+    /// Σ ψ of the relative velocity along the bone.
+    pub rigid: f64,
+    /// Σ max(0, θ − θ_max)².
+    pub joint: f64,
+    /// Centroid separation of several people.
+    pub sep: f64,
+    /// Joint collision of several people.
+    pub coll: f64,
+}
+
+/// The objective at one set of parameters, with its gradient.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evaluation {
+    /// L = w_EM L_EM + w_kine (…).
+    pub loss: f64,
+    /// The unweighted terms.
+    pub terms: Terms,
+    /// Forward-consistency IoU of each view over its EM region; `None` where both masks are empty.
+    pub iou: Vec<Option<f64>>,
+    /// ∂L/∂Θ, the total.
+    pub gradient: Pppr,
+    /// ∂L_EM/∂Θ, unweighted.
+    pub em_gradient: Pppr,
+}
+
+/// What is known of the fit after `iteration` Adam steps (0: the initial pose).
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepReport {
+    /// Adam steps taken.
+    pub iteration: usize,
+    /// L of the parameters at this iteration.
+    pub loss: f64,
+    /// Unweighted terms of the same.
+    pub terms: Terms,
+    /// Forward-consistency IoU of each view.
+    pub iou: Vec<Option<f64>>,
+    /// The convergence criterion of SPEC section 4 at this iteration.
+    pub converged: bool,
+}
+
+/// Why a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StopReason {
+    /// The asked number of iterations was done.
+    Iterations,
+    /// The convergence criterion held and the configuration says to stop there.
+    Converged,
+    /// Somebody stopped it.
+    Stopped,
+}
+
+impl StopReason {
+    /// In words.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Iterations => "all iterations done",
+            Self::Converged => "converged",
+            Self::Stopped => "stopped",
+        }
+    }
+
+    /// The word in tables.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Iterations => "iterations",
+            Self::Converged => "converged",
+            Self::Stopped => "stopped",
+        }
+    }
+}
+
+/// Why a fit cannot be set up or go on.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FitError {
+    /// A map has no finite cell.
+    #[error("array `{array}` has no finite cell; expected at least one number that is neither NaN nor infinite")]
+    NoFiniteCell {
+        /// Key of the map.
+        array: String,
+    },
+    /// A map's shape does not match its view.
+    #[error("array `{array}` has {got} cells; its view's axes make {expected}")]
+    WrongShape {
+        /// Key of the map.
+        array: String,
+        /// Cells found.
+        got: usize,
+        /// Cells expected.
+        expected: usize,
+    },
+    /// The parameters do not match the skeleton or the radar.
+    #[error("parameters have {what} = {got}; expected {expected}")]
+    WrongParameters {
+        /// Which size.
+        what: &'static str,
+        /// Found.
+        got: usize,
+        /// Expected.
+        expected: usize,
+    },
+    /// Nothing in the map to start from.
+    #[error("no start pose: {reason}")]
+    NoStart {
+        /// Why.
+        reason: String,
+    },
+    /// A loss or parameter became NaN or infinite.
+    #[error("diverged at iteration {iteration}: {term} of {joint} is not finite")]
+    Diverged {
+        /// The iteration that could not be done.
+        iteration: usize,
+        /// Name of the joint.
+        joint: String,
+        /// The parameter group or loss term.
+        term: String,
+    },
+}

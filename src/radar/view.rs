@@ -1,0 +1,69 @@
+//! A view: one map of a frame, with its pose, its point-spread function and its axes.
+
+use super::Axis;
+use crate::geometry::Pose;
+use serde::{Deserialize, Serialize};
+
+/// What the stored numbers are: decides 20 or 10 log₁₀ on screen and nothing else (SPEC sections 4 and 6).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    /// Magnitude: dB = 20 log₁₀.
+    #[default]
+    Amplitude,
+    /// Squared magnitude: dB = 10 log₁₀.
+    Power,
+}
+
+impl Quantity {
+    /// The factor before log₁₀ that makes decibels.
+    pub fn db_factor(self) -> f64 {
+        match self {
+            Self::Amplitude => 20.0,
+            Self::Power => 10.0,
+        }
+    }
+}
+
+/// Standard deviations of the Gaussian closest to the main lobe of the FFT's window; SPEC section 3, `psf`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PointSpread {
+    /// σ_r, m.
+    pub range_m: f64,
+    /// σ_az at boresight, rad.
+    pub azimuth_rad: f64,
+    /// σ_el at boresight, rad.
+    pub elevation_rad: f64,
+    /// σ_dop, m/s.
+    pub doppler_mps: f64,
+}
+
+/// One map of a frame. The map is a C-ordered array whose shape is the axes' bins.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    /// Key of the array in the frame's npz.
+    pub array: String,
+    /// Amplitude or power.
+    pub quantity: Quantity,
+    /// Point-spread widths.
+    pub psf: PointSpread,
+    /// `p_view = rotation · p_world + translation`.
+    pub pose: Pose,
+    /// Two or three axes.
+    pub axes: Vec<Axis>,
+    /// A fixed EM region in bins, `[lo, hi)` per axis; wins over the configuration's `em_region`.
+    pub region: Option<Vec<[usize; 2]>>,
+}
+
+impl View {
+    /// Bins of each axis.
+    pub fn shape(&self) -> Vec<usize> {
+        self.axes.iter().map(|axis| axis.bins).collect()
+    }
+
+    /// Number of cells of the whole map.
+    pub fn cells(&self) -> usize {
+        self.axes.iter().map(|axis| axis.bins).product()
+    }
+}

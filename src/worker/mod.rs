@@ -1,0 +1,1 @@
+//! The thread that runs a fit, and its protocol.
