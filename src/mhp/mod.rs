@@ -1,5 +1,31 @@
 //! MHP, the fit: initialisation, forward model, objective with hand-written gradients, Adam, convergence, one `step`.
+//!
+//! [`Problem`] is one frame; [`Objective`] answers loss and gradient for parameters; [`Fitter`] takes Adam steps. The
+//! forward model goes from joints to cells in two files, `splat.rs` (a joint in a view, f64) and `kernel.rs` (cells,
+//! f64 or f32), and back in `kernel.rs` (moments) and `adjoint.rs`.
 
+mod adam;
+mod adjoint;
+mod convergence;
+mod em;
+mod fill;
+mod fitter;
+mod kernel;
+mod kinematic;
+mod objective;
+mod percentile;
+mod problem;
+mod region;
+mod scalar;
+mod simulate;
+mod splat;
 mod types;
 
+pub use adam::Adam;
+pub use fill::fill_missing;
+pub use fitter::{FitState, Fitter};
+pub use objective::{Masks, Objective, masks};
+pub use problem::Problem;
+pub use region::Region;
+pub use simulate::{simulate, simulate_joint};
 pub use types::{Evaluation, FitError, Precision, StepReport, StopReason, Terms};

@@ -112,6 +112,14 @@ pub enum FitError {
         /// Cells expected.
         expected: usize,
     },
+    /// A view that the forward model cannot compute.
+    #[error("view `{array}`: {reason}")]
+    WrongView {
+        /// Key of the map.
+        array: String,
+        /// What is wrong and what was expected.
+        reason: String,
+    },
     /// The parameters do not match the skeleton or the radar.
     #[error("parameters have {what} = {got}; expected {expected}")]
     WrongParameters {

@@ -1,0 +1,65 @@
+//! The convergence criterion of SPEC section 4.
+
+use super::kinematic::bone_length;
+use crate::body::{Pppr, Skeleton};
+
+/// How far back the loss is compared.
+pub(super) const LOOK_BACK: usize = 5;
+const SMALL_LOSS: f64 = 1.0;
+const SMALL_CHANGE: f64 = 0.005;
+const BONE_RATIO: (f64, f64) = (0.5, 1.5);
+
+/// (L < 1, or the loss of five iterations ago differs by under half a percent) and every joint finite and every bone
+/// within 0.5 to 1.5 of its reference. `losses` ends with the current one.
+pub(super) fn converged(skeleton: &Skeleton, params: &Pppr, losses: &[f64]) -> bool {
+    let Some(&now) = losses.last() else { return false };
+    let before = losses.len().checked_sub(LOOK_BACK + 1).and_then(|i| losses.get(i));
+    let settled = before.is_some_and(|&before| (before - now).abs() < SMALL_CHANGE * before.abs());
+    (now < SMALL_LOSS || settled) && params.is_finite() && bones_plausible(skeleton, params)
+}
+
+fn bones_plausible(skeleton: &Skeleton, params: &Pppr) -> bool {
+    let joints = params.shape().joints;
+    (0..params.shape().persons).all(|person| {
+        skeleton.bones.iter().zip(&skeleton.bone_lengths_m).all(|(bone, &reference)| {
+            let ratio = bone_length(params, bone.map(|j| person * joints + j)) / reference;
+            (BONE_RATIO.0..=BONE_RATIO.1).contains(&ratio)
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::PpprShape;
+
+    fn two_joints(distance_m: f64) -> (Skeleton, Pppr) {
+        let skeleton = Skeleton {
+            joints: vec!["a".into(), "b".into()],
+            bones: vec![[0, 1]],
+            bone_lengths_m: vec![0.4],
+            angles: vec![],
+        };
+        let mut params = Pppr::zeros(PpprShape { persons: 1, joints: 2, doppler_features: 1 });
+        params.set_vec3(crate::body::Group::Position, 1, [distance_m, 0.0, 0.0]);
+        (skeleton, params)
+    }
+
+    #[test]
+    fn needs_a_small_or_settled_loss() {
+        let (skeleton, params) = two_joints(0.4);
+        assert!(converged(&skeleton, &params, &[0.99]));
+        assert!(!converged(&skeleton, &params, &[1.0]));
+        assert!(!converged(&skeleton, &params, &[3.0, 3.0, 3.0, 3.0, 3.0]), "five losses look back four");
+        assert!(converged(&skeleton, &params, &[3.0, 9.0, 9.0, 9.0, 9.0, 2.99]));
+        assert!(!converged(&skeleton, &params, &[3.0, 9.0, 9.0, 9.0, 9.0, 2.98]));
+    }
+
+    #[test]
+    fn needs_finite_joints_and_plausible_bones() {
+        for (distance_m, want) in [(0.19, false), (0.21, true), (0.59, true), (0.61, false), (f64::NAN, false)] {
+            let (skeleton, params) = two_joints(distance_m);
+            assert_eq!(converged(&skeleton, &params, &[0.5]), want, "{distance_m}");
+        }
+    }
+}

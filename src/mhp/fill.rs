@@ -1,0 +1,95 @@
+//! Filling the cells of a map that hold no number; SPEC section 4.
+
+/// Replaces NaN and infinite cells by the mean of their finite 3^D neighbours, all at once, repeated until none is
+/// left. `map` is a C-ordered array of shape `shape`. Returns how many cells were filled, or `None` where no cell is
+/// finite (the map is then unchanged).
+pub fn fill_missing(map: &mut [f64], shape: &[usize]) -> Option<usize> {
+    let mut missing: Vec<usize> = (0..map.len()).filter(|&i| !map[i].is_finite()).collect();
+    let filled = missing.len();
+    if filled == map.len() {
+        return None;
+    }
+    while !missing.is_empty() {
+        let found: Vec<(usize, f64)> =
+            missing.iter().filter_map(|&cell| neighbour_mean(map, shape, cell).map(|mean| (cell, mean))).collect();
+        for &(cell, mean) in &found {
+            map[cell] = mean;
+        }
+        missing.retain(|&cell| !map[cell].is_finite());
+        if found.is_empty() {
+            break;
+        }
+    }
+    Some(filled)
+}
+
+fn neighbour_mean(map: &[f64], shape: &[usize], cell: usize) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0_u32);
+    for_neighbours(shape, cell, |other| {
+        if map[other].is_finite() {
+            sum += map[other];
+            count += 1;
+        }
+    });
+    let mean = sum / f64::from(count);
+    // A mean of huge numbers may overflow; halving first keeps it finite.
+    (count > 0).then(|| if mean.is_finite() { mean } else { mean.signum() * f64::MAX })
+}
+
+/// Calls `visit` with the flat index of each of the up to 3^D − 1 neighbours of `cell`.
+pub(super) fn for_neighbours(shape: &[usize], cell: usize, mut visit: impl FnMut(usize)) {
+    let dims = shape.len();
+    let mut index = vec![0_usize; dims];
+    let mut rest = cell;
+    for k in (0..dims).rev() {
+        index[k] = rest % shape[k];
+        rest /= shape[k];
+    }
+    for code in 0..3_usize.pow(dims as u32) {
+        let (mut other, mut digits, mut inside, mut same) = (0, code, true, true);
+        for k in 0..dims {
+            let offset = digits % 3;
+            digits /= 3;
+            let moved = (index[k] + offset).checked_sub(1).filter(|&m| m < shape[k]);
+            same &= offset == 1;
+            match moved {
+                Some(m) => other = other * shape[k] + m,
+                None => inside = false,
+            }
+        }
+        if inside && !same {
+            visit(other);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fills_from_finite_neighbours_all_at_once() {
+        let nan = f64::NAN;
+        let mut map = vec![1.0, nan, nan, 4.0, f64::INFINITY, nan];
+        assert_eq!(fill_missing(&mut map, &[2, 3]), Some(4));
+        // Cells (0, 1) and (1, 1) see 1 and 4 in the first round; (0, 2) and (1, 2) see those two in the second.
+        assert_eq!(map, vec![1.0, 2.5, 2.5, 4.0, 2.5, 2.5]);
+    }
+
+    #[test]
+    fn a_map_without_a_number_is_refused() {
+        assert_eq!(fill_missing(&mut [f64::NAN; 4], &[2, 2]), None);
+        assert_eq!(fill_missing(&mut [], &[0, 2]), None);
+    }
+
+    #[test]
+    fn neighbours_stop_at_the_border() {
+        let mut seen = Vec::new();
+        for_neighbours(&[3, 3], 0, |cell| seen.push(cell));
+        seen.sort_unstable();
+        assert_eq!(seen, [1, 3, 4]);
+        let mut count = 0;
+        for_neighbours(&[3, 3, 3], 13, |_| count += 1);
+        assert_eq!(count, 26);
+    }
+}

@@ -1,0 +1,193 @@
+//! The fitter: one `step` is one Adam update and one evaluation. It knows no thread, file or window.
+
+use super::adam::Adam;
+use super::convergence::{LOOK_BACK, converged};
+use super::{Evaluation, FitError, Objective, Precision, Problem, StepReport};
+use crate::body::{Group, Pppr};
+use crate::config::FitConfig;
+use std::sync::Arc;
+
+/// Everything that another step needs: restoring it continues the run bit for bit under the same configuration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitState {
+    /// Adam steps taken.
+    pub iteration: usize,
+    /// Parameters at that iteration.
+    pub params: Pppr,
+    /// Adam's moments.
+    pub adam: Adam,
+    /// Losses of the last iterations (up to six), the current one last: the convergence criterion looks back five.
+    pub losses: Vec<f64>,
+}
+
+/// Adam on the objective of one frame.
+pub struct Fitter {
+    objective: Objective,
+    state: FitState,
+    evaluation: Evaluation,
+}
+
+impl Fitter {
+    /// Sets up a fit that starts at `initial`, and evaluates it (iteration 0).
+    ///
+    /// # Errors
+    /// Where `initial` has the wrong sizes, or it or its loss is not finite.
+    pub fn new(
+        problem: Arc<Problem>,
+        config: FitConfig,
+        precision: Precision,
+        initial: Pppr,
+    ) -> Result<Self, FitError> {
+        let mut objective = Objective::new(problem, config, precision, &initial)?;
+        let evaluation = evaluate(&mut objective, &initial, 0)?;
+        let adam = Adam::new(initial.shape());
+        let losses = vec![evaluation.loss];
+        Ok(Self { objective, state: FitState { iteration: 0, params: initial, adam, losses }, evaluation })
+    }
+
+    /// One Adam step from the current parameters, then their evaluation.
+    ///
+    /// # Errors
+    /// [`FitError::Diverged`] where the new parameters or their loss are not finite; the fitter then stays where it was.
+    pub fn step(&mut self) -> Result<StepReport, FitError> {
+        let mut next = self.state.clone();
+        next.iteration += 1;
+        next.adam.update(&mut next.params, &self.evaluation.gradient, self.objective.config().learning_rate);
+        self.evaluation = evaluate(&mut self.objective, &next.params, next.iteration)?;
+        next.losses.push(self.evaluation.loss);
+        let surplus = next.losses.len().saturating_sub(LOOK_BACK + 1);
+        next.losses.drain(..surplus);
+        self.state = next;
+        Ok(self.report())
+    }
+
+    /// What is known of the current parameters; also at iteration 0.
+    pub fn report(&self) -> StepReport {
+        let skeleton = &self.objective.problem().skeleton;
+        StepReport {
+            iteration: self.state.iteration,
+            loss: self.evaluation.loss,
+            terms: self.evaluation.terms,
+            iou: self.evaluation.iou.clone(),
+            converged: converged(skeleton, &self.state.params, &self.state.losses),
+        }
+    }
+
+    /// Loss and gradients of the current parameters.
+    pub fn evaluation(&self) -> &Evaluation {
+        &self.evaluation
+    }
+
+    /// The current parameters.
+    pub fn params(&self) -> &Pppr {
+        &self.state.params
+    }
+
+    /// Adam steps taken.
+    pub fn iteration(&self) -> usize {
+        self.state.iteration
+    }
+
+    /// The state to come back to.
+    pub fn state(&self) -> FitState {
+        self.state.clone()
+    }
+
+    /// Goes to `state`; the configuration stays as it is.
+    ///
+    /// # Errors
+    /// Where the state's parameters have the wrong sizes or are not finite; the fitter then stays where it was.
+    pub fn restore(&mut self, state: FitState) -> Result<(), FitError> {
+        self.objective.problem().check(&state.params)?;
+        self.evaluation = evaluate(&mut self.objective, &state.params, state.iteration)?;
+        self.state = state;
+        Ok(())
+    }
+
+    /// Changes the configuration from the next step on; the current parameters are evaluated anew. The EM region stays
+    /// around the initial persons.
+    ///
+    /// # Errors
+    /// Where the loss is not finite under the new configuration, which is then not taken.
+    pub fn set_config(&mut self, config: FitConfig) -> Result<(), FitError> {
+        let before = *self.objective.config();
+        self.objective.set_config(config);
+        match evaluate(&mut self.objective, &self.state.params, self.state.iteration) {
+            Ok(evaluation) => {
+                if let Some(last) = self.state.losses.last_mut() {
+                    *last = evaluation.loss;
+                }
+                self.evaluation = evaluation;
+                Ok(())
+            }
+            Err(error) => {
+                self.objective.set_config(before);
+                Err(error)
+            }
+        }
+    }
+
+    /// Takes parameters edited by hand at the current iteration; Adam's moments start anew.
+    ///
+    /// # Errors
+    /// Where `params` has the wrong sizes, or it or its loss is not finite; the fitter then stays where it was.
+    pub fn set_params(&mut self, params: Pppr) -> Result<(), FitError> {
+        self.objective.problem().check(&params)?;
+        self.evaluation = evaluate(&mut self.objective, &params, self.state.iteration)?;
+        self.state.adam = Adam::new(params.shape());
+        self.state.params = params;
+        self.state.losses = vec![self.evaluation.loss];
+        Ok(())
+    }
+
+    /// The configuration in force.
+    pub fn config(&self) -> &FitConfig {
+        self.objective.config()
+    }
+
+    /// The objective: regions, warnings, masks.
+    pub fn objective(&self) -> &Objective {
+        &self.objective
+    }
+}
+
+/// Evaluates, and refuses what is not finite.
+fn evaluate(objective: &mut Objective, params: &Pppr, iteration: usize) -> Result<Evaluation, FitError> {
+    let names = |joint: usize| joint_name(objective, params, joint);
+    if let Some((joint, group)) = first_non_finite(params) {
+        return Err(FitError::Diverged { iteration, joint: names(joint), term: group.key().to_owned() });
+    }
+    let evaluation = objective.evaluate(params);
+    if let Some((joint, group)) = first_non_finite(&evaluation.gradient) {
+        let term = format!("the gradient of {}", group.key());
+        return Err(FitError::Diverged { iteration, joint: joint_name(objective, params, joint), term });
+    }
+    let t = &evaluation.terms;
+    let terms = [
+        ("L_EM", t.em),
+        ("L_bone", t.bone),
+        ("L_rigid", t.rigid),
+        ("L_joint", t.joint),
+        ("L_sep", t.sep),
+        ("L_coll", t.coll),
+        ("L", evaluation.loss),
+    ];
+    match terms.iter().find(|(_, value)| !value.is_finite()) {
+        Some((term, _)) => {
+            Err(FitError::Diverged { iteration, joint: "all joints".to_owned(), term: (*term).to_owned() })
+        }
+        None => Ok(evaluation),
+    }
+}
+
+fn first_non_finite(params: &Pppr) -> Option<(usize, Group)> {
+    (0..params.shape().total_joints())
+        .flat_map(|joint| Group::ALL.map(|group| (joint, group)))
+        .find(|&(joint, group)| params.joint(group, joint).iter().any(|x| !x.is_finite()))
+}
+
+fn joint_name(objective: &Objective, params: &Pppr, joint: usize) -> String {
+    let shape = params.shape();
+    let name = objective.problem().skeleton.shown_name(joint % shape.joints.max(1));
+    if shape.persons > 1 { format!("{name} of person {}", joint / shape.joints.max(1)) } else { name }
+}

@@ -1,0 +1,166 @@
+//! L(Θ) and ∂L/∂Θ; SPEC section 4.
+
+use super::em::{self, ViewAnswer};
+use super::percentile::percentile;
+use super::region::{self, Region};
+use super::splat::Scene;
+use super::{Evaluation, FitError, Precision, Problem, kinematic};
+use crate::body::{Group, Pppr};
+use crate::config::FitConfig;
+use crate::geometry::Vec3;
+use std::sync::Arc;
+
+/// The objective of one fit: its EM region and the mask of H_ori are fixed by the initial parameters.
+pub struct Objective {
+    problem: Arc<Problem>,
+    config: FitConfig,
+    precision: Precision,
+    centres: Vec<Vec3>,
+    regions: Vec<Region>,
+    /// B_ori over each region's cells.
+    targets: Vec<Vec<bool>>,
+    warnings: Vec<String>,
+}
+
+/// Hard masks of one view over its whole map, C order; false outside the EM region.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Masks {
+    /// B_ori
+    pub ori: Vec<bool>,
+    /// B_sim
+    pub sim: Vec<bool>,
+    /// The EM region.
+    pub inside: Vec<bool>,
+}
+
+impl Masks {
+    /// Forward-consistency IoU; `None` where both masks are empty.
+    pub fn iou(&self) -> Option<f64> {
+        em::hard_iou(self.ori.iter().copied().zip(self.sim.iter().copied()))
+    }
+}
+
+impl Objective {
+    /// Fixes the EM region around the persons of `initial`.
+    ///
+    /// # Errors
+    /// Where `initial` has the wrong sizes or a position that is not finite.
+    pub fn new(
+        problem: Arc<Problem>,
+        config: FitConfig,
+        precision: Precision,
+        initial: &Pppr,
+    ) -> Result<Self, FitError> {
+        problem.check(initial)?;
+        let centres = region::centres(initial);
+        let (regions, warnings) = region::regions(&problem, config.em_region, &centres)?;
+        let targets = targets(&problem, &regions, config.tau_pct);
+        Ok(Self { problem, config, precision, centres, regions, targets, warnings })
+    }
+
+    /// Changes the configuration; the EM region stays around the same initial persons.
+    pub fn set_config(&mut self, config: FitConfig) {
+        if config.em_region != self.config.em_region
+            && let Ok((regions, warnings)) = region::regions(&self.problem, config.em_region, &self.centres)
+        {
+            (self.regions, self.warnings) = (regions, warnings);
+            self.targets = targets(&self.problem, &self.regions, config.tau_pct);
+        } else if config.tau_pct != self.config.tau_pct {
+            self.targets = targets(&self.problem, &self.regions, config.tau_pct);
+        }
+        self.config = config;
+    }
+
+    /// The configuration in force.
+    pub fn config(&self) -> &FitConfig {
+        &self.config
+    }
+
+    /// The problem.
+    pub fn problem(&self) -> &Arc<Problem> {
+        &self.problem
+    }
+
+    /// The precision of the per-cell kernel.
+    pub fn precision(&self) -> Precision {
+        self.precision
+    }
+
+    /// The EM region of each view.
+    pub fn regions(&self) -> &[Region] {
+        &self.regions
+    }
+
+    /// What had to be widened, in words.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// L, its terms and its gradients at `params`, which must have the sizes of the initial parameters (those of another
+    /// number of persons are accepted).
+    pub fn evaluate(&mut self, params: &Pppr) -> Evaluation {
+        let mut em_gradient = Pppr::zeros(params.shape());
+        let views = self.problem.views.len() as f64;
+        let (mut em, mut iou) = (0.0, Vec::with_capacity(self.regions.len()));
+        for index in 0..self.regions.len() {
+            let answer = self.view(index, params, 1.0 / views, &mut em_gradient);
+            em += answer.loss / views;
+            iou.push(answer.iou);
+        }
+        let mut gradient = Pppr::zeros(params.shape());
+        let mut terms = kinematic::evaluate(&self.problem.skeleton, &self.config, params, &mut gradient);
+        terms.em = em;
+        for group in Group::ALL {
+            for (total, em) in gradient.group_mut(group).iter_mut().zip(em_gradient.group(group)) {
+                *total = self.config.w_kine * *total + self.config.w_em * em;
+            }
+        }
+        let kinematic = terms.bone + terms.rigid + terms.joint + terms.sep + terms.coll;
+        let loss = self.config.w_em * em + self.config.w_kine * kinematic;
+        Evaluation { loss, terms, iou, gradient, em_gradient }
+    }
+
+    fn view(&self, index: usize, params: &Pppr, scale: f64, gradient: &mut Pppr) -> ViewAnswer {
+        let scene = Scene { radar: &self.problem.radar, view: &self.problem.views[index], config: &self.config };
+        let (region, target) = (&self.regions[index], &self.targets[index]);
+        match self.precision {
+            Precision::F64 => em::evaluate::<f64>(&scene, params, region, target, scale, gradient),
+            Precision::F32 => em::evaluate::<f32>(&scene, params, region, target, scale, gradient),
+        }
+    }
+}
+
+/// B_ori over each region's cells.
+fn targets(problem: &Problem, regions: &[Region], tau_pct: f64) -> Vec<Vec<bool>> {
+    regions
+        .iter()
+        .enumerate()
+        .map(|(view, region)| {
+            let map = problem.map(view);
+            let cells: Vec<f64> = region.indices(&problem.views[view].shape()).iter().map(|&i| map[i]).collect();
+            let threshold = percentile(&cells, 100.0 - tau_pct);
+            cells.iter().map(|&h| h > threshold).collect()
+        })
+        .collect()
+}
+
+/// The masks of a view for a simulated whole map `sim_map` (from [`super::simulate`]). A map of another size gives an
+/// empty mask.
+pub fn masks(objective: &Objective, view: usize, sim_map: &[f64]) -> Masks {
+    let (Some(region), Some(shape)) =
+        (objective.regions.get(view), objective.problem.views.get(view).map(crate::radar::View::shape))
+    else {
+        return Masks { ori: Vec::new(), sim: Vec::new(), inside: Vec::new() };
+    };
+    let cells = shape.iter().product();
+    let indices = region.indices(&shape);
+    let simulated: Vec<f64> = indices.iter().filter_map(|&i| sim_map.get(i).copied()).collect();
+    let threshold = percentile(&simulated, 100.0 - objective.config.tau_pct);
+    let mut masks = Masks { ori: vec![false; cells], sim: vec![false; cells], inside: vec![false; cells] };
+    for (&cell, &ori) in indices.iter().zip(&objective.targets[view]) {
+        masks.inside[cell] = true;
+        masks.ori[cell] = ori;
+        masks.sim[cell] = sim_map.get(cell).is_some_and(|&h| h > threshold);
+    }
+    masks
+}

@@ -1,0 +1,120 @@
+//! One frame's worth of optimisation problem: radar, skeleton, views and their maps, checked and filled.
+
+use super::{FitError, fill_missing};
+use crate::body::{Pppr, Skeleton};
+use crate::radar::{RadarConfig, View};
+
+/// Everything a fit needs besides its configuration and its start. Maps are cast to f64 and their missing cells filled
+/// (SPEC section 4).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Problem {
+    /// Chirp and array.
+    pub radar: RadarConfig,
+    /// Joints, bones and limits.
+    pub skeleton: Skeleton,
+    /// One view a map.
+    pub views: Vec<View>,
+    maps: Vec<Vec<f64>>,
+    filled: Vec<usize>,
+}
+
+impl Problem {
+    /// Checks and fills `maps`, one a view, C-ordered, each as long as the product of its view's bins.
+    ///
+    /// # Errors
+    /// Where there is no view, a view has other than 1 to 3 axes, an axis has no extent, a fixed region lies outside its
+    /// axis, a map has the wrong number of cells, or none of them is finite.
+    pub fn new(radar: RadarConfig, skeleton: Skeleton, views: Vec<View>, maps: &[&[f64]]) -> Result<Self, FitError> {
+        if views.is_empty() || views.len() != maps.len() {
+            return Err(FitError::WrongParameters { what: "maps", got: maps.len(), expected: views.len().max(1) });
+        }
+        check_skeleton(&skeleton)?;
+        let mut filled_maps = Vec::with_capacity(maps.len());
+        let mut filled = Vec::with_capacity(maps.len());
+        for (view, map) in views.iter().zip(maps) {
+            check_view(view)?;
+            let array = view.array.clone();
+            if map.len() != view.cells() {
+                return Err(FitError::WrongShape { array, got: map.len(), expected: view.cells() });
+            }
+            let mut map = map.to_vec();
+            filled.push(fill_missing(&mut map, &view.shape()).ok_or(FitError::NoFiniteCell { array })?);
+            filled_maps.push(map);
+        }
+        Ok(Self { radar, skeleton, views, maps: filled_maps, filled })
+    }
+
+    /// H_ori of a view, missing cells filled, C order; empty where there is no such view.
+    pub fn map(&self, view: usize) -> &[f64] {
+        self.maps.get(view).map_or(&[], Vec::as_slice)
+    }
+
+    /// How many cells of a view's map were filled.
+    pub fn filled_cells(&self, view: usize) -> usize {
+        self.filled.get(view).copied().unwrap_or(0)
+    }
+
+    /// Checks the sizes of `params` against the skeleton and the radar.
+    ///
+    /// # Errors
+    /// Names the first size that differs.
+    pub fn check(&self, params: &Pppr) -> Result<(), FitError> {
+        let shape = params.shape();
+        let sizes = [
+            ("joints", shape.joints, self.skeleton.joints.len()),
+            ("doppler_features", shape.doppler_features, self.radar.doppler_features),
+        ];
+        for (what, got, expected) in sizes {
+            if got != expected {
+                return Err(FitError::WrongParameters { what, got, expected });
+            }
+        }
+        if shape.persons == 0 {
+            return Err(FitError::WrongParameters { what: "persons", got: 0, expected: 1 });
+        }
+        Ok(())
+    }
+}
+
+fn check_skeleton(skeleton: &Skeleton) -> Result<(), FitError> {
+    let joints = skeleton.joints.len();
+    let indices = skeleton.bones.iter().flatten().chain(skeleton.angles.iter().flatten());
+    if let Some(&index) = indices.max().filter(|&&index| index >= joints) {
+        return Err(FitError::WrongParameters {
+            what: "a joint index",
+            got: index,
+            expected: joints.saturating_sub(1),
+        });
+    }
+    let (got, expected) = (skeleton.bone_lengths_m.len(), skeleton.bones.len());
+    if got != expected {
+        return Err(FitError::WrongParameters { what: "bone lengths", got, expected });
+    }
+    Ok(())
+}
+
+fn check_view(view: &View) -> Result<(), FitError> {
+    let wrong = |reason: String| Err(FitError::WrongView { array: view.array.clone(), reason });
+    if !(1..=3).contains(&view.axes.len()) {
+        return wrong(format!("{} axes; expected 2 or 3", view.axes.len()));
+    }
+    for axis in &view.axes {
+        if axis.bins == 0 || !axis.step().is_finite() || axis.step() == 0.0 {
+            return wrong(format!("axis {} has no extent; expected bins ≥ 1 and lo ≠ hi", axis.kind.name()));
+        }
+    }
+    let Some(region) = &view.region else { return Ok(()) };
+    if region.len() != view.axes.len() {
+        return wrong(format!("region has {} axes; expected {}", region.len(), view.axes.len()));
+    }
+    for (&[lo, hi], axis) in region.iter().zip(&view.axes) {
+        if lo >= hi || hi > axis.bins {
+            return wrong(format!(
+                "region [{lo}, {hi}) of axis {}; expected within [0, {})",
+                axis.kind.name(),
+                axis.bins
+            ));
+        }
+    }
+    Ok(())
+}

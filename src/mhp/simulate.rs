@@ -1,0 +1,63 @@
+//! H_sim over whole maps; SPEC section 3.
+
+use super::kernel::Kernel;
+use super::region::Region;
+use super::scalar::Real;
+use super::splat::{Scene, Splat};
+use super::{Precision, Problem};
+use crate::body::Pppr;
+use crate::config::{FitConfig, Summation};
+
+/// ε of SPEC section 3.
+pub(super) const EPSILON: f64 = 1e-30;
+
+/// ln √(S² + ε²) from ln S.
+pub(super) fn ln_floored(ln_s: f64) -> f64 {
+    ln_hypot(ln_s, EPSILON.ln())
+}
+
+fn ln_hypot(a: f64, b: f64) -> f64 {
+    let (high, low) = if a >= b { (a, b) } else { (b, a) };
+    // With a NaN the comparison fails and `a` is `low`: it stays visible.
+    high + 0.5 * (2.0 * (low - high)).exp().ln_1p()
+}
+
+/// Every joint of `params` in one view.
+pub(super) fn splats(scene: &Scene<'_>, params: &Pppr) -> Vec<Splat> {
+    (0..params.shape().total_joints()).map(|joint| scene.splat(params, joint).0).collect()
+}
+
+/// H_sim of every view over its whole map, C order, f64; SPEC section 3.
+pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, params: &Pppr) -> Vec<Vec<f64>> {
+    problem
+        .views
+        .iter()
+        .map(|view| {
+            let splats = splats(&Scene { radar: &problem.radar, view, config }, params);
+            let region = Region::whole(view);
+            match precision {
+                Precision::F64 => map::<f64>(&splats, &region, config.summation),
+                Precision::F32 => map::<f32>(&splats, &region, config.summation),
+            }
+        })
+        .collect()
+}
+
+fn map<T: Real>(splats: &[Splat], region: &Region, summation: Summation) -> Vec<f64> {
+    let mut map = vec![f64::NEG_INFINITY; region.cells()];
+    Kernel::<T>::new(splats, &region.bins, summation).forward(&mut map);
+    for value in &mut map {
+        *value = ln_floored(*value).exp();
+    }
+    map
+}
+
+/// |A_j K_j| of one flat joint over a view's whole map, C order: who lit this cell. Empty where there is no such view
+/// or joint.
+pub fn simulate_joint(problem: &Problem, config: &FitConfig, view: usize, params: &Pppr, joint: usize) -> Vec<f64> {
+    let Some(view) = problem.views.get(view).filter(|_| joint < params.shape().total_joints()) else {
+        return Vec::new();
+    };
+    let splat = Scene { radar: &problem.radar, view, config }.splat(params, joint).0;
+    map::<f64>(&[splat], &Region::whole(view), Summation::Incoherent)
+}

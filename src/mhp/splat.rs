@@ -1,0 +1,408 @@
+//! One joint seen by one view: its Gaussian in bin coordinates, its weight, its phases. All in f64; SPEC section 3.
+//!
+//! What is kept is what the per-cell kernel needs ([`Splat`]) and what the derivative needs on the way back
+//! ([`Seen`], [`Row`]); `adjoint.rs` reads like this file from bottom to top.
+
+use crate::body::{Group, Pppr};
+use crate::config::FitConfig;
+use crate::geometry::{Mat3, Vec3, add_scaled, dot, mat_mul, mat_vec, norm, rotation_from_quaternion, scale};
+use crate::radar::{Axis, AxisKind, RadarConfig, SPEED_OF_LIGHT, Spacing, View};
+use std::f64::consts::{PI, TAU};
+
+/// Distances are held above this, m.
+pub(super) const DISTANCE_FLOOR_M: f64 = 0.01;
+/// Cosines that stand in a denominator are held above this.
+pub(super) const COSINE_FLOOR: f64 = 0.05;
+
+/// A quantity held above a floor; its gradient is zero while it is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Floored {
+    /// max(x, floor)
+    pub value: f64,
+    /// 1 where the gradient passes, 0 where the floor holds.
+    pub pass: f64,
+}
+
+impl Floored {
+    pub(super) fn new(x: f64, floor: f64) -> Self {
+        // A NaN must stay visible, so the comparison lets it through.
+        if x < floor { Self { value: floor, pass: 0.0 } } else { Self { value: x, pass: 1.0 } }
+    }
+}
+
+/// A point in the view frame and the directions around it.
+#[derive(Debug, Clone)]
+pub(super) struct Seen {
+    /// The point after the surface offset, m.
+    pub p: Vec3,
+    /// d = ‖p‖, m.
+    pub d: Floored,
+    /// ρ = √(x² + y²), m.
+    pub rho: Floored,
+    /// √(x² + z²), m.
+    pub h: Floored,
+    pub azimuth: f64,
+    pub elevation: f64,
+    pub sin_az: f64,
+    pub cos_az: f64,
+    pub sin_el: f64,
+    pub cos_el: f64,
+    /// cos θ_az where it stands in a denominator.
+    pub cos_az_floored: Floored,
+    /// cos θ_el where it stands in a denominator.
+    pub cos_el_floored: Floored,
+    /// s = u_y, the sine of the cone angle.
+    pub sin_cone: f64,
+    /// √(1 − s²).
+    pub cos_cone: Floored,
+    /// Radial unit vector.
+    pub u: Vec3,
+    pub e_az: Vec3,
+    pub e_el: Vec3,
+    /// (ŷ − s u)/cos.
+    pub e_cone: Vec3,
+    /// Horizontal radial unit vector, (cos az, sin az, 0).
+    pub e_rho: Vec3,
+    /// Unit vector of (x, 0, z).
+    pub e_h: Vec3,
+}
+
+impl Seen {
+    pub(super) fn new(p: Vec3) -> Self {
+        let (rho, h) = (p[0].hypot(p[1]), p[0].hypot(p[2]));
+        let (azimuth, elevation) = (p[1].atan2(p[0]), p[2].atan2(rho));
+        let ((sin_az, cos_az), (sin_el, cos_el)) = (azimuth.sin_cos(), elevation.sin_cos());
+        let u = [cos_el * cos_az, cos_el * sin_az, sin_el];
+        let sin_cone = u[1];
+        let cos_cone = Floored::new((1.0 - sin_cone * sin_cone).max(0.0).sqrt(), COSINE_FLOOR);
+        let e_cone = scale([-sin_cone * u[0], 1.0 - sin_cone * u[1], -sin_cone * u[2]], 1.0 / cos_cone.value);
+        Self {
+            p,
+            d: Floored::new(norm(p), DISTANCE_FLOOR_M),
+            rho: Floored::new(rho, DISTANCE_FLOOR_M),
+            h: Floored::new(h, DISTANCE_FLOOR_M),
+            azimuth,
+            elevation,
+            sin_az,
+            cos_az,
+            sin_el,
+            cos_el,
+            cos_az_floored: Floored::new(cos_az, COSINE_FLOOR),
+            cos_el_floored: Floored::new(cos_el, COSINE_FLOOR),
+            sin_cone,
+            cos_cone,
+            u,
+            e_az: [-sin_az, cos_az, 0.0],
+            e_el: [-sin_el * cos_az, -sin_el * sin_az, cos_el],
+            e_cone,
+            e_rho: [cos_az, sin_az, 0.0],
+            e_h: if h > 0.0 { [p[0] / h, 0.0, p[2] / h] } else { [1.0, 0.0, 0.0] },
+        }
+    }
+
+    /// The coordinate ξ of this point on `axis`, in axis units; `radial_mps` is v_r.
+    pub(super) fn coordinate(&self, axis: &Axis, radial_mps: f64) -> f64 {
+        let sine = axis.spacing == Spacing::Sine;
+        match axis.kind {
+            AxisKind::Range => self.d.value,
+            AxisKind::Azimuth if sine => self.sin_az,
+            AxisKind::Azimuth => self.azimuth,
+            AxisKind::Elevation if sine => self.sin_el,
+            AxisKind::Elevation => self.elevation,
+            AxisKind::Cone if sine => self.sin_cone,
+            AxisKind::Cone => self.sin_cone.clamp(-1.0, 1.0).asin(),
+            AxisKind::Doppler => radial_mps,
+            AxisKind::X => self.p[0],
+            AxisKind::Y => self.p[1],
+            AxisKind::Z => self.p[2],
+            AxisKind::DepthH => self.h.value,
+            AxisKind::DepthV => self.rho.value,
+        }
+    }
+
+    /// dξ/dθ of an angular axis: 1, or the floored cosine on a sine axis.
+    pub(super) fn slope(&self, axis: &Axis) -> f64 {
+        match (axis.spacing, axis.kind) {
+            (Spacing::Sine, AxisKind::Azimuth) => self.cos_az_floored.value,
+            (Spacing::Sine, AxisKind::Elevation) => self.cos_el_floored.value,
+            (Spacing::Sine, AxisKind::Cone) => self.cos_cone.value,
+            _ => 1.0,
+        }
+    }
+
+    /// The unit direction along ∂ξ/∂p, and the arm: ∂ξ/∂p = direction · slope / arm. A Doppler axis has none.
+    pub(super) fn direction_and_arm(&self, kind: AxisKind) -> (Vec3, f64) {
+        match kind {
+            AxisKind::Range => (self.u, 1.0),
+            AxisKind::Azimuth => (self.e_az, self.rho.value),
+            AxisKind::Elevation => (self.e_el, self.d.value),
+            AxisKind::Cone => (self.e_cone, self.d.value),
+            AxisKind::Doppler => ([0.0; 3], 1.0),
+            AxisKind::X => ([1.0, 0.0, 0.0], 1.0),
+            AxisKind::Y => ([0.0, 1.0, 0.0], 1.0),
+            AxisKind::Z => ([0.0, 0.0, 1.0], 1.0),
+            AxisKind::DepthH => (self.e_h, 1.0),
+            AxisKind::DepthV => (self.e_rho, 1.0),
+        }
+    }
+}
+
+/// One axis at one joint.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Row {
+    /// Whether the axis sees the joint (its operator is on, or it has none).
+    pub seen: bool,
+    pub step: f64,
+    pub slope: f64,
+    pub arm: f64,
+    pub direction: Vec3,
+    /// ∂b/∂p; zero where the axis does not see the joint.
+    pub gradient: Vec3,
+    /// Displacement of one bin, m.
+    pub displacement: Vec3,
+}
+
+/// What the per-cell kernel needs of one joint in one view.
+#[derive(Debug, Clone)]
+pub(super) struct Splat {
+    /// Number of axes, 1 to 3.
+    pub dims: usize,
+    /// Bin coordinates b.
+    pub bin: [f64; 3],
+    /// C⁻¹ in its leading dims × dims block, bins⁻².
+    pub precision: Mat3,
+    /// ln of amplitude times the Gaussian's norm.
+    pub ln_weight: f64,
+    /// φ, reduced to one turn.
+    pub phase: f64,
+    /// Phase ramp κ, rad per bin.
+    pub kappa: [f64; 3],
+    /// ln of the spectrum's factor a bin of each Doppler axis; empty on other axes.
+    pub spectrum: [Vec<f64>; 3],
+}
+
+/// What the derivative needs besides.
+#[derive(Debug, Clone)]
+pub(super) struct Trace {
+    /// The joint before the surface offset, view frame.
+    pub unmoved: Vec3,
+    pub seen: Seen,
+    pub rows: [Row; 3],
+    /// v in the view frame, m/s.
+    pub velocity: Vec3,
+    pub opacity: f64,
+    /// (w, x, y, z) as stored.
+    pub quaternion: [f64; 4],
+    pub rotation: Mat3,
+    pub scale: Vec3,
+    /// R_view R S.
+    pub spread: Mat3,
+    /// Σ', m².
+    pub blurred: Mat3,
+    pub w_az: f64,
+    pub w_el: f64,
+    pub omega_mean: f64,
+}
+
+/// A view, a radar and a configuration: everything that is the same for all joints.
+pub(super) struct Scene<'a> {
+    pub radar: &'a RadarConfig,
+    pub view: &'a View,
+    pub config: &'a FitConfig,
+}
+
+impl Scene<'_> {
+    /// Whether the operator behind an axis is on.
+    pub(super) fn sees(&self, kind: AxisKind) -> bool {
+        let on = self.config.operators;
+        match kind {
+            AxisKind::Range => on.range,
+            AxisKind::Azimuth | AxisKind::Elevation | AxisKind::Cone => on.angle,
+            AxisKind::Doppler => on.doppler,
+            _ => true,
+        }
+    }
+
+    /// The variance f of an axis whose width does not come through Σ', bins².
+    fn own_variance(&self, axis: &Axis) -> f64 {
+        let psf = &self.view.psf;
+        let sigma = match axis.kind {
+            AxisKind::Doppler => psf.doppler_mps,
+            kind if self.sees(kind) => 0.0,
+            AxisKind::Range => psf.range_m,
+            AxisKind::Azimuth | AxisKind::Cone => psf.azimuth_rad,
+            AxisKind::Elevation => psf.elevation_rad,
+            _ => 0.0,
+        };
+        (sigma / axis.step()).powi(2)
+    }
+
+    /// The factor of p that moves a joint to its skin: max(d − δ, floor)/d.
+    pub(super) fn surface_factor(&self, unmoved: Vec3) -> (f64, Floored, Floored) {
+        let d = Floored::new(norm(unmoved), DISTANCE_FLOOR_M);
+        let skin = Floored::new(d.value - self.config.surface_offset_m, DISTANCE_FLOOR_M);
+        (skin.value / d.value, d, skin)
+    }
+
+    /// Projects flat joint `joint` of `params` into this view.
+    pub(super) fn splat(&self, params: &Pppr, joint: usize) -> (Splat, Trace) {
+        let pose = &self.view.pose;
+        let unmoved = pose.view_from_world(params.position(joint));
+        let seen = Seen::new(scale(unmoved, self.surface_factor(unmoved).0));
+        let velocity = mat_vec(&pose.rotation, params.velocity(joint));
+        let radial = dot(velocity, seen.u);
+        let omega = params.joint(Group::Omega, joint);
+        let omega_mean = omega.iter().sum::<f64>() / omega.len().max(1) as f64;
+
+        let psf = &self.view.psf;
+        let (rotation, scales) = (rotation_from_quaternion(params.rotation(joint)), params.scale(joint));
+        let world_spread: Mat3 = std::array::from_fn(|i| std::array::from_fn(|k| rotation[i][k] * scales[k]));
+        let spread = mat_mul(&pose.rotation, &world_spread);
+        let w_az = seen.rho.value * psf.azimuth_rad / seen.cos_az_floored.value;
+        let w_el = seen.d.value * psf.elevation_rad / seen.cos_el_floored.value;
+        let blurred = blurred(&spread, &seen, psf.range_m, w_az, w_el);
+
+        let dims = self.view.axes.len().min(3);
+        let (mut rows, mut bin, mut kappa) = ([Row::default(); 3], [0.0; 3], [0.0; 3]);
+        let mut spectrum: [Vec<f64>; 3] = Default::default();
+        let mut covariance = [[0.0; 3]; 3];
+        for (k, axis) in self.view.axes.iter().take(dims).enumerate() {
+            rows[k] = self.row(&seen, axis);
+            bin[k] = axis.bin(if rows[k].seen { seen.coordinate(axis, radial) } else { 0.0 });
+            if self.config.operators.doppler {
+                kappa[k] = omega_mean * dot(velocity, rows[k].displacement);
+            }
+            if axis.kind == AxisKind::Doppler {
+                spectrum[k] = spectrum_of(omega, omega_mean, axis.bins);
+            }
+            covariance[k][k] = self.own_variance(axis) + 1.0 / 12.0;
+        }
+        for k in 0..dims {
+            for l in 0..dims {
+                covariance[k][l] += dot(rows[k].gradient, mat_vec(&blurred, rows[l].gradient));
+            }
+        }
+        let (precision, ln_det) = inverse_and_ln_det(&covariance, dims);
+
+        let opacity = params.opacity(joint);
+        let attenuation =
+            if self.config.operators.attenuation { 4.0 * (self.radar.r_max_m / seen.d.value).ln() } else { 0.0 };
+        let ln_weight =
+            ln_opacity(params.joint(Group::Beta, joint)[0]) + attenuation - 0.5 * (dims as f64 * TAU.ln() + ln_det);
+        let splat = Splat {
+            dims,
+            bin,
+            precision,
+            ln_weight,
+            phase: self.phase(&seen, radial).rem_euclid(TAU),
+            kappa,
+            spectrum,
+        };
+        let trace = Trace {
+            unmoved,
+            seen,
+            rows,
+            velocity,
+            opacity,
+            quaternion: params.rotation(joint),
+            rotation,
+            scale: scales,
+            spread,
+            blurred,
+            w_az,
+            w_el,
+            omega_mean,
+        };
+        (splat, trace)
+    }
+
+    fn row(&self, seen: &Seen, axis: &Axis) -> Row {
+        let (direction, arm) = seen.direction_and_arm(axis.kind);
+        let (slope, step, on) = (seen.slope(axis), axis.step(), self.sees(axis.kind));
+        let gradient = if on { scale(direction, slope / (arm * step)) } else { [0.0; 3] };
+        Row { seen: on, step, slope, arm, direction, gradient, displacement: scale(direction, arm / slope * step) }
+    }
+
+    fn phase(&self, seen: &Seen, radial_mps: f64) -> f64 {
+        let (radar, on, per_metre) = (self.radar, self.config.operators, TAU / self.radar.wavelength_m());
+        let mut phase = 0.0;
+        if on.range {
+            phase += TAU * radar.slope_hz_per_s() * (2.0 * seen.d.value / SPEED_OF_LIGHT).powi(2);
+        }
+        if on.doppler {
+            phase += per_metre * 2.0 * radial_mps * radar.frame_s;
+        }
+        if on.angle {
+            phase += per_metre * (radar.l_az_m * seen.sin_az + radar.l_el_m * seen.sin_el);
+        }
+        phase
+    }
+
+    /// (∂φ/∂d, ∂φ/∂v_r, ∂φ/∂θ_az, ∂φ/∂θ_el).
+    pub(super) fn phase_slopes(&self, seen: &Seen) -> [f64; 4] {
+        let (radar, on, per_metre) = (self.radar, self.config.operators, TAU / self.radar.wavelength_m());
+        let gate = |on: bool, x: f64| if on { x } else { 0.0 };
+        let tau = 2.0 * seen.d.value / SPEED_OF_LIGHT;
+        [
+            gate(on.range, 8.0 * PI * radar.slope_hz_per_s() * tau / SPEED_OF_LIGHT),
+            gate(on.doppler, per_metre * 2.0 * radar.frame_s),
+            gate(on.angle, per_metre * radar.l_az_m * seen.cos_az),
+            gate(on.angle, per_metre * radar.l_el_m * seen.cos_el),
+        ]
+    }
+}
+
+/// Σ' = M Mᵀ + σ_r² u uᵀ + w_az² e_az e_azᵀ + w_el² e_el e_elᵀ, m².
+fn blurred(spread: &Mat3, seen: &Seen, sigma_r: f64, w_az: f64, w_el: f64) -> Mat3 {
+    std::array::from_fn(|i| {
+        let mut row: Vec3 = std::array::from_fn(|k| dot(spread[i], spread[k]));
+        add_scaled(&mut row, seen.u, sigma_r * sigma_r * seen.u[i]);
+        add_scaled(&mut row, seen.e_az, w_az * w_az * seen.e_az[i]);
+        add_scaled(&mut row, seen.e_el, w_el * w_el * seen.e_el[i]);
+        row
+    })
+}
+
+/// Where bin `bin` of a Doppler axis lies among `features` entries of ω: lower entry and weight of the upper one.
+pub(super) fn feature_at(bin: usize, bins: usize, features: usize) -> (usize, f64) {
+    if bins < 2 || features < 2 {
+        return (0, 0.0);
+    }
+    let t = bin as f64 * (features - 1) as f64 / (bins - 1) as f64;
+    let lower = (t.floor() as usize).min(features - 2);
+    (lower, t - lower as f64)
+}
+
+fn spectrum_of(omega: &[f64], mean: f64, bins: usize) -> Vec<f64> {
+    (0..bins)
+        .map(|bin| {
+            let (lower, t) = feature_at(bin, bins, omega.len());
+            let at = |i: usize| omega.get(i).copied().unwrap_or(0.0);
+            let upper = if t == 0.0 { 0.0 } else { at(lower + 1) * t };
+            at(lower) * (1.0 - t) + upper - mean
+        })
+        .collect()
+}
+
+/// ln σ(β), exact for large |β|.
+fn ln_opacity(beta: f64) -> f64 {
+    beta.min(0.0) - (-beta.abs()).exp().ln_1p()
+}
+
+/// The inverse of a symmetric positive definite matrix (leading `dims` block) and the ln of its determinant.
+fn inverse_and_ln_det(c: &Mat3, dims: usize) -> (Mat3, f64) {
+    let mut full = *c;
+    for (k, row) in full.iter_mut().enumerate().skip(dims) {
+        *row = [0.0; 3];
+        row[k] = 1.0;
+    }
+    let m = &full;
+    let cofactor = |i: usize, k: usize| {
+        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+        let (p, q) = ((k + 1) % 3, (k + 2) % 3);
+        m[a][p] * m[b][q] - m[a][q] * m[b][p]
+    };
+    let determinant = m[0][0] * cofactor(0, 0) + m[0][1] * cofactor(0, 1) + m[0][2] * cofactor(0, 2);
+    let inverse = std::array::from_fn(|i| std::array::from_fn(|k| cofactor(k, i) / determinant));
+    (inverse, determinant.ln())
+}
