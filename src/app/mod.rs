@@ -1,1 +1,246 @@
-//! The window.
+//! The window: reads the session, sends commands, draws panes. It changes no state of its own but where things are.
+//!
+//! Each pass: threads' reports become commands, pressed keys become commands, panes are drawn and send commands, all of
+//! them are applied at the end. Nothing repaints unless something changed: threads wake the window.
+
+mod commands;
+mod layout;
+mod map_image;
+mod menu;
+mod overlay;
+mod panes;
+mod theme;
+mod widgets;
+
+use crate::session::{Command, LogLevel, Runtime, Session, ViewState};
+use commands::{Act, AppAct};
+use layout::Layout;
+use overlay::Overlay;
+use panes::{PaneStates, Shared};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+pub use layout::PaneKind;
+
+/// The name under which settings are stored.
+pub const APP_ID: &str = "mhp-inspector";
+
+const VIEW_KEY: &str = "view";
+const RECENT_KEY: &str = "recent";
+const LAYOUT_KEY: &str = "layout";
+const CONFIG_KEY: &str = "config";
+
+/// The application behind the window.
+pub struct InspectorApp {
+    session: Session,
+    runtime: Runtime,
+    layout: Layout,
+    panes: PaneStates,
+    overlay: Overlay,
+    notices_seen: u64,
+    last_play: Option<f64>,
+    applied_zoom: f32,
+    dropped: Option<PathBuf>,
+}
+
+impl InspectorApp {
+    /// The window's application; `paths` are opened, or without one the bundled sample where it can be found.
+    pub fn new(cc: &eframe::CreationContext<'_>, paths: &[PathBuf]) -> Self {
+        theme::install(&cc.egui_ctx);
+        let mut session = Session::default();
+        let mut layout = Layout::default();
+        if let Some(storage) = cc.storage {
+            session.view = eframe::get_value::<ViewState>(storage, VIEW_KEY).unwrap_or_default();
+            session.data.recent = eframe::get_value(storage, RECENT_KEY).unwrap_or_default();
+            session.config = eframe::get_value(storage, CONFIG_KEY).unwrap_or_default();
+            if let Some(stored) = eframe::get_value(storage, LAYOUT_KEY) {
+                layout = Layout::restored(stored);
+            }
+        }
+        let ctx = cc.egui_ctx.clone();
+        let runtime = Runtime::new(Arc::new(move || ctx.request_repaint()), Some(Arc::new(overlay::pick)));
+        let mut app = Self {
+            session,
+            runtime,
+            layout,
+            panes: PaneStates::new(cc.wgpu_render_state.clone()),
+            overlay: Overlay::default(),
+            notices_seen: 0,
+            last_play: None,
+            applied_zoom: 1.0,
+            dropped: None,
+        };
+        match paths.first().cloned().or_else(crate::dataset::bundled_sample) {
+            Some(path) => app.apply(Command::Open(path)),
+            None => app.apply(Command::Log(
+                LogLevel::Info,
+                "the bundled sample was not found; open a data set with File > Open folder".into(),
+            )),
+        }
+        for extra in paths.iter().skip(1) {
+            app.session.data.recent.push(extra.clone());
+        }
+        app
+    }
+
+    /// The state behind the window, to be read by tests and by `screenshot`.
+    pub fn session(&self) -> &Session {
+        &self.session
+    }
+
+    /// Applies a command as if a person had given it.
+    pub fn apply(&mut self, command: Command) {
+        self.runtime.apply(&mut self.session, command);
+    }
+
+    /// Zooms the maps to the person and the camera to the selection.
+    pub fn focus(&mut self) {
+        self.panes.focus(&self.session);
+    }
+
+    fn act(&mut self, ctx: &egui::Context, act: Act) {
+        match act {
+            Act::Session(command) => self.apply(command),
+            Act::App(act) => self.app_act(ctx, act),
+        }
+    }
+
+    fn app_act(&mut self, ctx: &egui::Context, act: AppAct) {
+        match act {
+            AppAct::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
+            AppAct::Palette => self.overlay.toggle_palette(),
+            AppAct::Help => self.overlay.toggle_help(),
+            AppAct::About => self.overlay.toggle_about(),
+            AppAct::GotoFrame => self.overlay.open_goto(self.session.data.frame_index),
+            AppAct::ResetLayout => self.layout = Layout::default(),
+            AppAct::ResetViews => self.panes.reset_views(),
+            AppAct::Focus => self.panes.focus(&self.session),
+            AppAct::CameraRadar => self.panes.scene.from_radar(&self.session),
+            AppAct::CameraTop => self.panes.scene.from_top(&self.session),
+            AppAct::CameraSide => self.panes.scene.from_side(&self.session),
+            AppAct::ZoomIn => self.set_zoom(self.session.view.zoom + 0.1),
+            AppAct::ZoomOut => self.set_zoom(self.session.view.zoom - 0.1),
+            AppAct::ZoomReset => self.set_zoom(1.0),
+            AppAct::FullScreen => {
+                let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
+                ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!full));
+            }
+        }
+    }
+
+    fn set_zoom(&mut self, zoom: f32) {
+        let mut view = self.session.view.clone();
+        view.zoom = (zoom.clamp(0.7, 2.0) * 10.0).round() / 10.0;
+        self.apply(Command::SetView(Box::new(view)));
+    }
+
+    /// Files dropped on the window.
+    fn take_drops(&mut self, ctx: &egui::Context) {
+        let dropped = ctx.input(|i| i.raw.dropped_files.iter().find_map(|file| file.path().map(PathBuf::from)));
+        if dropped.is_some() && dropped != self.dropped {
+            if let Some(path) = dropped.clone() {
+                self.apply(Command::Open(path));
+            }
+        }
+        self.dropped = dropped;
+    }
+
+    /// Plays frames at the asked rate, never faster than they can be read.
+    fn play(&mut self, ctx: &egui::Context) {
+        if !self.session.data.playing {
+            self.last_play = None;
+            return;
+        }
+        let rate = self.session.data.dataset.as_ref().and_then(|d| d.info().frame_rate_hz).unwrap_or(10.0);
+        let fps = if self.session.view.play_fps > 0.0 { self.session.view.play_fps } else { rate };
+        let pause = 1.0 / fps.clamp(0.1, 60.0);
+        let now = ctx.input(|i| i.time);
+        let since = self.last_play.map_or(f64::INFINITY, |last| now - last);
+        if since >= pause && self.session.data.loading.is_none() {
+            self.last_play = Some(now);
+            self.apply(Command::StepFrames(1));
+        }
+        if self.session.data.playing {
+            let wait = (pause - since).clamp(0.001, pause);
+            ctx.request_repaint_after(std::time::Duration::from_secs_f64(wait));
+        }
+    }
+
+    /// Errors and warnings that appeared since the last pass become notifications.
+    fn take_notices(&mut self, ctx: &egui::Context) {
+        if let Some((count, level, text)) = &self.session.notice
+            && *count > self.notices_seen
+        {
+            self.notices_seen = *count;
+            self.overlay.notify(*level, text.clone(), ctx.input(|i| i.time));
+        }
+    }
+}
+
+impl eframe::App for InspectorApp {
+    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        theme::apply(ctx, self.session.view.theme);
+        if self.applied_zoom != self.session.view.zoom {
+            self.applied_zoom = self.session.view.zoom;
+            ctx.set_zoom_factor(self.applied_zoom);
+        }
+        self.runtime.poll(&mut self.session);
+        self.take_drops(ctx);
+        self.play(ctx);
+        if self.runtime.is_busy() {
+            ctx.request_repaint_after(std::time::Duration::from_millis(100));
+        }
+        if !self.overlay.is_modal() {
+            for command in commands::pressed(ctx) {
+                if (command.enabled)(&self.session) {
+                    let act = (command.act)(&self.session);
+                    self.act(ctx, act);
+                }
+            }
+        }
+        self.take_notices(ctx);
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        let mut acts: Vec<Act> = Vec::new();
+        {
+            let mut shared = Shared { session: &self.session, acts: &mut acts };
+            menu::bar(ui, &mut shared);
+            panes::timeline::show(ui, &mut shared, &mut self.panes.timeline);
+            self.layout.show(ui, &mut shared, &mut self.panes);
+            self.overlay.show(ui, &mut shared);
+        }
+        let ctx = ui.ctx().clone();
+        for act in acts {
+            self.act(&ctx, act);
+        }
+        // A command given in this pass is seen in the next one.
+        self.take_notices(&ctx);
+    }
+
+    fn save(&mut self, storage: &mut dyn eframe::Storage) {
+        eframe::set_value(storage, VIEW_KEY, &self.session.view);
+        eframe::set_value(storage, RECENT_KEY, &self.session.data.recent);
+        eframe::set_value(storage, CONFIG_KEY, &self.session.config);
+        eframe::set_value(storage, LAYOUT_KEY, self.layout.stored());
+    }
+}
+
+/// Opens the window and returns when it is closed.
+///
+/// # Errors
+/// Where there is no display or no graphics adapter.
+pub fn run(paths: Vec<PathBuf>) -> anyhow::Result<()> {
+    let options = eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default()
+            .with_app_id(APP_ID)
+            .with_title("MHP Inspector")
+            .with_inner_size([1440.0, 900.0])
+            .with_min_inner_size([960.0, 600.0])
+            .with_drag_and_drop(true),
+        renderer: eframe::Renderer::Wgpu,
+        ..Default::default()
+    };
+    eframe::run_native(APP_ID, options, Box::new(move |cc| Ok(Box::new(InspectorApp::new(cc, &paths)))))
+        .map_err(|error| anyhow::anyhow!("the window cannot be opened: {error}"))
+}

@@ -1,5 +1,6 @@
 //! One axis of a map: what it measures and where its bins lie.
 
+use crate::geometry::{Vec3, norm};
 use serde::{Deserialize, Serialize};
 
 /// What an axis measures; SPEC section 1.
@@ -103,6 +104,28 @@ impl Axis {
     /// Step between bin centres, in axis units (may be negative).
     pub fn step(&self) -> f64 {
         (self.hi - self.lo) / self.bins as f64
+    }
+
+    /// Axis coordinate ξ of a point at rest in the view frame, m (0 on a Doppler axis); SPEC section 1.
+    pub fn coordinate(&self, p_view: Vec3) -> f64 {
+        let [x, y, z] = p_view;
+        let (rho, d) = (x.hypot(y), norm(p_view).max(1e-9));
+        let angle = match self.kind {
+            AxisKind::Range => return d,
+            AxisKind::Doppler => return 0.0,
+            AxisKind::X => return x,
+            AxisKind::Y => return y,
+            AxisKind::Z => return z,
+            AxisKind::DepthH => return x.hypot(z),
+            AxisKind::DepthV => return rho,
+            AxisKind::Azimuth => y.atan2(x),
+            AxisKind::Elevation => z.atan2(rho),
+            AxisKind::Cone => (y / d).clamp(-1.0, 1.0).asin(),
+        };
+        match self.spacing {
+            Spacing::Linear => angle,
+            Spacing::Sine => angle.sin(),
+        }
     }
 
     /// Axis coordinate at bin coordinate `bin` (an integer is a bin centre).

@@ -1,7 +1,7 @@
 //! A view: one map of a frame, with its pose, its point-spread function and its axes.
 
 use super::Axis;
-use crate::geometry::Pose;
+use crate::geometry::{Pose, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// What the stored numbers are: decides 20 or 10 log₁₀ on screen and nothing else (SPEC sections 4 and 6).
@@ -60,6 +60,12 @@ impl View {
     /// Bins of each axis.
     pub fn shape(&self) -> Vec<usize> {
         self.axes.iter().map(|axis| axis.bins).collect()
+    }
+
+    /// Bin coordinates of a point at rest, world metres: where a drawing of it belongs on the map.
+    pub fn bins_of(&self, p_world: Vec3) -> Vec<f64> {
+        let p_view = self.pose.view_from_world(p_world);
+        self.axes.iter().map(|axis| axis.bin(axis.coordinate(p_view))).collect()
     }
 
     /// Number of cells of the whole map.

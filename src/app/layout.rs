@@ -1,0 +1,169 @@
+//! Where the panes are: a tree of tiles that can be dragged, resized, stored and reset.
+
+use super::panes::{self, PaneStates, Shared};
+use super::theme::{self, Tokens};
+use egui_tiles::{Container, Linear, LinearDir, SimplificationOptions, TabState, Tile, TileId, Tiles, Tree, UiResponse};
+use serde::{Deserialize, Serialize};
+
+/// A pane.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PaneKind {
+    /// The frame list.
+    Frames,
+    /// The measured maps.
+    HOri,
+    /// The simulated maps.
+    HSim,
+    /// The masks of the two.
+    Masks,
+    /// Gaussians and skeleton in 3-D.
+    Scene,
+    /// Loss curves.
+    Curves,
+    /// Settings of the fit.
+    Fit,
+    /// The selected joint.
+    Joint,
+    /// Labels in image pixels.
+    Image,
+    /// The log.
+    Log,
+}
+
+impl PaneKind {
+    /// The title on its tab.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Frames => "Frames",
+            Self::HOri => "H_ori",
+            Self::HSim => "H_sim",
+            Self::Masks => "Masks",
+            Self::Scene => "3-D",
+            Self::Curves => "Curves",
+            Self::Fit => "Fit",
+            Self::Joint => "Joint",
+            Self::Image => "Image plane",
+            Self::Log => "Log",
+        }
+    }
+}
+
+/// The tree of tiles.
+pub struct Layout {
+    tree: Tree<PaneKind>,
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        let mut tiles = Tiles::default();
+        let maps: Vec<TileId> =
+            [PaneKind::HOri, PaneKind::HSim, PaneKind::Masks].map(|pane| tiles.insert_pane(pane)).to_vec();
+        let maps = tiles.insert_horizontal_tile(maps);
+        let scene = tiles.insert_pane(PaneKind::Scene);
+        let image = tiles.insert_pane(PaneKind::Image);
+        let scene = tabs(&mut tiles, vec![scene, image]);
+        let curves = tiles.insert_pane(PaneKind::Curves);
+        let log = tiles.insert_pane(PaneKind::Log);
+        let curves = tabs(&mut tiles, vec![curves, log]);
+        let below = linear(&mut tiles, LinearDir::Horizontal, &[(scene, 1.0), (curves, 1.0)]);
+        let middle = linear(&mut tiles, LinearDir::Vertical, &[(maps, 1.05), (below, 1.0)]);
+        let frames = tiles.insert_pane(PaneKind::Frames);
+        let fit = tiles.insert_pane(PaneKind::Fit);
+        let joint = tiles.insert_pane(PaneKind::Joint);
+        let right = linear(&mut tiles, LinearDir::Vertical, &[(fit, 1.25), (joint, 1.0)]);
+        let root = linear(&mut tiles, LinearDir::Horizontal, &[(frames, 0.17), (middle, 0.62), (right, 0.25)]);
+        Self { tree: Tree::new(egui::Id::new("panes"), root, tiles) }
+    }
+}
+
+fn linear(tiles: &mut Tiles<PaneKind>, dir: LinearDir, children: &[(TileId, f32)]) -> TileId {
+    let mut linear = Linear::new(dir, children.iter().map(|child| child.0).collect());
+    for &(child, share) in children {
+        linear.shares.set_share(child, share);
+    }
+    tiles.insert_container(Container::Linear(linear))
+}
+
+fn tabs(tiles: &mut Tiles<PaneKind>, children: Vec<TileId>) -> TileId {
+    tiles.insert_tab_tile(children)
+}
+
+impl Layout {
+    /// A stored tree; one without a single pane is replaced by the default.
+    pub fn restored(tree: Tree<PaneKind>) -> Self {
+        if tree.root().is_some() && tree.tiles.iter().any(|(_, tile)| matches!(tile, Tile::Pane(_))) {
+            Self { tree }
+        } else {
+            Self::default()
+        }
+    }
+
+    /// The tree, to be stored.
+    pub fn stored(&self) -> &Tree<PaneKind> {
+        &self.tree
+    }
+
+    /// Draws every pane in what is left of the window.
+    pub fn show(&mut self, ui: &mut egui::Ui, shared: &mut Shared<'_>, states: &mut PaneStates) {
+        let tokens = Tokens::of(ui);
+        egui::CentralPanel::default().frame(egui::Frame::new().fill(tokens.stroke)).show(ui, |ui| {
+            let mut behavior = Behavior { shared, states };
+            self.tree.ui(&mut behavior, ui);
+        });
+    }
+}
+
+struct Behavior<'a, 'b> {
+    shared: &'a mut Shared<'b>,
+    states: &'a mut PaneStates,
+}
+
+impl egui_tiles::Behavior<PaneKind> for Behavior<'_, '_> {
+    fn pane_ui(&mut self, ui: &mut egui::Ui, _tile: TileId, pane: &mut PaneKind) -> UiResponse {
+        let tokens = Tokens::of(ui);
+        let data = matches!(pane, PaneKind::HOri | PaneKind::HSim | PaneKind::Masks | PaneKind::Scene | PaneKind::Image);
+        let margin = if data { 0 } else { 8 };
+        egui::Frame::new().fill(tokens.panel).inner_margin(margin).show(ui, |ui| {
+            ui.set_min_size(ui.available_size());
+            panes::show(*pane, ui, self.shared, self.states);
+        });
+        UiResponse::None
+    }
+
+    fn tab_title_for_pane(&mut self, pane: &PaneKind) -> egui::WidgetText {
+        egui::RichText::new(pane.title()).font(theme::strong(12.0)).into()
+    }
+
+    fn tab_bar_height(&self, _style: &egui::Style) -> f32 {
+        24.0
+    }
+
+    fn gap_width(&self, _style: &egui::Style) -> f32 {
+        1.0
+    }
+
+    fn tab_bar_color(&self, visuals: &egui::Visuals) -> egui::Color32 {
+        if visuals.dark_mode { theme::DARK.panel } else { theme::LIGHT.panel }
+    }
+
+    fn tab_bg_color(&self, visuals: &egui::Visuals, _: &Tiles<PaneKind>, _: TileId, _: &TabState) -> egui::Color32 {
+        self.tab_bar_color(visuals)
+    }
+
+    fn tab_text_color(&self, visuals: &egui::Visuals, _: &Tiles<PaneKind>, _: TileId, state: &TabState) -> egui::Color32 {
+        let tokens = if visuals.dark_mode { theme::DARK } else { theme::LIGHT };
+        if state.active { tokens.text } else { tokens.dim }
+    }
+
+    fn tab_outline_stroke(&self, _: &egui::Visuals, _: &Tiles<PaneKind>, _: TileId, _: &TabState) -> egui::Stroke {
+        egui::Stroke::NONE
+    }
+
+    fn tab_bar_hline_stroke(&self, visuals: &egui::Visuals) -> egui::Stroke {
+        egui::Stroke::new(1.0, if visuals.dark_mode { theme::DARK.stroke } else { theme::LIGHT.stroke })
+    }
+
+    fn simplification_options(&self) -> SimplificationOptions {
+        SimplificationOptions { all_panes_must_have_tabs: true, ..Default::default() }
+    }
+}

@@ -1,0 +1,257 @@
+//! From a map to pixels: which axis is up, what is left, decibels, colour limits.
+//!
+//! Conventions: range or depth upward, left as seen from the radar on the left, height upward only where no depth is.
+//! Arrays are never flipped in memory; only the picture is.
+
+use crate::radar::{Axis, AxisKind, View};
+use crate::render::Colormap;
+use crate::session::{ColorRange, MapScale};
+use egui::{Color32, ColorImage};
+
+/// How a view's array becomes a picture. Pixel (column, row), row 0 at the top.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Orientation {
+    /// The array axis drawn upward.
+    pub vertical: usize,
+    /// The array axis drawn across.
+    pub horizontal: usize,
+    /// A third axis, over which the largest value is drawn.
+    pub collapsed: Option<usize>,
+    /// Bin 0 of the vertical axis is at the top.
+    pub vertical_from_top: bool,
+    /// Bin 0 of the horizontal axis is at the left.
+    pub horizontal_from_left: bool,
+}
+
+impl Orientation {
+    /// The orientation of a view by the conventions above.
+    pub fn of(view: &View) -> Self {
+        let axes = &view.axes;
+        let vertical = axes.iter().position(|axis| axis.kind.is_depth()).unwrap_or(0);
+        let others: Vec<usize> = (0..axes.len()).filter(|&axis| axis != vertical).collect();
+        let horizontal = others.first().copied().unwrap_or(vertical);
+        let grows_left = |axis: &Axis| matches!(axis.kind, AxisKind::Azimuth | AxisKind::Cone | AxisKind::Y);
+        let rising = |axis: usize| axes.get(axis).is_some_and(|axis| axis.step() > 0.0);
+        let leftward = axes.get(horizontal).is_some_and(grows_left);
+        Self {
+            vertical,
+            horizontal,
+            collapsed: others.get(1).copied(),
+            vertical_from_top: !rising(vertical),
+            horizontal_from_left: rising(horizontal) != leftward,
+        }
+    }
+
+    /// Width and height of the picture in cells.
+    pub fn size(&self, view: &View) -> [usize; 2] {
+        [view.axes[self.horizontal].bins, view.axes[self.vertical].bins]
+    }
+
+    /// Picture coordinates, (0, 0) the upper left corner and (1, 1) the lower right, of bin coordinates.
+    pub fn unit_from_bins(&self, view: &View, bins: &[f64]) -> [f64; 2] {
+        let across = (bins[self.horizontal] + 0.5) / view.axes[self.horizontal].bins as f64;
+        let down = (bins[self.vertical] + 0.5) / view.axes[self.vertical].bins as f64;
+        [
+            if self.horizontal_from_left { across } else { 1.0 - across },
+            if self.vertical_from_top { down } else { 1.0 - down },
+        ]
+    }
+
+    /// (horizontal bin, vertical bin), fractional, of picture coordinates.
+    pub fn bins_from_unit(&self, view: &View, unit: [f64; 2]) -> [f64; 2] {
+        let across = if self.horizontal_from_left { unit[0] } else { 1.0 - unit[0] };
+        let down = if self.vertical_from_top { unit[1] } else { 1.0 - unit[1] };
+        [across * view.axes[self.horizontal].bins as f64 - 0.5, down * view.axes[self.vertical].bins as f64 - 0.5]
+    }
+
+    /// The array bin of a pixel, with the collapsed axis at `third`.
+    pub fn index(&self, view: &View, column: usize, row: usize, third: usize) -> usize {
+        let [width, height] = self.size(view);
+        let mut bins = [0usize; 3];
+        bins[self.horizontal] = if self.horizontal_from_left { column } else { width - 1 - column };
+        bins[self.vertical] = if self.vertical_from_top { row } else { height - 1 - row };
+        if let Some(axis) = self.collapsed {
+            bins[axis] = third;
+        }
+        view.axes.iter().zip(bins).fold(0, |index, (axis, bin)| index * axis.bins + bin)
+    }
+
+    /// The picture of a map, row by row: the cell itself, or the largest over the collapsed axis.
+    pub fn picture(&self, view: &View, map: &[f64]) -> Vec<f64> {
+        let [width, height] = self.size(view);
+        let depth = self.collapsed.map_or(1, |axis| view.axes[axis].bins);
+        let mut out = Vec::with_capacity(width * height);
+        for row in 0..height {
+            for column in 0..width {
+                let mut best = f64::NAN;
+                for third in 0..depth {
+                    let value = map.get(self.index(view, column, row, third)).copied().unwrap_or(f64::NAN);
+                    best = best.max(value);
+                }
+                out.push(best);
+            }
+        }
+        out
+    }
+
+    /// The picture of a mask: true where any cell over the collapsed axis is.
+    pub fn mask_picture(&self, view: &View, mask: &[bool]) -> Vec<bool> {
+        let [width, height] = self.size(view);
+        let depth = self.collapsed.map_or(1, |axis| view.axes[axis].bins);
+        let mut out = Vec::with_capacity(width * height);
+        for row in 0..height {
+            for column in 0..width {
+                let any = (0..depth).any(|third| mask.get(self.index(view, column, row, third)) == Some(&true));
+                out.push(any);
+            }
+        }
+        out
+    }
+
+    /// True where one cell is as wide as it is high in metres when drawn to scale.
+    pub fn metric_aspect(&self, view: &View) -> Option<f32> {
+        let metric = |axis: &Axis| !axis.kind.is_angular() && axis.kind != AxisKind::Doppler;
+        let (h, v) = (&view.axes[self.horizontal], &view.axes[self.vertical]);
+        (metric(h) && metric(v)).then(|| ((h.hi - h.lo).abs() / (v.hi - v.lo).abs()) as f32)
+    }
+}
+
+/// Stored values as shown: relative to the largest finite value, in dB or linear.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shown {
+    /// What is shown, cell by cell of the picture.
+    pub values: Vec<f64>,
+    /// The stored value that is 0 dB or 1.
+    pub reference: f64,
+}
+
+/// Converts a picture of stored values.
+pub fn shown(picture: &[f64], scale: MapScale, db_factor: f64) -> Shown {
+    let reference = picture.iter().copied().filter(|x| x.is_finite()).fold(0.0, f64::max);
+    let reference = if reference > 0.0 { reference } else { 1.0 };
+    let values = picture
+        .iter()
+        .map(|&value| match scale {
+            MapScale::Linear => value / reference,
+            MapScale::Decibel if value.is_nan() => f64::NAN,
+            MapScale::Decibel => (db_factor * (value.max(0.0) / reference).log10()).max(-400.0),
+        })
+        .collect();
+    Shown { values, reference }
+}
+
+/// The limits of the colour bar for shown values.
+pub fn limits(values: &[f64], range: ColorRange) -> (f64, f64) {
+    let (lo, hi) = match range {
+        ColorRange::Fixed { lo, hi } => (lo, hi),
+        ColorRange::Percentile { lo, hi } => {
+            let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
+            sorted.sort_by(f64::total_cmp);
+            let at = |q: f64| {
+                let last = sorted.len().saturating_sub(1) as f64;
+                sorted.get((q / 100.0 * last).round() as usize).copied().unwrap_or(0.0)
+            };
+            (at(lo), at(hi))
+        }
+    };
+    if hi > lo { (lo, hi) } else { (lo - 1.0, lo + 1.0) }
+}
+
+/// Colours shown values between limits. Cells outside are hatched where `hatch`, cells without a number are `nan`.
+pub fn colorize(size: [usize; 2], values: &[f64], (lo, hi): (f64, f64), map: Colormap, hatch: bool, nan: Color32) -> ColorImage {
+    let lut = map.lut();
+    let span = hi - lo;
+    let mut image = ColorImage::filled(size, Color32::BLACK);
+    for (i, (pixel, &value)) in image.pixels.iter_mut().zip(values).enumerate() {
+        if value.is_nan() {
+            *pixel = nan;
+            continue;
+        }
+        let t = ((value - lo) / span).clamp(0.0, 1.0);
+        let [r, g, b] = lut[(t * 255.0).round() as usize];
+        *pixel = Color32::from_rgb(r, g, b);
+        let outside = value < lo || value > hi;
+        if hatch && outside && (i % size[0] + i / size[0]) % 4 == 0 {
+            *pixel = if t > 0.5 { Color32::BLACK } else { Color32::from_gray(150) };
+        }
+    }
+    image
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests")]
+    use super::*;
+    use crate::radar::{PointSpread, Quantity, Spacing};
+
+    fn view(kinds: &[(AxisKind, usize, f64, f64)]) -> View {
+        View {
+            array: "map".into(),
+            quantity: Quantity::Amplitude,
+            psf: PointSpread::default(),
+            pose: crate::geometry::Pose::default(),
+            axes: kinds
+                .iter()
+                .map(|&(kind, bins, lo, hi)| Axis { kind, bins, lo, hi, spacing: Spacing::Linear })
+                .collect(),
+            region: None,
+        }
+    }
+
+    /// Far is up and left is left, however the array lies.
+    #[test]
+    fn far_is_up_and_left_is_left() {
+        for (range, azimuth) in [((0.0, 8.0), (-1.0, 1.0)), ((8.0, 0.0), (1.0, -1.0)), ((0.0, 8.0), (1.0, -1.0))] {
+            let v = view(&[(AxisKind::Range, 4, range.0, range.1), (AxisKind::Azimuth, 6, azimuth.0, azimuth.1)]);
+            let o = Orientation::of(&v);
+            let far = v.axes[0].bin(6.0);
+            let left = v.axes[1].bin(0.6);
+            let [x, y] = o.unit_from_bins(&v, &[far, left]);
+            assert!(y < 0.5, "6 m of 8 m is in the upper half, got {y}");
+            assert!(x < 0.5, "azimuth +0.6 rad is left, got {x}");
+        }
+    }
+
+    #[test]
+    fn height_grows_to_the_right_and_doppler_too() {
+        let v = view(&[(AxisKind::DepthV, 256, 7.98, -0.01), (AxisKind::Z, 128, -1.98, 3.02)]);
+        let o = Orientation::of(&v);
+        assert!(o.vertical_from_top && o.horizontal_from_left);
+        let d = view(&[(AxisKind::Doppler, 8, -2.0, 2.0), (AxisKind::Range, 8, 0.0, 4.0)]);
+        let o = Orientation::of(&d);
+        assert_eq!((o.vertical, o.horizontal), (1, 0));
+        assert!(o.horizontal_from_left && !o.vertical_from_top);
+    }
+
+    #[test]
+    fn bins_and_picture_coordinates_invert_each_other() {
+        let v = view(&[(AxisKind::Range, 40, 4.0, 1.3), (AxisKind::Azimuth, 32, 0.9, -1.0), (AxisKind::Elevation, 8, -1.0, 1.0)]);
+        let o = Orientation::of(&v);
+        let unit = o.unit_from_bins(&v, &[12.25, 7.5, 3.0]);
+        let [h, w] = [o.bins_from_unit(&v, unit)[1], o.bins_from_unit(&v, unit)[0]];
+        assert!((h - 12.25).abs() < 1e-12 && (w - 7.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_cube_is_drawn_as_its_largest_over_the_third_axis() {
+        let v = view(&[(AxisKind::Range, 2, 1.0, 0.0), (AxisKind::Azimuth, 2, 1.0, -1.0), (AxisKind::Elevation, 3, -1.0, 1.0)]);
+        let o = Orientation::of(&v);
+        let map: Vec<f64> = (0..12).map(f64::from).collect();
+        assert_eq!(o.picture(&v, &map), vec![2.0, 5.0, 8.0, 11.0]);
+    }
+
+    #[test]
+    fn decibels_follow_the_quantity() {
+        let amplitude = shown(&[1.0, 10.0], MapScale::Decibel, 20.0);
+        assert_eq!(amplitude.values, vec![-20.0, 0.0]);
+        let power = shown(&[1.0, 10.0, f64::NAN], MapScale::Decibel, 10.0);
+        assert_eq!(power.values[..2], [-10.0, 0.0]);
+        assert!(power.values.last().unwrap().is_nan());
+    }
+
+    #[test]
+    fn a_constant_map_still_has_limits() {
+        let (lo, hi) = limits(&[3.0; 9], ColorRange::default());
+        assert!(lo < hi);
+    }
+}

@@ -1,0 +1,102 @@
+//! The bar at the top: menus from the command table, and the status of data set, frame and fit.
+
+use super::commands::{COMMANDS, Menu, shortcut_text, tooltip};
+use super::panes::Shared;
+use super::theme::{self, Tokens};
+use crate::session::{Command, FitStatus};
+use egui::{RichText, Ui};
+
+pub(super) fn bar(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let tokens = Tokens::of(ui);
+    let frame = egui::Frame::new().fill(tokens.panel).inner_margin(egui::Margin::symmetric(6, 2));
+    egui::Panel::top("menu").exact_size(28.0).frame(frame).show(ui, |ui| {
+        ui.horizontal_centered(|ui| {
+            egui::MenuBar::new().ui(ui, |ui| {
+                for menu in Menu::ALL {
+                    ui.menu_button(menu.title(), |ui| items(ui, shared, menu));
+                }
+                status(ui, shared, &tokens);
+            });
+        });
+    });
+}
+
+fn items(ui: &mut Ui, shared: &mut Shared<'_>, menu: Menu) {
+    ui.set_min_width(230.0);
+    for command in COMMANDS.iter().filter(|command| command.menu == menu) {
+        if menu == Menu::File && command.label == "Quit" {
+            recent(ui, shared);
+            ui.separator();
+        }
+        let enabled = (command.enabled)(shared.session);
+        let mut button = egui::Button::new(command.label);
+        if let Some(&keys) = command.keys.first() {
+            button = button.shortcut_text(shortcut_text(keys));
+        }
+        let mark = match command.label {
+            "Warm start" => shared.session.warm_start,
+            "Play frames" => shared.session.data.playing,
+            _ => false,
+        };
+        let response = ui.add_enabled(enabled, button.selected(mark));
+        if response.on_hover_text(tooltip(command)).clicked() {
+            shared.acts.push((command.act)(shared.session));
+            ui.close();
+        }
+    }
+}
+
+fn recent(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let paths = shared.session.data.recent.clone();
+    ui.menu_button("Open recent", |ui| {
+        if paths.is_empty() {
+            ui.label("Nothing was opened yet.");
+        }
+        for path in &paths {
+            if ui.button(path.display().to_string()).clicked() {
+                shared.send(Command::Open(path.clone()));
+                ui.close();
+            }
+        }
+        if !paths.is_empty() {
+            ui.separator();
+            if ui.button("Clear list").clicked() {
+                shared.send(Command::ClearRecent);
+                ui.close();
+            }
+        }
+    });
+}
+
+/// Right side of the bar: data set, axes convention, speed.
+fn status(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
+    ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+        let session = shared.session;
+        if let Some(opening) = &session.data.opening {
+            if ui.small_button("Cancel").on_hover_text("Stop opening; what is on screen stays.").clicked() {
+                shared.send(Command::CancelOpen);
+            }
+            let share = if opening.total > 0 { opening.done as f32 / opening.total as f32 } else { 0.0 };
+            let text = if opening.total > 0 { format!("{} {}/{}", opening.stage, opening.done, opening.total) } else { format!("{} {}", opening.stage, opening.done) };
+            ui.add(egui::ProgressBar::new(share).desired_width(180.0).desired_height(14.0).text(RichText::new(text).small()));
+            return;
+        }
+        let fit = &session.fit;
+        let speed = fit.shown.as_ref().filter(|_| fit.is_running()).map_or(0.0, |s| s.iterations_per_s);
+        let timing = match (fit.run_ms, fit.status == FitStatus::Running) {
+            (_, true) if speed > 0.0 => format!("{speed:.0} it/s"),
+            (Some(ms), false) => format!("init {:.1} ms · run {ms:.0} ms", fit.init_ms),
+            _ if fit.problem.is_some() => format!("init {:.1} ms", fit.init_ms),
+            _ => String::new(),
+        };
+        ui.label(RichText::new(timing).font(theme::mono(theme::CAPTION)).color(tokens.dim)).on_hover_text("Time of the initialisation and of the last run, or iterations a second.");
+        if let Some(dataset) = &session.data.dataset {
+            let info = dataset.info();
+            let badge = RichText::new(&info.axes_badge).small().color(tokens.dim);
+            let tip = format!("Axes convention of this data set.\n{}", info.assumptions.join("\n"));
+            ui.add(egui::Label::new(badge).truncate()).on_hover_text(tip);
+            let frame = session.data.frame.as_ref().map_or_else(String::new, |f| format!(" · {}", f.name));
+            ui.label(RichText::new(format!("{}{frame}", info.name)).font(theme::strong(12.0))).on_hover_text(info.root.display().to_string());
+        }
+    });
+}

@@ -1,0 +1,167 @@
+//! The joint inspector: every parameter of the selected joint, its gradient split into the electromagnetic and the
+//! kinematic part, and fields to edit it by hand.
+
+use super::{Shared, empty};
+use crate::app::theme::{self, Tokens};
+use crate::body::{Group, Pppr};
+use crate::session::Command;
+use egui::{RichText, Ui};
+
+/// Values that are being edited.
+#[derive(Default)]
+pub(in crate::app) struct State {
+    edit: Option<(u64, u32, usize, Pppr)>,
+}
+
+/// Names, units and step of a group's components.
+fn components(group: Group) -> (&'static str, &'static [&'static str], &'static str, f64) {
+    match group {
+        Group::Position => ("Position p", &["x", "y", "z"], "m", 0.005),
+        Group::LogScale => ("Log scale ln s", &["x", "y", "z"], "", 0.01),
+        Group::Rotation => ("Rotation q", &["w", "x", "y", "z"], "", 0.005),
+        Group::Velocity => ("Velocity v", &["x", "y", "z"], "m/s", 0.01),
+        Group::Beta => ("Opacity β", &["β"], "", 0.02),
+        Group::Omega => ("Doppler features ω", &[], "rad·s/m²", 0.01),
+    }
+}
+
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    let session = shared.session;
+    let (Some(problem), Some(snapshot)) = (&session.fit.problem, &session.fit.shown) else {
+        return empty(ui, "No joint", "The parameters of a joint appear here once a frame is fitted.");
+    };
+    let joints = problem.skeleton.joints.len().max(1);
+    picker(ui, shared);
+    let Some(joint) = session.joint.filter(|j| *j < snapshot.params.shape().total_joints()) else {
+        return empty(ui, "No joint selected", "Click a joint in the 3-D view or on a map, or choose one above.");
+    };
+    let key = (snapshot.job, snapshot.branch, snapshot.iteration);
+    if state.edit.as_ref().is_none_or(|(job, branch, iteration, _)| (*job, *branch, *iteration) != key) {
+        state.edit = Some((key.0, key.1, key.2, snapshot.params.clone()));
+    }
+    let Some((.., edited)) = &mut state.edit else { return };
+    let evaluation = &snapshot.evaluation;
+    let w_em = snapshot.config.w_em;
+    let tokens = Tokens::of(ui);
+    let editable = session.fit.is_ready() && !session.fit.is_running();
+    let mut committed = false;
+    egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        derived(ui, &snapshot.params, joint, &tokens);
+        for group in Group::ALL.into_iter().filter(|g| *g != Group::Omega) {
+            let (title, names, unit, speed) = components(group);
+            egui::Grid::new(("joint", title)).num_columns(4).spacing([8.0, 2.0]).min_col_width(34.0).show(ui, |ui| {
+                ui.label(RichText::new(if unit.is_empty() { title.to_owned() } else { format!("{title} / {unit}") }).small().color(tokens.dim));
+                for (text, tip) in [
+                    ("value", "The parameter; drag or type to edit it by hand, which starts a branch."),
+                    ("w_EM ∂L_EM", "Gradient of the weighted electromagnetic term."),
+                    ("w_kine ∂L_kine", "Gradient of the weighted kinematic terms."),
+                ] {
+                    ui.label(RichText::new(text).size(10.0).color(tokens.dim)).on_hover_text(tip);
+                }
+                ui.end_row();
+                for (i, name) in names.iter().enumerate() {
+                    ui.label(RichText::new(format!("   {name}")).color(tokens.dim));
+                    let value = &mut edited.joint_mut(group, joint)[i];
+                    let drag = egui::DragValue::new(value).speed(speed).fixed_decimals(4);
+                    let response = ui.add_enabled(editable, drag);
+                    let spoken = format!("{title} {name}");
+                    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, editable, &spoken));
+                    let tip = if editable { "Edit by hand. An edit starts a branch." } else { "Pause the run to edit." };
+                    committed |= response.drag_stopped() || (response.changed() && !response.dragged());
+                    response.on_hover_text(tip).on_disabled_hover_text(tip);
+                    let em = w_em * evaluation.em_gradient.joint(group, joint)[i];
+                    let kinematic = evaluation.gradient.joint(group, joint)[i] - em;
+                    ui.label(gradient(em, tokens.curve("em"), &tokens));
+                    ui.label(gradient(kinematic, tokens.curve("bone"), &tokens));
+                    ui.end_row();
+                }
+            });
+            ui.add_space(4.0);
+        }
+        omega(ui, &snapshot.params, &evaluation.gradient, joint, &tokens);
+    });
+    debug_assert!(joint / joints < snapshot.params.shape().persons);
+    if committed && *edited != snapshot.params {
+        let params = Box::new(edited.clone());
+        state.edit = None;
+        shared.send(Command::EditParams(params));
+    }
+}
+
+/// A joint chosen by name, and the one before or after.
+fn picker(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let session = shared.session;
+    let Some(problem) = &session.fit.problem else { return };
+    let skeleton = &problem.skeleton;
+    let joints = skeleton.joints.len().max(1);
+    let total = session.shown_positions().len();
+    let name = |j: usize| {
+        let name = skeleton.shown_name(j % joints);
+        if total > joints { format!("person {} · {name}", j / joints + 1) } else { name }
+    };
+    let mut chosen = session.joint;
+    ui.horizontal(|ui| {
+        let text = chosen.map_or_else(|| "choose a joint".into(), name);
+        let combo = egui::ComboBox::from_id_salt("joint").width(150.0).selected_text(text);
+        combo.show_ui(ui, |ui| {
+            for j in 0..total {
+                ui.selectable_value(&mut chosen, Some(j), name(j));
+            }
+        });
+        for (sign, step, spoken) in [("◂", total.saturating_sub(1), "Previous joint"), ("▸", 1, "Next joint")] {
+            let tip = format!("{spoken} of the skeleton.");
+            if crate::app::widgets::icon_button(ui, sign, spoken, &tip, total > 0, false).clicked() {
+                chosen = Some(chosen.map_or(0, |j| (j + step) % total));
+            }
+        }
+    });
+    if chosen != session.joint {
+        shared.send(Command::SelectJoint(chosen));
+    }
+}
+
+/// What the parameters mean: scale in metres, opacity, range, radial velocity.
+fn derived(ui: &mut Ui, params: &Pppr, joint: usize, tokens: &Tokens) {
+    let p = params.position(joint);
+    let range = crate::geometry::norm(p);
+    let radial = if range > 0.0 { crate::geometry::dot(params.velocity(joint), p) / range } else { 0.0 };
+    let [sx, sy, sz] = params.scale(joint).map(|s| s * 100.0);
+    let direction = if radial.abs() < 5e-4 { "at rest" } else if radial < 0.0 { "approaching" } else { "receding" };
+    let text = format!(
+        "s {sx:.1} × {sy:.1} × {sz:.1} cm   α {:.3}\nrange {range:.3} m   v_r {radial:+.3} m/s, {direction}",
+        params.opacity(joint)
+    );
+    ui.label(RichText::new(text).font(theme::mono(theme::CAPTION)).color(tokens.dim));
+    ui.add_space(4.0);
+}
+
+fn gradient(value: f64, color: egui::Color32, tokens: &Tokens) -> RichText {
+    let color = if value == 0.0 { tokens.dim } else { color };
+    let text = if value == 0.0 { "0".to_owned() } else { format!("{value:+.2e}") };
+    RichText::new(text.replace('-', "−")).font(theme::mono(theme::CAPTION)).color(color)
+}
+
+/// ω as bars: its mean drives the phase ramp, its deviations shape the spectrum.
+fn omega(ui: &mut Ui, params: &Pppr, total: &Pppr, joint: usize, tokens: &Tokens) {
+    let values = params.joint(Group::Omega, joint);
+    if values.is_empty() {
+        return;
+    }
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let slope = total.joint(Group::Omega, joint).iter().map(|g| g.abs()).fold(0.0, f64::max);
+    ui.label(RichText::new(format!("ω ({} features)   mean {mean:+.4}   largest |∂L| {slope:.1e}", values.len())).small().color(tokens.dim))
+        .on_hover_text("Doppler features: the mean is the phase ramp, rad·s/m²; deviations shape the spectrum along a Doppler axis.");
+    let (rect, _) = ui.allocate_exact_size(egui::vec2(ui.available_width().min(260.0), 36.0), egui::Sense::hover());
+    let largest = values.iter().map(|v| v.abs()).fold(1e-6, f64::max);
+    let width = rect.width() / values.len() as f32;
+    ui.painter().hline(rect.x_range(), rect.center().y, egui::Stroke::new(1.0, tokens.stroke));
+    for (i, v) in values.iter().enumerate() {
+        let height = (v / largest) as f32 * rect.height() / 2.0;
+        let x = rect.left() + width * i as f32;
+        let bar = egui::Rect::from_two_pos(
+            egui::pos2(x, rect.center().y),
+            egui::pos2(x + (width - 1.0).max(1.0), rect.center().y - height),
+        );
+        ui.painter().rect_filled(bar, 0.0, tokens.accent);
+    }
+}

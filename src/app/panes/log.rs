@@ -1,0 +1,46 @@
+//! The log: what was opened, assumed, repaired, refused.
+
+use super::{Shared, empty};
+use crate::app::theme::{self, Tokens};
+use crate::session::{Command, LogLevel};
+
+pub(super) fn show(ui: &mut egui::Ui, shared: &mut Shared<'_>) {
+    if shared.session.log.is_empty() {
+        empty(ui, "Nothing to tell", "Opened data sets, assumptions, warnings and errors appear here.");
+        return;
+    }
+    let tokens = Tokens::of(ui);
+    ui.horizontal(|ui| {
+        ui.label(egui::RichText::new(format!("{} lines", shared.session.log.len())).small().color(tokens.dim));
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            if ui.small_button("Clear log").on_hover_text("Empty the log.").clicked() {
+                shared.send(Command::ClearLog);
+            }
+            if ui.small_button("Copy log").on_hover_text("Copy every line to the clipboard.").clicked() {
+                let all: Vec<String> = shared.session.log.iter().map(|line| line.text.clone()).collect();
+                ui.ctx().copy_text(all.join("\n"));
+            }
+        });
+    });
+    egui::ScrollArea::vertical().auto_shrink(false).stick_to_bottom(true).show(ui, |ui| {
+        for line in &shared.session.log {
+            let (mark, color) = match line.level {
+                LogLevel::Info => ("·", tokens.dim),
+                LogLevel::Warning => ("▲", tokens.warn),
+                LogLevel::Error => ("■", tokens.bad),
+            };
+            ui.horizontal_top(|ui| {
+                let clock = egui::RichText::new(clock(line.at)).font(theme::mono(theme::CAPTION)).color(tokens.dim);
+                ui.label(clock);
+                ui.label(egui::RichText::new(mark).color(color));
+                ui.add(egui::Label::new(egui::RichText::new(&line.text).small()).wrap());
+            });
+        }
+    });
+}
+
+/// Time of day in UTC, hh:mm:ss.
+fn clock(at: std::time::SystemTime) -> String {
+    let seconds = at.duration_since(std::time::UNIX_EPOCH).map_or(0, |d| d.as_secs() % 86_400);
+    format!("{:02}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60)
+}

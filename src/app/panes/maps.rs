@@ -1,0 +1,276 @@
+//! The maps: H_ori, H_sim and the masks of each view, with one zoom, one cursor and one probe for all three columns.
+
+mod overlay;
+mod picture;
+mod toolbar;
+
+use super::{Shared, empty};
+use crate::app::map_image::Orientation;
+use crate::app::theme::{self, Tokens};
+use crate::app::widgets::{ColorBar, colorbar};
+use crate::radar::View;
+use crate::session::{ColorRange, Compare, Session};
+use egui::{Rect, Sense, Ui, UiBuilder, pos2, vec2};
+use picture::{Content, Pictures};
+
+/// Which column a pane is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(in crate::app) enum Column {
+    Ori,
+    Sim,
+    Masks,
+}
+
+/// The part of a map that is seen, in picture coordinates (0..1 both ways).
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Window {
+    min: [f32; 2],
+    max: [f32; 2],
+}
+
+impl Default for Window {
+    fn default() -> Self {
+        Self { min: [0.0; 2], max: [1.0; 2] }
+    }
+}
+
+/// What the three panes share between passes.
+#[derive(Default)]
+pub(in crate::app) struct State {
+    pictures: Pictures,
+    windows: Vec<Window>,
+    /// View and (column, row) pixel under the pointer, whichever pane it is in.
+    hovered: Option<(usize, [usize; 2])>,
+    hovered_next: Option<(usize, [usize; 2])>,
+    pass: u64,
+}
+
+impl State {
+    pub(in crate::app) fn reset(&mut self) {
+        self.windows.clear();
+    }
+
+    /// Zooms every map to the EM region.
+    pub(in crate::app) fn focus(&mut self, session: &Session) {
+        let (Some(dataset), Some(snapshot)) = (&session.data.dataset, &session.fit.shown) else { return };
+        let views = &dataset.info().views;
+        self.windows.resize(views.len(), Window::default());
+        for (i, (view, masks)) in views.iter().zip(&snapshot.masks).enumerate() {
+            if let Some([min, max]) = overlay::region_box(view, &masks.inside) {
+                let pad = [(max[0] - min[0]) * 0.06, (max[1] - min[1]) * 0.06];
+                self.windows[i] = Window {
+                    min: [(min[0] - pad[0]).max(0.0), (min[1] - pad[1]).max(0.0)],
+                    max: [(max[0] + pad[0]).min(1.0), (max[1] + pad[1]).min(1.0)],
+                };
+            }
+        }
+    }
+
+    /// The pixel that was hovered in the last pass is this pass's linked cursor.
+    fn begin_pass(&mut self, pass: u64) {
+        if self.pass != pass {
+            self.pass = pass;
+            self.hovered = self.hovered_next.take();
+        }
+    }
+}
+
+/// Draws one column.
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column) {
+    state.begin_pass(ui.ctx().cumulative_pass_nr());
+    let session = shared.session;
+    let Some(dataset) = &session.data.dataset else {
+        let how = "Open a folder with File > Open folder, or drop it on the window.";
+        return empty(ui, "No data set", how);
+    };
+    if let Some(error) = &session.data.error {
+        return empty(ui, "This frame cannot be shown", error);
+    }
+    let Some(frame) = &session.data.frame else { return empty(ui, "Reading the frame…", "") };
+    let views = &dataset.info().views;
+    state.windows.resize(views.len(), Window::default());
+    state.pictures.update(session, views, frame);
+    toolbar::show(ui, shared, column);
+    if column != Column::Ori && session.fit.shown.is_none() {
+        return match &session.fit.status {
+            crate::session::FitStatus::Failed(why) => empty(ui, "No fit", why),
+            _ => empty(ui, "Preparing the fit…", "The start pose is being sought in the maps."),
+        };
+    }
+    let area = ui.available_rect_before_wrap();
+    for (i, rect) in arrange(area, views).into_iter().enumerate() {
+        let builder = UiBuilder::new().max_rect(rect).id_salt(("map", i));
+        ui.scope_builder(builder, |ui| one(ui, shared, state, column, i, rect));
+    }
+}
+
+/// Side by side or one above the other, whichever makes the maps larger.
+fn arrange(area: Rect, views: &[View]) -> Vec<Rect> {
+    let n = views.len().max(1);
+    let aspects: Vec<f32> = views.iter().map(|v| Orientation::of(v).metric_aspect(v).unwrap_or(1.0)).collect();
+    let score = |cell: egui::Vec2| -> f32 {
+        let usable = cell - vec2(78.0, 44.0);
+        aspects.iter().map(|a| usable.x.min(usable.y * a).max(0.0) / a.sqrt()).sum()
+    };
+    let across = vec2(area.width() / n as f32, area.height());
+    let down = vec2(area.width(), area.height() / n as f32);
+    let side_by_side = score(across) > score(down);
+    (0..n)
+        .map(|i| {
+            let (size, offset) =
+                if side_by_side { (across, vec2(across.x * i as f32, 0.0)) } else { (down, vec2(0.0, down.y * i as f32)) };
+            Rect::from_min_size(area.min + offset, size)
+        })
+        .collect()
+}
+
+/// One map of one view: title, picture, axes, colour bar, overlays, probe.
+fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, index: usize, rect: Rect) {
+    let session = shared.session;
+    let Some(view) = session.data.dataset.as_ref().and_then(|d| d.info().views.get(index)) else { return };
+    let orientation = Orientation::of(view);
+    let flipped = ui.input(|i| i.modifiers.shift)
+        && ui.input(|i| i.pointer.hover_pos()).is_some_and(|p| rect.contains(p))
+        && column != Column::Masks;
+    let content = match (column, flipped) {
+        (Column::Masks, _) => Content::Masks,
+        (Column::Ori, false) | (Column::Sim, true) => Content::Ori,
+        (Column::Ori, true) => Content::Sim,
+        (Column::Sim, false) => match session.view.compare {
+            Compare::Flip | Compare::Wipe => Content::Sim,
+            Compare::Difference => Content::Difference,
+        },
+    };
+    let bar_width = if content == Content::Masks { 0.0 } else { 44.0 };
+    let inner = Rect::from_min_max(rect.min + vec2(34.0, 20.0), rect.max - vec2(8.0 + bar_width, 28.0));
+    let plot = fit_aspect(inner, view, orientation);
+    if plot.width() < 24.0 || plot.height() < 24.0 {
+        return;
+    }
+    let tokens = Tokens::of(ui);
+    overlay::title(ui, rect, plot, view, content, &tokens, session);
+    let name = format!("{} map of {}", content.name(), view.array);
+    let response = ui.interact(plot, ui.id().with("plot"), Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, &name));
+    navigate(ui, &response, plot, &mut state.windows[index]);
+    let window = state.windows[index];
+    let painter = ui.painter().with_clip_rect(plot.intersect(ui.clip_rect()));
+    painter.rect_filled(plot, 0.0, theme::MASK_GROUND);
+    state.pictures.paint(ui, &painter, plot, window_rect(window), index, content);
+    if column == Column::Sim && session.view.compare == Compare::Wipe && !flipped {
+        wipe(ui, shared, state, index, plot, window);
+    }
+    let to_screen = |unit: [f64; 2]| screen(plot, window, unit);
+    overlay::draw(&painter, session, view, index, orientation, &to_screen, &tokens);
+    overlay::axes(ui, plot, view, orientation, window, &tokens);
+    ui.painter().rect_stroke(plot, 0.0, egui::Stroke::new(1.0, tokens.stroke), egui::StrokeKind::Outside);
+    if let Some(pointer) = response.hover_pos() {
+        let unit = unit_at(plot, window, pointer);
+        if let Some(pixel) = overlay::pixel_at(view, orientation, unit) {
+            state.hovered_next = Some((index, pixel));
+            let text = overlay::probe(session, &state.pictures, view, index, orientation, pixel);
+            response.clone().on_hover_ui_at_pointer(|ui| {
+                ui.label(egui::RichText::new(text).font(theme::mono(theme::CAPTION)));
+            });
+        }
+        if response.clicked() {
+            let joint = overlay::joint_near(session, view, orientation, &to_screen, pointer);
+            if joint != session.joint {
+                shared.send(crate::session::Command::SelectJoint(joint));
+            }
+        }
+    }
+    if let Some((hovered, pixel)) = state.hovered.filter(|(hovered, _)| *hovered == index) {
+        debug_assert_eq!(hovered, index);
+        overlay::crosshair(&painter, plot, &to_screen, view, orientation, pixel, &tokens);
+    }
+    if content != Content::Masks {
+        let bar = ColorBar {
+            rect: Rect::from_min_max(pos2(plot.max.x + 2.0, plot.min.y - 14.0), pos2(plot.max.x + 2.0 + bar_width, plot.max.y + 6.0)),
+            map: state.pictures.colormap(content),
+            limits: state.pictures.limits(index, content),
+            unit: state.pictures.unit(content),
+            name,
+        };
+        if let Some((lo, hi)) = colorbar(ui, &bar)
+            && content != Content::Difference
+        {
+            shared.set_view(|v| v.range = ColorRange::Fixed { lo, hi });
+        }
+    }
+}
+
+/// The largest rectangle of the map's own proportions; where an axis is not in metres, all of it.
+fn fit_aspect(inner: Rect, view: &View, orientation: Orientation) -> Rect {
+    let Some(aspect) = orientation.metric_aspect(view) else { return inner };
+    let width = inner.width().min(inner.height() * aspect);
+    let size = vec2(width, width / aspect);
+    Rect::from_min_size(pos2(inner.min.x + (inner.width() - width) / 2.0, inner.min.y), size)
+}
+
+/// Drag pans, the wheel zooms at the pointer, a double click shows everything.
+fn navigate(ui: &Ui, response: &egui::Response, plot: Rect, window: &mut Window) {
+    let span = [window.max[0] - window.min[0], window.max[1] - window.min[1]];
+    let mut moved = *window;
+    if response.dragged() {
+        let delta = response.drag_delta();
+        for (axis, by) in [(0, delta.x / plot.width()), (1, delta.y / plot.height())] {
+            let by = (by * span[axis]).clamp(moved.max[axis] - 1.0, moved.min[axis]);
+            moved.min[axis] -= by;
+            moved.max[axis] -= by;
+        }
+    }
+    if let Some(pointer) = response.hover_pos() {
+        let (scroll, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
+        let factor = (-scroll * 0.004).exp() / pinch;
+        if (factor - 1.0).abs() > 1e-4 {
+            let unit = unit_at(plot, *window, pointer);
+            for axis in 0..2 {
+                let new_span = (span[axis] * factor).clamp(0.02, 1.0);
+                let at = (unit[axis] as f32 - window.min[axis]) / span[axis];
+                let min = (unit[axis] as f32 - at * new_span).clamp(0.0, 1.0 - new_span);
+                moved.min[axis] = min;
+                moved.max[axis] = min + new_span;
+            }
+        }
+    }
+    if response.double_clicked() {
+        moved = Window::default();
+    }
+    *window = moved;
+}
+
+/// The line between H_ori (left) and H_sim (right), and H_ori left of it.
+fn wipe(ui: &Ui, shared: &mut Shared<'_>, state: &State, index: usize, plot: Rect, window: Window) {
+    let x = plot.min.x + plot.width() * shared.session.view.wipe;
+    let left = Rect::from_min_max(plot.min, pos2(x, plot.max.y));
+    let painter = ui.painter().with_clip_rect(left.intersect(ui.clip_rect()));
+    state.pictures.paint(ui, &painter, plot, window_rect(window), index, Content::Ori);
+    let tokens = Tokens::of(ui);
+    let handle = Rect::from_center_size(pos2(x, plot.center().y), vec2(10.0, plot.height()));
+    let response = ui.interact(handle, ui.id().with("wipe"), Sense::drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Wipe position"));
+    if response.dragged() {
+        let at = (shared.session.view.wipe + response.drag_delta().x / plot.width()).clamp(0.0, 1.0);
+        shared.set_view(|v| v.wipe = at);
+    }
+    let response = response.on_hover_cursor(egui::CursorIcon::ResizeHorizontal);
+    let width = if response.hovered() || response.dragged() { 2.0 } else { 1.0 };
+    ui.painter().vline(x, plot.y_range(), egui::Stroke::new(width, tokens.accent));
+}
+
+fn window_rect(window: Window) -> Rect {
+    Rect::from_min_max(pos2(window.min[0], window.min[1]), pos2(window.max[0], window.max[1]))
+}
+
+/// Picture coordinates to the screen.
+fn screen(plot: Rect, window: Window, unit: [f64; 2]) -> egui::Pos2 {
+    let t = |axis: usize| (unit[axis] as f32 - window.min[axis]) / (window.max[axis] - window.min[axis]);
+    pos2(plot.min.x + t(0) * plot.width(), plot.min.y + t(1) * plot.height())
+}
+
+/// Picture coordinates under a point of the screen.
+fn unit_at(plot: Rect, window: Window, at: egui::Pos2) -> [f64; 2] {
+    let t = [(at.x - plot.min.x) / plot.width(), (at.y - plot.min.y) / plot.height()];
+    std::array::from_fn(|axis| f64::from(window.min[axis] + t[axis] * (window.max[axis] - window.min[axis])))
+}

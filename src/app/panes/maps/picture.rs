@@ -1,0 +1,249 @@
+//! Textures of the maps, made again only when what they show changed.
+
+use crate::app::map_image::{Orientation, Shown, colorize, limits, shown};
+use crate::app::theme;
+use crate::dataset::Frame;
+use crate::radar::View;
+use crate::render::Colormap;
+use crate::session::{ColorRange, MapScale, Session, ViewState};
+use crate::worker::Snapshot;
+use egui::{Color32, ColorImage, Painter, Rect, TextureHandle, TextureOptions, Ui};
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// What a map shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Content {
+    Ori,
+    Sim,
+    Difference,
+    Masks,
+}
+
+impl Content {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Ori => "H_ori",
+            Self::Sim => "H_sim",
+            Self::Difference => "H_sim − H_ori",
+            Self::Masks => "Masks",
+        }
+    }
+}
+
+/// The maps of one view as shown.
+#[derive(Default)]
+struct ViewPictures {
+    size: [usize; 2],
+    ori_stored: Vec<f64>,
+    ori: Option<Shown>,
+    sim_stored: Vec<f64>,
+    sim: Option<Shown>,
+    masks: Option<[Vec<bool>; 3]>,
+    ori_limits: (f64, f64),
+    sim_limits: (f64, f64),
+    difference_limit: f64,
+}
+
+/// Every view's pictures and the textures made of them.
+#[derive(Default)]
+pub(super) struct Pictures {
+    views: Vec<ViewPictures>,
+    frame: Option<Arc<Frame>>,
+    snapshot: Option<Arc<Snapshot>>,
+    look: Option<Look>,
+    textures: RefCell<HashMap<(usize, Content), TextureHandle>>,
+}
+
+/// What of the view state changes pixels.
+#[derive(Debug, Clone, PartialEq)]
+struct Look {
+    scale: MapScale,
+    range: ColorRange,
+    shared_range: bool,
+    colormap: Colormap,
+    hatch: bool,
+    mask_opacity: f32,
+}
+
+impl Look {
+    fn of(view: &ViewState) -> Self {
+        let colormap = Colormap::ALL.into_iter().find(|m| m.name().eq_ignore_ascii_case(&view.colormap));
+        Self {
+            scale: view.scale,
+            range: view.range,
+            shared_range: view.shared_range,
+            colormap: colormap.unwrap_or_default(),
+            hatch: view.show_clipped,
+            mask_opacity: view.mask_opacity,
+        }
+    }
+}
+
+fn same<T>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+        (None, None) => true,
+        _ => false,
+    }
+}
+
+impl Pictures {
+    /// Brings everything up to date with the session; does nothing where nothing changed.
+    pub(super) fn update(&mut self, session: &Session, views: &[View], frame: &Arc<Frame>) {
+        let look = Look::of(&session.view);
+        let new_frame = !same(self.frame.as_ref(), Some(frame));
+        let new_snapshot = !same(self.snapshot.as_ref(), session.fit.shown.as_ref());
+        let new_look = self.look.as_ref() != Some(&look);
+        if !(new_frame || new_snapshot || new_look) {
+            return;
+        }
+        let all = new_frame || new_look;
+        self.views.resize_with(views.len(), ViewPictures::default);
+        for (i, view) in views.iter().enumerate() {
+            let pictures = &mut self.views[i];
+            let orientation = Orientation::of(view);
+            pictures.size = orientation.size(view);
+            if all && let Some(map) = frame.maps.get(i) {
+                pictures.ori_stored = orientation.picture(view, &map.data);
+                let ori = shown(&pictures.ori_stored, look.scale, view.quantity.db_factor());
+                pictures.ori_limits = limits(&ori.values, look.range);
+                pictures.ori = Some(ori);
+            }
+            if all || new_snapshot {
+                pictures.take_snapshot(session.fit.shown.as_deref(), i, view, &look);
+            }
+        }
+        let textures = self.textures.get_mut();
+        textures.retain(|(_, content), _| !all && *content == Content::Ori);
+        self.frame = Some(Arc::clone(frame));
+        self.snapshot.clone_from(&session.fit.shown);
+        self.look = Some(look);
+    }
+
+    /// Draws the part `uv` of a map into `rect`.
+    pub(super) fn paint(&self, ui: &Ui, painter: &Painter, rect: Rect, uv: Rect, view: usize, content: Content) {
+        let mut textures = self.textures.borrow_mut();
+        if !textures.contains_key(&(view, content)) {
+            let Some(image) = self.image(view, content) else { return };
+            let name = format!("map {view} {}", content.name());
+            let texture = ui.ctx().load_texture(name, image, TextureOptions::NEAREST);
+            textures.insert((view, content), texture);
+        }
+        if let Some(texture) = textures.get(&(view, content)) {
+            painter.image(texture.id(), rect, uv, Color32::WHITE);
+        }
+    }
+
+    fn image(&self, view: usize, content: Content) -> Option<ColorImage> {
+        let (pictures, look) = (self.views.get(view)?, self.look.as_ref()?);
+        let paint = |values: &[f64], limits, map| colorize(pictures.size, values, limits, map, look.hatch, theme::NAN_CELL);
+        Some(match content {
+            Content::Ori => paint(&pictures.ori.as_ref()?.values, pictures.ori_limits, look.colormap),
+            Content::Sim => paint(&pictures.sim.as_ref()?.values, pictures.sim_limits, look.colormap),
+            Content::Difference => {
+                let limit = pictures.difference_limit;
+                paint(&pictures.difference()?, (-limit, limit), Colormap::Diverging)
+            }
+            Content::Masks => pictures.mask_image(look.mask_opacity)?,
+        })
+    }
+
+    pub(super) fn colormap(&self, content: Content) -> Colormap {
+        match content {
+            Content::Difference => Colormap::Diverging,
+            _ => self.look.as_ref().map(|look| look.colormap).unwrap_or_default(),
+        }
+    }
+
+    pub(super) fn limits(&self, view: usize, content: Content) -> (f64, f64) {
+        let Some(pictures) = self.views.get(view) else { return (0.0, 1.0) };
+        match content {
+            Content::Sim => pictures.sim_limits,
+            Content::Difference => (-pictures.difference_limit, pictures.difference_limit),
+            _ => pictures.ori_limits,
+        }
+    }
+
+    pub(super) fn unit(&self, content: Content) -> &'static str {
+        let decibel = self.look.as_ref().is_none_or(|look| look.scale == MapScale::Decibel);
+        match (content, decibel) {
+            (Content::Difference, true) => "Δ dB",
+            (Content::Difference, false) => "Δ of max",
+            (_, true) => "dB re max",
+            (_, false) => "of max",
+        }
+    }
+
+    /// (stored, shown) value of H_ori and of H_sim at a pixel.
+    pub(super) fn values(&self, view: usize, pixel: [usize; 2]) -> [Option<(f64, f64)>; 2] {
+        let Some(p) = self.views.get(view) else { return [None, None] };
+        let at = pixel[1] * p.size[0] + pixel[0];
+        let pair = |stored: &[f64], shown: &Option<Shown>| {
+            Some((*stored.get(at)?, *shown.as_ref()?.values.get(at)?))
+        };
+        [pair(&p.ori_stored, &p.ori), pair(&p.sim_stored, &p.sim)]
+    }
+
+    /// Whether a pixel is in H_ori's mask, in H_sim's, in the EM region.
+    pub(super) fn mask_at(&self, view: usize, pixel: [usize; 2]) -> Option<[bool; 3]> {
+        let p = self.views.get(view)?;
+        let masks = p.masks.as_ref()?;
+        let at = pixel[1] * p.size[0] + pixel[0];
+        Some([*masks[0].get(at)?, *masks[1].get(at)?, *masks[2].get(at)?])
+    }
+}
+
+impl ViewPictures {
+    fn take_snapshot(&mut self, snapshot: Option<&Snapshot>, index: usize, view: &View, look: &Look) {
+        let orientation = Orientation::of(view);
+        self.sim = None;
+        self.masks = None;
+        self.sim_stored.clear();
+        let Some(snapshot) = snapshot else { return };
+        if let Some(map) = snapshot.h_sim.get(index) {
+            self.sim_stored = orientation.picture(view, map);
+            let sim = shown(&self.sim_stored, look.scale, view.quantity.db_factor());
+            let own = look.shared_range || matches!(look.range, ColorRange::Fixed { .. });
+            self.sim_limits = if own { self.ori_limits } else { limits(&sim.values, look.range) };
+            self.sim = Some(sim);
+            self.difference_limit = match look.scale {
+                MapScale::Decibel => 0.5 * (self.ori_limits.1 - self.ori_limits.0).abs().max(1.0),
+                MapScale::Linear => 1.0,
+            };
+        }
+        self.masks = snapshot.masks.get(index).map(|masks| {
+            [&masks.ori, &masks.sim, &masks.inside].map(|mask| orientation.mask_picture(view, mask))
+        });
+    }
+
+    /// H_sim − H_ori, both clipped to the limits' floor, so that −400 dB of nothing does not hide the rest.
+    fn difference(&self) -> Option<Vec<f64>> {
+        let (ori, sim) = (self.ori.as_ref()?, self.sim.as_ref()?);
+        let floor = self.ori_limits.0;
+        Some(sim.values.iter().zip(&ori.values).map(|(s, o)| s.max(floor) - o.max(floor)).collect())
+    }
+
+    /// White both, orange H_ori only, blue H_sim only, over a dim grey H_ori; outside the EM region darker.
+    fn mask_image(&self, opacity: f32) -> Option<ColorImage> {
+        let masks = self.masks.as_ref()?;
+        let ori = self.ori.as_ref()?;
+        let mut image = colorize(self.size, &ori.values, self.ori_limits, Colormap::Grey, false, theme::NAN_CELL);
+        let mix = |a: Color32, b: Color32, t: f32| {
+            let channel = |x: u8, y: u8| (f32::from(x) + (f32::from(y) - f32::from(x)) * t).round() as u8;
+            Color32::from_rgb(channel(a.r(), b.r()), channel(a.g(), b.g()), channel(a.b(), b.b()))
+        };
+        for (i, pixel) in image.pixels.iter_mut().enumerate() {
+            let (in_ori, in_sim, inside) = (masks[0][i], masks[1][i], masks[2][i]);
+            let ground = mix(theme::MASK_GROUND, *pixel, if inside { 0.45 } else { 0.18 });
+            *pixel = match (in_ori, in_sim) {
+                (true, true) => mix(ground, theme::MASK_BOTH, opacity.max(0.05)),
+                (true, false) => mix(ground, theme::MASK_ORI, opacity),
+                (false, true) => mix(ground, theme::MASK_SIM, opacity),
+                (false, false) => ground,
+            };
+        }
+        Some(image)
+    }
+}

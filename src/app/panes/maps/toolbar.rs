@@ -1,0 +1,115 @@
+//! The line above the maps: scale and colours over H_ori, comparison over H_sim, the legend over the masks.
+
+use super::{Column, Shared};
+use crate::app::theme::{self, Tokens};
+use crate::render::Colormap;
+use crate::session::{ColorRange, Compare, MapScale};
+use egui::{Color32, RichText, Sense, Ui, vec2};
+
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, column: Column) {
+    egui::Frame::new().inner_margin(egui::Margin::symmetric(8, 3)).show(ui, |ui| {
+        ui.horizontal(|ui| {
+            ui.set_height(22.0);
+            match column {
+                Column::Ori => colours(ui, shared),
+                Column::Sim => comparison(ui, shared),
+                Column::Masks => legend(ui, shared),
+            }
+        });
+    });
+}
+
+fn colours(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let view = &shared.session.view;
+    let (mut scale, mut name) = (view.scale, view.colormap.clone());
+    egui::ComboBox::from_id_salt("scale").width(62.0).selected_text(if scale == MapScale::Decibel { "dB" } else { "linear" }).show_ui(ui, |ui| {
+        ui.selectable_value(&mut scale, MapScale::Decibel, "dB").on_hover_text("20 log₁₀ of an amplitude, 10 log₁₀ of a power, relative to the map's maximum.");
+        ui.selectable_value(&mut scale, MapScale::Linear, "linear").on_hover_text("The stored value divided by the map's maximum.");
+    }).response.on_hover_text("Scale of the colours.");
+    egui::ComboBox::from_id_salt("colormap").width(74.0).selected_text(&name).show_ui(ui, |ui| {
+        for map in Colormap::ALL.into_iter().filter(|map| *map != Colormap::Diverging) {
+            let lower = map.name().to_lowercase();
+            ui.horizontal(|ui| {
+                ramp(ui, map);
+                ui.selectable_value(&mut name, lower.clone(), lower);
+            });
+        }
+    }).response.on_hover_text("Colour map. Viridis, inferno and magma are perceptually uniform.");
+    more(ui, shared);
+    let view = &shared.session.view;
+    if scale != view.scale || name != view.colormap {
+        shared.set_view(|v| {
+            if scale != v.scale {
+                // Limits in dB mean nothing on a linear scale.
+                v.range = ColorRange::default();
+            }
+            (v.scale, v.colormap) = (scale, name);
+        });
+    }
+}
+
+/// What is drawn on the maps, and how the limits are found.
+fn more(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let mut view = shared.session.view.clone();
+    let menu = ui.menu_button("Show", |ui| {
+        ui.checkbox(&mut view.show_region, "EM region").on_hover_text("The cells that L_EM is computed on (dashed).");
+        ui.checkbox(&mut view.show_skeleton, "Fitted skeleton").on_hover_text("Joints and bones of the shown iteration.");
+        ui.checkbox(&mut view.show_truth, "Truth").on_hover_text("The data set's joints in metres, where it has them (white).");
+        ui.checkbox(&mut view.show_boxes, "Labelled boxes").on_hover_text("The data set's boxes on the maps (red).");
+        ui.checkbox(&mut view.show_clipped, "Hatch clipped cells").on_hover_text("Mark cells outside the colour limits.");
+        ui.separator();
+        ui.checkbox(&mut view.shared_range, "Same limits for H_sim").on_hover_text("H_sim uses H_ori's colour limits, and keeps them over the steps of a run.");
+        ui.separator();
+        ui.label(RichText::new("Colour limits").small());
+        if let ColorRange::Percentile { lo, hi } = &mut view.range {
+            ui.add(egui::Slider::new(lo, 0.0..=50.0).text("lower percentile"));
+            ui.add(egui::Slider::new(hi, 50.0..=100.0).text("upper percentile"));
+        } else {
+            ui.label("set on the colour bar");
+        }
+        if ui.button("Auto-contrast").on_hover_text("2nd and 99.8th percentile. Key: C").clicked() {
+            view.range = ColorRange::default();
+        }
+    });
+    menu.response.on_hover_text("What is drawn on the maps, and how the colour limits are found.");
+    if view != shared.session.view {
+        shared.set_view(|v| *v = view);
+    }
+}
+
+fn comparison(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let mut mode = shared.session.view.compare;
+    ui.selectable_value(&mut mode, Compare::Flip, "H_sim").on_hover_text("H_sim alone. Hold Shift over a map to flip it with H_ori.");
+    ui.selectable_value(&mut mode, Compare::Wipe, "Wipe").on_hover_text("H_ori left of a line, H_sim right of it. Key: W");
+    ui.selectable_value(&mut mode, Compare::Difference, "Difference").on_hover_text("H_sim − H_ori, colours diverging about zero. Key: D");
+    if mode != shared.session.view.compare {
+        shared.set_view(|v| v.compare = mode);
+    }
+}
+
+fn legend(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let tokens = Tokens::of(ui);
+    let entries: [(Color32, &str, &str); 3] = [
+        (theme::MASK_BOTH, "both", "In the masks of H_ori and of H_sim."),
+        (theme::MASK_ORI, "H_ori only", "Measured, not explained by the fit."),
+        (theme::MASK_SIM, "H_sim only", "Simulated, not measured."),
+    ];
+    for (color, text, tip) in entries {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            let (rect, _) = ui.allocate_exact_size(vec2(9.0, 9.0), Sense::hover());
+            ui.painter().rect(rect, 1.0, color, egui::Stroke::new(1.0, tokens.dim), egui::StrokeKind::Inside);
+            ui.label(RichText::new(text).small()).on_hover_text(tip);
+        });
+    }
+}
+
+fn ramp(ui: &mut Ui, map: Colormap) {
+    let (rect, _) = ui.allocate_exact_size(vec2(48.0, 10.0), Sense::hover());
+    for i in 0..24 {
+        let [r, g, b] = map.sample(f64::from(i) / 23.0);
+        let x = rect.min.x + 2.0 * i as f32;
+        let stripe = egui::Rect::from_min_size(egui::pos2(x, rect.min.y), vec2(2.0, rect.height()));
+        ui.painter().rect_filled(stripe, 0.0, Color32::from_rgb(r, g, b));
+    }
+}

@@ -1,0 +1,119 @@
+//! The panes: each draws a part of the session and sends what is asked of it.
+
+mod curves;
+mod fit;
+mod frames;
+mod image;
+mod joint;
+mod log;
+mod maps;
+mod scene;
+pub(super) mod timeline;
+
+use super::PaneKind;
+use super::commands::{Act, AppAct, command};
+use super::theme::{self, Tokens};
+use crate::session::{Command, Session, ViewState};
+
+/// What every pane gets.
+pub(super) struct Shared<'a> {
+    /// The state, to be read.
+    pub(super) session: &'a Session,
+    /// What is asked for; carried out after the pass.
+    pub(super) acts: &'a mut Vec<Act>,
+}
+
+impl Shared<'_> {
+    /// Sends a command to the session.
+    pub(super) fn send(&mut self, command: Command) {
+        self.acts.push(Act::Session(command));
+    }
+
+    /// Asks the window for something.
+    pub(super) fn app(&mut self, act: AppAct) {
+        self.acts.push(Act::App(act));
+    }
+
+    /// Does the user command called `label`, if it is enabled.
+    pub(super) fn invoke(&mut self, label: &str) {
+        if let Some(command) = command(label).filter(|c| (c.enabled)(self.session)) {
+            self.acts.push((command.act)(self.session));
+        }
+    }
+
+    /// Changes how things are shown.
+    pub(super) fn set_view(&mut self, change: impl FnOnce(&mut ViewState)) {
+        let mut view = self.session.view.clone();
+        change(&mut view);
+        if view != self.session.view {
+            self.send(Command::SetView(Box::new(view)));
+        }
+    }
+}
+
+/// What the panes remember between passes: textures, zoom, camera. None of it is a user's work.
+pub(super) struct PaneStates {
+    pub(super) maps: maps::State,
+    pub(super) scene: scene::State,
+    pub(super) curves: curves::State,
+    pub(super) frames: frames::State,
+    pub(super) joint: joint::State,
+    pub(super) image: image::State,
+    pub(super) timeline: timeline::State,
+}
+
+impl PaneStates {
+    pub(super) fn new(render_state: Option<eframe::egui_wgpu::RenderState>) -> Self {
+        Self {
+            maps: maps::State::default(),
+            scene: scene::State::new(render_state),
+            curves: curves::State::default(),
+            frames: frames::State::default(),
+            joint: joint::State::default(),
+            image: image::State::default(),
+            timeline: timeline::State::default(),
+        }
+    }
+
+    pub(super) fn reset_views(&mut self) {
+        self.maps.reset();
+        self.scene.reset();
+        self.curves.reset();
+    }
+
+    pub(super) fn focus(&mut self, session: &Session) {
+        self.maps.focus(session);
+        self.scene.focus(session);
+    }
+}
+
+/// Draws a pane.
+pub(super) fn show(pane: PaneKind, ui: &mut egui::Ui, shared: &mut Shared<'_>, states: &mut PaneStates) {
+    match pane {
+        PaneKind::Frames => frames::show(ui, shared, &mut states.frames),
+        PaneKind::HOri => maps::show(ui, shared, &mut states.maps, maps::Column::Ori),
+        PaneKind::HSim => maps::show(ui, shared, &mut states.maps, maps::Column::Sim),
+        PaneKind::Masks => maps::show(ui, shared, &mut states.maps, maps::Column::Masks),
+        PaneKind::Scene => scene::show(ui, shared, &mut states.scene),
+        PaneKind::Curves => curves::show(ui, shared, &mut states.curves),
+        PaneKind::Fit => fit::show(ui, shared),
+        PaneKind::Joint => joint::show(ui, shared, &mut states.joint),
+        PaneKind::Image => image::show(ui, shared, &mut states.image),
+        PaneKind::Log => log::show(ui, shared),
+    }
+}
+
+/// An empty pane says what would fill it and how.
+pub(super) fn empty(ui: &mut egui::Ui, title: &str, how: &str) {
+    let tokens = Tokens::of(ui);
+    ui.centered_and_justified(|ui| {
+        let mut text = egui::text::LayoutJob::default();
+        let format = |font, color| egui::TextFormat { font_id: font, color, ..Default::default() };
+        text.append(title, 0.0, format(theme::strong(theme::BODY), tokens.text));
+        text.append("\n", 0.0, format(theme::strong(theme::BODY), tokens.text));
+        text.append(how, 0.0, format(egui::FontId::proportional(theme::CAPTION), tokens.dim));
+        text.halign = egui::Align::Center;
+        text.wrap.max_width = (ui.available_width() - 24.0).max(80.0);
+        ui.label(text);
+    });
+}

@@ -1,0 +1,258 @@
+//! The 3-D view: Gaussians, bones, truth, velocity, gradients, the radar and its field of view.
+//!
+//! The picture is drawn offscreen by [`SceneRenderer`] and shown as a texture; it is drawn again only when the scene, the
+//! camera or the size changed.
+
+mod build;
+
+use super::{Shared, empty};
+use crate::app::commands::AppAct;
+use crate::app::theme::{self, Tokens};
+use crate::render::{Camera, Scene, SceneRenderer, Vec2, Vec3, pick, shapes};
+use crate::session::{Command, Session, SplatMode};
+use eframe::egui_wgpu::RenderState;
+use eframe::wgpu;
+use egui::{Align2, Color32, Rect, RichText, Sense, TextureId, Ui, pos2, vec2};
+
+/// Radius that a camera at its start shows, m.
+const RADIUS_M: f32 = 2.4;
+
+/// Camera and GPU objects.
+pub(in crate::app) struct State {
+    render_state: Option<RenderState>,
+    renderer: Option<SceneRenderer>,
+    texture: Option<(TextureId, u64)>,
+    camera: Option<Camera>,
+}
+
+impl State {
+    pub(in crate::app) fn new(render_state: Option<RenderState>) -> Self {
+        let renderer = render_state.as_ref().map(|s| SceneRenderer::new(&s.device, &s.queue, s.target_format));
+        Self { render_state, renderer, texture: None, camera: None }
+    }
+
+    pub(in crate::app) fn reset(&mut self) {
+        self.camera = None;
+    }
+
+    pub(in crate::app) fn focus(&mut self, session: &Session) {
+        let positions = session.shown_positions();
+        let camera = self.camera.get_or_insert_with(|| Camera::overview(centre(session), RADIUS_M));
+        match session.joint.and_then(|joint| positions.get(joint)) {
+            Some(&p) => camera.focus(Vec3::from(p.map(|x| x as f32)), 0.5),
+            None => camera.focus(centre(session), 1.1),
+        }
+    }
+
+    pub(in crate::app) fn from_radar(&mut self, session: &Session) {
+        let mut camera = Camera::from_radar();
+        let eye = Vec3::new(0.0, 0.0, 0.0);
+        let to = centre(session) - eye;
+        camera.target = eye + Vec3::X * to.length().max(1.0);
+        camera.distance = to.length().max(1.0);
+        self.camera = Some(camera);
+    }
+
+    pub(in crate::app) fn from_top(&mut self, session: &Session) {
+        self.camera = Some(Camera::top(centre(session) * 0.7, RADIUS_M));
+    }
+
+    pub(in crate::app) fn from_side(&mut self, session: &Session) {
+        self.camera = Some(Camera::side(centre(session) * 0.7, RADIUS_M));
+    }
+}
+
+/// The middle of the shown joints, or a place in front of the radar.
+fn centre(session: &Session) -> Vec3 {
+    let positions = session.shown_positions();
+    if positions.is_empty() {
+        return Vec3::new(3.0, 0.0, 0.0);
+    }
+    let sum = positions.iter().fold(Vec3::ZERO, |sum, p| sum + Vec3::from(p.map(|x| x as f32)));
+    sum / positions.len() as f32
+}
+
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    if shared.session.data.dataset.is_none() {
+        return empty(ui, "Nothing in the scene", "The Gaussians of a fit appear here when a frame is open.");
+    }
+    let camera_missing = state.camera.is_none();
+    if camera_missing && shared.session.fit.shown.is_some() {
+        state.camera = Some(Camera::overview(centre(shared.session), RADIUS_M));
+    }
+    toolbar(ui, shared);
+    let rect = ui.available_rect_before_wrap();
+    if rect.width() < 16.0 || rect.height() < 16.0 {
+        return;
+    }
+    let response = ui.interact(rect, ui.id().with("scene"), Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "3-D scene"));
+    let mut camera = state.camera.unwrap_or_else(|| Camera::overview(centre(shared.session), RADIUS_M));
+    let tokens = Tokens::of(ui);
+    let scale = ui.ctx().pixels_per_point();
+    let viewport = Vec2::new(rect.width() * scale, rect.height() * scale);
+    steer(ui, &response, rect, viewport, scale, &mut camera);
+    let (mut scene, labels) = build::scene(shared.session, &camera, &tokens, scale);
+    let corner = Vec2::new(34.0 * scale, viewport.y - 34.0 * scale);
+    let (triad, letters) = shapes::corner_triad(&camera, viewport, corner, 20.0 * scale, 1.6 * scale);
+    scene.overlay.extend(triad);
+    paint(ui, state, rect, viewport, &scene, &camera);
+    if state.camera.is_some() {
+        state.camera = Some(camera);
+    }
+    let painter = ui.painter().with_clip_rect(rect);
+    for (letter, at) in ["x", "y", "z"].iter().zip(letters) {
+        let at = rect.min + vec2(at.x, at.y) / scale;
+        painter.text(at, Align2::CENTER_CENTER, letter, theme::mono(10.0), tokens.dim);
+    }
+    for (world, text, color) in labels {
+        if let Some(seen) = camera.project(world, viewport) {
+            let at = rect.min + vec2(seen.px.x, seen.px.y) / scale + vec2(6.0, -6.0);
+            painter.text(at, Align2::LEFT_BOTTOM, text, egui::FontId::proportional(theme::CAPTION), color);
+        }
+    }
+    captions(&painter, rect, shared.session, &tokens, state);
+    interact(ui, shared, state, &response, rect, viewport, scale, &scene, &camera);
+}
+
+/// Drag orbits, right or middle drag pans, the wheel zooms to the pointer.
+fn steer(ui: &Ui, response: &egui::Response, rect: Rect, viewport: Vec2, scale: f32, camera: &mut Camera) {
+    let drag = response.drag_delta() * scale;
+    if response.dragged_by(egui::PointerButton::Primary) {
+        camera.orbit(drag.x / scale, drag.y / scale);
+    } else if response.dragged() {
+        camera.pan(drag.x, drag.y, viewport);
+    }
+    if let Some(pointer) = response.hover_pos() {
+        let (scroll, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
+        let factor = (scroll * 0.003).exp() * pinch;
+        if (factor - 1.0).abs() > 1e-4 {
+            let t = (pointer - rect.min) / rect.size();
+            let ndc = Vec2::new(2.0 * t.x - 1.0, 1.0 - 2.0 * t.y);
+            camera.zoom(factor, Some(ndc), rect.aspect_ratio());
+        }
+    }
+}
+
+fn paint(ui: &Ui, state: &mut State, rect: Rect, viewport: Vec2, scene: &Scene, camera: &Camera) {
+    let (Some(gpu), Some(renderer)) = (&state.render_state, &mut state.renderer) else {
+        let how = "No graphics adapter: the 3-D view is not drawn.";
+        ui.painter().text(rect.center(), Align2::CENTER_CENTER, how, egui::FontId::proportional(12.0), Color32::GRAY);
+        return;
+    };
+    let size = [viewport.x.round().max(1.0) as u32, viewport.y.round().max(1.0) as u32];
+    renderer.render(&gpu.device, &gpu.queue, size, scene, camera);
+    let generation = renderer.target_generation();
+    let stale = state.texture.is_none_or(|(_, known)| known != generation);
+    if stale {
+        let view = renderer.texture().create_view(&wgpu::TextureViewDescriptor::default());
+        let mut egui_renderer = gpu.renderer.write();
+        let filter = wgpu::FilterMode::Linear;
+        let id = match state.texture {
+            Some((id, _)) => {
+                egui_renderer.update_egui_texture_from_wgpu_texture(&gpu.device, &view, filter, id);
+                id
+            }
+            None => egui_renderer.register_native_texture(&gpu.device, &view, filter),
+        };
+        state.texture = Some((id, generation));
+    }
+    if let Some((id, _)) = state.texture {
+        let all = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+        ui.painter().with_clip_rect(rect).image(id, rect, all, Color32::WHITE);
+    }
+}
+
+#[expect(clippy::too_many_arguments, reason = "what is drawn and where, all of it needed to pick")]
+fn interact(
+    ui: &Ui,
+    shared: &mut Shared<'_>,
+    state: &mut State,
+    response: &egui::Response,
+    rect: Rect,
+    viewport: Vec2,
+    scale: f32,
+    scene: &Scene,
+    camera: &Camera,
+) {
+    let Some(pointer) = response.hover_pos() else { return };
+    let px = Vec2::new((pointer.x - rect.min.x) * scale, (pointer.y - rect.min.y) * scale);
+    let hit = (!response.dragged()).then(|| pick(scene, camera, px, viewport)).flatten().map(|id| id as usize);
+    if response.double_clicked() {
+        match hit {
+            Some(joint) => {
+                shared.send(Command::SelectJoint(Some(joint)));
+                if let Some(p) = shared.session.shown_positions().get(joint)
+                    && let Some(camera) = &mut state.camera
+                {
+                    camera.focus(Vec3::from(p.map(|x| x as f32)), 0.5);
+                }
+            }
+            None => state.camera = None,
+        }
+    } else if response.clicked() && hit != shared.session.joint {
+        shared.send(Command::SelectJoint(hit));
+    }
+    if let (Some(joint), Some(problem)) = (hit, &shared.session.fit.problem) {
+        let joints = problem.skeleton.joints.len().max(1);
+        let text = format!("{}\nclick: select · double click: focus", problem.skeleton.shown_name(joint % joints));
+        ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
+        response.clone().on_hover_text_at_pointer(text);
+    }
+}
+
+/// What the picture means, in words, in its corners.
+fn captions(painter: &egui::Painter, rect: Rect, session: &Session, tokens: &Tokens, state: &State) {
+    let small = egui::FontId::proportional(theme::CAPTION);
+    let mode = if session.view.splat_mode == SplatMode::Splat { "splats" } else { "ellipsoids" };
+    let text = format!("Gaussian {mode} at {:.1} σ · grid 1 m", session.view.splat_sigma);
+    painter.text(rect.right_bottom() - vec2(8.0, 6.0), Align2::RIGHT_BOTTOM, text, small.clone(), tokens.dim);
+    let mut x = rect.right() - 8.0;
+    let has_truth = session.data.frame.as_ref().is_some_and(|f| f.truth.is_some()) && session.view.show_truth;
+    let keys = [("right", tokens.right, true), ("left", tokens.left, true), ("truth", tokens.ok, has_truth)];
+    for (word, color, shown) in keys {
+        if shown {
+            let drawn = painter.text(pos2(x, rect.top() + 6.0), Align2::RIGHT_TOP, word, small.clone(), color);
+            x = drawn.left() - 10.0;
+        }
+    }
+    if let Some(skipped) = state.renderer.as_ref().map(SceneRenderer::skipped).filter(|n| *n > 0) {
+        let text = format!("{skipped} Gaussians cannot be drawn (not finite)");
+        painter.text(rect.left_top() + vec2(8.0, 6.0), Align2::LEFT_TOP, text, small, tokens.bad);
+    }
+}
+
+fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let mut view = shared.session.view.clone();
+    egui::Frame::new().inner_margin(egui::Margin::symmetric(8, 3)).show(ui, |ui| {
+        ui.horizontal(|ui| {
+            ui.set_height(22.0);
+            ui.selectable_value(&mut view.splat_mode, SplatMode::Splat, "Splats").on_hover_text("Alpha-blended Gaussians, sorted by depth.");
+            ui.selectable_value(&mut view.splat_mode, SplatMode::Ellipsoid, "Ellipsoids").on_hover_text("Opaque surfaces at the stated number of standard deviations.");
+            let drag = egui::DragValue::new(&mut view.splat_sigma).range(0.5..=4.0).speed(0.02).fixed_decimals(1).suffix(" σ");
+            let response = ui.add(drag);
+            response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, "Standard deviations drawn"));
+            response.on_hover_text("How many standard deviations of each Gaussian are drawn.");
+            ui.menu_button("Show", |ui| {
+                ui.checkbox(&mut view.show_velocity, "Velocity").on_hover_text("v of each joint, 0.3 s long.");
+                ui.checkbox(&mut view.show_gradients, "Descent directions").on_hover_text("−∂L/∂p at each joint: blue the electromagnetic part, orange the kinematic part.");
+                ui.checkbox(&mut view.show_truth, "Truth").on_hover_text("The data set's joints in metres, where it has them.");
+                ui.checkbox(&mut view.show_initial, "Start pose");
+                ui.checkbox(&mut view.show_grid, "Ground grid");
+                ui.checkbox(&mut view.show_frustum, "Radar and field of view");
+            }).response.on_hover_text("What is drawn in the scene.");
+            ui.menu_button("Camera", |ui| {
+                for (label, act) in [("View from the radar", AppAct::CameraRadar), ("View from above", AppAct::CameraTop), ("View from the side", AppAct::CameraSide)] {
+                    if ui.button(label).clicked() {
+                        shared.app(act);
+                        ui.close();
+                    }
+                }
+                ui.label(RichText::new("Drag orbits, right drag pans,\nwheel zooms, double click focuses.").small());
+            });
+        });
+    });
+    if view != shared.session.view {
+        shared.set_view(|v| *v = view);
+    }
+}

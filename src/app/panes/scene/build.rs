@@ -1,0 +1,210 @@
+//! The scene of a session: Gaussians and lines.
+
+use crate::app::theme::Tokens;
+use crate::body::{Group, Pppr, Side, Skeleton};
+use crate::geometry::{self, rotation_from_quaternion};
+use crate::radar::AxisKind;
+use crate::render::shapes::{self, Stroke};
+use crate::render::{Camera, LineInstance, Scene, SceneMode, SplatInstance, Vec3};
+use crate::session::{Session, SplatMode};
+use egui::Color32;
+
+/// Seconds of motion that a velocity arrow shows.
+const VELOCITY_S: f32 = 0.3;
+/// Length of the longest gradient arrow, m.
+const GRADIENT_M: f64 = 0.35;
+
+/// A text at a place, m.
+type Label = (Vec3, String, Color32);
+
+/// Everything that is drawn, and the texts beside it.
+pub(super) fn scene(session: &Session, camera: &Camera, tokens: &Tokens, px: f32) -> (Scene, Vec<Label>) {
+    let look = &session.view;
+    let mut scene = Scene {
+        background: rgba(tokens.canvas, 1.0),
+        sigma: look.splat_sigma,
+        contour: if look.splat_mode == SplatMode::Splat { 0.6 } else { 0.0 },
+        mode: if look.splat_mode == SplatMode::Splat { SceneMode::Splat } else { SceneMode::Ellipsoid },
+        ..Scene::default()
+    };
+    let mut labels = Vec::new();
+    if look.show_grid {
+        scene.lines.extend(ground(session, tokens, px));
+    }
+    if look.show_frustum {
+        scene.lines.extend(radar(session, tokens, px));
+    }
+    let skeleton = session.fit.problem.as_ref().map(|problem| &problem.skeleton);
+    if let (Some(snapshot), Some(skeleton)) = (&session.fit.shown, skeleton) {
+        person(&mut scene, &mut labels, session, &snapshot.params, skeleton, tokens, px);
+        if look.show_velocity {
+            velocities(&mut scene, &snapshot.params, skeleton, camera, tokens, px);
+        }
+        if look.show_gradients {
+            let total = &snapshot.evaluation.gradient;
+            gradients(&mut scene, &snapshot.params, total, &snapshot.evaluation.em_gradient, &snapshot.config, camera, tokens, px);
+        }
+    }
+    if look.show_initial && let (Some(initial), Some(skeleton)) = (&session.fit.initial, skeleton) {
+        let positions: Vec<_> = (0..initial.shape().total_joints()).map(|j| initial.position(j)).collect();
+        let stroke = Stroke { color: rgba(tokens.dim, 0.6), width_px: 1.0 * px };
+        bones(&mut scene.lines, skeleton, &positions, &|_| stroke);
+    }
+    if look.show_truth
+        && let (Some(truth), Some(dataset)) = (session.data.frame.as_ref().and_then(|f| f.truth.as_ref()), &session.data.dataset)
+    {
+        let stroke = Stroke { color: rgba(tokens.ok, 0.85), width_px: 1.5 * px };
+        bones(&mut scene.lines, &dataset.info().skeleton, &truth.joints, &|_| stroke);
+    }
+    (scene, labels)
+}
+
+fn rgba(color: Color32, alpha: f32) -> [f32; 4] {
+    [f32::from(color.r()) / 255.0, f32::from(color.g()) / 255.0, f32::from(color.b()) / 255.0, alpha]
+}
+
+fn vec3(p: geometry::Vec3) -> Vec3 {
+    Vec3::from(p.map(|x| x as f32))
+}
+
+fn person(
+    scene: &mut Scene,
+    labels: &mut Vec<Label>,
+    session: &Session,
+    params: &Pppr,
+    skeleton: &Skeleton,
+    tokens: &Tokens,
+    px: f32,
+) {
+    let joints = skeleton.joints.len().max(1);
+    for joint in 0..params.shape().total_joints() {
+        let selected = session.joint == Some(joint);
+        let side = skeleton.side(joint % joints);
+        let color = if side == Side::Middle { tokens.text } else { tokens.side(side) };
+        let opacity = (0.25 + 0.6 * params.opacity(joint) as f32).min(0.9);
+        let alpha = if selected { 0.95 } else { opacity };
+        scene.splats.push(SplatInstance {
+            center: params.position(joint).map(|x| x as f32),
+            covariance: covariance(params, joint),
+            color: rgba(if selected { tokens.warn } else { color }, alpha),
+            id: joint as u32,
+        });
+        if selected {
+            labels.push((vec3(params.position(joint)), skeleton.shown_name(joint % joints), tokens.text));
+        }
+        if let Some(text) = side_letter(&skeleton.joints[joint % joints], side) {
+            labels.push((vec3(params.position(joint)), text.into(), color));
+        }
+    }
+    let positions: Vec<_> = (0..params.shape().total_joints()).map(|j| params.position(j)).collect();
+    bones(&mut scene.lines, skeleton, &positions, &|side| Stroke {
+        color: rgba(if side == Side::Middle { tokens.dim } else { tokens.side(side) }, 1.0),
+        width_px: 2.0 * px,
+    });
+}
+
+/// L and R are printed at the wrists and ankles: the sides must be readable without colours.
+fn side_letter(name: &str, side: Side) -> Option<&'static str> {
+    let end = name.ends_with("wrist") || name.ends_with("ankle");
+    match side {
+        Side::Left if end => Some("L"),
+        Side::Right if end => Some("R"),
+        _ => None,
+    }
+}
+
+/// Σ = R S Sᵀ Rᵀ as xx, xy, xz, yy, yz, zz, m²; SPEC section 2.
+fn covariance(params: &Pppr, joint: usize) -> [f32; 6] {
+    let r = rotation_from_quaternion(params.rotation(joint));
+    let s = params.scale(joint);
+    let entry = |i: usize, k: usize| (0..3).map(|c| r[i][c] * s[c] * s[c] * r[k][c]).sum::<f64>() as f32;
+    [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)]
+}
+
+fn bones(lines: &mut Vec<LineInstance>, skeleton: &Skeleton, positions: &[geometry::Vec3], stroke: &dyn Fn(Side) -> Stroke) {
+    for person in positions.chunks_exact(skeleton.joints.len().max(1)) {
+        for &bone in &skeleton.bones {
+            if let (Some(&a), Some(&b)) = (person.get(bone[0]), person.get(bone[1])) {
+                lines.push(stroke(skeleton.bone_side(bone)).line(vec3(a), vec3(b)));
+            }
+        }
+    }
+}
+
+fn velocities(scene: &mut Scene, params: &Pppr, skeleton: &Skeleton, camera: &Camera, tokens: &Tokens, px: f32) {
+    for joint in 0..params.shape().total_joints() {
+        let velocity = vec3(params.velocity(joint)) * VELOCITY_S;
+        if velocity.length() > 0.01 {
+            let side = skeleton.side(joint % skeleton.joints.len().max(1));
+            let stroke = Stroke { color: rgba(tokens.side(side), 1.0), width_px: 1.5 * px };
+            let from = vec3(params.position(joint));
+            scene.lines.extend(shapes::arrow(from, from + velocity, camera.eye(), stroke));
+        }
+    }
+}
+
+/// −∂L/∂p split into its parts: what each term wants of each joint. The longest is [`GRADIENT_M`] long.
+#[expect(clippy::too_many_arguments, reason = "a picture of six inputs")]
+fn gradients(
+    scene: &mut Scene,
+    params: &Pppr,
+    total: &Pppr,
+    em: &Pppr,
+    config: &crate::config::FitConfig,
+    camera: &Camera,
+    tokens: &Tokens,
+    px: f32,
+) {
+    let parts: Vec<[geometry::Vec3; 2]> = (0..params.shape().total_joints())
+        .map(|joint| {
+            let em = geometry::scale(em.vec3(Group::Position, joint), -config.w_em);
+            let all = geometry::scale(total.vec3(Group::Position, joint), -1.0);
+            [em, geometry::sub(all, em)]
+        })
+        .collect();
+    let longest = parts.iter().flatten().map(|v| geometry::norm(*v)).fold(0.0, f64::max);
+    if longest <= 0.0 || !longest.is_finite() {
+        return;
+    }
+    for (joint, part) in parts.iter().enumerate() {
+        let from = vec3(params.position(joint));
+        for (v, color) in part.iter().zip([tokens.curve("em"), tokens.curve("bone")]) {
+            let arrow = vec3(geometry::scale(*v, GRADIENT_M / longest));
+            if arrow.length() > 0.01 {
+                let stroke = Stroke { color: rgba(color, 1.0), width_px: 2.0 * px };
+                scene.overlay.extend(shapes::arrow(from, from + arrow, camera.eye(), stroke));
+            }
+        }
+    }
+}
+
+/// A grid below the lowest joint of the start pose, so that it does not move while fitting.
+fn ground(session: &Session, tokens: &Tokens, px: f32) -> Vec<LineInstance> {
+    let lowest = session
+        .fit
+        .initial
+        .as_ref()
+        .map_or(-1.0, |p| (0..p.shape().total_joints()).map(|j| p.position(j)[2]).fold(f64::INFINITY, f64::min));
+    let z = if lowest.is_finite() { (lowest as f32 - 0.08).min(0.0) } else { -1.0 };
+    let minor = Stroke { color: rgba(tokens.stroke, 0.9), width_px: px };
+    let major = Stroke { color: rgba(tokens.dim, 0.45), width_px: px };
+    shapes::grid((0, 8), (-3, 3), z, minor, major)
+}
+
+/// The radar, and its field of view as wide as the data set's angular axes say, else ±60° and ±30°.
+fn radar(session: &Session, tokens: &Tokens, px: f32) -> Vec<LineInstance> {
+    let widest = |kinds: &[AxisKind], otherwise: f64| {
+        let axes = session.data.dataset.iter().flat_map(|d| &d.info().views).flat_map(|v| &v.axes);
+        let of = axes.filter(|a| kinds.contains(&a.kind));
+        let ends = of.flat_map(|a| [a.value_at(0.0).abs(), a.value_at(a.bins as f64 - 1.0).abs()]);
+        let found = ends.fold(0.0, f64::max);
+        (if found > 0.0 { found } else { otherwise }).min(1.4) as f32
+    };
+    let azimuth = widest(&[AxisKind::Azimuth, AxisKind::Cone], 60f64.to_radians());
+    let elevation = widest(&[AxisKind::Elevation], 30f64.to_radians());
+    let line = Stroke { color: rgba(tokens.dim, 0.35), width_px: px };
+    let mut lines = shapes::frustum(azimuth, elevation, 1.2, line);
+    lines.extend(shapes::radar(0.18, Stroke { color: rgba(tokens.text, 0.9), width_px: 1.5 * px }));
+    lines.extend(shapes::triad(Vec3::ZERO, 0.3, 2.0 * px));
+    lines
+}

@@ -1,0 +1,149 @@
+//! The bottom strip: frames coloured by IoU with their transport, and the iterations with theirs.
+
+use super::Shared;
+use crate::app::theme::{self, Tokens};
+use crate::app::widgets::{icon_button, iou_color};
+use crate::session::Command;
+use egui::{Rect, RichText, Sense, Stroke, Ui, pos2, vec2};
+
+/// What the strip remembers.
+#[derive(Default)]
+pub(in crate::app) struct State {
+    drag_frame: Option<usize>,
+}
+
+/// Draws the strip at the bottom of the window.
+pub(in crate::app) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    let tokens = Tokens::of(ui);
+    let frame = egui::Frame::new().fill(tokens.panel).inner_margin(egui::Margin::symmetric(8, 4));
+    egui::Panel::bottom("timeline").exact_size(62.0).frame(frame).show(ui, |ui| {
+        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
+        ui.horizontal(|ui| frames(ui, shared, state, &tokens));
+        ui.horizontal(|ui| iterations(ui, shared, &tokens));
+    });
+}
+
+/// Width of the caption before each strip, so that both strips begin at the same place.
+const CAPTION: f32 = 70.0;
+/// Width of the numbers behind each strip.
+const NUMBERS: f32 = 118.0;
+
+fn caption(ui: &mut Ui, text: &str) {
+    ui.add_sized([CAPTION, 22.0], egui::Label::new(RichText::new(text).small()).halign(egui::Align::LEFT));
+}
+
+fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tokens) {
+    let (count, index, playing) = {
+        let data = &shared.session.data;
+        (data.len(), data.frame_index, data.playing)
+    };
+    caption(ui, "Frame");
+    let many = count > 1;
+    for (sign, name, label, enabled) in [
+        ("⏮", "First frame", "First frame", index > 0),
+        ("◂", "Previous frame", "Previous frame", index > 0),
+        (if playing { "⏸" } else { "▶" }, if playing { "Stop playing" } else { "Play frames" }, "Play frames", many),
+        ("▸", "Next frame", "Next frame", index + 1 < count),
+        ("⏭", "Last frame", "Last frame", index + 1 < count),
+    ] {
+        let tip = crate::app::commands::command(label).map(crate::app::commands::tooltip).unwrap_or_default();
+        if icon_button(ui, sign, name, &tip, enabled, playing && label == "Play frames").clicked() {
+            shared.invoke(label);
+        }
+    }
+    let (rect, response) = ui.allocate_exact_size(vec2((ui.available_width() - NUMBERS - 4.0).max(40.0), 22.0), Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::slider(many, index as f64, "Timeline"));
+    ui.painter().rect_filled(rect, 2.0, tokens.canvas);
+    if count > 0 {
+        strip(ui, shared, rect, count, tokens);
+        let at = |x: f32| (((x - rect.left()) / rect.width() * count as f32).floor().max(0.0) as usize).min(count - 1);
+        if let Some(pointer) = response.interact_pointer_pos().filter(|_| response.dragged() || response.clicked()) {
+            let wanted = at(pointer.x);
+            if state.drag_frame != Some(wanted) {
+                state.drag_frame = Some(wanted);
+                shared.send(Command::GotoFrame(wanted));
+            }
+        } else {
+            state.drag_frame = None;
+        }
+        let x = rect.left() + (index as f32 + 0.5) / count as f32 * rect.width();
+        ui.painter().vline(x, rect.y_range(), Stroke::new(2.0, tokens.accent));
+        if let (Some(pointer), Some(dataset)) = (response.hover_pos(), &shared.session.data.dataset) {
+            let i = at(pointer.x);
+            let summary = shared.session.summaries.get(&i);
+            let iou = summary.and_then(|s| s.iou).map_or_else(|| "not fitted".into(), |x| format!("IoU {x:.3}"));
+            response.on_hover_text_at_pointer(format!("{i} · {}\n{iou}", dataset.frame_name(i)));
+        }
+    }
+    ui.painter().rect_stroke(rect, 2.0, Stroke::new(1.0, tokens.stroke), egui::StrokeKind::Inside);
+    let text = if count == 0 { "—".into() } else { format!("{} / {}", index, count - 1) };
+    numbers(ui, &text, if shared.session.data.loading.is_some() { "reading…" } else { "" });
+}
+
+/// IoU of each fitted frame as a bar: its height and colour say the same.
+fn strip(ui: &Ui, shared: &Shared<'_>, rect: Rect, count: usize, tokens: &Tokens) {
+    let width = (rect.width() / count as f32).max(1.0);
+    for (&i, summary) in &shared.session.summaries {
+        if let Some(iou) = summary.iou {
+            let x = rect.left() + i as f32 / count as f32 * rect.width();
+            let height = (iou as f32).clamp(0.08, 1.0) * (rect.height() - 4.0);
+            let bar = Rect::from_min_max(pos2(x, rect.bottom() - 2.0 - height), pos2(x + width.max(2.0) - if width > 4.0 { 1.0 } else { 0.0 }, rect.bottom() - 2.0));
+            ui.painter().rect_filled(bar, 0.0, iou_color(tokens, iou));
+        }
+    }
+}
+
+fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
+    let fit = &shared.session.fit;
+    let (shown, head, running, ready, back) =
+        (fit.shown_iteration(), fit.head(), fit.is_running(), fit.is_ready(), fit.cursor.is_some());
+    let start = fit.branch().map_or(0, crate::session::Branch::start);
+    let flags: Vec<(usize, String)> = fit.branch().map_or_else(Vec::new, |b| b.flags.iter().map(|f| (f.iteration, f.text.clone())).collect());
+    caption(ui, "Iteration");
+    for (sign, name, label, enabled, active) in [
+        ("◂", "Iteration back", "One step back", ready && shown > start, false),
+        (if running { "⏸" } else { "▶" }, "Run or pause fit", "Run or pause", ready, running),
+        ("▸", "Iteration forward", "One step", ready && !(running && !back), false),
+        ("⏭", "Follow newest", "Follow newest iteration", back, false),
+    ] {
+        let tip = crate::app::commands::command(label).map(crate::app::commands::tooltip).unwrap_or_default();
+        if icon_button(ui, sign, name, &tip, enabled, active).clicked() {
+            shared.invoke(label);
+        }
+    }
+    ui.add_space(26.0 + 4.0);
+    let (rect, response) = ui.allocate_exact_size(vec2((ui.available_width() - NUMBERS - 4.0).max(40.0), 22.0), Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::slider(ready, shown as f64, "Iteration scrubber"));
+    let track = Rect::from_center_size(rect.center(), vec2(rect.width(), 4.0));
+    ui.painter().rect_filled(track, 2.0, tokens.stroke);
+    let span = (head - start).max(1) as f32;
+    let x_of = |k: usize| rect.left() + (k.saturating_sub(start)) as f32 / span * rect.width();
+    let target = shared.session.config.iterations;
+    if head > start {
+        let done = Rect::from_min_max(track.min, pos2(x_of(shown), track.max.y));
+        ui.painter().rect_filled(done, 2.0, tokens.accent.gamma_multiply(0.7));
+        ui.painter().circle_filled(pos2(x_of(shown), rect.center().y), 5.0, tokens.accent);
+    }
+    for (k, _) in &flags {
+        ui.painter().vline(x_of(*k), rect.y_range(), Stroke::new(1.0, tokens.warn));
+    }
+    if let Some(pointer) = response.interact_pointer_pos().filter(|_| response.dragged() || response.clicked()) {
+        let k = start + ((pointer.x - rect.left()) / rect.width() * span).round().max(0.0) as usize;
+        if k.min(head) != shown {
+            shared.send(Command::GotoIteration(k.min(head)));
+        }
+    }
+    response.on_hover_text("Drag to show an earlier iteration. Changing a setting there starts a branch.");
+    let rate = shared.session.fit.shown.as_ref().map_or(0.0, |s| s.iterations_per_s);
+    let side = if running && rate > 0.0 { format!("{rate:.0} it/s") } else if head < target && head > 0 { format!("of {target}") } else { String::new() };
+    numbers(ui, &format!("{shown} / {head}"), &side);
+    let _ = theme::GRID;
+}
+
+fn numbers(ui: &mut Ui, text: &str, side: &str) {
+    let tokens = Tokens::of(ui);
+    ui.allocate_ui_with_layout(vec2(NUMBERS, 22.0), egui::Layout::right_to_left(egui::Align::Center), |ui| {
+        ui.label(RichText::new(text).font(theme::mono(12.0)));
+        ui.label(RichText::new(side).small().color(tokens.dim));
+    });
+}

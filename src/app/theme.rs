@@ -1,0 +1,236 @@
+//! The look: tokens, fonts, spacing. Every colour of the window comes from here; only data is saturated.
+
+use crate::body::Side;
+use crate::session::ThemeChoice;
+use egui::{Color32, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Stroke, TextStyle, Visuals};
+use std::sync::Arc;
+
+/// Body text, points.
+pub const BODY: f32 = 13.0;
+/// Captions, ticks and dense tables, points.
+pub const CAPTION: f32 = 11.0;
+/// Pane titles, points.
+pub const TITLE: f32 = 14.0;
+/// The grid that distances are multiples of, points.
+pub const GRID: f32 = 4.0;
+
+/// The colours of one theme.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tokens {
+    /// Behind data.
+    pub canvas: Color32,
+    /// Behind controls.
+    pub panel: Color32,
+    /// Buttons, fields, selected rows.
+    pub raised: Color32,
+    /// Lines between things.
+    pub stroke: Color32,
+    /// Text.
+    pub text: Color32,
+    /// Secondary text.
+    pub dim: Color32,
+    /// Selection and focus.
+    pub accent: Color32,
+    /// Good.
+    pub ok: Color32,
+    /// Attention.
+    pub warn: Color32,
+    /// Wrong.
+    pub bad: Color32,
+    /// The person's left.
+    pub left: Color32,
+    /// The person's right.
+    pub right: Color32,
+    /// True in the dark theme.
+    pub dark: bool,
+}
+
+const fn rgb(hex: u32) -> Color32 {
+    Color32::from_rgb((hex >> 16) as u8, (hex >> 8) as u8, hex as u8)
+}
+
+/// The dark theme.
+pub const DARK: Tokens = Tokens {
+    canvas: rgb(0x101216),
+    panel: rgb(0x171A20),
+    raised: rgb(0x1F232B),
+    stroke: rgb(0x2B303A),
+    text: rgb(0xE6E8EB),
+    dim: rgb(0x9AA3AF),
+    accent: rgb(0x4DA3FF),
+    ok: rgb(0x5CC98B),
+    warn: rgb(0xF2B84B),
+    bad: rgb(0xF2655C),
+    left: rgb(0x4DA3FF),
+    right: rgb(0xFF9F45),
+    dark: true,
+};
+
+/// The light theme.
+pub const LIGHT: Tokens = Tokens {
+    canvas: rgb(0xFFFFFF),
+    panel: rgb(0xF5F6F8),
+    raised: rgb(0xFFFFFF),
+    stroke: rgb(0xD9DDE3),
+    text: rgb(0x1B1F24),
+    dim: rgb(0x5C6570),
+    accent: rgb(0x1769C2),
+    ok: rgb(0x1E8A52),
+    warn: rgb(0xA66A00),
+    bad: rgb(0xC6372E),
+    left: rgb(0x1769C2),
+    right: rgb(0xC25E00),
+    dark: false,
+};
+
+/// Mask overlay: cells in both masks, in H_ori's only, in H_sim's only.
+pub const MASK_BOTH: Color32 = Color32::from_rgb(0xFF, 0xFF, 0xFF);
+/// In H_ori's mask only.
+pub const MASK_ORI: Color32 = Color32::from_rgb(0xFF, 0x9F, 0x45);
+/// In H_sim's mask only.
+pub const MASK_SIM: Color32 = Color32::from_rgb(0x4D, 0xA3, 0xFF);
+/// Behind the masks, in both themes: white must be readable on it.
+pub const MASK_GROUND: Color32 = Color32::from_rgb(0x10, 0x12, 0x16);
+/// Cells that hold no number.
+pub const NAN_CELL: Color32 = Color32::from_rgb(0xB0, 0x3A, 0x9A);
+
+impl Tokens {
+    /// The tokens of the theme that `ui` is drawn in.
+    pub fn of(ui: &egui::Ui) -> Self {
+        if ui.visuals().dark_mode { DARK } else { LIGHT }
+    }
+
+    /// The colour of a side of the body.
+    pub fn side(&self, side: Side) -> Color32 {
+        match side {
+            Side::Left => self.left,
+            Side::Right => self.right,
+            Side::Middle => self.dim,
+        }
+    }
+
+    /// The colours of the curves, by name.
+    pub fn curve(&self, name: &str) -> Color32 {
+        let dark = self.dark;
+        let pick = |on_dark: u32, on_light: u32| rgb(if dark { on_dark } else { on_light });
+        match name {
+            "total" => self.text,
+            "em" => pick(0x4DA3FF, 0x1769C2),
+            "bone" => pick(0xFF9F45, 0xC25E00),
+            "rigid" => pick(0xC792EA, 0x7A3DB8),
+            "joint" => pick(0x5CC98B, 0x1E8A52),
+            "sep" => pick(0xF2B84B, 0xA66A00),
+            "coll" => pick(0xF2655C, 0xC6372E),
+            "majpe" => pick(0x7FDBDA, 0x0B7A78),
+            "iou 0" => pick(0x8BD17C, 0x2E7D1E),
+            _ => pick(0xE58FB1, 0xA33266),
+        }
+    }
+}
+
+/// Numbers: tabular figures.
+pub fn mono(size: f32) -> FontId {
+    FontId::new(size, FontFamily::Monospace)
+}
+
+/// Text that names a pane.
+pub fn strong(size: f32) -> FontId {
+    FontId::new(size, FontFamily::Name("semibold".into()))
+}
+
+/// Loads the fonts and sets both themes.
+pub fn install(ctx: &egui::Context) {
+    ctx.set_fonts(fonts());
+    for (theme, tokens) in [(egui::Theme::Dark, DARK), (egui::Theme::Light, LIGHT)] {
+        ctx.style_mut_of(theme, |style| {
+            style.visuals = visuals(&tokens);
+            style.text_styles = [
+                (TextStyle::Body, FontId::new(BODY, FontFamily::Proportional)),
+                (TextStyle::Button, FontId::new(BODY, FontFamily::Proportional)),
+                (TextStyle::Small, FontId::new(CAPTION, FontFamily::Proportional)),
+                (TextStyle::Heading, strong(TITLE)),
+                (TextStyle::Monospace, mono(12.0)),
+            ]
+            .into();
+            let space = &mut style.spacing;
+            space.item_spacing = egui::vec2(2.0 * GRID, GRID);
+            space.button_padding = egui::vec2(2.0 * GRID, 3.0);
+            space.interact_size = egui::vec2(40.0, 22.0);
+            space.slider_width = 120.0;
+            space.combo_width = 96.0;
+            space.menu_margin = Margin::same(6);
+            space.tooltip_width = 380.0;
+            space.scroll = egui::style::ScrollStyle { bar_width: 8.0, ..egui::style::ScrollStyle::thin() };
+            style.interaction.tooltip_delay = 0.4;
+            style.animation_time = 0.0;
+        });
+    }
+}
+
+/// Applies the chosen theme.
+pub fn apply(ctx: &egui::Context, choice: ThemeChoice) {
+    ctx.set_theme(match choice {
+        ThemeChoice::Dark => egui::ThemePreference::Dark,
+        ThemeChoice::Light => egui::ThemePreference::Light,
+        ThemeChoice::System => egui::ThemePreference::System,
+    });
+}
+
+fn fonts() -> FontDefinitions {
+    let mut fonts = FontDefinitions::default();
+    let files: [(&str, &'static [u8]); 3] = [
+        ("Inter", include_bytes!("../../assets/fonts/Inter-Regular.ttf")),
+        ("Inter semibold", include_bytes!("../../assets/fonts/Inter-SemiBold.ttf")),
+        ("JetBrains Mono", include_bytes!("../../assets/fonts/JetBrainsMono-Regular.ttf")),
+    ];
+    for (name, bytes) in files {
+        fonts.font_data.insert(name.into(), Arc::new(FontData::from_static(bytes)));
+    }
+    let fallback = fonts.families.get(&FontFamily::Proportional).cloned().unwrap_or_default();
+    let family = |first: &[&str]| first.iter().map(ToString::to_string).chain(fallback.iter().cloned()).collect();
+    fonts.families.insert(FontFamily::Proportional, family(&["Inter", "JetBrains Mono"]));
+    fonts.families.insert(FontFamily::Monospace, family(&["JetBrains Mono", "Inter"]));
+    fonts.families.insert(FontFamily::Name("semibold".into()), family(&["Inter semibold", "JetBrains Mono"]));
+    fonts
+}
+
+fn visuals(t: &Tokens) -> Visuals {
+    let mut v = if t.dark { Visuals::dark() } else { Visuals::light() };
+    let round = CornerRadius::same(3);
+    v.override_text_color = None;
+    v.panel_fill = t.panel;
+    v.window_fill = t.panel;
+    v.extreme_bg_color = t.canvas;
+    v.faint_bg_color = t.raised;
+    v.code_bg_color = t.raised;
+    v.window_stroke = Stroke::new(1.0, t.stroke);
+    v.window_corner_radius = CornerRadius::same(6);
+    v.menu_corner_radius = CornerRadius::same(4);
+    v.hyperlink_color = t.accent;
+    v.warn_fg_color = t.warn;
+    v.error_fg_color = t.bad;
+    v.selection.bg_fill = t.accent.gamma_multiply(if t.dark { 0.35 } else { 0.25 });
+    v.selection.stroke = Stroke::new(1.0, t.text);
+    v.slider_trailing_fill = true;
+    v.weak_text_color = Some(t.dim);
+    v.popup_shadow.blur = 8;
+    v.window_shadow.blur = 12;
+    let w = &mut v.widgets;
+    for (state, fill, stroke, text) in [
+        (&mut w.noninteractive, t.panel, t.stroke, t.text),
+        (&mut w.inactive, t.raised, t.stroke, t.text),
+        (&mut w.hovered, t.stroke, t.dim, t.text),
+        (&mut w.active, t.stroke, t.accent, t.text),
+        (&mut w.open, t.raised, t.stroke, t.text),
+    ] {
+        state.bg_fill = fill;
+        state.weak_bg_fill = fill;
+        state.bg_stroke = Stroke::new(1.0, stroke);
+        state.fg_stroke = Stroke::new(1.0, text);
+        state.corner_radius = round;
+        state.expansion = 0.0;
+    }
+    // The track of a slider and the box of a check mark must be seen against the panel.
+    w.inactive.bg_fill = t.stroke;
+    v
+}

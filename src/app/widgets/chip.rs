@@ -1,0 +1,52 @@
+//! Chips, icon buttons and rows of a name and a number.
+
+use crate::app::theme::{self, Tokens};
+use egui::{Color32, Response, RichText, Sense, Ui, WidgetInfo};
+
+/// A word in a rounded frame.
+pub(crate) fn chip(ui: &mut Ui, text: &str, color: Color32) -> Response {
+    egui::Frame::new()
+        .stroke(egui::Stroke::new(1.0, color))
+        .corner_radius(3)
+        .inner_margin(egui::Margin::symmetric(4, 0))
+        .show(ui, |ui| ui.label(RichText::new(text).small().color(color)))
+        .response
+}
+
+/// The colour of an IoU: bad, attention, good. The number beside it says the same.
+pub(crate) fn iou_color(tokens: &Tokens, iou: f64) -> Color32 {
+    if iou >= 0.5 {
+        tokens.ok
+    } else if iou >= 0.3 {
+        tokens.warn
+    } else {
+        tokens.bad
+    }
+}
+
+/// A square button with a sign on it and a spoken name.
+pub(crate) fn icon_button(ui: &mut Ui, sign: &str, name: &str, tooltip: &str, enabled: bool, active: bool) -> Response {
+    let tokens = Tokens::of(ui);
+    let text = RichText::new(sign).font(theme::mono(theme::BODY));
+    let mut button = egui::Button::new(text).min_size(egui::vec2(26.0, 22.0)).sense(Sense::click());
+    if active {
+        button = button.fill(tokens.accent.gamma_multiply(0.35));
+    }
+    let response = ui.add_enabled(enabled, button);
+    let name = name.to_owned();
+    response.widget_info(move || WidgetInfo::labeled(egui::Role::Button, enabled, &name));
+    response.on_hover_text(tooltip).on_disabled_hover_text(tooltip)
+}
+
+/// A name at the left and a number with its unit at the right edge, in tabular figures.
+pub(crate) fn value_row(ui: &mut Ui, name: &str, value: &str, unit: &str) -> Response {
+    let tokens = Tokens::of(ui);
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(name).color(tokens.dim));
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.add_sized([26.0, 16.0], egui::Label::new(RichText::new(unit).small().color(tokens.dim)));
+            ui.label(RichText::new(value).font(theme::mono(12.0)));
+        });
+    })
+    .response
+}

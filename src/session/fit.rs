@@ -1,0 +1,90 @@
+//! The fit of the frame on screen.
+
+use super::history::{Branch, History, Row};
+use crate::body::Pppr;
+use crate::config::FitConfig;
+use crate::mhp::{Initialisation, Problem};
+use crate::worker::{JobId, Snapshot};
+use std::sync::Arc;
+
+/// What the worker is doing for this frame.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum FitStatus {
+    /// No frame, or no fit asked for.
+    #[default]
+    Idle,
+    /// Maps are being filled and a start pose sought.
+    Preparing,
+    /// Ready to step.
+    Paused,
+    /// Stepping.
+    Running,
+    /// It cannot go on; the text says why.
+    Failed(String),
+}
+
+/// The fit of one frame. Without a problem it is still being prepared.
+#[derive(Debug, Clone, Default)]
+pub struct Fit {
+    /// The worker's job.
+    pub job: JobId,
+    /// The data set's frame.
+    pub frame: usize,
+    /// What is going on.
+    pub status: FitStatus,
+    /// Filled maps, views, skeleton.
+    pub problem: Option<Arc<Problem>>,
+    /// The pose that fixes the EM region.
+    pub initial: Option<Pppr>,
+    /// How the start pose was found.
+    pub initialisation: Option<Initialisation>,
+    /// Milliseconds that took.
+    pub init_ms: f64,
+    /// Milliseconds of the last run.
+    pub run_ms: Option<f64>,
+    /// Why the last run ended, in words.
+    pub reason: Option<&'static str>,
+    /// Every step.
+    pub history: History,
+    /// An earlier iteration of the active branch that is being looked at; `None` follows the newest.
+    pub cursor: Option<usize>,
+    /// What is drawn.
+    pub shown: Option<Arc<Snapshot>>,
+}
+
+impl Fit {
+    /// The active branch.
+    pub fn branch(&self) -> Option<&Branch> {
+        self.history.active()
+    }
+
+    /// The newest iteration of the active branch.
+    pub fn head(&self) -> usize {
+        self.branch().map_or(0, Branch::head)
+    }
+
+    /// The iteration that is looked at.
+    pub fn shown_iteration(&self) -> usize {
+        self.cursor.unwrap_or_else(|| self.head())
+    }
+
+    /// The row that is looked at.
+    pub fn shown_row(&self) -> Option<&Row> {
+        self.branch()?.row(self.shown_iteration())
+    }
+
+    /// True where commands to the optimiser make sense.
+    pub fn is_ready(&self) -> bool {
+        matches!(self.status, FitStatus::Paused | FitStatus::Running)
+    }
+
+    /// True while stepping.
+    pub fn is_running(&self) -> bool {
+        self.status == FitStatus::Running
+    }
+
+    /// The settings in force at the iteration that is looked at.
+    pub fn shown_config(&self) -> Option<FitConfig> {
+        self.branch().map(|branch| branch.config_at(self.shown_iteration()))
+    }
+}

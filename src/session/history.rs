@@ -1,0 +1,271 @@
+//! Every step of a fit: reports for the curves, states to go back to, branches that began at an earlier state.
+
+use crate::config::{FIELDS, FitConfig};
+use crate::mhp::{FitState, StepReport};
+use std::sync::Arc;
+
+/// Bytes of states that one fit may keep; beyond it every second state is forgotten (its report stays).
+pub const STATE_BUDGET: usize = 128 << 20;
+
+/// One iteration.
+#[derive(Debug, Clone)]
+pub struct Row {
+    /// Loss, terms, IoU.
+    pub report: StepReport,
+    /// Parameters and Adam moments; `None` where thinned out.
+    pub state: Option<Arc<FitState>>,
+    /// Mean absolute joint position error, mm, where there is truth.
+    pub majpe_mm: Option<f64>,
+}
+
+/// A hyperparameter changed here.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flag {
+    /// The last iteration with the old settings.
+    pub iteration: usize,
+    /// What changed, in words.
+    pub text: String,
+    /// The settings from there on.
+    pub config: FitConfig,
+}
+
+/// A line of iterations.
+#[derive(Debug, Clone)]
+pub struct Branch {
+    /// Its number; 0 is the first.
+    pub id: u32,
+    /// The branch and iteration that it began at.
+    pub parent: Option<(u32, usize)>,
+    /// Settings at its beginning.
+    pub config: FitConfig,
+    /// Iterations, ascending and without holes.
+    pub rows: Vec<Row>,
+    /// Changes of settings.
+    pub flags: Vec<Flag>,
+}
+
+impl Branch {
+    /// The first iteration.
+    pub fn start(&self) -> usize {
+        self.rows.first().map_or(0, |row| row.report.iteration)
+    }
+
+    /// The last iteration.
+    pub fn head(&self) -> usize {
+        self.rows.last().map_or(0, |row| row.report.iteration)
+    }
+
+    /// The row of an iteration.
+    pub fn row(&self, iteration: usize) -> Option<&Row> {
+        self.rows.get(iteration.checked_sub(self.start())?)
+    }
+
+    /// The last iteration at or before `iteration` whose state is kept.
+    pub fn state_at(&self, iteration: usize) -> Option<(usize, &Arc<FitState>)> {
+        let last = iteration.checked_sub(self.start())?.min(self.rows.len().checked_sub(1)?);
+        self.rows.get(..=last)?.iter().rev().find_map(|r| r.state.as_ref().map(|s| (r.report.iteration, s)))
+    }
+
+    /// The settings in force at an iteration.
+    pub fn config_at(&self, iteration: usize) -> FitConfig {
+        self.flags.iter().rev().find(|flag| flag.iteration < iteration).map_or(self.config, |flag| flag.config)
+    }
+
+    /// The newest settings.
+    pub fn newest_config(&self) -> FitConfig {
+        self.flags.last().map_or(self.config, |flag| flag.config)
+    }
+}
+
+/// All branches of one fit.
+#[derive(Debug, Clone, Default)]
+pub struct History {
+    branches: Vec<Branch>,
+    active: u32,
+    next_id: u32,
+    state_bytes: usize,
+}
+
+impl History {
+    /// A history with an empty first branch.
+    pub fn new(config: FitConfig) -> Self {
+        let mut history = Self::default();
+        history.begin(None, config);
+        history
+    }
+
+    /// Starts a branch, makes it the active one and answers its number.
+    pub fn begin(&mut self, parent: Option<(u32, usize)>, config: FitConfig) -> u32 {
+        let id = self.next_id;
+        self.next_id += 1;
+        self.branches.push(Branch { id, parent, config, rows: Vec::new(), flags: Vec::new() });
+        self.active = id;
+        id
+    }
+
+    /// All branches in the order they began.
+    pub fn branches(&self) -> &[Branch] {
+        &self.branches
+    }
+
+    /// A branch by number.
+    pub fn branch(&self, id: u32) -> Option<&Branch> {
+        self.branches.iter().find(|branch| branch.id == id)
+    }
+
+    /// The branch that a run continues.
+    pub fn active(&self) -> Option<&Branch> {
+        self.branch(self.active)
+    }
+
+    /// Number of the active branch.
+    pub fn active_id(&self) -> u32 {
+        self.active
+    }
+
+    /// Makes another branch the active one.
+    pub fn activate(&mut self, id: u32) {
+        if self.branch(id).is_some() {
+            self.active = id;
+        }
+    }
+
+    /// Removes a branch that has a parent, and those that began on it; the parent becomes active.
+    pub fn discard(&mut self, id: u32) -> Option<(u32, usize)> {
+        let parent = self.branch(id)?.parent?;
+        let mut gone = vec![id];
+        loop {
+            let more: Vec<u32> = self
+                .branches
+                .iter()
+                .filter(|b| b.parent.is_some_and(|(p, _)| gone.contains(&p)) && !gone.contains(&b.id))
+                .map(|b| b.id)
+                .collect();
+            if more.is_empty() {
+                break;
+            }
+            gone.extend(more);
+        }
+        self.branches.retain(|branch| !gone.contains(&branch.id));
+        self.active = parent.0;
+        self.recount();
+        Some(parent)
+    }
+
+    /// Keeps only iteration 0 of the first branch.
+    pub fn keep_start(&mut self) {
+        self.branches.truncate(1);
+        if let Some(first) = self.branches.first_mut() {
+            first.rows.truncate(1);
+            first.config = first.flags.last().map_or(first.config, |flag| flag.config);
+            first.flags.clear();
+            self.active = first.id;
+        }
+        self.recount();
+    }
+
+    /// Appends a row. A second row of the same iteration replaces the first one only where a branch begins (an edit by
+    /// hand, or settings changed before the first step); otherwise history is never rewritten.
+    pub fn push(&mut self, branch: u32, row: Row) {
+        let bytes = row.state.as_ref().map_or(0, |state| state.bytes());
+        let Some(branch) = self.branches.iter_mut().find(|b| b.id == branch) else { return };
+        match branch.rows.last() {
+            Some(last) if last.report.iteration == row.report.iteration => {
+                if branch.rows.len() == 1 {
+                    branch.rows[0] = row;
+                }
+            }
+            Some(last) if last.report.iteration + 1 != row.report.iteration => {}
+            _ => {
+                branch.rows.push(row);
+                self.state_bytes += bytes;
+                if self.state_bytes > STATE_BUDGET {
+                    self.thin();
+                }
+            }
+        }
+    }
+
+    /// Records changed settings.
+    pub fn flag(&mut self, branch: u32, iteration: usize, config: FitConfig) {
+        let Some(branch) = self.branches.iter_mut().find(|b| b.id == branch) else { return };
+        if branch.rows.len() <= 1 {
+            branch.config = config;
+            branch.flags.clear();
+            return;
+        }
+        // A slider sends many values between two steps: one flag is what took effect.
+        if branch.flags.last().is_some_and(|flag| flag.iteration == iteration) {
+            branch.flags.pop();
+        }
+        let old = branch.newest_config();
+        let text = difference(&old, &config);
+        if !text.is_empty() {
+            branch.flags.push(Flag { iteration, text, config });
+        }
+    }
+
+    /// Forgets every second state except each branch's first and last.
+    fn thin(&mut self) {
+        for branch in &mut self.branches {
+            let last = branch.rows.len().saturating_sub(1);
+            let mut kept = 0;
+            for (i, row) in branch.rows.iter_mut().enumerate() {
+                if row.state.is_some() {
+                    kept += 1;
+                    if kept % 2 == 0 && i != last {
+                        row.state = None;
+                    }
+                }
+            }
+        }
+        self.recount();
+    }
+
+    fn recount(&mut self) {
+        self.state_bytes =
+            self.branches.iter().flat_map(|b| &b.rows).filter_map(|r| r.state.as_ref()).map(|s| s.bytes()).sum();
+    }
+}
+
+/// What differs between two configurations, in words: `τ_pct 10 → 15`.
+pub fn difference(old: &FitConfig, new: &FitConfig) -> String {
+    let mut parts: Vec<String> = FIELDS
+        .iter()
+        .filter(|field| (field.get)(old) != (field.get)(new))
+        .map(|field| format!("{} {} → {}", field.label, short((field.get)(old)), short((field.get)(new))))
+        .collect();
+    if old.summation != new.summation {
+        parts.push(format!("sum {:?} → {:?}", old.summation, new.summation).to_lowercase());
+    }
+    if old.em_region != new.em_region {
+        parts.push("EM region changed".into());
+    }
+    if old.operators != new.operators {
+        let pairs = [
+            ("attenuation", old.operators.attenuation, new.operators.attenuation),
+            ("range", old.operators.range, new.operators.range),
+            ("Doppler", old.operators.doppler, new.operators.doppler),
+            ("angle", old.operators.angle, new.operators.angle),
+        ];
+        for (name, was, is) in pairs {
+            if was != is {
+                parts.push(format!("{name} {}", if is { "on" } else { "off" }));
+            }
+        }
+    }
+    if old.stop_when_converged != new.stop_when_converged {
+        parts.push(format!("stop when converged {}", if new.stop_when_converged { "on" } else { "off" }));
+    }
+    parts.join(", ")
+}
+
+/// A number with at most four significant digits.
+fn short(x: f64) -> String {
+    if x == 0.0 {
+        return "0".into();
+    }
+    let digits = (3 - x.abs().log10().floor() as i32).clamp(0, 9) as usize;
+    let text = format!("{x:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}

@@ -1,0 +1,131 @@
+//! The session's fields.
+
+use super::fit::Fit;
+use super::view::ViewState;
+use crate::config::FitConfig;
+use crate::dataset::{BareCatalog, Dataset, Frame};
+use crate::mhp::Precision;
+use crate::worker::JobId;
+use std::collections::{BTreeMap, VecDeque};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Lines the log keeps.
+pub(super) const LOG_LINES: usize = 2000;
+/// Entries of the recent list.
+pub(super) const RECENT: usize = 12;
+
+/// How bad a log line is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LogLevel {
+    /// For information.
+    Info,
+    /// Something was assumed or repaired.
+    Warning,
+    /// Something could not be done.
+    Error,
+}
+
+/// A line of the log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogLine {
+    /// When.
+    pub at: std::time::SystemTime,
+    /// How bad.
+    pub level: LogLevel,
+    /// What.
+    pub text: String,
+}
+
+/// A data set that is being opened.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Opening {
+    /// What was asked for.
+    pub path: PathBuf,
+    /// What it is doing.
+    pub stage: String,
+    /// Done so far.
+    pub done: u64,
+    /// Of how many; 0 where unknown.
+    pub total: u64,
+}
+
+/// The data side.
+#[derive(Debug, Default)]
+pub struct Data {
+    /// The open data set.
+    pub dataset: Option<Arc<Dataset>>,
+    /// One that is being opened; the old one stays on screen until it is there.
+    pub opening: Option<Opening>,
+    /// A bare file whose axes must be told.
+    pub bare: Option<(PathBuf, BareCatalog)>,
+    /// The frame that was asked for.
+    pub frame_index: usize,
+    /// The frame on screen.
+    pub frame: Option<Arc<Frame>>,
+    /// A frame that is being read.
+    pub loading: Option<usize>,
+    /// Why the asked frame is not on screen.
+    pub error: Option<String>,
+    /// Recently opened, newest first.
+    pub recent: Vec<PathBuf>,
+    /// Frames are playing.
+    pub playing: bool,
+}
+
+impl Data {
+    /// Number of frames.
+    pub fn len(&self) -> usize {
+        self.dataset.as_ref().map_or(0, |dataset| dataset.len())
+    }
+
+    /// True where there is no frame.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// What is known of a frame's fit, for the list and the timeline.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameSummary {
+    /// Iterations done.
+    pub iterations: usize,
+    /// L.
+    pub loss: f64,
+    /// Mean forward-consistency IoU over the views.
+    pub iou: Option<f64>,
+    /// The convergence criterion.
+    pub converged: bool,
+    /// MAJPE, mm, where there is truth.
+    pub majpe_mm: Option<f64>,
+}
+
+/// Everything behind the window.
+#[derive(Debug, Default)]
+pub struct Session {
+    /// Data set and frame.
+    pub data: Data,
+    /// The fit of the frame on screen.
+    pub fit: Fit,
+    /// Fits of other frames that were left, to be found again.
+    pub fits: BTreeMap<usize, Fit>,
+    /// Frames in the order they were left, oldest first: the oldest fits are forgotten first.
+    pub(super) left: VecDeque<usize>,
+    /// One line a fitted frame.
+    pub summaries: BTreeMap<usize, FrameSummary>,
+    /// Settings.
+    pub config: FitConfig,
+    /// Scalar of the kernel.
+    pub precision: Precision,
+    /// Start the next frame from this one's result.
+    pub warm_start: bool,
+    /// The selected joint (flat index).
+    pub joint: Option<usize>,
+    /// How things are shown.
+    pub view: ViewState,
+    /// The log, oldest first.
+    pub log: VecDeque<LogLine>,
+    /// The newest error, for a notification; counts up so that the same text twice is told twice.
+    pub notice: Option<(u64, LogLevel, String)>,
+    pub(super) jobs: JobId,
+}

@@ -1,0 +1,173 @@
+//! How things are shown: kept over frame changes and restarts, never touched by a fit.
+
+use serde::{Deserialize, Serialize};
+
+/// Light, dark, or whatever the desktop says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum ThemeChoice {
+    /// Dark.
+    #[default]
+    Dark,
+    /// Light.
+    Light,
+    /// The desktop's choice.
+    System,
+}
+
+/// Linear values or decibels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum MapScale {
+    /// 20 log₁₀ of an amplitude, 10 log₁₀ of a power, relative to the map's maximum.
+    #[default]
+    Decibel,
+    /// The stored value, divided by the map's maximum.
+    Linear,
+}
+
+/// How the limits of the colour bar are found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum ColorRange {
+    /// Percentiles of H_ori inside the map, shared by H_sim and kept over the steps of a run.
+    Percentile {
+        /// Lower percentile, 0..100.
+        lo: f64,
+        /// Upper percentile, 0..100.
+        hi: f64,
+    },
+    /// Fixed limits in shown units.
+    Fixed {
+        /// Lower limit.
+        lo: f64,
+        /// Upper limit.
+        hi: f64,
+    },
+}
+
+impl Default for ColorRange {
+    fn default() -> Self {
+        Self::Percentile { lo: 2.0, hi: 99.8 }
+    }
+}
+
+/// What the H_sim pane shows against H_ori.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Compare {
+    /// H_sim alone; hold Shift for H_ori.
+    #[default]
+    Flip,
+    /// H_ori left of a line that can be dragged, H_sim right of it.
+    Wipe,
+    /// H_sim − H_ori, both relative to their maxima, diverging colours about zero.
+    Difference,
+}
+
+/// How the Gaussians are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum SplatMode {
+    /// Alpha-blended splats.
+    #[default]
+    Splat,
+    /// Opaque ellipsoids.
+    Ellipsoid,
+}
+
+/// Order of the frame list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum FrameSort {
+    /// As in the data set.
+    #[default]
+    Index,
+    /// Lowest mean IoU first; frames without a fit last.
+    Iou,
+}
+
+/// Everything about the view that a person sets.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ViewState {
+    /// Light or dark.
+    pub theme: ThemeChoice,
+    /// Linear or dB.
+    pub scale: MapScale,
+    /// Limits of the colour bar.
+    pub range: ColorRange,
+    /// H_sim uses H_ori's limits.
+    pub shared_range: bool,
+    /// Name of the colour map, in lower case.
+    pub colormap: String,
+    /// What the H_sim pane shows.
+    pub compare: Compare,
+    /// Where the wipe's line is, 0..1 of the map's width.
+    pub wipe: f32,
+    /// Draw the EM region on the maps.
+    pub show_region: bool,
+    /// Draw the joints and bones on the maps.
+    pub show_skeleton: bool,
+    /// Draw labelled boxes on the maps.
+    pub show_boxes: bool,
+    /// Hatch cells outside the colour range.
+    pub show_clipped: bool,
+    /// Opacity of the mask overlay over H_ori.
+    pub mask_opacity: f32,
+    /// Splats or ellipsoids.
+    pub splat_mode: SplatMode,
+    /// Gaussians are drawn up to this many standard deviations.
+    pub splat_sigma: f32,
+    /// Draw velocity arrows.
+    pub show_velocity: bool,
+    /// Draw the truth skeleton.
+    pub show_truth: bool,
+    /// Draw the ground grid.
+    pub show_grid: bool,
+    /// Draw the radar's field of view.
+    pub show_frustum: bool,
+    /// Draw the start pose.
+    pub show_initial: bool,
+    /// Draw the negative gradients as arrows at the joints.
+    pub show_gradients: bool,
+    /// Log₁₀ of the losses.
+    pub log_loss: bool,
+    /// Curves switched off, by name.
+    pub hidden_curves: Vec<String>,
+    /// Frames a second when playing; 0 takes the data set's rate.
+    pub play_fps: f64,
+    /// Order of the frame list.
+    pub frame_sort: FrameSort,
+    /// Scale of the whole interface.
+    pub zoom: f32,
+    /// Begin to fit a frame as soon as it is shown.
+    pub run_on_open: bool,
+}
+
+impl Default for ViewState {
+    fn default() -> Self {
+        Self {
+            theme: ThemeChoice::default(),
+            scale: MapScale::default(),
+            range: ColorRange::default(),
+            shared_range: true,
+            colormap: "viridis".into(),
+            compare: Compare::default(),
+            wipe: 0.5,
+            show_region: true,
+            show_skeleton: true,
+            show_boxes: true,
+            show_clipped: false,
+            mask_opacity: 0.65,
+            splat_mode: SplatMode::default(),
+            splat_sigma: 2.0,
+            show_velocity: true,
+            show_truth: true,
+            show_grid: true,
+            show_frustum: true,
+            show_initial: false,
+            show_gradients: false,
+            log_loss: true,
+            hidden_curves: Vec::new(),
+            play_fps: 0.0,
+            frame_sort: FrameSort::default(),
+            zoom: 1.0,
+            run_on_open: false,
+        }
+    }
+}

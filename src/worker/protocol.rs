@@ -1,0 +1,179 @@
+//! What the window and the worker say to each other.
+
+use crate::body::{Pppr, Skeleton};
+use crate::config::FitConfig;
+use crate::dataset::Frame;
+use crate::mhp::{Evaluation, FitState, Initialisation, Masks, Precision, Problem, StepReport, StopReason};
+use crate::radar::{RadarConfig, View};
+use std::sync::Arc;
+
+/// Identifies one fit of one frame; messages of an older job are dropped.
+pub type JobId = u64;
+
+/// Where a fit begins.
+#[derive(Debug, Clone)]
+pub enum Start {
+    /// From the map's peaks.
+    Initialise,
+    /// From these parameters (the previous frame's).
+    Warm(Pppr),
+    /// From a state of an earlier session with the same frame; `initial` fixes the EM region.
+    Resume {
+        /// The initial pose of that fit.
+        initial: Pppr,
+        /// Where it stood.
+        state: Arc<FitState>,
+    },
+}
+
+/// Everything a job needs.
+#[derive(Debug, Clone)]
+pub struct Prepare {
+    /// The new job.
+    pub job: JobId,
+    /// The branch that its rows belong to.
+    pub branch: u32,
+    /// The data set's radar.
+    pub radar: RadarConfig,
+    /// The data set's skeleton.
+    pub skeleton: Skeleton,
+    /// The data set's views.
+    pub views: Vec<View>,
+    /// The frame.
+    pub frame: Arc<Frame>,
+    /// Settings.
+    pub config: FitConfig,
+    /// Scalar of the kernel.
+    pub precision: Precision,
+    /// Where to begin.
+    pub start: Start,
+}
+
+/// Window to worker.
+#[derive(Debug, Clone)]
+pub enum WorkerCommand {
+    /// Set up a job, replacing the old one; it stays paused.
+    Prepare(Box<Prepare>),
+    /// Run until this iteration.
+    RunTo(usize),
+    /// Stop after the current step; the job stays.
+    Pause,
+    /// Take effect at the next step.
+    Configure(FitConfig),
+    /// Continue from an earlier state (and perhaps other settings) as a new branch.
+    Branch {
+        /// Tag of the rows that follow.
+        branch: u32,
+        /// Where to continue.
+        state: Arc<FitState>,
+        /// Settings from there on.
+        config: FitConfig,
+    },
+    /// Replace the parameters at the current iteration by hand.
+    Edit(Box<Pppr>),
+    /// Show an earlier state without going back to it: answers with a snapshot.
+    Inspect {
+        /// The branch that the state is of.
+        branch: u32,
+        /// The state.
+        state: Arc<FitState>,
+        /// The settings that were in force there.
+        config: FitConfig,
+    },
+    /// Forget the job.
+    Discard,
+    /// Test hook: panic inside the job, to prove that the window lives on.
+    #[doc(hidden)]
+    PanicForTest,
+    /// End the thread.
+    Shutdown,
+}
+
+/// What there is to draw at one iteration.
+#[derive(Debug, Clone)]
+pub struct Snapshot {
+    /// The job.
+    pub job: JobId,
+    /// The branch.
+    pub branch: u32,
+    /// The iteration.
+    pub iteration: usize,
+    /// False for the answer to [`WorkerCommand::Inspect`].
+    pub live: bool,
+    /// Settings in force.
+    pub config: FitConfig,
+    /// The parameters.
+    pub params: Pppr,
+    /// The objective there.
+    pub evaluation: Evaluation,
+    /// H_sim of each view, whole maps.
+    pub h_sim: Vec<Vec<f64>>,
+    /// Masks of each view, whole maps.
+    pub masks: Vec<Masks>,
+    /// Iterations a second of the run so far; 0 when paused.
+    pub iterations_per_s: f64,
+}
+
+/// One iteration, for the curves and for going back.
+#[derive(Debug, Clone)]
+pub struct HistoryRow {
+    /// The branch.
+    pub branch: u32,
+    /// Loss, terms, IoU, convergence.
+    pub report: StepReport,
+    /// Parameters and Adam moments.
+    pub state: Arc<FitState>,
+}
+
+/// The answer to [`WorkerCommand::Prepare`].
+#[derive(Debug, Clone)]
+pub struct Prepared {
+    /// Maps filled, shapes checked.
+    pub problem: Arc<Problem>,
+    /// How the start pose was found; `None` when warm or resumed.
+    pub initialisation: Option<Initialisation>,
+    /// The pose that fixes the EM region.
+    pub initial: Pppr,
+    /// Warnings of the objective (an EM region without cells, …).
+    pub warnings: Vec<String>,
+    /// Milliseconds of the initialisation.
+    pub init_ms: f64,
+}
+
+/// Rare and lossless.
+#[derive(Debug, Clone)]
+pub enum WorkerEvent {
+    /// The job is ready and paused at its start.
+    Prepared(Box<Prepared>),
+    /// Settings changed and hold from the step after `iteration`.
+    ConfigApplied {
+        /// The branch.
+        branch: u32,
+        /// The last iteration with the old settings.
+        iteration: usize,
+        /// The new settings.
+        config: FitConfig,
+    },
+    /// A run ended.
+    Finished {
+        /// The branch.
+        branch: u32,
+        /// Where it stands.
+        iteration: usize,
+        /// Why.
+        reason: StopReason,
+        /// Milliseconds since the run began.
+        run_ms: f64,
+    },
+    /// The job cannot go on; the text names what diverged or failed.
+    Failed(String),
+}
+
+/// Worker to window, without the snapshots.
+#[derive(Debug, Clone)]
+pub enum WorkerMessage {
+    /// A batch of iterations.
+    Rows(JobId, Vec<HistoryRow>),
+    /// Something happened.
+    Event(JobId, WorkerEvent),
+}

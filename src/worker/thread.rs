@@ -1,0 +1,366 @@
+//! The worker's loop: drain every command, take one step, publish; block while nothing runs.
+
+use super::handle::Latest;
+use super::protocol::{
+    HistoryRow, JobId, Prepare, Prepared, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
+};
+use crate::config::FitConfig;
+use crate::mhp::{FitError, FitState, Fitter, Objective, Precision, Problem, StopReason, initialise, masks, simulate};
+use crossbeam_channel::{Receiver, Sender};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Snapshots are published at most this often while running.
+const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(33);
+/// A running fit spends at most one part in this many on snapshots.
+const SNAPSHOT_SHARE: u32 = 5;
+/// Rows are sent in batches at most this often while running.
+const ROWS_INTERVAL: Duration = Duration::from_millis(33);
+
+/// One fit.
+struct Job {
+    id: JobId,
+    branch: u32,
+    problem: Arc<Problem>,
+    fitter: Fitter,
+    /// A second objective with the same EM region, for looking at states that are not the current one.
+    viewer: Objective,
+    target: usize,
+    rows: Vec<HistoryRow>,
+    run_began: Instant,
+    steps_in_run: usize,
+    rows_sent: Instant,
+    snapshot_sent: Instant,
+    snapshot_cost: Duration,
+    dirty: bool,
+}
+
+/// The thread's state.
+pub(super) struct Thread {
+    inbox: Receiver<WorkerCommand>,
+    outbox: Sender<WorkerMessage>,
+    snapshot: Arc<Latest<Snapshot>>,
+    wake: Box<dyn Fn() + Send>,
+    job: Option<Job>,
+    /// The job that the last `Prepare` named, also when it failed.
+    current: JobId,
+}
+
+impl Thread {
+    pub(super) fn new(
+        inbox: Receiver<WorkerCommand>,
+        outbox: Sender<WorkerMessage>,
+        snapshot: Arc<Latest<Snapshot>>,
+        wake: Box<dyn Fn() + Send>,
+    ) -> Self {
+        Self { inbox, outbox, snapshot, wake, job: None, current: 0 }
+    }
+
+    /// Until `Shutdown` or until the window is gone.
+    pub(super) fn run(&mut self) {
+        loop {
+            match catch_unwind(AssertUnwindSafe(|| self.turn())) {
+                Ok(true) => {}
+                Ok(false) => return,
+                Err(panic) => {
+                    self.job = None;
+                    let text = panic
+                        .downcast_ref::<String>()
+                        .cloned()
+                        .or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string))
+                        .unwrap_or_else(|| "unknown cause".into());
+                    self.event(WorkerEvent::Failed(format!("the fit stopped on an internal error: {text}")));
+                }
+            }
+        }
+    }
+
+    /// Drains the commands and takes one step. False at the end.
+    fn turn(&mut self) -> bool {
+        let running = self.job.as_ref().is_some_and(Job::is_running);
+        if !running {
+            self.publish();
+            match self.inbox.recv() {
+                Ok(command) => {
+                    if !self.handle(command) {
+                        return false;
+                    }
+                }
+                Err(_) => return false,
+            }
+        }
+        while let Ok(command) = self.inbox.try_recv() {
+            if !self.handle(command) {
+                return false;
+            }
+        }
+        self.step();
+        true
+    }
+
+    fn step(&mut self) {
+        let Some(job) = self.job.as_mut().filter(|job| job.is_running()) else { return };
+        match job.step() {
+            Ok(None) => {}
+            Ok(Some(reason)) => {
+                let finished = WorkerEvent::Finished {
+                    branch: job.branch,
+                    iteration: job.fitter.report().iteration,
+                    reason,
+                    run_ms: job.run_began.elapsed().as_secs_f64() * 1e3,
+                };
+                self.publish();
+                self.event(finished);
+                return;
+            }
+            Err(error) => {
+                job.target = 0;
+                self.publish();
+                self.event(WorkerEvent::Failed(error.to_string()));
+                return;
+            }
+        }
+        self.publish_in_passing();
+    }
+
+    fn handle(&mut self, command: WorkerCommand) -> bool {
+        match command {
+            WorkerCommand::Prepare(prepare) => self.prepare(*prepare),
+            WorkerCommand::Discard => self.job = None,
+            WorkerCommand::Shutdown => return false,
+            command => {
+                if let Some(job) = self.job.as_mut() {
+                    match job.handle(command) {
+                        Ok(Reply::Nothing) => {}
+                        Ok(Reply::Event(event)) => self.event(event),
+                        Ok(Reply::Show(snapshot)) => {
+                            self.snapshot.put(*snapshot);
+                            (self.wake)();
+                        }
+                        Err(error) => self.event(WorkerEvent::Failed(error.to_string())),
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    fn prepare(&mut self, prepare: Prepare) {
+        self.job = None;
+        self.current = prepare.job;
+        match Job::new(prepare) {
+            Ok((job, prepared)) => {
+                self.job = Some(job);
+                self.event(WorkerEvent::Prepared(Box::new(prepared)));
+            }
+            Err(error) => self.event(WorkerEvent::Failed(error.to_string())),
+        }
+    }
+
+    /// Everything that waits: at pause, stop and end.
+    fn publish(&mut self) {
+        self.send_rows();
+        if let Some(job) = self.job.as_mut().filter(|job| job.dirty) {
+            self.snapshot.put(job.snapshot());
+            (self.wake)();
+        }
+    }
+
+    /// While running: rows and snapshots at their own pace.
+    fn publish_in_passing(&mut self) {
+        let Some(job) = self.job.as_mut() else { return };
+        let pause = SNAPSHOT_INTERVAL.max(job.snapshot_cost * SNAPSHOT_SHARE);
+        if job.snapshot_sent.elapsed() >= pause {
+            self.snapshot.put(job.snapshot());
+            self.send_rows();
+            (self.wake)();
+        } else if job.rows_sent.elapsed() >= ROWS_INTERVAL {
+            self.send_rows();
+            (self.wake)();
+        }
+    }
+
+    fn send_rows(&mut self) {
+        if let Some(job) = self.job.as_mut().filter(|job| !job.rows.is_empty()) {
+            job.rows_sent = Instant::now();
+            let _ = self.outbox.send(WorkerMessage::Rows(job.id, std::mem::take(&mut job.rows)));
+            (self.wake)();
+        }
+    }
+
+    fn event(&mut self, event: WorkerEvent) {
+        self.send_rows();
+        let _ = self.outbox.send(WorkerMessage::Event(self.current, event));
+        (self.wake)();
+    }
+}
+
+enum Reply {
+    Nothing,
+    Event(WorkerEvent),
+    Show(Box<Snapshot>),
+}
+
+impl Job {
+    fn new(prepare: Prepare) -> Result<(Self, Prepared), FitError> {
+        let Prepare { job, branch, radar, skeleton, views, frame, config, precision, start } = prepare;
+        let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
+        let problem = Arc::new(Problem::new(radar, skeleton, views, &maps)?);
+        let began = Instant::now();
+        let (initialisation, initial, state) = match start {
+            Start::Initialise => {
+                let found = initialise(&problem, &config)?;
+                let initial = found.params.clone();
+                (Some(found), initial, None)
+            }
+            Start::Warm(params) => (None, params, None),
+            Start::Resume { initial, state } => (None, initial, Some(state)),
+        };
+        let init_ms = began.elapsed().as_secs_f64() * 1e3;
+        let mut fitter = Fitter::new(Arc::clone(&problem), config, precision, initial.clone())?;
+        let viewer = Objective::new(Arc::clone(&problem), config, precision, &initial)?;
+        let warnings = viewer.warnings().to_vec();
+        let resumed = state.is_some();
+        if let Some(state) = state {
+            fitter.restore(FitState::clone(&state))?;
+        }
+        let now = Instant::now();
+        let mut new = Self {
+            id: job,
+            branch,
+            problem: Arc::clone(&problem),
+            fitter,
+            viewer,
+            target: 0,
+            rows: Vec::new(),
+            run_began: now,
+            steps_in_run: 0,
+            rows_sent: now,
+            snapshot_sent: now,
+            snapshot_cost: Duration::ZERO,
+            dirty: true,
+        };
+        if !resumed {
+            new.push_row();
+        }
+        Ok((new, Prepared { problem, initialisation, initial, warnings, init_ms }))
+    }
+
+    fn iteration(&self) -> usize {
+        self.fitter.report().iteration
+    }
+
+    fn is_running(&self) -> bool {
+        self.target > self.iteration()
+    }
+
+    fn push_row(&mut self) {
+        let row =
+            HistoryRow { branch: self.branch, report: self.fitter.report(), state: Arc::new(self.fitter.state()) };
+        self.rows.push(row);
+        self.dirty = true;
+    }
+
+    fn step(&mut self) -> Result<Option<StopReason>, FitError> {
+        let report = self.fitter.step()?;
+        self.steps_in_run += 1;
+        self.push_row();
+        if report.converged && self.fitter.config().stop_when_converged {
+            self.target = 0;
+            return Ok(Some(StopReason::Converged));
+        }
+        Ok((report.iteration >= self.target).then_some(StopReason::Iterations))
+    }
+
+    fn handle(&mut self, command: WorkerCommand) -> Result<Reply, FitError> {
+        match command {
+            WorkerCommand::RunTo(target) => {
+                self.target = target;
+                self.run_began = Instant::now();
+                self.steps_in_run = 0;
+            }
+            WorkerCommand::Pause => {
+                let was_running = self.is_running();
+                self.target = 0;
+                if was_running {
+                    return Ok(Reply::Event(WorkerEvent::Finished {
+                        branch: self.branch,
+                        iteration: self.iteration(),
+                        reason: StopReason::Stopped,
+                        run_ms: self.run_began.elapsed().as_secs_f64() * 1e3,
+                    }));
+                }
+            }
+            WorkerCommand::Configure(config) => {
+                self.fitter.set_config(config)?;
+                self.dirty = true;
+                let (branch, iteration) = (self.branch, self.iteration());
+                return Ok(Reply::Event(WorkerEvent::ConfigApplied { branch, iteration, config }));
+            }
+            WorkerCommand::Branch { branch, state, config } => {
+                self.target = 0;
+                self.fitter.set_config(config)?;
+                self.fitter.restore(FitState::clone(&state))?;
+                self.branch = branch;
+                self.push_row();
+            }
+            WorkerCommand::Edit(params) => {
+                self.fitter.set_params(*params)?;
+                self.push_row();
+            }
+            WorkerCommand::Inspect { branch, state, config } => {
+                return self.inspect(branch, &state, config).map(|snapshot| Reply::Show(Box::new(snapshot)));
+            }
+            #[expect(clippy::panic, reason = "the test hook that proves the window survives a panic")]
+            WorkerCommand::PanicForTest => panic!("asked to panic"),
+            WorkerCommand::Prepare(_) | WorkerCommand::Discard | WorkerCommand::Shutdown => {}
+        }
+        Ok(Reply::Nothing)
+    }
+
+    fn inspect(&mut self, branch: u32, state: &FitState, config: FitConfig) -> Result<Snapshot, FitError> {
+        self.viewer.set_config(config)?;
+        let evaluation = self.viewer.evaluate(&state.params);
+        let h_sim = simulate(&self.problem, &config, Precision::F32, &state.params);
+        let masks = (0..h_sim.len()).map(|view| masks(&self.viewer, view, &h_sim[view])).collect();
+        Ok(Snapshot {
+            job: self.id,
+            branch,
+            iteration: state.iteration,
+            live: false,
+            config,
+            params: state.params.clone(),
+            evaluation,
+            h_sim,
+            masks,
+            iterations_per_s: 0.0,
+        })
+    }
+
+    fn snapshot(&mut self) -> Snapshot {
+        let began = Instant::now();
+        let config = *self.fitter.config();
+        let params = self.fitter.params().clone();
+        let h_sim = simulate(&self.problem, &config, Precision::F32, &params);
+        let masks = (0..h_sim.len()).map(|view| masks(self.fitter.objective(), view, &h_sim[view])).collect();
+        let running = self.is_running();
+        let seconds = self.run_began.elapsed().as_secs_f64();
+        let snapshot = Snapshot {
+            job: self.id,
+            branch: self.branch,
+            iteration: self.iteration(),
+            live: true,
+            config,
+            params,
+            evaluation: self.fitter.evaluation().clone(),
+            h_sim,
+            masks,
+            iterations_per_s: if running && seconds > 0.0 { self.steps_in_run as f64 / seconds } else { 0.0 },
+        };
+        self.dirty = false;
+        self.snapshot_cost = began.elapsed();
+        self.snapshot_sent = Instant::now();
+        snapshot
+    }
+}
