@@ -2,7 +2,7 @@
 
 use super::command::{Command, Effect, PickKind};
 use super::state::{LogLevel, Session};
-use crate::dataset::{DEFAULT_CACHE_BYTES, Dataset, Loader, OpenJob};
+use crate::dataset::{Dataset, Loader, OpenJob};
 use crate::worker::Worker;
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::path::PathBuf;
@@ -63,7 +63,7 @@ impl Runtime {
         if let Some(command) = self.opening_report(session) {
             return Some(command);
         }
-        if let Some((index, result)) = self.loader.as_mut().and_then(Loader::poll) {
+        if let Some((index, result)) = self.loader.as_ref().and_then(Loader::poll) {
             return Some(Command::FrameLoaded(index, result));
         }
         let worker = self.worker.as_ref()?;
@@ -80,8 +80,7 @@ impl Runtime {
             let (path, _) = self.opening.take()?;
             return Some(Command::Opened(path, result.map(Arc::new)));
         }
-        let progress = job.progress();
-        let (stage, done, total) = (progress.stage(), progress.done(), progress.total());
+        let crate::dataset::ProgressState { stage, done, total } = job.progress().state();
         let shown = session.data.opening.as_ref()?;
         (shown.stage != stage || shown.done != done || shown.total != total).then_some(Command::OpenProgress {
             stage,
@@ -109,7 +108,7 @@ impl Runtime {
             Effect::Pick(kind) => self.pick(kind),
             Effect::UseDataset(dataset) => {
                 let wake = Arc::clone(&self.wake);
-                self.loader = Some(Loader::start(dataset, DEFAULT_CACHE_BYTES, move || wake()));
+                self.loader = Some(Loader::start(dataset, move || wake()));
             }
             Effect::Load(index) => {
                 if let Some(loader) = &self.loader {

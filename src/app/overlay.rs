@@ -1,0 +1,267 @@
+//! What lies over the panes: palette, help sheet, about, go to, the question about a bare file's axes, notifications.
+
+mod bare;
+
+use super::commands::{COMMANDS, Menu, UserCommand, shortcut_text};
+use super::panes::Shared;
+use super::theme::{self, Tokens};
+use crate::session::{Command, LogLevel, PickKind};
+use egui::{Align2, Key, RichText, Ui, vec2};
+use std::path::PathBuf;
+
+/// Seconds that a notification stays.
+const NOTICE_S: f64 = 8.0;
+
+/// Which sheet is open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Sheet {
+    #[default]
+    None,
+    Palette,
+    Help,
+    About,
+    Goto,
+}
+
+/// What lies over the panes.
+#[derive(Default)]
+pub(super) struct Overlay {
+    sheet: Sheet,
+    query: String,
+    chosen: usize,
+    fresh: bool,
+    notices: Vec<(f64, LogLevel, String)>,
+    bare: bare::State,
+}
+
+impl Overlay {
+    pub(super) fn toggle_palette(&mut self) {
+        self.toggle(Sheet::Palette);
+    }
+
+    pub(super) fn toggle_help(&mut self) {
+        self.toggle(Sheet::Help);
+    }
+
+    pub(super) fn toggle_about(&mut self) {
+        self.toggle(Sheet::About);
+    }
+
+    pub(super) fn open_goto(&mut self, current: usize) {
+        self.toggle(Sheet::Goto);
+        self.query = current.to_string();
+    }
+
+    fn toggle(&mut self, sheet: Sheet) {
+        self.sheet = if self.sheet == sheet { Sheet::None } else { sheet };
+        self.query.clear();
+        self.chosen = 0;
+        self.fresh = true;
+    }
+
+    /// True while keys belong to a sheet.
+    pub(super) fn is_modal(&self) -> bool {
+        self.sheet != Sheet::None || self.bare.is_open()
+    }
+
+    pub(super) fn notify(&mut self, level: LogLevel, text: String, now: f64) {
+        self.notices.push((now + NOTICE_S, level, text));
+        let surplus = self.notices.len().saturating_sub(4);
+        self.notices.drain(..surplus);
+    }
+
+    pub(super) fn show(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) {
+        self.bare.show(ui, shared);
+        self.notices(ui);
+        let close = match self.sheet {
+            Sheet::None => false,
+            Sheet::Palette => self.palette(ui, shared),
+            Sheet::Help => sheet(ui, "Keys and gestures", 760.0, help),
+            Sheet::About => sheet(ui, "About MHP Inspector", 460.0, about),
+            Sheet::Goto => self.goto(ui, shared),
+        };
+        if close {
+            self.sheet = Sheet::None;
+        }
+    }
+
+    /// Type to find a command, arrows to choose, Enter to do it.
+    fn palette(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
+        let (up, down, enter) = ui.input_mut(|i| {
+            let none = egui::Modifiers::NONE;
+            (i.consume_key(none, Key::ArrowUp), i.consume_key(none, Key::ArrowDown), i.key_pressed(Key::Enter))
+        });
+        let words: Vec<String> = self.query.to_lowercase().split_whitespace().map(str::to_owned).collect();
+        let fits = |c: &&UserCommand| {
+            let text = format!("{} {} {}", c.label, c.menu.title(), c.tooltip).to_lowercase();
+            words.iter().all(|word| text.contains(word.as_str()))
+        };
+        let found: Vec<&UserCommand> = COMMANDS.iter().filter(fits).collect();
+        let last = found.len().saturating_sub(1);
+        self.chosen = (self.chosen + usize::from(down)).min(last).saturating_sub(usize::from(up));
+        let mut done = false;
+        let tokens = Tokens::of(ui);
+        let response = egui::Modal::new(egui::Id::new("palette")).show(ui.ctx(), |ui| {
+            ui.set_width(460.0);
+            let field = ui.add(egui::TextEdit::singleline(&mut self.query).hint_text("Type a command").desired_width(f32::INFINITY));
+            field.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Command palette"));
+            if self.fresh {
+                field.request_focus();
+                self.fresh = false;
+            }
+            if field.changed() {
+                self.chosen = 0;
+            }
+            ui.add_space(4.0);
+            egui::ScrollArea::vertical().max_height(340.0).show(ui, |ui| {
+                for (i, command) in found.iter().enumerate() {
+                    let enabled = (command.enabled)(shared.session);
+                    let mut button = egui::Button::new(command.label).selected(i == self.chosen).min_size(vec2(440.0, 22.0));
+                    let keys = command.keys.first().map(|&k| shortcut_text(k)).unwrap_or_default();
+                    button = button.shortcut_text(keys).frame_when_inactive(false);
+                    let response = ui.add_enabled(enabled, button).on_hover_text(command.tooltip);
+                    if i == self.chosen && (up || down) {
+                        response.scroll_to_me(None);
+                    }
+                    if response.clicked() || (enter && i == self.chosen && enabled) {
+                        shared.acts.push((command.act)(shared.session));
+                        done = true;
+                    }
+                }
+                if found.is_empty() {
+                    ui.label(RichText::new("No command has these words.").color(tokens.dim));
+                }
+            });
+        });
+        done || response.should_close()
+    }
+
+    fn goto(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
+        let last = shared.session.data.len().saturating_sub(1);
+        let mut done = false;
+        let response = egui::Modal::new(egui::Id::new("goto")).show(ui.ctx(), |ui| {
+            ui.set_width(260.0);
+            ui.label(format!("Frame, 0 to {last}"));
+            let field = ui.add(egui::TextEdit::singleline(&mut self.query).desired_width(f32::INFINITY));
+            field.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Frame number"));
+            if self.fresh {
+                field.request_focus();
+                self.fresh = false;
+            }
+            let wanted = self.query.trim().parse::<usize>().ok().filter(|n| *n <= last);
+            let go = ui.add_enabled(wanted.is_some(), egui::Button::new("Go")).clicked();
+            if let Some(index) = wanted.filter(|_| go || ui.input(|i| i.key_pressed(Key::Enter))) {
+                shared.send(Command::GotoFrame(index));
+                done = true;
+            }
+        });
+        done || response.should_close()
+    }
+
+    fn notices(&mut self, ui: &Ui) {
+        let now = ui.input(|i| i.time);
+        self.notices.retain(|(until, ..)| *until > now);
+        let tokens = Tokens::of(ui);
+        let mut closed = None;
+        for (i, (until, level, text)) in self.notices.iter().enumerate() {
+            let color = if *level == LogLevel::Error { tokens.bad } else { tokens.warn };
+            let offset = vec2(-12.0, -74.0 - 64.0 * i as f32);
+            egui::Area::new(egui::Id::new(("notice", i))).anchor(Align2::RIGHT_BOTTOM, offset).order(egui::Order::Foreground).show(ui.ctx(), |ui| {
+                egui::Frame::popup(ui.style()).stroke(egui::Stroke::new(1.0, color)).show(ui, |ui| {
+                    ui.set_max_width(420.0);
+                    ui.horizontal(|ui| {
+                        ui.label(RichText::new(if *level == LogLevel::Error { "■" } else { "▲" }).color(color));
+                        ui.add(egui::Label::new(RichText::new(text).small()).wrap());
+                        let close = ui.small_button("✕");
+                        close.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Dismiss notification"));
+                        if close.clicked() {
+                            closed = Some(i);
+                        }
+                    });
+                });
+            });
+            ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64((until - now).max(0.05)));
+        }
+        if let Some(i) = closed {
+            self.notices.remove(i);
+        }
+    }
+}
+
+/// A sheet with a title that Escape or a click outside closes.
+fn sheet(ui: &Ui, title: &str, width: f32, content: fn(&mut Ui)) -> bool {
+    let height = ui.ctx().content_rect().height() * 0.8;
+    egui::Modal::new(egui::Id::new(title))
+        .show(ui.ctx(), |ui| {
+            ui.set_width(width.min(ui.ctx().content_rect().width() - 60.0));
+            ui.label(RichText::new(title).font(theme::strong(16.0)));
+            ui.add_space(6.0);
+            egui::ScrollArea::vertical().max_height(height - 80.0).show(ui, content);
+            ui.add_space(6.0);
+            ui.button("Close").clicked()
+        })
+        .pipe_close()
+}
+
+trait PipeClose {
+    fn pipe_close(self) -> bool;
+}
+
+impl PipeClose for egui::ModalResponse<bool> {
+    fn pipe_close(self) -> bool {
+        self.inner || self.should_close()
+    }
+}
+
+fn help(ui: &mut Ui) {
+    let tokens = Tokens::of(ui);
+    ui.columns(2, |columns| {
+        for (i, menu) in Menu::ALL.into_iter().enumerate() {
+            let ui = &mut columns[usize::from(i >= 3)];
+            ui.label(RichText::new(menu.title()).font(theme::strong(13.0)));
+            for command in COMMANDS.iter().filter(|c| c.menu == menu && !c.keys.is_empty()) {
+                key_row(ui, &shortcut_text(command.keys[0]), command.label, &tokens);
+            }
+            ui.add_space(8.0);
+        }
+        let ui = &mut columns[1];
+        ui.label(RichText::new("Mouse").font(theme::strong(13.0)));
+        for (gesture, what) in [
+            ("Shift held", "flip H_ori and H_sim under the pointer"),
+            ("drag", "pan a map; orbit in 3-D; scrub a strip"),
+            ("right drag", "pan in 3-D; zoom to a box in the curves"),
+            ("wheel", "zoom at the pointer"),
+            ("click", "select a joint; show an iteration"),
+            ("double click", "whole map; focus a joint; whole curve"),
+        ] {
+            key_row(ui, gesture, what, &tokens);
+        }
+    });
+}
+
+fn key_row(ui: &mut Ui, key: &str, what: &str, tokens: &Tokens) {
+    ui.horizontal(|ui| {
+        ui.add_sized([104.0, 18.0], egui::Label::new(RichText::new(key).font(theme::mono(12.0)).color(tokens.accent)).halign(egui::Align::LEFT));
+        ui.label(what);
+    });
+}
+
+fn about(ui: &mut Ui) {
+    ui.label(format!("Version {}", env!("CARGO_PKG_VERSION")));
+    ui.label(env!("CARGO_PKG_DESCRIPTION"));
+    ui.add_space(6.0);
+    ui.label("Licence: MIT OR Apache-2.0. Fonts: Inter and JetBrains Mono, SIL Open Font License 1.1.");
+    ui.label("Method: Person Parametric Physics-informed Representation (PPPR) and its pipeline MHP.");
+}
+
+/// Shows the desktop's file dialog; blocks, so it is called on a thread of its own.
+pub(super) fn pick(kind: PickKind) -> Option<PathBuf> {
+    let dialog = rfd::FileDialog::new().set_title("Open a data set");
+    match kind {
+        PickKind::Folder => dialog.pick_folder(),
+        PickKind::File => dialog
+            .add_filter("Radar data", &["npz", "npy", "toml"])
+            .add_filter("All files", &["*"])
+            .pick_file(),
+    }
+}
