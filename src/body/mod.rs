@@ -2,6 +2,7 @@
 
 mod pppr;
 mod skeleton;
+mod skeletons;
 
 pub use pppr::{Group, Pppr, PpprShape};
 pub use skeleton::{Side, Skeleton};

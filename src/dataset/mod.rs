@@ -1,5 +1,35 @@
 //! Data sets: what a frame is, and how it is read from disk.
+//!
+//! A [`Dataset`] is an index of names and what is true of every frame ([`DatasetInfo`]); it opens without reading a
+//! single frame. Where files say nothing of their axes, nobody guesses behind the user's back: a manifest, a preset or a
+//! remembered choice says it, and what had to be assumed is listed. [`OpenJob`] and [`Loader`] do both off the window's
+//! thread.
 
+mod bare;
+mod cache;
+mod error;
+mod files;
 mod frame;
+mod generic;
+mod job;
+mod loader;
+mod manifest;
+mod mmvr;
+pub mod npz;
+mod pppr_io;
+mod progress;
+mod set;
+mod words;
 
+pub use bare::{BareCatalog, BareChoice, HOME_VARIABLE, Remembered};
+pub use cache::{DEFAULT_BUDGET, FrameCache};
+pub use error::DatasetError;
 pub use frame::{Frame, Heatmap, ImageAnnotations, Truth};
+pub use job::OpenJob;
+pub use loader::{Loaded, Loader};
+pub use manifest::{Layout, Manifest};
+pub use npz::NpzError;
+pub use pppr_io::{read_pppr, write_pppr};
+pub use progress::{Progress, ProgressState};
+pub use set::{Dataset, DatasetInfo, MANIFEST_NAME};
+pub use words::{axes_badge, axis_position, axis_words, system_words, view_words};

@@ -1,0 +1,127 @@
+//! What can be wrong with a data set; every message names file, key and what was expected.
+
+use super::npz::NpzError;
+use super::{BareCatalog, Layout};
+use std::path::{Path, PathBuf};
+
+/// Why a data set could not be opened or a frame not loaded.
+#[derive(Debug, thiserror::Error)]
+pub enum DatasetError {
+    /// Nothing at that path.
+    #[error("{path}: no such file or folder", path = path.display())]
+    NotFound {
+        /// The path.
+        path: PathBuf,
+    },
+    /// A folder or text file cannot be read.
+    #[error("{path}: cannot be read: {reason}", path = path.display())]
+    Read {
+        /// What the operating system said.
+        reason: std::io::Error,
+        /// The file or folder.
+        path: PathBuf,
+    },
+    /// A file cannot be written.
+    #[error("{path}: cannot be written: {reason}", path = path.display())]
+    Write {
+        /// What the operating system said.
+        reason: std::io::Error,
+        /// The file.
+        path: PathBuf,
+    },
+    /// An array file is not what it should be.
+    #[error(transparent)]
+    Npz(#[from] NpzError),
+    /// A manifest is not what it should be.
+    #[error("{place}: {message}", place = place(path, *line))]
+    Manifest {
+        /// What is wrong, naming the key.
+        message: String,
+        /// The line, counted from 1, where one can be named.
+        line: Option<usize>,
+        /// The manifest.
+        path: PathBuf,
+    },
+    /// A folder without frames.
+    #[error("{path}: no frames in it; expected {expected}", path = path.display())]
+    NoFrames {
+        /// What would have been one.
+        expected: String,
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file of arrays of which none can be a map.
+    #[error("{path}: no array in it can be a map; expected real numbers with 2 or 3 axes; it holds {present}", path = path.display())]
+    NoMaps {
+        /// The arrays that exist, with shape and dtype.
+        present: String,
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file of maps whose axes nobody has told yet: ask, then call `Dataset::open_bare`.
+    #[error("{0}")]
+    NeedsAxes(BareCatalog),
+    /// A choice of axes that does not fit the file.
+    #[error("{path}: the chosen axes do not fit: {message}", path = path.display())]
+    BadChoice {
+        /// What is wrong.
+        message: String,
+        /// The file.
+        path: PathBuf,
+    },
+    /// A layout that is recognised but not read.
+    #[error("{path}: layout `{layout}` is not supported yet; expected npz or mmvr", path = path.display())]
+    NotSupported {
+        /// The layout.
+        layout: Layout,
+        /// The manifest or folder.
+        path: PathBuf,
+    },
+    /// MMVR's grouped variant: four frames in one file.
+    #[error(
+        "{path}: array `{key}` has shape {got}: this is the grouped variant of MMVR, several frames in one file, which is not \
+         read; expected {expected}: open the ungrouped data set",
+        path = path.display()
+    )]
+    Grouped {
+        /// The array.
+        key: String,
+        /// Its shape.
+        got: String,
+        /// The shape of one frame.
+        expected: String,
+        /// The file.
+        path: PathBuf,
+    },
+    /// An index past the end.
+    #[error("{path}: no frame {index}; the data set has {count}, counted from 0", path = path.display())]
+    NoSuchFrame {
+        /// What was asked for.
+        index: usize,
+        /// Frames that exist.
+        count: usize,
+        /// The data set.
+        path: PathBuf,
+    },
+    /// Somebody pressed cancel.
+    #[error("cancelled")]
+    Cancelled,
+    /// A defect in this program, caught so that the window lives on.
+    #[error("{path}: internal error while reading: {message}", path = path.display())]
+    Internal {
+        /// The panic's text.
+        message: String,
+        /// What was being read.
+        path: PathBuf,
+    },
+}
+
+fn place(path: &Path, line: Option<usize>) -> String {
+    line.map_or_else(|| path.display().to_string(), |line| format!("{}:{line}", path.display()))
+}
+
+/// The text of a caught panic.
+pub(super) fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "a panic without text".into())
+}

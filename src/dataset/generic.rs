@@ -1,0 +1,118 @@
+//! One frame of a generic data set (an npz beside a manifest) and of a bare file.
+
+use super::npz::{Array, NpzArchive};
+use super::{DatasetError, DatasetInfo, Frame, Heatmap, NpzError, Truth};
+use crate::geometry::Vec3;
+use std::path::Path;
+
+/// Loads an npz of maps, with joints, velocities, person count and time where it has them; SPEC section 6.
+pub(super) fn load(index: usize, name: String, path: &Path, info: &DatasetInfo) -> Result<Frame, DatasetError> {
+    let mut file = NpzArchive::open(path)?;
+    let mut notes = Vec::new();
+    let maps = info.views.iter().map(|view| {
+        let map = file.read(&view.array)?;
+        heatmap(&file, &view.array, map, &view.shape())
+    });
+    let maps = maps.collect::<Result<Vec<_>, NpzError>>()?;
+    let truth = read_truth(&mut file, info.skeleton.joints.len())?;
+    let person_count = match scalar(&mut file, "person_count")? {
+        Some(count) if count >= 0.0 && count.fract() == 0.0 => Some(count as usize),
+        Some(count) => {
+            notes.push(format!("person_count is {count}; expected a whole number, it is ignored"));
+            None
+        }
+        None => None,
+    };
+    if let (Some(count), Some(truth)) = (person_count, &truth)
+        && count != truth.persons
+    {
+        notes.push(format!("person_count is {count}, joints has {} persons", truth.persons));
+    }
+    let timestamp_s = scalar(&mut file, "timestamp_s")?;
+    Ok(Frame {
+        index,
+        name,
+        global_id: None,
+        timestamp_s: timestamp_s.or_else(|| info.frame_rate_hz.map(|rate| index as f64 / rate)),
+        maps,
+        map_boxes: vec![Vec::new(); info.views.len()],
+        person_count: person_count.or_else(|| truth.as_ref().map(|truth| truth.persons)),
+        truth,
+        image: None,
+        notes,
+    })
+}
+
+/// Loads frame `index` of a bare file: the arrays themselves, or slab `index` of each.
+pub(super) fn load_bare(
+    index: usize,
+    name: String,
+    path: &Path,
+    stacked: bool,
+    info: &DatasetInfo,
+) -> Result<Frame, DatasetError> {
+    let mut file = NpzArchive::open(path)?;
+    let maps = info.views.iter().map(|view| {
+        let map = if stacked { file.read_slab(&view.array, index)? } else { file.read(&view.array)? };
+        heatmap(&file, &view.array, map, &view.shape())
+    });
+    Ok(Frame {
+        index,
+        name,
+        global_id: None,
+        timestamp_s: info.frame_rate_hz.map(|rate| index as f64 / rate),
+        maps: maps.collect::<Result<Vec<_>, NpzError>>()?,
+        map_boxes: vec![Vec::new(); info.views.len()],
+        person_count: None,
+        truth: None,
+        image: None,
+        notes: Vec::new(),
+    })
+}
+
+fn heatmap(file: &NpzArchive, key: &str, map: Array, expected: &[usize]) -> Result<Heatmap, NpzError> {
+    if map.shape != expected {
+        let expected = format!("{}, the bins of its axes", super::npz::shape_text(expected));
+        return Err(file.wrong_shape(key, &map.shape, expected));
+    }
+    Ok(Heatmap { shape: map.shape, data: map.data, dtype: map.dtype })
+}
+
+/// A number: 0-d, or one element.
+fn scalar(file: &mut NpzArchive, key: &str) -> Result<Option<f64>, NpzError> {
+    if !file.contains(key) {
+        return Ok(None);
+    }
+    let array = file.read(key)?;
+    match array.data[..] {
+        [one] => Ok(Some(one)),
+        _ => Err(file.wrong_shape(key, &array.shape, "one number".into())),
+    }
+}
+
+fn read_truth(file: &mut NpzArchive, joints: usize) -> Result<Option<Truth>, NpzError> {
+    let Some((persons, positions)) = vectors(file, "joints", joints)? else { return Ok(None) };
+    let velocities = vectors(file, "velocities", joints)?;
+    if let Some((moving, _)) = &velocities
+        && *moving != persons
+    {
+        let expected = format!("({persons}, {joints}, 3), as `joints`");
+        return Err(file.wrong_shape("velocities", &[*moving, joints, 3], expected));
+    }
+    Ok(Some(Truth { joints: positions, velocities: velocities.map(|(_, v)| v), persons }))
+}
+
+/// (persons, joints, 3) as persons and 3-vectors.
+fn vectors(file: &mut NpzArchive, key: &str, joints: usize) -> Result<Option<(usize, Vec<Vec3>)>, NpzError> {
+    if !file.contains(key) {
+        return Ok(None);
+    }
+    let array = file.read(key)?;
+    match array.shape[..] {
+        [persons, n, 3] if n == joints => Ok(Some((persons, array.data.as_chunks::<3>().0.to_vec()))),
+        _ => {
+            let expected = format!("(persons, {joints}, 3), {joints} being the joints of the skeleton");
+            Err(file.wrong_shape(key, &array.shape, expected))
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! One frame of MMVR: `NNNNN_radar.npz` and its companions, any of which may be missing.
+//!
+//! The labels are pixels of a camera image and stay that; only the boxes drawn on the radar maps are in bins. Those lie
+//! on disk as (column 0, row 0, column 1, row 1).
+
+use super::files::RADAR_SUFFIX;
+use super::npz::{Array, NpzArchive, NpzError, shape_text};
+use super::{DatasetError, DatasetInfo, Frame, Heatmap, ImageAnnotations};
+use std::path::{Path, PathBuf};
+
+/// Camera images of MMVR, (width, height), px.
+const IMAGE_SIZE: [usize; 2] = [640, 480];
+
+/// Loads the frame `stem` of a folder.
+pub(super) fn load(
+    index: usize,
+    folder: &Path,
+    sequence: &str,
+    stem: &str,
+    info: &DatasetInfo,
+) -> Result<Frame, DatasetError> {
+    let mut labels = Labels { folder, stem, notes: Vec::new() };
+    let maps = load_maps(&folder.join(format!("{stem}{RADAR_SUFFIX}")), info)?;
+    let global_id = labels.open("meta", "no global frame id").and_then(|(mut file, path)| {
+        let ids = file.read_texts("global_frame_id");
+        labels.keep(ids, &path).map(|ids| ids.join(", "))
+    });
+    let (map_boxes, image_boxes) = labels.boxes(info);
+    let keypoints = labels.keypoints();
+    let masks = labels.masks();
+    let person_count = labels.count([
+        ("boxes", image_boxes.as_ref().map(Vec::len)),
+        ("key points", keypoints.as_ref().map(Vec::len)),
+        ("masks", masks.as_ref().map(|(_, masks)| masks.len())),
+    ]);
+    let size = masks.as_ref().map_or(IMAGE_SIZE, |(size, _)| *size);
+    let image = (image_boxes.is_some() || keypoints.is_some() || masks.is_some()).then(|| ImageAnnotations {
+        size,
+        keypoints: keypoints.unwrap_or_default(),
+        keypoint_skeleton: "coco17".into(),
+        boxes: image_boxes.unwrap_or_default(),
+        masks: masks.map(|(_, masks)| masks).unwrap_or_default(),
+    });
+    Ok(Frame {
+        index,
+        name: format!("{sequence}/{stem}"),
+        global_id,
+        timestamp_s: info
+            .frame_rate_hz
+            .and_then(|rate| stem.parse::<u32>().ok().map(|number| f64::from(number) / rate)),
+        maps,
+        map_boxes,
+        person_count,
+        truth: None,
+        image,
+        notes: labels.notes,
+    })
+}
+
+fn load_maps(path: &Path, info: &DatasetInfo) -> Result<Vec<Heatmap>, DatasetError> {
+    let mut file = NpzArchive::open(path)?;
+    let mut maps = Vec::with_capacity(info.views.len());
+    for view in &info.views {
+        let Array { shape, data, dtype } = file.read(&view.array)?;
+        let expected = view.shape();
+        if shape.len() == expected.len() + 1 && shape.ends_with(&expected) {
+            let (got, expected) = (shape_text(&shape), shape_text(&expected));
+            return Err(DatasetError::Grouped { key: view.array.clone(), got, expected, path: path.to_owned() });
+        }
+        if shape != expected {
+            let expected = format!("{}, the bins of its axes", shape_text(&expected));
+            return Err(file.wrong_shape(&view.array, &shape, expected).into());
+        }
+        maps.push(Heatmap { shape, data, dtype });
+    }
+    Ok(maps)
+}
+
+/// The companions of one frame, and what is wrong with them.
+struct Labels<'a> {
+    folder: &'a Path,
+    stem: &'a str,
+    notes: Vec<String>,
+}
+
+impl Labels<'_> {
+    /// Opens a companion; a missing or damaged one becomes a note.
+    fn open(&mut self, kind: &str, without: &str) -> Option<(NpzArchive, PathBuf)> {
+        let path = self.folder.join(format!("{}_{kind}.npz", self.stem));
+        match NpzArchive::open(&path) {
+            Ok(file) => Some((file, path)),
+            Err(error) if error.is_not_found() => {
+                self.notes.push(format!("{}_{kind}.npz is missing: {without}", self.stem));
+                None
+            }
+            Err(error) => {
+                self.notes.push(format!("{without}: {error}"));
+                None
+            }
+        }
+    }
+
+    /// An unreadable array becomes a note too.
+    fn keep<T>(&mut self, result: Result<T, NpzError>, _path: &Path) -> Option<T> {
+        result.map_err(|error| self.notes.push(error.to_string())).ok()
+    }
+
+    /// An array of shape (n, …rest), as rows of its first axis.
+    fn rows(&mut self, file: &mut NpzArchive, key: &str, rest: &[usize]) -> Option<Vec<Vec<f64>>> {
+        let path = file.path().to_owned();
+        let array = self.keep(file.read(key), &path)?;
+        // No person at all is stored with any number of axes.
+        if array.data.is_empty() {
+            return Some(Vec::new());
+        }
+        if array.shape.get(1..) != Some(rest) {
+            let rest: Vec<String> = rest.iter().map(usize::to_string).collect();
+            let error = file.wrong_shape(key, &array.shape, format!("(persons, {})", rest.join(", ")));
+            self.notes.push(error.to_string());
+            return None;
+        }
+        let width: usize = rest.iter().product();
+        Some(array.data.chunks_exact(width.max(1)).map(<[f64]>::to_vec).collect())
+    }
+
+    /// Boxes on each view's map, in bins; and boxes in the image, px.
+    fn boxes(&mut self, info: &DatasetInfo) -> (Vec<Vec<[f64; 4]>>, Option<Vec<[f64; 5]>>) {
+        let Some((mut file, _)) = self.open("bbox", "no boxes") else {
+            return (vec![Vec::new(); info.views.len()], None);
+        };
+        let mut on_maps = Vec::with_capacity(info.views.len());
+        for view in &info.views {
+            let key = format!("bbox_{}", view.array.strip_prefix("hm_").unwrap_or(&view.array));
+            let rows = self.rows(&mut file, &key, &[4]).unwrap_or_default();
+            let boxes = rows.iter().filter_map(|row| <[f64; 4]>::try_from(row.as_slice()).ok());
+            on_maps.push(boxes.map(|[column0, row0, column1, row1]| [row0, column0, row1, column1]).collect());
+        }
+        let image = self.rows(&mut file, "bbox_i", &[5]);
+        (on_maps, image.map(|rows| rows.iter().filter_map(|row| <[f64; 5]>::try_from(row.as_slice()).ok()).collect()))
+    }
+
+    /// Key points of each person: (x, y, score), px.
+    fn keypoints(&mut self) -> Option<Vec<Vec<[f64; 3]>>> {
+        let (mut file, _) = self.open("pose", "no key points")?;
+        let persons = self.rows(&mut file, "kp", &[17, 3])?;
+        let points = |person: &Vec<f64>| person.as_chunks::<3>().0.to_vec();
+        Some(persons.iter().map(points).collect())
+    }
+
+    /// One mask a person and the image's size (width, height).
+    fn masks(&mut self) -> Option<([usize; 2], Vec<Vec<bool>>)> {
+        let (mut file, path) = self.open("mask", "no masks")?;
+        let (shape, flags) = self.keep(file.read_flags("mask"), &path)?;
+        let [_, height, width] = shape[..] else {
+            let error = file.wrong_shape("mask", &shape, "(persons, height, width)".into());
+            self.notes.push(error.to_string());
+            return None;
+        };
+        if flags.is_empty() {
+            return Some((IMAGE_SIZE, Vec::new()));
+        }
+        Some(([width, height], flags.chunks_exact((height * width).max(1)).map(<[bool]>::to_vec).collect()))
+    }
+
+    /// The number of persons that the labels agree on; where they do not, the first and a note.
+    fn count(&mut self, counts: [(&str, Option<usize>); 3]) -> Option<usize> {
+        let known: Vec<(&str, usize)> = counts.into_iter().filter_map(|(what, n)| n.map(|n| (what, n))).collect();
+        if known.windows(2).any(|w| w[0].1 != w[1].1) {
+            let told: Vec<String> = known.iter().map(|(what, n)| format!("{n} {what}")).collect();
+            self.notes.push(format!("the labels disagree about the number of persons: {}", told.join(", ")));
+        }
+        known.first().map(|&(_, n)| n)
+    }
+}

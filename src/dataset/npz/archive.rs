@@ -1,0 +1,297 @@
+//! Reading: one type for `.npz` and `.npy`, told apart by their first bytes, not by their names.
+
+use super::decode::{Array, flags, numbers, texts};
+use super::header::{Header, Scalar, read_header};
+use super::{NpzError, shape_text, shown};
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+use std::path::{Path, PathBuf};
+
+/// The key under which the only array of an `.npy` file is known.
+pub const NPY_KEY: &str = "array";
+/// Elements of an array that are accepted: 2²⁸, 2 GiB once they are `f64`.
+const MAX_ELEMENTS: usize = 1 << 28;
+/// Deflate cannot pack tighter than this, so an entry that claims more lies about its size.
+const MAX_RATIO: u64 = 1032;
+/// What maps and labels may be made of.
+const REAL: &str = "real numbers (float16/32/64, int, uint or bool)";
+
+/// One array of an archive, as its header describes it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Entry {
+    /// Its key.
+    pub key: String,
+    /// Its dtype as in the file, for example `<f4`.
+    pub dtype: String,
+    /// Its shape.
+    pub shape: Vec<usize>,
+    /// True for a dtype that [`NpzArchive::read`] accepts.
+    pub is_real: bool,
+}
+
+enum Kind {
+    Npz(npyz::npz::NpzArchive<BufReader<File>>),
+    Npy(File),
+}
+
+/// An open `.npz` archive, or an `.npy` file seen as an archive with the one key [`NPY_KEY`].
+pub struct NpzArchive {
+    kind: Kind,
+    keys: Vec<String>,
+    file_bytes: u64,
+    path: PathBuf,
+}
+
+impl NpzArchive {
+    /// Opens a file and reads its directory, no data.
+    ///
+    /// # Errors
+    /// Where it cannot be opened, is empty, is neither npz nor npy, or is truncated.
+    pub fn open(path: &Path) -> Result<Self, NpzError> {
+        let read_error = |reason| NpzError::Read { reason, path: path.to_owned() };
+        let mut file = File::open(path).map_err(read_error)?;
+        let meta = file.metadata().map_err(read_error)?;
+        if meta.is_dir() {
+            return Err(read_error(std::io::Error::other("it is a folder; expected an npz or npy file")));
+        }
+        let mut magic = Vec::new();
+        (&mut file).take(32).read_to_end(&mut magic).map_err(read_error)?;
+        file.rewind().map_err(read_error)?;
+        let (kind, keys) = if magic.is_empty() {
+            return Err(NpzError::Empty { path: path.to_owned() });
+        } else if magic.starts_with(b"PK") {
+            let bad =
+                |error: std::io::Error| NpzError::BadArchive { message: error.to_string(), path: path.to_owned() };
+            let archive = npyz::npz::NpzArchive::new(BufReader::new(file)).map_err(bad)?;
+            let mut keys: Vec<String> = archive.array_names().map(str::to_owned).collect();
+            keys.sort();
+            (Kind::Npz(archive), keys)
+        } else if magic.starts_with(b"\x93NUMPY") {
+            (Kind::Npy(file), vec![NPY_KEY.to_owned()])
+        } else {
+            return Err(NpzError::NotAnArchive { found: shown(&magic), path: path.to_owned() });
+        };
+        Ok(Self { kind, keys, file_bytes: meta.len(), path: path.to_owned() })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Every key, sorted.
+    pub fn keys(&self) -> &[String] {
+        &self.keys
+    }
+
+    /// True where `key` exists.
+    pub fn contains(&self, key: &str) -> bool {
+        self.keys.iter().any(|k| k == key)
+    }
+
+    /// Key, dtype and shape of every array, sorted by key, without reading data.
+    ///
+    /// # Errors
+    /// Where a header is damaged.
+    pub fn entries(&mut self) -> Result<Vec<Entry>, NpzError> {
+        let keys = self.keys.clone();
+        keys.iter().map(|key| self.entry(key)).collect()
+    }
+
+    /// Key, dtype and shape of one array, without reading data.
+    ///
+    /// # Errors
+    /// Where it is missing or its header is damaged.
+    pub fn entry(&mut self, key: &str) -> Result<Entry, NpzError> {
+        let header = self.with_entry(key, |source| Ok(source.header.clone()))?;
+        let is_real = matches!(header.scalar, Scalar::Bool | Scalar::Int(_) | Scalar::Uint(_) | Scalar::Float(_));
+        Ok(Entry { key: key.to_owned(), dtype: header.dtype, shape: header.shape, is_real })
+    }
+
+    /// Reads an array of real numbers to its end, checksum included.
+    ///
+    /// # Errors
+    /// Missing key, object array, complex numbers or text, a size that the file cannot hold, damaged data.
+    pub fn read(&mut self, key: &str) -> Result<Array, NpzError> {
+        let (bytes, header) = self.read_bytes(key)?;
+        let data = numbers(&bytes, &header).ok_or_else(|| self.wrong_type(key, &header, REAL))?;
+        Ok(Array { shape: header.shape, data, dtype: header.dtype })
+    }
+
+    /// Reads the slab `index` of an array along its first axis: what [`Self::read`] would give, of one dimension less.
+    /// In C order only the bytes up to the slab are read, so the archive's checksum is not.
+    ///
+    /// # Errors
+    /// As [`Self::read`], and where the first axis has no such index.
+    pub fn read_slab(&mut self, key: &str, index: usize) -> Result<Array, NpzError> {
+        let header = self.with_entry(key, |source| Ok(source.header.clone()))?;
+        let expected = || format!("a first axis longer than {index}");
+        let Some((_, shape)) = header.shape.split_first().filter(|&(&n, _)| index < n) else {
+            return Err(self.wrong_shape(key, &header.shape, expected()));
+        };
+        let shape = shape.to_vec();
+        let cells: usize = shape.iter().product();
+        if header.fortran {
+            let whole = self.read(key)?;
+            let data = whole.data.get(index * cells..(index + 1) * cells).unwrap_or_default().to_vec();
+            return Ok(Array { shape, data, dtype: whole.dtype });
+        }
+        let bytes = self.with_entry(key, |source| source.slab(index, cells))?;
+        let slab = Header { shape: shape.clone(), ..header };
+        let data = numbers(&bytes, &slab).ok_or_else(|| self.wrong_type(key, &slab, REAL))?;
+        Ok(Array { shape, data, dtype: slab.dtype })
+    }
+
+    /// Reads an array of flags: shape and elements in C order.
+    ///
+    /// # Errors
+    /// As [`Self::read`], for any dtype but `bool` and `uint8`.
+    pub fn read_flags(&mut self, key: &str) -> Result<(Vec<usize>, Vec<bool>), NpzError> {
+        let (bytes, header) = self.read_bytes(key)?;
+        let data = flags(&bytes, &header).ok_or_else(|| self.wrong_type(key, &header, "bool or uint8"))?;
+        Ok((header.shape, data))
+    }
+
+    /// Reads every element as text: unicode, bytes, and integers in full.
+    ///
+    /// # Errors
+    /// As [`Self::read`], for complex and structured dtypes.
+    pub fn read_texts(&mut self, key: &str) -> Result<Vec<String>, NpzError> {
+        let (bytes, header) = self.read_bytes(key)?;
+        texts(&bytes, &header).ok_or_else(|| self.wrong_type(key, &header, "text or numbers"))
+    }
+
+    /// The error for a shape that the caller did not expect.
+    pub(crate) fn wrong_shape(&self, key: &str, got: &[usize], expected: String) -> NpzError {
+        NpzError::WrongShape { key: key.to_owned(), got: shape_text(got), expected, path: self.path.clone() }
+    }
+
+    fn wrong_type(&self, key: &str, header: &Header, expected: &'static str) -> NpzError {
+        let (key, path) = (key.to_owned(), self.path.clone());
+        if header.scalar == Scalar::Object {
+            return NpzError::Pickled { key, path };
+        }
+        NpzError::WrongType { key, dtype: header.dtype.clone(), expected, path }
+    }
+
+    fn read_bytes(&mut self, key: &str) -> Result<(Vec<u8>, Header), NpzError> {
+        self.with_entry(key, |source| {
+            let bytes = source.all()?;
+            Ok((bytes, source.header.clone()))
+        })
+    }
+
+    /// Calls `read` with the entry, its header parsed and the reader at the first byte of data.
+    fn with_entry<T>(
+        &mut self,
+        key: &str,
+        read: impl FnOnce(&mut Source<'_>) -> Result<T, NpzError>,
+    ) -> Result<T, NpzError> {
+        if !self.contains(key) {
+            let present = if self.keys.is_empty() { "no arrays".to_owned() } else { self.keys.join(", ") };
+            return Err(NpzError::MissingKey { key: key.to_owned(), present, path: self.path.clone() });
+        }
+        let (path, file_bytes) = (self.path.as_path(), self.file_bytes);
+        match &mut self.kind {
+            Kind::Npy(file) => {
+                file.rewind().map_err(|reason| NpzError::Read { reason, path: path.to_owned() })?;
+                let mut reader = BufReader::new(file);
+                let header = parse(&mut reader, key, path)?;
+                read(&mut Source { reader: &mut reader, header, available: file_bytes, key, path })
+            }
+            Kind::Npz(archive) => {
+                let name = npyz::npz::file_name_from_array_name(key);
+                let mut entry = archive
+                    .zip_archive()
+                    .by_name(&name)
+                    .map_err(|error| NpzError::BadArchive { message: error.to_string(), path: path.to_owned() })?;
+                let packed = entry.compressed_size().min(file_bytes);
+                let available = entry.size().min(packed.saturating_mul(MAX_RATIO).saturating_add(64));
+                let header = parse(&mut entry, key, path)?;
+                read(&mut Source { reader: &mut entry, header, available, key, path })
+            }
+        }
+    }
+}
+
+/// Reads one array of real numbers.
+///
+/// # Errors
+/// See [`NpzArchive::open`] and [`NpzArchive::read`].
+pub fn read_array(path: &Path, key: &str) -> Result<Array, NpzError> {
+    NpzArchive::open(path)?.read(key)
+}
+
+fn parse(reader: &mut dyn Read, key: &str, path: &Path) -> Result<Header, NpzError> {
+    let bad = |message| NpzError::BadHeader { key: key.to_owned(), message, path: path.to_owned() };
+    read_header(reader).map_err(bad)
+}
+
+/// One entry, about to be read.
+struct Source<'a> {
+    reader: &'a mut dyn Read,
+    header: Header,
+    /// Bytes that the entry can hold at most, header included.
+    available: u64,
+    key: &'a str,
+    path: &'a Path,
+}
+
+impl Source<'_> {
+    fn corrupt(&self, message: String) -> NpzError {
+        NpzError::Corrupt { key: self.key.to_owned(), message, path: self.path.to_owned() }
+    }
+
+    /// Refuses object arrays, and sizes that cannot be there, before anything is allocated.
+    fn check(&self) -> Result<(), NpzError> {
+        let (key, path) = (self.key.to_owned(), self.path.to_owned());
+        if self.header.scalar == Scalar::Object {
+            return Err(NpzError::Pickled { key, path });
+        }
+        let declared = self.header.data_bytes();
+        let holds = self.available.saturating_sub(self.header.bytes);
+        let limit = if declared > u128::from(holds) {
+            format!("the file holds at most {holds}; refused before allocating")
+        } else if self.header.len() > MAX_ELEMENTS {
+            format!("at most {MAX_ELEMENTS} elements are read; refused before allocating")
+        } else {
+            return Ok(());
+        };
+        Err(NpzError::TooLarge { key, shape: shape_text(&self.header.shape), declared, limit, path })
+    }
+
+    /// Reads exactly `count` bytes.
+    fn take(&mut self, count: u64) -> Result<Vec<u8>, NpzError> {
+        let mut bytes = Vec::with_capacity(usize::try_from(count).unwrap_or(0));
+        let got = (&mut *self.reader).take(count).read_to_end(&mut bytes);
+        match got {
+            Ok(got) if got as u64 == count => Ok(bytes),
+            Ok(got) => Err(self.corrupt(format!("its data end after {got} of {count} bytes"))),
+            Err(error) => Err(self.corrupt(error.to_string())),
+        }
+    }
+
+    /// All bytes of the data; the read past them makes the archive check its sum.
+    fn all(&mut self) -> Result<Vec<u8>, NpzError> {
+        self.check()?;
+        let bytes = self.take(u64::try_from(self.header.data_bytes()).unwrap_or(u64::MAX))?;
+        match self.reader.read(&mut [0_u8]) {
+            Ok(0) => Ok(bytes),
+            Ok(_) => Err(self.corrupt("it goes on after the declared shape is full".into())),
+            Err(error) => Err(self.corrupt(error.to_string())),
+        }
+    }
+
+    /// The bytes of slab `index`, of `cells` elements.
+    fn slab(&mut self, index: usize, cells: usize) -> Result<Vec<u8>, NpzError> {
+        self.check()?;
+        let count = (cells as u64).saturating_mul(self.header.width as u64);
+        let skip = count.saturating_mul(index as u64);
+        let skipped = std::io::copy(&mut (&mut *self.reader).take(skip), &mut std::io::sink());
+        match skipped {
+            Ok(got) if got == skip => self.take(count),
+            Ok(got) => Err(self.corrupt(format!("its data end after {got} bytes"))),
+            Err(error) => Err(self.corrupt(error.to_string())),
+        }
+    }
+}

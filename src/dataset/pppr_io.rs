@@ -1,0 +1,61 @@
+//! PPPR files: npz with the arrays of SPEC section 2, any real dtype, byte and memory order.
+
+use super::npz::{ArrayView, NpzArchive, NpzError, write};
+use crate::body::{Group, Pppr, PpprShape};
+use std::path::Path;
+
+/// Reads the parameters of all joints of all persons. `position` sets the persons and joints, `omega` the Doppler
+/// features; every other array must agree, and all with `expected` where it is given.
+///
+/// # Errors
+/// See [`NpzArchive::read`]; and where a shape is not (persons, joints, width), which the message names, or a number is
+/// not finite.
+pub fn read_pppr(path: &Path, expected: Option<PpprShape>) -> Result<Pppr, NpzError> {
+    let mut file = NpzArchive::open(path)?;
+    let shape = match expected {
+        Some(shape) => shape,
+        None => {
+            let persons = axes_of(&mut file, Group::Position, "(persons, joints, 3)")?;
+            let features = axes_of(&mut file, Group::Omega, "(persons, joints, Doppler features)")?;
+            PpprShape { persons: persons[0], joints: persons[1], doppler_features: features[2] }
+        }
+    };
+    let mut arrays = Vec::with_capacity(Group::ALL.len());
+    for group in Group::ALL {
+        let array = file.read(group.key())?;
+        let wanted = shape.array_shape(group);
+        if array.shape != wanted {
+            let expected = format!("{}, as the other arrays and the skeleton say", super::npz::shape_text(&wanted));
+            return Err(file.wrong_shape(group.key(), &array.shape, expected));
+        }
+        if let Some((at, value)) = array.data.iter().enumerate().find(|(_, x)| !x.is_finite()) {
+            let message = format!("element {at} is {value}; expected finite numbers");
+            return Err(NpzError::Corrupt { key: group.key().into(), message, path: path.to_owned() });
+        }
+        arrays.push(array.data);
+    }
+    // Allocated only now: every size has been seen in the file.
+    let mut pppr = Pppr::zeros(shape);
+    for (group, data) in Group::ALL.into_iter().zip(arrays) {
+        pppr.group_mut(group).copy_from_slice(&data);
+    }
+    Ok(pppr)
+}
+
+fn axes_of(file: &mut NpzArchive, group: Group, expected: &str) -> Result<[usize; 3], NpzError> {
+    let entry = file.entry(group.key())?;
+    match entry.shape[..] {
+        [persons, joints, width] if persons > 0 && joints > 0 => Ok([persons, joints, width]),
+        _ => Err(file.wrong_shape(group.key(), &entry.shape, expected.into())),
+    }
+}
+
+/// Writes the parameters as float64, atomically.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn write_pppr(path: &Path, pppr: &Pppr) -> Result<(), NpzError> {
+    let shape = pppr.shape();
+    let arrays = Group::ALL.map(|group| (group.key(), ArrayView::f64(&shape.array_shape(group), pppr.group(group))));
+    write(path, &arrays)
+}

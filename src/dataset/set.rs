@@ -1,0 +1,376 @@
+//! `Dataset`: what was opened, and its frames one at a time.
+
+use super::bare::{BareCatalog, BareChoice, Remembered, assumptions, frames_of};
+use super::files::{RADAR_SUFFIX, Segment, matching, segments};
+use super::manifest::{Layout, Manifest};
+use super::words::axes_badge;
+use super::{DatasetError, Frame, Progress, generic, mmvr};
+use crate::body::Skeleton;
+use crate::radar::{RadarConfig, View};
+use std::path::{Path, PathBuf};
+
+/// The name of a manifest inside a data set's folder.
+pub const MANIFEST_NAME: &str = "dataset.toml";
+
+/// What is true of every frame of a data set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DatasetInfo {
+    /// Name shown to a person.
+    pub name: String,
+    /// How it lies on disk.
+    pub layout: Layout,
+    /// The folder, or the bare file.
+    pub root: PathBuf,
+    /// Frames a second, where known.
+    pub frame_rate_hz: Option<f64>,
+    /// The joints that a fit has.
+    pub skeleton: Skeleton,
+    /// Chirp and array.
+    pub radar: RadarConfig,
+    /// The maps of a frame, in the order of [`Frame::maps`].
+    pub views: Vec<View>,
+    /// The convention of the axes in words.
+    pub axes_badge: String,
+    /// What was assumed because the data set does not publish it.
+    pub assumptions: Vec<String>,
+    /// What was found on opening that somebody should know: folders that could not be read.
+    pub notes: Vec<String>,
+}
+
+#[derive(Debug)]
+enum Source {
+    /// Folders of frames, and the index of the first frame of each.
+    Mmvr { segments: Vec<Segment>, starts: Vec<usize>, frames: usize },
+    /// Files relative to the root.
+    Files(Vec<PathBuf>),
+    /// One file; `stacked` where the arrays' first axis counts frames.
+    Bare { frames: usize, stacked: bool },
+}
+
+/// An open data set: an index of names. Frames are read by [`Self::load`], from any thread.
+#[derive(Debug)]
+pub struct Dataset {
+    info: DatasetInfo,
+    source: Source,
+    start: usize,
+}
+
+impl Dataset {
+    /// Opens an MMVR tree or any folder inside one, a `*_radar.npz` (its folder, starting at it), a folder with a
+    /// `dataset.toml`, a manifest itself, or an `.npy`/`.npz` of maps whose axes were chosen before.
+    ///
+    /// # Errors
+    /// One error that names file, key and expectation; [`DatasetError::NeedsAxes`] for a bare file seen the first time.
+    pub fn open(path: &Path, progress: &Progress) -> Result<Self, DatasetError> {
+        progress.begin("opening", 0);
+        if is_folder(path)? {
+            let manifest = path.join(MANIFEST_NAME);
+            return match exists(&manifest)? {
+                true => Self::open_folder(path, &Manifest::from_file(&manifest)?, progress),
+                false => Self::open_mmvr(path, true, None, &Manifest::mmvr()?, progress),
+            };
+        }
+        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+            return Self::open_folder(parent(path), &Manifest::from_file(path)?, progress);
+        }
+        if let Some(stem) = radar_stem(path) {
+            return Self::open_mmvr(parent(path), false, Some(&stem), &Manifest::mmvr()?, progress);
+        }
+        let catalog = BareCatalog::read(path)?;
+        match Remembered::of_user().and_then(|remembered| remembered.recall(&catalog)) {
+            Some(choice) => Self::from_choice(&catalog, &choice),
+            None => Err(DatasetError::NeedsAxes(catalog)),
+        }
+    }
+
+    /// Opens `path` as `manifest` says, whatever lies beside it: overrides a preset, or describes a bare file.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_with_manifest(path: &Path, manifest: &Manifest, progress: &Progress) -> Result<Self, DatasetError> {
+        progress.begin("opening", 0);
+        if is_folder(path)? {
+            return Self::open_folder(path, manifest, progress);
+        }
+        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+            return Self::open_folder(parent(path), manifest, progress);
+        }
+        match (manifest.layout, radar_stem(path)) {
+            (Layout::Mmvr, Some(stem)) => Self::open_mmvr(parent(path), false, Some(&stem), manifest, progress),
+            (Layout::Npz, _) => Self::from_manifest(path, manifest),
+            (layout, _) => {
+                let message = format!("layout \"{layout}\" does not describe a single file; expected \"npz\"");
+                Err(DatasetError::Manifest { message, line: None, path: manifest.path.clone() })
+            }
+        }
+    }
+
+    /// Opens a bare file with chosen axes, and remembers the choice for files with the same arrays.
+    ///
+    /// # Errors
+    /// Where the choice does not fit the file. That it could not be remembered is logged, not an error.
+    pub fn open_bare(path: &Path, choice: &BareChoice) -> Result<Self, DatasetError> {
+        Self::open_bare_remembering(path, choice, Remembered::of_user().as_ref())
+    }
+
+    /// As [`Self::open_bare`], with the memory given.
+    ///
+    /// # Errors
+    /// As [`Self::open_bare`].
+    pub fn open_bare_remembering(
+        path: &Path,
+        choice: &BareChoice,
+        remembered: Option<&Remembered>,
+    ) -> Result<Self, DatasetError> {
+        let catalog = BareCatalog::read(path)?;
+        let opened = Self::from_choice(&catalog, choice)?;
+        if let Some(Err(error)) = remembered.map(|remembered| remembered.remember(&catalog, choice)) {
+            tracing::warn!("the choice of axes is not remembered: {error}");
+        }
+        Ok(opened)
+    }
+
+    fn open_folder(root: &Path, manifest: &Manifest, progress: &Progress) -> Result<Self, DatasetError> {
+        match manifest.layout {
+            Layout::Npz => Self::open_files(root, manifest, progress),
+            Layout::Mmvr => Self::open_mmvr(root, true, None, manifest, progress),
+            layout => Err(DatasetError::NotSupported { layout, path: manifest.path.clone() }),
+        }
+    }
+
+    fn open_files(root: &Path, manifest: &Manifest, progress: &Progress) -> Result<Self, DatasetError> {
+        let Some(pattern) = &manifest.frames else {
+            let message = "missing key `frames`; layout \"npz\" needs it, for example \"frames/*.npz\"".into();
+            return Err(DatasetError::Manifest { message, line: None, path: manifest.path.clone() });
+        };
+        let files = matching(root, pattern, progress)?;
+        if files.is_empty() {
+            let expected = format!("files that match `frames = \"{pattern}\"` of {}", manifest.path.display());
+            return Err(DatasetError::NoFrames { expected, path: root.to_owned() });
+        }
+        Ok(Self { info: info_of(root, manifest, manifest, folder_name(root))?, source: Source::Files(files), start: 0 })
+    }
+
+    fn open_mmvr(
+        root: &Path,
+        deep: bool,
+        stem: Option<&str>,
+        manifest: &Manifest,
+        progress: &Progress,
+    ) -> Result<Self, DatasetError> {
+        let (segments, notes) = segments(root, deep, progress)?;
+        if segments.is_empty() {
+            let expected = format!("{MANIFEST_NAME}, or MMVR's NNNNN{RADAR_SUFFIX} in it or in a folder below");
+            let expected = notes.iter().fold(expected, |text, note| format!("{text}; {note}"));
+            return Err(DatasetError::NoFrames { expected, path: root.to_owned() });
+        }
+        let starts: Vec<usize> =
+            segments.iter().scan(0, |at, segment| Some(std::mem::replace(at, *at + segment.len()))).collect();
+        let frames = segments.iter().map(Segment::len).sum();
+        let start = stem.and_then(|stem| {
+            let segment = segments.first()?;
+            (0..segment.len()).find(|&i| segment.stem(i) == stem)
+        });
+        let mut info = info_of(root, manifest, &Manifest::mmvr()?, "MMVR".into())?;
+        info.notes = notes;
+        info.assumptions.push("frame rate: 900 frames a minute-long segment, hence 15 a second".into());
+        if manifest.views.is_empty() || manifest.path.starts_with("assets") {
+            info.assumptions
+                .push("point spread: 0.06 m and 0.03 rad are assumed; MMVR does not publish its own".into());
+            info.assumptions.push("quantity: amplitudes are assumed, from the spread of the values".into());
+        }
+        Ok(Self { info, source: Source::Mmvr { segments, starts, frames }, start: start.unwrap_or(0) })
+    }
+
+    fn from_choice(catalog: &BareCatalog, choice: &BareChoice) -> Result<Self, DatasetError> {
+        let frames = choice.frames_in(catalog)?;
+        let skeleton = Skeleton::preset(&choice.skeleton).unwrap_or_else(default_skeleton);
+        let info = DatasetInfo {
+            name: file_stem(&catalog.path),
+            layout: Layout::Bare,
+            root: catalog.path.clone(),
+            frame_rate_hz: choice.frame_rate_hz,
+            skeleton,
+            radar: RadarConfig::default(),
+            axes_badge: axes_badge(&choice.views),
+            assumptions: assumptions(&choice.views),
+            views: choice.views.clone(),
+            notes: Vec::new(),
+        };
+        Ok(Self { info, source: Source::Bare { frames, stacked: choice.first_axis_is_frame }, start: 0 })
+    }
+
+    fn from_manifest(path: &Path, manifest: &Manifest) -> Result<Self, DatasetError> {
+        let catalog = BareCatalog::read(path)?;
+        let axes = |array: &str| catalog.arrays.iter().find(|entry| entry.key == array).map(|entry| entry.shape.len());
+        let stacked = manifest.views.iter().all(|view| axes(&view.array) == Some(view.axes.len() + 1));
+        let frames = frames_of(&manifest.views, stacked, &catalog)?;
+        let mut info = info_of(path, manifest, manifest, file_stem(path))?;
+        info.layout = Layout::Bare;
+        Ok(Self { info, source: Source::Bare { frames, stacked }, start: 0 })
+    }
+
+    /// What is true of every frame.
+    pub fn info(&self) -> &DatasetInfo {
+        &self.info
+    }
+
+    /// Frames.
+    pub fn len(&self) -> usize {
+        match &self.source {
+            Source::Mmvr { frames, .. } | Source::Bare { frames, .. } => *frames,
+            Source::Files(files) => files.len(),
+        }
+    }
+
+    /// True without frames; an open data set has at least one.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The frame to show first: that of the `*_radar.npz` that was opened, else 0.
+    pub fn start_index(&self) -> usize {
+        self.start
+    }
+
+    /// Sequences: consecutive frames with the same [`Self::sequence`].
+    pub fn sequences(&self) -> usize {
+        match &self.source {
+            Source::Mmvr { segments, .. } => segments.len(),
+            Source::Files(files) => {
+                let mut folders: Vec<_> = files.iter().map(|file| file.parent()).collect();
+                folders.dedup();
+                folders.len()
+            }
+            Source::Bare { .. } => 1,
+        }
+    }
+
+    /// What identifies frame `i` for a person; empty past the end.
+    pub fn frame_name(&self, i: usize) -> String {
+        match &self.source {
+            Source::Mmvr { .. } => {
+                self.segment(i).map(|(s, k)| format!("{}/{}", s.sequence, s.stem(k))).unwrap_or_default()
+            }
+            Source::Files(files) => {
+                files.get(i).map(|file| file.with_extension("").to_string_lossy().into_owned()).unwrap_or_default()
+            }
+            Source::Bare { stacked: true, .. } => format!("{}/{i:06}", self.info.name),
+            Source::Bare { .. } => self.info.name.clone(),
+        }
+    }
+
+    /// What frame `i` follows the one before in: MMVR's session and segment, a folder, or the data set.
+    pub fn sequence(&self, i: usize) -> &str {
+        let found = match &self.source {
+            Source::Mmvr { .. } => self.segment(i).map(|(segment, _)| segment.sequence.as_str()),
+            Source::Files(files) => {
+                files.get(i).and_then(|file| file.parent()?.to_str()).filter(|name| !name.is_empty())
+            }
+            Source::Bare { .. } => None,
+        };
+        found.unwrap_or(&self.info.name)
+    }
+
+    /// The file that frame `i` is read from; the root past the end.
+    pub fn frame_path(&self, i: usize) -> PathBuf {
+        let found = match &self.source {
+            Source::Mmvr { .. } => {
+                self.segment(i).map(|(segment, k)| segment.path.join(format!("{}{RADAR_SUFFIX}", segment.stem(k))))
+            }
+            Source::Files(files) => files.get(i).map(|file| self.info.root.join(file)),
+            Source::Bare { .. } => None,
+        };
+        found.unwrap_or_else(|| self.info.root.clone())
+    }
+
+    /// Reads frame `i` from disk.
+    ///
+    /// # Errors
+    /// One error that names file, key and expectation. Missing companions of an MMVR frame are notes, not errors.
+    pub fn load(&self, i: usize) -> Result<Frame, DatasetError> {
+        if i >= self.len() {
+            return Err(DatasetError::NoSuchFrame { index: i, count: self.len(), path: self.info.root.clone() });
+        }
+        let (name, path) = (self.frame_name(i), self.frame_path(i));
+        match &self.source {
+            Source::Files(_) => generic::load(i, name, &path, &self.info),
+            Source::Bare { stacked, .. } => generic::load_bare(i, name, &path, *stacked, &self.info),
+            Source::Mmvr { .. } => match self.segment(i) {
+                Some((segment, k)) => mmvr::load(i, &segment.path, &segment.sequence, segment.stem(k), &self.info),
+                None => Err(DatasetError::NoSuchFrame { index: i, count: self.len(), path: self.info.root.clone() }),
+            },
+        }
+    }
+
+    /// The segment of frame `i` and the frame's index in it.
+    fn segment(&self, i: usize) -> Option<(&Segment, usize)> {
+        let Source::Mmvr { segments, starts, frames } = &self.source else { return None };
+        let at = starts.partition_point(|&start| start <= i).checked_sub(1).filter(|_| i < *frames)?;
+        Some((segments.get(at)?, i - starts.get(at)?))
+    }
+}
+
+/// What a manifest says, filled up from its layout's preset; what neither says is assumed, and told.
+fn info_of(root: &Path, manifest: &Manifest, preset: &Manifest, name: String) -> Result<DatasetInfo, DatasetError> {
+    let views = if manifest.views.is_empty() { &preset.views } else { &manifest.views };
+    let mut assumptions = Vec::new();
+    let radar = manifest.radar.clone().or_else(|| preset.radar.clone()).unwrap_or_else(|| {
+        assumptions.push(
+            "radar: chirp and array are not published; a 77 GHz radar with 2.5 GHz of bandwidth is assumed".into(),
+        );
+        RadarConfig::default()
+    });
+    let skeleton = manifest.skeleton.clone().or_else(|| preset.skeleton.clone()).unwrap_or_else(default_skeleton);
+    Ok(DatasetInfo {
+        name: manifest.name.clone().unwrap_or(name),
+        layout: manifest.layout,
+        root: root.to_owned(),
+        frame_rate_hz: manifest.frame_rate_hz.or(preset.frame_rate_hz),
+        skeleton,
+        radar,
+        axes_badge: axes_badge(views),
+        views: views.clone(),
+        assumptions,
+        notes: Vec::new(),
+    })
+}
+
+fn default_skeleton() -> Skeleton {
+    Skeleton::preset("coco17").unwrap_or(Skeleton {
+        joints: Vec::new(),
+        bones: Vec::new(),
+        bone_lengths_m: Vec::new(),
+        angles: Vec::new(),
+    })
+}
+
+fn is_folder(path: &Path) -> Result<bool, DatasetError> {
+    std::fs::metadata(path).map(|meta| meta.is_dir()).map_err(|reason| match reason.kind() {
+        std::io::ErrorKind::NotFound => DatasetError::NotFound { path: path.to_owned() },
+        _ => DatasetError::Read { reason, path: path.to_owned() },
+    })
+}
+
+fn exists(path: &Path) -> Result<bool, DatasetError> {
+    path.try_exists().map_err(|reason| DatasetError::Read { reason, path: path.to_owned() })
+}
+
+fn parent(path: &Path) -> &Path {
+    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+fn folder_name(root: &Path) -> String {
+    let whole = std::path::absolute(root).unwrap_or_else(|_| root.to_owned());
+    whole.file_name().map_or_else(|| "data set".into(), |name| name.to_string_lossy().into_owned())
+}
+
+fn file_stem(path: &Path) -> String {
+    path.file_stem().map_or_else(|| "file".into(), |stem| stem.to_string_lossy().into_owned())
+}
+
+/// `00383` of `00383_radar.npz`.
+fn radar_stem(path: &Path) -> Option<String> {
+    let name = path.file_name()?.to_str()?;
+    name.strip_suffix(RADAR_SUFFIX).filter(|stem| !stem.is_empty()).map(str::to_owned)
+}
