@@ -1,9 +1,11 @@
 //! Every folder of reference cases, at the tolerances that its README states, in both precisions.
 #![expect(clippy::unwrap_used, reason = "a test stops where its material is missing")]
 
+#[path = "common/cases.rs"]
+mod cases;
 mod common;
 
-use common::{Case, case_folders, read};
+use cases::{Case, case_folders, read};
 use mhp_inspector::body::{Group, Pppr};
 use mhp_inspector::mhp::{Evaluation, Objective, Precision, masks, simulate};
 use std::path::Path;

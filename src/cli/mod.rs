@@ -1,5 +1,7 @@
 //! The command line: one file a subcommand. Arguments as typed become a validated configuration and one library call.
 
+mod score;
+
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -21,12 +23,21 @@ pub struct Cli {
 
 /// The subcommands; everything the window does, one of them can do headless.
 #[derive(Debug, Subcommand)]
-pub enum Command {}
+pub enum Command {
+    /// Evaluate the objective at given parameters: simulated maps, losses and gradients.
+    ///
+    /// Writes an npz with `sim_<array>`, `iou_<array>`, `loss`, its terms `em bone rigid joint sep coll`, and the gradients
+    /// `grad_<group>` (of the total) and `grad_em_<group>` (of L_EM alone), all float64. Prints the scalars as one JSON
+    /// object; an IoU of two empty masks is null there and NaN in the npz. The EM region is that of the given positions.
+    Score(score::ScoreArgs),
+}
 
 /// Runs a subcommand.
 ///
 /// # Errors
 /// Whatever the subcommand could not do, naming file, key and what was expected.
 pub fn run(command: Command) -> anyhow::Result<ExitCode> {
-    match command {}
+    match command {
+        Command::Score(args) => score::run(&args),
+    }
 }

@@ -1,1 +1,5 @@
 //! Metrics of a fit.
+
+mod metrics;
+
+pub use metrics::{JointErrors, iou, joint_errors, majpe_mm, pa_majpe_mm};

@@ -1,0 +1,127 @@
+//! `score`: the objective at given parameters, with maps and gradients; SPEC section 7.
+
+use crate::body::{Group, Pppr};
+use crate::config::FitConfig;
+use crate::dataset::npz::{ArrayView, write};
+use crate::dataset::{Dataset, Progress, read_pppr};
+use crate::mhp::{Evaluation, Objective, Precision, Problem, simulate};
+use anyhow::Context as _;
+use clap::{Args, ValueEnum};
+use serde_json::{Map, Value};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+/// What `score` is told.
+#[derive(Debug, Args)]
+pub struct ScoreArgs {
+    /// Data set: a folder with dataset.toml, an MMVR folder, or a *_radar.npz.
+    #[arg(long, value_name = "DIR")]
+    dataset: PathBuf,
+    /// Index of the frame, from 0.
+    #[arg(long, value_name = "I")]
+    frame: usize,
+    /// PPPR npz: position, log_scale, rotation, velocity, beta, omega.
+    #[arg(long, value_name = "P.npz")]
+    params: PathBuf,
+    /// Fit configuration; without it the defaults.
+    #[arg(long, value_name = "FIT.toml")]
+    config: Option<PathBuf>,
+    /// Scalar of the per-cell kernel.
+    #[arg(long, value_enum, default_value = "f64")]
+    precision: PrecisionArg,
+    /// Where the answer is written.
+    #[arg(long, value_name = "OUT.npz")]
+    out: PathBuf,
+}
+
+/// The two precisions as typed.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum PrecisionArg {
+    /// Double: the oracle.
+    F64,
+    /// Single: the fast path.
+    F32,
+}
+
+impl From<PrecisionArg> for Precision {
+    fn from(typed: PrecisionArg) -> Self {
+        match typed {
+            PrecisionArg::F64 => Self::F64,
+            PrecisionArg::F32 => Self::F32,
+        }
+    }
+}
+
+/// Runs `score`.
+///
+/// # Errors
+/// Where the data set, frame, parameters or configuration cannot be read or do not fit each other, or the answer cannot
+/// be written.
+pub(super) fn run(args: &ScoreArgs) -> anyhow::Result<ExitCode> {
+    let config = args.config.as_deref().map(FitConfig::from_file).transpose()?.unwrap_or_default();
+    let dataset = Dataset::open(&args.dataset, &Progress::new())?;
+    let frame = dataset.load(args.frame)?;
+    let params = read_pppr(&args.params, None)?;
+    let info = dataset.info();
+    let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
+    let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps)
+        .with_context(|| dataset.frame_path(args.frame).display().to_string())?;
+    problem.check(&params).with_context(|| args.params.display().to_string())?;
+
+    let (problem, precision) = (Arc::new(problem), args.precision.into());
+    let mut objective = Objective::new(Arc::clone(&problem), config, precision, &params)?;
+    for warning in objective.warnings() {
+        tracing::warn!("{warning}");
+    }
+    let evaluation = objective.evaluate(&params);
+    let maps = simulate(&problem, &config, precision, &params);
+    let scalars = scalars(&problem, &evaluation);
+    write_answer(args, &problem, &evaluation, &maps, &scalars)?;
+    let json: Map<String, Value> = scalars.into_iter().map(|(key, x)| (key, Value::from(x))).collect();
+    println!("{}", Value::Object(json));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Key and value; NaN where undefined.
+fn scalars(problem: &Problem, evaluation: &Evaluation) -> Vec<(String, f64)> {
+    let t = &evaluation.terms;
+    let losses = [
+        ("loss", evaluation.loss),
+        ("em", t.em),
+        ("bone", t.bone),
+        ("rigid", t.rigid),
+        ("joint", t.joint),
+        ("sep", t.sep),
+        ("coll", t.coll),
+    ];
+    let ious = problem.views.iter().zip(&evaluation.iou);
+    let ious = ious.map(|(view, iou)| (format!("iou_{}", view.array), iou.unwrap_or(f64::NAN)));
+    losses.into_iter().map(|(key, x)| (key.to_owned(), x)).chain(ious).collect()
+}
+
+fn write_answer(
+    args: &ScoreArgs,
+    problem: &Problem,
+    evaluation: &Evaluation,
+    maps: &[Vec<f64>],
+    scalars: &[(String, f64)],
+) -> anyhow::Result<()> {
+    let mut arrays: Vec<(String, ArrayView<'_>)> = Vec::new();
+    for (view, map) in problem.views.iter().zip(maps) {
+        arrays.push((format!("sim_{}", view.array), ArrayView::f64(&view.shape(), map)));
+    }
+    for (key, value) in scalars {
+        arrays.push((key.clone(), ArrayView::f64(&[], std::slice::from_ref(value))));
+    }
+    let gradients: [(&str, &Pppr); 2] = [("grad", &evaluation.gradient), ("grad_em", &evaluation.em_gradient)];
+    for (prefix, gradient) in gradients {
+        for group in Group::ALL {
+            let shape = gradient.shape().array_shape(group);
+            arrays.push((format!("{prefix}_{}", group.key()), ArrayView::f64(&shape, gradient.group(group))));
+        }
+    }
+    let named: Vec<(&str, ArrayView<'_>)> = arrays.iter().map(|(key, array)| (key.as_str(), array.clone())).collect();
+    write(&args.out, &named)?;
+    Ok(())
+}

@@ -1,0 +1,203 @@
+//! How good a fit is: joint errors with and without alignment, and the IoU of masks.
+//!
+//! The alignment is Horn's: the rotation between two centred point sets is the eigenvector of the largest eigenvalue of
+//! a symmetric 4×4 matrix, found by Jacobi rotations. It cannot reflect, so a mirrored skeleton stays wrong.
+
+use crate::geometry::{Vec3, add, dot, mat_vec, norm, rotation_from_quaternion, scale, sub};
+
+const MM_PER_M: f64 = 1000.0;
+
+/// Errors of an estimate against truth, mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointErrors {
+    /// Mean over joints of the distance to truth.
+    pub majpe_mm: f64,
+    /// The same after the best rotation, translation and scale of each person.
+    pub pa_majpe_mm: f64,
+}
+
+/// Mean distance of corresponding joints (m), in mm; `None` where the lists are empty or differ in length.
+pub fn majpe_mm(estimate: &[Vec3], truth: &[Vec3]) -> Option<f64> {
+    if estimate.is_empty() || estimate.len() != truth.len() {
+        return None;
+    }
+    let sum: f64 = estimate.iter().zip(truth).map(|(&a, &b)| norm(sub(a, b))).sum();
+    Some(MM_PER_M * sum / estimate.len() as f64)
+}
+
+/// [`majpe_mm`] after the similarity transform of `estimate` that fits `truth` best in least squares.
+pub fn pa_majpe_mm(estimate: &[Vec3], truth: &[Vec3]) -> Option<f64> {
+    majpe_mm(&aligned(estimate, truth)?, truth)
+}
+
+/// Errors of several persons of `joints` joints each (flat lists, person by person). Persons carry no identity: they are
+/// paired closest first, and where the counts differ the smaller number of persons counts.
+/// `None` where either list is empty or no whole number of persons.
+pub fn joint_errors(estimate: &[Vec3], truth: &[Vec3], joints: usize) -> Option<JointErrors> {
+    if joints == 0 || estimate.len() % joints != 0 || truth.len() % joints != 0 {
+        return None;
+    }
+    let estimated: Vec<&[Vec3]> = estimate.chunks_exact(joints).collect();
+    let true_persons: Vec<&[Vec3]> = truth.chunks_exact(joints).collect();
+    let pairs = pair(&estimated, &true_persons);
+    let count = pairs.len() as f64;
+    let mut errors = JointErrors { majpe_mm: 0.0, pa_majpe_mm: 0.0 };
+    for &(a, b) in &pairs {
+        errors.majpe_mm += majpe_mm(estimated[a], true_persons[b])? / count;
+        errors.pa_majpe_mm += pa_majpe_mm(estimated[a], true_persons[b])? / count;
+    }
+    (!pairs.is_empty()).then_some(errors)
+}
+
+/// |a ∩ b| / |a ∪ b|; `None` where both are empty.
+pub fn iou(a: &[bool], b: &[bool]) -> Option<f64> {
+    let both = a.iter().zip(b).filter(|(a, b)| **a && **b).count();
+    let either = a.iter().zip(b).filter(|(a, b)| **a || **b).count();
+    (either > 0).then(|| both as f64 / either as f64)
+}
+
+/// Pairs persons by repeatedly taking the closest two that are left, in order of distance.
+fn pair(estimated: &[&[Vec3]], truth: &[&[Vec3]]) -> Vec<(usize, usize)> {
+    let mut candidates: Vec<(f64, usize, usize)> = (0..estimated.len())
+        .flat_map(|a| (0..truth.len()).map(move |b| (a, b)))
+        .filter_map(|(a, b)| majpe_mm(estimated[a], truth[b]).map(|distance| (distance, a, b)))
+        .collect();
+    candidates.sort_by(|x, y| x.0.total_cmp(&y.0));
+    let mut pairs: Vec<(usize, usize)> = Vec::new();
+    for (_, a, b) in candidates {
+        if pairs.iter().all(|&(p, q)| p != a && q != b) {
+            pairs.push((a, b));
+        }
+    }
+    pairs
+}
+
+fn centroid(points: &[Vec3]) -> Vec3 {
+    scale(points.iter().fold([0.0; 3], |sum, &p| add(sum, p)), 1.0 / points.len() as f64)
+}
+
+/// `estimate` after the similarity transform (no reflection) that brings it closest to `truth`.
+fn aligned(estimate: &[Vec3], truth: &[Vec3]) -> Option<Vec<Vec3>> {
+    if estimate.is_empty() || estimate.len() != truth.len() {
+        return None;
+    }
+    let (from, to) = (centroid(estimate), centroid(truth));
+    let centred: Vec<Vec3> = estimate.iter().map(|&p| sub(p, from)).collect();
+    let target: Vec<Vec3> = truth.iter().map(|&p| sub(p, to)).collect();
+    let rotation = rotation_from_quaternion(horn_quaternion(&centred, &target));
+    let turned: Vec<Vec3> = centred.iter().map(|&p| mat_vec(&rotation, p)).collect();
+    let size: f64 = centred.iter().map(|&p| dot(p, p)).sum();
+    let along: f64 = turned.iter().zip(&target).map(|(&a, &b)| dot(a, b)).sum();
+    let factor = if size > 0.0 { along / size } else { 0.0 };
+    Some(turned.into_iter().map(|p| add(scale(p, factor), to)).collect())
+}
+
+/// The quaternion (w, x, y, z) of the rotation that turns `from` onto `to`, both centred.
+fn horn_quaternion(from: &[Vec3], to: &[Vec3]) -> [f64; 4] {
+    let s: [[f64; 3]; 3] =
+        std::array::from_fn(|i| std::array::from_fn(|k| from.iter().zip(to).map(|(a, b)| a[i] * b[k]).sum()));
+    let n = [
+        [s[0][0] + s[1][1] + s[2][2], s[1][2] - s[2][1], s[2][0] - s[0][2], s[0][1] - s[1][0]],
+        [s[1][2] - s[2][1], s[0][0] - s[1][1] - s[2][2], s[0][1] + s[1][0], s[2][0] + s[0][2]],
+        [s[2][0] - s[0][2], s[0][1] + s[1][0], s[1][1] - s[0][0] - s[2][2], s[1][2] + s[2][1]],
+        [s[0][1] - s[1][0], s[2][0] + s[0][2], s[1][2] + s[2][1], s[2][2] - s[0][0] - s[1][1]],
+    ];
+    largest_eigenvector(n)
+}
+
+/// Cyclic Jacobi rotations on a symmetric 4×4 matrix; a handful of sweeps reach machine precision.
+fn largest_eigenvector(mut a: [[f64; 4]; 4]) -> [f64; 4] {
+    let mut vectors: [[f64; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|k| f64::from(u8::from(i == k))));
+    for _sweep in 0..30 {
+        for p in 0..4 {
+            for q in p + 1..4 {
+                if a[p][q] != 0.0 {
+                    rotate(&mut a, &mut vectors, p, q);
+                }
+            }
+        }
+    }
+    let best = (0..4).max_by(|&i, &k| a[i][i].total_cmp(&a[k][k])).unwrap_or(0);
+    std::array::from_fn(|i| vectors[i][best])
+}
+
+fn rotate(a: &mut [[f64; 4]; 4], vectors: &mut [[f64; 4]; 4], p: usize, q: usize) {
+    let theta = 0.5 * (2.0 * a[p][q]).atan2(a[q][q] - a[p][p]);
+    let (s, c) = theta.sin_cos();
+    for row in a.iter_mut().chain(vectors.iter_mut()) {
+        (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+    }
+    for k in 0..4 {
+        (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test stops where a metric is undefined")]
+    use super::*;
+
+    const BODY: [Vec3; 5] = [[0.0, 0.0, 1.7], [0.1, 0.2, 1.4], [0.0, -0.2, 1.4], [0.05, 0.1, 0.0], [-0.3, -0.15, 0.1]];
+
+    #[test]
+    fn majpe_is_the_mean_distance() {
+        let moved: Vec<Vec3> = BODY.iter().map(|&p| add(p, [0.03, 0.0, -0.04])).collect();
+        assert!((majpe_mm(&moved, &BODY).unwrap() - 50.0).abs() < 1e-9);
+        assert_eq!(majpe_mm(&[], &[]), None);
+        assert_eq!(majpe_mm(&BODY, &BODY[1..]), None);
+    }
+
+    #[test]
+    fn a_similarity_transform_costs_nothing_after_alignment() {
+        for q in [[1.0, 0.0, 0.0, 0.0], [0.3, -0.5, 0.8, 0.1], [0.0, 0.0, 0.0, 1.0]] {
+            let rotation = rotation_from_quaternion(q);
+            let moved: Vec<Vec3> =
+                BODY.iter().map(|&p| add(scale(mat_vec(&rotation, p), 1.3), [2.0, -1.0, 0.5])).collect();
+            assert!(majpe_mm(&moved, &BODY).unwrap() > 500.0);
+            assert!(pa_majpe_mm(&moved, &BODY).unwrap() < 1e-9, "{q:?}");
+        }
+    }
+
+    #[test]
+    fn a_mirrored_body_stays_wrong() {
+        let mirrored = BODY.map(|[x, y, z]| [x, -y, z]);
+        assert!(pa_majpe_mm(&mirrored, &BODY).unwrap() > 20.0);
+    }
+
+    #[test]
+    fn alignment_is_least_squares() {
+        let mut bent = BODY;
+        bent[0][0] += 0.2;
+        bent[4][2] -= 0.1;
+        let best = aligned(&bent, &BODY).unwrap();
+        let cost = |points: &[Vec3]| points.iter().zip(&BODY).map(|(&a, &b)| dot(sub(a, b), sub(a, b))).sum::<f64>();
+        for axis in 0..3 {
+            for amount in [-1e-3, 1e-3] {
+                let mut q = [1.0, 0.0, 0.0, 0.0];
+                q[axis + 1] = amount;
+                let turn = rotation_from_quaternion(q);
+                let middle = centroid(&BODY);
+                let turned: Vec<Vec3> = best.iter().map(|&p| add(mat_vec(&turn, sub(p, middle)), middle)).collect();
+                assert!(cost(&turned) > cost(&best));
+                let grown: Vec<Vec3> = best.iter().map(|&p| add(scale(sub(p, middle), 1.0 + amount), middle)).collect();
+                assert!(cost(&grown) > cost(&best));
+            }
+        }
+    }
+
+    #[test]
+    fn persons_are_paired_by_distance() {
+        let far: Vec<Vec3> = BODY.iter().map(|&p| add(p, [0.0, 3.0, 0.0])).collect();
+        let truth = [BODY.to_vec(), far.clone()].concat();
+        let swapped = [far, BODY.to_vec()].concat();
+        assert!(joint_errors(&swapped, &truth, 5).unwrap().majpe_mm < 1e-9);
+        assert!(joint_errors(&BODY, &truth, 5).unwrap().pa_majpe_mm < 1e-9);
+        assert_eq!(joint_errors(&BODY, &truth, 4), None);
+    }
+
+    #[test]
+    fn iou_of_empty_masks_is_undefined() {
+        assert_eq!(iou(&[false, false], &[false, false]), None);
+        assert_eq!(iou(&[true, true, false], &[false, true, true]), Some(1.0 / 3.0));
+    }
+}

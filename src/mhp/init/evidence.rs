@@ -1,0 +1,233 @@
+//! One view's map as evidence for a body: background taken off, local maxima found, points looked up.
+//!
+//! A strong echo smears along its own range (sidelobes of the angular transform), and so do walls that surround the
+//! radar: both are arcs about the radar. A person is compact. So each cell is compared with the median of the cells at
+//! the same range; where a view does not resolve range, with the median of the map.
+
+use super::super::fill::for_neighbours;
+use super::super::percentile::percentile;
+use super::super::splat::Seen;
+use crate::geometry::{Vec3, add_scaled, dot, mat_t_vec, scale};
+use crate::radar::{Axis, AxisKind, View};
+
+/// Echoes nearer than this are leakage from the radar itself, m.
+const NEAREST_M: f64 = 0.5;
+/// A ring with fewer cells says nothing of the background.
+const SMALLEST_RING: usize = 8;
+/// The ln-salience above which a cell counts as fully lit.
+const FULLY_LIT: f64 = 2.0;
+/// Percentiles tried for local maxima, strictest first, until [`ENOUGH_PEAKS`] are found.
+const PERCENTILES: [f64; 6] = [99.5, 99.0, 98.0, 96.0, 92.0, 85.0];
+const ENOUGH_PEAKS: usize = 12;
+/// At most this many peaks of a view are kept, strongest first.
+const MOST_PEAKS: usize = 40;
+
+/// A local maximum of a map.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Peak {
+    /// Index of the view.
+    pub view: usize,
+    /// Bin on each axis of the view.
+    pub bin: Vec<usize>,
+    /// H_ori there.
+    pub value: f64,
+    /// H_ori over the background at the same range, ln.
+    pub salience: f64,
+}
+
+/// A view's map without its Doppler axes (the strongest Doppler bin stands for a cell).
+pub(super) struct Evidence<'a> {
+    view: &'a View,
+    index: usize,
+    /// Spatial axes and their places among the view's axes.
+    axes: Vec<(usize, &'a Axis)>,
+    shape: Vec<usize>,
+    /// H of each spatial cell, and the full cell it was taken from.
+    value: Vec<f64>,
+    source: Vec<usize>,
+    /// ln H over the background, ≥ 0.
+    salience: Vec<f64>,
+    /// H over the background, of the map's largest.
+    excess: Vec<f64>,
+}
+
+impl<'a> Evidence<'a> {
+    pub(super) fn new(index: usize, view: &'a View, map: &[f64]) -> Self {
+        let axes: Vec<(usize, &Axis)> =
+            view.axes.iter().enumerate().filter(|(_, axis)| axis.kind != AxisKind::Doppler).collect();
+        let shape: Vec<usize> = axes.iter().map(|(_, axis)| axis.bins).collect();
+        let cells = shape.iter().product();
+        let (mut value, mut source) = (vec![f64::NEG_INFINITY; cells], vec![0; cells]);
+        for (cell, &h) in map.iter().enumerate() {
+            let bins = unravel(cell, &view.shape());
+            let spatial = axes.iter().fold(0, |flat, &(k, axis)| flat * axis.bins + bins[k]);
+            if h > value[spatial] {
+                (value[spatial], source[spatial]) = (h, cell);
+            }
+        }
+        let mut evidence = Self { view, index, axes, shape, value, source, salience: vec![], excess: vec![] };
+        evidence.subtract_background();
+        evidence
+    }
+
+    fn subtract_background(&mut self) {
+        let largest = self.value.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        let tiny = largest * 1e-12;
+        let ln: Vec<f64> = self.value.iter().map(|h| h.max(tiny).ln()).collect();
+        let ranges: Vec<Option<f64>> = (0..ln.len()).map(|cell| self.range_m(cell)).collect();
+        let ring_m = self.axes.iter().filter(|(_, a)| !a.kind.is_angular()).map(|(_, a)| a.step().abs());
+        let ring_m = ring_m.fold(f64::INFINITY, f64::min);
+        let ring = |cell: usize| ranges[cell].map_or(0, |range| (range / ring_m).round() as usize);
+        let rings = (0..ln.len()).map(ring).max().unwrap_or(0) + 1;
+        let mut members: Vec<Vec<f64>> = vec![Vec::new(); rings];
+        for (cell, &x) in ln.iter().enumerate() {
+            members[ring(cell)].push(x);
+        }
+        let overall = percentile(&ln, 50.0);
+        let background: Vec<f64> =
+            members.iter().map(|m| if m.len() < SMALLEST_RING { overall } else { percentile(m, 50.0) }).collect();
+        let far_enough = |cell: usize| ranges[cell].is_none_or(|range| range > NEAREST_M);
+        let above = |cell: usize| if far_enough(cell) { (ln[cell] - background[ring(cell)]).max(0.0) } else { 0.0 };
+        self.salience = (0..ln.len()).map(above).collect();
+        self.excess = self.salience.iter().zip(&self.value).map(|(s, h)| h / largest * (1.0 - (-s).exp())).collect();
+    }
+
+    /// Distance from the view's origin as far as the axes tell it, m.
+    fn range_m(&self, cell: usize) -> Option<f64> {
+        let bins = unravel(cell, &self.shape);
+        let at = |kind: AxisKind| {
+            self.axes.iter().zip(&bins).find(|((_, a), _)| a.kind == kind).map(|((_, a), &b)| a.value_at(b as f64))
+        };
+        if let Some(range) = at(AxisKind::Range) {
+            return Some(range);
+        }
+        let pieces = match (at(AxisKind::DepthH), at(AxisKind::DepthV)) {
+            (Some(h), _) => vec![Some(h), at(AxisKind::Y)],
+            (None, Some(rho)) => vec![Some(rho), at(AxisKind::Z)],
+            _ => vec![at(AxisKind::X), at(AxisKind::Y), at(AxisKind::Z)],
+        };
+        let known: Vec<f64> = pieces.into_iter().flatten().collect();
+        (!known.is_empty()).then(|| known.iter().map(|x| x * x).sum::<f64>().sqrt())
+    }
+
+    /// Local maxima above the strictest percentile that leaves enough of them, strongest excess first.
+    pub(super) fn peaks(&self) -> Vec<Peak> {
+        let maxima: Vec<usize> = (0..self.value.len()).filter(|&cell| self.is_maximum(cell)).collect();
+        let mut kept = Vec::new();
+        for q in PERCENTILES {
+            let level = percentile(&self.value, q);
+            kept = maxima.iter().copied().filter(|&cell| self.value[cell] >= level).collect();
+            if kept.len() >= ENOUGH_PEAKS {
+                break;
+            }
+        }
+        kept.sort_by(|&a, &b| self.excess[b].total_cmp(&self.excess[a]).then(a.cmp(&b)));
+        kept.truncate(MOST_PEAKS);
+        kept.into_iter().map(|cell| self.peak(cell)).collect()
+    }
+
+    fn is_maximum(&self, cell: usize) -> bool {
+        let mut highest = self.excess[cell] > 0.0;
+        for_neighbours(&self.shape, cell, |other| highest &= self.value[other] <= self.value[cell]);
+        highest
+    }
+
+    fn peak(&self, cell: usize) -> Peak {
+        Peak {
+            view: self.index,
+            bin: unravel(self.source[cell], &self.view.shape()),
+            value: self.value[cell],
+            salience: self.salience[cell],
+        }
+    }
+
+    /// The spatial cell at a world point; `None` outside the map.
+    fn cell(&self, p_world: Vec3) -> Option<usize> {
+        let seen = Seen::new(self.view.pose.view_from_world(p_world));
+        self.axes.iter().try_fold(0, |flat, (_, axis)| {
+            let bin = axis.bin(seen.coordinate(axis, 0.0)).round();
+            (bin >= 0.0 && bin < axis.bins as f64).then_some(flat * axis.bins + bin as usize)
+        })
+    }
+
+    /// Mean over `points` of the amplitude over the background, of the map's largest.
+    pub(super) fn mean_excess(&self, points: &[Vec3]) -> f64 {
+        let sum: f64 = points.iter().filter_map(|&p| self.cell(p)).map(|cell| self.excess[cell]).sum();
+        sum / points.len().max(1) as f64
+    }
+
+    /// Mean over `points` of how lit they are, 0 to 1: strong and stronger echoes count alike, so that the whole body
+    /// has a say and not its brightest part.
+    pub(super) fn mean_lit(&self, points: &[Vec3]) -> f64 {
+        let lit = |cell: usize| (self.salience[cell] / FULLY_LIT).min(1.0);
+        points.iter().filter_map(|&p| self.cell(p)).map(lit).sum::<f64>() / points.len().max(1) as f64
+    }
+
+    /// Radial velocity (m/s) of the strongest Doppler bin at a world point, where the view has a Doppler axis.
+    pub(super) fn radial_mps(&self, p_world: Vec3) -> Option<f64> {
+        let (k, axis) = self.view.axes.iter().enumerate().find(|(_, axis)| axis.kind == AxisKind::Doppler)?;
+        let bins = unravel(self.source[self.cell(p_world)?], &self.view.shape());
+        Some(axis.at(bins[k] as f64))
+    }
+}
+
+fn unravel(mut flat: usize, shape: &[usize]) -> Vec<usize> {
+    let mut bins = vec![0; shape.len()];
+    for k in (0..shape.len()).rev() {
+        bins[k] = flat % shape[k];
+        flat /= shape[k];
+    }
+    bins
+}
+
+/// The world point that best agrees with all `peaks` at once, and the root mean square disagreement, m. What no axis
+/// tells stays at the radar's boresight.
+pub(super) fn locate(views: &[View], peaks: &[&Peak]) -> (Vec3, f64) {
+    let mut p = [2.0, 0.0, 0.0];
+    let mut misfit = f64::INFINITY;
+    for _ in 0..25 {
+        let (mut normal, mut pull) = ([[0.0; 3]; 3], [0.0; 3]);
+        let (mut squares, mut count) = (0.0, 0.0);
+        for (direction, gap_m) in peaks.iter().flat_map(|peak| equations(&views[peak.view], peak, p)) {
+            for i in 0..3 {
+                add_scaled(&mut normal[i], direction, direction[i]);
+            }
+            add_scaled(&mut pull, direction, gap_m);
+            squares += gap_m * gap_m;
+            count += 1.0;
+        }
+        misfit = (squares / f64::max(count, 1.0)).sqrt();
+        for (i, row) in normal.iter_mut().enumerate() {
+            row[i] += 1e-3;
+        }
+        let step = solve(&normal, pull);
+        // A long step would jump to the other side of the radar.
+        let length = dot(step, step).sqrt();
+        add_scaled(&mut p, step, if length > 1.0 { 1.0 / length } else { 1.0 });
+    }
+    (p, misfit)
+}
+
+/// For each spatial axis of the peak's view: the unit direction in which the coordinate grows (world) and the gap
+/// between the peak's coordinate and that of `p`, m.
+fn equations(view: &View, peak: &Peak, p: Vec3) -> Vec<(Vec3, f64)> {
+    let seen = Seen::new(view.pose.view_from_world(p));
+    let spatial = view.axes.iter().zip(&peak.bin).filter(|(axis, _)| axis.kind != AxisKind::Doppler);
+    spatial
+        .map(|(axis, &bin)| {
+            let (direction, arm) = seen.direction_and_arm(axis.kind);
+            let gap = (axis.at(bin as f64) - seen.coordinate(axis, 0.0)) * arm / seen.slope(axis);
+            (mat_t_vec(&view.pose.rotation, direction), gap)
+        })
+        .collect()
+}
+
+/// Solves the 3×3 system by Cramer's rule; the matrix is positive definite.
+fn solve(m: &[Vec3; 3], b: Vec3) -> Vec3 {
+    use crate::geometry::cross;
+    let (c12, c20, c01) = (cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1]));
+    let mut x = scale(c12, b[0]);
+    add_scaled(&mut x, c20, b[1]);
+    add_scaled(&mut x, c01, b[2]);
+    scale(x, 1.0 / dot(m[0], c12))
+}

@@ -1,0 +1,170 @@
+//! Initialisation of one person from the maps alone.
+//!
+//! 1. Background off, local maxima above an adaptive percentile ([`evidence`]).
+//! 2. Peaks of different views are paired where their coordinates agree on one point in space.
+//! 3. A standing body is tried at every such point, at several heights and depths. The place where all views show
+//!    the most echo over their background wins: a wall arc has none, a strong echo in one view only has little.
+//! 4. The body is shifted until it covers what is lit, then until L_EM is smallest.
+//!
+//! Nothing here reads a label.
+
+mod evidence;
+mod template;
+
+pub use evidence::Peak;
+
+use super::{FitError, Objective, Precision, Problem};
+use crate::body::{Group, Pppr, PpprShape};
+use crate::config::FitConfig;
+use crate::geometry::{Vec3, add, norm, scale, sub};
+use evidence::{Evidence, locate};
+use std::sync::Arc;
+use template::Template;
+
+/// Peaks of two views that disagree by more are not one body, m.
+const LARGEST_MISFIT_M: f64 = 0.35;
+/// Initial standard deviation of a joint's Gaussian, m.
+const INITIAL_SCALE_M: f64 = 0.08;
+/// Where the middle of a body is expected when nothing tells its height: a radar stands at about chest height, m.
+const EXPECTED_MIDDLE_M: f64 = -0.2;
+/// How weakly that is held: one metre away costs this share of the evidence.
+const EXPECTATION_WEIGHT: f64 = 0.05;
+
+/// A start for the fit, and how it came about.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Initialisation {
+    /// One person on the problem's skeleton.
+    pub params: Pppr,
+    /// Local maxima of every view, strongest over the background first within a view.
+    pub peaks: Vec<Peak>,
+    /// What was found and assumed, in words.
+    pub notes: Vec<String>,
+}
+
+/// Finds one person; SPEC section 2 says what the parameters are.
+///
+/// # Errors
+/// [`FitError::NoStart`] where no view shows anything above its background.
+pub fn initialise(problem: &Problem, config: &FitConfig) -> Result<Initialisation, FitError> {
+    let evidence: Vec<Evidence<'_>> =
+        problem.views.iter().enumerate().map(|(k, view)| Evidence::new(k, view, problem.map(k))).collect();
+    let peaks: Vec<Peak> = evidence.iter().flat_map(Evidence::peaks).collect();
+    let template = Template::new(&problem.skeleton);
+    let mut notes: Vec<String> = (0..problem.views.len())
+        .filter(|&k| problem.filled_cells(k) > 0)
+        .map(|k| format!("{}: {} missing cells filled", problem.views[k].array, problem.filled_cells(k)))
+        .collect();
+    let candidates = candidates(problem, &peaks);
+    let found = candidates
+        .iter()
+        .map(|&at| (at, shared_excess(&evidence, &template.facing_origin(at))))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .filter(|(_, score)| *score > 0.0);
+    let Some((at, _)) = found else {
+        return Err(FitError::NoStart {
+            reason: format!("none of {} peaks stands above the background in all views", peaks.len()),
+        });
+    };
+    notes.push(format!("{} peaks, {} places where the views agree", peaks.len(), candidates.len()));
+    let at = cover(&evidence, &template, at);
+    let at = settle(problem, config, &evidence, &template, at)?;
+    let (params, velocity_note) = standing(problem, &evidence, &template, at);
+    notes.push(format!("standing at x {:.2} m, y {:.2} m, facing the radar", at[0], at[1]));
+    notes.push(velocity_note);
+    Ok(Initialisation { params, peaks, notes })
+}
+
+/// Points where peaks of two views (or the peaks of the only view) may be one body.
+fn candidates(problem: &Problem, peaks: &[Peak]) -> Vec<Vec3> {
+    let mut found = Vec::new();
+    for (i, a) in peaks.iter().enumerate() {
+        if problem.views.len() == 1 {
+            found.push(locate(&problem.views, &[a]));
+        }
+        for b in peaks.iter().skip(i + 1).filter(|b| b.view != a.view) {
+            found.push(locate(&problem.views, &[a, b]));
+        }
+    }
+    found.retain(|(p, misfit)| *misfit < LARGEST_MISFIT_M && norm(*p).is_finite());
+    // A body stands behind its nearest echo, and its brightest part may be high or low on it.
+    let places = found.iter().flat_map(|(p, _)| {
+        [0.0, 0.15].into_iter().flat_map(move |behind| {
+            [-0.6, -0.3, 0.0, 0.3, 0.6].map(|up| add(scale(*p, 1.0 + behind / norm(*p).max(0.5)), [0.0, 0.0, up]))
+        })
+    });
+    places.collect()
+}
+
+/// How much echo over the background all views show at a body: the geometric mean over views, so that each must agree.
+fn shared_excess(evidence: &[Evidence<'_>], body: &[Vec3]) -> f64 {
+    let logs: f64 = evidence.iter().map(|e| e.mean_excess(body).ln()).sum();
+    (logs / evidence.len().max(1) as f64).exp()
+}
+
+/// Walks downhill on a grid that is halved `halvings` times: the best of the six neighbours until none is better.
+fn descend(start: Vec3, step_m: f64, halvings: usize, mut cost: impl FnMut(Vec3) -> f64) -> Vec3 {
+    let (mut at, mut lowest, mut step) = (start, cost(start), step_m);
+    for _ in 0..=halvings {
+        for _ in 0..12 {
+            let moves = (0..6).map(|k| {
+                let mut to = at;
+                to[k / 2] += if k % 2 == 0 { step } else { -step };
+                (to, cost(to))
+            });
+            let Some((to, value)) = moves.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, value)| *value < lowest)
+            else {
+                break;
+            };
+            (at, lowest) = (to, value);
+        }
+        step *= 0.5;
+    }
+    at
+}
+
+/// Shifts the body until as much of it as possible lies on what is lit in every view.
+fn cover(evidence: &[Evidence<'_>], template: &Template, at: Vec3) -> Vec3 {
+    descend(at, 0.2, 3, |p| {
+        let body = template.facing_origin(p);
+        let lit: f64 = evidence.iter().map(|e| e.mean_lit(&body)).sum::<f64>() / evidence.len().max(1) as f64;
+        EXPECTATION_WEIGHT * (p[2] - EXPECTED_MIDDLE_M).powi(2) - lit
+    })
+}
+
+/// Shifts the body until L_EM is smallest, in the EM region around where it was found.
+fn settle(
+    problem: &Problem,
+    config: &FitConfig,
+    evidence: &[Evidence<'_>],
+    template: &Template,
+    at: Vec3,
+) -> Result<Vec3, FitError> {
+    let start = standing(problem, evidence, template, at).0;
+    let mut objective = Objective::new(Arc::new(problem.clone()), *config, Precision::F32, &start)?;
+    Ok(descend(at, 0.1, 1, |p| {
+        let loss = objective.evaluate(&standing(problem, evidence, template, p).0).terms.em;
+        loss + 0.1 * EXPECTATION_WEIGHT * (p[2] - EXPECTED_MIDDLE_M).powi(2)
+    }))
+}
+
+/// The parameters of a body that stands at `at`.
+fn standing(problem: &Problem, evidence: &[Evidence<'_>], template: &Template, at: Vec3) -> (Pppr, String) {
+    let body = template.facing_origin(at);
+    let doppler_features = problem.radar.doppler_features;
+    let mut params = Pppr::zeros(PpprShape { persons: 1, joints: body.len(), doppler_features });
+    let radial = evidence.iter().zip(&problem.views).find_map(|(e, view)| {
+        let from_radar = sub(at, view.pose.world_from_view([0.0; 3]));
+        e.radial_mps(at).map(|v| (v, scale(from_radar, v / norm(from_radar).max(1e-6))))
+    });
+    for (joint, &p) in body.iter().enumerate() {
+        params.set_vec3(Group::Position, joint, p);
+        params.set_vec3(Group::LogScale, joint, [INITIAL_SCALE_M.ln(); 3]);
+        params.joint_mut(Group::Rotation, joint).copy_from_slice(&[1.0, 0.0, 0.0, 0.0]);
+        params.set_vec3(Group::Velocity, joint, radial.map_or([0.0; 3], |(_, v)| v));
+    }
+    let note = match radial {
+        Some((v, _)) => format!("radial velocity {v:.2} m/s from the Doppler axis"),
+        None => "velocity 0: no Doppler axis".to_owned(),
+    };
+    (params, note)
+}
