@@ -14,7 +14,7 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let done = match cli.command {
         Some(command) => run(command),
-        None => open_window(&cli.paths),
+        None => open_window(cli.paths),
     };
     done.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");
@@ -22,6 +22,12 @@ fn main() -> ExitCode {
     })
 }
 
-fn open_window(_paths: &[std::path::PathBuf]) -> anyhow::Result<ExitCode> {
-    anyhow::bail!("this build has no window")
+#[cfg(feature = "viewer")]
+fn open_window(paths: Vec<std::path::PathBuf>) -> anyhow::Result<ExitCode> {
+    mhp_inspector::app::run(paths).map(|()| ExitCode::SUCCESS)
+}
+
+#[cfg(not(feature = "viewer"))]
+fn open_window(_: Vec<std::path::PathBuf>) -> anyhow::Result<ExitCode> {
+    anyhow::bail!("this build has no window (it was made without the feature `viewer`); try --help")
 }

@@ -6,7 +6,7 @@ use egui::{Key, Modifiers};
 
 /// The menu that a command is in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Menu {
+pub(crate) enum Menu {
     /// Opening and leaving.
     File,
     /// Frames.
@@ -21,10 +21,10 @@ pub enum Menu {
 
 impl Menu {
     /// In the order of the menu bar.
-    pub const ALL: [Self; 5] = [Self::File, Self::Frame, Self::Fit, Self::View, Self::Help];
+    pub(crate) const ALL: [Self; 5] = [Self::File, Self::Frame, Self::Fit, Self::View, Self::Help];
 
     /// The title on the bar.
-    pub fn title(self) -> &'static str {
+    pub(crate) fn title(self) -> &'static str {
         match self {
             Self::File => "File",
             Self::Frame => "Frame",
@@ -37,7 +37,7 @@ impl Menu {
 
 /// What only the window can do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AppAct {
+pub(crate) enum AppAct {
     /// Close the window.
     Quit,
     /// Show or hide the palette.
@@ -72,7 +72,7 @@ pub enum AppAct {
 
 /// What a command does.
 #[derive(Debug)]
-pub enum Act {
+pub(crate) enum Act {
     /// Change the session.
     Session(Command),
     /// Change the window.
@@ -80,22 +80,22 @@ pub enum Act {
 }
 
 /// A key with its modifiers.
-pub type Shortcut = (Modifiers, Key);
+pub(crate) type Shortcut = (Modifiers, Key);
 
 /// One command.
-pub struct UserCommand {
+pub(crate) struct UserCommand {
     /// Sentence case, unique.
-    pub label: &'static str,
+    pub(crate) label: &'static str,
     /// One sentence: what it does.
-    pub tooltip: &'static str,
+    pub(crate) tooltip: &'static str,
     /// Its menu.
-    pub menu: Menu,
+    pub(crate) menu: Menu,
     /// Its keys; the first is shown.
-    pub keys: &'static [Shortcut],
+    pub(crate) keys: &'static [Shortcut],
     /// Whether it would do something now.
-    pub enabled: fn(&Session) -> bool,
+    pub(crate) enabled: fn(&Session) -> bool,
     /// What it does.
-    pub act: fn(&Session) -> Act,
+    pub(crate) act: fn(&Session) -> Act,
 }
 
 const NONE: Modifiers = Modifiers::NONE;
@@ -138,7 +138,7 @@ fn compare(s: &Session, mode: Compare) -> Act {
 }
 
 /// Every command, in the order of its menu.
-pub const COMMANDS: &[UserCommand] = &[
+pub(crate) const COMMANDS: &[UserCommand] = &[
     UserCommand {
         label: "Open folder…",
         tooltip: "Open a data set: an MMVR tree or any folder inside one, or a folder with dataset.toml.",
@@ -466,12 +466,12 @@ pub const COMMANDS: &[UserCommand] = &[
 ];
 
 /// The command called `label`.
-pub fn command(label: &str) -> Option<&'static UserCommand> {
+pub(crate) fn command(label: &str) -> Option<&'static UserCommand> {
     COMMANDS.iter().find(|command| command.label == label)
 }
 
 /// A shortcut as it is printed: `Ctrl+Shift+O`.
-pub fn shortcut_text((modifiers, key): Shortcut) -> String {
+pub(crate) fn shortcut_text((modifiers, key): Shortcut) -> String {
     let key_text = match key {
         Key::ArrowLeft => "←",
         Key::ArrowRight => "→",
@@ -497,7 +497,7 @@ pub fn shortcut_text((modifiers, key): Shortcut) -> String {
 }
 
 /// Tooltip with the shortcut at its end.
-pub fn tooltip(command: &UserCommand) -> String {
+pub(crate) fn tooltip(command: &UserCommand) -> String {
     command.keys.first().map_or_else(
         || command.tooltip.to_owned(),
         |&keys| format!("{}\nKey: {}", command.tooltip, shortcut_text(keys)),
@@ -507,7 +507,7 @@ pub fn tooltip(command: &UserCommand) -> String {
 /// The commands whose keys were pressed in this pass; their key events are taken out of the input.
 ///
 /// While text is being typed nothing is taken except function keys and combinations with Ctrl that text fields do not use.
-pub fn pressed(ctx: &egui::Context) -> Vec<&'static UserCommand> {
+pub(crate) fn pressed(ctx: &egui::Context) -> Vec<&'static UserCommand> {
     let focused = ctx.memory(egui::Memory::focused);
     let typing = focused.is_some_and(|id| egui::text_edit::TextEditState::load(ctx, id).is_some());
     let mut found = Vec::new();
@@ -525,9 +525,9 @@ pub fn pressed(ctx: &egui::Context) -> Vec<&'static UserCommand> {
             if focused.is_some() && !held.0 && matches!(key, Key::Space | Key::Enter | Key::Escape | Key::Tab) {
                 return true;
             }
-            let hit = COMMANDS.iter().find(|command| {
-                command.keys.iter().any(|(m, k)| k == key && (m.command, m.shift) == held)
-            });
+            let hit = COMMANDS
+                .iter()
+                .find(|command| command.keys.iter().any(|(m, k)| k == key && (m.command, m.shift) == held));
             found.extend(hit);
             hit.is_none()
         });

@@ -2,7 +2,9 @@
 
 use super::panes::{self, PaneStates, Shared};
 use super::theme::{self, Tokens};
-use egui_tiles::{Container, Linear, LinearDir, SimplificationOptions, TabState, Tile, TileId, Tiles, Tree, UiResponse};
+use egui_tiles::{
+    Container, Linear, LinearDir, SimplificationOptions, TabState, Tile, TileId, Tiles, Tree, UiResponse,
+};
 use serde::{Deserialize, Serialize};
 
 /// A pane.
@@ -49,7 +51,7 @@ impl PaneKind {
 }
 
 /// The tree of tiles.
-pub struct Layout {
+pub(crate) struct Layout {
     tree: Tree<PaneKind>,
 }
 
@@ -72,7 +74,7 @@ impl Default for Layout {
         let joint = tiles.insert_pane(PaneKind::Joint);
         let right = linear(&mut tiles, LinearDir::Vertical, &[(fit, 1.25), (joint, 1.0)]);
         let root = linear(&mut tiles, LinearDir::Horizontal, &[(frames, 0.17), (middle, 0.62), (right, 0.25)]);
-        Self { tree: Tree::new(egui::Id::new("panes"), root, tiles) }
+        Self { tree: Tree::new(egui::Id::unique("panes"), root, tiles) }
     }
 }
 
@@ -90,7 +92,7 @@ fn tabs(tiles: &mut Tiles<PaneKind>, children: Vec<TileId>) -> TileId {
 
 impl Layout {
     /// A stored tree; one without a single pane is replaced by the default.
-    pub fn restored(tree: Tree<PaneKind>) -> Self {
+    pub(crate) fn restored(tree: Tree<PaneKind>) -> Self {
         if tree.root().is_some() && tree.tiles.iter().any(|(_, tile)| matches!(tile, Tile::Pane(_))) {
             Self { tree }
         } else {
@@ -99,12 +101,12 @@ impl Layout {
     }
 
     /// The tree, to be stored.
-    pub fn stored(&self) -> &Tree<PaneKind> {
+    pub(crate) fn stored(&self) -> &Tree<PaneKind> {
         &self.tree
     }
 
     /// Draws every pane in what is left of the window.
-    pub fn show(&mut self, ui: &mut egui::Ui, shared: &mut Shared<'_>, states: &mut PaneStates) {
+    pub(crate) fn show(&mut self, ui: &mut egui::Ui, shared: &mut Shared<'_>, states: &mut PaneStates) {
         let tokens = Tokens::of(ui);
         egui::CentralPanel::default().frame(egui::Frame::new().fill(tokens.stroke)).show(ui, |ui| {
             let mut behavior = Behavior { shared, states };
@@ -121,7 +123,8 @@ struct Behavior<'a, 'b> {
 impl egui_tiles::Behavior<PaneKind> for Behavior<'_, '_> {
     fn pane_ui(&mut self, ui: &mut egui::Ui, _tile: TileId, pane: &mut PaneKind) -> UiResponse {
         let tokens = Tokens::of(ui);
-        let data = matches!(pane, PaneKind::HOri | PaneKind::HSim | PaneKind::Masks | PaneKind::Scene | PaneKind::Image);
+        let data =
+            matches!(pane, PaneKind::HOri | PaneKind::HSim | PaneKind::Masks | PaneKind::Scene | PaneKind::Image);
         let margin = if data { 0 } else { 8 };
         egui::Frame::new().fill(tokens.panel).inner_margin(margin).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
@@ -150,7 +153,13 @@ impl egui_tiles::Behavior<PaneKind> for Behavior<'_, '_> {
         self.tab_bar_color(visuals)
     }
 
-    fn tab_text_color(&self, visuals: &egui::Visuals, _: &Tiles<PaneKind>, _: TileId, state: &TabState) -> egui::Color32 {
+    fn tab_text_color(
+        &self,
+        visuals: &egui::Visuals,
+        _: &Tiles<PaneKind>,
+        _: TileId,
+        state: &TabState,
+    ) -> egui::Color32 {
         let tokens = if visuals.dark_mode { theme::DARK } else { theme::LIGHT };
         if state.active { tokens.text } else { tokens.dim }
     }

@@ -10,22 +10,22 @@ use egui::{Color32, ColorImage};
 
 /// How a view's array becomes a picture. Pixel (column, row), row 0 at the top.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Orientation {
+pub(crate) struct Orientation {
     /// The array axis drawn upward.
-    pub vertical: usize,
+    pub(crate) vertical: usize,
     /// The array axis drawn across.
-    pub horizontal: usize,
+    pub(crate) horizontal: usize,
     /// A third axis, over which the largest value is drawn.
-    pub collapsed: Option<usize>,
+    pub(crate) collapsed: Option<usize>,
     /// Bin 0 of the vertical axis is at the top.
-    pub vertical_from_top: bool,
+    pub(crate) vertical_from_top: bool,
     /// Bin 0 of the horizontal axis is at the left.
-    pub horizontal_from_left: bool,
+    pub(crate) horizontal_from_left: bool,
 }
 
 impl Orientation {
     /// The orientation of a view by the conventions above.
-    pub fn of(view: &View) -> Self {
+    pub(crate) fn of(view: &View) -> Self {
         let axes = &view.axes;
         let vertical = axes.iter().position(|axis| axis.kind.is_depth()).unwrap_or(0);
         let others: Vec<usize> = (0..axes.len()).filter(|&axis| axis != vertical).collect();
@@ -43,12 +43,12 @@ impl Orientation {
     }
 
     /// Width and height of the picture in cells.
-    pub fn size(&self, view: &View) -> [usize; 2] {
+    pub(crate) fn size(&self, view: &View) -> [usize; 2] {
         [view.axes[self.horizontal].bins, view.axes[self.vertical].bins]
     }
 
     /// Picture coordinates, (0, 0) the upper left corner and (1, 1) the lower right, of bin coordinates.
-    pub fn unit_from_bins(&self, view: &View, bins: &[f64]) -> [f64; 2] {
+    pub(crate) fn unit_from_bins(&self, view: &View, bins: &[f64]) -> [f64; 2] {
         let across = (bins[self.horizontal] + 0.5) / view.axes[self.horizontal].bins as f64;
         let down = (bins[self.vertical] + 0.5) / view.axes[self.vertical].bins as f64;
         [
@@ -58,14 +58,14 @@ impl Orientation {
     }
 
     /// (horizontal bin, vertical bin), fractional, of picture coordinates.
-    pub fn bins_from_unit(&self, view: &View, unit: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn bins_from_unit(&self, view: &View, unit: [f64; 2]) -> [f64; 2] {
         let across = if self.horizontal_from_left { unit[0] } else { 1.0 - unit[0] };
         let down = if self.vertical_from_top { unit[1] } else { 1.0 - unit[1] };
         [across * view.axes[self.horizontal].bins as f64 - 0.5, down * view.axes[self.vertical].bins as f64 - 0.5]
     }
 
     /// The array bin of a pixel, with the collapsed axis at `third`.
-    pub fn index(&self, view: &View, column: usize, row: usize, third: usize) -> usize {
+    pub(crate) fn index(&self, view: &View, column: usize, row: usize, third: usize) -> usize {
         let [width, height] = self.size(view);
         let mut bins = [0usize; 3];
         bins[self.horizontal] = if self.horizontal_from_left { column } else { width - 1 - column };
@@ -77,7 +77,7 @@ impl Orientation {
     }
 
     /// The picture of a map, row by row: the cell itself, or the largest over the collapsed axis.
-    pub fn picture(&self, view: &View, map: &[f64]) -> Vec<f64> {
+    pub(crate) fn picture(&self, view: &View, map: &[f64]) -> Vec<f64> {
         let [width, height] = self.size(view);
         let depth = self.collapsed.map_or(1, |axis| view.axes[axis].bins);
         let mut out = Vec::with_capacity(width * height);
@@ -95,7 +95,7 @@ impl Orientation {
     }
 
     /// The picture of a mask: true where any cell over the collapsed axis is.
-    pub fn mask_picture(&self, view: &View, mask: &[bool]) -> Vec<bool> {
+    pub(crate) fn mask_picture(&self, view: &View, mask: &[bool]) -> Vec<bool> {
         let [width, height] = self.size(view);
         let depth = self.collapsed.map_or(1, |axis| view.axes[axis].bins);
         let mut out = Vec::with_capacity(width * height);
@@ -109,7 +109,7 @@ impl Orientation {
     }
 
     /// True where one cell is as wide as it is high in metres when drawn to scale.
-    pub fn metric_aspect(&self, view: &View) -> Option<f32> {
+    pub(crate) fn metric_aspect(&self, view: &View) -> Option<f32> {
         let metric = |axis: &Axis| !axis.kind.is_angular() && axis.kind != AxisKind::Doppler;
         let (h, v) = (&view.axes[self.horizontal], &view.axes[self.vertical]);
         (metric(h) && metric(v)).then(|| ((h.hi - h.lo).abs() / (v.hi - v.lo).abs()) as f32)
@@ -118,15 +118,15 @@ impl Orientation {
 
 /// Stored values as shown: relative to the largest finite value, in dB or linear.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Shown {
+pub(crate) struct Shown {
     /// What is shown, cell by cell of the picture.
-    pub values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// The stored value that is 0 dB or 1.
-    pub reference: f64,
+    pub(crate) reference: f64,
 }
 
 /// Converts a picture of stored values.
-pub fn shown(picture: &[f64], scale: MapScale, db_factor: f64) -> Shown {
+pub(crate) fn shown(picture: &[f64], scale: MapScale, db_factor: f64) -> Shown {
     let reference = picture.iter().copied().filter(|x| x.is_finite()).fold(0.0, f64::max);
     let reference = if reference > 0.0 { reference } else { 1.0 };
     let values = picture
@@ -141,7 +141,7 @@ pub fn shown(picture: &[f64], scale: MapScale, db_factor: f64) -> Shown {
 }
 
 /// The limits of the colour bar for shown values.
-pub fn limits(values: &[f64], range: ColorRange) -> (f64, f64) {
+pub(crate) fn limits(values: &[f64], range: ColorRange) -> (f64, f64) {
     let (lo, hi) = match range {
         ColorRange::Fixed { lo, hi } => (lo, hi),
         ColorRange::Percentile { lo, hi } => {
@@ -158,7 +158,14 @@ pub fn limits(values: &[f64], range: ColorRange) -> (f64, f64) {
 }
 
 /// Colours shown values between limits. Cells outside are hatched where `hatch`, cells without a number are `nan`.
-pub fn colorize(size: [usize; 2], values: &[f64], (lo, hi): (f64, f64), map: Colormap, hatch: bool, nan: Color32) -> ColorImage {
+pub(crate) fn colorize(
+    size: [usize; 2],
+    values: &[f64],
+    (lo, hi): (f64, f64),
+    map: Colormap,
+    hatch: bool,
+    nan: Color32,
+) -> ColorImage {
     let lut = map.lut();
     let span = hi - lo;
     let mut image = ColorImage::filled(size, Color32::BLACK);
@@ -225,7 +232,11 @@ mod tests {
 
     #[test]
     fn bins_and_picture_coordinates_invert_each_other() {
-        let v = view(&[(AxisKind::Range, 40, 4.0, 1.3), (AxisKind::Azimuth, 32, 0.9, -1.0), (AxisKind::Elevation, 8, -1.0, 1.0)]);
+        let v = view(&[
+            (AxisKind::Range, 40, 4.0, 1.3),
+            (AxisKind::Azimuth, 32, 0.9, -1.0),
+            (AxisKind::Elevation, 8, -1.0, 1.0),
+        ]);
         let o = Orientation::of(&v);
         let unit = o.unit_from_bins(&v, &[12.25, 7.5, 3.0]);
         let [h, w] = [o.bins_from_unit(&v, unit)[1], o.bins_from_unit(&v, unit)[0]];
@@ -234,7 +245,11 @@ mod tests {
 
     #[test]
     fn a_cube_is_drawn_as_its_largest_over_the_third_axis() {
-        let v = view(&[(AxisKind::Range, 2, 1.0, 0.0), (AxisKind::Azimuth, 2, 1.0, -1.0), (AxisKind::Elevation, 3, -1.0, 1.0)]);
+        let v = view(&[
+            (AxisKind::Range, 2, 1.0, 0.0),
+            (AxisKind::Azimuth, 2, 1.0, -1.0),
+            (AxisKind::Elevation, 3, -1.0, 1.0),
+        ]);
         let o = Orientation::of(&v);
         let map: Vec<f64> = (0..12).map(f64::from).collect();
         assert_eq!(o.picture(&v, &map), vec![2.0, 5.0, 8.0, 11.0]);

@@ -77,8 +77,17 @@ fn status(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
                 shared.send(Command::CancelOpen);
             }
             let share = if opening.total > 0 { opening.done as f32 / opening.total as f32 } else { 0.0 };
-            let text = if opening.total > 0 { format!("{} {}/{}", opening.stage, opening.done, opening.total) } else { format!("{} {}", opening.stage, opening.done) };
-            ui.add(egui::ProgressBar::new(share).desired_width(180.0).desired_height(14.0).text(RichText::new(text).small()));
+            let text = if opening.total > 0 {
+                format!("{} {}/{}", opening.stage, opening.done, opening.total)
+            } else {
+                format!("{} {}", opening.stage, opening.done)
+            };
+            ui.add(
+                egui::ProgressBar::new(share)
+                    .desired_width(180.0)
+                    .desired_height(14.0)
+                    .text(RichText::new(text).small()),
+            );
             return;
         }
         let fit = &session.fit;
@@ -89,14 +98,16 @@ fn status(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
             _ if fit.problem.is_some() => format!("init {:.1} ms", fit.init_ms),
             _ => String::new(),
         };
-        ui.label(RichText::new(timing).font(theme::mono(theme::CAPTION)).color(tokens.dim)).on_hover_text("Time of the initialisation and of the last run, or iterations a second.");
+        ui.label(RichText::new(timing).font(theme::mono(theme::CAPTION)).color(tokens.dim))
+            .on_hover_text("Time of the initialisation and of the last run, or iterations a second.");
         if let Some(dataset) = &session.data.dataset {
             let info = dataset.info();
             let badge = RichText::new(&info.axes_badge).small().color(tokens.dim);
             let tip = format!("Axes convention of this data set.\n{}", info.assumptions.join("\n"));
             ui.add(egui::Label::new(badge).truncate()).on_hover_text(tip);
             let frame = session.data.frame.as_ref().map_or_else(String::new, |f| format!(" · {}", f.name));
-            ui.label(RichText::new(format!("{}{frame}", info.name)).font(theme::strong(12.0))).on_hover_text(info.root.display().to_string());
+            ui.label(RichText::new(format!("{}{frame}", info.name)).font(theme::strong(12.0)))
+                .on_hover_text(info.root.display().to_string());
         }
     });
 }

@@ -136,7 +136,12 @@ impl InspectorApp {
 
     /// Files dropped on the window.
     fn take_drops(&mut self, ctx: &egui::Context) {
-        let dropped = ctx.input(|i| i.raw.dropped_files.iter().find_map(|file| file.path().map(PathBuf::from)));
+        let dropped = ctx.input(|i| {
+            i.raw
+                .dropped_files
+                .iter()
+                .find_map(|file| Some(file.path().to_path_buf()).filter(|p| !p.as_os_str().is_empty()))
+        });
         if dropped.is_some() && dropped != self.dropped {
             if let Some(path) = dropped.clone() {
                 self.apply(Command::Open(path));

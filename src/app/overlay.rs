@@ -101,9 +101,11 @@ impl Overlay {
         self.chosen = (self.chosen + usize::from(down)).min(last).saturating_sub(usize::from(up));
         let mut done = false;
         let tokens = Tokens::of(ui);
-        let response = egui::Modal::new(egui::Id::new("palette")).show(ui.ctx(), |ui| {
+        let response = egui::Modal::new(egui::Id::unique("palette")).show(ui.ctx(), |ui| {
             ui.set_width(460.0);
-            let field = ui.add(egui::TextEdit::singleline(&mut self.query).hint_text("Type a command").desired_width(f32::INFINITY));
+            let field = ui.add(
+                egui::TextEdit::singleline(&mut self.query).hint_text("Type a command").desired_width(f32::INFINITY),
+            );
             field.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Command palette"));
             if self.fresh {
                 field.request_focus();
@@ -116,7 +118,8 @@ impl Overlay {
             egui::ScrollArea::vertical().max_height(340.0).show(ui, |ui| {
                 for (i, command) in found.iter().enumerate() {
                     let enabled = (command.enabled)(shared.session);
-                    let mut button = egui::Button::new(command.label).selected(i == self.chosen).min_size(vec2(440.0, 22.0));
+                    let mut button =
+                        egui::Button::new(command.label).selected(i == self.chosen).min_size(vec2(440.0, 22.0));
                     let keys = command.keys.first().map(|&k| shortcut_text(k)).unwrap_or_default();
                     button = button.shortcut_text(keys).frame_when_inactive(false);
                     let response = ui.add_enabled(enabled, button).on_hover_text(command.tooltip);
@@ -139,7 +142,7 @@ impl Overlay {
     fn goto(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
         let last = shared.session.data.len().saturating_sub(1);
         let mut done = false;
-        let response = egui::Modal::new(egui::Id::new("goto")).show(ui.ctx(), |ui| {
+        let response = egui::Modal::new(egui::Id::unique("goto")).show(ui.ctx(), |ui| {
             ui.set_width(260.0);
             ui.label(format!("Frame, 0 to {last}"));
             let field = ui.add(egui::TextEdit::singleline(&mut self.query).desired_width(f32::INFINITY));
@@ -166,20 +169,25 @@ impl Overlay {
         for (i, (until, level, text)) in self.notices.iter().enumerate() {
             let color = if *level == LogLevel::Error { tokens.bad } else { tokens.warn };
             let offset = vec2(-12.0, -74.0 - 64.0 * i as f32);
-            egui::Area::new(egui::Id::new(("notice", i))).anchor(Align2::RIGHT_BOTTOM, offset).order(egui::Order::Foreground).show(ui.ctx(), |ui| {
-                egui::Frame::popup(ui.style()).stroke(egui::Stroke::new(1.0, color)).show(ui, |ui| {
-                    ui.set_max_width(420.0);
-                    ui.horizontal(|ui| {
-                        ui.label(RichText::new(if *level == LogLevel::Error { "■" } else { "▲" }).color(color));
-                        ui.add(egui::Label::new(RichText::new(text).small()).wrap());
-                        let close = ui.small_button("✕");
-                        close.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Dismiss notification"));
-                        if close.clicked() {
-                            closed = Some(i);
-                        }
+            egui::Area::new(egui::Id::unique(("notice", i)))
+                .anchor(Align2::RIGHT_BOTTOM, offset)
+                .order(egui::Order::Foreground)
+                .show(ui.ctx(), |ui| {
+                    egui::Frame::popup(ui.style()).stroke(egui::Stroke::new(1.0, color)).show(ui, |ui| {
+                        ui.set_max_width(420.0);
+                        ui.horizontal(|ui| {
+                            ui.label(RichText::new(if *level == LogLevel::Error { "■" } else { "▲" }).color(color));
+                            ui.add(egui::Label::new(RichText::new(text).small()).wrap());
+                            let close = ui.small_button("✕");
+                            close.widget_info(|| {
+                                egui::WidgetInfo::labeled(egui::Role::Button, true, "Dismiss notification")
+                            });
+                            if close.clicked() {
+                                closed = Some(i);
+                            }
+                        });
                     });
                 });
-            });
             ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64((until - now).max(0.05)));
         }
         if let Some(i) = closed {
@@ -191,7 +199,7 @@ impl Overlay {
 /// A sheet with a title that Escape or a click outside closes.
 fn sheet(ui: &Ui, title: &str, width: f32, content: fn(&mut Ui)) -> bool {
     let height = ui.ctx().content_rect().height() * 0.8;
-    egui::Modal::new(egui::Id::new(title))
+    egui::Modal::new(egui::Id::unique(title))
         .show(ui.ctx(), |ui| {
             ui.set_width(width.min(ui.ctx().content_rect().width() - 60.0));
             ui.label(RichText::new(title).font(theme::strong(16.0)));
@@ -241,7 +249,10 @@ fn help(ui: &mut Ui) {
 
 fn key_row(ui: &mut Ui, key: &str, what: &str, tokens: &Tokens) {
     ui.horizontal(|ui| {
-        ui.add_sized([104.0, 18.0], egui::Label::new(RichText::new(key).font(theme::mono(12.0)).color(tokens.accent)).halign(egui::Align::LEFT));
+        ui.add_sized(
+            [104.0, 18.0],
+            egui::Label::new(RichText::new(key).font(theme::mono(12.0)).color(tokens.accent)).halign(egui::Align::LEFT),
+        );
         ui.label(what);
     });
 }
@@ -259,9 +270,8 @@ pub(super) fn pick(kind: PickKind) -> Option<PathBuf> {
     let dialog = rfd::FileDialog::new().set_title("Open a data set");
     match kind {
         PickKind::Folder => dialog.pick_folder(),
-        PickKind::File => dialog
-            .add_filter("Radar data", &["npz", "npy", "toml"])
-            .add_filter("All files", &["*"])
-            .pick_file(),
+        PickKind::File => {
+            dialog.add_filter("Radar data", &["npz", "npy", "toml"]).add_filter("All files", &["*"]).pick_file()
+        }
     }
 }

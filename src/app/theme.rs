@@ -6,43 +6,43 @@ use egui::{Color32, CornerRadius, FontData, FontDefinitions, FontFamily, FontId,
 use std::sync::Arc;
 
 /// Body text, points.
-pub const BODY: f32 = 13.0;
+pub(crate) const BODY: f32 = 13.0;
 /// Captions, ticks and dense tables, points.
-pub const CAPTION: f32 = 11.0;
+pub(crate) const CAPTION: f32 = 11.0;
 /// Pane titles, points.
-pub const TITLE: f32 = 14.0;
+pub(crate) const TITLE: f32 = 14.0;
 /// The grid that distances are multiples of, points.
-pub const GRID: f32 = 4.0;
+pub(crate) const GRID: f32 = 4.0;
 
 /// The colours of one theme.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tokens {
+pub(crate) struct Tokens {
     /// Behind data.
-    pub canvas: Color32,
+    pub(crate) canvas: Color32,
     /// Behind controls.
-    pub panel: Color32,
+    pub(crate) panel: Color32,
     /// Buttons, fields, selected rows.
-    pub raised: Color32,
+    pub(crate) raised: Color32,
     /// Lines between things.
-    pub stroke: Color32,
+    pub(crate) stroke: Color32,
     /// Text.
-    pub text: Color32,
+    pub(crate) text: Color32,
     /// Secondary text.
-    pub dim: Color32,
+    pub(crate) dim: Color32,
     /// Selection and focus.
-    pub accent: Color32,
+    pub(crate) accent: Color32,
     /// Good.
-    pub ok: Color32,
+    pub(crate) ok: Color32,
     /// Attention.
-    pub warn: Color32,
+    pub(crate) warn: Color32,
     /// Wrong.
-    pub bad: Color32,
+    pub(crate) bad: Color32,
     /// The person's left.
-    pub left: Color32,
+    pub(crate) left: Color32,
     /// The person's right.
-    pub right: Color32,
+    pub(crate) right: Color32,
     /// True in the dark theme.
-    pub dark: bool,
+    pub(crate) dark: bool,
 }
 
 const fn rgb(hex: u32) -> Color32 {
@@ -50,7 +50,7 @@ const fn rgb(hex: u32) -> Color32 {
 }
 
 /// The dark theme.
-pub const DARK: Tokens = Tokens {
+pub(crate) const DARK: Tokens = Tokens {
     canvas: rgb(0x101216),
     panel: rgb(0x171A20),
     raised: rgb(0x1F232B),
@@ -67,7 +67,7 @@ pub const DARK: Tokens = Tokens {
 };
 
 /// The light theme.
-pub const LIGHT: Tokens = Tokens {
+pub(crate) const LIGHT: Tokens = Tokens {
     canvas: rgb(0xFFFFFF),
     panel: rgb(0xF5F6F8),
     raised: rgb(0xFFFFFF),
@@ -84,24 +84,24 @@ pub const LIGHT: Tokens = Tokens {
 };
 
 /// Mask overlay: cells in both masks, in H_ori's only, in H_sim's only.
-pub const MASK_BOTH: Color32 = Color32::from_rgb(0xFF, 0xFF, 0xFF);
+pub(crate) const MASK_BOTH: Color32 = Color32::from_rgb(0xFF, 0xFF, 0xFF);
 /// In H_ori's mask only.
-pub const MASK_ORI: Color32 = Color32::from_rgb(0xFF, 0x9F, 0x45);
+pub(crate) const MASK_ORI: Color32 = Color32::from_rgb(0xFF, 0x9F, 0x45);
 /// In H_sim's mask only.
-pub const MASK_SIM: Color32 = Color32::from_rgb(0x4D, 0xA3, 0xFF);
+pub(crate) const MASK_SIM: Color32 = Color32::from_rgb(0x4D, 0xA3, 0xFF);
 /// Behind the masks, in both themes: white must be readable on it.
-pub const MASK_GROUND: Color32 = Color32::from_rgb(0x10, 0x12, 0x16);
+pub(crate) const MASK_GROUND: Color32 = Color32::from_rgb(0x10, 0x12, 0x16);
 /// Cells that hold no number.
-pub const NAN_CELL: Color32 = Color32::from_rgb(0xB0, 0x3A, 0x9A);
+pub(crate) const NAN_CELL: Color32 = Color32::from_rgb(0xB0, 0x3A, 0x9A);
 
 impl Tokens {
     /// The tokens of the theme that `ui` is drawn in.
-    pub fn of(ui: &egui::Ui) -> Self {
+    pub(crate) fn of(ui: &egui::Ui) -> Self {
         if ui.visuals().dark_mode { DARK } else { LIGHT }
     }
 
     /// The colour of a side of the body.
-    pub fn side(&self, side: Side) -> Color32 {
+    pub(crate) fn side(&self, side: Side) -> Color32 {
         match side {
             Side::Left => self.left,
             Side::Right => self.right,
@@ -110,7 +110,7 @@ impl Tokens {
     }
 
     /// The colours of the curves, by name.
-    pub fn curve(&self, name: &str) -> Color32 {
+    pub(crate) fn curve(&self, name: &str) -> Color32 {
         let dark = self.dark;
         let pick = |on_dark: u32, on_light: u32| rgb(if dark { on_dark } else { on_light });
         match name {
@@ -129,17 +129,17 @@ impl Tokens {
 }
 
 /// Numbers: tabular figures.
-pub fn mono(size: f32) -> FontId {
+pub(crate) fn mono(size: f32) -> FontId {
     FontId::new(size, FontFamily::Monospace)
 }
 
 /// Text that names a pane.
-pub fn strong(size: f32) -> FontId {
+pub(crate) fn strong(size: f32) -> FontId {
     FontId::new(size, FontFamily::Name("semibold".into()))
 }
 
 /// Loads the fonts and sets both themes.
-pub fn install(ctx: &egui::Context) {
+pub(crate) fn install(ctx: &egui::Context) {
     ctx.set_fonts(fonts());
     for (theme, tokens) in [(egui::Theme::Dark, DARK), (egui::Theme::Light, LIGHT)] {
         ctx.style_mut_of(theme, |style| {
@@ -168,7 +168,7 @@ pub fn install(ctx: &egui::Context) {
 }
 
 /// Applies the chosen theme.
-pub fn apply(ctx: &egui::Context, choice: ThemeChoice) {
+pub(crate) fn apply(ctx: &egui::Context, choice: ThemeChoice) {
     ctx.set_theme(match choice {
         ThemeChoice::Dark => egui::ThemePreference::Dark,
         ThemeChoice::Light => egui::ThemePreference::Light,

@@ -1,6 +1,8 @@
 //! The command line: one file a subcommand. Arguments as typed become a validated configuration and one library call.
 
 mod score;
+#[cfg(feature = "viewer")]
+mod screenshot;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
@@ -30,6 +32,9 @@ pub enum Command {
     /// `grad_<group>` (of the total) and `grad_em_<group>` (of L_EM alone), all float64. Prints the scalars as one JSON
     /// object; an IoU of two empty masks is null there and NaN in the npz. The EM region is that of the given positions.
     Score(score::ScoreArgs),
+    /// Draw the real window offscreen after a number of iterations, and save it as a PNG.
+    #[cfg(feature = "viewer")]
+    Screenshot(screenshot::ScreenshotArgs),
 }
 
 /// Runs a subcommand.
@@ -39,5 +44,7 @@ pub enum Command {
 pub fn run(command: Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Score(args) => score::run(&args),
+        #[cfg(feature = "viewer")]
+        Command::Screenshot(args) => screenshot::run(&args),
     }
 }

@@ -18,6 +18,7 @@ mod mmvr;
 pub mod npz;
 mod pppr_io;
 mod progress;
+mod sample;
 mod set;
 mod words;
 
@@ -31,5 +32,6 @@ pub use manifest::{Layout, Manifest};
 pub use npz::NpzError;
 pub use pppr_io::{read_pppr, write_pppr};
 pub use progress::{Progress, ProgressState};
+pub use sample::bundled_sample;
 pub use set::{Dataset, DatasetInfo, MANIFEST_NAME};
 pub use words::{axes_badge, axis_position, axis_words, system_words, view_words};

@@ -167,7 +167,7 @@ impl History {
     /// Appends a row. A second row of the same iteration replaces the first one only where a branch begins (an edit by
     /// hand, or settings changed before the first step); otherwise history is never rewritten.
     pub fn push(&mut self, branch: u32, row: Row) {
-        let bytes = row.state.as_ref().map_or(0, |state| state.bytes());
+        let bytes = row.state.as_ref().map_or(0, state_bytes);
         let Some(branch) = self.branches.iter_mut().find(|b| b.id == branch) else { return };
         match branch.rows.last() {
             Some(last) if last.report.iteration == row.report.iteration => {
@@ -224,8 +224,13 @@ impl History {
 
     fn recount(&mut self) {
         self.state_bytes =
-            self.branches.iter().flat_map(|b| &b.rows).filter_map(|r| r.state.as_ref()).map(|s| s.bytes()).sum();
+            self.branches.iter().flat_map(|b| &b.rows).filter_map(|r| r.state.as_ref()).map(state_bytes).sum();
     }
+}
+
+/// Bytes that a state holds: parameters and two moments of each.
+fn state_bytes(state: &Arc<FitState>) -> usize {
+    3 * size_of::<f64>() * state.params.shape().total()
 }
 
 /// What differs between two configurations, in words: `τ_pct 10 → 15`.

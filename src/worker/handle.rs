@@ -9,10 +9,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 const COMMAND_QUEUE: usize = 256;
 
 /// A cell of which only the newest value matters.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Latest<T>(Mutex<Option<T>>);
 
 impl<T> Latest<T> {
+    pub(super) fn empty() -> Self {
+        Self(Mutex::new(None))
+    }
+
     pub(super) fn put(&self, value: T) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(value);
     }
@@ -39,7 +43,7 @@ impl Worker {
     pub fn spawn(wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
         let (commands, inbox) = bounded(COMMAND_QUEUE);
         let (outbox, messages) = unbounded();
-        let snapshot = Arc::new(Latest::default());
+        let snapshot = Arc::new(Latest::empty());
         let mut body = Thread::new(inbox, outbox, Arc::clone(&snapshot), Box::new(wake));
         let thread = std::thread::Builder::new().name("mhp-worker".into()).spawn(move || body.run())?;
         Ok(Self { commands, messages, snapshot, thread: Some(thread) })

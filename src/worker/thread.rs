@@ -320,7 +320,7 @@ impl Job {
     }
 
     fn inspect(&mut self, branch: u32, state: &FitState, config: FitConfig) -> Result<Snapshot, FitError> {
-        self.viewer.set_config(config)?;
+        self.viewer.set_config(config);
         let evaluation = self.viewer.evaluate(&state.params);
         let h_sim = simulate(&self.problem, &config, Precision::F32, &state.params);
         let masks = (0..h_sim.len()).map(|view| masks(&self.viewer, view, &h_sim[view])).collect();

@@ -32,7 +32,7 @@ impl State {
         let Some((catalog, choice, used)) = &mut self.choice else { return };
         let path = path.clone();
         let mut send = None;
-        let response = egui::Modal::new(egui::Id::new("bare file")).show(ui.ctx(), |ui| {
+        let response = egui::Modal::new(egui::Id::unique("bare file")).show(ui.ctx(), |ui| {
             ui.set_width(640.0);
             let tokens = Tokens::of(ui);
             ui.label(RichText::new("What do these maps measure?").font(theme::strong(16.0)));
@@ -107,7 +107,8 @@ fn edit_axis(ui: &mut Ui, salt: (&str, usize), axis: &mut Axis) {
     let angular = axis.kind.is_angular();
     if angular {
         let mut sine = axis.spacing == Spacing::Sine;
-        ui.checkbox(&mut sine, "sine").on_hover_text("The bins are uniform in the sine of the angle; the ends are sines.");
+        ui.checkbox(&mut sine, "sine")
+            .on_hover_text("The bins are uniform in the sine of the angle; the ends are sines.");
         axis.spacing = if sine { Spacing::Sine } else { Spacing::Linear };
     } else {
         axis.spacing = Spacing::Linear;
@@ -120,7 +121,8 @@ fn edit_axis(ui: &mut Ui, salt: (&str, usize), axis: &mut Axis) {
     };
     ui.label("from").on_hover_text("Centre of bin 0.");
     ui.add(egui::DragValue::new(&mut axis.lo).speed(0.01).max_decimals(5).suffix(unit));
-    ui.label("to").on_hover_text("One step past the centre of the last bin. May be smaller than the start: a falling axis.");
+    ui.label("to")
+        .on_hover_text("One step past the centre of the last bin. May be smaller than the start: a falling axis.");
     ui.add(egui::DragValue::new(&mut axis.hi).speed(0.01).max_decimals(5).suffix(unit));
 }
 

@@ -42,7 +42,11 @@ fn curve(key: &str, name: &str, width: f32, value: impl Fn(&Row) -> Option<f64> 
 pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let fit = &shared.session.fit;
     let Some(branch) = fit.branch().filter(|b| !b.rows.is_empty()) else {
-        return empty(ui, "No iterations yet", "Press Enter to run the fit; loss, IoU and error appear here as it runs.");
+        return empty(
+            ui,
+            "No iterations yet",
+            "Press Enter to run the fit; loss, IoU and error appear here as it runs.",
+        );
     };
     let curves = curves(shared, branch, state.tab);
     toolbar(ui, shared, state, &curves);
@@ -51,7 +55,9 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let hidden = &shared.session.view.hidden_curves;
     let tokens = Tokens::of(ui);
     let mut plot = Plot::new(("curves", state.tab == Tab::Loss))
-        .x_axis_formatter(|mark, _| if mark.value.fract().abs() < 1e-9 { format!("{}", mark.value) } else { String::new() })
+        .x_axis_formatter(
+            |mark, _| if mark.value.fract().abs() < 1e-9 { format!("{}", mark.value) } else { String::new() },
+        )
         .show_grid([true, true])
         .grid_color(tokens.stroke)
         .allow_scroll(false)
@@ -69,11 +75,8 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     if std::mem::take(&mut state.reset) {
         plot = plot.reset();
     }
-    let lines: Vec<(Vec<PlotPoint>, &Curve)> = curves
-        .iter()
-        .filter(|c| !hidden.contains(&c.key))
-        .map(|c| (points(branch, c, log), c))
-        .collect();
+    let lines: Vec<(Vec<PlotPoint>, &Curve)> =
+        curves.iter().filter(|c| !hidden.contains(&c.key)).map(|c| (points(branch, c, log), c)).collect();
     let others: Vec<(u32, Vec<PlotPoint>)> = fit
         .history
         .branches()
@@ -100,7 +103,9 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             let x = flag.iteration as f64;
             plot.vline(VLine::new(flag.text.clone(), x).color(tokens.warn.gamma_multiply(0.7)).width(1.0));
             let text = RichText::new(format!("⚑ {}", flag.text)).size(10.0);
-            plot.text(Text::new("flag", PlotPoint::new(x, top), text).color(tokens.warn).anchor(egui::Align2::LEFT_TOP));
+            plot.text(
+                Text::new("flag", PlotPoint::new(x, top), text).color(tokens.warn).anchor(egui::Align2::LEFT_TOP),
+            );
         }
         plot.vline(VLine::new("shown iteration", shown as f64).color(tokens.accent).width(1.0));
         (plot.pointer_coordinate(), plot.response().clone())
@@ -138,7 +143,9 @@ fn curves(shared: &Shared<'_>, branch: &Branch, tab: Tab) -> Vec<Curve> {
                 .iter()
                 .enumerate()
                 .map(|(i, array)| {
-                    curve(&format!("iou {i}"), &format!("IoU {array}"), 1.5, move |r| r.report.iou.get(i).copied().flatten())
+                    curve(&format!("iou {i}"), &format!("IoU {array}"), 1.5, move |r| {
+                        r.report.iou.get(i).copied().flatten()
+                    })
                 })
                 .collect();
             if branch.rows.iter().any(|row| row.majpe_mm.is_some()) {
@@ -175,7 +182,13 @@ fn label(hover: &egui_plot::HoverPosition<'_>, log: bool) -> Option<String> {
 /// A tick of a log₁₀ axis.
 fn power(exponent: f64) -> String {
     let value = 10f64.powf(exponent);
-    if !(0.001..10_000.0).contains(&value) { format!("{value:.0e}") } else if value < 0.1 { format!("{value:.3}") } else { format!("{value:.2}") }
+    if !(0.001..10_000.0).contains(&value) {
+        format!("{value:.0e}")
+    } else if value < 0.1 {
+        format!("{value:.3}")
+    } else {
+        format!("{value:.2}")
+    }
 }
 
 fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, curves: &[Curve]) {
@@ -183,7 +196,8 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, curves: &[Cu
     let mut view = shared.session.view.clone();
     ui.horizontal_wrapped(|ui| {
         ui.selectable_value(&mut state.tab, Tab::Loss, "Loss").on_hover_text("The total and its unweighted terms.");
-        ui.selectable_value(&mut state.tab, Tab::Quality, "IoU and error").on_hover_text("Forward-consistency IoU of each view, and MAJPE where the data set has truth.");
+        ui.selectable_value(&mut state.tab, Tab::Quality, "IoU and error")
+            .on_hover_text("Forward-consistency IoU of each view, and MAJPE where the data set has truth.");
         if state.tab == Tab::Loss {
             ui.checkbox(&mut view.log_loss, "log y").on_hover_text("Logarithmic vertical axis.");
         }

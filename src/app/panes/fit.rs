@@ -100,7 +100,9 @@ fn branches(ui: &mut Ui, shared: &mut Shared<'_>) {
             }
         })
         .response
-        .on_hover_text("Branches of this fit. Changing a setting at an earlier iteration starts a new one and keeps the old.");
+        .on_hover_text(
+            "Branches of this fit. Changing a setting at an earlier iteration starts a new one and keeps the old.",
+        );
     if chosen != active {
         shared.send(Command::SelectBranch(chosen));
     }
@@ -119,11 +121,16 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
     let (loss, terms, iou) =
         evaluation.map_or((report.loss, report.terms, report.iou.clone()), |e| (e.loss, e.terms, e.iou.clone()));
     value_row(ui, "Iteration", &format!("{} / {}", report.iteration, fit.head()), "");
-    value_row(ui, "L total", &format!("{loss:.5}"), "").on_hover_text("L = w_EM·L_EM + w_kine·(L_bone + L_rigid + L_joint + L_sep + L_coll)");
-    value_row(ui, "L_EM", &format!("{:.5}", terms.em), "").on_hover_text("Mean over the views of one minus the soft IoU.");
-    value_row(ui, "L_bone", &format!("{:.5}", terms.bone), "").on_hover_text("Σ ψ(l − ℓ) over the bones: length against reference.");
-    value_row(ui, "L_rigid", &format!("{:.5}", terms.rigid), "").on_hover_text("Σ ψ of the relative velocity along each bone.");
-    value_row(ui, "L_joint", &format!("{:.5}", terms.joint), "").on_hover_text("Σ max(0, θ − θ_max)² over elbows and knees, rad².");
+    value_row(ui, "L total", &format!("{loss:.5}"), "")
+        .on_hover_text("L = w_EM·L_EM + w_kine·(L_bone + L_rigid + L_joint + L_sep + L_coll)");
+    value_row(ui, "L_EM", &format!("{:.5}", terms.em), "")
+        .on_hover_text("Mean over the views of one minus the soft IoU.");
+    value_row(ui, "L_bone", &format!("{:.5}", terms.bone), "")
+        .on_hover_text("Σ ψ(l − ℓ) over the bones: length against reference.");
+    value_row(ui, "L_rigid", &format!("{:.5}", terms.rigid), "")
+        .on_hover_text("Σ ψ of the relative velocity along each bone.");
+    value_row(ui, "L_joint", &format!("{:.5}", terms.joint), "")
+        .on_hover_text("Σ max(0, θ − θ_max)² over elbows and knees, rad².");
     if terms.sep != 0.0 || terms.coll != 0.0 {
         value_row(ui, "L_sep", &format!("{:.5}", terms.sep), "");
         value_row(ui, "L_coll", &format!("{:.5}", terms.coll), "");
@@ -134,7 +141,8 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
             ui.label(RichText::new(format!("IoU {name}")).color(tokens.dim));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 ui.add_sized([26.0, 16.0], egui::Label::new(""));
-                let (text, color) = iou.map_or(("—".into(), tokens.dim), |x| (format!("{x:.3}"), iou_color(&tokens, x)));
+                let (text, color) =
+                    iou.map_or(("—".into(), tokens.dim), |x| (format!("{x:.3}"), iou_color(&tokens, x)));
                 ui.label(RichText::new(text).font(theme::mono(12.0)).color(color));
             });
         })
@@ -142,7 +150,8 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
         .on_hover_text("Forward-consistency IoU of the hard masks over the EM region.");
     }
     if let Some(majpe) = row.majpe_mm {
-        value_row(ui, "MAJPE", &format!("{majpe:.1}"), "mm").on_hover_text("Mean absolute joint position error against the data set's joints.");
+        value_row(ui, "MAJPE", &format!("{majpe:.1}"), "mm")
+            .on_hover_text("Mean absolute joint position error against the data set's joints.");
     }
 }
 
@@ -156,22 +165,33 @@ fn settings(ui: &mut Ui, shared: &mut Shared<'_>) {
         for field in FIELDS.iter().skip(3).take(3) {
             slider(ui, field, &mut config);
         }
-        ui.checkbox(&mut config.stop_when_converged, "Stop when converged").on_hover_text("End a run as soon as the convergence criterion holds.");
+        ui.checkbox(&mut config.stop_when_converged, "Stop when converged")
+            .on_hover_text("End a run as soon as the convergence criterion holds.");
         let mut warm = shared.session.warm_start;
-        if ui.checkbox(&mut warm, "Warm start").on_hover_text("Start the next frame from this frame's result instead of from its own peaks.").changed() {
+        if ui
+            .checkbox(&mut warm, "Warm start")
+            .on_hover_text("Start the next frame from this frame's result instead of from its own peaks.")
+            .changed()
+        {
             shared.send(Command::SetWarmStart(warm));
         }
         let mut precision = shared.session.precision;
         ui.horizontal(|ui| {
             ui.label("Kernel");
-            ui.selectable_value(&mut precision, Precision::F64, "f64").on_hover_text("Double precision. Changing it resets the fit.");
-            ui.selectable_value(&mut precision, Precision::F32, "f32").on_hover_text("Single precision. Changing it resets the fit.");
+            ui.selectable_value(&mut precision, Precision::F64, "f64")
+                .on_hover_text("Double precision. Changing it resets the fit.");
+            ui.selectable_value(&mut precision, Precision::F32, "f32")
+                .on_hover_text("Single precision. Changing it resets the fit.");
         });
         if precision != shared.session.precision {
             shared.send(Command::SetPrecision(precision));
         }
         let mut auto = shared.session.view.run_on_open;
-        if ui.checkbox(&mut auto, "Fit each frame when shown").on_hover_text("Begin a run as soon as a frame without a fit is shown.").changed() {
+        if ui
+            .checkbox(&mut auto, "Fit each frame when shown")
+            .on_hover_text("Begin a run as soon as a frame without a fit is shown.")
+            .changed()
+        {
             shared.set_view(|v| v.run_on_open = auto);
         }
     });
@@ -179,8 +199,10 @@ fn settings(ui: &mut Ui, shared: &mut Shared<'_>) {
         operators(ui, &mut config);
         ui.horizontal(|ui| {
             ui.label("Sum");
-            ui.selectable_value(&mut config.summation, Summation::Coherent, "coherent").on_hover_text("H_sim = |Σ A K e^{iψ}|: joints interfere.");
-            ui.selectable_value(&mut config.summation, Summation::Incoherent, "incoherent").on_hover_text("H_sim = √Σ (A K)²: powers add.");
+            ui.selectable_value(&mut config.summation, Summation::Coherent, "coherent")
+                .on_hover_text("H_sim = |Σ A K e^{iψ}|: joints interfere.");
+            ui.selectable_value(&mut config.summation, Summation::Incoherent, "incoherent")
+                .on_hover_text("H_sim = √Σ (A K)²: powers add.");
         });
         region(ui, &mut config);
         slider(ui, &FIELDS[7], &mut config);
@@ -192,7 +214,11 @@ fn settings(ui: &mut Ui, shared: &mut Shared<'_>) {
     });
     ui.add_space(4.0);
     let changed = config != FitConfig::default();
-    if ui.add_enabled(changed, egui::Button::new("Reset all to defaults")).on_hover_text("The paper's settings.").clicked() {
+    if ui
+        .add_enabled(changed, egui::Button::new("Reset all to defaults"))
+        .on_hover_text("The paper's settings.")
+        .clicked()
+    {
         config = FitConfig::default();
     }
     if config != old {
@@ -205,7 +231,13 @@ fn slider(ui: &mut Ui, field: &Field, config: &mut FitConfig) {
     let default = (field.get)(&FitConfig::default());
     let mut value = (field.get)(config);
     let (lo, hi) = field.range;
-    let tip = format!("{}\nDefault {default}{}{}. FIT.toml: {}", field.help, if field.unit.is_empty() { "" } else { " " }, field.unit, field.key);
+    let tip = format!(
+        "{}\nDefault {default}{}{}. FIT.toml: {}",
+        field.help,
+        if field.unit.is_empty() { "" } else { " " },
+        field.unit,
+        field.key
+    );
     ui.horizontal(|ui| {
         let label = ui.add_sized([92.0, 20.0], egui::Label::new(field.label).halign(egui::Align::LEFT).truncate());
         label.on_hover_text(&tip);
@@ -242,9 +274,12 @@ fn operators(ui: &mut Ui, config: &mut FitConfig) {
     ui.horizontal_wrapped(|ui| {
         let o = &mut config.operators;
         ui.checkbox(&mut o.attenuation, "attenuation").on_hover_text("A = α·(r_max/d)⁴; off: A = α.");
-        ui.checkbox(&mut o.range, "range").on_hover_text("Beat-frequency phase 2πSτ²; off: range axes see every joint at 0 m.");
-        ui.checkbox(&mut o.doppler, "Doppler").on_hover_text("Phase 2π(2v_r/λ)T_frame and the ramp; off: Doppler axes see every joint at rest.");
-        ui.checkbox(&mut o.angle, "angle").on_hover_text("Array phase; off: angular axes see every joint at boresight.");
+        ui.checkbox(&mut o.range, "range")
+            .on_hover_text("Beat-frequency phase 2πSτ²; off: range axes see every joint at 0 m.");
+        ui.checkbox(&mut o.doppler, "Doppler")
+            .on_hover_text("Phase 2π(2v_r/λ)T_frame and the ramp; off: Doppler axes see every joint at rest.");
+        ui.checkbox(&mut o.angle, "angle")
+            .on_hover_text("Array phase; off: angular axes see every joint at boresight.");
     });
 }
 

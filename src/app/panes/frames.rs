@@ -31,7 +31,9 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     };
     let tokens = Tokens::of(ui);
     ui.horizontal(|ui| {
-        let field = egui::TextEdit::singleline(&mut state.filter).hint_text("Filter by name").desired_width(ui.available_width() - 8.0);
+        let field = egui::TextEdit::singleline(&mut state.filter)
+            .hint_text("Filter by name")
+            .desired_width(ui.available_width() - 8.0);
         let response = ui.add(field);
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Filter frames"));
         response.on_hover_text("Show frames whose name contains this.");
@@ -39,7 +41,8 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let mut sort = session.view.frame_sort;
     ui.horizontal_wrapped(|ui| {
         ui.selectable_value(&mut sort, FrameSort::Index, "By index").on_hover_text("In the data set's order.");
-        ui.selectable_value(&mut sort, FrameSort::Iou, "By IoU").on_hover_text("Lowest mean IoU first; frames without a fit last.");
+        ui.selectable_value(&mut sort, FrameSort::Iou, "By IoU")
+            .on_hover_text("Lowest mean IoU first; frames without a fit last.");
         ui.checkbox(&mut state.only_fitted, "fitted").on_hover_text("Only frames that were fitted in this session.");
     });
     if sort != session.view.frame_sort {
@@ -47,11 +50,16 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     }
     update_order(state, shared);
     let rows = &state.order.rows;
-    let text = if rows.len() == dataset.len() { format!("{} frames", dataset.len()) } else { format!("{} of {}", rows.len(), dataset.len()) };
+    let text = if rows.len() == dataset.len() {
+        format!("{} frames", dataset.len())
+    } else {
+        format!("{} of {}", rows.len(), dataset.len())
+    };
     ui.horizontal(|ui| {
         ui.label(RichText::new(text).small().color(tokens.dim));
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.label(RichText::new("IoU").small().color(tokens.dim)).on_hover_text("Mean forward-consistency IoU of the last fit in this session.");
+            ui.label(RichText::new("IoU").small().color(tokens.dim))
+                .on_hover_text("Mean forward-consistency IoU of the last fit in this session.");
         });
     });
     let current = session.data.frame_index;
@@ -106,7 +114,14 @@ fn update_order(state: &mut State, shared: &Shared<'_>) {
     state.order = Order { key: Some(key), rows };
 }
 
-fn row(ui: &mut Ui, shared: &Shared<'_>, dataset: &crate::dataset::Dataset, index: usize, current: bool, tokens: &Tokens) -> bool {
+fn row(
+    ui: &mut Ui,
+    shared: &Shared<'_>,
+    dataset: &crate::dataset::Dataset,
+    index: usize,
+    current: bool,
+    tokens: &Tokens,
+) -> bool {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
     let name = dataset.frame_name(index);
     let spoken = format!("Frame {name}");
@@ -130,10 +145,17 @@ fn row(ui: &mut Ui, shared: &Shared<'_>, dataset: &crate::dataset::Dataset, inde
         tokens.text,
     );
     if let Some(summary) = shared.session.summaries.get(&index) {
-        let (text, color) = summary.iou.map_or(("—".into(), tokens.dim), |x| (format!("{x:.2}"), iou_color(tokens, x)));
+        let (text, color) =
+            summary.iou.map_or(("—".into(), tokens.dim), |x| (format!("{x:.2}"), iou_color(tokens, x)));
         painter.text(pos2(rect.right() - 4.0, y), Align2::RIGHT_CENTER, text, theme::mono(theme::CAPTION), color);
         let mark = if summary.converged { "✓" } else { "·" };
-        painter.text(pos2(rect.right() - 40.0, y), Align2::CENTER_CENTER, mark, FontId::proportional(theme::CAPTION), tokens.dim);
+        painter.text(
+            pos2(rect.right() - 40.0, y),
+            Align2::CENTER_CENTER,
+            mark,
+            FontId::proportional(theme::CAPTION),
+            tokens.dim,
+        );
     }
     let response = response.on_hover_ui(|ui| {
         ui.label(format!("{} · {name}", dataset.sequence(index)));

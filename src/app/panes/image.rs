@@ -19,7 +19,11 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         return empty(ui, "No frame", "Labels in camera pixels appear here.");
     };
     let Some(image) = &frame.image else {
-        return empty(ui, "No image labels", "This data set has no key points, boxes or masks in camera pixels for this frame.");
+        return empty(
+            ui,
+            "No image labels",
+            "This data set has no key points, boxes or masks in camera pixels for this frame.",
+        );
     };
     let [width, height] = image.size.map(|n| n.max(1) as f32);
     let tokens = Tokens::of(ui);
@@ -27,7 +31,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let area = Rect::from_min_max(area.min, area.max - vec2(0.0, 18.0));
     let scale = (area.width() / width).min(area.height() / height);
     let rect = Rect::from_center_size(area.center(), vec2(width, height) * scale);
-    let response = ui.interact(rect, ui.id().with("image plane"), egui::Sense::hover());
+    let response = ui.interact(rect, ui.scope_id().with("image plane"), egui::Sense::hover());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "Image plane labels"));
     let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
     painter.rect_filled(rect, 0.0, tokens.canvas);
@@ -50,7 +54,13 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         "{width} × {height} px · {people} labelled {} · pixels of the camera, not metres: never compared with the fit",
         if people == 1 { "person" } else { "people" }
     );
-    ui.painter().text(pos2(area.left(), area.bottom() + 3.0), Align2::LEFT_TOP, text, FontId::proportional(theme::CAPTION), tokens.dim);
+    ui.painter().text(
+        pos2(area.left(), area.bottom() + 3.0),
+        Align2::LEFT_TOP,
+        text,
+        FontId::proportional(theme::CAPTION),
+        tokens.dim,
+    );
     if let Some(pointer) = response.hover_pos() {
         let px = (pointer - rect.min) / scale;
         response.on_hover_text_at_pointer(format!("x {:.0} px, y {:.0} px", px.x, px.y));
@@ -58,7 +68,13 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
 }
 
 /// Key points fade with their score: a nose seen from behind has a score near zero.
-fn draw_keypoints(painter: &egui::Painter, skeleton: &Skeleton, person: &[[f64; 3]], at: &dyn Fn(f64, f64) -> egui::Pos2, tokens: &Tokens) {
+fn draw_keypoints(
+    painter: &egui::Painter,
+    skeleton: &Skeleton,
+    person: &[[f64; 3]],
+    at: &dyn Fn(f64, f64) -> egui::Pos2,
+    tokens: &Tokens,
+) {
     let alpha = |score: f64| (0.15 + 0.85 * score.clamp(0.0, 1.0)) as f32;
     for &bone in &skeleton.bones {
         if let (Some(a), Some(b)) = (person.get(bone[0]), person.get(bone[1])) {

@@ -50,7 +50,11 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         for group in Group::ALL.into_iter().filter(|g| *g != Group::Omega) {
             let (title, names, unit, speed) = components(group);
             egui::Grid::new(("joint", title)).num_columns(4).spacing([8.0, 2.0]).min_col_width(34.0).show(ui, |ui| {
-                ui.label(RichText::new(if unit.is_empty() { title.to_owned() } else { format!("{title} / {unit}") }).small().color(tokens.dim));
+                ui.label(
+                    RichText::new(if unit.is_empty() { title.to_owned() } else { format!("{title} / {unit}") })
+                        .small()
+                        .color(tokens.dim),
+                );
                 for (text, tip) in [
                     ("value", "The parameter; drag or type to edit it by hand, which starts a branch."),
                     ("w_EM ∂L_EM", "Gradient of the weighted electromagnetic term."),
@@ -66,7 +70,8 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
                     let response = ui.add_enabled(editable, drag);
                     let spoken = format!("{title} {name}");
                     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, editable, &spoken));
-                    let tip = if editable { "Edit by hand. An edit starts a branch." } else { "Pause the run to edit." };
+                    let tip =
+                        if editable { "Edit by hand. An edit starts a branch." } else { "Pause the run to edit." };
                     committed |= response.drag_stopped() || (response.changed() && !response.dragged());
                     response.on_hover_text(tip).on_disabled_hover_text(tip);
                     let em = w_em * evaluation.em_gradient.joint(group, joint)[i];
@@ -126,7 +131,13 @@ fn derived(ui: &mut Ui, params: &Pppr, joint: usize, tokens: &Tokens) {
     let range = crate::geometry::norm(p);
     let radial = if range > 0.0 { crate::geometry::dot(params.velocity(joint), p) / range } else { 0.0 };
     let [sx, sy, sz] = params.scale(joint).map(|s| s * 100.0);
-    let direction = if radial.abs() < 5e-4 { "at rest" } else if radial < 0.0 { "approaching" } else { "receding" };
+    let direction = if radial.abs() < 5e-4 {
+        "at rest"
+    } else if radial < 0.0 {
+        "approaching"
+    } else {
+        "receding"
+    };
     let text = format!(
         "s {sx:.1} × {sy:.1} × {sz:.1} cm   α {:.3}\nrange {range:.3} m   v_r {radial:+.3} m/s, {direction}",
         params.opacity(joint)
@@ -149,8 +160,14 @@ fn omega(ui: &mut Ui, params: &Pppr, total: &Pppr, joint: usize, tokens: &Tokens
     }
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let slope = total.joint(Group::Omega, joint).iter().map(|g| g.abs()).fold(0.0, f64::max);
-    ui.label(RichText::new(format!("ω ({} features)   mean {mean:+.4}   largest |∂L| {slope:.1e}", values.len())).small().color(tokens.dim))
-        .on_hover_text("Doppler features: the mean is the phase ramp, rad·s/m²; deviations shape the spectrum along a Doppler axis.");
+    ui.label(
+        RichText::new(format!("ω ({} features)   mean {mean:+.4}   largest |∂L| {slope:.1e}", values.len()))
+            .small()
+            .color(tokens.dim),
+    )
+    .on_hover_text(
+        "Doppler features: the mean is the phase ramp, rad·s/m²; deviations shape the spectrum along a Doppler axis.",
+    );
     let (rect, _) = ui.allocate_exact_size(egui::vec2(ui.available_width().min(260.0), 36.0), egui::Sense::hover());
     let largest = values.iter().map(|v| v.abs()).fold(1e-6, f64::max);
     let width = rect.width() / values.len() as f32;

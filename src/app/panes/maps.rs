@@ -117,8 +117,11 @@ fn arrange(area: Rect, views: &[View]) -> Vec<Rect> {
     let side_by_side = score(across) > score(down);
     (0..n)
         .map(|i| {
-            let (size, offset) =
-                if side_by_side { (across, vec2(across.x * i as f32, 0.0)) } else { (down, vec2(0.0, down.y * i as f32)) };
+            let (size, offset) = if side_by_side {
+                (across, vec2(across.x * i as f32, 0.0))
+            } else {
+                (down, vec2(0.0, down.y * i as f32))
+            };
             Rect::from_min_size(area.min + offset, size)
         })
         .collect()
@@ -150,7 +153,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     let tokens = Tokens::of(ui);
     overlay::title(ui, rect, plot, view, content, &tokens, session);
     let name = format!("{} map of {}", content.name(), view.array);
-    let response = ui.interact(plot, ui.id().with("plot"), Sense::click_and_drag());
+    let response = ui.interact(plot, ui.scope_id().with("plot"), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, &name));
     navigate(ui, &response, plot, &mut state.windows[index]);
     let window = state.windows[index];
@@ -186,7 +189,10 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     }
     if content != Content::Masks {
         let bar = ColorBar {
-            rect: Rect::from_min_max(pos2(plot.max.x + 2.0, plot.min.y - 14.0), pos2(plot.max.x + 2.0 + bar_width, plot.max.y + 6.0)),
+            rect: Rect::from_min_max(
+                pos2(plot.max.x + 2.0, plot.min.y - 14.0),
+                pos2(plot.max.x + 2.0 + bar_width, plot.max.y + 6.0),
+            ),
             map: state.pictures.colormap(content),
             limits: state.pictures.limits(index, content),
             unit: state.pictures.unit(content),
@@ -248,7 +254,7 @@ fn wipe(ui: &Ui, shared: &mut Shared<'_>, state: &State, index: usize, plot: Rec
     state.pictures.paint(ui, &painter, plot, window_rect(window), index, Content::Ori);
     let tokens = Tokens::of(ui);
     let handle = Rect::from_center_size(pos2(x, plot.center().y), vec2(10.0, plot.height()));
-    let response = ui.interact(handle, ui.id().with("wipe"), Sense::drag());
+    let response = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Wipe position"));
     if response.dragged() {
         let at = (shared.session.view.wipe + response.drag_delta().x / plot.width()).clamp(0.0, 1.0);

@@ -85,7 +85,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     if rect.width() < 16.0 || rect.height() < 16.0 {
         return;
     }
-    let response = ui.interact(rect, ui.id().with("scene"), Sense::click_and_drag());
+    let response = ui.interact(rect, ui.scope_id().with("scene"), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "3-D scene"));
     let mut camera = state.camera.unwrap_or_else(|| Camera::overview(centre(shared.session), RADIUS_M));
     let tokens = Tokens::of(ui);
@@ -227,22 +227,34 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
     egui::Frame::new().inner_margin(egui::Margin::symmetric(8, 3)).show(ui, |ui| {
         ui.horizontal(|ui| {
             ui.set_height(22.0);
-            ui.selectable_value(&mut view.splat_mode, SplatMode::Splat, "Splats").on_hover_text("Alpha-blended Gaussians, sorted by depth.");
-            ui.selectable_value(&mut view.splat_mode, SplatMode::Ellipsoid, "Ellipsoids").on_hover_text("Opaque surfaces at the stated number of standard deviations.");
-            let drag = egui::DragValue::new(&mut view.splat_sigma).range(0.5..=4.0).speed(0.02).fixed_decimals(1).suffix(" σ");
+            ui.selectable_value(&mut view.splat_mode, SplatMode::Splat, "Splats")
+                .on_hover_text("Alpha-blended Gaussians, sorted by depth.");
+            ui.selectable_value(&mut view.splat_mode, SplatMode::Ellipsoid, "Ellipsoids")
+                .on_hover_text("Opaque surfaces at the stated number of standard deviations.");
+            let drag =
+                egui::DragValue::new(&mut view.splat_sigma).range(0.5..=4.0).speed(0.02).fixed_decimals(1).suffix(" σ");
             let response = ui.add(drag);
-            response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, "Standard deviations drawn"));
+            response
+                .widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, "Standard deviations drawn"));
             response.on_hover_text("How many standard deviations of each Gaussian are drawn.");
             ui.menu_button("Show", |ui| {
                 ui.checkbox(&mut view.show_velocity, "Velocity").on_hover_text("v of each joint, 0.3 s long.");
-                ui.checkbox(&mut view.show_gradients, "Descent directions").on_hover_text("−∂L/∂p at each joint: blue the electromagnetic part, orange the kinematic part.");
-                ui.checkbox(&mut view.show_truth, "Truth").on_hover_text("The data set's joints in metres, where it has them.");
+                ui.checkbox(&mut view.show_gradients, "Descent directions")
+                    .on_hover_text("−∂L/∂p at each joint: blue the electromagnetic part, orange the kinematic part.");
+                ui.checkbox(&mut view.show_truth, "Truth")
+                    .on_hover_text("The data set's joints in metres, where it has them.");
                 ui.checkbox(&mut view.show_initial, "Start pose");
                 ui.checkbox(&mut view.show_grid, "Ground grid");
                 ui.checkbox(&mut view.show_frustum, "Radar and field of view");
-            }).response.on_hover_text("What is drawn in the scene.");
+            })
+            .response
+            .on_hover_text("What is drawn in the scene.");
             ui.menu_button("Camera", |ui| {
-                for (label, act) in [("View from the radar", AppAct::CameraRadar), ("View from above", AppAct::CameraTop), ("View from the side", AppAct::CameraSide)] {
+                for (label, act) in [
+                    ("View from the radar", AppAct::CameraRadar),
+                    ("View from above", AppAct::CameraTop),
+                    ("View from the side", AppAct::CameraSide),
+                ] {
                     if ui.button(label).clicked() {
                         shared.app(act);
                         ui.close();

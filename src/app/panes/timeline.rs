@@ -51,7 +51,8 @@ fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Toke
             shared.invoke(label);
         }
     }
-    let (rect, response) = ui.allocate_exact_size(vec2((ui.available_width() - NUMBERS - 4.0).max(40.0), 22.0), Sense::click_and_drag());
+    let (rect, response) =
+        ui.allocate_exact_size(vec2((ui.available_width() - NUMBERS - 4.0).max(40.0), 22.0), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::slider(many, index as f64, "Timeline"));
     ui.painter().rect_filled(rect, 2.0, tokens.canvas);
     if count > 0 {
@@ -87,7 +88,10 @@ fn strip(ui: &Ui, shared: &Shared<'_>, rect: Rect, count: usize, tokens: &Tokens
         if let Some(iou) = summary.iou {
             let x = rect.left() + i as f32 / count as f32 * rect.width();
             let height = (iou as f32).clamp(0.08, 1.0) * (rect.height() - 4.0);
-            let bar = Rect::from_min_max(pos2(x, rect.bottom() - 2.0 - height), pos2(x + width.max(2.0) - if width > 4.0 { 1.0 } else { 0.0 }, rect.bottom() - 2.0));
+            let bar = Rect::from_min_max(
+                pos2(x, rect.bottom() - 2.0 - height),
+                pos2(x + width.max(2.0) - if width > 4.0 { 1.0 } else { 0.0 }, rect.bottom() - 2.0),
+            );
             ui.painter().rect_filled(bar, 0.0, iou_color(tokens, iou));
         }
     }
@@ -98,7 +102,8 @@ fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
     let (shown, head, running, ready, back) =
         (fit.shown_iteration(), fit.head(), fit.is_running(), fit.is_ready(), fit.cursor.is_some());
     let start = fit.branch().map_or(0, crate::session::Branch::start);
-    let flags: Vec<(usize, String)> = fit.branch().map_or_else(Vec::new, |b| b.flags.iter().map(|f| (f.iteration, f.text.clone())).collect());
+    let flags: Vec<(usize, String)> =
+        fit.branch().map_or_else(Vec::new, |b| b.flags.iter().map(|f| (f.iteration, f.text.clone())).collect());
     caption(ui, "Iteration");
     for (sign, name, label, enabled, active) in [
         ("◂", "Iteration back", "One step back", ready && shown > start, false),
@@ -112,7 +117,8 @@ fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
         }
     }
     ui.add_space(26.0 + 4.0);
-    let (rect, response) = ui.allocate_exact_size(vec2((ui.available_width() - NUMBERS - 4.0).max(40.0), 22.0), Sense::click_and_drag());
+    let (rect, response) =
+        ui.allocate_exact_size(vec2((ui.available_width() - NUMBERS - 4.0).max(40.0), 22.0), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::slider(ready, shown as f64, "Iteration scrubber"));
     let track = Rect::from_center_size(rect.center(), vec2(rect.width(), 4.0));
     ui.painter().rect_filled(track, 2.0, tokens.stroke);
@@ -135,7 +141,13 @@ fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
     }
     response.on_hover_text("Drag to show an earlier iteration. Changing a setting there starts a branch.");
     let rate = shared.session.fit.shown.as_ref().map_or(0.0, |s| s.iterations_per_s);
-    let side = if running && rate > 0.0 { format!("{rate:.0} it/s") } else if head < target && head > 0 { format!("of {target}") } else { String::new() };
+    let side = if running && rate > 0.0 {
+        format!("{rate:.0} it/s")
+    } else if head < target && head > 0 {
+        format!("of {target}")
+    } else {
+        String::new()
+    };
     numbers(ui, &format!("{shown} / {head}"), &side);
     let _ = theme::GRID;
 }

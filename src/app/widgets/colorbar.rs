@@ -57,7 +57,7 @@ fn handles(ui: &mut Ui, bar: &ColorBar<'_>, strip: Rect, tokens: &Tokens) -> Opt
     let mut new = None;
     for (upper, y, name) in [(false, strip.max.y, "lower limit"), (true, strip.min.y, "upper limit")] {
         let rect = Rect::from_center_size(pos2(strip.center().x, y), vec2(18.0, 9.0));
-        let id = ui.id().with(("colorbar", &bar.name, upper));
+        let id = ui.scope_id().with(("colorbar", &bar.name, upper));
         let response = ui.interact(rect, id, Sense::drag());
         let spoken = format!("{} {name}", bar.name);
         response.widget_info(move || egui::WidgetInfo::labeled(egui::Role::Slider, true, &spoken));

@@ -12,7 +12,15 @@ use crate::session::Session;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, pos2, vec2};
 
 /// Title line of a map: array, what it shows, IoU.
-pub(super) fn title(ui: &Ui, rect: Rect, plot: Rect, view: &View, content: Content, tokens: &Tokens, session: &Session) {
+pub(super) fn title(
+    ui: &Ui,
+    rect: Rect,
+    plot: Rect,
+    view: &View,
+    content: Content,
+    tokens: &Tokens,
+    session: &Session,
+) {
     let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
     let at = pos2(plot.min.x.min(rect.max.x - 120.0), rect.min.y + 3.0);
     let caption = FontId::proportional(theme::CAPTION);
@@ -147,7 +155,9 @@ pub(super) fn draw(
         let color = Color32::from_white_alpha(170);
         bones(painter, &dataset.info().skeleton, &truth.joints, view, o, to_screen, &|_| Stroke::new(1.0, color));
     }
-    if look.show_skeleton && let Some(problem) = &session.fit.problem {
+    if look.show_skeleton
+        && let Some(problem) = &session.fit.problem
+    {
         let positions = session.shown_positions();
         let skeleton = &problem.skeleton;
         // Dark-theme side colours in both themes: the ground is the map.
@@ -156,7 +166,12 @@ pub(super) fn draw(
             let at = to_screen(o.unit_from_bins(view, &view.bins_of(p)));
             let selected = session.joint == Some(joint);
             let color = theme::DARK.side(skeleton.side(joint % skeleton.joints.len().max(1)));
-            painter.circle(at, if selected { 4.0 } else { 2.2 }, color, Stroke::new(1.0, Color32::from_black_alpha(180)));
+            painter.circle(
+                at,
+                if selected { 4.0 } else { 2.2 },
+                color,
+                Stroke::new(1.0, Color32::from_black_alpha(180)),
+            );
             if selected {
                 painter.circle_stroke(at, 7.0, Stroke::new(1.5, Color32::WHITE));
             }
@@ -183,7 +198,14 @@ fn bones(
     }
 }
 
-fn boxed(painter: &Painter, view: &View, o: Orientation, b: [f64; 4], to_screen: &dyn Fn([f64; 2]) -> Pos2, _: &Tokens) {
+fn boxed(
+    painter: &Painter,
+    view: &View,
+    o: Orientation,
+    b: [f64; 4],
+    to_screen: &dyn Fn([f64; 2]) -> Pos2,
+    _: &Tokens,
+) {
     // Box edges are pixel edges: half a bin before the centre of their first pixel.
     let corner = |row: f64, column: f64| {
         let mut bins = vec![0.0; view.axes.len()];
@@ -195,7 +217,13 @@ fn boxed(painter: &Painter, view: &View, o: Orientation, b: [f64; 4], to_screen:
     };
     let rect = Rect::from_two_pos(corner(b[0], b[1]), corner(b[2], b[3]));
     painter.rect_stroke(rect, 0.0, Stroke::new(1.5, Color32::from_rgb(0xF2, 0x65, 0x5C)), egui::StrokeKind::Middle);
-    painter.text(rect.left_top() + vec2(1.0, -1.0), Align2::LEFT_BOTTOM, "label", FontId::proportional(9.0), Color32::WHITE);
+    painter.text(
+        rect.left_top() + vec2(1.0, -1.0),
+        Align2::LEFT_BOTTOM,
+        "label",
+        FontId::proportional(9.0),
+        Color32::WHITE,
+    );
 }
 
 fn dashed(painter: &Painter, rect: Rect, color: Color32) {
@@ -230,7 +258,14 @@ pub(super) fn crosshair(
 }
 
 /// What the probe says of a pixel: stored and shown values, where it is.
-pub(super) fn probe(session: &Session, pictures: &Pictures, view: &View, index: usize, o: Orientation, pixel: [usize; 2]) -> String {
+pub(super) fn probe(
+    session: &Session,
+    pictures: &Pictures,
+    view: &View,
+    index: usize,
+    o: Orientation,
+    pixel: [usize; 2],
+) -> String {
     let [width, height] = o.size(view);
     let unit = [(pixel[0] as f64 + 0.5) / width as f64, (pixel[1] as f64 + 0.5) / height as f64];
     let [across, up] = o.bins_from_unit(view, unit);
@@ -281,10 +316,7 @@ fn polar(view: &View, o: Orientation, up: f64, across: f64) -> Vec<String> {
     }
     let (x, y) = (v.value_at(up), h.value_at(across));
     let name = if h.kind == AxisKind::Y { "azimuth" } else { "elevation" };
-    vec![
-        format!("{:<15} {:>8.3} m", "range", x.hypot(y)),
-        format!("{name:<15} {:>8.2} °", y.atan2(x).to_degrees()),
-    ]
+    vec![format!("{:<15} {:>8.3} m", "range", x.hypot(y)), format!("{name:<15} {:>8.2} °", y.atan2(x).to_degrees())]
 }
 
 /// The joint drawn within 10 points of the pointer.

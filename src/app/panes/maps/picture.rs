@@ -138,7 +138,8 @@ impl Pictures {
 
     fn image(&self, view: usize, content: Content) -> Option<ColorImage> {
         let (pictures, look) = (self.views.get(view)?, self.look.as_ref()?);
-        let paint = |values: &[f64], limits, map| colorize(pictures.size, values, limits, map, look.hatch, theme::NAN_CELL);
+        let paint =
+            |values: &[f64], limits, map| colorize(pictures.size, values, limits, map, look.hatch, theme::NAN_CELL);
         Some(match content {
             Content::Ori => paint(&pictures.ori.as_ref()?.values, pictures.ori_limits, look.colormap),
             Content::Sim => paint(&pictures.sim.as_ref()?.values, pictures.sim_limits, look.colormap),
@@ -180,9 +181,7 @@ impl Pictures {
     pub(super) fn values(&self, view: usize, pixel: [usize; 2]) -> [Option<(f64, f64)>; 2] {
         let Some(p) = self.views.get(view) else { return [None, None] };
         let at = pixel[1] * p.size[0] + pixel[0];
-        let pair = |stored: &[f64], shown: &Option<Shown>| {
-            Some((*stored.get(at)?, *shown.as_ref()?.values.get(at)?))
-        };
+        let pair = |stored: &[f64], shown: &Option<Shown>| Some((*stored.get(at)?, *shown.as_ref()?.values.get(at)?));
         [pair(&p.ori_stored, &p.ori), pair(&p.sim_stored, &p.sim)]
     }
 
@@ -213,9 +212,10 @@ impl ViewPictures {
                 MapScale::Linear => 1.0,
             };
         }
-        self.masks = snapshot.masks.get(index).map(|masks| {
-            [&masks.ori, &masks.sim, &masks.inside].map(|mask| orientation.mask_picture(view, mask))
-        });
+        self.masks = snapshot
+            .masks
+            .get(index)
+            .map(|masks| [&masks.ori, &masks.sim, &masks.inside].map(|mask| orientation.mask_picture(view, mask)));
     }
 
     /// H_sim − H_ori, both clipped to the limits' floor, so that −400 dB of nothing does not hide the rest.

@@ -13,7 +13,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, column: Column) {
             match column {
                 Column::Ori => colours(ui, shared),
                 Column::Sim => comparison(ui, shared),
-                Column::Masks => legend(ui, shared),
+                Column::Masks => legend(ui),
             }
         });
     });
@@ -22,19 +22,31 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, column: Column) {
 fn colours(ui: &mut Ui, shared: &mut Shared<'_>) {
     let view = &shared.session.view;
     let (mut scale, mut name) = (view.scale, view.colormap.clone());
-    egui::ComboBox::from_id_salt("scale").width(62.0).selected_text(if scale == MapScale::Decibel { "dB" } else { "linear" }).show_ui(ui, |ui| {
-        ui.selectable_value(&mut scale, MapScale::Decibel, "dB").on_hover_text("20 log₁₀ of an amplitude, 10 log₁₀ of a power, relative to the map's maximum.");
-        ui.selectable_value(&mut scale, MapScale::Linear, "linear").on_hover_text("The stored value divided by the map's maximum.");
-    }).response.on_hover_text("Scale of the colours.");
-    egui::ComboBox::from_id_salt("colormap").width(74.0).selected_text(&name).show_ui(ui, |ui| {
-        for map in Colormap::ALL.into_iter().filter(|map| *map != Colormap::Diverging) {
-            let lower = map.name().to_lowercase();
-            ui.horizontal(|ui| {
-                ramp(ui, map);
-                ui.selectable_value(&mut name, lower.clone(), lower);
-            });
-        }
-    }).response.on_hover_text("Colour map. Viridis, inferno and magma are perceptually uniform.");
+    egui::ComboBox::from_id_salt("scale")
+        .width(62.0)
+        .selected_text(if scale == MapScale::Decibel { "dB" } else { "linear" })
+        .show_ui(ui, |ui| {
+            ui.selectable_value(&mut scale, MapScale::Decibel, "dB")
+                .on_hover_text("20 log₁₀ of an amplitude, 10 log₁₀ of a power, relative to the map's maximum.");
+            ui.selectable_value(&mut scale, MapScale::Linear, "linear")
+                .on_hover_text("The stored value divided by the map's maximum.");
+        })
+        .response
+        .on_hover_text("Scale of the colours.");
+    egui::ComboBox::from_id_salt("colormap")
+        .width(74.0)
+        .selected_text(&name)
+        .show_ui(ui, |ui| {
+            for map in Colormap::ALL.into_iter().filter(|map| *map != Colormap::Diverging) {
+                let lower = map.name().to_lowercase();
+                ui.horizontal(|ui| {
+                    ramp(ui, map);
+                    ui.selectable_value(&mut name, lower.clone(), lower);
+                });
+            }
+        })
+        .response
+        .on_hover_text("Colour map. Viridis, inferno and magma are perceptually uniform.");
     more(ui, shared);
     let view = &shared.session.view;
     if scale != view.scale || name != view.colormap {
@@ -53,12 +65,16 @@ fn more(ui: &mut Ui, shared: &mut Shared<'_>) {
     let mut view = shared.session.view.clone();
     let menu = ui.menu_button("Show", |ui| {
         ui.checkbox(&mut view.show_region, "EM region").on_hover_text("The cells that L_EM is computed on (dashed).");
-        ui.checkbox(&mut view.show_skeleton, "Fitted skeleton").on_hover_text("Joints and bones of the shown iteration.");
-        ui.checkbox(&mut view.show_truth, "Truth").on_hover_text("The data set's joints in metres, where it has them (white).");
+        ui.checkbox(&mut view.show_skeleton, "Fitted skeleton")
+            .on_hover_text("Joints and bones of the shown iteration.");
+        ui.checkbox(&mut view.show_truth, "Truth")
+            .on_hover_text("The data set's joints in metres, where it has them (white).");
         ui.checkbox(&mut view.show_boxes, "Labelled boxes").on_hover_text("The data set's boxes on the maps (red).");
-        ui.checkbox(&mut view.show_clipped, "Hatch clipped cells").on_hover_text("Mark cells outside the colour limits.");
+        ui.checkbox(&mut view.show_clipped, "Hatch clipped cells")
+            .on_hover_text("Mark cells outside the colour limits.");
         ui.separator();
-        ui.checkbox(&mut view.shared_range, "Same limits for H_sim").on_hover_text("H_sim uses H_ori's colour limits, and keeps them over the steps of a run.");
+        ui.checkbox(&mut view.shared_range, "Same limits for H_sim")
+            .on_hover_text("H_sim uses H_ori's colour limits, and keeps them over the steps of a run.");
         ui.separator();
         ui.label(RichText::new("Colour limits").small());
         if let ColorRange::Percentile { lo, hi } = &mut view.range {
@@ -79,15 +95,18 @@ fn more(ui: &mut Ui, shared: &mut Shared<'_>) {
 
 fn comparison(ui: &mut Ui, shared: &mut Shared<'_>) {
     let mut mode = shared.session.view.compare;
-    ui.selectable_value(&mut mode, Compare::Flip, "H_sim").on_hover_text("H_sim alone. Hold Shift over a map to flip it with H_ori.");
-    ui.selectable_value(&mut mode, Compare::Wipe, "Wipe").on_hover_text("H_ori left of a line, H_sim right of it. Key: W");
-    ui.selectable_value(&mut mode, Compare::Difference, "Difference").on_hover_text("H_sim − H_ori, colours diverging about zero. Key: D");
+    ui.selectable_value(&mut mode, Compare::Flip, "H_sim")
+        .on_hover_text("H_sim alone. Hold Shift over a map to flip it with H_ori.");
+    ui.selectable_value(&mut mode, Compare::Wipe, "Wipe")
+        .on_hover_text("H_ori left of a line, H_sim right of it. Key: W");
+    ui.selectable_value(&mut mode, Compare::Difference, "Difference")
+        .on_hover_text("H_sim − H_ori, colours diverging about zero. Key: D");
     if mode != shared.session.view.compare {
         shared.set_view(|v| v.compare = mode);
     }
 }
 
-fn legend(ui: &mut Ui, shared: &mut Shared<'_>) {
+fn legend(ui: &mut Ui) {
     let tokens = Tokens::of(ui);
     let entries: [(Color32, &str, &str); 3] = [
         (theme::MASK_BOTH, "both", "In the masks of H_ori and of H_sim."),

@@ -42,16 +42,28 @@ pub(super) fn scene(session: &Session, camera: &Camera, tokens: &Tokens, px: f32
         }
         if look.show_gradients {
             let total = &snapshot.evaluation.gradient;
-            gradients(&mut scene, &snapshot.params, total, &snapshot.evaluation.em_gradient, &snapshot.config, camera, tokens, px);
+            gradients(
+                &mut scene,
+                &snapshot.params,
+                total,
+                &snapshot.evaluation.em_gradient,
+                &snapshot.config,
+                camera,
+                tokens,
+                px,
+            );
         }
     }
-    if look.show_initial && let (Some(initial), Some(skeleton)) = (&session.fit.initial, skeleton) {
+    if look.show_initial
+        && let (Some(initial), Some(skeleton)) = (&session.fit.initial, skeleton)
+    {
         let positions: Vec<_> = (0..initial.shape().total_joints()).map(|j| initial.position(j)).collect();
         let stroke = Stroke { color: rgba(tokens.dim, 0.6), width_px: 1.0 * px };
         bones(&mut scene.lines, skeleton, &positions, &|_| stroke);
     }
     if look.show_truth
-        && let (Some(truth), Some(dataset)) = (session.data.frame.as_ref().and_then(|f| f.truth.as_ref()), &session.data.dataset)
+        && let (Some(truth), Some(dataset)) =
+            (session.data.frame.as_ref().and_then(|f| f.truth.as_ref()), &session.data.dataset)
     {
         let stroke = Stroke { color: rgba(tokens.ok, 0.85), width_px: 1.5 * px };
         bones(&mut scene.lines, &dataset.info().skeleton, &truth.joints, &|_| stroke);
@@ -121,7 +133,12 @@ fn covariance(params: &Pppr, joint: usize) -> [f32; 6] {
     [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)]
 }
 
-fn bones(lines: &mut Vec<LineInstance>, skeleton: &Skeleton, positions: &[geometry::Vec3], stroke: &dyn Fn(Side) -> Stroke) {
+fn bones(
+    lines: &mut Vec<LineInstance>,
+    skeleton: &Skeleton,
+    positions: &[geometry::Vec3],
+    stroke: &dyn Fn(Side) -> Stroke,
+) {
     for person in positions.chunks_exact(skeleton.joints.len().max(1)) {
         for &bone in &skeleton.bones {
             if let (Some(&a), Some(&b)) = (person.get(bone[0]), person.get(bone[1])) {

@@ -1,0 +1,161 @@
+//! `screenshot`: the real window, drawn offscreen after a number of iterations.
+
+use crate::app::InspectorApp;
+use crate::config::FitConfig;
+use crate::session::{Command, FitStatus, ThemeChoice};
+use anyhow::{Context as _, bail};
+use clap::{Args, ValueEnum};
+use egui_kittest::Harness;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+/// How long a data set may take to open, or a fit to do its iterations.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// What `screenshot` is told.
+#[derive(Debug, Args)]
+pub struct ScreenshotArgs {
+    /// Data set, as for the window.
+    path: PathBuf,
+    /// Index of the frame, from 0.
+    #[arg(long, value_name = "I", default_value_t = 0)]
+    frame: usize,
+    /// Iterations to run first.
+    #[arg(long, value_name = "K", default_value_t = 60)]
+    iterations: usize,
+    /// Fit configuration; without it the defaults.
+    #[arg(long, value_name = "FIT.toml")]
+    config: Option<PathBuf>,
+    /// The picture.
+    #[arg(long, value_name = "X.png")]
+    out: PathBuf,
+    /// Width and height in points.
+    #[arg(long, value_name = "WxH", default_value = "1440x900", value_parser = parse_size)]
+    size: (u32, u32),
+    /// Pixels a point: 2 for a high-density screen.
+    #[arg(long, value_name = "S", default_value_t = 1.0)]
+    scale: f32,
+    /// Theme.
+    #[arg(long, value_enum, default_value = "dark")]
+    theme: ThemeArg,
+    /// Zoom the maps to the fitted region.
+    #[arg(long)]
+    focus: bool,
+    /// Select this joint, for example left_wrist.
+    #[arg(long, value_name = "NAME")]
+    joint: Option<String>,
+}
+
+/// The themes as typed.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum ThemeArg {
+    /// Dark.
+    Dark,
+    /// Light.
+    Light,
+}
+
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let (w, h) = text.split_once('x').ok_or("expected WIDTHxHEIGHT, for example 1440x900")?;
+    let side = |s: &str| s.parse::<u32>().map_err(|e| e.to_string());
+    let (w, h) = (side(w)?, side(h)?);
+    if (320..=8192).contains(&w) && (240..=8192).contains(&h) {
+        Ok((w, h))
+    } else {
+        Err("expected 320x240 to 8192x8192".into())
+    }
+}
+
+/// Runs `screenshot`.
+///
+/// # Errors
+/// Where the data set or frame cannot be read, the fit fails, there is no graphics adapter, or the picture cannot be
+/// written.
+pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
+    let config = args.config.as_deref().map(FitConfig::from_file).transpose()?.unwrap_or_default();
+    let paths = vec![args.path.clone()];
+    let mut harness = Harness::builder()
+        .with_size([args.size.0 as f32, args.size.1 as f32])
+        .with_pixels_per_point(args.scale)
+        .with_accessibility_check(false)
+        .allow_missing_glyphs()
+        .with_render_cursor(false)
+        .wgpu()
+        .build_eframe(|cc| InspectorApp::new(cc, &paths));
+    set_up(&mut harness, args, config)?;
+    harness.run_steps(3);
+    let picture = harness.render().map_err(|e| anyhow::anyhow!("the window cannot be drawn: {e}"))?;
+    picture.save(&args.out).with_context(|| format!("{}: cannot be written", args.out.display()))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn set_up(harness: &mut Harness<'_, InspectorApp>, args: &ScreenshotArgs, config: FitConfig) -> anyhow::Result<()> {
+    let mut view = harness.state().session().view.clone();
+    view.theme = match args.theme {
+        ThemeArg::Dark => ThemeChoice::Dark,
+        ThemeArg::Light => ThemeChoice::Light,
+    };
+    harness.state_mut().apply(Command::SetView(Box::new(view)));
+    harness.state_mut().apply(Command::SetConfig(config));
+    until(harness, "the data set", |app| app.session().data.dataset.is_some() && app.session().data.opening.is_none())?;
+    let frames = harness.state().session().data.len();
+    if args.frame >= frames {
+        bail!("{}: frame {} was asked for; expected 0 ..= {}", args.path.display(), args.frame, frames - 1);
+    }
+    harness.state_mut().apply(Command::GotoFrame(args.frame));
+    until(harness, "the start pose", |app| {
+        let fit = &app.session().fit;
+        fit.frame == args.frame && fit.is_ready() && fit.shown.is_some()
+    })?;
+    if args.iterations > 0 {
+        harness.state_mut().apply(Command::StepFit(args.iterations));
+        until(harness, "the iterations", |app| {
+            let fit = &app.session().fit;
+            fit.status == FitStatus::Paused && fit.shown.as_ref().is_some_and(|s| s.iteration == fit.head())
+        })?;
+    }
+    if let Some(name) = &args.joint {
+        let problem = harness.state().session().fit.problem.clone();
+        let joint = problem.as_ref().and_then(|p| p.skeleton.joint(name));
+        let Some(joint) = joint else { bail!("no joint is called {name}") };
+        harness.state_mut().apply(Command::SelectJoint(Some(joint)));
+    }
+    if args.focus {
+        harness.state_mut().focus();
+    }
+    Ok(())
+}
+
+/// Draws passes until something holds; the session's newest error ends the wait.
+fn until(
+    harness: &mut Harness<'_, InspectorApp>,
+    what: &str,
+    done: impl Fn(&InspectorApp) -> bool,
+) -> anyhow::Result<()> {
+    let began = Instant::now();
+    loop {
+        harness.step();
+        if done(harness.state()) {
+            return Ok(());
+        }
+        let session = harness.state().session();
+        if let FitStatus::Failed(why) = &session.fit.status {
+            bail!("{why}");
+        }
+        if let Some(why) = &session.data.error {
+            bail!("{why}");
+        }
+        if let Some((_, catalog)) = &session.data.bare {
+            bail!("{catalog}");
+        }
+        if session.data.dataset.is_none() && session.data.opening.is_none() {
+            let why = session.log.iter().rev().find(|line| line.level == crate::session::LogLevel::Error);
+            bail!("{}", why.map_or("nothing was opened", |line| line.text.as_str()));
+        }
+        if began.elapsed() > PATIENCE {
+            bail!("waiting for {what} took longer than {} s", PATIENCE.as_secs());
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
