@@ -54,7 +54,7 @@ impl EllipsoidPrimitive {
         let [xx, xy, xz, yy, yz, zz] = invert(&scaled)?;
         let center = projection.pixel(view);
         let (min, max) = (min - 1.0, max + 1.0);
-        projection.on_screen((min + max) / 2.0, (max - min) / 2.0).then(|| Self {
+        projection.on_screen((min + max) / 2.0, (max - min) / 2.0).then_some(Self {
             bounds: [min.x, min.y, max.x, max.y],
             center: [center.x, center.y, view.z],
             inverse_x: [xx, xy, xz],
