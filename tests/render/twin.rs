@@ -170,3 +170,28 @@ fn a_camera_that_is_not_a_number_draws_the_background() {
         }
     }
 }
+
+#[test]
+fn a_line_cut_by_splats_shows_no_seam() {
+    let line = |y: f32| LineInstance {
+        a: [1.5, -0.4 + y, -0.3],
+        b: [4.0, 0.9 + y, 0.5],
+        color: [0.2, 0.8, 1.0, 0.5],
+        width_px: 6.0,
+    };
+    // Invisible, but in the way: each cuts the lines at its depth.
+    let splat = |i: u32| SplatInstance {
+        center: [1.6 + 0.2 * i as f32, 0.0, 0.0],
+        covariance: demo::covariance(Vec3::X, 0.4, 0.4),
+        color: [1.0, 1.0, 1.0, 0.0],
+        id: i,
+    };
+    let whole = Scene { lines: vec![line(0.0), line(0.2)], ..Scene::default() };
+    let cut = Scene { splats: (0..11).map(splat).collect(), ..whole.clone() };
+    let (size, camera) = ([300, 200], Camera::from_radar());
+    assert_eq!(difference(&cpu::render(size, &cut, &camera), &cpu::render(size, &whole, &camera)).1, 0.0);
+    if let Some(mut gpu) = gpu() {
+        let expected = gpu.render(size, &whole, &camera).unwrap();
+        assert_eq!(difference(&gpu.render(size, &cut, &camera).unwrap(), &expected).1, 0.0);
+    }
+}
