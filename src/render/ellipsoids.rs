@@ -54,7 +54,7 @@ impl EllipsoidPrimitive {
         let [xx, xy, xz, yy, yz, zz] = invert(&scaled)?;
         let center = projection.pixel(view);
         let (min, max) = (min - 1.0, max + 1.0);
-        projection.on_screen((min + max) / 2.0, (max - min) / 2.0).then(|| Self {
+        projection.on_screen((min + max) / 2.0, (max - min) / 2.0).then_some(Self {
             bounds: [min.x, min.y, max.x, max.y],
             center: [center.x, center.y, view.z],
             inverse_x: [xx, xy, xz],
@@ -99,7 +99,7 @@ impl EllipsoidPrimitive {
         let coverage = (inside_px + 0.5).clamp(0.0, 1.0);
         let tau = closest - ((1.0 - q).max(0.0) / a).sqrt();
         let normal = (as0 + ad * tau).normalize();
-        let shade = 0.5 + 0.5 * normal.dot(LIGHT).max(0.0);
+        let shade = 0.6 + 0.4 * normal.dot(LIGHT).max(0.0);
         let [red, green, blue, _] = self.color;
         let color = [red * shade, green * shade, blue * shade, 1.0];
         let z = globals.buffer_depth((depth + tau).max(NEAR_M));

@@ -60,7 +60,7 @@ fn fragment(in: Varying) -> Surface {
     }
     let tau = closest - sqrt(max(1.0 - q, 0.0) / a);
     let normal = normalize(as0 + ad * tau);
-    let shade = 0.5 + 0.5 * max(dot(normal, LIGHT), 0.0);
+    let shade = 0.6 + 0.4 * max(dot(normal, LIGHT), 0.0);
     let z = globals.depth_offset - globals.depth_scale / max(depth + tau, NEAR_M);
     return Surface(z, vec4<f32>(in.color * shade * coverage, coverage));
 }

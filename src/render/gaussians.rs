@@ -47,7 +47,7 @@ impl SplatPrimitive {
             return None;
         }
         let [a, b, c] = screen_covariance(splat, projection);
-        let (mid, spread) = ((a + c) / 2.0, ((a - c) / 2.0).hypot(b));
+        let (mid, spread) = (f32::midpoint(a, c), ((a - c) / 2.0).hypot(b));
         let angle = 0.5 * (2.0 * b).atan2(a - c);
         // Rounding may eat the smaller eigenvalue of a long splat; the low-pass filter is its lower bound.
         let sigma = Vec2::new((mid + spread).sqrt(), (mid - spread).max(LOW_PASS_PX2).sqrt());

@@ -1,4 +1,4 @@
-//! Straight lines with round caps, of constant width on the screen, antialiased by their distance in pixels.
+//! Straight lines with round caps (thin ones end flat), of constant width on the screen, antialiased by their distance in pixels.
 //!
 //! A line is clipped by the near and far planes and by the picture's edge before it becomes a quad, so that no vertex
 //! is far off the screen. It can be cut into pieces along its length (`order`), which share their edges exactly: the
@@ -11,6 +11,9 @@ use super::projection::Projection;
 use super::scene::LineInstance;
 use super::wgpu;
 use glam::{Vec2, Vec3};
+
+/// Lines up to this width, px, end flat: the caps of a thin translucent polyline would show as dots.
+const MAX_FLAT_PX: f32 = 1.5;
 
 /// A piece of a line on the screen; the vertex attributes of `lines.wgsl`, in order.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -56,12 +59,13 @@ impl LinePrimitive {
         let [z0, z1] = [t0, t1].map(|t| z[0] + (z[1] - z[0]) * t);
         let length = start.distance(end);
         let direction = if length > 1e-4 { (end - start) / length } else { Vec2::X };
+        let cap = if line.width_px > MAX_FLAT_PX { half + 1.0 } else { 0.0 };
         let [red, green, blue, alpha] = line.color;
         Some(Self {
             start: start.to_array(),
             direction: direction.to_array(),
             shape: [length, half],
-            piece: [-(half + 1.0), length + half + 1.0],
+            piece: [-cap, length + cap],
             z: [z0, z1],
             color: [red, green, blue, alpha * line.width_px.min(1.0)],
         })

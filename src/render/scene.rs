@@ -18,7 +18,7 @@ pub struct SplatInstance {
     pub id: u32,
 }
 
-/// One straight line with round caps, of constant width on the screen.
+/// One straight line of constant width on the screen; round caps where it is wider than 1.5 px, else flat ends.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct LineInstance {
