@@ -5,7 +5,7 @@ use crate::mhp::{FitState, StepReport};
 use std::sync::Arc;
 
 /// Bytes of states that one fit may keep; beyond it every second state is forgotten (its report stays).
-pub const STATE_BUDGET: usize = 128 << 20;
+pub(super) const STATE_BUDGET: usize = 128 << 20;
 
 /// One iteration.
 #[derive(Debug, Clone)]
@@ -234,7 +234,7 @@ fn state_bytes(state: &Arc<FitState>) -> usize {
 }
 
 /// What differs between two configurations, in words: `τ_pct 10 → 15`.
-pub fn difference(old: &FitConfig, new: &FitConfig) -> String {
+pub(super) fn difference(old: &FitConfig, new: &FitConfig) -> String {
     let mut parts: Vec<String> = FIELDS
         .iter()
         .filter(|field| (field.get)(old) != (field.get)(new))

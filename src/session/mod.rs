@@ -15,6 +15,6 @@ mod view;
 pub use command::{Command, Effect, PickKind};
 pub use fit::{Fit, FitStatus};
 pub use history::{Branch, Flag, History, Row};
-pub use runtime::Runtime;
+pub use runtime::{Picker, Runtime, Wake};
 pub use state::{Data, FrameSummary, LogLevel, LogLine, Opening, Session};
 pub use view::{ColorRange, Compare, FrameSort, MapScale, SplatMode, ThemeChoice, ViewState};
