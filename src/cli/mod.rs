@@ -1,5 +1,7 @@
 //! The command line: one file a subcommand. Arguments as typed become a validated configuration and one library call.
 
+mod info;
+
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -21,12 +23,17 @@ pub struct Cli {
 
 /// The subcommands; everything the window does, one of them can do headless.
 #[derive(Debug, Subcommand)]
-pub enum Command {}
+pub enum Command {
+    /// Tell what is in a data set: frames, views and axes, ranges of values, skeleton, people, labels.
+    Info(info::Args),
+}
 
 /// Runs a subcommand.
 ///
 /// # Errors
 /// Whatever the subcommand could not do, naming file, key and what was expected.
 pub fn run(command: Command) -> anyhow::Result<ExitCode> {
-    match command {}
+    match command {
+        Command::Info(args) => info::run(&args),
+    }
 }
