@@ -234,12 +234,13 @@ fn folders_without_frames_and_paths_that_are_not_there_are_told_apart() {
     }
 }
 
+#[cfg(unix)]
 #[test]
 fn what_cannot_be_opened_says_why() {
+    use std::os::unix::fs::PermissionsExt;
     let folder = tempfile::tempdir().unwrap();
     let secret = folder.path().join("00000_radar.npz");
     std::fs::write(&secret, b"PK").unwrap();
-    use std::os::unix::fs::PermissionsExt;
     std::fs::set_permissions(&secret, std::fs::Permissions::from_mode(0o000)).unwrap();
     if std::fs::File::open(&secret).is_ok() {
         println!("skipped in part: this user reads files without permission (root)");

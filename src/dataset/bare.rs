@@ -4,6 +4,7 @@ use super::manifest::{ViewText, view_fault};
 use super::npz::{Entry, NpzArchive, replace_file, shape_text};
 use super::{DatasetError, words};
 use crate::body::Skeleton;
+use crate::geometry::Pose;
 use crate::radar::{Axis, AxisKind, PointSpread, Quantity, Spacing, View};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -150,7 +151,7 @@ fn guess_view(entry: &Entry, stacked: bool) -> View {
         }
         _ => vec![edges(AxisKind::DepthH, size(0), 8.0, 0.0), edges(AxisKind::Y, size(1), 1.0, -4.0)],
     };
-    View { array: entry.key.clone(), quantity: Quantity::Amplitude, psf, pose: Default::default(), axes, region: None }
+    View { array: entry.key.clone(), quantity: Quantity::Amplitude, psf, pose: Pose::default(), axes, region: None }
 }
 
 /// An axis whose outer edges are `first` and `last`, the bin centres half a step inside.
