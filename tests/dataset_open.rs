@@ -307,7 +307,7 @@ fn a_bare_npy_opens_with_a_manifest_or_a_guess() {
     write_npy(&path, &ArrayView::f64(&[256, 128], &map)).unwrap();
     let choice = BareChoice::guess(&BareCatalog::read(&path).unwrap());
     assert_eq!(choice.views[0].axes, Manifest::mmvr().unwrap().views[0].axes, "256 by 128 are taken for MMVR");
-    let text = format!("{}", GENERIC.replace("\"rd\"", "\"array\"").replace("bins = 2", "bins = 256"));
+    let text = GENERIC.replace("\"rd\"", "\"array\"").replace("bins = 2", "bins = 256");
     let text = text.replace("bins = 3", "bins = 128");
     let manifest = Manifest::parse(&text, Path::new("m.toml")).unwrap();
     let dataset = Dataset::open_with_manifest(&path, &manifest, &Progress::new()).unwrap();

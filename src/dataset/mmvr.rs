@@ -6,6 +6,8 @@
 use super::files::RADAR_SUFFIX;
 use super::npz::{Array, NpzArchive, NpzError, shape_text};
 use super::{DatasetError, DatasetInfo, Frame, Heatmap, ImageAnnotations};
+use crate::radar::View;
+use rayon::prelude::*;
 use std::path::Path;
 
 /// Camera images of MMVR, (width, height), px.
@@ -19,8 +21,42 @@ pub(super) fn load(
     stem: &str,
     info: &DatasetInfo,
 ) -> Result<Frame, DatasetError> {
+    let radar = folder.join(format!("{stem}{RADAR_SUFFIX}"));
+    let (maps, labels) = rayon::join(|| load_maps(&radar, info), || load_labels(folder, stem, info));
+    Ok(Frame {
+        index,
+        name: format!("{sequence}/{stem}"),
+        timestamp_s: info
+            .frame_rate_hz
+            .and_then(|rate| stem.parse::<u32>().ok().map(|number| f64::from(number) / rate)),
+        maps: maps?,
+        ..labels
+    })
+}
+
+/// One map a view. Inflating is what takes the time, so each view has its own reader and thread.
+fn load_maps(path: &Path, info: &DatasetInfo) -> Result<Vec<Heatmap>, DatasetError> {
+    info.views.par_iter().map(|view| load_map(path, view)).collect()
+}
+
+fn load_map(path: &Path, view: &View) -> Result<Heatmap, DatasetError> {
+    let mut file = NpzArchive::open(path)?;
+    let Array { shape, data, dtype } = file.read(&view.array)?;
+    let expected = view.shape();
+    if shape.len() == expected.len() + 1 && shape.ends_with(&expected) {
+        let (got, expected) = (shape_text(&shape), shape_text(&expected));
+        return Err(DatasetError::Grouped { key: view.array.clone(), got, expected, path: path.to_owned() });
+    }
+    if shape != expected {
+        let expected = format!("{}, the bins of its axes", shape_text(&expected));
+        return Err(file.wrong_shape(&view.array, &shape, expected).into());
+    }
+    Ok(Heatmap { shape, data, dtype })
+}
+
+/// A frame without its maps: what the companions say, and notes about those that are missing.
+fn load_labels(folder: &Path, stem: &str, info: &DatasetInfo) -> Frame {
     let mut labels = Labels { folder, stem, notes: Vec::new() };
-    let maps = load_maps(&folder.join(format!("{stem}{RADAR_SUFFIX}")), info)?;
     let global_id = labels.open("meta", "no global frame id").and_then(|mut file| {
         let ids = file.read_texts("global_frame_id");
         labels.keep(ids).map(|ids| ids.join(", "))
@@ -41,39 +77,9 @@ pub(super) fn load(
         boxes: image_boxes.unwrap_or_default(),
         masks: masks.map(|(_, masks)| masks).unwrap_or_default(),
     });
-    Ok(Frame {
-        index,
-        name: format!("{sequence}/{stem}"),
-        global_id,
-        timestamp_s: info
-            .frame_rate_hz
-            .and_then(|rate| stem.parse::<u32>().ok().map(|number| f64::from(number) / rate)),
-        maps,
-        map_boxes,
-        person_count,
-        truth: None,
-        image,
-        notes: labels.notes,
-    })
-}
-
-fn load_maps(path: &Path, info: &DatasetInfo) -> Result<Vec<Heatmap>, DatasetError> {
-    let mut file = NpzArchive::open(path)?;
-    let mut maps = Vec::with_capacity(info.views.len());
-    for view in &info.views {
-        let Array { shape, data, dtype } = file.read(&view.array)?;
-        let expected = view.shape();
-        if shape.len() == expected.len() + 1 && shape.ends_with(&expected) {
-            let (got, expected) = (shape_text(&shape), shape_text(&expected));
-            return Err(DatasetError::Grouped { key: view.array.clone(), got, expected, path: path.to_owned() });
-        }
-        if shape != expected {
-            let expected = format!("{}, the bins of its axes", shape_text(&expected));
-            return Err(file.wrong_shape(&view.array, &shape, expected).into());
-        }
-        maps.push(Heatmap { shape, data, dtype });
-    }
-    Ok(maps)
+    let (notes, truth) = (labels.notes, None);
+    let (index, name, maps, timestamp_s) = (0, String::new(), Vec::new(), None);
+    Frame { index, name, global_id, timestamp_s, maps, map_boxes, person_count, truth, image, notes }
 }
 
 /// Labelled boxes.
