@@ -269,6 +269,7 @@ fn a_bare_file_asks_once_and_is_remembered() {
         ("hm_vert", ArrayView::f64(&[2, 6, 4], &map)),
         ("hm_hori", ArrayView::f64(&[2, 6, 4], &map)),
         ("time", ArrayView::f64(&[2], &[0.0, 1.0])),
+        ("joints", ArrayView::f64(&[2, 8, 3], &map)),
         ("id", ArrayView::text("x")),
     ];
     write(&path, &arrays).unwrap();

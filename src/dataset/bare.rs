@@ -43,7 +43,8 @@ impl BareCatalog {
     /// Where the file cannot be read or has no candidate.
     pub fn read(path: &Path) -> Result<Self, DatasetError> {
         let all = NpzArchive::open(path)?.entries()?;
-        let fits = |e: &&Entry| e.is_real && (2..=4).contains(&e.shape.len()) && !e.shape.contains(&0);
+        let pose = |e: &Entry| matches!(e.key.as_str(), "joints" | "velocities") && e.shape.last() == Some(&3);
+        let fits = |e: &&Entry| e.is_real && (2..=4).contains(&e.shape.len()) && !e.shape.contains(&0) && !pose(e);
         let arrays: Vec<Entry> = all.iter().filter(fits).cloned().collect();
         if arrays.is_empty() {
             let present = if all.is_empty() { "no arrays".into() } else { listed(&all) };
