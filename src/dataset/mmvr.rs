@@ -36,7 +36,9 @@ pub(super) fn load(
 
 /// One map a view. Inflating is what takes the time, so each view has its own reader and thread.
 fn load_maps(path: &Path, info: &DatasetInfo) -> Result<Vec<Heatmap>, DatasetError> {
-    info.views.par_iter().map(|view| load_map(path, view)).collect()
+    let maps: Vec<_> = info.views.par_iter().map(|view| load_map(path, view)).collect();
+    // Of several errors the first view's is told, whichever thread was faster.
+    maps.into_iter().collect()
 }
 
 fn load_map(path: &Path, view: &View) -> Result<Heatmap, DatasetError> {
