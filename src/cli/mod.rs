@@ -3,6 +3,7 @@
 mod score;
 #[cfg(feature = "viewer")]
 mod screenshot;
+mod info;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
@@ -35,6 +36,8 @@ pub enum Command {
     /// Draw the real window offscreen after a number of iterations, and save it as a PNG.
     #[cfg(feature = "viewer")]
     Screenshot(screenshot::ScreenshotArgs),
+    /// Tell what is in a data set: frames, views and axes, ranges of values, skeleton, people, labels.
+    Info(info::Args),
 }
 
 /// Runs a subcommand.
@@ -46,5 +49,6 @@ pub fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Score(args) => score::run(&args),
         #[cfg(feature = "viewer")]
         Command::Screenshot(args) => screenshot::run(&args),
+        Command::Info(args) => info::run(&args),
     }
 }
