@@ -31,15 +31,14 @@ pub(super) fn hard_iou(masks: impl Iterator<Item = (bool, bool)>) -> Option<f64>
     (either > 0).then(|| both as f64 / either as f64)
 }
 
-/// Evaluates L_view over `region` and adds its gradient times `gradient_scale` to `gradient`. `target` is B_ori over
-/// the region's cells in C order.
+/// Evaluates L_view over `region`, and adds its gradient times `scale` to `gradient` where one is given: (`scale`,
+/// `gradient`). `target` is B_ori over the region's cells in C order.
 pub(super) fn evaluate<T: Real>(
     scene: &Scene<'_>,
     params: &Pppr,
     region: &Region,
     target: &[bool],
-    gradient_scale: f64,
-    gradient: &mut Pppr,
+    gradient: Option<(f64, &mut Pppr)>,
 ) -> ViewAnswer {
     let joints = params.shape().total_joints();
     let (splats, traces): (Vec<Splat>, Vec<Trace>) = (0..joints).map(|j| scene.splat(params, j)).unzip();
@@ -47,13 +46,15 @@ pub(super) fn evaluate<T: Real>(
     let mut ln_s = vec![f64::NEG_INFINITY; region.cells()];
     kernel.forward(&mut ln_s);
 
-    let (answer, weight) = soft_iou(&ln_s, target, scene.config.tau_pct, scene.config.softness, gradient_scale);
-    let mut moments = vec![empty_moments(scene); joints];
-    kernel.backward(&weight, &mut moments);
-    for (joint, moments) in moments.iter().enumerate() {
-        pull_back(scene, &splats[joint], &traces[joint], moments, joint, gradient);
+    let mask = SoftMask::new(&ln_s, target, scene.config.tau_pct, scene.config.softness);
+    if let Some((scale, gradient)) = gradient {
+        let mut moments = vec![empty_moments(scene); joints];
+        kernel.backward(&mask.weight(&ln_s, target, scale), &mut moments);
+        for (joint, moments) in moments.iter().enumerate() {
+            pull_back(scene, &splats[joint], &traces[joint], moments, joint, gradient);
+        }
     }
-    answer
+    ViewAnswer { loss: mask.loss(), iou: mask.iou }
 }
 
 fn empty_moments(scene: &Scene<'_>) -> Moments {
@@ -66,32 +67,57 @@ fn empty_moments(scene: &Scene<'_>) -> Moments {
     moments
 }
 
-/// The loss, and ∂(scale · L)/∂ln|S| of every cell; the threshold is held constant.
-fn soft_iou(ln_s: &[f64], target: &[bool], tau_pct: f64, softness: f64, scale: f64) -> (ViewAnswer, Vec<f64>) {
-    let ln_h: Vec<f64> = ln_s.iter().map(|&x| ln_floored(x)).collect();
-    let threshold = ln_percentile(&ln_h, 100.0 - tau_pct);
-    let iou = hard_iou(ln_h.iter().zip(target).map(|(&h, &b)| (h > threshold, b)));
-    let soft_threshold = ln_sum(threshold, SOFT_FLOOR.ln());
-    let soft: Vec<f64> =
-        ln_h.iter().map(|&h| sigmoid((ln_sum(h, SOFT_FLOOR.ln()) - soft_threshold) / softness)).collect();
+/// The soft mask of H_sim and what it has in common with the hard mask of H_ori.
+struct SoftMask {
+    ln_h: Vec<f64>,
+    /// m
+    soft: Vec<f64>,
+    softness: f64,
+    /// Σ m B
+    common: f64,
+    /// Σ (m + B − m B)
+    union: f64,
+    /// IoU of the hard masks.
+    iou: Option<f64>,
+}
 
-    let (mut common, mut union) = (0.0, 0.0);
-    for (&m, &b) in soft.iter().zip(target) {
-        let b = f64::from(u8::from(b));
-        common += m * b;
-        union += m + b - m * b;
+impl SoftMask {
+    fn new(ln_s: &[f64], target: &[bool], tau_pct: f64, softness: f64) -> Self {
+        let ln_h: Vec<f64> = ln_s.iter().map(|&x| ln_floored(x)).collect();
+        let threshold = ln_percentile(&ln_h, 100.0 - tau_pct);
+        let iou = hard_iou(ln_h.iter().zip(target).map(|(&h, &b)| (h > threshold, b)));
+        let soft_threshold = ln_sum(threshold, SOFT_FLOOR.ln());
+        let soften = |&h: &f64| sigmoid((ln_sum(h, SOFT_FLOOR.ln()) - soft_threshold) / softness);
+        let soft: Vec<f64> = ln_h.iter().map(soften).collect();
+        let (mut common, mut union) = (0.0, 0.0);
+        for (&m, &b) in soft.iter().zip(target) {
+            let b = f64::from(u8::from(b));
+            common += m * b;
+            union += m + b - m * b;
+        }
+        Self { ln_h, soft, softness, common, union, iou }
     }
-    if union == 0.0 {
-        return (ViewAnswer { loss: 1.0, iou }, vec![0.0; ln_s.len()]);
+
+    /// L_view; 1 where both masks are empty.
+    fn loss(&self) -> f64 {
+        if self.union == 0.0 { 1.0 } else { 1.0 - self.common / self.union }
     }
-    let weight = soft.iter().zip(target).zip(ln_s.iter().zip(&ln_h)).map(|((&m, &b), (&ln_s, &ln_h))| {
-        let loss_by_m = if b { -1.0 / union } else { common / (union * union) };
-        // d ln(H + h)/d ln H and d ln H/d ln|S|
-        let above_soft_floor = sigmoid(ln_h - SOFT_FLOOR.ln());
-        let above_floor = sigmoid(2.0 * (ln_s - EPSILON.ln()));
-        scale * loss_by_m * m * (1.0 - m) / softness * above_soft_floor * above_floor
-    });
-    (ViewAnswer { loss: 1.0 - common / union, iou }, weight.collect())
+
+    /// ∂(scale · L)/∂ln|S| of every cell; the threshold is held constant.
+    fn weight(&self, ln_s: &[f64], target: &[bool], scale: f64) -> Vec<f64> {
+        if self.union == 0.0 {
+            return vec![0.0; ln_s.len()];
+        }
+        let cells = self.soft.iter().zip(target).zip(ln_s.iter().zip(&self.ln_h));
+        let weight = cells.map(|((&m, &b), (&ln_s, &ln_h))| {
+            let loss_by_m = if b { -1.0 / self.union } else { self.common / (self.union * self.union) };
+            // d ln(H + h)/d ln H and d ln H/d ln|S|
+            let above_soft_floor = sigmoid(ln_h - SOFT_FLOOR.ln());
+            let above_floor = sigmoid(2.0 * (ln_s - EPSILON.ln()));
+            scale * loss_by_m * m * (1.0 - m) / self.softness * above_soft_floor * above_floor
+        });
+        weight.collect()
+    }
 }
 
 /// ln(eᵃ + eᵇ)

@@ -103,7 +103,7 @@ impl Objective {
         let views = self.problem.views.len() as f64;
         let (mut em, mut iou) = (0.0, Vec::with_capacity(self.regions.len()));
         for index in 0..self.regions.len() {
-            let answer = self.view(index, params, 1.0 / views, &mut em_gradient);
+            let answer = self.view(index, params, Some((1.0 / views, &mut em_gradient)));
             em += answer.loss / views;
             iou.push(answer.iou);
         }
@@ -120,12 +120,18 @@ impl Objective {
         Evaluation { loss, terms, iou, gradient, em_gradient }
     }
 
-    fn view(&self, index: usize, params: &Pppr, scale: f64, gradient: &mut Pppr) -> ViewAnswer {
+    /// L_EM alone, without its gradient.
+    pub fn em_loss(&self, params: &Pppr) -> f64 {
+        let losses = (0..self.regions.len()).map(|index| self.view(index, params, None).loss);
+        losses.sum::<f64>() / self.problem.views.len() as f64
+    }
+
+    fn view(&self, index: usize, params: &Pppr, gradient: Option<(f64, &mut Pppr)>) -> ViewAnswer {
         let scene = Scene { radar: &self.problem.radar, view: &self.problem.views[index], config: &self.config };
         let (region, target) = (&self.regions[index], &self.targets[index]);
         match self.precision {
-            Precision::F64 => em::evaluate::<f64>(&scene, params, region, target, scale, gradient),
-            Precision::F32 => em::evaluate::<f32>(&scene, params, region, target, scale, gradient),
+            Precision::F64 => em::evaluate::<f64>(&scene, params, region, target, gradient),
+            Precision::F32 => em::evaluate::<f32>(&scene, params, region, target, gradient),
         }
     }
 }

@@ -14,6 +14,8 @@ use crate::radar::{Axis, AxisKind, View};
 const NEAREST_M: f64 = 0.5;
 /// A ring with fewer cells says nothing of the background.
 const SMALLEST_RING: usize = 8;
+/// Spread of speckle, ln: a Rayleigh amplitude has 0.64. What rises less over the background is not counted.
+const SPECKLE: f64 = 0.64;
 /// The ln-salience above which a cell counts as fully lit.
 const FULLY_LIT: f64 = 2.0;
 /// Percentiles tried for local maxima, strictest first, until [`ENOUGH_PEAKS`] are found.
@@ -89,7 +91,8 @@ impl<'a> Evidence<'a> {
         let far_enough = |cell: usize| ranges[cell].is_none_or(|range| range > NEAREST_M);
         let above = |cell: usize| if far_enough(cell) { (ln[cell] - background[ring(cell)]).max(0.0) } else { 0.0 };
         self.salience = (0..ln.len()).map(above).collect();
-        self.excess = self.salience.iter().zip(&self.value).map(|(s, h)| h / largest * (1.0 - (-s).exp())).collect();
+        let over_speckle = |s: f64| 1.0 - (SPECKLE - s).min(0.0).exp();
+        self.excess = self.salience.iter().zip(&self.value).map(|(&s, h)| h / largest * over_speckle(s)).collect();
     }
 
     /// Distance from the view's origin as far as the axes tell it, m.

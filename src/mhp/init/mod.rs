@@ -27,8 +27,11 @@ const LARGEST_MISFIT_M: f64 = 0.35;
 const INITIAL_SCALE_M: f64 = 0.08;
 /// Where the middle of a body is expected when nothing tells its height: a radar stands at about chest height, m.
 const EXPECTED_MIDDLE_M: f64 = -0.2;
-/// How weakly that is held: one metre away costs this share of the evidence.
-const EXPECTATION_WEIGHT: f64 = 0.05;
+/// How weakly that is held: what one metre away costs, in units of L_EM (0 to 1) or of the lit share.
+const EXPECTATION_WEIGHT: f64 = 0.2;
+
+/// Height of the ripples of L_EM along a shift of the body.
+const RIPPLE: f64 = 0.02;
 
 /// A start for the fit, and how it came about.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,17 +58,18 @@ pub fn initialise(problem: &Problem, config: &FitConfig) -> Result<Initialisatio
         .map(|k| format!("{}: {} missing cells filled", problem.views[k].array, problem.filled_cells(k)))
         .collect();
     let candidates = candidates(problem, &peaks);
-    let found = candidates
-        .iter()
-        .map(|&at| (at, shared_excess(&evidence, &template.facing_origin(at))))
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .filter(|(_, score)| *score > 0.0);
-    let Some((at, _)) = found else {
-        return Err(FitError::NoStart {
-            reason: format!("none of {} peaks stands above the background in all views", peaks.len()),
-        });
+    notes.push(format!("{} peaks, {} places tried", peaks.len(), candidates.len()));
+    let best = |score: &dyn Fn(&[Vec3]) -> f64| {
+        let scored = candidates.iter().map(|&at| (at, score(&template.facing_origin(at))));
+        scored.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, score)| *score > 0.0).map(|(at, _)| at)
     };
-    notes.push(format!("{} peaks, {} places where the views agree", peaks.len(), candidates.len()));
+    let at = best(&|body| shared_excess(&evidence, body)).or_else(|| {
+        notes.push("the views agree on no place: the strongest echo of one view was taken".to_owned());
+        best(&|body| evidence.iter().map(|e| e.mean_excess(body)).sum())
+    });
+    let Some(at) = at else {
+        return Err(FitError::NoStart { reason: format!("none of {} peaks stands above its background", peaks.len()) });
+    };
     let at = cover(&evidence, &template, at);
     let at = settle(problem, config, &evidence, &template, at)?;
     let (params, velocity_note) = standing(problem, &evidence, &template, at);
@@ -74,18 +78,19 @@ pub fn initialise(problem: &Problem, config: &FitConfig) -> Result<Initialisatio
     Ok(Initialisation { params, peaks, notes })
 }
 
-/// Points where peaks of two views (or the peaks of the only view) may be one body.
+/// Points where peaks of two views may be one body; each peak by itself where no two agree or there is one view.
 fn candidates(problem: &Problem, peaks: &[Peak]) -> Vec<Vec3> {
     let mut found = Vec::new();
     for (i, a) in peaks.iter().enumerate() {
-        if problem.views.len() == 1 {
-            found.push(locate(&problem.views, &[a]));
-        }
         for b in peaks.iter().skip(i + 1).filter(|b| b.view != a.view) {
             found.push(locate(&problem.views, &[a, b]));
         }
     }
-    found.retain(|(p, misfit)| *misfit < LARGEST_MISFIT_M && norm(*p).is_finite());
+    let sound = |(p, misfit): &(Vec3, f64)| *misfit < LARGEST_MISFIT_M && norm(*p).is_finite();
+    found.retain(sound);
+    if found.is_empty() {
+        found = peaks.iter().map(|peak| locate(&problem.views, &[peak])).filter(sound).collect();
+    }
     // A body stands behind its nearest echo, and its brightest part may be high or low on it.
     let places = found.iter().flat_map(|(p, _)| {
         [0.0, 0.15].into_iter().flat_map(move |behind| {
@@ -101,12 +106,13 @@ fn shared_excess(evidence: &[Evidence<'_>], body: &[Vec3]) -> f64 {
     (logs / evidence.len().max(1) as f64).exp()
 }
 
-/// Walks downhill on a grid that is halved `halvings` times: the best of the six neighbours until none is better.
-fn descend(start: Vec3, step_m: f64, halvings: usize, mut cost: impl FnMut(Vec3) -> f64) -> Vec3 {
+/// Walks downhill along the first `axes` coordinates on a grid that is halved `halvings` times: to the best neighbour
+/// until none is better.
+fn descend(start: Vec3, axes: usize, step_m: f64, halvings: usize, mut cost: impl FnMut(Vec3) -> f64) -> Vec3 {
     let (mut at, mut lowest, mut step) = (start, cost(start), step_m);
     for _ in 0..=halvings {
         for _ in 0..12 {
-            let moves = (0..6).map(|k| {
+            let moves = (0..2 * axes).map(|k| {
                 let mut to = at;
                 to[k / 2] += if k % 2 == 0 { step } else { -step };
                 (to, cost(to))
@@ -124,7 +130,7 @@ fn descend(start: Vec3, step_m: f64, halvings: usize, mut cost: impl FnMut(Vec3)
 
 /// Shifts the body until as much of it as possible lies on what is lit in every view.
 fn cover(evidence: &[Evidence<'_>], template: &Template, at: Vec3) -> Vec3 {
-    descend(at, 0.2, 3, |p| {
+    descend(at, 3, 0.2, 3, |p| {
         let body = template.facing_origin(p);
         let lit: f64 = evidence.iter().map(|e| e.mean_lit(&body)).sum::<f64>() / evidence.len().max(1) as f64;
         EXPECTATION_WEIGHT * (p[2] - EXPECTED_MIDDLE_M).powi(2) - lit
@@ -140,11 +146,29 @@ fn settle(
     at: Vec3,
 ) -> Result<Vec3, FitError> {
     let start = standing(problem, evidence, template, at).0;
-    let mut objective = Objective::new(Arc::new(problem.clone()), *config, Precision::F32, &start)?;
-    Ok(descend(at, 0.1, 1, |p| {
-        let loss = objective.evaluate(&standing(problem, evidence, template, p).0).terms.em;
-        loss + 0.1 * EXPECTATION_WEIGHT * (p[2] - EXPECTED_MIDDLE_M).powi(2)
-    }))
+    let objective = Objective::new(Arc::new(problem.clone()), *config, Precision::F32, &start)?;
+    let mut cost = |p: Vec3| {
+        let loss = objective.em_loss(&standing(problem, evidence, template, p).0);
+        loss + EXPECTATION_WEIGHT * (p[2] - EXPECTED_MIDDLE_M).powi(2)
+    };
+    let at = descend(at, 3, 0.1, 2, &mut cost);
+    let at = add(at, [0.0, 0.0, mean_shift(|up| cost(add(at, [0.0, 0.0, up])))]);
+    Ok(descend(at, 2, 0.05, 2, &mut cost))
+}
+
+/// The mean height shift under exp(−cost/T). L_EM along the height of a body is a wide, shallow valley with ripples where
+/// single joints meet single speckles; its deepest ripple says less than its middle.
+fn mean_shift(mut cost: impl FnMut(f64) -> f64) -> f64 {
+    let shifts: Vec<f64> = (-6..=6).map(|k| 0.1 * f64::from(k)).collect();
+    let costs: Vec<f64> = shifts.iter().map(|&up| cost(up)).collect();
+    let lowest = costs.iter().copied().fold(f64::INFINITY, f64::min);
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for (shift, cost) in shifts.into_iter().zip(costs).filter(|(_, cost)| cost.is_finite()) {
+        let weight = (-(cost - lowest) / RIPPLE).exp();
+        sum += weight * shift;
+        weights += weight;
+    }
+    if weights > 0.0 { sum / weights } else { 0.0 }
 }
 
 /// The parameters of a body that stands at `at`.

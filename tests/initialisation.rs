@@ -1,0 +1,88 @@
+//! The start pose on scenes with truth: the one-person reference cases.
+#![expect(clippy::unwrap_used, reason = "a test stops where its material is missing")]
+
+#[path = "common/cases.rs"]
+mod cases;
+mod common;
+
+use cases::{Case, case_folders, read};
+use mhp_inspector::body::Group;
+use mhp_inspector::geometry::{norm, sub};
+use mhp_inspector::mhp::{FitError, Problem, initialise};
+
+fn centroid(flat: &[f64]) -> [f64; 3] {
+    std::array::from_fn(|k| flat.iter().skip(k).step_by(3).sum::<f64>() / (flat.len() / 3) as f64)
+}
+
+/// Horizontal and vertical distance of the joints' centroids, m.
+fn miss(found: [f64; 3], truth: [f64; 3]) -> [f64; 2] {
+    [(found[0] - truth[0]).hypot(found[1] - truth[1]), (found[2] - truth[2]).abs()]
+}
+
+#[test]
+fn finds_the_person_of_the_reference_cases() {
+    for folder in case_folders() {
+        let name = folder.file_name().unwrap().to_string_lossy().into_owned();
+        let case = Case::open(&folder);
+        let truth = read(&folder.join("frames/000000.npz"), "joints");
+        let start = initialise(&case.problem, &case.config).unwrap();
+        assert_eq!(start.params.shape().persons, 1);
+        assert!(start.params.is_finite());
+        let [across, up] = miss(centroid(start.params.group(Group::Position)), centroid(&truth));
+        println!("{name}: {across:.2} m across, {up:.2} m up; {:?}", start.notes);
+        // Range and Doppler switched off leave nothing to see the distance by.
+        if name != "range-off-doppler-off" {
+            assert!(across < 0.45 && up < 0.25, "{name}: {across:.2} m across, {up:.2} m up");
+        }
+    }
+}
+
+/// A wall that outshines the person in one view, and a ring of sidelobes, must not draw the start away.
+#[test]
+fn is_not_drawn_to_a_wall() {
+    let folder = case_folders().into_iter().find(|f| f.ends_with("mmvr-size")).unwrap();
+    let case = Case::open(&folder);
+    let truth = centroid(&read(&folder.join("frames/000000.npz"), "joints"));
+    let views = case.problem.views.clone();
+    let mut maps: Vec<Vec<f64>> = (0..2).map(|view| case.problem.map(view).to_vec()).collect();
+    let largest = maps[0].iter().copied().fold(0.0, f64::max);
+    for (cell, value) in maps[0].iter_mut().enumerate() {
+        let depth = views[0].axes[0].at((cell / 128) as f64);
+        let across = views[0].axes[1].at((cell % 128) as f64);
+        let range = depth.hypot(across);
+        *value += 3.0 * largest * (-((range - 5.5) / 0.1).powi(2)).exp();
+        *value += 0.3 * largest * (-((range - 2.4) / 0.15).powi(2)).exp();
+    }
+    let slices: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
+    let problem = Problem::new(case.problem.radar, case.problem.skeleton, views, &slices).unwrap();
+    let start = initialise(&problem, &case.config).unwrap();
+    let [across, up] = miss(centroid(start.params.group(Group::Position)), truth);
+    assert!(across < 0.35 && up < 0.3, "{across:.2} m across, {up:.2} m up");
+}
+
+#[test]
+fn a_constant_map_has_no_start() {
+    let folder = case_folders().into_iter().find(|f| f.ends_with("mmvr-size")).unwrap();
+    let case = Case::open(&folder);
+    let flat = vec![1.0; 256 * 128];
+    let problem = Problem::new(case.problem.radar, case.problem.skeleton, case.problem.views, &[&flat, &flat]).unwrap();
+    assert!(matches!(initialise(&problem, &case.config), Err(FitError::NoStart { .. })));
+}
+
+#[test]
+fn starts_with_bones_of_reference_length_and_the_stated_values() {
+    let folder = case_folders().into_iter().find(|f| f.ends_with("mmvr-size")).unwrap();
+    let case = Case::open(&folder);
+    let params = initialise(&case.problem, &case.config).unwrap().params;
+    let skeleton = &case.problem.skeleton;
+    for (&[m, n], want) in skeleton.bones.iter().zip(&skeleton.bone_lengths_m) {
+        let length = norm(sub(params.position(m), params.position(n)));
+        assert!((length - want).abs() < 0.02, "{} to {}: {length}", skeleton.joints[m], skeleton.joints[n]);
+    }
+    for joint in 0..params.shape().joints {
+        assert!(params.scale(joint).iter().all(|s| (s - 0.08).abs() < 1e-12));
+        assert_eq!(params.rotation(joint), [1.0, 0.0, 0.0, 0.0]);
+        assert_eq!(params.velocity(joint), [0.0; 3]);
+        assert_eq!(params.opacity(joint), 0.5);
+    }
+}
