@@ -68,7 +68,7 @@ impl Default for Layout {
         let log = tiles.insert_pane(PaneKind::Log);
         let curves = tabs(&mut tiles, vec![curves, log]);
         let below = linear(&mut tiles, LinearDir::Horizontal, &[(scene, 1.0), (curves, 1.0)]);
-        let middle = linear(&mut tiles, LinearDir::Vertical, &[(maps, 1.05), (below, 1.0)]);
+        let middle = linear(&mut tiles, LinearDir::Vertical, &[(maps, 1.12), (below, 1.0)]);
         let frames = tiles.insert_pane(PaneKind::Frames);
         let fit = tiles.insert_pane(PaneKind::Fit);
         let joint = tiles.insert_pane(PaneKind::Joint);

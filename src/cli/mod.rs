@@ -1,9 +1,9 @@
 //! The command line: one file a subcommand. Arguments as typed become a validated configuration and one library call.
 
+mod info;
 mod score;
 #[cfg(feature = "viewer")]
 mod screenshot;
-mod info;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;

@@ -99,6 +99,8 @@ pub struct ViewState {
     pub compare: Compare,
     /// Where the wipe's line is, 0..1 of the map's width.
     pub wipe: f32,
+    /// Draw maps whose axes are metres to scale.
+    pub true_proportions: bool,
     /// Draw the EM region on the maps.
     pub show_region: bool,
     /// Draw the joints and bones on the maps.
@@ -149,6 +151,7 @@ impl Default for ViewState {
             colormap: "viridis".into(),
             compare: Compare::default(),
             wipe: 0.5,
+            true_proportions: false,
             show_region: true,
             show_skeleton: true,
             show_boxes: true,

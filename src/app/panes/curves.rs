@@ -204,18 +204,17 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, curves: &[Cu
         ui.add_space(4.0);
         for c in curves {
             let on = !view.hidden_curves.contains(&c.key);
-            let color = if on { tokens.curve(&c.key) } else { Color32::TRANSPARENT };
-            let text = RichText::new(&c.name).font(egui::FontId::proportional(theme::CAPTION));
-            let text = if on { text } else { text.color(tokens.dim).strikethrough() };
-            let response = ui
-                .horizontal(|ui| {
-                    ui.spacing_mut().item_spacing.x = 3.0;
-                    let (rect, _) = ui.allocate_exact_size(egui::vec2(10.0, 10.0), egui::Sense::hover());
-                    let stroke = egui::Stroke::new(1.0, tokens.curve(&c.key));
-                    ui.painter().rect(rect.shrink2(egui::vec2(0.0, 3.0)), 1.0, color, stroke, egui::StrokeKind::Inside);
-                    ui.add(egui::Label::new(text).sense(egui::Sense::click()).selectable(false))
-                })
-                .inner;
+            let mut text = egui::text::LayoutJob::default();
+            let font = egui::FontId::proportional(theme::CAPTION);
+            let part = |color: Color32, on: bool| egui::TextFormat {
+                font_id: font.clone(),
+                color,
+                strikethrough: if on { egui::Stroke::NONE } else { egui::Stroke::new(1.0, tokens.dim) },
+                ..Default::default()
+            };
+            text.append("━ ", 0.0, part(if on { tokens.curve(&c.key) } else { tokens.stroke }, true));
+            text.append(&c.name, 0.0, part(if on { tokens.text } else { tokens.dim }, on));
+            let response = ui.add(egui::Label::new(text).sense(egui::Sense::click()).selectable(false));
             let name = format!("Curve {}", c.name);
             response.widget_info(|| egui::WidgetInfo::selected(egui::Role::CheckBox, true, on, &name));
             if response.on_hover_text("Click to show or hide.").clicked() {

@@ -239,8 +239,12 @@ fn slider(ui: &mut Ui, field: &Field, config: &mut FitConfig) {
         field.key
     );
     ui.horizontal(|ui| {
-        let label = ui.add_sized([92.0, 20.0], egui::Label::new(field.label).halign(egui::Align::LEFT).truncate());
-        label.on_hover_text(&tip);
+        let layout = egui::Layout::left_to_right(egui::Align::Center);
+        let label = ui.allocate_ui_with_layout(egui::vec2(96.0, 20.0), layout, |ui| {
+            ui.set_min_width(96.0);
+            ui.add(egui::Label::new(field.label).truncate())
+        });
+        label.inner.on_hover_text(&tip);
         let width = (ui.available_width() - 92.0).max(40.0);
         ui.spacing_mut().slider_width = width;
         let mut slider = egui::Slider::new(&mut value, lo..=hi).show_value(false);

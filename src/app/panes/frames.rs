@@ -51,7 +51,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     update_order(state, shared);
     let rows = &state.order.rows;
     let text = if rows.len() == dataset.len() {
-        format!("{} frames", dataset.len())
+        plural(dataset.len())
     } else {
         format!("{} of {}", rows.len(), dataset.len())
     };
@@ -86,6 +86,10 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     if let Some(index) = clicked {
         shared.send(Command::GotoFrame(index));
     }
+}
+
+fn plural(frames: usize) -> String {
+    format!("{frames} frame{}", if frames == 1 { "" } else { "s" })
 }
 
 fn update_order(state: &mut State, shared: &Shared<'_>) {

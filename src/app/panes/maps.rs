@@ -98,19 +98,26 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, colu
         };
     }
     let area = ui.available_rect_before_wrap();
-    for (i, rect) in arrange(area, views).into_iter().enumerate() {
+    for (i, rect) in arrange(area, views, session.view.true_proportions).into_iter().enumerate() {
         let builder = UiBuilder::new().max_rect(rect).id_salt(("map", i));
         ui.scope_builder(builder, |ui| one(ui, shared, state, column, i, rect));
     }
 }
 
 /// Side by side or one above the other, whichever makes the maps larger.
-fn arrange(area: Rect, views: &[View]) -> Vec<Rect> {
+fn arrange(area: Rect, views: &[View], to_scale: bool) -> Vec<Rect> {
     let n = views.len().max(1);
     let aspects: Vec<f32> = views.iter().map(|v| Orientation::of(v).metric_aspect(v).unwrap_or(1.0)).collect();
     let score = |cell: egui::Vec2| -> f32 {
-        let usable = cell - vec2(78.0, 44.0);
-        aspects.iter().map(|a| usable.x.min(usable.y * a).max(0.0) / a.sqrt()).sum()
+        let usable = (cell - vec2(92.0, 48.0)).max(egui::Vec2::ZERO);
+        // To scale: the area that is left. Freely stretched: the area, less where the proportions are far off.
+        aspects
+            .iter()
+            .map(|a| {
+                let (w, h) = (usable.x.min(usable.y * a), usable.y.min(usable.x / a));
+                if to_scale { w * h } else { (usable.x * usable.y * w * h).sqrt() }
+            })
+            .sum()
     };
     let across = vec2(area.width() / n as f32, area.height());
     let down = vec2(area.width(), area.height() / n as f32);
@@ -144,9 +151,10 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
             Compare::Difference => Content::Difference,
         },
     };
-    let bar_width = if content == Content::Masks { 0.0 } else { 44.0 };
-    let inner = Rect::from_min_max(rect.min + vec2(34.0, 20.0), rect.max - vec2(8.0 + bar_width, 28.0));
-    let plot = fit_aspect(inner, view, orientation);
+    // The masks have no colour bar, but keep its place: the three columns must line up.
+    let bar_width = 46.0;
+    let inner = Rect::from_min_max(rect.min + vec2(42.0, 20.0), rect.max - vec2(4.0 + bar_width, 30.0));
+    let plot = if session.view.true_proportions { fit_aspect(inner, view, orientation) } else { inner };
     if plot.width() < 24.0 || plot.height() < 24.0 {
         return;
     }
@@ -190,7 +198,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     if content != Content::Masks {
         let bar = ColorBar {
             rect: Rect::from_min_max(
-                pos2(plot.max.x + 2.0, plot.min.y - 14.0),
+                pos2(plot.max.x + 2.0, plot.min.y - 16.0),
                 pos2(plot.max.x + 2.0 + bar_width, plot.max.y + 6.0),
             ),
             map: state.pictures.colormap(content),
@@ -210,8 +218,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
 fn fit_aspect(inner: Rect, view: &View, orientation: Orientation) -> Rect {
     let Some(aspect) = orientation.metric_aspect(view) else { return inner };
     let width = inner.width().min(inner.height() * aspect);
-    let size = vec2(width, width / aspect);
-    Rect::from_min_size(pos2(inner.min.x + (inner.width() - width) / 2.0, inner.min.y), size)
+    Rect::from_min_size(inner.min, vec2(width, width / aspect))
 }
 
 /// Drag pans, the wheel zooms at the pointer, a double click shows everything.

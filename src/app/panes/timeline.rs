@@ -40,11 +40,11 @@ fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Toke
     caption(ui, "Frame");
     let many = count > 1;
     for (sign, name, label, enabled) in [
-        ("⏮", "First frame", "First frame", index > 0),
+        ("|◂", "First frame", "First frame", index > 0),
         ("◂", "Previous frame", "Previous frame", index > 0),
         (if playing { "⏸" } else { "▶" }, if playing { "Stop playing" } else { "Play frames" }, "Play frames", many),
         ("▸", "Next frame", "Next frame", index + 1 < count),
-        ("⏭", "Last frame", "Last frame", index + 1 < count),
+        ("▸|", "Last frame", "Last frame", index + 1 < count),
     ] {
         let tip = crate::app::commands::command(label).map(crate::app::commands::tooltip).unwrap_or_default();
         if icon_button(ui, sign, name, &tip, enabled, playing && label == "Play frames").clicked() {
@@ -109,7 +109,7 @@ fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
         ("◂", "Iteration back", "One step back", ready && shown > start, false),
         (if running { "⏸" } else { "▶" }, "Run or pause fit", "Run or pause", ready, running),
         ("▸", "Iteration forward", "One step", ready && !(running && !back), false),
-        ("⏭", "Follow newest", "Follow newest iteration", back, false),
+        ("▸|", "Follow newest", "Follow newest iteration", back, false),
     ] {
         let tip = crate::app::commands::command(label).map(crate::app::commands::tooltip).unwrap_or_default();
         if icon_button(ui, sign, name, &tip, enabled, active).clicked() {
@@ -149,7 +149,6 @@ fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
         String::new()
     };
     numbers(ui, &format!("{shown} / {head}"), &side);
-    let _ = theme::GRID;
 }
 
 fn numbers(ui: &mut Ui, text: &str, side: &str) {

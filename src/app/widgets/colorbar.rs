@@ -37,7 +37,7 @@ pub(crate) fn colorbar(ui: &mut Ui, bar: &ColorBar<'_>) -> Option<(f64, f64)> {
     }
     painter.rect_stroke(strip, 0.0, Stroke::new(1.0, tokens.stroke), egui::StrokeKind::Outside);
     let caption = egui::FontId::proportional(10.0);
-    painter.text(bar.rect.min + vec2(2.0, 1.0), Align2::LEFT_TOP, bar.unit, caption, tokens.dim);
+    ui.painter().text(bar.rect.right_top() + vec2(0.0, 2.0), Align2::RIGHT_TOP, bar.unit, caption, tokens.dim);
     let (lo, hi) = bar.limits;
     let ticks = ((strip.height() / 34.0).floor() as usize).clamp(1, 6);
     for i in 0..=ticks {

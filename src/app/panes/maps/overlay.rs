@@ -61,8 +61,10 @@ pub(super) fn axes(ui: &Ui, plot: Rect, view: &View, o: Orientation, window: Win
     }
     let name = axis_caption(across);
     painter.text(pos2(plot.center().x, plot.max.y + 14.0), Align2::CENTER_TOP, name, caption.clone(), tokens.dim);
-    let name = format!("{} ↑ {}", up.shown_name(), up.shown_unit());
-    painter.text(pos2(plot.min.x - 32.0, plot.min.y - 3.0), Align2::LEFT_BOTTOM, name, caption, tokens.dim);
+    let name = format!("{} {} →", up.shown_name(), up.shown_unit());
+    let galley = painter.layout_no_wrap(name, caption, tokens.dim);
+    let at = pos2(plot.min.x - 40.0, plot.center().y + galley.size().x / 2.0);
+    painter.add(egui::epaint::TextShape::new(at, galley, tokens.dim).with_angle(-std::f32::consts::FRAC_PI_2));
 }
 
 fn axis_caption(axis: &Axis) -> String {

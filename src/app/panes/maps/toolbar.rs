@@ -70,6 +70,8 @@ fn more(ui: &mut Ui, shared: &mut Shared<'_>) {
         ui.checkbox(&mut view.show_truth, "Truth")
             .on_hover_text("The data set's joints in metres, where it has them (white).");
         ui.checkbox(&mut view.show_boxes, "Labelled boxes").on_hover_text("The data set's boxes on the maps (red).");
+        ui.checkbox(&mut view.true_proportions, "True proportions")
+            .on_hover_text("Draw maps whose axes are metres to scale.");
         ui.checkbox(&mut view.show_clipped, "Hatch clipped cells")
             .on_hover_text("Mark cells outside the colour limits.");
         ui.separator();
