@@ -172,6 +172,15 @@ impl egui_tiles::Behavior<PaneKind> for Behavior<'_, '_> {
         egui::Stroke::new(1.0, if visuals.dark_mode { theme::DARK.stroke } else { theme::LIGHT.stroke })
     }
 
+    fn resize_stroke(&self, style: &egui::Style, state: egui_tiles::ResizeState) -> egui::Stroke {
+        let tokens = if style.visuals.dark_mode { theme::DARK } else { theme::LIGHT };
+        match state {
+            egui_tiles::ResizeState::Idle => egui::Stroke::new(1.0, tokens.stroke),
+            egui_tiles::ResizeState::Hovering => egui::Stroke::new(2.0, tokens.dim),
+            egui_tiles::ResizeState::Dragging => egui::Stroke::new(2.0, tokens.accent),
+        }
+    }
+
     fn simplification_options(&self) -> SimplificationOptions {
         SimplificationOptions { all_panes_must_have_tabs: true, ..Default::default() }
     }

@@ -163,7 +163,7 @@ fn points(branch: &Branch, curve: &Curve, log: bool) -> Vec<PlotPoint> {
         .iter()
         .filter_map(|row| {
             let value = (curve.value)(row)?;
-            let y = if log { (value > 1e-12).then(|| value.log10())? } else { value };
+            let y = if log { (value > 1e-7).then(|| value.log10())? } else { value };
             y.is_finite().then(|| PlotPoint::new(row.report.iteration as f64, y))
         })
         .collect()
@@ -212,7 +212,7 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, curves: &[Cu
                 strikethrough: if on { egui::Stroke::NONE } else { egui::Stroke::new(1.0, tokens.dim) },
                 ..Default::default()
             };
-            text.append("━ ", 0.0, part(if on { tokens.curve(&c.key) } else { tokens.stroke }, true));
+            text.append("■ ", 0.0, part(if on { tokens.curve(&c.key) } else { tokens.stroke }, true));
             text.append(&c.name, 0.0, part(if on { tokens.text } else { tokens.dim }, on));
             let response = ui.add(egui::Label::new(text).sense(egui::Sense::click()).selectable(false));
             let name = format!("Curve {}", c.name);

@@ -47,21 +47,18 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let mut committed = false;
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         derived(ui, &snapshot.params, joint, &tokens);
-        for group in Group::ALL.into_iter().filter(|g| *g != Group::Omega) {
-            let (title, names, unit, speed) = components(group);
-            egui::Grid::new(("joint", title)).num_columns(4).spacing([8.0, 2.0]).min_col_width(34.0).show(ui, |ui| {
-                ui.label(
-                    RichText::new(if unit.is_empty() { title.to_owned() } else { format!("{title} / {unit}") })
-                        .small()
-                        .color(tokens.dim),
-                );
-                for (text, tip) in [
-                    ("value", "The parameter; drag or type to edit it by hand, which starts a branch."),
-                    ("w_EM ∂L_EM", "Gradient of the weighted electromagnetic term."),
-                    ("w_kine ∂L_kine", "Gradient of the weighted kinematic terms."),
-                ] {
-                    ui.label(RichText::new(text).size(10.0).color(tokens.dim)).on_hover_text(tip);
-                }
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("gradient of").size(10.0).color(tokens.dim));
+            ui.label(RichText::new("■ w_EM·L_EM").size(10.0).color(tokens.curve("em")))
+                .on_hover_text("Gradient of the weighted electromagnetic term.");
+            ui.label(RichText::new("■ w_kine·L_kine").size(10.0).color(tokens.curve("bone")))
+                .on_hover_text("Gradient of the weighted kinematic terms.");
+        });
+        egui::Grid::new("joint parameters").num_columns(4).spacing([8.0, 2.0]).min_col_width(58.0).show(ui, |ui| {
+            for group in Group::ALL.into_iter().filter(|g| *g != Group::Omega) {
+                let (title, names, unit, speed) = components(group);
+                let title_text = if unit.is_empty() { title.to_owned() } else { format!("{title} / {unit}") };
+                ui.label(RichText::new(title_text).small().color(tokens.text));
                 ui.end_row();
                 for (i, name) in names.iter().enumerate() {
                     ui.label(RichText::new(format!("   {name}")).color(tokens.dim));
@@ -80,9 +77,9 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
                     ui.label(gradient(kinematic, tokens.curve("bone"), &tokens));
                     ui.end_row();
                 }
-            });
-            ui.add_space(4.0);
-        }
+            }
+        });
+        ui.add_space(4.0);
         omega(ui, &snapshot.params, &evaluation.gradient, joint, &tokens);
     });
     debug_assert!(joint / joints < snapshot.params.shape().persons);

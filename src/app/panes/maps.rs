@@ -198,7 +198,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     if content != Content::Masks {
         let bar = ColorBar {
             rect: Rect::from_min_max(
-                pos2(plot.max.x + 2.0, plot.min.y - 16.0),
+                pos2(plot.max.x + 2.0, plot.min.y - 18.0),
                 pos2(plot.max.x + 2.0 + bar_width, plot.max.y + 6.0),
             ),
             map: state.pictures.colormap(content),

@@ -29,7 +29,10 @@ const CAPTION: f32 = 70.0;
 const NUMBERS: f32 = 118.0;
 
 fn caption(ui: &mut Ui, text: &str) {
-    ui.add_sized([CAPTION, 22.0], egui::Label::new(RichText::new(text).small()).halign(egui::Align::LEFT));
+    ui.allocate_ui_with_layout(vec2(CAPTION, 22.0), egui::Layout::left_to_right(egui::Align::Center), |ui| {
+        ui.set_min_width(CAPTION);
+        ui.label(RichText::new(text).small());
+    });
 }
 
 fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tokens) {
@@ -116,7 +119,7 @@ fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
             shared.invoke(label);
         }
     }
-    ui.add_space(26.0 + 4.0);
+    ui.add_space(30.0 + 4.0);
     let (rect, response) =
         ui.allocate_exact_size(vec2((ui.available_width() - NUMBERS - 4.0).max(40.0), 22.0), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::slider(ready, shown as f64, "Iteration scrubber"));

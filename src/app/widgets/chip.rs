@@ -28,7 +28,7 @@ pub(crate) fn iou_color(tokens: &Tokens, iou: f64) -> Color32 {
 pub(crate) fn icon_button(ui: &mut Ui, sign: &str, name: &str, tooltip: &str, enabled: bool, active: bool) -> Response {
     let tokens = Tokens::of(ui);
     let text = RichText::new(sign).font(theme::mono(theme::BODY));
-    let mut button = egui::Button::new(text).min_size(egui::vec2(26.0, 22.0)).sense(Sense::click());
+    let mut button = egui::Button::new(text).min_size(egui::vec2(30.0, 22.0)).sense(Sense::click());
     if active {
         button = button.fill(tokens.accent.gamma_multiply(0.35));
     }

@@ -21,7 +21,7 @@ pub(crate) struct ColorBar<'a> {
 /// Draws the bar; answers new limits while a handle is dragged or the bar is scrolled.
 pub(crate) fn colorbar(ui: &mut Ui, bar: &ColorBar<'_>) -> Option<(f64, f64)> {
     let tokens = Tokens::of(ui);
-    let strip = Rect::from_min_max(bar.rect.min + vec2(4.0, 16.0), pos2(bar.rect.min.x + 14.0, bar.rect.max.y - 6.0));
+    let strip = Rect::from_min_max(bar.rect.min + vec2(4.0, 18.0), pos2(bar.rect.min.x + 14.0, bar.rect.max.y - 6.0));
     if strip.height() < 24.0 {
         return None;
     }
