@@ -214,7 +214,7 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, curves: &[Cu
             };
             text.append("■ ", 0.0, part(if on { tokens.curve(&c.key) } else { tokens.stroke }, true));
             text.append(&c.name, 0.0, part(if on { tokens.text } else { tokens.dim }, on));
-            let response = ui.add(egui::Label::new(text).sense(egui::Sense::click()).selectable(false));
+            let response = ui.add(egui::Label::new(text).sense(egui::Sense::click()).selectable(false).extend());
             let name = format!("Curve {}", c.name);
             response.widget_info(|| egui::WidgetInfo::selected(egui::Role::CheckBox, true, on, &name));
             if response.on_hover_text("Click to show or hide.").clicked() {

@@ -39,7 +39,7 @@ impl State {
         let positions = session.shown_positions();
         let camera = self.camera.get_or_insert_with(|| Camera::overview(centre(session), RADIUS_M));
         match session.joint.and_then(|joint| positions.get(joint)) {
-            Some(&p) => camera.focus(Vec3::from(p.map(|x| x as f32)), 0.5),
+            Some(&p) => camera.focus(Vec3::from(p.map(|x| x as f32)), 0.8),
             None => camera.focus(centre(session), 1.1),
         }
     }
@@ -185,7 +185,7 @@ fn interact(
                 if let Some(p) = shared.session.shown_positions().get(joint)
                     && let Some(camera) = &mut state.camera
                 {
-                    camera.focus(Vec3::from(p.map(|x| x as f32)), 0.5);
+                    camera.focus(Vec3::from(p.map(|x| x as f32)), 0.8);
                 }
             }
             None => state.camera = None,
