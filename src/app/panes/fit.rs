@@ -121,7 +121,12 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
     let tokens = Tokens::of(ui);
     let fit = &shared.session.fit;
     let Some(row) = fit.shown_row() else {
-        ui.label(RichText::new("The start pose is being sought.").color(tokens.dim));
+        let text = if fit.status == FitStatus::Preparing {
+            "The start pose is being sought."
+        } else {
+            "No fit: open a frame."
+        };
+        ui.label(RichText::new(text).color(tokens.dim));
         return;
     };
     let report = &row.report;
