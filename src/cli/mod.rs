@@ -1,5 +1,6 @@
 //! The command line: one file a subcommand. Arguments as typed become a validated configuration and one library call.
 
+mod info;
 mod score;
 
 use clap::{Parser, Subcommand};
@@ -24,6 +25,8 @@ pub struct Cli {
 /// The subcommands; everything the window does, one of them can do headless.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Tell what is in a data set: frames, views and axes, ranges of values, skeleton, people, labels.
+    Info(info::Args),
     /// Evaluate the objective at given parameters: simulated maps, losses and gradients.
     ///
     /// Writes an npz with `sim_<array>`, `iou_<array>`, `loss`, its terms `em bone rigid joint sep coll`, and the gradients
@@ -38,6 +41,7 @@ pub enum Command {
 /// Whatever the subcommand could not do, naming file, key and what was expected.
 pub fn run(command: Command) -> anyhow::Result<ExitCode> {
     match command {
+        Command::Info(args) => info::run(&args),
         Command::Score(args) => score::run(&args),
     }
 }

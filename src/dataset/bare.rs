@@ -4,6 +4,7 @@ use super::manifest::{ViewText, view_fault};
 use super::npz::{Entry, NpzArchive, replace_file, shape_text};
 use super::{DatasetError, words};
 use crate::body::Skeleton;
+use crate::geometry::Pose;
 use crate::radar::{Axis, AxisKind, PointSpread, Quantity, Spacing, View};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -42,7 +43,8 @@ impl BareCatalog {
     /// Where the file cannot be read or has no candidate.
     pub fn read(path: &Path) -> Result<Self, DatasetError> {
         let all = NpzArchive::open(path)?.entries()?;
-        let fits = |e: &&Entry| e.is_real && (2..=4).contains(&e.shape.len()) && !e.shape.contains(&0);
+        let pose = |e: &Entry| matches!(e.key.as_str(), "joints" | "velocities") && e.shape.last() == Some(&3);
+        let fits = |e: &&Entry| e.is_real && (2..=4).contains(&e.shape.len()) && !e.shape.contains(&0) && !pose(e);
         let arrays: Vec<Entry> = all.iter().filter(fits).cloned().collect();
         if arrays.is_empty() {
             let present = if all.is_empty() { "no arrays".into() } else { listed(&all) };
@@ -150,7 +152,7 @@ fn guess_view(entry: &Entry, stacked: bool) -> View {
         }
         _ => vec![edges(AxisKind::DepthH, size(0), 8.0, 0.0), edges(AxisKind::Y, size(1), 1.0, -4.0)],
     };
-    View { array: entry.key.clone(), quantity: Quantity::Amplitude, psf, pose: Default::default(), axes, region: None }
+    View { array: entry.key.clone(), quantity: Quantity::Amplitude, psf, pose: Pose::default(), axes, region: None }
 }
 
 /// An axis whose outer edges are `first` and `last`, the bin centres half a step inside.

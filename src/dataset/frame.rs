@@ -65,10 +65,17 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Memory that this frame holds, bytes.
+    /// Memory that this frame holds, bytes; small parts rounded up.
     pub fn bytes(&self) -> usize {
-        let maps: usize = self.maps.iter().map(|m| m.data.len() * 8).sum();
-        let masks: usize = self.image.iter().flat_map(|i| &i.masks).map(Vec::len).sum();
-        maps + masks + 4096
+        let maps: usize = self.maps.iter().map(|m| m.data.len() * size_of::<f64>()).sum();
+        let truth = self.truth.as_ref().map_or(0, |t| (t.joints.len() * 2) * size_of::<Vec3>());
+        let image = self.image.as_ref().map_or(0, |image| {
+            let masks: usize = image.masks.iter().map(Vec::len).sum();
+            let points: usize = image.keypoints.iter().map(Vec::len).sum();
+            masks + points * size_of::<[f64; 3]>() + image.boxes.len() * size_of::<[f64; 5]>()
+        });
+        let boxes: usize = self.map_boxes.iter().map(|boxes| boxes.len() * size_of::<[f64; 4]>()).sum();
+        let notes: usize = self.notes.iter().map(String::len).sum();
+        maps + truth + image + boxes + notes + 4096
     }
 }

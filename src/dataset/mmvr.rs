@@ -6,7 +6,9 @@
 use super::files::RADAR_SUFFIX;
 use super::npz::{Array, NpzArchive, NpzError, shape_text};
 use super::{DatasetError, DatasetInfo, Frame, Heatmap, ImageAnnotations};
-use std::path::{Path, PathBuf};
+use crate::radar::View;
+use rayon::prelude::*;
+use std::path::Path;
 
 /// Camera images of MMVR, (width, height), px.
 const IMAGE_SIZE: [usize; 2] = [640, 480];
@@ -19,13 +21,49 @@ pub(super) fn load(
     stem: &str,
     info: &DatasetInfo,
 ) -> Result<Frame, DatasetError> {
+    let radar = folder.join(format!("{stem}{RADAR_SUFFIX}"));
+    let (maps, labels) = rayon::join(|| load_maps(&radar, info), || load_labels(folder, stem, info));
+    Ok(Frame {
+        index,
+        name: format!("{sequence}/{stem}"),
+        timestamp_s: info
+            .frame_rate_hz
+            .and_then(|rate| stem.parse::<u32>().ok().map(|number| f64::from(number) / rate)),
+        maps: maps?,
+        ..labels
+    })
+}
+
+/// One map a view. Inflating is what takes the time, so each view has its own reader and thread.
+fn load_maps(path: &Path, info: &DatasetInfo) -> Result<Vec<Heatmap>, DatasetError> {
+    let maps: Vec<_> = info.views.par_iter().map(|view| load_map(path, view)).collect();
+    // Of several errors the first view's is told, whichever thread was faster.
+    maps.into_iter().collect()
+}
+
+fn load_map(path: &Path, view: &View) -> Result<Heatmap, DatasetError> {
+    let mut file = NpzArchive::open(path)?;
+    let Array { shape, data, dtype } = file.read(&view.array)?;
+    let expected = view.shape();
+    if shape.len() == expected.len() + 1 && shape.ends_with(&expected) {
+        let (got, expected) = (shape_text(&shape), shape_text(&expected));
+        return Err(DatasetError::Grouped { key: view.array.clone(), got, expected, path: path.to_owned() });
+    }
+    if shape != expected {
+        let expected = format!("{}, the bins of its axes", shape_text(&expected));
+        return Err(file.wrong_shape(&view.array, &shape, expected).into());
+    }
+    Ok(Heatmap { shape, data, dtype })
+}
+
+/// A frame without its maps: what the companions say, and notes about those that are missing.
+fn load_labels(folder: &Path, stem: &str, info: &DatasetInfo) -> Frame {
     let mut labels = Labels { folder, stem, notes: Vec::new() };
-    let maps = load_maps(&folder.join(format!("{stem}{RADAR_SUFFIX}")), info)?;
-    let global_id = labels.open("meta", "no global frame id").and_then(|(mut file, path)| {
+    let global_id = labels.open("meta", "no global frame id").and_then(|mut file| {
         let ids = file.read_texts("global_frame_id");
-        labels.keep(ids, &path).map(|ids| ids.join(", "))
+        labels.keep(ids).map(|ids| ids.join(", "))
     });
-    let (map_boxes, image_boxes) = labels.boxes(info);
+    let Boxes { on_maps: map_boxes, in_image: image_boxes } = labels.boxes(info);
     let keypoints = labels.keypoints();
     let masks = labels.masks();
     let person_count = labels.count([
@@ -41,39 +79,17 @@ pub(super) fn load(
         boxes: image_boxes.unwrap_or_default(),
         masks: masks.map(|(_, masks)| masks).unwrap_or_default(),
     });
-    Ok(Frame {
-        index,
-        name: format!("{sequence}/{stem}"),
-        global_id,
-        timestamp_s: info
-            .frame_rate_hz
-            .and_then(|rate| stem.parse::<u32>().ok().map(|number| f64::from(number) / rate)),
-        maps,
-        map_boxes,
-        person_count,
-        truth: None,
-        image,
-        notes: labels.notes,
-    })
+    let (notes, truth) = (labels.notes, None);
+    let (index, name, maps, timestamp_s) = (0, String::new(), Vec::new(), None);
+    Frame { index, name, global_id, timestamp_s, maps, map_boxes, person_count, truth, image, notes }
 }
 
-fn load_maps(path: &Path, info: &DatasetInfo) -> Result<Vec<Heatmap>, DatasetError> {
-    let mut file = NpzArchive::open(path)?;
-    let mut maps = Vec::with_capacity(info.views.len());
-    for view in &info.views {
-        let Array { shape, data, dtype } = file.read(&view.array)?;
-        let expected = view.shape();
-        if shape.len() == expected.len() + 1 && shape.ends_with(&expected) {
-            let (got, expected) = (shape_text(&shape), shape_text(&expected));
-            return Err(DatasetError::Grouped { key: view.array.clone(), got, expected, path: path.to_owned() });
-        }
-        if shape != expected {
-            let expected = format!("{}, the bins of its axes", shape_text(&expected));
-            return Err(file.wrong_shape(&view.array, &shape, expected).into());
-        }
-        maps.push(Heatmap { shape, data, dtype });
-    }
-    Ok(maps)
+/// Labelled boxes.
+struct Boxes {
+    /// On each view's map, in bins: row, column, row, column.
+    on_maps: Vec<Vec<[f64; 4]>>,
+    /// In the image: x0, y0, x1, y1 px, score; `None` where the file or the array is missing.
+    in_image: Option<Vec<[f64; 5]>>,
 }
 
 /// The companions of one frame, and what is wrong with them.
@@ -85,10 +101,10 @@ struct Labels<'a> {
 
 impl Labels<'_> {
     /// Opens a companion; a missing or damaged one becomes a note.
-    fn open(&mut self, kind: &str, without: &str) -> Option<(NpzArchive, PathBuf)> {
+    fn open(&mut self, kind: &str, without: &str) -> Option<NpzArchive> {
         let path = self.folder.join(format!("{}_{kind}.npz", self.stem));
         match NpzArchive::open(&path) {
-            Ok(file) => Some((file, path)),
+            Ok(file) => Some(file),
             Err(error) if error.is_not_found() => {
                 self.notes.push(format!("{}_{kind}.npz is missing: {without}", self.stem));
                 None
@@ -101,14 +117,13 @@ impl Labels<'_> {
     }
 
     /// An unreadable array becomes a note too.
-    fn keep<T>(&mut self, result: Result<T, NpzError>, _path: &Path) -> Option<T> {
+    fn keep<T>(&mut self, result: Result<T, NpzError>) -> Option<T> {
         result.map_err(|error| self.notes.push(error.to_string())).ok()
     }
 
     /// An array of shape (n, …rest), as rows of its first axis.
     fn rows(&mut self, file: &mut NpzArchive, key: &str, rest: &[usize]) -> Option<Vec<Vec<f64>>> {
-        let path = file.path().to_owned();
-        let array = self.keep(file.read(key), &path)?;
+        let array = self.keep(file.read(key))?;
         // No person at all is stored with any number of axes.
         if array.data.is_empty() {
             return Some(Vec::new());
@@ -124,9 +139,9 @@ impl Labels<'_> {
     }
 
     /// Boxes on each view's map, in bins; and boxes in the image, px.
-    fn boxes(&mut self, info: &DatasetInfo) -> (Vec<Vec<[f64; 4]>>, Option<Vec<[f64; 5]>>) {
-        let Some((mut file, _)) = self.open("bbox", "no boxes") else {
-            return (vec![Vec::new(); info.views.len()], None);
+    fn boxes(&mut self, info: &DatasetInfo) -> Boxes {
+        let Some(mut file) = self.open("bbox", "no boxes") else {
+            return Boxes { on_maps: vec![Vec::new(); info.views.len()], in_image: None };
         };
         let mut on_maps = Vec::with_capacity(info.views.len());
         for view in &info.views {
@@ -136,12 +151,14 @@ impl Labels<'_> {
             on_maps.push(boxes.map(|[column0, row0, column1, row1]| [row0, column0, row1, column1]).collect());
         }
         let image = self.rows(&mut file, "bbox_i", &[5]);
-        (on_maps, image.map(|rows| rows.iter().filter_map(|row| <[f64; 5]>::try_from(row.as_slice()).ok()).collect()))
+        let in_image =
+            image.map(|rows| rows.iter().filter_map(|row| <[f64; 5]>::try_from(row.as_slice()).ok()).collect());
+        Boxes { on_maps, in_image }
     }
 
     /// Key points of each person: (x, y, score), px.
     fn keypoints(&mut self) -> Option<Vec<Vec<[f64; 3]>>> {
-        let (mut file, _) = self.open("pose", "no key points")?;
+        let mut file = self.open("pose", "no key points")?;
         let persons = self.rows(&mut file, "kp", &[17, 3])?;
         let points = |person: &Vec<f64>| person.as_chunks::<3>().0.to_vec();
         Some(persons.iter().map(points).collect())
@@ -149,8 +166,8 @@ impl Labels<'_> {
 
     /// One mask a person and the image's size (width, height).
     fn masks(&mut self) -> Option<([usize; 2], Vec<Vec<bool>>)> {
-        let (mut file, path) = self.open("mask", "no masks")?;
-        let (shape, flags) = self.keep(file.read_flags("mask"), &path)?;
+        let mut file = self.open("mask", "no masks")?;
+        let (shape, flags) = self.keep(file.read_flags("mask"))?;
         let [_, height, width] = shape[..] else {
             let error = file.wrong_shape("mask", &shape, "(persons, height, width)".into());
             self.notes.push(error.to_string());

@@ -12,13 +12,12 @@ use std::path::Path;
 /// not finite.
 pub fn read_pppr(path: &Path, expected: Option<PpprShape>) -> Result<Pppr, NpzError> {
     let mut file = NpzArchive::open(path)?;
-    let shape = match expected {
-        Some(shape) => shape,
-        None => {
-            let persons = axes_of(&mut file, Group::Position, "(persons, joints, 3)")?;
-            let features = axes_of(&mut file, Group::Omega, "(persons, joints, Doppler features)")?;
-            PpprShape { persons: persons[0], joints: persons[1], doppler_features: features[2] }
-        }
+    let shape = if let Some(shape) = expected {
+        shape
+    } else {
+        let [persons, joints, _] = axes_of(&mut file, Group::Position, "(persons, joints, 3)")?;
+        let [.., doppler_features] = axes_of(&mut file, Group::Omega, "(persons, joints, Doppler features)")?;
+        PpprShape { persons, joints, doppler_features }
     };
     let mut arrays = Vec::with_capacity(Group::ALL.len());
     for group in Group::ALL {

@@ -64,17 +64,18 @@ impl Dataset {
     pub fn open(path: &Path, progress: &Progress) -> Result<Self, DatasetError> {
         progress.begin("opening", 0);
         if is_folder(path)? {
-            let manifest = path.join(MANIFEST_NAME);
-            return match exists(&manifest)? {
-                true => Self::open_folder(path, &Manifest::from_file(&manifest)?, progress),
-                false => Self::open_mmvr(path, true, None, &Manifest::mmvr()?, progress),
+            return match manifest_in(path)? {
+                Some(manifest) => Self::open_folder(path, &manifest, progress),
+                None => Self::open_mmvr(path, true, None, &Manifest::mmvr()?, progress),
             };
         }
         if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
             return Self::open_folder(parent(path), &Manifest::from_file(path)?, progress);
         }
         if let Some(stem) = radar_stem(path) {
-            return Self::open_mmvr(parent(path), false, Some(&stem), &Manifest::mmvr()?, progress);
+            let beside = manifest_in(parent(path))?.filter(|manifest| manifest.layout == Layout::Mmvr);
+            let manifest = beside.map_or_else(Manifest::mmvr, Ok)?;
+            return Self::open_mmvr(parent(path), false, Some(&stem), &manifest, progress);
         }
         let catalog = BareCatalog::read(path)?;
         match Remembered::of_user().and_then(|remembered| remembered.recall(&catalog)) {
@@ -148,7 +149,7 @@ impl Dataset {
             let expected = format!("files that match `frames = \"{pattern}\"` of {}", manifest.path.display());
             return Err(DatasetError::NoFrames { expected, path: root.to_owned() });
         }
-        Ok(Self { info: info_of(root, manifest, manifest, folder_name(root))?, source: Source::Files(files), start: 0 })
+        Ok(Self { info: info_of(root, manifest, manifest, folder_name(root)), source: Source::Files(files), start: 0 })
     }
 
     fn open_mmvr(
@@ -171,10 +172,13 @@ impl Dataset {
             let segment = segments.first()?;
             (0..segment.len()).find(|&i| segment.stem(i) == stem)
         });
-        let mut info = info_of(root, manifest, &Manifest::mmvr()?, "MMVR".into())?;
+        let preset = Manifest::mmvr()?;
+        let mut info = info_of(root, manifest, &preset, "MMVR".into());
         info.notes = notes;
-        info.assumptions.push("frame rate: 900 frames a minute-long segment, hence 15 a second".into());
-        if manifest.views.is_empty() || manifest.path.starts_with("assets") {
+        if info.frame_rate_hz == preset.frame_rate_hz {
+            info.assumptions.push("frame rate: 900 frames a minute-long segment, hence 15 a second".into());
+        }
+        if info.views == preset.views {
             info.assumptions
                 .push("point spread: 0.06 m and 0.03 rad are assumed; MMVR does not publish its own".into());
             info.assumptions.push("quantity: amplitudes are assumed, from the spread of the values".into());
@@ -205,7 +209,7 @@ impl Dataset {
         let axes = |array: &str| catalog.arrays.iter().find(|entry| entry.key == array).map(|entry| entry.shape.len());
         let stacked = manifest.views.iter().all(|view| axes(&view.array) == Some(view.axes.len() + 1));
         let frames = frames_of(&manifest.views, stacked, &catalog)?;
-        let mut info = info_of(path, manifest, manifest, file_stem(path))?;
+        let mut info = info_of(path, manifest, manifest, file_stem(path));
         info.layout = Layout::Bare;
         Ok(Self { info, source: Source::Bare { frames, stacked }, start: 0 })
     }
@@ -312,7 +316,7 @@ impl Dataset {
 }
 
 /// What a manifest says, filled up from its layout's preset; what neither says is assumed, and told.
-fn info_of(root: &Path, manifest: &Manifest, preset: &Manifest, name: String) -> Result<DatasetInfo, DatasetError> {
+fn info_of(root: &Path, manifest: &Manifest, preset: &Manifest, name: String) -> DatasetInfo {
     let views = if manifest.views.is_empty() { &preset.views } else { &manifest.views };
     let mut assumptions = Vec::new();
     let radar = manifest.radar.clone().or_else(|| preset.radar.clone()).unwrap_or_else(|| {
@@ -322,7 +326,7 @@ fn info_of(root: &Path, manifest: &Manifest, preset: &Manifest, name: String) ->
         RadarConfig::default()
     });
     let skeleton = manifest.skeleton.clone().or_else(|| preset.skeleton.clone()).unwrap_or_else(default_skeleton);
-    Ok(DatasetInfo {
+    DatasetInfo {
         name: manifest.name.clone().unwrap_or(name),
         layout: manifest.layout,
         root: root.to_owned(),
@@ -333,7 +337,7 @@ fn info_of(root: &Path, manifest: &Manifest, preset: &Manifest, name: String) ->
         views: views.clone(),
         assumptions,
         notes: Vec::new(),
-    })
+    }
 }
 
 fn default_skeleton() -> Skeleton {
@@ -352,8 +356,11 @@ fn is_folder(path: &Path) -> Result<bool, DatasetError> {
     })
 }
 
-fn exists(path: &Path) -> Result<bool, DatasetError> {
-    path.try_exists().map_err(|reason| DatasetError::Read { reason, path: path.to_owned() })
+/// The manifest in a folder, where there is one.
+fn manifest_in(folder: &Path) -> Result<Option<Manifest>, DatasetError> {
+    let path = folder.join(MANIFEST_NAME);
+    let there = path.try_exists().map_err(|reason| DatasetError::Read { reason, path: path.clone() })?;
+    if there { Manifest::from_file(&path).map(Some) } else { Ok(None) }
 }
 
 fn parent(path: &Path) -> &Path {

@@ -250,7 +250,7 @@ impl Source<'_> {
         }
         let declared = self.header.data_bytes();
         let holds = self.available.saturating_sub(self.header.bytes);
-        let limit = if declared > u128::from(holds) {
+        let limit = if declared > holds {
             format!("the file holds at most {holds}; refused before allocating")
         } else if self.header.len() > MAX_ELEMENTS {
             format!("at most {MAX_ELEMENTS} elements are read; refused before allocating")
@@ -274,7 +274,7 @@ impl Source<'_> {
     /// All bytes of the data; the read past them makes the archive check its sum.
     fn all(&mut self) -> Result<Vec<u8>, NpzError> {
         self.check()?;
-        let bytes = self.take(u64::try_from(self.header.data_bytes()).unwrap_or(u64::MAX))?;
+        let bytes = self.take(self.header.data_bytes())?;
         match self.reader.read(&mut [0_u8]) {
             Ok(0) => Ok(bytes),
             Ok(_) => Err(self.corrupt("it goes on after the declared shape is full".into())),

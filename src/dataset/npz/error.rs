@@ -95,7 +95,7 @@ pub enum NpzError {
         /// The declared shape.
         shape: String,
         /// Bytes that the shape needs.
-        declared: u128,
+        declared: u64,
         /// What limits it, in words.
         limit: String,
         /// The file.

@@ -60,9 +60,9 @@ impl Header {
         self.shape.iter().product()
     }
 
-    /// Bytes that the data need.
-    pub(super) fn data_bytes(&self) -> u128 {
-        self.len() as u128 * self.width as u128
+    /// Bytes that the data need; saturates, which no file can hold.
+    pub(super) fn data_bytes(&self) -> u64 {
+        (self.len() as u64).saturating_mul(self.width as u64)
     }
 }
 
