@@ -4,11 +4,14 @@
 #[path = "common/cases.rs"]
 mod cases;
 mod common;
+#[path = "common/reading.rs"]
+mod reading;
 
-use cases::{Case, case_folders};
+use cases::Case;
 use mhp_inspector::body::Group;
 use mhp_inspector::config::{EmRegion, FitConfig};
 use mhp_inspector::mhp::{FitError, Fitter, Objective, Precision, Problem, Region, masks, simulate};
+use reading::case_folders;
 use std::sync::Arc;
 
 fn case(name: &str) -> Case {

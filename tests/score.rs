@@ -1,11 +1,11 @@
 //! `mhp-inspector score`, run as a program: its answers on the committed cases, and what it says to bad input.
 #![expect(clippy::unwrap_used, reason = "a test stops where its material is missing")]
 
-#[path = "common/cases.rs"]
-mod cases;
 mod common;
+#[path = "common/reading.rs"]
+mod reading;
 
-use cases::{case_folders, read};
+use reading::{case_folders, read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
