@@ -9,15 +9,17 @@
 //! Nothing here reads a label.
 
 mod evidence;
+mod height;
 mod template;
 
 pub use evidence::Peak;
 
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
-use crate::config::FitConfig;
+use crate::config::{FitConfig, Summation};
 use crate::geometry::{Vec3, add, norm, scale, sub};
 use evidence::{Evidence, locate};
+use height::Expectation;
 use std::sync::Arc;
 use template::Template;
 
@@ -25,11 +27,6 @@ use template::Template;
 const LARGEST_MISFIT_M: f64 = 0.35;
 /// Initial standard deviation of a joint's Gaussian, m.
 const INITIAL_SCALE_M: f64 = 0.08;
-/// Where the middle of a body is expected when nothing tells its height: a radar stands at about chest height, m.
-const EXPECTED_MIDDLE_M: f64 = -0.2;
-/// How weakly that is held: what one metre away costs, in units of L_EM (0 to 1) or of the lit share.
-const EXPECTATION_WEIGHT: f64 = 0.2;
-
 /// Height of the ripples of L_EM along a shift of the body.
 const RIPPLE: f64 = 0.02;
 
@@ -71,9 +68,14 @@ pub fn initialise(problem: &Problem, config: &FitConfig) -> Result<Initialisatio
         return Err(FitError::NoStart { reason: format!("none of {} peaks stands above its background", peaks.len()) });
     };
     let at = cover(&evidence, &template, at);
-    let at = settle(problem, config, &evidence, &template, at)?;
+    let expected = Expectation::new(&evidence, at);
+    let at = settle(problem, config, &evidence, &template, expected, at)?;
     let (params, velocity_note) = standing(problem, &evidence, &template, at);
     notes.push(format!("standing at x {:.2} m, y {:.2} m, facing the radar", at[0], at[1]));
+    notes.push(match expected.extent_m {
+        Some([low, high]) => format!("feet at z {low:.2} m and head at {high:.2} m seen"),
+        None => format!("no feet and head seen: middle of the body expected at z {:.2} m", expected.middle_m),
+    });
     notes.push(velocity_note);
     Ok(Initialisation { params, peaks, notes })
 }
@@ -106,13 +108,12 @@ fn shared_excess(evidence: &[Evidence<'_>], body: &[Vec3]) -> f64 {
     (logs / evidence.len().max(1) as f64).exp()
 }
 
-/// Walks downhill along the first `axes` coordinates on a grid that is halved `halvings` times: to the best neighbour
-/// until none is better.
-fn descend(start: Vec3, axes: usize, step_m: f64, halvings: usize, mut cost: impl FnMut(Vec3) -> f64) -> Vec3 {
+/// Walks downhill on a grid that is halved `halvings` times: to the best of the six neighbours until none is better.
+fn descend(start: Vec3, step_m: f64, halvings: usize, mut cost: impl FnMut(Vec3) -> f64) -> Vec3 {
     let (mut at, mut lowest, mut step) = (start, cost(start), step_m);
     for _ in 0..=halvings {
         for _ in 0..12 {
-            let moves = (0..2 * axes).map(|k| {
+            let moves = (0..6).map(|k| {
                 let mut to = at;
                 to[k / 2] += if k % 2 == 0 { step } else { -step };
                 (to, cost(to))
@@ -130,10 +131,11 @@ fn descend(start: Vec3, axes: usize, step_m: f64, halvings: usize, mut cost: imp
 
 /// Shifts the body until as much of it as possible lies on what is lit in every view.
 fn cover(evidence: &[Evidence<'_>], template: &Template, at: Vec3) -> Vec3 {
-    descend(at, 3, 0.2, 3, |p| {
+    let expected = Expectation::new(evidence, at);
+    descend(at, 0.2, 3, |p| {
         let body = template.facing_origin(p);
         let lit: f64 = evidence.iter().map(|e| e.mean_lit(&body)).sum::<f64>() / evidence.len().max(1) as f64;
-        EXPECTATION_WEIGHT * (p[2] - EXPECTED_MIDDLE_M).powi(2) - lit
+        expected.cost(p[2]) - lit
     })
 }
 
@@ -143,24 +145,33 @@ fn settle(
     config: &FitConfig,
     evidence: &[Evidence<'_>],
     template: &Template,
+    expected: Expectation,
     at: Vec3,
 ) -> Result<Vec3, FitError> {
     let start = standing(problem, evidence, template, at).0;
-    let objective = Objective::new(Arc::new(problem.clone()), *config, Precision::F32, &start)?;
+    // Where the joints are is not known to a wavelength, so their interference says nothing yet.
+    let config = FitConfig { summation: Summation::Incoherent, ..*config };
+    let objective = Objective::new(Arc::new(problem.clone()), config, Precision::F32, &start)?;
     let mut cost = |p: Vec3| {
         let loss = objective.em_loss(&standing(problem, evidence, template, p).0);
-        loss + EXPECTATION_WEIGHT * (p[2] - EXPECTED_MIDDLE_M).powi(2)
+        loss + expected.cost(p[2])
     };
-    let at = descend(at, 3, 0.1, 2, &mut cost);
-    let at = add(at, [0.0, 0.0, mean_shift(|up| cost(add(at, [0.0, 0.0, up])))]);
-    Ok(descend(at, 2, 0.05, 2, &mut cost))
+    let mut at = descend(at, 0.1, 1, &mut cost);
+    for (axis, reach_m) in [(2, 0.6), (0, 0.3), (1, 0.3)] {
+        at[axis] += mean_shift(reach_m, |shift| {
+            let mut moved = at;
+            moved[axis] += shift;
+            cost(moved)
+        });
+    }
+    Ok(at)
 }
 
-/// The mean height shift under exp(−cost/T). L_EM along the height of a body is a wide, shallow valley with ripples where
-/// single joints meet single speckles; its deepest ripple says less than its middle.
-fn mean_shift(mut cost: impl FnMut(f64) -> f64) -> f64 {
-    let shifts: Vec<f64> = (-6..=6).map(|k| 0.1 * f64::from(k)).collect();
-    let costs: Vec<f64> = shifts.iter().map(|&up| cost(up)).collect();
+/// The mean shift within ± `reach_m` under exp(−cost/T). L_EM along a shift of the body is a wide valley with ripples
+/// where single joints meet single speckles; its deepest ripple says less than its middle.
+fn mean_shift(reach_m: f64, mut cost: impl FnMut(f64) -> f64) -> f64 {
+    let shifts: Vec<f64> = (-6..=6).map(|k| reach_m * f64::from(k) / 6.0).collect();
+    let costs: Vec<f64> = shifts.iter().map(|&shift| cost(shift)).collect();
     let lowest = costs.iter().copied().fold(f64::INFINITY, f64::min);
     let (mut sum, mut weights) = (0.0, 0.0);
     for (shift, cost) in shifts.into_iter().zip(costs).filter(|(_, cost)| cost.is_finite()) {
