@@ -101,7 +101,7 @@ impl Overlay {
         self.chosen = (self.chosen + usize::from(down)).min(last).saturating_sub(usize::from(up));
         let mut done = false;
         let tokens = Tokens::of(ui);
-        let response = egui::Modal::new(egui::Id::unique("palette")).show(ui.ctx(), |ui| {
+        let response = modal(ui, "palette").show(ui.ctx(), |ui| {
             ui.set_width(460.0);
             let field = ui.add(
                 egui::TextEdit::singleline(&mut self.query).hint_text("Type a command").desired_width(f32::INFINITY),
@@ -142,7 +142,7 @@ impl Overlay {
     fn goto(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
         let last = shared.session.data.len().saturating_sub(1);
         let mut done = false;
-        let response = egui::Modal::new(egui::Id::unique("goto")).show(ui.ctx(), |ui| {
+        let response = modal(ui, "goto").show(ui.ctx(), |ui| {
             ui.set_width(260.0);
             ui.label(format!("Frame, 0 to {last}"));
             let field = ui.add(egui::TextEdit::singleline(&mut self.query).desired_width(f32::INFINITY));
@@ -196,10 +196,15 @@ impl Overlay {
     }
 }
 
+/// A sheet in the middle of the window.
+fn modal(ui: &Ui, name: &str) -> egui::Modal {
+    egui::Modal::new(egui::Id::unique(name)).frame(egui::Frame::popup(ui.style()).inner_margin(16))
+}
+
 /// A sheet with a title that Escape or a click outside closes.
 fn sheet(ui: &Ui, title: &str, width: f32, content: fn(&mut Ui)) -> bool {
     let height = ui.ctx().content_rect().height() * 0.8;
-    egui::Modal::new(egui::Id::unique(title))
+    modal(ui, title)
         .show(ui.ctx(), |ui| {
             ui.set_width(width.min(ui.ctx().content_rect().width() - 60.0));
             ui.label(RichText::new(title).font(theme::strong(16.0)));
@@ -249,10 +254,11 @@ fn help(ui: &mut Ui) {
 
 fn key_row(ui: &mut Ui, key: &str, what: &str, tokens: &Tokens) {
     ui.horizontal(|ui| {
-        ui.add_sized(
-            [104.0, 18.0],
-            egui::Label::new(RichText::new(key).font(theme::mono(12.0)).color(tokens.accent)).halign(egui::Align::LEFT),
-        );
+        let layout = egui::Layout::left_to_right(egui::Align::Center);
+        ui.allocate_ui_with_layout(vec2(104.0, 18.0), layout, |ui| {
+            ui.set_min_width(104.0);
+            ui.label(RichText::new(key).font(theme::mono(12.0)).color(tokens.accent));
+        });
         ui.label(what);
     });
 }
