@@ -1,5 +1,7 @@
 //! The command line: one file a subcommand. Arguments as typed become a validated configuration and one library call.
 
+pub mod sample;
+
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -21,12 +23,17 @@ pub struct Cli {
 
 /// The subcommands; everything the window does, one of them can do headless.
 #[derive(Debug, Subcommand)]
-pub enum Command {}
+pub enum Command {
+    /// Write the bundled sample data set anew: a person who walks before two FMCW arrays, with 3-D truth.
+    Sample(sample::Args),
+}
 
 /// Runs a subcommand.
 ///
 /// # Errors
 /// Whatever the subcommand could not do, naming file, key and what was expected.
 pub fn run(command: Command) -> anyhow::Result<ExitCode> {
-    match command {}
+    match command {
+        Command::Sample(args) => sample::run(&args),
+    }
 }

@@ -83,10 +83,18 @@ impl Stage {
 
     /// The spectrum of `input`, in the FFT's own order.
     fn run(&self, input: impl Iterator<Item = Complex64>) -> Vec<Complex64> {
-        let mut buffer: Vec<Complex64> = input.zip(&self.weights).map(|(x, w)| x * w).collect();
-        buffer.resize(self.plan.len(), Complex64::ZERO);
-        self.plan.process(&mut buffer);
+        let mut buffer = vec![Complex64::ZERO; self.plan.len()];
+        self.run_in(input, &mut buffer);
         buffer
+    }
+
+    /// Likewise into `buffer`, which has the FFT's length.
+    fn run_in(&self, input: impl Iterator<Item = Complex64>, buffer: &mut [Complex64]) {
+        buffer.fill(Complex64::ZERO);
+        for (cell, (x, w)) in buffer.iter_mut().zip(input.zip(&self.weights)) {
+            *cell = x * w;
+        }
+        self.plan.process(buffer);
     }
 
     /// The spectrum of `input` with frequency 0 at bin ⌊length/2⌋.
@@ -131,10 +139,15 @@ impl Chain {
         let dopplers = self.doppler_fft.max(adc.chirps);
         let row = |elements: &Vec<Vec<Complex64>>| {
             let mut power = vec![0.0; angle.plan.len()];
+            let mut buffer = vec![Complex64::ZERO; angle.plan.len()];
             for bin in 0..dopplers {
-                let spectrum = angle.run_centred(elements.iter().map(|spectrum| spectrum[bin]));
-                power.iter_mut().zip(spectrum).for_each(|(sum, x)| *sum += x.norm_sqr());
+                angle.run_in(elements.iter().map(|spectrum| spectrum[bin]), &mut buffer);
+                for (sum, x) in power.iter_mut().zip(&buffer) {
+                    *sum += x.norm_sqr();
+                }
             }
+            let half = power.len() / 2;
+            power.rotate_right(half);
             power.into_iter().map(f64::sqrt).collect::<Vec<f64>>()
         };
         let rows: Vec<Vec<f64>> = self.range_doppler(fmcw, adc).par_iter().map(row).collect();
@@ -198,16 +211,19 @@ impl RadarCube {
 }
 
 impl PolarMap {
-    /// Amplitude at a range and a sine, bilinear between bins; NaN beyond the map.
+    /// Amplitude at a range and a sine, bilinear between bins; NaN beyond the last range. The sine axis is periodic, as the
+    /// angle FFT is.
     pub fn sample(&self, range_m: f64, sine: f64) -> f64 {
         let (r, s) = (range_m / self.range_step_m, sine / self.sine_step + (self.sines / 2) as f64);
-        if !(r >= 0.0 && s >= 0.0 && r <= (self.ranges - 1) as f64 && s <= (self.sines - 1) as f64) {
+        if !(r >= 0.0 && r <= (self.ranges - 1) as f64 && s.is_finite()) {
             return f64::NAN;
         }
-        let (i, j) = ((r as usize).min(self.ranges - 2), (s as usize).min(self.sines - 2));
-        let (a, b) = (r - i as f64, s - j as f64);
-        let at = |i: usize, j: usize| self.data[i * self.sines + j];
-        (1.0 - a) * ((1.0 - b) * at(i, j) + b * at(i, j + 1)) + a * ((1.0 - b) * at(i + 1, j) + b * at(i + 1, j + 1))
+        let (i, a) = ((r as usize).min(self.ranges - 2), s.floor());
+        let (r, s) = (r - i as f64, s - a);
+        let column = |a: f64| (a as i64).rem_euclid(self.sines as i64) as usize;
+        let (j, k) = (column(a), column(a + 1.0));
+        let row = |i: usize| (1.0 - s) * self.data[i * self.sines + j] + s * self.data[i * self.sines + k];
+        (1.0 - r) * row(i) + r * row(i + 1)
     }
 
     /// The map on a `depth_h` or `depth_v` axis (rows) and the array's own Cartesian axis (columns), row-major.

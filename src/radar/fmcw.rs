@@ -150,12 +150,29 @@ impl Fmcw {
         let (slope, delay) = (self.radar.slope_hz_per_s(), (d_tx + d_rx) / SPEED_OF_LIGHT);
         let cycles = self.radar.start_hz * delay - 0.5 * slope * delay * delay;
         let step_cycles = slope * delay * self.radar.chirp_s / self.samples as f64;
-        let mut phasor = scatterer.reflectivity * gain * Complex64::cis(TAU * cycles.fract());
+        let first = scatterer.reflectivity * gain * Complex64::cis(TAU * cycles.fract());
         let step = Complex64::cis(TAU * step_cycles.fract());
-        for sample in line {
-            *sample += phasor;
-            phasor *= step;
+        rotate_into(first, step, line);
+    }
+}
+
+/// line[n] += first · stepⁿ, in four interleaved recurrences: one alone waits for its own multiplication every sample.
+fn rotate_into(first: Complex64, step: Complex64, line: &mut [Complex64]) {
+    let two = step * step;
+    let four = two * two;
+    let (mut a, mut b, mut c, mut d) = (first, first * step, first * two, first * step * two);
+    let mut quads = line.chunks_exact_mut(4);
+    for quad in &mut quads {
+        if let [w, x, y, z] = quad {
+            *w += a;
+            *x += b;
+            *y += c;
+            *z += d;
         }
+        (a, b, c, d) = (a * four, b * four, c * four, d * four);
+    }
+    for (sample, phasor) in quads.into_remainder().iter_mut().zip([a, b, c]) {
+        *sample += phasor;
     }
 }
 
