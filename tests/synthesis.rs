@@ -1,7 +1,7 @@
 //! The synthesiser against physics that it does not share code with, and the committed sample against its own truth.
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its input has failed")]
 
-use mhp_inspector::cli::sample::{CHAIN, Plane, write_data_set};
+use mhp_inspector::cli::sample::{CHAIN, Plane, Scene, write_data_set};
 use mhp_inspector::radar::{
     AdcCube, Chain, Fmcw, RadarCube, Receiver, SPEED_OF_LIGHT, Scatterer, Window, main_lobe_sigma_bins, moving_point,
 };
@@ -153,8 +153,9 @@ fn manifest_widths_are_those_of_a_blob_in_the_cartesian_map() {
         let null_sine = 1.46496 * fmcw.radar.wavelength_m() / (24.0 * 0.0019);
         let across = lobe(lateral.step(), null_sine * d, &|i| map[row * lateral.bins + (column as i64 + i) as usize]);
         let (range_m, width_m) = (measured_sigma(&along), measured_sigma(&across));
-        assert!((range_m / psf.range_m - 1.0).abs() < 0.05, "{plane:?}: {range_m} against {}", psf.range_m);
-        assert!((width_m / (d * sine_sigma) - 1.0).abs() < 0.05, "{plane:?}: {width_m} against {}", d * sine_sigma);
+        println!("{plane:?}: {range_m} / {}, {width_m} / {}", psf.range_m, d * sine_sigma);
+        assert!((range_m / psf.range_m - 1.0).abs() < 0.02, "{plane:?}: {range_m} against {}", psf.range_m);
+        assert!((width_m / (d * sine_sigma) - 1.0).abs() < 0.02, "{plane:?}: {width_m} against {}", d * sine_sigma);
     }
     assert!((main_lobe_sigma_bins(Window::Hann, 256) - 0.825).abs() < 1e-3);
 }
@@ -213,6 +214,14 @@ fn one_seed_gives_the_same_bytes_and_another_gives_others() {
     // Not even the time of writing: the date in the archive's first header is DOS time 0, 1980-01-01.
     assert_eq!(bytes[0][10..14], [0, 0, 33, 0]);
     assert!(bytes[0] != bytes[2]);
+}
+
+#[test]
+fn nothing_clips_where_the_walker_is_nearest() {
+    let scene = Scene::new(7);
+    for index in [18, 19, 20] {
+        assert_eq!(scene.frame(index).clipped, 0.0, "frame {index}");
+    }
 }
 
 fn array<T: npyz::Deserialize>(path: &PathBuf, key: &str) -> Vec<T> {

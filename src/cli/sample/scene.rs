@@ -32,7 +32,8 @@ pub const CHAIN: Chain = Chain {
     max_range_m: 9.5,
 };
 
-/// Noise 20 dB above that of an ideal receiver would still leave the walker 30 dB above the floor of the map.
+/// Noise that leaves the walker's peak 17 to 40 dB above the median of the map (measured on the 32 frames of seed 7); a full scale
+/// that nothing exceeds where the walker is nearest.
 const RECEIVER: Receiver = Receiver { noise: 0.1, full_scale: 2.0, bits: 12 };
 
 /// The chirp of both radars.
