@@ -1,6 +1,7 @@
 //! The command line: one file a subcommand. Arguments as typed become a validated configuration and one library call.
 
 mod info;
+pub mod sample;
 mod score;
 #[cfg(feature = "viewer")]
 mod screenshot;
@@ -38,6 +39,8 @@ pub enum Command {
     Screenshot(screenshot::ScreenshotArgs),
     /// Tell what is in a data set: frames, views and axes, ranges of values, skeleton, people, labels.
     Info(info::Args),
+    /// Write the bundled sample data set anew: a person who walks before two FMCW arrays, with 3-D truth.
+    Sample(sample::Args),
 }
 
 /// Runs a subcommand.
@@ -50,5 +53,6 @@ pub fn run(command: Command) -> anyhow::Result<ExitCode> {
         #[cfg(feature = "viewer")]
         Command::Screenshot(args) => screenshot::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Sample(args) => sample::run(&args),
     }
 }
