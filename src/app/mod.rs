@@ -28,7 +28,6 @@ pub const APP_ID: &str = "mhp-inspector";
 const VIEW_KEY: &str = "view";
 const RECENT_KEY: &str = "recent";
 const LAYOUT_KEY: &str = "layout";
-const CONFIG_KEY: &str = "config";
 
 /// The application behind the window.
 pub struct InspectorApp {
@@ -52,7 +51,6 @@ impl InspectorApp {
         if let Some(storage) = cc.storage {
             session.view = eframe::get_value::<ViewState>(storage, VIEW_KEY).unwrap_or_default();
             session.data.recent = eframe::get_value(storage, RECENT_KEY).unwrap_or_default();
-            session.config = eframe::get_value(storage, CONFIG_KEY).unwrap_or_default();
             if let Some(stored) = eframe::get_value(storage, LAYOUT_KEY) {
                 layout = Layout::restored(stored);
             }
@@ -226,7 +224,6 @@ impl eframe::App for InspectorApp {
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         eframe::set_value(storage, VIEW_KEY, &self.session.view);
         eframe::set_value(storage, RECENT_KEY, &self.session.data.recent);
-        eframe::set_value(storage, CONFIG_KEY, &self.session.config);
         eframe::set_value(storage, LAYOUT_KEY, self.layout.stored());
     }
 }
