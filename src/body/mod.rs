@@ -1,8 +1,15 @@
-//! The human body: skeleton topologies and the PPPR parameters that are optimised.
+//! The human body: skeleton topologies, the PPPR parameters that are optimised, and a body that walks.
 
 mod pppr;
 mod skeleton;
+<<<<<<< HEAD
 mod skeletons;
+=======
+mod surface;
+mod walker;
+>>>>>>> sample
 
 pub use pppr::{Group, Pppr, PpprShape};
 pub use skeleton::{Side, Skeleton};
+pub use surface::{BodySurface, SurfacePoint};
+pub use walker::{BodyPose, Path, Segment, SegmentFrame, Walker};

@@ -2,6 +2,7 @@
 
 mod info;
 mod score;
+pub mod sample;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
@@ -33,6 +34,8 @@ pub enum Command {
     /// `grad_<group>` (of the total) and `grad_em_<group>` (of L_EM alone), all float64. Prints the scalars as one JSON
     /// object; an IoU of two empty masks is null there and NaN in the npz. The EM region is that of the given positions.
     Score(score::ScoreArgs),
+    /// Write the bundled sample data set anew: a person who walks before two FMCW arrays, with 3-D truth.
+    Sample(sample::Args),
 }
 
 /// Runs a subcommand.
@@ -43,5 +46,6 @@ pub fn run(command: Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Info(args) => info::run(&args),
         Command::Score(args) => score::run(&args),
+        Command::Sample(args) => sample::run(&args),
     }
 }
