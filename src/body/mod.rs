@@ -2,12 +2,9 @@
 
 mod pppr;
 mod skeleton;
-<<<<<<< HEAD
 mod skeletons;
-=======
 mod surface;
 mod walker;
->>>>>>> sample
 
 pub use pppr::{Group, Pppr, PpprShape};
 pub use skeleton::{Side, Skeleton};
