@@ -20,8 +20,8 @@ use table::Table;
 
 /// Shown under the options of `fit --help`.
 pub(super) const HELP: &str = "\
-Columns: frame iterations converged reason loss em bone rigid joint sep coll iou_<array>... majpe_mm pa_majpe_mm
-init_ms fit_ms. What is unknown is empty (null in JSON): an error against truth where the data set has none, init_ms
+Columns: frame iterations converged reason loss em bone rigid joint sep coll iou_<array>... majpe_mm pa_majpe_mm init_ms \
+fit_ms. What is unknown is empty (null in JSON): the errors in mm where the data set has no joints in metres, init_ms \
 where the frame before was the start. A frame that cannot be fitted has the reason `error: ...`, and the run goes on.
 
 Exit codes: 0 every frame was fitted; 1 some were not; 2 none was, or the input is bad.
@@ -29,8 +29,8 @@ Exit codes: 0 every frame was fitted; 1 some were not; 2 none was, or the input 
 Examples:
   mhp-inspector fit data/d1s1/000/00383_radar.npz
       One frame of MMVR with the defaults; prints its row.
-  mhp-inspector fit data/d1s1 --frames 0..900 --config fit.toml --warm-start --out results
-      The first minute, each frame from the one before; writes results/summary.csv, fit.toml and pppr/*.npz.";
+  mhp-inspector fit data/d1s1 --frames 0..900 --warm-start --out results
+      A minute of MMVR, each frame from the one before; writes results/summary.csv, fit.toml, pppr/*.npz.";
 
 /// What `fit` is told.
 #[derive(Debug, Args)]

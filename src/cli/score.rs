@@ -19,9 +19,8 @@ Exit codes: 0 the answer is written; 2 bad input.
 Examples:
   mhp-inspector score --dataset case --frame 0 --params case/params.npz --out answer.npz
       Maps, losses and gradients at these parameters, with the default configuration.
-  mhp-inspector score --dataset data/mmvr --frame 0 --params results/pppr/mmvr_00383.npz --config results/fit.toml
-      --precision f32 --out answer.npz
-      The result of a fit, evaluated once more in single precision.";
+  mhp-inspector score --dataset case --frame 0 --params p.npz --config fit.toml --precision f32 --out a.npz
+      The same under other settings, in single precision.";
 
 /// What `score` is told.
 #[derive(Debug, Args)]
