@@ -9,6 +9,8 @@ use mhp_inspector::dataset::npz::{ArrayView, write};
 use mhp_inspector::dataset::{Dataset, Manifest, Progress, read_pppr};
 use mhp_inspector::diagnose::joint_errors;
 use mhp_inspector::mhp::{Fitter, Precision, Problem, initialise, simulate};
+use mhp_inspector::radar::RadarConfig;
+use mhp_inspector::study::{BatchOptions, StudyError, run_batch};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -83,14 +85,14 @@ impl Small {
         let blank: Vec<Vec<f64>> = manifest.views.iter().map(|view| vec![1.0; view.cells()]).collect();
         let blank: Vec<&[f64]> = blank.iter().map(Vec::as_slice).collect();
         let skeleton = Skeleton::preset("coco17").unwrap();
-        let problem = Problem::new(Default::default(), skeleton, manifest.views.clone(), &blank).unwrap();
+        let problem = Problem::new(RadarConfig::default(), skeleton, manifest.views.clone(), &blank).unwrap();
         let truth = body(3.0, left_m);
         let mut maps = simulate(&problem, &FitConfig::default(), Precision::F64, &truth);
         for map in &mut maps {
             let largest = map.iter().copied().fold(0.0, f64::max);
             for (cell, value) in map.iter_mut().enumerate() {
                 // A fixed speckle: nothing in it is random from run to run.
-                let speckle = (cell as f64 * 12.9898).sin().mul_add(43_758.545_3, 0.0).fract().abs();
+                let speckle = ((cell as f64 * 12.9898).sin() * 43_758.545_3).fract().abs();
                 *value += largest * 1e-2 * (0.5 + speckle);
             }
         }
@@ -294,6 +296,32 @@ fn where_no_frame_can_be_fitted_the_code_is_two_and_the_table_still_valid() {
     assert!(stderr.starts_with("error: none of 2 frames could be fitted; the first: "), "{stderr}");
     assert_eq!((stderr.lines().count(), text(&output.stdout).as_str()), (1, ""));
     assert!(column(&summary(&out), "reason").iter().all(|reason| reason.starts_with("error: ")));
+}
+
+#[test]
+fn an_error_of_the_sink_ends_the_batch() {
+    let small = Small::new(&[("a/000", 0.0)]);
+    for k in 1..40 {
+        std::fs::copy(small.file("a/000"), small.file(&format!("a/{k:03}"))).unwrap();
+    }
+    let pppr = small.path().join("pppr");
+    std::fs::create_dir(&pppr).unwrap();
+    let options = BatchOptions {
+        config: FitConfig { iterations: 1, ..FitConfig::default() },
+        precision: Precision::F64,
+        warm_start: false,
+        params_folder: Some(pppr.clone()),
+    };
+    let mut told = Vec::new();
+    let full = || StudyError::Write { reason: std::io::Error::other("disk full"), path: "summary.csv".into() };
+    let error = run_batch(&small.open(), 0..40, &options, |row| {
+        told.push(row.index);
+        if told.len() < 3 { Ok(()) } else { Err(full()) }
+    });
+    assert_eq!(error.unwrap_err().to_string(), "summary.csv: cannot be written: disk full");
+    assert_eq!(told, [0, 1, 2]);
+    let fitted = std::fs::read_dir(&pppr).unwrap().count();
+    assert!((3..40).contains(&fitted), "{fitted} frames were fitted before the threads noticed");
 }
 
 #[test]

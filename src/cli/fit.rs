@@ -88,7 +88,7 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
         bar.inc(1);
         summary.as_mut().map_or(Ok(()), |summary| summary.add(&row))?;
         report.add(row);
-        Ok::<(), crate::study::StudyError>(())
+        Ok(())
     });
     bar.finish_and_clear();
     done?;

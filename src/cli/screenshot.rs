@@ -12,7 +12,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 /// How long a data set may take to open, or a fit to do its iterations.
-const PATIENCE: Duration = Duration::from_secs(300);
+const PATIENCE: Duration = Duration::from_mins(5);
 
 /// Shown under the options of `screenshot --help`.
 pub(super) const HELP: &str = "\

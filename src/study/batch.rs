@@ -4,7 +4,7 @@
 //! are in memory than there are threads. Plain threads and not rayon's: a thread of rayon's that waits inside one fit
 //! may begin another meanwhile, and the times of both would be wrong.
 
-use super::{FitNumbers, FrameFit, FrameRow};
+use super::{FitNumbers, FrameFit, FrameRow, StudyError};
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::{Dataset, write_pppr};
@@ -50,12 +50,11 @@ pub fn fit_frame(
     let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps);
     let problem = Arc::new(problem.map_err(|error| in_file(&error))?);
     let began = Instant::now();
-    let (initial, init_ms) = match start {
-        Some(params) => (params, None),
-        None => {
-            let found = initialise(&problem, &options.config).map_err(|error| in_file(&error))?;
-            (found.params, Some(milliseconds(began)))
-        }
+    let (initial, init_ms) = if let Some(params) = start {
+        (params, None)
+    } else {
+        let found = initialise(&problem, &options.config).map_err(|error| in_file(&error))?;
+        (found.params, Some(milliseconds(began)))
     };
     let began = Instant::now();
     let mut fitter =
@@ -89,13 +88,13 @@ fn milliseconds(began: Instant) -> f64 {
 /// done. A frame that fails is a row with the reason, and the batch goes on; an error of `sink` ends it.
 ///
 /// # Errors
-/// What `sink` said.
-pub fn run_batch<E>(
+/// What `sink` said, or that there is no thread to fit on.
+pub fn run_batch(
     dataset: &Dataset,
     frames: Range<usize>,
     options: &BatchOptions,
-    mut sink: impl FnMut(FrameRow) -> Result<(), E>,
-) -> Result<(), E> {
+    mut sink: impl FnMut(FrameRow) -> Result<(), StudyError>,
+) -> Result<(), StudyError> {
     let batch = Batch {
         dataset,
         options,
@@ -106,14 +105,16 @@ pub fn run_batch<E>(
     let threads = if options.warm_start { 1 } else { rayon::current_num_threads().clamp(1, frames.len().max(1)) };
     let (outbox, inbox) = crossbeam_channel::bounded::<FrameRow>(threads);
     std::thread::scope(|scope| {
-        for _ in 0..threads {
+        // The inbox goes with this closure: after an error the threads find nobody listening, and end.
+        let inbox = inbox;
+        for k in 0..threads {
             let (batch, outbox) = (&batch, outbox.clone());
-            scope.spawn(move || batch.work(&outbox));
+            let named = std::thread::Builder::new().name(format!("fit {k}"));
+            named.spawn_scoped(scope, move || batch.work(&outbox)).map_err(|reason| StudyError::Thread { reason })?;
         }
         drop(outbox);
         let mut early = BTreeMap::new();
         let mut due = frames.start;
-        // The inbox goes with this loop: after an error of the sink the threads find nobody listening, and end.
         for row in inbox {
             early.insert(row.index, row);
             while let Some(row) = early.remove(&due) {

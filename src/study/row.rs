@@ -1,5 +1,6 @@
 //! What is known of one fitted frame, and the means over many.
 
+use super::summary::{FIRST, NUMBERS};
 use crate::body::Pppr;
 use crate::mhp::{StepReport, StopReason};
 use serde_json::{Map, Value};
@@ -45,7 +46,7 @@ impl FrameRow {
     /// The numbers, in the order of the columns between `reason` and the end: loss, six terms, the IoU of `views`
     /// views, two joint errors, two times. `None` where unknown.
     pub fn values(&self, views: usize) -> Vec<Option<f64>> {
-        let Ok(fit) = &self.fit else { return vec![None; 7 + views + 4] };
+        let Ok(fit) = &self.fit else { return vec![None; views + NUMBERS] };
         let (report, t) = (&fit.report, &fit.report.terms);
         let losses = [report.loss, t.em, t.bone, t.rigid, t.joint, t.sep, t.coll].map(Some);
         let ious = (0..views).map(|view| report.iou.get(view).copied().flatten());
@@ -104,7 +105,7 @@ pub struct Means {
 impl Means {
     /// No frame yet, of a data set with `views` views.
     pub fn new(views: usize) -> Self {
-        Self { frames: 0, failed: 0, converged: 0, iterations: 0, sums: vec![(0.0, 0); 7 + views + 4] }
+        Self { frames: 0, failed: 0, converged: 0, iterations: 0, sums: vec![(0.0, 0); views + NUMBERS] }
     }
 
     /// Counts a row.
@@ -117,7 +118,7 @@ impl Means {
             }
             Err(_) => self.failed += 1,
         }
-        let views = self.sums.len() - 11;
+        let views = self.sums.len() - NUMBERS;
         for ((sum, count), value) in self.sums.iter_mut().zip(row.values(views)) {
             if let Some(value) = value {
                 *sum += value;
@@ -157,7 +158,7 @@ impl Means {
         object.insert("failed".into(), self.failed.into());
         object.insert("converged_share".into(), self.converged_share().into());
         object.insert("iterations".into(), self.iterations().into());
-        let numbers = columns.iter().skip(super::summary::FIRST.len()).cloned();
+        let numbers = columns.iter().skip(FIRST.len()).cloned();
         object.extend(numbers.zip(self.values().into_iter().map(Value::from)));
         Value::Object(object)
     }

@@ -8,8 +8,10 @@ use std::path::{Path, PathBuf};
 pub(super) const FIRST: [&str; 4] = ["frame", "iterations", "converged", "reason"];
 const LOSSES: [&str; 7] = ["loss", "em", "bone", "rigid", "joint", "sep", "coll"];
 const LAST: [&str; 4] = ["majpe_mm", "pa_majpe_mm", "init_ms", "fit_ms"];
+/// Columns of numbers, besides one for the IoU of each view.
+pub(super) const NUMBERS: usize = LOSSES.len() + LAST.len();
 
-/// What can go wrong with the files of a batch.
+/// What can go wrong with a batch as a whole.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// A folder or table cannot be written.
@@ -19,6 +21,12 @@ pub enum StudyError {
         reason: std::io::Error,
         /// The file or folder.
         path: PathBuf,
+    },
+    /// The operating system gives no more threads.
+    #[error("no thread to fit on: {reason}")]
+    Thread {
+        /// What it said.
+        reason: std::io::Error,
     },
 }
 
