@@ -110,6 +110,7 @@ impl InspectorApp {
             AppAct::Help => self.overlay.toggle_help(),
             AppAct::About => self.overlay.toggle_about(),
             AppAct::GotoFrame => self.overlay.open_goto(self.session.data.frame_index),
+            AppAct::OpenPath => self.overlay.open_path(self.session.data.recent.first()),
             AppAct::ResetLayout => self.layout = Layout::default(),
             AppAct::ResetViews => self.panes.reset_views(),
             AppAct::Focus => self.panes.focus(&self.session),

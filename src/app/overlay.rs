@@ -21,6 +21,7 @@ enum Sheet {
     Help,
     About,
     Goto,
+    Path,
 }
 
 /// What lies over the panes.
@@ -52,6 +53,11 @@ impl Overlay {
         self.query = current.to_string();
     }
 
+    pub(super) fn open_path(&mut self, start: Option<&PathBuf>) {
+        self.toggle(Sheet::Path);
+        self.query = start.map(|path| path.display().to_string()).unwrap_or_default();
+    }
+
     fn toggle(&mut self, sheet: Sheet) {
         self.sheet = if self.sheet == sheet { Sheet::None } else { sheet };
         self.query.clear();
@@ -79,6 +85,7 @@ impl Overlay {
             Sheet::Help => sheet(ui, "Keys and gestures", 760.0, help),
             Sheet::About => sheet(ui, "About MHP Inspector", 460.0, about),
             Sheet::Goto => self.goto(ui, shared),
+            Sheet::Path => self.path(ui, shared),
         };
         if close {
             self.sheet = Sheet::None;
@@ -155,6 +162,31 @@ impl Overlay {
             let go = ui.add_enabled(wanted.is_some(), egui::Button::new("Go")).clicked();
             if let Some(index) = wanted.filter(|_| go || ui.input(|i| i.key_pressed(Key::Enter))) {
                 shared.send(Command::GotoFrame(index));
+                done = true;
+            }
+        });
+        done || response.should_close()
+    }
+
+    fn path(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
+        let mut done = false;
+        let response = modal(ui, "path").show(ui.ctx(), |ui| {
+            ui.set_width(560.0);
+            ui.label("Path of an MMVR folder, a folder with dataset.toml, a *_radar.npz, or an .npy or .npz of maps");
+            let field = ui.add(
+                egui::TextEdit::singleline(&mut self.query)
+                    .font(egui::TextStyle::Monospace)
+                    .desired_width(f32::INFINITY),
+            );
+            field.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Path"));
+            if self.fresh {
+                field.request_focus();
+                self.fresh = false;
+            }
+            let typed = self.query.trim();
+            let open = ui.add_enabled(!typed.is_empty(), egui::Button::new("Open")).clicked();
+            if !typed.is_empty() && (open || ui.input(|i| i.key_pressed(Key::Enter))) {
+                shared.send(Command::Open(PathBuf::from(typed)));
                 done = true;
             }
         });

@@ -23,12 +23,14 @@ pub(in crate::app) struct State {
     renderer: Option<SceneRenderer>,
     texture: Option<(TextureId, u64)>,
     camera: Option<Camera>,
+    /// The data set that the camera was placed for.
+    dataset: Option<std::sync::Weak<crate::dataset::Dataset>>,
 }
 
 impl State {
     pub(in crate::app) fn new(render_state: Option<RenderState>) -> Self {
         let renderer = render_state.as_ref().map(|s| SceneRenderer::new(&s.device, &s.queue, s.target_format));
-        Self { render_state, renderer, texture: None, camera: None }
+        Self { render_state, renderer, texture: None, camera: None, dataset: None }
     }
 
     pub(in crate::app) fn reset(&mut self) {
@@ -76,8 +78,14 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     if shared.session.data.dataset.is_none() {
         return empty(ui, "Nothing in the scene", "The Gaussians of a fit appear here when a frame is open.");
     }
-    let camera_missing = state.camera.is_none();
-    if camera_missing && shared.session.fit.shown.is_some() {
+    let known = state.dataset.as_ref().and_then(std::sync::Weak::upgrade);
+    if !known
+        .is_some_and(|known| shared.session.data.dataset.as_ref().is_some_and(|d| std::sync::Arc::ptr_eq(&known, d)))
+    {
+        state.dataset = shared.session.data.dataset.as_ref().map(std::sync::Arc::downgrade);
+        state.camera = None;
+    }
+    if state.camera.is_none() && shared.session.fit.shown.is_some() {
         state.camera = Some(Camera::overview(centre(shared.session), RADIUS_M));
     }
     toolbar(ui, shared);
