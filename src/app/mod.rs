@@ -114,9 +114,9 @@ impl InspectorApp {
             AppAct::ResetLayout => self.layout = Layout::default(),
             AppAct::ResetViews => self.panes.reset_views(),
             AppAct::Focus => self.panes.focus(&self.session),
-            AppAct::CameraRadar => self.panes.scene.from_radar(&self.session),
-            AppAct::CameraTop => self.panes.scene.from_top(&self.session),
-            AppAct::CameraSide => self.panes.scene.from_side(&self.session),
+            AppAct::CameraRadar => self.panes.scene.look_from_radar(&self.session),
+            AppAct::CameraTop => self.panes.scene.look_from_top(&self.session),
+            AppAct::CameraSide => self.panes.scene.look_from_side(&self.session),
             AppAct::ZoomIn => self.set_zoom(self.session.view.zoom + 0.1),
             AppAct::ZoomOut => self.set_zoom(self.session.view.zoom - 0.1),
             AppAct::ZoomReset => self.set_zoom(1.0),
@@ -141,10 +141,10 @@ impl InspectorApp {
                 .iter()
                 .find_map(|file| Some(file.path().to_path_buf()).filter(|p| !p.as_os_str().is_empty()))
         });
-        if dropped.is_some() && dropped != self.dropped {
-            if let Some(path) = dropped.clone() {
-                self.apply(Command::Open(path));
-            }
+        if dropped != self.dropped
+            && let Some(path) = dropped.clone()
+        {
+            self.apply(Command::Open(path));
         }
         self.dropped = dropped;
     }

@@ -19,7 +19,7 @@ const RADIUS_M: f32 = 2.4;
 
 /// Camera and GPU objects.
 pub(in crate::app) struct State {
-    render_state: Option<RenderState>,
+    gpu: Option<RenderState>,
     renderer: Option<SceneRenderer>,
     texture: Option<(TextureId, u64)>,
     camera: Option<Camera>,
@@ -28,9 +28,9 @@ pub(in crate::app) struct State {
 }
 
 impl State {
-    pub(in crate::app) fn new(render_state: Option<RenderState>) -> Self {
-        let renderer = render_state.as_ref().map(|s| SceneRenderer::new(&s.device, &s.queue, s.target_format));
-        Self { render_state, renderer, texture: None, camera: None, dataset: None }
+    pub(in crate::app) fn new(gpu: Option<RenderState>) -> Self {
+        let renderer = gpu.as_ref().map(|s| SceneRenderer::new(&s.device, &s.queue, s.target_format));
+        Self { gpu, renderer, texture: None, camera: None, dataset: None }
     }
 
     pub(in crate::app) fn reset(&mut self) {
@@ -46,7 +46,7 @@ impl State {
         }
     }
 
-    pub(in crate::app) fn from_radar(&mut self, session: &Session) {
+    pub(in crate::app) fn look_from_radar(&mut self, session: &Session) {
         let mut camera = Camera::from_radar();
         let eye = Vec3::new(0.0, 0.0, 0.0);
         let to = centre(session) - eye;
@@ -55,11 +55,11 @@ impl State {
         self.camera = Some(camera);
     }
 
-    pub(in crate::app) fn from_top(&mut self, session: &Session) {
+    pub(in crate::app) fn look_from_top(&mut self, session: &Session) {
         self.camera = Some(Camera::top(centre(session) * 0.7, RADIUS_M));
     }
 
-    pub(in crate::app) fn from_side(&mut self, session: &Session) {
+    pub(in crate::app) fn look_from_side(&mut self, session: &Session) {
         self.camera = Some(Camera::side(centre(session) * 0.7, RADIUS_M));
     }
 }
@@ -143,7 +143,7 @@ fn steer(ui: &Ui, response: &egui::Response, rect: Rect, viewport: Vec2, scale: 
 }
 
 fn paint(ui: &Ui, state: &mut State, rect: Rect, viewport: Vec2, scene: &Scene, camera: &Camera) {
-    let (Some(gpu), Some(renderer)) = (&state.render_state, &mut state.renderer) else {
+    let (Some(gpu), Some(renderer)) = (&state.gpu, &mut state.renderer) else {
         let how = "No graphics adapter: the 3-D view is not drawn.";
         ui.painter().text(rect.center(), Align2::CENTER_CENTER, how, egui::FontId::proportional(12.0), Color32::GRAY);
         return;
