@@ -30,7 +30,7 @@ const DISTINCT_M: f64 = 0.7;
 /// At most this many places are looked at closely.
 const MOST_PLACES: usize = 8;
 /// A place with less than this share of the strongest place's echo is no rival to it.
-const WEAKEST_RIVAL: f64 = 0.4;
+const WEAKEST_RIVAL: f64 = 0.3;
 /// Initial standard deviation of a joint's Gaussian, m.
 const INITIAL_SCALE_M: f64 = 0.08;
 /// Height of the ripples of L_EM along a shift of the body.
