@@ -25,6 +25,12 @@ use template::Template;
 
 /// Peaks of two views that disagree by more are not one body, m.
 const LARGEST_MISFIT_M: f64 = 0.35;
+/// Places nearer to each other are one, m.
+const DISTINCT_M: f64 = 0.7;
+/// At most this many places are looked at closely.
+const MOST_PLACES: usize = 8;
+/// A place with less than this share of the strongest place's echo is no rival to it.
+const WEAKEST_RIVAL: f64 = 0.3;
 /// Initial standard deviation of a joint's Gaussian, m.
 const INITIAL_SCALE_M: f64 = 0.08;
 /// Height of the ripples of L_EM along a shift of the body.
@@ -56,19 +62,21 @@ pub fn initialise(problem: &Problem, config: &FitConfig) -> Result<Initialisatio
         .collect();
     let candidates = candidates(problem, &peaks);
     notes.push(format!("{} peaks, {} places tried", peaks.len(), candidates.len()));
-    let best = |score: &dyn Fn(&[Vec3]) -> f64| {
+    let ranked = |score: &dyn Fn(&[Vec3]) -> f64| {
         let scored = candidates.iter().map(|&at| (at, score(&template.facing_origin(at))));
-        scored.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, score)| *score > 0.0).map(|(at, _)| at)
+        let mut scored: Vec<(Vec3, f64)> = scored.filter(|(_, score)| *score > 0.0).collect();
+        scored.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let least = WEAKEST_RIVAL * scored.first().map_or(0.0, |(_, score)| *score);
+        scored.into_iter().filter(|(_, score)| *score >= least).map(|(at, _)| at).collect::<Vec<Vec3>>()
     };
-    let at = best(&|body| shared_excess(&evidence, body)).or_else(|| {
+    let mut places = ranked(&|body| shared_excess(&evidence, body));
+    if places.is_empty() {
         notes.push("the views agree on no place: the strongest echo of one view was taken".to_owned());
-        best(&|body| evidence.iter().map(|e| e.mean_excess(body)).sum())
-    });
-    let Some(at) = at else {
+        places = ranked(&|body| evidence.iter().map(|e| e.mean_excess(body)).sum());
+    }
+    let Some((at, expected)) = most_bodily(&evidence, &template, &places) else {
         return Err(FitError::NoStart { reason: format!("none of {} peaks stands above its background", peaks.len()) });
     };
-    let at = cover(&evidence, &template, at);
-    let expected = Expectation::new(&evidence, at);
     let at = settle(problem, config, &evidence, &template, expected, at)?;
     let (params, velocity_note) = standing(problem, &evidence, &template, at);
     notes.push(format!("standing at x {:.2} m, y {:.2} m, facing the radar", at[0], at[1]));
@@ -100,6 +108,29 @@ fn candidates(problem: &Problem, peaks: &[Peak]) -> Vec<Vec3> {
         })
     });
     places.collect()
+}
+
+/// The first of the strongest distinct `places` where something stands from feet to head, or the strongest: a corner of
+/// the room may outshine a person in both views, but it is a spot.
+fn most_bodily(evidence: &[Evidence<'_>], template: &Template, places: &[Vec3]) -> Option<(Vec3, Expectation)> {
+    let mut tried: Vec<(Vec3, Expectation)> = Vec::new();
+    let mut starts: Vec<Vec3> = Vec::new();
+    for &place in places {
+        if starts.iter().any(|start| (start[0] - place[0]).hypot(start[1] - place[1]) < DISTINCT_M) {
+            continue;
+        }
+        starts.push(place);
+        let at = cover(evidence, template, place);
+        let expected = Expectation::new(evidence, at);
+        if expected.extent_m.is_some() {
+            return Some((at, expected));
+        }
+        tried.push((at, expected));
+        if tried.len() == MOST_PLACES {
+            break;
+        }
+    }
+    tried.first().copied()
 }
 
 /// How much echo over the background all views show at a body: the geometric mean over views, so that each must agree.
