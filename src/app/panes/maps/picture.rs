@@ -129,16 +129,13 @@ impl Pictures {
         let mut textures = self.textures.borrow_mut();
         if !matches!(textures.get(&(view, content)), Some((_, true))) {
             let Some(image) = self.image(view, content) else { return };
-            match textures.get_mut(&(view, content)) {
-                Some((texture, fresh)) => {
-                    texture.set(image, TextureOptions::NEAREST);
-                    *fresh = true;
-                }
-                None => {
-                    let name = format!("map {view} {}", content.name());
-                    let texture = ui.ctx().load_texture(name, image, TextureOptions::NEAREST);
-                    textures.insert((view, content), (texture, true));
-                }
+            if let Some((texture, fresh)) = textures.get_mut(&(view, content)) {
+                texture.set(image, TextureOptions::NEAREST);
+                *fresh = true;
+            } else {
+                let name = format!("map {view} {}", content.name());
+                let texture = ui.ctx().load_texture(name, image, TextureOptions::NEAREST);
+                textures.insert((view, content), (texture, true));
             }
         }
         if let Some((texture, _)) = textures.get(&(view, content)) {
