@@ -319,7 +319,10 @@ impl Session {
         }
         let (shown, head) = (self.fit.shown_iteration(), self.fit.head());
         if shown < head {
-            return self.goto_iteration((shown + n).min(head));
+            // States may be thinned out: the next one that is kept, or a step would stay where it is.
+            let wanted = (shown + n).min(head);
+            let next = self.fit.branch().and_then(|branch| branch.kept_from(wanted));
+            return self.goto_iteration(next.unwrap_or(head));
         }
         if self.fit.is_running() {
             return Vec::new();
@@ -434,7 +437,12 @@ impl Session {
         let (kept, state) = branch.state_at(at).map(|(k, s)| (k, Arc::clone(s)))?;
         let parent = branch.id;
         let old = branch.config_at(kept);
+        // Until the worker answers with the row under the new settings, the branch begins with the one that is known.
+        let row = branch.row(kept).cloned();
         let id = self.fit.history.begin(Some((parent, kept)), self.config);
+        if let Some(row) = row {
+            self.fit.history.push(id, row);
+        }
         self.fit.cursor = None;
         self.fit.status = FitStatus::Paused;
         let what = difference(&old, &self.config);
@@ -524,12 +532,13 @@ impl Session {
                 Vec::new()
             }
             WorkerEvent::Failed(text) => {
-                // With rows there is still something to look at and to go back to.
-                self.fit.status = if self.fit.problem.is_some() && self.fit.shown.is_some() {
-                    FitStatus::Paused
-                } else {
-                    FitStatus::Failed(text.clone())
-                };
+                self.fit.status = FitStatus::Paused;
+                self.fit.reason = Some("failed");
+                self.note(LogLevel::Error, text);
+                Vec::new()
+            }
+            WorkerEvent::Lost(text) => {
+                self.fit.status = FitStatus::Failed(text.clone());
                 self.fit.reason = Some("failed");
                 self.note(LogLevel::Error, text);
                 Vec::new()
@@ -571,7 +580,8 @@ impl Session {
             return;
         }
         let wanted = match self.fit.cursor {
-            None => true,
+            // An answer to a look back that is over by now would show the past as the present.
+            None => snapshot.live || snapshot.iteration == self.fit.head(),
             Some(cursor) => !snapshot.live && snapshot.iteration == cursor,
         };
         if wanted {

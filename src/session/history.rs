@@ -66,6 +66,12 @@ impl Branch {
         self.rows.get(..=last)?.iter().rev().find_map(|r| r.state.as_ref().map(|s| (r.report.iteration, s)))
     }
 
+    /// The first iteration at or after `iteration` whose state is kept.
+    pub fn kept_from(&self, iteration: usize) -> Option<usize> {
+        let first = iteration.saturating_sub(self.start());
+        self.rows.get(first..)?.iter().find(|row| row.state.is_some()).map(|row| row.report.iteration)
+    }
+
     /// The settings in force at an iteration.
     pub fn config_at(&self, iteration: usize) -> FitConfig {
         self.flags.iter().rev().find(|flag| flag.iteration < iteration).map_or(self.config, |flag| flag.config)

@@ -8,21 +8,23 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Commands that may wait; more than a person can issue between two steps.
 const COMMAND_QUEUE: usize = 256;
 
-/// A cell of which only the newest value matters.
-#[derive(Debug)]
-pub(super) struct Latest<T>(Mutex<Option<T>>);
+/// Snapshots of which only the newest of a kind matters: a run's pictures must not replace the answer to somebody who
+/// looks back, however slow the window is to take it.
+#[derive(Debug, Default)]
+pub(super) struct Latest {
+    live: Mutex<Option<Snapshot>>,
+    answer: Mutex<Option<Snapshot>>,
+}
 
-impl<T> Latest<T> {
-    pub(super) fn empty() -> Self {
-        Self(Mutex::new(None))
+impl Latest {
+    pub(super) fn put(&self, snapshot: Snapshot) {
+        let cell = if snapshot.live { &self.live } else { &self.answer };
+        *cell.lock().unwrap_or_else(PoisonError::into_inner) = Some(snapshot);
     }
 
-    pub(super) fn put(&self, value: T) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(value);
-    }
-
-    pub(super) fn take(&self) -> Option<T> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
+    pub(super) fn take(&self) -> Option<Snapshot> {
+        let take = |cell: &Mutex<Option<Snapshot>>| cell.lock().unwrap_or_else(PoisonError::into_inner).take();
+        take(&self.answer).or_else(|| take(&self.live))
     }
 }
 
@@ -31,7 +33,7 @@ impl<T> Latest<T> {
 pub struct Worker {
     commands: Sender<WorkerCommand>,
     messages: Receiver<WorkerMessage>,
-    snapshot: Arc<Latest<Snapshot>>,
+    snapshot: Arc<Latest>,
     thread: Option<std::thread::JoinHandle<()>>,
 }
 
@@ -43,7 +45,7 @@ impl Worker {
     pub fn spawn(wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
         let (commands, inbox) = bounded(COMMAND_QUEUE);
         let (outbox, messages) = unbounded();
-        let snapshot = Arc::new(Latest::empty());
+        let snapshot = Arc::new(Latest::default());
         let mut body = Thread::new(inbox, outbox, Arc::clone(&snapshot), Box::new(wake));
         let thread = std::thread::Builder::new().name("mhp-worker".into()).spawn(move || body.run())?;
         Ok(Self { commands, messages, snapshot, thread: Some(thread) })
@@ -70,7 +72,7 @@ impl Worker {
         self.messages.recv_timeout(timeout).ok()
     }
 
-    /// The newest snapshot since the last call.
+    /// The newest answer to [`WorkerCommand::Inspect`], else the newest picture of the run, each once. Call until `None`.
     pub fn take_snapshot(&self) -> Option<Snapshot> {
         self.snapshot.take()
     }

@@ -165,8 +165,11 @@ pub enum WorkerEvent {
         /// Milliseconds since the run began.
         run_ms: f64,
     },
-    /// The job cannot go on; the text names what diverged or failed.
+    /// A command could not be done, or the next step not be taken; the job stays where it was. The text names what
+    /// diverged or failed.
     Failed(String),
+    /// There is no job any more: it could not be prepared or ended in a panic.
+    Lost(String),
 }
 
 /// Worker to window, without the snapshots.

@@ -18,10 +18,15 @@ const SNAPSHOT_SHARE: u32 = 5;
 /// Rows are sent in batches at most this often while running.
 const ROWS_INTERVAL: Duration = Duration::from_millis(33);
 
+/// The start of a branch whose first row this job did not make.
+const NOWHERE: usize = usize::MAX;
+
 /// One fit.
 struct Job {
     id: JobId,
     branch: u32,
+    /// The iteration of the branch's first row.
+    branch_start: usize,
     problem: Arc<Problem>,
     fitter: Fitter,
     /// A second objective with the same EM region, for looking at states that are not the current one.
@@ -40,7 +45,7 @@ struct Job {
 pub(super) struct Thread {
     inbox: Receiver<WorkerCommand>,
     outbox: Sender<WorkerMessage>,
-    snapshot: Arc<Latest<Snapshot>>,
+    snapshot: Arc<Latest>,
     wake: Box<dyn Fn() + Send>,
     job: Option<Job>,
     /// The job that the last `Prepare` named, also when it failed.
@@ -51,7 +56,7 @@ impl Thread {
     pub(super) fn new(
         inbox: Receiver<WorkerCommand>,
         outbox: Sender<WorkerMessage>,
-        snapshot: Arc<Latest<Snapshot>>,
+        snapshot: Arc<Latest>,
         wake: Box<dyn Fn() + Send>,
     ) -> Self {
         Self { inbox, outbox, snapshot, wake, job: None, current: 0 }
@@ -64,13 +69,13 @@ impl Thread {
                 Ok(true) => {}
                 Ok(false) => return,
                 Err(panic) => {
-                    self.job = None;
                     let text = panic
                         .downcast_ref::<String>()
                         .cloned()
                         .or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string))
                         .unwrap_or_else(|| "unknown cause".into());
-                    self.event(WorkerEvent::Failed(format!("the fit stopped on an internal error: {text}")));
+                    self.event(WorkerEvent::Lost(format!("the fit stopped on an internal error: {text}")));
+                    self.job = None;
                 }
             }
         }
@@ -104,12 +109,7 @@ impl Thread {
         match job.step() {
             Ok(None) => {}
             Ok(Some(reason)) => {
-                let finished = WorkerEvent::Finished {
-                    branch: job.branch,
-                    iteration: job.fitter.report().iteration,
-                    reason,
-                    run_ms: job.run_began.elapsed().as_secs_f64() * 1e3,
-                };
+                let finished = job.finished(reason);
                 self.publish();
                 self.event(finished);
                 return;
@@ -138,8 +138,13 @@ impl Thread {
                             self.snapshot.put(*snapshot);
                             (self.wake)();
                         }
-                        Err(error) => self.event(WorkerEvent::Failed(error.to_string())),
+                        Err(error) => {
+                            job.target = 0;
+                            self.event(WorkerEvent::Failed(error.to_string()));
+                        }
                     }
+                } else if matches!(command, WorkerCommand::RunTo(_)) {
+                    self.event(WorkerEvent::Lost("there is no fit to run: reset it".into()));
                 }
             }
         }
@@ -154,7 +159,7 @@ impl Thread {
                 self.job = Some(job);
                 self.event(WorkerEvent::Prepared(Box::new(prepared)));
             }
-            Err(error) => self.event(WorkerEvent::Failed(error.to_string())),
+            Err(error) => self.event(WorkerEvent::Lost(error.to_string())),
         }
     }
 
@@ -229,6 +234,7 @@ impl Job {
         let mut new = Self {
             id: job,
             branch,
+            branch_start: if resumed { NOWHERE } else { 0 },
             problem: Arc::clone(&problem),
             fitter,
             viewer,
@@ -255,6 +261,15 @@ impl Job {
         self.target > self.iteration()
     }
 
+    fn finished(&self, reason: StopReason) -> WorkerEvent {
+        WorkerEvent::Finished {
+            branch: self.branch,
+            iteration: self.iteration(),
+            reason,
+            run_ms: self.run_began.elapsed().as_secs_f64() * 1e3,
+        }
+    }
+
     fn push_row(&mut self) {
         let row =
             HistoryRow { branch: self.branch, report: self.fitter.report(), state: Arc::new(self.fitter.state()) };
@@ -279,23 +294,25 @@ impl Job {
                 self.target = target;
                 self.run_began = Instant::now();
                 self.steps_in_run = 0;
+                if !self.is_running() {
+                    return Ok(Reply::Event(self.finished(StopReason::Iterations)));
+                }
             }
             WorkerCommand::Pause => {
                 let was_running = self.is_running();
                 self.target = 0;
                 if was_running {
-                    return Ok(Reply::Event(WorkerEvent::Finished {
-                        branch: self.branch,
-                        iteration: self.iteration(),
-                        reason: StopReason::Stopped,
-                        run_ms: self.run_began.elapsed().as_secs_f64() * 1e3,
-                    }));
+                    return Ok(Reply::Event(self.finished(StopReason::Stopped)));
                 }
             }
             WorkerCommand::Configure(config) => {
                 self.fitter.set_config(config)?;
                 self.dirty = true;
                 let (branch, iteration) = (self.branch, self.iteration());
+                if iteration == self.branch_start {
+                    // The branch begins with these settings, so its first row is theirs.
+                    self.push_row();
+                }
                 return Ok(Reply::Event(WorkerEvent::ConfigApplied { branch, iteration, config }));
             }
             WorkerCommand::Branch { branch, state, config } => {
@@ -303,6 +320,7 @@ impl Job {
                 self.fitter.set_config(config)?;
                 self.fitter.restore(FitState::clone(&state))?;
                 self.branch = branch;
+                self.branch_start = self.iteration();
                 self.push_row();
             }
             WorkerCommand::Edit(params) => {
