@@ -7,7 +7,8 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     tracing_subscriber::fmt()
         .with_env_filter(
-            tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn,mhp_inspector=info".into()),
+            tracing_subscriber::EnvFilter::try_from_default_env()
+                .unwrap_or_else(|_| "warn,winit=error,wgpu_hal=error,mhp_inspector=info".into()),
         )
         .with_writer(std::io::stderr)
         .init();

@@ -69,17 +69,22 @@ impl State {
     }
 
     /// The pixel that was hovered in the last pass is this pass's linked cursor.
-    fn begin_pass(&mut self, pass: u64) {
+    fn begin_pass(&mut self, ctx: &egui::Context) {
+        let pass = ctx.cumulative_pass_nr();
         if self.pass != pass {
             self.pass = pass;
             self.hovered = self.hovered_next.take();
+            // One more pass after the pointer moved, or the cursor would stay a step behind it.
+            if self.hovered.is_some() && ctx.input(|i| i.pointer.delta() != egui::Vec2::ZERO) {
+                ctx.request_repaint();
+            }
         }
     }
 }
 
 /// Draws one column.
 pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column) {
-    state.begin_pass(ui.ctx().cumulative_pass_nr());
+    state.begin_pass(ui.ctx());
     let session = shared.session;
     let Some(dataset) = &session.data.dataset else {
         let how = "Open a folder with File > Open folder, or drop it on the window.";
@@ -187,8 +192,10 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
         if let Some(pixel) = overlay::pixel_at(view, orientation, unit) {
             state.hovered_next = Some((index, pixel));
             let text = overlay::probe(session, &state.pictures, view, index, orientation, pixel);
-            response.clone().on_hover_ui_at_pointer(|ui| {
-                ui.label(egui::RichText::new(text).font(theme::mono(theme::CAPTION)));
+            let anchor = egui::PopupAnchor::Pointer;
+            let probe = egui::Tooltip::always_open(ui.ctx().clone(), ui.layer_id(), response.id, anchor).gap(14.0);
+            probe.show(|ui| {
+                ui.add(egui::Label::new(egui::RichText::new(text).font(theme::mono(theme::CAPTION))).extend());
             });
         }
         if response.clicked() {

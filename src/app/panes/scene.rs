@@ -39,9 +39,9 @@ impl State {
 
     pub(in crate::app) fn focus(&mut self, session: &Session) {
         let positions = session.shown_positions();
-        let camera = self.camera.get_or_insert_with(|| Camera::overview(centre(session), RADIUS_M));
+        let camera = self.camera.get_or_insert_with(|| overview(session));
         match session.joint.and_then(|joint| positions.get(joint)) {
-            Some(&p) => camera.focus(Vec3::from(p.map(|x| x as f32)), 0.8),
+            Some(&p) => camera.focus(Vec3::from(p.map(|x| x as f32)), 1.1),
             None => camera.focus(centre(session), 1.1),
         }
     }
@@ -62,6 +62,12 @@ impl State {
     pub(in crate::app) fn look_from_side(&mut self, session: &Session) {
         self.camera = Some(Camera::side(centre(session) * 0.7, RADIUS_M));
     }
+}
+
+/// Radar and person in one picture.
+fn overview(session: &Session) -> Camera {
+    let person = centre(session);
+    Camera::overview(person * 0.62, (person.length() * 0.62).max(RADIUS_M * 0.8))
 }
 
 /// The middle of the shown joints, or a place in front of the radar.
@@ -86,7 +92,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         state.camera = None;
     }
     if state.camera.is_none() && shared.session.fit.shown.is_some() {
-        state.camera = Some(Camera::overview(centre(shared.session), RADIUS_M));
+        state.camera = Some(overview(shared.session));
     }
     toolbar(ui, shared);
     let rect = ui.available_rect_before_wrap();
@@ -95,7 +101,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     }
     let response = ui.interact(rect, ui.scope_id().with("scene"), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "3-D scene"));
-    let mut camera = state.camera.unwrap_or_else(|| Camera::overview(centre(shared.session), RADIUS_M));
+    let mut camera = state.camera.unwrap_or_else(|| overview(shared.session));
     let tokens = Tokens::of(ui);
     let scale = ui.ctx().pixels_per_point();
     let viewport = Vec2::new(rect.width() * scale, rect.height() * scale);
@@ -193,7 +199,7 @@ fn interact(
                 if let Some(p) = shared.session.shown_positions().get(joint)
                     && let Some(camera) = &mut state.camera
                 {
-                    camera.focus(Vec3::from(p.map(|x| x as f32)), 0.8);
+                    camera.focus(Vec3::from(p.map(|x| x as f32)), 1.1);
                 }
             }
             None => state.camera = None,
