@@ -88,7 +88,7 @@ fn bad_input_is_one_message_and_exit_code_2() {
         (&folder, &other.join("params.npz"), &[], &["doppler_features", "24", "params.npz"]),
         (&folder, &folder.join("absent.npz"), &[], &["absent.npz"]),
         (&folder, &folder.join("fit.toml"), &[], &["fit.toml"]),
-        (&folder, &good, &["--config", typo], &["w_kin", "line 2", "fit.toml"]),
+        (&folder, &good, &["--config", typo], &["w_kin", "fit.toml:2:"]),
         (&folder.join("absent"), &good, &[], &["absent"]),
     ];
     for (dataset, params, extra, words) in cases {
