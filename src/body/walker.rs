@@ -68,7 +68,7 @@ const JOINTS: [&str; 17] = [
     "right_ankle",
 ];
 
-/// The rigid parts of the body, in the order of [`Pose::segments`]. Limbs hang along −z of their frame from its origin.
+/// The rigid parts of the body, in the order of [`BodyPose::segments`]. Limbs hang along −z of their frame from its origin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[expect(missing_docs, reason = "the names say it; left and right are the person's own")]
 pub enum Segment {

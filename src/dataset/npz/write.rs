@@ -114,7 +114,7 @@ pub fn write(path: &Path, arrays: &[(&str, ArrayView<'_>)]) -> Result<(), NpzErr
 /// Writes one array as `.npy`.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_npy(path: &Path, array: &ArrayView<'_>) -> Result<(), NpzError> {
     replace_file(path, |out| array.write_to(out)).map_err(|reason| NpzError::Write { reason, path: path.to_owned() })
 }
