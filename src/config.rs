@@ -276,19 +276,21 @@ pub enum ConfigError {
         /// Largest accepted.
         hi: f64,
     },
-    /// The text is not valid TOML or has a wrong key; the message names key and line.
-    #[error("{path}: not a valid fit configuration: {message}")]
-    Parse {
-        /// What the parser said.
+    /// A file that is not TOML, has a wrong key or a wrong value.
+    #[error("{place}: {message}", place = place(path, *line))]
+    Invalid {
+        /// What is wrong, naming the key.
         message: String,
+        /// The line, counted from 1, where one can be named.
+        line: Option<usize>,
         /// The file.
         path: PathBuf,
     },
     /// The file could not be read.
-    #[error("{path}: cannot be read: {source}")]
+    #[error("{path}: cannot be read: {reason}", path = path.display())]
     Read {
-        /// Why.
-        source: std::io::Error,
+        /// What the operating system said.
+        reason: std::io::Error,
         /// The file.
         path: PathBuf,
     },
@@ -315,17 +317,94 @@ impl FitConfig {
     /// Where the file cannot be read, is not TOML, has an unknown key (named, with its line), or a number out of range.
     pub fn from_file(path: &Path) -> Result<Self, ConfigError> {
         let text =
-            std::fs::read_to_string(path).map_err(|source| ConfigError::Read { source, path: path.to_owned() })?;
-        toml::from_str::<Self>(&text)
-            .map_err(|error| ConfigError::Parse {
-                message: error.to_string().trim_end().to_owned(),
-                path: path.to_owned(),
-            })?
-            .validated()
+            std::fs::read_to_string(path).map_err(|reason| ConfigError::Read { reason, path: path.to_owned() })?;
+        Self::parse(&text, path)
+    }
+
+    /// Reads the text of a `FIT.toml`; `path` is for messages.
+    ///
+    /// # Errors
+    /// As [`Self::from_file`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self, ConfigError> {
+        let invalid = |message: String, at: Option<usize>| ConfigError::Invalid {
+            message,
+            line: at.map(|at| 1 + text.bytes().take(at).filter(|&byte| byte == b'\n').count()),
+            path: path.to_owned(),
+        };
+        let parsed = toml::from_str::<Self>(text)
+            .map_err(|error| invalid(in_our_words(error.message()), error.span().map(|span| span.start)))?;
+        parsed.validated().map_err(|error| {
+            let ConfigError::OutOfRange { key, .. } = error else { return error };
+            invalid(error.to_string(), offset_of(text, key))
+        })
     }
 
     /// The configuration as `FIT.toml`.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).unwrap_or_default()
+    }
+}
+
+fn place(path: &Path, line: Option<usize>) -> String {
+    line.map_or_else(|| path.display().to_string(), |line| format!("{}:{line}", path.display()))
+}
+
+/// `unknown field` is the parser's word; a configuration has keys.
+fn in_our_words(message: &str) -> String {
+    let message = message.trim_end().replace('\n', "; ");
+    match message.strip_prefix("unknown field ") {
+        Some(rest) => format!("unknown key {}", rest.replacen(", expected", "; expected", 1)),
+        None => message,
+    }
+}
+
+/// Where the line begins that sets a key of the top table.
+fn offset_of(text: &str, key: &str) -> Option<usize> {
+    let mut at = 0;
+    text.split_inclusive('\n').find_map(|line| {
+        let here = at;
+        at += line.len();
+        let rest = line.trim_start().strip_prefix(key)?;
+        rest.trim_start().starts_with('=').then_some(here)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(text: &str) -> String {
+        FitConfig::parse(text, Path::new("fit.toml")).err().map_or_else(|| "accepted".into(), |e| e.to_string())
+    }
+
+    #[test]
+    fn what_is_written_reads_back() {
+        let full = FitConfig {
+            em_region: EmRegion::Full,
+            summation: Summation::Incoherent,
+            learning_rate: 3e-3,
+            operators: Operators { range: false, ..Operators::default() },
+            stop_when_converged: true,
+            ..FitConfig::default()
+        };
+        for config in [FitConfig::default(), full] {
+            let text = config.to_toml();
+            assert_eq!(FitConfig::parse(&text, Path::new("fit.toml")).ok(), Some(config), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_key_or_value_names_file_line_key_and_expectation() {
+        let text = refusal("w_em = 1\nw_kin = 2\n");
+        assert!(text.starts_with("fit.toml:2: unknown key `w_kin`; expected one of `w_em`, `w_kine`"), "{text}");
+        assert_eq!(refusal("\ntau_pct = 100\n"), "fit.toml:2: tau_pct is 100; expected a number in 0.1 ..= 99.9");
+        let text = refusal("iterations = -1");
+        assert!(text.starts_with("fit.toml:1: ") && !text.contains('\n'), "{text}");
+        let text = refusal("em_region = \"half\"");
+        assert!(text.starts_with("fit.toml:1: em_region must be \"full\" or"), "{text}");
+        let text = refusal("[operators]\nrang = true");
+        assert!(text.starts_with("fit.toml:2: unknown key `rang`; expected one of `attenuation`"), "{text}");
+        assert!(refusal("w_em = ").starts_with("fit.toml:1: "));
+        assert!(refusal("softness = nan").starts_with("fit.toml:1: softness is NaN; expected"));
     }
 }

@@ -32,6 +32,7 @@
 //! | [`cli`] | one file a subcommand |
 //! | [`session`] | the state behind the window and the only function that changes it |
 //! | [`worker`] | the thread that runs a fit, and its protocol |
+//! | [`study`] | batch runs and their tables |
 //! | [`diagnose`] | metrics: IoU, MAJPE, PA-MAJPE |
 //! | [`mhp`] | initialisation, forward model, objective, Adam, convergence, the fitter's one `step` |
 //! | [`dataset`] | frames, the generic manifest, MMVR, npz; lazy loading and a cache with a byte budget |
@@ -48,6 +49,7 @@ pub mod diagnose;
 pub mod geometry;
 pub mod mhp;
 pub mod radar;
+pub mod study;
 pub mod worker;
 
 #[cfg(feature = "viewer")]

@@ -44,6 +44,7 @@ fn starts_within_the_labelled_boxes_and_reaches_the_asked_iou() {
     println!("init {:.0} ms: {notes:?}", clock.elapsed().as_secs_f64() * 1e3);
     let joints: Vec<[[f64; 2]; 2]> =
         params.group(Group::Position).chunks_exact(3).map(|p| cells([p[0], p[1], p[2]])).collect();
+    println!("start {:.2?}", params.position(0));
     for (view, boxes) in frame.map_boxes.iter().enumerate() {
         for axis in 0..2 {
             for joint in &joints {

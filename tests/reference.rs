@@ -4,10 +4,13 @@
 #[path = "common/cases.rs"]
 mod cases;
 mod common;
+#[path = "common/reading.rs"]
+mod reading;
 
-use cases::{Case, case_folders, read};
+use cases::Case;
 use mhp_inspector::body::{Group, Pppr};
 use mhp_inspector::mhp::{Evaluation, Objective, Precision, masks, simulate};
+use reading::{case_folders, read};
 use std::path::Path;
 use std::sync::Arc;
 

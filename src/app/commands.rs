@@ -48,6 +48,8 @@ pub(crate) enum AppAct {
     About,
     /// Type the number of a frame.
     GotoFrame,
+    /// Type the path of a data set.
+    OpenPath,
     /// The panes as they were at first.
     ResetLayout,
     /// Zoom of maps and curves and the camera as they were at first.
@@ -154,6 +156,14 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
         keys: &[(CTRL_SHIFT, Key::O)],
         enabled: always,
         act: |_| Act::Session(Command::Pick(PickKind::File)),
+    },
+    UserCommand {
+        label: "Open path…",
+        tooltip: "Type or paste the path of a data set; needs no file dialog.",
+        menu: Menu::File,
+        keys: &[(CTRL, Key::L)],
+        enabled: always,
+        act: |_| Act::App(AppAct::OpenPath),
     },
     UserCommand {
         label: "Quit",

@@ -72,7 +72,7 @@ impl Default for Layout {
         let frames = tiles.insert_pane(PaneKind::Frames);
         let fit = tiles.insert_pane(PaneKind::Fit);
         let joint = tiles.insert_pane(PaneKind::Joint);
-        let right = linear(&mut tiles, LinearDir::Vertical, &[(fit, 1.25), (joint, 1.0)]);
+        let right = linear(&mut tiles, LinearDir::Vertical, &[(fit, 1.5), (joint, 1.0)]);
         let root = linear(&mut tiles, LinearDir::Horizontal, &[(frames, 0.17), (middle, 0.62), (right, 0.25)]);
         Self { tree: Tree::new(egui::Id::unique("panes"), root, tiles) }
     }

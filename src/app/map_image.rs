@@ -178,7 +178,7 @@ pub(crate) fn colorize(
         let [r, g, b] = lut[(t * 255.0).round() as usize];
         *pixel = Color32::from_rgb(r, g, b);
         let outside = value < lo || value > hi;
-        if hatch && outside && (i % size[0] + i / size[0]) % 4 == 0 {
+        if hatch && outside && (i % size[0] + i / size[0]).is_multiple_of(4) {
             *pixel = if t > 0.5 { Color32::BLACK } else { Color32::from_gray(150) };
         }
     }

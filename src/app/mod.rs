@@ -28,7 +28,6 @@ pub const APP_ID: &str = "mhp-inspector";
 const VIEW_KEY: &str = "view";
 const RECENT_KEY: &str = "recent";
 const LAYOUT_KEY: &str = "layout";
-const CONFIG_KEY: &str = "config";
 
 /// The application behind the window.
 pub struct InspectorApp {
@@ -52,7 +51,6 @@ impl InspectorApp {
         if let Some(storage) = cc.storage {
             session.view = eframe::get_value::<ViewState>(storage, VIEW_KEY).unwrap_or_default();
             session.data.recent = eframe::get_value(storage, RECENT_KEY).unwrap_or_default();
-            session.config = eframe::get_value(storage, CONFIG_KEY).unwrap_or_default();
             if let Some(stored) = eframe::get_value(storage, LAYOUT_KEY) {
                 layout = Layout::restored(stored);
             }
@@ -112,12 +110,13 @@ impl InspectorApp {
             AppAct::Help => self.overlay.toggle_help(),
             AppAct::About => self.overlay.toggle_about(),
             AppAct::GotoFrame => self.overlay.open_goto(self.session.data.frame_index),
+            AppAct::OpenPath => self.overlay.open_path(self.session.data.recent.first()),
             AppAct::ResetLayout => self.layout = Layout::default(),
             AppAct::ResetViews => self.panes.reset_views(),
             AppAct::Focus => self.panes.focus(&self.session),
-            AppAct::CameraRadar => self.panes.scene.from_radar(&self.session),
-            AppAct::CameraTop => self.panes.scene.from_top(&self.session),
-            AppAct::CameraSide => self.panes.scene.from_side(&self.session),
+            AppAct::CameraRadar => self.panes.scene.look_from_radar(&self.session),
+            AppAct::CameraTop => self.panes.scene.look_from_top(&self.session),
+            AppAct::CameraSide => self.panes.scene.look_from_side(&self.session),
             AppAct::ZoomIn => self.set_zoom(self.session.view.zoom + 0.1),
             AppAct::ZoomOut => self.set_zoom(self.session.view.zoom - 0.1),
             AppAct::ZoomReset => self.set_zoom(1.0),
@@ -142,10 +141,10 @@ impl InspectorApp {
                 .iter()
                 .find_map(|file| Some(file.path().to_path_buf()).filter(|p| !p.as_os_str().is_empty()))
         });
-        if dropped.is_some() && dropped != self.dropped {
-            if let Some(path) = dropped.clone() {
-                self.apply(Command::Open(path));
-            }
+        if dropped != self.dropped
+            && let Some(path) = dropped.clone()
+        {
+            self.apply(Command::Open(path));
         }
         self.dropped = dropped;
     }
@@ -226,7 +225,6 @@ impl eframe::App for InspectorApp {
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         eframe::set_value(storage, VIEW_KEY, &self.session.view);
         eframe::set_value(storage, RECENT_KEY, &self.session.data.recent);
-        eframe::set_value(storage, CONFIG_KEY, &self.session.config);
         eframe::set_value(storage, LAYOUT_KEY, self.layout.stored());
     }
 }

@@ -21,6 +21,7 @@ enum Sheet {
     Help,
     About,
     Goto,
+    Path,
 }
 
 /// What lies over the panes.
@@ -52,6 +53,11 @@ impl Overlay {
         self.query = current.to_string();
     }
 
+    pub(super) fn open_path(&mut self, start: Option<&PathBuf>) {
+        self.toggle(Sheet::Path);
+        self.query = start.map(|path| path.display().to_string()).unwrap_or_default();
+    }
+
     fn toggle(&mut self, sheet: Sheet) {
         self.sheet = if self.sheet == sheet { Sheet::None } else { sheet };
         self.query.clear();
@@ -79,6 +85,7 @@ impl Overlay {
             Sheet::Help => sheet(ui, "Keys and gestures", 760.0, help),
             Sheet::About => sheet(ui, "About MHP Inspector", 460.0, about),
             Sheet::Goto => self.goto(ui, shared),
+            Sheet::Path => self.path(ui, shared),
         };
         if close {
             self.sheet = Sheet::None;
@@ -101,7 +108,7 @@ impl Overlay {
         self.chosen = (self.chosen + usize::from(down)).min(last).saturating_sub(usize::from(up));
         let mut done = false;
         let tokens = Tokens::of(ui);
-        let response = egui::Modal::new(egui::Id::unique("palette")).show(ui.ctx(), |ui| {
+        let response = modal(ui, "palette").show(ui.ctx(), |ui| {
             ui.set_width(460.0);
             let field = ui.add(
                 egui::TextEdit::singleline(&mut self.query).hint_text("Type a command").desired_width(f32::INFINITY),
@@ -142,7 +149,7 @@ impl Overlay {
     fn goto(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
         let last = shared.session.data.len().saturating_sub(1);
         let mut done = false;
-        let response = egui::Modal::new(egui::Id::unique("goto")).show(ui.ctx(), |ui| {
+        let response = modal(ui, "goto").show(ui.ctx(), |ui| {
             ui.set_width(260.0);
             ui.label(format!("Frame, 0 to {last}"));
             let field = ui.add(egui::TextEdit::singleline(&mut self.query).desired_width(f32::INFINITY));
@@ -155,6 +162,31 @@ impl Overlay {
             let go = ui.add_enabled(wanted.is_some(), egui::Button::new("Go")).clicked();
             if let Some(index) = wanted.filter(|_| go || ui.input(|i| i.key_pressed(Key::Enter))) {
                 shared.send(Command::GotoFrame(index));
+                done = true;
+            }
+        });
+        done || response.should_close()
+    }
+
+    fn path(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
+        let mut done = false;
+        let response = modal(ui, "path").show(ui.ctx(), |ui| {
+            ui.set_width(560.0);
+            ui.label("Path of an MMVR folder, a folder with dataset.toml, a *_radar.npz, or an .npy or .npz of maps");
+            let field = ui.add(
+                egui::TextEdit::singleline(&mut self.query)
+                    .font(egui::TextStyle::Monospace)
+                    .desired_width(f32::INFINITY),
+            );
+            field.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Path"));
+            if self.fresh {
+                field.request_focus();
+                self.fresh = false;
+            }
+            let typed = self.query.trim();
+            let open = ui.add_enabled(!typed.is_empty(), egui::Button::new("Open")).clicked();
+            if !typed.is_empty() && (open || ui.input(|i| i.key_pressed(Key::Enter))) {
+                shared.send(Command::Open(PathBuf::from(typed)));
                 done = true;
             }
         });
@@ -196,10 +228,15 @@ impl Overlay {
     }
 }
 
+/// A sheet in the middle of the window.
+fn modal(ui: &Ui, name: &str) -> egui::Modal {
+    egui::Modal::new(egui::Id::unique(name)).frame(egui::Frame::popup(ui.style()).inner_margin(16))
+}
+
 /// A sheet with a title that Escape or a click outside closes.
 fn sheet(ui: &Ui, title: &str, width: f32, content: fn(&mut Ui)) -> bool {
     let height = ui.ctx().content_rect().height() * 0.8;
-    egui::Modal::new(egui::Id::unique(title))
+    modal(ui, title)
         .show(ui.ctx(), |ui| {
             ui.set_width(width.min(ui.ctx().content_rect().width() - 60.0));
             ui.label(RichText::new(title).font(theme::strong(16.0)));
@@ -249,10 +286,11 @@ fn help(ui: &mut Ui) {
 
 fn key_row(ui: &mut Ui, key: &str, what: &str, tokens: &Tokens) {
     ui.horizontal(|ui| {
-        ui.add_sized(
-            [104.0, 18.0],
-            egui::Label::new(RichText::new(key).font(theme::mono(12.0)).color(tokens.accent)).halign(egui::Align::LEFT),
-        );
+        let layout = egui::Layout::left_to_right(egui::Align::Center);
+        ui.allocate_ui_with_layout(vec2(104.0, 18.0), layout, |ui| {
+            ui.set_min_width(104.0);
+            ui.label(RichText::new(key).font(theme::mono(12.0)).color(tokens.accent));
+        });
         ui.label(what);
     });
 }

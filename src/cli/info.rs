@@ -1,12 +1,23 @@
 //! `info`: what a data set is and what its first frame holds, as text for people or JSON for programs.
 
-use crate::dataset::{Dataset, DatasetInfo, Frame, Heatmap, Manifest, Progress, view_words};
+use super::common::{open, print};
+use crate::dataset::{Dataset, DatasetInfo, Frame, Heatmap, view_words};
 use crate::radar::View;
-use anyhow::Context;
+use anyhow::Context as _;
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
+
+/// Shown under the options of `info --help`.
+pub(super) const HELP: &str = "\
+Exit codes: 0 told; 2 bad input.
+
+Examples:
+  mhp-inspector info data/mmvr
+      Layout, axes in words, what had to be assumed, and the values of the first frame.
+  mhp-inspector info maps.npz --manifest dataset.toml --json
+      A file of maps whose axes the manifest names, for a program to read.";
 
 /// What is in a data set: layout, frames, views and axes, ranges of values, skeleton, people, labels.
 #[derive(Debug, clap::Args)]
@@ -16,7 +27,7 @@ pub struct Args {
     /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
     #[arg(long, value_name = "FILE")]
     manifest: Option<PathBuf>,
-    /// The frame whose values are told; default: the one that PATH names, else the first.
+    /// The frame whose values are told, counted from 0. Default: the one that PATH names, else the first.
     #[arg(long, value_name = "I")]
     frame: Option<usize>,
     /// One JSON object instead of text.
@@ -59,22 +70,15 @@ impl Values {
 /// # Errors
 /// Where the data set cannot be opened or that frame not be loaded.
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let progress = Progress::new();
-    let dataset = match &args.manifest {
-        Some(file) => Dataset::open_with_manifest(&args.path, &Manifest::from_file(file)?, &progress)?,
-        None => Dataset::open(&args.path, &progress)?,
-    };
+    let dataset = open(&args.path, args.manifest.as_deref())?;
     let frame = dataset.load(args.frame.unwrap_or(dataset.start_index()))?;
     let text = if args.json {
         serde_json::to_string_pretty(&as_json(&dataset, &frame)).context("writing JSON")? + "\n"
     } else {
         as_text(&dataset, &frame)
     };
-    match std::io::Write::write_all(&mut std::io::stdout().lock(), text.as_bytes()) {
-        // Whoever reads has seen enough: `info … | head`.
-        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(ExitCode::SUCCESS),
-        done => done.map(|()| ExitCode::SUCCESS).context("writing to standard output"),
-    }
+    print(&text)?;
+    Ok(ExitCode::SUCCESS)
 }
 
 fn as_json(dataset: &Dataset, frame: &Frame) -> Value {

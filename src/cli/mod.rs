@@ -1,6 +1,10 @@
 //! The command line: one file a subcommand. Arguments as typed become a validated configuration and one library call.
 
+mod common;
+mod fit;
+mod frames;
 mod info;
+pub mod sample;
 mod score;
 #[cfg(feature = "viewer")]
 mod screenshot;
@@ -11,10 +15,26 @@ use std::process::ExitCode;
 
 /// The exit code of bad input: a file, a key, a value that is not what it should be.
 pub const EXIT_BAD_INPUT: u8 = 2;
+/// The exit code of a batch of which some frames could not be fitted.
+pub const EXIT_SOME_FAILED: u8 = 1;
+
+/// Shown under the options of `--help`.
+const HELP: &str = "\
+Exit codes: 0 done; 1 some frames of a batch could not be fitted; 2 bad input, told in one line on standard error.
+
+Examples:
+  mhp-inspector
+      The window on the bundled sample.
+  mhp-inspector data/mmvr
+      The window on an MMVR folder.
+  mhp-inspector info data/mmvr
+      What is in it: frames, views, axes, ranges of values.
+  mhp-inspector fit data/mmvr --frames 0..10 --out results
+      Ten fits without a window. `mhp-inspector fit --help` tells more.";
 
 /// Fit parametric human models to mmWave radar heatmaps, frame by frame, and see why a fit fails.
 #[derive(Debug, Parser)]
-#[command(version, about, args_conflicts_with_subcommands = true)]
+#[command(version, about, args_conflicts_with_subcommands = true, after_help = HELP)]
 pub struct Cli {
     /// What to do; without a subcommand the window opens.
     #[command(subcommand)]
@@ -27,17 +47,28 @@ pub struct Cli {
 /// The subcommands; everything the window does, one of them can do headless.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Fit frames of a data set: a row a frame, a table of all, the parameters as npz.
+    ///
+    /// Each frame starts from the peaks of its own maps, or with --warm-start from the frame before, and takes the
+    /// configured number of Adam steps. Frames are fitted side by side; rows are in the order of the data set.
+    #[command(after_help = fit::HELP)]
+    Fit(fit::FitArgs),
+    /// Tell what is in a data set: layout, frames, views and axes, ranges of values, skeleton, people, labels.
+    #[command(after_help = info::HELP)]
+    Info(info::Args),
     /// Evaluate the objective at given parameters: simulated maps, losses and gradients.
     ///
     /// Writes an npz with `sim_<array>`, `iou_<array>`, `loss`, its terms `em bone rigid joint sep coll`, and the gradients
     /// `grad_<group>` (of the total) and `grad_em_<group>` (of L_EM alone), all float64. Prints the scalars as one JSON
     /// object; an IoU of two empty masks is null there and NaN in the npz. The EM region is that of the given positions.
+    #[command(after_help = score::HELP)]
     Score(score::ScoreArgs),
     /// Draw the real window offscreen after a number of iterations, and save it as a PNG.
     #[cfg(feature = "viewer")]
+    #[command(after_help = screenshot::HELP)]
     Screenshot(screenshot::ScreenshotArgs),
-    /// Tell what is in a data set: frames, views and axes, ranges of values, skeleton, people, labels.
-    Info(info::Args),
+    /// Write the bundled sample data set anew: a person who walks before two FMCW arrays, with 3-D truth.
+    Sample(sample::Args),
 }
 
 /// Runs a subcommand.
@@ -46,9 +77,11 @@ pub enum Command {
 /// Whatever the subcommand could not do, naming file, key and what was expected.
 pub fn run(command: Command) -> anyhow::Result<ExitCode> {
     match command {
+        Command::Fit(args) => fit::run(&args),
+        Command::Info(args) => info::run(&args),
         Command::Score(args) => score::run(&args),
         #[cfg(feature = "viewer")]
         Command::Screenshot(args) => screenshot::run(&args),
-        Command::Info(args) => info::run(&args),
+        Command::Sample(args) => sample::run(&args),
     }
 }

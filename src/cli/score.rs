@@ -1,24 +1,34 @@
 //! `score`: the objective at given parameters, with maps and gradients; SPEC section 7.
 
+use super::common::{PrecisionArg, config, open, print};
 use crate::body::{Group, Pppr};
-use crate::config::FitConfig;
 use crate::dataset::npz::{ArrayView, write};
-use crate::dataset::{Dataset, Progress, read_pppr};
-use crate::mhp::{Evaluation, Objective, Precision, Problem, simulate};
+use crate::dataset::read_pppr;
+use crate::mhp::{Evaluation, Objective, Problem, simulate};
 use anyhow::Context as _;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+/// Shown under the options of `score --help`.
+pub(super) const HELP: &str = "\
+Exit codes: 0 the answer is written; 2 bad input.
+
+Examples:
+  mhp-inspector score --dataset case --frame 0 --params case/params.npz --out answer.npz
+      Maps, losses and gradients at these parameters, with the default configuration.
+  mhp-inspector score --dataset case --frame 0 --params p.npz --config fit.toml --precision f32 --out a.npz
+      The same under other settings, in single precision.";
+
 /// What `score` is told.
 #[derive(Debug, Args)]
 pub struct ScoreArgs {
-    /// Data set: a folder with dataset.toml, an MMVR folder, or a *_radar.npz.
+    /// An MMVR tree or any folder inside one, a `*_radar.npz`, a folder with `dataset.toml`, or an `.npy`/`.npz` of maps.
     #[arg(long, value_name = "DIR")]
     dataset: PathBuf,
-    /// Index of the frame, from 0.
+    /// The frame, counted from 0.
     #[arg(long, value_name = "I")]
     frame: usize,
     /// PPPR npz: position, log_scale, rotation, velocity, beta, omega.
@@ -33,24 +43,9 @@ pub struct ScoreArgs {
     /// Where the answer is written.
     #[arg(long, value_name = "OUT.npz")]
     out: PathBuf,
-}
-
-/// The two precisions as typed.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum PrecisionArg {
-    /// Double: the oracle.
-    F64,
-    /// Single: the fast path.
-    F32,
-}
-
-impl From<PrecisionArg> for Precision {
-    fn from(typed: PrecisionArg) -> Self {
-        match typed {
-            PrecisionArg::F64 => Self::F64,
-            PrecisionArg::F32 => Self::F32,
-        }
-    }
+    /// A manifest (as `dataset.toml`) that says what the data set is, instead of its own or the preset.
+    #[arg(long, value_name = "FILE")]
+    manifest: Option<PathBuf>,
 }
 
 /// Runs `score`.
@@ -59,8 +54,8 @@ impl From<PrecisionArg> for Precision {
 /// Where the data set, frame, parameters or configuration cannot be read or do not fit each other, or the answer cannot
 /// be written.
 pub(super) fn run(args: &ScoreArgs) -> anyhow::Result<ExitCode> {
-    let config = args.config.as_deref().map(FitConfig::from_file).transpose()?.unwrap_or_default();
-    let dataset = Dataset::open(&args.dataset, &Progress::new())?;
+    let config = config(args.config.as_deref())?;
+    let dataset = open(&args.dataset, args.manifest.as_deref())?;
     let frame = dataset.load(args.frame)?;
     let params = read_pppr(&args.params, None)?;
     let info = dataset.info();
@@ -79,7 +74,7 @@ pub(super) fn run(args: &ScoreArgs) -> anyhow::Result<ExitCode> {
     let scalars = scalars(&problem, &evaluation);
     write_answer(args, &problem, &evaluation, &maps, &scalars)?;
     let json: Map<String, Value> = scalars.into_iter().map(|(key, x)| (key, Value::from(x))).collect();
-    println!("{}", Value::Object(json));
+    print(&format!("{}\n", Value::Object(json)))?;
     Ok(ExitCode::SUCCESS)
 }
 

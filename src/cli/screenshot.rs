@@ -1,5 +1,6 @@
 //! `screenshot`: the real window, drawn offscreen after a number of iterations.
 
+use super::common::config;
 use crate::app::InspectorApp;
 use crate::config::FitConfig;
 use crate::session::{Command, FitStatus, ThemeChoice};
@@ -11,23 +12,34 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 /// How long a data set may take to open, or a fit to do its iterations.
-const PATIENCE: Duration = Duration::from_secs(300);
+const PATIENCE: Duration = Duration::from_mins(5);
+
+/// Shown under the options of `screenshot --help`.
+pub(super) const HELP: &str = "\
+Needs no display, but a graphics adapter (Mesa's lavapipe will do).
+Exit codes: 0 the picture is written; 2 bad input, or nothing can be drawn.
+
+Examples:
+  mhp-inspector screenshot data/mmvr --iterations 60 --out fit.png
+      The window after 60 Adam steps on the first frame.
+  mhp-inspector screenshot data/mmvr --iterations 0 --size 1920x1080 --theme light --focus --out start.png
+      The start pose, the maps zoomed to the fitted region.";
 
 /// What `screenshot` is told.
 #[derive(Debug, Args)]
 pub struct ScreenshotArgs {
-    /// Data set, as for the window.
+    /// An MMVR tree or any folder inside one, a `*_radar.npz`, a folder with `dataset.toml`, or an `.npy`/`.npz` of maps.
     path: PathBuf,
-    /// Index of the frame, from 0.
+    /// The frame, counted from 0.
     #[arg(long, value_name = "I", default_value_t = 0)]
     frame: usize,
-    /// Iterations to run first.
+    /// Adam steps to take first.
     #[arg(long, value_name = "K", default_value_t = 60)]
     iterations: usize,
     /// Fit configuration; without it the defaults.
     #[arg(long, value_name = "FIT.toml")]
     config: Option<PathBuf>,
-    /// The picture.
+    /// Where the picture is written.
     #[arg(long, value_name = "X.png")]
     out: PathBuf,
     /// Width and height in points.
@@ -73,7 +85,7 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
 /// Where the data set or frame cannot be read, the fit fails, there is no graphics adapter, or the picture cannot be
 /// written.
 pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
-    let config = args.config.as_deref().map(FitConfig::from_file).transpose()?.unwrap_or_default();
+    let config = config(args.config.as_deref())?;
     let paths = vec![args.path.clone()];
     let mut harness = Harness::builder()
         .with_size([args.size.0 as f32, args.size.1 as f32])

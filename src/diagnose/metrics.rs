@@ -34,7 +34,7 @@ pub fn pa_majpe_mm(estimate: &[Vec3], truth: &[Vec3]) -> Option<f64> {
 /// paired closest first, and where the counts differ the smaller number of persons counts.
 /// `None` where either list is empty or no whole number of persons.
 pub fn joint_errors(estimate: &[Vec3], truth: &[Vec3], joints: usize) -> Option<JointErrors> {
-    if joints == 0 || estimate.len() % joints != 0 || truth.len() % joints != 0 {
+    if joints == 0 || !estimate.len().is_multiple_of(joints) || !truth.len().is_multiple_of(joints) {
         return None;
     }
     let estimated: Vec<&[Vec3]> = estimate.chunks_exact(joints).collect();

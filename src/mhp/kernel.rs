@@ -185,7 +185,7 @@ impl<'a, T: Real> Kernel<'a, T> {
                 *exponent += spectrum;
             }
             for (reference, &exponent) in self.reference.iter_mut().zip(exponents.iter()) {
-                if !(*reference >= exponent) {
+                if exponent > *reference || exponent.is_nan() {
                     *reference = exponent;
                 }
             }

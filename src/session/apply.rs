@@ -14,6 +14,8 @@ use std::sync::Arc;
 
 /// Fits of frames that were left are kept up to this many.
 const KEPT_FITS: usize = 16;
+/// Bytes of states that each of them may keep.
+const KEPT_FIT_BYTES: usize = 4 << 20;
 
 impl Session {
     /// Applies one command and answers what the outside has to do for it.
@@ -237,6 +239,7 @@ impl Session {
         }
         fit.shown = None;
         fit.status = FitStatus::Paused;
+        fit.history.shrink(KEPT_FIT_BYTES);
         self.left.retain(|frame| *frame != fit.frame);
         if fit.head() > 0 || fit.history.branches().len() > 1 {
             self.left.push_back(fit.frame);

@@ -211,6 +211,17 @@ impl History {
         }
     }
 
+    /// Forgets states until no more than `budget` bytes of them are left (or only each branch's first and last).
+    pub fn shrink(&mut self, budget: usize) {
+        while self.state_bytes > budget {
+            let before = self.state_bytes;
+            self.thin();
+            if self.state_bytes == before {
+                return;
+            }
+        }
+    }
+
     /// Forgets every second state except each branch's first and last.
     fn thin(&mut self) {
         for branch in &mut self.branches {

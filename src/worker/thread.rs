@@ -328,7 +328,7 @@ impl Job {
                 self.push_row();
             }
             WorkerCommand::Inspect { branch, state, config } => {
-                return self.inspect(branch, &state, config).map(|snapshot| Reply::Show(Box::new(snapshot)));
+                return Ok(Reply::Show(Box::new(self.inspect(branch, &state, config))));
             }
             #[expect(clippy::panic, reason = "the test hook that proves the window survives a panic")]
             WorkerCommand::PanicForTest => panic!("asked to panic"),
@@ -337,12 +337,12 @@ impl Job {
         Ok(Reply::Nothing)
     }
 
-    fn inspect(&mut self, branch: u32, state: &FitState, config: FitConfig) -> Result<Snapshot, FitError> {
+    fn inspect(&mut self, branch: u32, state: &FitState, config: FitConfig) -> Snapshot {
         self.viewer.set_config(config);
         let evaluation = self.viewer.evaluate(&state.params);
         let h_sim = simulate(&self.problem, &config, Precision::F32, &state.params);
         let masks = (0..h_sim.len()).map(|view| masks(&self.viewer, view, &h_sim[view])).collect();
-        Ok(Snapshot {
+        Snapshot {
             job: self.id,
             branch,
             iteration: state.iteration,
@@ -353,7 +353,7 @@ impl Job {
             h_sim,
             masks,
             iterations_per_s: 0.0,
-        })
+        }
     }
 
     fn snapshot(&mut self) -> Snapshot {

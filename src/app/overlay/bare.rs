@@ -32,7 +32,7 @@ impl State {
         let Some((catalog, choice, used)) = &mut self.choice else { return };
         let path = path.clone();
         let mut send = None;
-        let response = egui::Modal::new(egui::Id::unique("bare file")).show(ui.ctx(), |ui| {
+        let response = super::modal(ui, "bare file").show(ui.ctx(), |ui| {
             ui.set_width(640.0);
             let tokens = Tokens::of(ui);
             ui.label(RichText::new("What do these maps measure?").font(theme::strong(16.0)));

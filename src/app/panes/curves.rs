@@ -99,10 +99,17 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             plot.line(Line::new(c.name.clone(), PlotPoints::Borrowed(points)).color(color).width(c.width));
         }
         let top = plot.plot_bounds().max()[1];
+        let mut free_from = f32::NEG_INFINITY;
         for flag in &branch.flags {
             let x = flag.iteration as f64;
             plot.vline(VLine::new(flag.text.clone(), x).color(tokens.warn.gamma_multiply(0.7)).width(1.0));
-            let text = RichText::new(format!("⚑ {}", flag.text)).size(10.0);
+            // A dragged slider leaves many flags; texts are written where there is room.
+            let at = plot.screen_from_plot(PlotPoint::new(x, top)).x;
+            if at < free_from {
+                continue;
+            }
+            free_from = at + 12.0 + 5.5 * flag.text.chars().count() as f32;
+            let text = RichText::new(format!("◆ {}", flag.text)).size(10.0);
             plot.text(
                 Text::new("flag", PlotPoint::new(x, top), text).color(tokens.warn).anchor(egui::Align2::LEFT_TOP),
             );
@@ -214,7 +221,7 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, curves: &[Cu
             };
             text.append("■ ", 0.0, part(if on { tokens.curve(&c.key) } else { tokens.stroke }, true));
             text.append(&c.name, 0.0, part(if on { tokens.text } else { tokens.dim }, on));
-            let response = ui.add(egui::Label::new(text).sense(egui::Sense::click()).selectable(false));
+            let response = ui.add(egui::Label::new(text).sense(egui::Sense::click()).selectable(false).extend());
             let name = format!("Curve {}", c.name);
             response.widget_info(|| egui::WidgetInfo::selected(egui::Role::CheckBox, true, on, &name));
             if response.on_hover_text("Click to show or hide.").clicked() {

@@ -13,9 +13,18 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
         transport(ui, shared);
         status(ui, shared);
         ui.separator();
+        let old = shared.session.config;
+        let mut config = old;
+        for field in FIELDS.iter().take(3) {
+            slider(ui, field, &mut config);
+        }
+        ui.separator();
         numbers(ui, shared);
         ui.separator();
-        settings(ui, shared);
+        settings(ui, shared, &mut config);
+        if config != old {
+            shared.send(Command::SetConfig(config));
+        }
     });
 }
 
@@ -32,10 +41,10 @@ fn transport(ui: &mut Ui, shared: &mut Shared<'_>) {
         if response.on_hover_text("Run the asked number of iterations, or pause.\nKey: Enter").clicked() {
             shared.invoke("Run or pause");
         }
-        if icon_button(ui, "◂", "Step back", "Show the iteration before.\nKey: ,", ready && shown > 0, false).clicked() {
+        if icon_button(ui, "−1", "Step back", "Show the iteration before.\nKey: ,", ready && shown > 0, false).clicked() {
             shared.invoke("One step back");
         }
-        if icon_button(ui, "▸", "Step forward", "One iteration forward.\nKey: .", ready && !(running && shown == head), false).clicked() {
+        if icon_button(ui, "+1", "Step forward", "One iteration forward.\nKey: .", ready && !(running && shown == head), false).clicked() {
             shared.invoke("One step");
         }
         if icon_button(ui, "+10", "Ten steps forward", "Ten iterations forward.\nKey: Shift+.", ready && !(running && shown == head), false).clicked() {
@@ -112,7 +121,12 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
     let tokens = Tokens::of(ui);
     let fit = &shared.session.fit;
     let Some(row) = fit.shown_row() else {
-        ui.label(RichText::new("The start pose is being sought.").color(tokens.dim));
+        let text = if fit.status == FitStatus::Preparing {
+            "The start pose is being sought."
+        } else {
+            "No fit: open a frame."
+        };
+        ui.label(RichText::new(text).color(tokens.dim));
         return;
     };
     let report = &row.report;
@@ -155,15 +169,10 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
     }
 }
 
-fn settings(ui: &mut Ui, shared: &mut Shared<'_>) {
-    let old = shared.session.config;
-    let mut config = old;
-    for field in FIELDS.iter().take(3) {
-        slider(ui, field, &mut config);
-    }
+fn settings(ui: &mut Ui, shared: &mut Shared<'_>, config: &mut FitConfig) {
     egui::CollapsingHeader::new("Optimiser").default_open(true).show(ui, |ui| {
         for field in FIELDS.iter().skip(3).take(3) {
-            slider(ui, field, &mut config);
+            slider(ui, field, config);
         }
         ui.checkbox(&mut config.stop_when_converged, "Stop when converged")
             .on_hover_text("End a run as soon as the convergence criterion holds.");
@@ -196,7 +205,7 @@ fn settings(ui: &mut Ui, shared: &mut Shared<'_>) {
         }
     });
     egui::CollapsingHeader::new("Radar simulation").default_open(true).show(ui, |ui| {
-        operators(ui, &mut config);
+        operators(ui, config);
         ui.horizontal(|ui| {
             ui.label("Sum");
             ui.selectable_value(&mut config.summation, Summation::Coherent, "coherent")
@@ -204,25 +213,22 @@ fn settings(ui: &mut Ui, shared: &mut Shared<'_>) {
             ui.selectable_value(&mut config.summation, Summation::Incoherent, "incoherent")
                 .on_hover_text("H_sim = √Σ (A K)²: powers add.");
         });
-        region(ui, &mut config);
-        slider(ui, &FIELDS[7], &mut config);
+        region(ui, config);
+        slider(ui, &FIELDS[7], config);
     });
     egui::CollapsingHeader::new("Kinematic limits").default_open(false).show(ui, |ui| {
         for field in [&FIELDS[6], &FIELDS[8], &FIELDS[9]] {
-            slider(ui, field, &mut config);
+            slider(ui, field, config);
         }
     });
     ui.add_space(4.0);
-    let changed = config != FitConfig::default();
+    let changed = *config != FitConfig::default();
     if ui
         .add_enabled(changed, egui::Button::new("Reset all to defaults"))
         .on_hover_text("The paper's settings.")
         .clicked()
     {
-        config = FitConfig::default();
-    }
-    if config != old {
-        shared.send(Command::SetConfig(config));
+        *config = FitConfig::default();
     }
 }
 

@@ -19,11 +19,9 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         return empty(ui, "No frame", "Labels in camera pixels appear here.");
     };
     let Some(image) = &frame.image else {
-        return empty(
-            ui,
-            "No image labels",
-            "This data set has no key points, boxes or masks in camera pixels for this frame.",
-        );
+        let how = "This frame has no key points, boxes or masks in camera pixels.";
+        let how = frame.notes.iter().fold(how.to_owned(), |text, note| format!("{text}\n{note}"));
+        return empty(ui, "No image labels", &how);
     };
     let [width, height] = image.size.map(|n| n.max(1) as f32);
     let tokens = Tokens::of(ui);
@@ -50,8 +48,9 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     }
     ui.painter().rect_stroke(rect, 0.0, Stroke::new(1.0, tokens.stroke), egui::StrokeKind::Outside);
     let people = image.keypoints.len().max(image.boxes.len());
+    let missing = if frame.notes.is_empty() { String::new() } else { format!(" · {}", frame.notes.join(" · ")) };
     let text = format!(
-        "{width} × {height} px · {people} labelled {} · pixels of the camera, not metres: never compared with the fit",
+        "{width} × {height} px · {people} labelled {} · pixels of the camera, not metres: never compared with the fit{missing}",
         if people == 1 { "person" } else { "people" }
     );
     ui.painter().text(

@@ -43,6 +43,8 @@ pub(in crate::app) struct State {
     hovered: Option<(usize, [usize; 2])>,
     hovered_next: Option<(usize, [usize; 2])>,
     pass: u64,
+    /// The data set that the windows belong to.
+    dataset: Option<std::sync::Weak<crate::dataset::Dataset>>,
 }
 
 impl State {
@@ -88,6 +90,11 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, colu
     }
     let Some(frame) = &session.data.frame else { return empty(ui, "Reading the frame…", "") };
     let views = &dataset.info().views;
+    let known = state.dataset.as_ref().and_then(std::sync::Weak::upgrade);
+    if !known.is_some_and(|known| std::sync::Arc::ptr_eq(&known, dataset)) {
+        state.dataset = Some(std::sync::Arc::downgrade(dataset));
+        state.windows.clear();
+    }
     state.windows.resize(views.len(), Window::default());
     state.pictures.update(session, views, frame);
     toolbar::show(ui, shared, column);

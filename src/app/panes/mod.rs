@@ -106,14 +106,21 @@ pub(super) fn show(pane: PaneKind, ui: &mut egui::Ui, shared: &mut Shared<'_>, s
 /// An empty pane says what would fill it and how.
 pub(super) fn empty(ui: &mut egui::Ui, title: &str, how: &str) {
     let tokens = Tokens::of(ui);
-    ui.centered_and_justified(|ui| {
-        let mut text = egui::text::LayoutJob::default();
-        let format = |font, color| egui::TextFormat { font_id: font, color, ..Default::default() };
-        text.append(title, 0.0, format(theme::strong(theme::BODY), tokens.text));
-        text.append("\n", 0.0, format(theme::strong(theme::BODY), tokens.text));
-        text.append(how, 0.0, format(egui::FontId::proportional(theme::CAPTION), tokens.dim));
-        text.halign = egui::Align::Center;
-        text.wrap.max_width = (ui.available_width() - 24.0).max(80.0);
-        ui.label(text);
-    });
+    let area = ui.available_rect_before_wrap().shrink(16.0);
+    let mut text = egui::text::LayoutJob::default();
+    let format = |font, color| egui::TextFormat { font_id: font, color, ..Default::default() };
+    text.append(title, 0.0, format(theme::strong(theme::BODY), tokens.text));
+    if !how.is_empty() {
+        text.append(&format!("\n{how}"), 0.0, format(egui::FontId::proportional(theme::CAPTION), tokens.dim));
+    }
+    text.halign = egui::Align::Center;
+    text.wrap.max_width = area.width().clamp(60.0, 420.0);
+    let galley = ui.painter().layout_job(text);
+    let top = (area.center().y - galley.size().y / 2.0).max(area.top());
+    let rect =
+        egui::Rect::from_min_size(egui::pos2(area.left(), top), egui::vec2(area.width().max(1.0), galley.size().y));
+    let response = ui.allocate_rect(rect, egui::Sense::hover());
+    let spoken = format!("{title}. {how}");
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &spoken));
+    ui.painter().with_clip_rect(ui.clip_rect()).galley(egui::pos2(area.center().x, top), galley, tokens.text);
 }

@@ -19,16 +19,18 @@ const RADIUS_M: f32 = 2.4;
 
 /// Camera and GPU objects.
 pub(in crate::app) struct State {
-    render_state: Option<RenderState>,
+    gpu: Option<RenderState>,
     renderer: Option<SceneRenderer>,
     texture: Option<(TextureId, u64)>,
     camera: Option<Camera>,
+    /// The data set that the camera was placed for.
+    dataset: Option<std::sync::Weak<crate::dataset::Dataset>>,
 }
 
 impl State {
-    pub(in crate::app) fn new(render_state: Option<RenderState>) -> Self {
-        let renderer = render_state.as_ref().map(|s| SceneRenderer::new(&s.device, &s.queue, s.target_format));
-        Self { render_state, renderer, texture: None, camera: None }
+    pub(in crate::app) fn new(gpu: Option<RenderState>) -> Self {
+        let renderer = gpu.as_ref().map(|s| SceneRenderer::new(&s.device, &s.queue, s.target_format));
+        Self { gpu, renderer, texture: None, camera: None, dataset: None }
     }
 
     pub(in crate::app) fn reset(&mut self) {
@@ -39,12 +41,12 @@ impl State {
         let positions = session.shown_positions();
         let camera = self.camera.get_or_insert_with(|| Camera::overview(centre(session), RADIUS_M));
         match session.joint.and_then(|joint| positions.get(joint)) {
-            Some(&p) => camera.focus(Vec3::from(p.map(|x| x as f32)), 0.5),
+            Some(&p) => camera.focus(Vec3::from(p.map(|x| x as f32)), 0.8),
             None => camera.focus(centre(session), 1.1),
         }
     }
 
-    pub(in crate::app) fn from_radar(&mut self, session: &Session) {
+    pub(in crate::app) fn look_from_radar(&mut self, session: &Session) {
         let mut camera = Camera::from_radar();
         let eye = Vec3::new(0.0, 0.0, 0.0);
         let to = centre(session) - eye;
@@ -53,11 +55,11 @@ impl State {
         self.camera = Some(camera);
     }
 
-    pub(in crate::app) fn from_top(&mut self, session: &Session) {
+    pub(in crate::app) fn look_from_top(&mut self, session: &Session) {
         self.camera = Some(Camera::top(centre(session) * 0.7, RADIUS_M));
     }
 
-    pub(in crate::app) fn from_side(&mut self, session: &Session) {
+    pub(in crate::app) fn look_from_side(&mut self, session: &Session) {
         self.camera = Some(Camera::side(centre(session) * 0.7, RADIUS_M));
     }
 }
@@ -76,8 +78,14 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     if shared.session.data.dataset.is_none() {
         return empty(ui, "Nothing in the scene", "The Gaussians of a fit appear here when a frame is open.");
     }
-    let camera_missing = state.camera.is_none();
-    if camera_missing && shared.session.fit.shown.is_some() {
+    let known = state.dataset.as_ref().and_then(std::sync::Weak::upgrade);
+    if !known
+        .is_some_and(|known| shared.session.data.dataset.as_ref().is_some_and(|d| std::sync::Arc::ptr_eq(&known, d)))
+    {
+        state.dataset = shared.session.data.dataset.as_ref().map(std::sync::Arc::downgrade);
+        state.camera = None;
+    }
+    if state.camera.is_none() && shared.session.fit.shown.is_some() {
         state.camera = Some(Camera::overview(centre(shared.session), RADIUS_M));
     }
     toolbar(ui, shared);
@@ -135,7 +143,7 @@ fn steer(ui: &Ui, response: &egui::Response, rect: Rect, viewport: Vec2, scale: 
 }
 
 fn paint(ui: &Ui, state: &mut State, rect: Rect, viewport: Vec2, scene: &Scene, camera: &Camera) {
-    let (Some(gpu), Some(renderer)) = (&state.render_state, &mut state.renderer) else {
+    let (Some(gpu), Some(renderer)) = (&state.gpu, &mut state.renderer) else {
         let how = "No graphics adapter: the 3-D view is not drawn.";
         ui.painter().text(rect.center(), Align2::CENTER_CENTER, how, egui::FontId::proportional(12.0), Color32::GRAY);
         return;
@@ -185,7 +193,7 @@ fn interact(
                 if let Some(p) = shared.session.shown_positions().get(joint)
                     && let Some(camera) = &mut state.camera
                 {
-                    camera.focus(Vec3::from(p.map(|x| x as f32)), 0.5);
+                    camera.focus(Vec3::from(p.map(|x| x as f32)), 0.8);
                 }
             }
             None => state.camera = None,

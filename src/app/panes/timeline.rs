@@ -111,7 +111,7 @@ fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
     for (sign, name, label, enabled, active) in [
         ("◂", "Iteration back", "One step back", ready && shown > start, false),
         (if running { "⏸" } else { "▶" }, "Run or pause fit", "Run or pause", ready, running),
-        ("▸", "Iteration forward", "One step", ready && !(running && !back), false),
+        ("▸", "Iteration forward", "One step", ready && (back || !running), false),
         ("▸|", "Follow newest", "Follow newest iteration", back, false),
     ] {
         let tip = crate::app::commands::command(label).map(crate::app::commands::tooltip).unwrap_or_default();

@@ -27,7 +27,7 @@ pub(crate) fn iou_color(tokens: &Tokens, iou: f64) -> Color32 {
 /// A square button with a sign on it and a spoken name.
 pub(crate) fn icon_button(ui: &mut Ui, sign: &str, name: &str, tooltip: &str, enabled: bool, active: bool) -> Response {
     let tokens = Tokens::of(ui);
-    let text = RichText::new(sign).font(theme::mono(theme::BODY));
+    let text = RichText::new(sign).font(theme::mono(if sign.chars().count() == 1 { 15.0 } else { 12.0 }));
     let mut button = egui::Button::new(text).min_size(egui::vec2(30.0, 22.0)).sense(Sense::click());
     if active {
         button = button.fill(tokens.accent.gamma_multiply(0.35));

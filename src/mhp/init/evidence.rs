@@ -15,7 +15,7 @@ const NEAREST_M: f64 = 0.5;
 /// A ring with fewer cells says nothing of the background.
 const SMALLEST_RING: usize = 8;
 /// Spread of speckle, ln: a Rayleigh amplitude has 0.64. What rises less over the background is not counted.
-const SPECKLE: f64 = 0.64;
+pub(super) const SPECKLE: f64 = 0.64;
 /// The ln-salience above which a cell counts as fully lit.
 const FULLY_LIT: f64 = 2.0;
 /// Percentiles tried for local maxima, strictest first, until [`ENOUGH_PEAKS`] are found.
@@ -164,6 +164,23 @@ impl<'a> Evidence<'a> {
     pub(super) fn mean_lit(&self, points: &[Vec3]) -> f64 {
         let lit = |cell: usize| (self.salience[cell] / FULLY_LIT).min(1.0);
         points.iter().filter_map(|&p| self.cell(p)).map(lit).sum::<f64>() / points.len().max(1) as f64
+    }
+
+    /// Whether some axis of this view tells heights near a world point.
+    pub(super) fn resolves_height(&self, p_world: Vec3) -> bool {
+        let seen = Seen::new(self.view.pose.view_from_world(p_world));
+        self.axes.iter().any(|(_, axis)| {
+            let up = mat_t_vec(&self.view.pose.rotation, seen.direction_and_arm(axis.kind).0)[2];
+            up.abs() > 0.7
+        })
+    }
+
+    /// The largest salience at height `z_m` within `reach_m` before and behind `p_world`, ln.
+    pub(super) fn salience_at_height(&self, p_world: Vec3, z_m: f64, reach_m: f64) -> f64 {
+        let distance = p_world[0].hypot(p_world[1]).max(NEAREST_M);
+        let along = (-8..=8).map(|k| 1.0 + reach_m * f64::from(k) / (8.0 * distance));
+        let cells = along.filter_map(|k| self.cell([p_world[0] * k, p_world[1] * k, z_m]));
+        cells.map(|cell| self.salience[cell]).fold(0.0, f64::max)
     }
 
     /// Radial velocity (m/s) of the strongest Doppler bin at a world point, where the view has a Doppler axis.

@@ -9,27 +9,30 @@
 //! Nothing here reads a label.
 
 mod evidence;
+mod height;
 mod template;
 
 pub use evidence::Peak;
 
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
-use crate::config::FitConfig;
+use crate::config::{FitConfig, Summation};
 use crate::geometry::{Vec3, add, norm, scale, sub};
 use evidence::{Evidence, locate};
+use height::Expectation;
 use std::sync::Arc;
 use template::Template;
 
 /// Peaks of two views that disagree by more are not one body, m.
 const LARGEST_MISFIT_M: f64 = 0.35;
+/// Places nearer to each other are one, m.
+const DISTINCT_M: f64 = 0.7;
+/// At most this many places are looked at closely.
+const MOST_PLACES: usize = 8;
+/// A place with less than this share of the strongest place's echo is no rival to it.
+const WEAKEST_RIVAL: f64 = 0.3;
 /// Initial standard deviation of a joint's Gaussian, m.
 const INITIAL_SCALE_M: f64 = 0.08;
-/// Where the middle of a body is expected when nothing tells its height: a radar stands at about chest height, m.
-const EXPECTED_MIDDLE_M: f64 = -0.2;
-/// How weakly that is held: what one metre away costs, in units of L_EM (0 to 1) or of the lit share.
-const EXPECTATION_WEIGHT: f64 = 0.2;
-
 /// Height of the ripples of L_EM along a shift of the body.
 const RIPPLE: f64 = 0.02;
 
@@ -59,21 +62,28 @@ pub fn initialise(problem: &Problem, config: &FitConfig) -> Result<Initialisatio
         .collect();
     let candidates = candidates(problem, &peaks);
     notes.push(format!("{} peaks, {} places tried", peaks.len(), candidates.len()));
-    let best = |score: &dyn Fn(&[Vec3]) -> f64| {
+    let ranked = |score: &dyn Fn(&[Vec3]) -> f64| {
         let scored = candidates.iter().map(|&at| (at, score(&template.facing_origin(at))));
-        scored.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, score)| *score > 0.0).map(|(at, _)| at)
+        let mut scored: Vec<(Vec3, f64)> = scored.filter(|(_, score)| *score > 0.0).collect();
+        scored.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let least = WEAKEST_RIVAL * scored.first().map_or(0.0, |(_, score)| *score);
+        scored.into_iter().filter(|(_, score)| *score >= least).map(|(at, _)| at).collect::<Vec<Vec3>>()
     };
-    let at = best(&|body| shared_excess(&evidence, body)).or_else(|| {
+    let mut places = ranked(&|body| shared_excess(&evidence, body));
+    if places.is_empty() {
         notes.push("the views agree on no place: the strongest echo of one view was taken".to_owned());
-        best(&|body| evidence.iter().map(|e| e.mean_excess(body)).sum())
-    });
-    let Some(at) = at else {
+        places = ranked(&|body| evidence.iter().map(|e| e.mean_excess(body)).sum());
+    }
+    let Some((at, expected)) = most_bodily(&evidence, &template, &places) else {
         return Err(FitError::NoStart { reason: format!("none of {} peaks stands above its background", peaks.len()) });
     };
-    let at = cover(&evidence, &template, at);
-    let at = settle(problem, config, &evidence, &template, at)?;
+    let at = settle(problem, config, &evidence, &template, expected, at)?;
     let (params, velocity_note) = standing(problem, &evidence, &template, at);
     notes.push(format!("standing at x {:.2} m, y {:.2} m, facing the radar", at[0], at[1]));
+    notes.push(match expected.extent_m {
+        Some([low, high]) => format!("feet at z {low:.2} m and head at {high:.2} m seen"),
+        None => format!("no feet and head seen: middle of the body expected at z {:.2} m", expected.middle_m),
+    });
     notes.push(velocity_note);
     Ok(Initialisation { params, peaks, notes })
 }
@@ -100,19 +110,41 @@ fn candidates(problem: &Problem, peaks: &[Peak]) -> Vec<Vec3> {
     places.collect()
 }
 
+/// The first of the strongest distinct `places` where something stands from feet to head, or the strongest: a corner of
+/// the room may outshine a person in both views, but it is a spot.
+fn most_bodily(evidence: &[Evidence<'_>], template: &Template, places: &[Vec3]) -> Option<(Vec3, Expectation)> {
+    let mut tried: Vec<(Vec3, Expectation)> = Vec::new();
+    let mut starts: Vec<Vec3> = Vec::new();
+    for &place in places {
+        if starts.iter().any(|start| (start[0] - place[0]).hypot(start[1] - place[1]) < DISTINCT_M) {
+            continue;
+        }
+        starts.push(place);
+        let at = cover(evidence, template, place);
+        let expected = Expectation::new(evidence, at);
+        if expected.extent_m.is_some() {
+            return Some((at, expected));
+        }
+        tried.push((at, expected));
+        if tried.len() == MOST_PLACES {
+            break;
+        }
+    }
+    tried.first().copied()
+}
+
 /// How much echo over the background all views show at a body: the geometric mean over views, so that each must agree.
 fn shared_excess(evidence: &[Evidence<'_>], body: &[Vec3]) -> f64 {
     let logs: f64 = evidence.iter().map(|e| e.mean_excess(body).ln()).sum();
     (logs / evidence.len().max(1) as f64).exp()
 }
 
-/// Walks downhill along the first `axes` coordinates on a grid that is halved `halvings` times: to the best neighbour
-/// until none is better.
-fn descend(start: Vec3, axes: usize, step_m: f64, halvings: usize, mut cost: impl FnMut(Vec3) -> f64) -> Vec3 {
+/// Walks downhill on a grid that is halved `halvings` times: to the best of the six neighbours until none is better.
+fn descend(start: Vec3, step_m: f64, halvings: usize, mut cost: impl FnMut(Vec3) -> f64) -> Vec3 {
     let (mut at, mut lowest, mut step) = (start, cost(start), step_m);
     for _ in 0..=halvings {
         for _ in 0..12 {
-            let moves = (0..2 * axes).map(|k| {
+            let moves = (0..6).map(|k| {
                 let mut to = at;
                 to[k / 2] += if k % 2 == 0 { step } else { -step };
                 (to, cost(to))
@@ -130,10 +162,11 @@ fn descend(start: Vec3, axes: usize, step_m: f64, halvings: usize, mut cost: imp
 
 /// Shifts the body until as much of it as possible lies on what is lit in every view.
 fn cover(evidence: &[Evidence<'_>], template: &Template, at: Vec3) -> Vec3 {
-    descend(at, 3, 0.2, 3, |p| {
+    let expected = Expectation::new(evidence, at);
+    descend(at, 0.2, 3, |p| {
         let body = template.facing_origin(p);
         let lit: f64 = evidence.iter().map(|e| e.mean_lit(&body)).sum::<f64>() / evidence.len().max(1) as f64;
-        EXPECTATION_WEIGHT * (p[2] - EXPECTED_MIDDLE_M).powi(2) - lit
+        expected.cost(p[2]) - lit
     })
 }
 
@@ -143,24 +176,33 @@ fn settle(
     config: &FitConfig,
     evidence: &[Evidence<'_>],
     template: &Template,
+    expected: Expectation,
     at: Vec3,
 ) -> Result<Vec3, FitError> {
     let start = standing(problem, evidence, template, at).0;
-    let objective = Objective::new(Arc::new(problem.clone()), *config, Precision::F32, &start)?;
+    // Where the joints are is not known to a wavelength, so their interference says nothing yet.
+    let config = FitConfig { summation: Summation::Incoherent, ..*config };
+    let objective = Objective::new(Arc::new(problem.clone()), config, Precision::F32, &start)?;
     let mut cost = |p: Vec3| {
         let loss = objective.em_loss(&standing(problem, evidence, template, p).0);
-        loss + EXPECTATION_WEIGHT * (p[2] - EXPECTED_MIDDLE_M).powi(2)
+        loss + expected.cost(p[2])
     };
-    let at = descend(at, 3, 0.1, 2, &mut cost);
-    let at = add(at, [0.0, 0.0, mean_shift(|up| cost(add(at, [0.0, 0.0, up])))]);
-    Ok(descend(at, 2, 0.05, 2, &mut cost))
+    let mut at = descend(at, 0.1, 1, &mut cost);
+    for (axis, reach_m) in [(2, 0.6), (0, 0.3), (1, 0.3)] {
+        at[axis] += mean_shift(reach_m, |shift| {
+            let mut moved = at;
+            moved[axis] += shift;
+            cost(moved)
+        });
+    }
+    Ok(at)
 }
 
-/// The mean height shift under exp(−cost/T). L_EM along the height of a body is a wide, shallow valley with ripples where
-/// single joints meet single speckles; its deepest ripple says less than its middle.
-fn mean_shift(mut cost: impl FnMut(f64) -> f64) -> f64 {
-    let shifts: Vec<f64> = (-6..=6).map(|k| 0.1 * f64::from(k)).collect();
-    let costs: Vec<f64> = shifts.iter().map(|&up| cost(up)).collect();
+/// The mean shift within ± `reach_m` under exp(−cost/T). L_EM along a shift of the body is a wide valley with ripples
+/// where single joints meet single speckles; its deepest ripple says less than its middle.
+fn mean_shift(reach_m: f64, mut cost: impl FnMut(f64) -> f64) -> f64 {
+    let shifts: Vec<f64> = (-6..=6).map(|k| reach_m * f64::from(k) / 6.0).collect();
+    let costs: Vec<f64> = shifts.iter().map(|&shift| cost(shift)).collect();
     let lowest = costs.iter().copied().fold(f64::INFINITY, f64::min);
     let (mut sum, mut weights) = (0.0, 0.0);
     for (shift, cost) in shifts.into_iter().zip(costs).filter(|(_, cost)| cost.is_finite()) {

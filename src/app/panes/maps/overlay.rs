@@ -33,8 +33,7 @@ pub(super) fn title(
             });
             iou.map_or_else(|| "IoU —".to_owned(), |iou| format!("IoU {iou:.3}"))
         }
-        Content::Ori => String::new(),
-        Content::Sim => String::new(),
+        Content::Ori | Content::Sim => String::new(),
         Content::Difference => "H_sim − H_ori".into(),
     };
     let font = if content == Content::Masks { theme::mono(theme::CAPTION) } else { caption };

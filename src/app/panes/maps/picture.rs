@@ -53,7 +53,8 @@ pub(super) struct Pictures {
     frame: Option<Arc<Frame>>,
     snapshot: Option<Arc<Snapshot>>,
     look: Option<Look>,
-    textures: RefCell<HashMap<(usize, Content), TextureHandle>>,
+    /// With whether the texture shows what the maps are now.
+    textures: RefCell<HashMap<(usize, Content), (TextureHandle, bool)>>,
 }
 
 /// What of the view state changes pixels.
@@ -115,8 +116,9 @@ impl Pictures {
                 pictures.take_snapshot(session.fit.shown.as_deref(), i, view, &look);
             }
         }
-        let textures = self.textures.get_mut();
-        textures.retain(|(_, content), _| !all && *content == Content::Ori);
+        for ((_, content), (_, fresh)) in self.textures.get_mut() {
+            *fresh &= !all && *content == Content::Ori;
+        }
         self.frame = Some(Arc::clone(frame));
         self.snapshot.clone_from(&session.fit.shown);
         self.look = Some(look);
@@ -125,13 +127,18 @@ impl Pictures {
     /// Draws the part `uv` of a map into `rect`.
     pub(super) fn paint(&self, ui: &Ui, painter: &Painter, rect: Rect, uv: Rect, view: usize, content: Content) {
         let mut textures = self.textures.borrow_mut();
-        if !textures.contains_key(&(view, content)) {
+        if !matches!(textures.get(&(view, content)), Some((_, true))) {
             let Some(image) = self.image(view, content) else { return };
-            let name = format!("map {view} {}", content.name());
-            let texture = ui.ctx().load_texture(name, image, TextureOptions::NEAREST);
-            textures.insert((view, content), texture);
+            if let Some((texture, fresh)) = textures.get_mut(&(view, content)) {
+                texture.set(image, TextureOptions::NEAREST);
+                *fresh = true;
+            } else {
+                let name = format!("map {view} {}", content.name());
+                let texture = ui.ctx().load_texture(name, image, TextureOptions::NEAREST);
+                textures.insert((view, content), (texture, true));
+            }
         }
-        if let Some(texture) = textures.get(&(view, content)) {
+        if let Some((texture, _)) = textures.get(&(view, content)) {
             painter.image(texture.id(), rect, uv, Color32::WHITE);
         }
     }

@@ -1,0 +1,206 @@
+//! `fit`: frames of a data set, one after the other or side by side, into a table and parameter files.
+
+mod table;
+
+use super::common::{PrecisionArg, config, open, print};
+use super::frames::FrameRange;
+use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
+use crate::config::FitConfig;
+use crate::dataset::{Dataset, Layout};
+use crate::study::{BatchOptions, FrameRow, Means, Summary, columns, run_batch};
+use anyhow::Context as _;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+use std::io::IsTerminal as _;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use table::Table;
+
+/// Shown under the options of `fit --help`.
+pub(super) const HELP: &str = "\
+Columns: frame iterations converged reason loss em bone rigid joint sep coll iou_<array>... majpe_mm pa_majpe_mm init_ms \
+fit_ms. What is unknown is empty (null in JSON): the errors in mm where the data set has no joints in metres, init_ms \
+where the frame before was the start. A frame that cannot be fitted has the reason `error: ...`, and the run goes on.
+
+Exit codes: 0 every frame was fitted; 1 some were not; 2 none was, or the input is bad.
+
+Examples:
+  mhp-inspector fit data/d1s1/000/00383_radar.npz
+      One frame of MMVR with the defaults; prints its row.
+  mhp-inspector fit data/d1s1 --frames 0..900 --warm-start --out results
+      A minute of MMVR, each frame from the one before; writes results/summary.csv, fit.toml, pppr/*.npz.";
+
+/// What `fit` is told.
+#[derive(Debug, Args)]
+pub struct FitArgs {
+    /// An MMVR tree or any folder inside one, a `*_radar.npz`, a folder with `dataset.toml`, or an `.npy`/`.npz` of maps.
+    path: PathBuf,
+    /// Frames to fit, counted from 0, as in Rust: 5..12 (12 not included), 5..=11, 5.., ..12, or 7 alone. Default: all,
+    /// or the one that PATH names.
+    #[arg(long, value_name = "A..B")]
+    frames: Option<FrameRange>,
+    /// Fit configuration; without it the defaults.
+    #[arg(long, value_name = "FIT.toml")]
+    config: Option<PathBuf>,
+    /// Adam steps of a frame, instead of the configuration's.
+    #[arg(long, value_name = "N")]
+    iterations: Option<usize>,
+    /// Scalar of the per-cell kernel.
+    #[arg(long, value_enum, default_value = "f64")]
+    precision: PrecisionArg,
+    /// Folder for summary.csv, fit.toml (the settings in force) and pppr/NAME.npz (the parameters of each frame, `_` for
+    /// `/` in its name). Without it nothing is written.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Start each frame from the result of the one before in its sequence; one frame at a time then.
+    #[arg(long)]
+    warm_start: bool,
+    /// One JSON object instead of a table: `frames` with the keys of the columns, and `mean`.
+    #[arg(long)]
+    json: bool,
+    /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
+    #[arg(long, value_name = "FILE")]
+    manifest: Option<PathBuf>,
+}
+
+/// Runs `fit`.
+///
+/// # Errors
+/// Where the configuration, the data set or the range of frames is bad, DIR cannot be written, or no frame at all could
+/// be fitted.
+pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
+    let config = settings(args)?;
+    let dataset = open(&args.path, args.manifest.as_deref())?;
+    let frames = frames(args, &dataset)?;
+    let arrays: Vec<String> = dataset.info().views.iter().map(|view| view.array.clone()).collect();
+    let mut summary = args.out.as_deref().map(|out| prepare(out, args, &dataset, &config, &arrays)).transpose()?;
+    let options = BatchOptions {
+        config,
+        precision: args.precision.into(),
+        warm_start: args.warm_start,
+        params_folder: args.out.as_deref().map(params_folder),
+    };
+    let bar = progress_bar(frames.len());
+    let mut report = Report::new(arrays, args.json);
+    let done = run_batch(&dataset, frames, &options, |row| {
+        bar.inc(1);
+        summary.as_mut().map_or(Ok(()), |summary| summary.add(&row))?;
+        report.add(row);
+        Ok(())
+    });
+    bar.finish_and_clear();
+    done?;
+    report.tell()
+}
+
+fn settings(args: &FitArgs) -> anyhow::Result<FitConfig> {
+    let config = config(args.config.as_deref())?;
+    match args.iterations {
+        Some(iterations) => FitConfig { iterations, ..config }.validated().context("--iterations"),
+        None => Ok(config),
+    }
+}
+
+/// The frames asked for; the one that PATH names; or all.
+fn frames(args: &FitArgs, dataset: &Dataset) -> anyhow::Result<Range<usize>> {
+    let whole = args.frames.is_none() && !(dataset.info().layout == Layout::Mmvr && args.path.is_file());
+    if whole {
+        return Ok(0..dataset.len());
+    }
+    let Some(range) = args.frames else { return Ok(dataset.start_index()..dataset.start_index() + 1) };
+    range.within(dataset.len()).map_err(|why| anyhow::anyhow!("{}: --frames: {why}", args.path.display()))
+}
+
+fn params_folder(out: &Path) -> PathBuf {
+    out.join("pppr")
+}
+
+/// Makes the folders, writes the settings, and opens the table: what cannot be written is told before anything is fitted.
+fn prepare(
+    out: &Path,
+    args: &FitArgs,
+    dataset: &Dataset,
+    config: &FitConfig,
+    arrays: &[String],
+) -> anyhow::Result<Summary> {
+    let folder = params_folder(out);
+    std::fs::create_dir_all(&folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    let precision = match args.precision {
+        PrecisionArg::F64 => "f64",
+        PrecisionArg::F32 => "f32",
+    };
+    let head = format!(
+        "# mhp-inspector {} fit of {}\n# precision {precision}, {}\n",
+        env!("CARGO_PKG_VERSION"),
+        dataset.info().root.display().to_string().escape_debug(),
+        if args.warm_start { "warm start" } else { "every frame from its own peaks" },
+    );
+    let file = out.join("fit.toml");
+    std::fs::write(&file, head + &config.to_toml())
+        .with_context(|| format!("{}: cannot be written", file.display()))?;
+    Ok(Summary::create(&out.join("summary.csv"), arrays)?)
+}
+
+/// On standard error, and only where somebody can see it move.
+fn progress_bar(frames: usize) -> ProgressBar {
+    if !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} frames, {elapsed} gone, {eta} to go");
+    let bar = ProgressBar::new(frames as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.tick();
+    bar
+}
+
+/// What is printed at the end.
+struct Report {
+    columns: Vec<String>,
+    means: Means,
+    first_error: Option<String>,
+    table: Table,
+    /// One object a row, where JSON was asked for.
+    json: Option<Vec<Value>>,
+}
+
+impl Report {
+    fn new(arrays: Vec<String>, json: bool) -> Self {
+        Self {
+            columns: columns(&arrays),
+            means: Means::new(arrays.len()),
+            first_error: None,
+            table: Table::new(arrays),
+            json: json.then(Vec::new),
+        }
+    }
+
+    fn add(&mut self, row: FrameRow) {
+        self.means.add(&row);
+        if let (None, Err(why)) = (&self.first_error, &row.fit) {
+            self.first_error = Some(why.clone());
+        }
+        match &mut self.json {
+            Some(rows) => rows.push(row.json(&self.columns)),
+            None => self.table.add(row),
+        }
+    }
+
+    fn tell(self) -> anyhow::Result<ExitCode> {
+        let (frames, failed) = (self.means.frames, self.means.failed);
+        let nothing = failed == frames;
+        if let Some(rows) = self.json {
+            let object = json!({ "frames": rows, "mean": self.means.json(&self.columns) });
+            print(&(serde_json::to_string_pretty(&object).context("writing JSON")? + "\n"))?;
+        } else if !nothing {
+            print(&self.table.text(&self.means))?;
+        }
+        let Some(why) = self.first_error else { return Ok(ExitCode::SUCCESS) };
+        match frames {
+            1 => eprintln!("error: {why}"),
+            _ if nothing => eprintln!("error: none of {frames} frames could be fitted; the first: {why}"),
+            _ => eprintln!("warning: {failed} of {frames} frames could not be fitted; the first: {why}"),
+        }
+        Ok(ExitCode::from(if nothing { EXIT_BAD_INPUT } else { EXIT_SOME_FAILED }))
+    }
+}

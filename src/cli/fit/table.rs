@@ -1,0 +1,97 @@
+//! The table for people: the first rows, and the means of all.
+
+use crate::study::{FrameRow, Means};
+
+/// Rows that are shown; the rest is in the means and in summary.csv.
+const SHOWN: usize = 20;
+/// What stands where nothing is known.
+const UNKNOWN: &str = "-";
+
+/// Collects what is shown.
+pub(super) struct Table {
+    arrays: Vec<String>,
+    rows: Vec<FrameRow>,
+}
+
+impl Table {
+    pub(super) fn new(arrays: Vec<String>) -> Self {
+        Self { arrays, rows: Vec::new() }
+    }
+
+    pub(super) fn add(&mut self, row: FrameRow) {
+        if self.rows.len() < SHOWN {
+            self.rows.push(row);
+        }
+    }
+
+    /// Head, rows, how many more there are, means.
+    pub(super) fn text(&self, means: &Means) -> String {
+        let views = self.arrays.len();
+        let mut lines = vec![self.head()];
+        lines.extend(self.rows.iter().map(|row| {
+            let fit = row.fit.as_ref().ok();
+            let converged = fit.map(|fit| if fit.report.converged { "yes" } else { "no" });
+            let iterations = fit.map(|fit| fit.report.iteration.to_string());
+            line(&row.frame, iterations, converged.map(Into::into), &row.values(views), views, row.reason())
+        }));
+        let mean = line(
+            "mean",
+            means.iterations().map(|n| format!("{n:.0}")),
+            means.converged_share().map(|share| format!("{:.0} %", 100.0 * share)),
+            &means.values(),
+            views,
+            format!("{} of {} frames fitted", means.fitted(), means.frames),
+        );
+        lines.push(mean);
+        let more = means.frames - self.rows.len();
+        aligned(&lines, (more > 0).then(|| format!("... and {more} more frames")))
+    }
+
+    fn head(&self) -> Vec<String> {
+        let ious = self.arrays.iter().map(|array| format!("iou_{array}"));
+        let first = ["frame", "iterations", "converged", "loss", "em"].map(String::from);
+        let last = ["majpe_mm", "pa_majpe_mm", "init_ms", "fit_ms", "reason"].map(String::from);
+        first.into_iter().chain(ious).chain(last).collect()
+    }
+}
+
+/// One line's cells. `values` are loss, six terms, the IoUs, two errors and two times.
+fn line(
+    frame: &str,
+    iterations: Option<String>,
+    converged: Option<String>,
+    values: &[Option<f64>],
+    views: usize,
+    reason: String,
+) -> Vec<String> {
+    let text = |x: Option<String>| x.unwrap_or_else(|| UNKNOWN.into());
+    let number =
+        |k: usize, digits: usize| text(values.get(k).copied().flatten().map(|value| format!("{value:.digits$}")));
+    let mut cells = vec![frame.to_owned(), text(iterations), text(converged), number(0, 4), number(1, 4)];
+    cells.extend((7..7 + views).map(|k| number(k, 3)));
+    cells.extend([(7, 1), (8, 1), (9, 0), (10, 0)].map(|(k, digits)| number(views + k, digits)));
+    cells.push(reason);
+    cells
+}
+
+/// Columns two spaces apart; the first and the last to the left, numbers to the right. `before_last` is a line by itself.
+fn aligned(lines: &[Vec<String>], before_last: Option<String>) -> String {
+    let count = lines.first().map_or(0, Vec::len);
+    let width = |k: usize| lines.iter().filter_map(|line| line.get(k)).map(|cell| cell.chars().count()).max();
+    let widths: Vec<usize> = (0..count).map(|k| width(k).unwrap_or(0)).collect();
+    let mut texts: Vec<String> = lines
+        .iter()
+        .map(|line| {
+            let cells = line.iter().zip(&widths).enumerate().map(|(k, (cell, &width))| match k {
+                0 => format!("{cell:<width$}"),
+                _ if k + 1 == count => cell.clone(),
+                _ => format!("{cell:>width$}"),
+            });
+            cells.collect::<Vec<_>>().join("  ")
+        })
+        .collect();
+    if let Some(text) = before_last {
+        texts.insert(texts.len().saturating_sub(1), text);
+    }
+    texts.join("\n") + "\n"
+}

@@ -1,0 +1,74 @@
+//! How high a body stands: the extent of what is lit above and below the place where it was found.
+
+use super::evidence::{Evidence, SPECKLE};
+use crate::geometry::Vec3;
+
+/// Where the middle of a body is expected when nothing tells its height: a radar stands at about chest height, m.
+const UNSEEN_MIDDLE_M: f64 = -0.2;
+/// What one metre off costs then, in units of L_EM.
+const UNSEEN_WEIGHT: f64 = 0.2;
+/// The same where feet and head were seen, to about 5 cm.
+const SEEN_WEIGHT: f64 = 5.0;
+/// A joint's echo may be this far before or behind the body's middle, m.
+const REACH_M: f64 = 0.35;
+const STEP_M: f64 = 0.04;
+/// Dark stretches up to this length do not end a body, m.
+const LARGEST_GAP_M: f64 = 0.2;
+/// An extent outside this is no whole standing body, m.
+const PLAUSIBLE_M: (f64, f64) = (1.2, 2.2);
+
+/// Where the middle of the body is expected, and how firmly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Expectation {
+    /// Height of the middle, world frame, m.
+    pub middle_m: f64,
+    weight: f64,
+    /// Lowest and highest lit height, m, where they were seen.
+    pub extent_m: Option<[f64; 2]>,
+}
+
+impl Expectation {
+    /// Looks for feet and head of a body found near `at`.
+    pub(super) fn new(evidence: &[Evidence<'_>], at: Vec3) -> Self {
+        let telling: Vec<&Evidence<'_>> = evidence.iter().filter(|e| e.resolves_height(at)).collect();
+        let lit = |z: f64| {
+            let sum: f64 = telling.iter().map(|e| e.salience_at_height(at, z, REACH_M)).sum();
+            sum / telling.len().max(1) as f64 > SPECKLE
+        };
+        let heights: Vec<f64> = (-50..=50).map(|k| at[2] + STEP_M * f64::from(k)).filter(|&z| lit(z)).collect();
+        let extent_m = extent_around(&heights, at[2])
+            .filter(|[low, high]| (PLAUSIBLE_M.0..=PLAUSIBLE_M.1).contains(&(high - low)));
+        match extent_m {
+            Some([low, high]) => Self { middle_m: f64::midpoint(low, high), weight: SEEN_WEIGHT, extent_m },
+            None => Self { middle_m: UNSEEN_MIDDLE_M, weight: UNSEEN_WEIGHT, extent_m },
+        }
+    }
+
+    /// What a body whose middle is at height `z_m` costs.
+    pub(super) fn cost(&self, z_m: f64) -> f64 {
+        self.weight * (z_m - self.middle_m).powi(2)
+    }
+}
+
+/// First and last of the rising `heights` that hang together with the one nearest to `z_m`.
+fn extent_around(heights: &[f64], z_m: f64) -> Option<[f64; 2]> {
+    let nearest = (0..heights.len()).min_by(|&a, &b| (heights[a] - z_m).abs().total_cmp(&(heights[b] - z_m).abs()))?;
+    let joined = |pair: &[f64]| pair[1] - pair[0] <= LARGEST_GAP_M;
+    let below = heights[..=nearest].windows(2).rev().take_while(|pair| joined(pair)).count();
+    let above = heights[nearest..].windows(2).take_while(|pair| joined(pair)).count();
+    Some([heights[nearest - below], heights[nearest + above]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_extent_ends_at_a_gap() {
+        let heights = [-2.0, -1.0, -0.9, -0.75, 0.0, 0.1, 0.25, 0.9];
+        assert_eq!(extent_around(&heights, -0.8), Some([-1.0, -0.75]));
+        assert_eq!(extent_around(&heights, 0.2), Some([0.0, 0.25]));
+        assert_eq!(extent_around(&heights, 5.0), Some([0.9, 0.9]));
+        assert_eq!(extent_around(&[], 0.0), None);
+    }
+}

@@ -1,0 +1,215 @@
+//! What is known of one fitted frame, and the means over many.
+
+use super::summary::{FIRST, NUMBERS};
+use crate::body::Pppr;
+use crate::mhp::{StepReport, StopReason};
+use serde_json::{Map, Value};
+
+/// The numbers of a fit that worked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitNumbers {
+    /// Iteration, loss, terms, IoU of each view and convergence at the end.
+    pub report: StepReport,
+    /// Why the run ended.
+    pub reason: StopReason,
+    /// Mean joint error against the data set's own joints, mm.
+    pub majpe_mm: Option<f64>,
+    /// The same after alignment of each person.
+    pub pa_majpe_mm: Option<f64>,
+    /// Time to find the start pose, ms; `None` where it was the result of the frame before.
+    pub init_ms: Option<f64>,
+    /// Time of all Adam steps, ms.
+    pub fit_ms: f64,
+}
+
+/// A fit that worked: its numbers and the parameters it ended with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameFit {
+    /// The numbers of its row.
+    pub numbers: FitNumbers,
+    /// Where the fit ended; SPEC section 2.
+    pub params: Pppr,
+}
+
+/// One row of a batch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameRow {
+    /// Index in the data set.
+    pub index: usize,
+    /// The frame's name.
+    pub frame: String,
+    /// The fit, or why there is none: one line that names the file.
+    pub fit: Result<FitNumbers, String>,
+}
+
+impl FrameRow {
+    /// The numbers, in the order of the columns between `reason` and the end: loss, six terms, the IoU of `views`
+    /// views, two joint errors, two times. `None` where unknown.
+    pub fn values(&self, views: usize) -> Vec<Option<f64>> {
+        let Ok(fit) = &self.fit else { return vec![None; views + NUMBERS] };
+        let (report, t) = (&fit.report, &fit.report.terms);
+        let losses = [report.loss, t.em, t.bone, t.rigid, t.joint, t.sep, t.coll].map(Some);
+        let ious = (0..views).map(|view| report.iou.get(view).copied().flatten());
+        let rest = [fit.majpe_mm, fit.pa_majpe_mm, fit.init_ms, Some(fit.fit_ms)];
+        losses.into_iter().chain(ious).chain(rest).map(|x| x.filter(|x| x.is_finite())).collect()
+    }
+
+    /// Why the run ended: `iterations`, `converged`, or `error: …`.
+    pub fn reason(&self) -> String {
+        match &self.fit {
+            Ok(fit) => fit.reason.word().to_owned(),
+            Err(why) => format!("error: {why}"),
+        }
+    }
+
+    /// One cell a column of [`super::columns`]; empty where unknown.
+    pub fn cells(&self, views: usize) -> Vec<String> {
+        let fit = self.fit.as_ref().ok();
+        let text = |x: Option<String>| x.unwrap_or_default();
+        let first = [
+            self.frame.clone(),
+            text(fit.map(|fit| fit.report.iteration.to_string())),
+            text(fit.map(|fit| fit.report.converged.to_string())),
+            self.reason(),
+        ];
+        first.into_iter().chain(self.values(views).into_iter().map(|x| text(x.map(|x| x.to_string())))).collect()
+    }
+
+    /// The row as a JSON object with the keys of [`super::columns`]; null where unknown.
+    pub fn json(&self, columns: &[String]) -> Value {
+        let views = columns.len().saturating_sub(super::columns(&[]).len());
+        let fit = self.fit.as_ref().ok();
+        let first = [
+            Value::from(self.frame.clone()),
+            Value::from(fit.map(|fit| fit.report.iteration)),
+            Value::from(fit.map(|fit| fit.report.converged)),
+            Value::from(self.reason()),
+        ];
+        let values = first.into_iter().chain(self.values(views).into_iter().map(Value::from));
+        Value::Object(columns.iter().cloned().zip(values).collect())
+    }
+}
+
+/// Running means over the frames that could be fitted; each value over the frames where it is known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Means {
+    /// Frames seen, failed ones included.
+    pub frames: usize,
+    /// Frames without a fit.
+    pub failed: usize,
+    converged: usize,
+    iterations: usize,
+    sums: Vec<(f64, usize)>,
+}
+
+impl Means {
+    /// No frame yet, of a data set with `views` views.
+    pub fn new(views: usize) -> Self {
+        Self { frames: 0, failed: 0, converged: 0, iterations: 0, sums: vec![(0.0, 0); views + NUMBERS] }
+    }
+
+    /// Counts a row.
+    pub fn add(&mut self, row: &FrameRow) {
+        self.frames += 1;
+        match &row.fit {
+            Ok(fit) => {
+                self.converged += usize::from(fit.report.converged);
+                self.iterations += fit.report.iteration;
+            }
+            Err(_) => self.failed += 1,
+        }
+        let views = self.sums.len() - NUMBERS;
+        for ((sum, count), value) in self.sums.iter_mut().zip(row.values(views)) {
+            if let Some(value) = value {
+                *sum += value;
+                *count += 1;
+            }
+        }
+    }
+
+    /// Frames with a fit.
+    pub fn fitted(&self) -> usize {
+        self.frames - self.failed
+    }
+
+    /// Share of the fitted frames that met the convergence criterion.
+    pub fn converged_share(&self) -> Option<f64> {
+        self.over_fitted(self.converged)
+    }
+
+    /// Mean number of iterations.
+    pub fn iterations(&self) -> Option<f64> {
+        self.over_fitted(self.iterations)
+    }
+
+    fn over_fitted(&self, count: usize) -> Option<f64> {
+        (self.fitted() > 0).then(|| count as f64 / self.fitted() as f64)
+    }
+
+    /// The means in the order of [`FrameRow::values`].
+    pub fn values(&self) -> Vec<Option<f64>> {
+        self.sums.iter().map(|&(sum, count)| (count > 0).then(|| sum / count as f64)).collect()
+    }
+
+    /// `frames`, `failed`, `converged_share`, `iterations` and the mean of every number column; null where unknown.
+    pub fn json(&self, columns: &[String]) -> Value {
+        let mut object = Map::new();
+        object.insert("frames".into(), self.frames.into());
+        object.insert("failed".into(), self.failed.into());
+        object.insert("converged_share".into(), self.converged_share().into());
+        object.insert("iterations".into(), self.iterations().into());
+        let numbers = columns.iter().skip(FIRST.len()).cloned();
+        object.extend(numbers.zip(self.values().into_iter().map(Value::from)));
+        Value::Object(object)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mhp::Terms;
+
+    fn row(loss: f64, iou: Option<f64>, converged: bool) -> FrameRow {
+        let terms = Terms { em: 0.5, bone: 0.1, rigid: 0.2, joint: 0.3, sep: 0.0, coll: 0.0 };
+        let report = StepReport { iteration: 10, loss, terms, iou: vec![iou], converged };
+        let fit = FitNumbers {
+            report,
+            reason: StopReason::Iterations,
+            majpe_mm: None,
+            pa_majpe_mm: None,
+            init_ms: Some(2.0),
+            fit_ms: 5.0,
+        };
+        FrameRow { index: 0, frame: "a/0".into(), fit: Ok(fit) }
+    }
+
+    #[test]
+    fn means_are_over_the_frames_where_a_value_is_known() {
+        let mut means = Means::new(1);
+        for row in [row(1.0, Some(0.4), true), row(3.0, None, false)] {
+            means.add(&row);
+        }
+        means.add(&FrameRow { index: 2, frame: "a/2".into(), fit: Err("x.npz: no".into()) });
+        let json = means.json(&super::super::columns(&["hm".to_owned()]));
+        assert_eq!((means.frames, means.failed, means.converged_share()), (3, 1, Some(0.5)));
+        assert_eq!(json["loss"], 2.0);
+        assert_eq!(json["iou_hm"], 0.4);
+        assert_eq!(json["fit_ms"], 5.0);
+        assert!(json["majpe_mm"].is_null());
+        assert_eq!(json["iterations"], 10.0);
+    }
+
+    #[test]
+    fn unknown_cells_are_empty_and_numbers_read_back_exactly() {
+        let columns = super::super::columns(&["hm".to_owned()]);
+        let cells = row(0.1 + 0.2, None, true).cells(1);
+        assert_eq!(cells.len(), columns.len());
+        assert_eq!(cells[..4], ["a/0", "10", "true", "iterations"]);
+        assert_eq!(cells[4].parse(), Ok(0.1 + 0.2));
+        assert_eq!(cells[11], "", "an undefined IoU");
+        assert_eq!(cells[12..], ["", "", "2", "5"]);
+        let failed = FrameRow { index: 0, frame: "b".into(), fit: Err("why".into()) };
+        assert_eq!(failed.cells(1)[1..5], ["", "", "error: why", ""]);
+        assert_eq!(failed.json(&columns)["loss"], Value::Null);
+    }
+}

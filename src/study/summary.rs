@@ -1,0 +1,77 @@
+//! `summary.csv`: a row is on disk as soon as its frame is done, so that an interrupted run leaves a valid table.
+
+use super::FrameRow;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// The columns before the numbers.
+pub(super) const FIRST: [&str; 4] = ["frame", "iterations", "converged", "reason"];
+const LOSSES: [&str; 7] = ["loss", "em", "bone", "rigid", "joint", "sep", "coll"];
+const LAST: [&str; 4] = ["majpe_mm", "pa_majpe_mm", "init_ms", "fit_ms"];
+/// Columns of numbers, besides one for the IoU of each view.
+pub(super) const NUMBERS: usize = LOSSES.len() + LAST.len();
+
+/// What can go wrong with a batch as a whole.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// A folder or table cannot be written.
+    #[error("{path}: cannot be written: {reason}", path = path.display())]
+    Write {
+        /// What the operating system said.
+        reason: std::io::Error,
+        /// The file or folder.
+        path: PathBuf,
+    },
+    /// The operating system gives no more threads.
+    #[error("no thread to fit on: {reason}")]
+    Thread {
+        /// What it said.
+        reason: std::io::Error,
+    },
+}
+
+/// The columns of a batch, in order: `frame iterations converged reason loss em bone rigid joint sep coll iou_<array>…
+/// majpe_mm pa_majpe_mm init_ms fit_ms`, an IoU for each of `arrays`.
+pub fn columns(arrays: &[String]) -> Vec<String> {
+    let plain = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let ious = arrays.iter().map(|array| format!("iou_{array}")).collect();
+    [plain(&FIRST), plain(&LOSSES), ious, plain(&LAST)].concat()
+}
+
+/// An open `summary.csv`.
+#[derive(Debug)]
+pub struct Summary {
+    writer: csv::Writer<File>,
+    views: usize,
+    path: PathBuf,
+}
+
+impl Summary {
+    /// Creates the table (an older one is replaced) and writes its head.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn create(path: &Path, arrays: &[String]) -> Result<Self, StudyError> {
+        let failed = |reason| StudyError::Write { reason, path: path.to_owned() };
+        // A row is flushed by itself and is shorter than the buffer, hence reaches the file in one piece.
+        let writer =
+            csv::WriterBuilder::new().buffer_capacity(1 << 16).from_writer(File::create(path).map_err(failed)?);
+        let mut summary = Self { writer, views: arrays.len(), path: path.to_owned() };
+        summary.record(&columns(arrays))?;
+        Ok(summary)
+    }
+
+    /// Appends a row and flushes it.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn add(&mut self, row: &FrameRow) -> Result<(), StudyError> {
+        self.record(&row.cells(self.views))
+    }
+
+    fn record(&mut self, cells: &[String]) -> Result<(), StudyError> {
+        let written = self.writer.write_record(cells).map_err(std::io::Error::other);
+        let flushed = written.and_then(|()| self.writer.flush());
+        flushed.map_err(|reason| StudyError::Write { reason, path: self.path.clone() })
+    }
+}
