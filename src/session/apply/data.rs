@@ -1,0 +1,187 @@
+//! Opening data sets, changing frames, putting fits aside and finding them again.
+
+use crate::body::Pppr;
+use crate::dataset::{Dataset, DatasetError, Frame};
+use crate::session::command::Effect;
+use crate::session::fit::{Fit, FitStatus};
+use crate::session::history::History;
+use crate::session::state::{LogLevel, Opening, RECENT, Session};
+use crate::worker::{Prepare, Start, WorkerCommand};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Fits of frames that were left are kept up to this many.
+const KEPT_FITS: usize = 16;
+/// Bytes of states that each of them may keep.
+const KEPT_FIT_BYTES: usize = 4 << 20;
+
+impl Session {
+    pub(super) fn open(&mut self, path: PathBuf) -> Vec<Effect> {
+        self.data.bare = None;
+        self.data.opening = Some(opening(path.clone()));
+        vec![Effect::Open(path)]
+    }
+
+    pub(super) fn opened(&mut self, path: PathBuf, result: Result<Arc<Dataset>, DatasetError>) -> Vec<Effect> {
+        self.data.opening = None;
+        let dataset = match result {
+            Ok(dataset) => dataset,
+            Err(DatasetError::NeedsAxes(catalog)) => {
+                self.data.bare = Some((path, catalog));
+                return Vec::new();
+            }
+            Err(DatasetError::Cancelled) => {
+                self.note(LogLevel::Info, format!("opening {} was cancelled", path.display()));
+                return Vec::new();
+            }
+            Err(error) => {
+                self.note(LogLevel::Error, error.to_string());
+                return Vec::new();
+            }
+        };
+        self.remember(path);
+        let frames = dataset.len();
+        let info = dataset.info();
+        let opened = format!("opened {}: {frames} frame{}", info.name, if frames == 1 { "" } else { "s" });
+        let assumptions = info.assumptions.clone();
+        self.note(LogLevel::Info, opened);
+        for assumption in assumptions {
+            self.note(LogLevel::Info, assumption);
+        }
+        let start = dataset.start_index();
+        let mut effects = self.leave_frame();
+        self.fits.clear();
+        self.left.clear();
+        self.summaries.clear();
+        self.data.frame = None;
+        self.data.playing = false;
+        self.data.dataset = Some(Arc::clone(&dataset));
+        self.joint = None;
+        effects.push(Effect::UseDataset(dataset));
+        self.data.frame_index = start;
+        effects.extend(self.load(start));
+        effects
+    }
+
+    pub(super) fn remember(&mut self, path: PathBuf) {
+        let path = std::path::absolute(&path).unwrap_or(path);
+        self.data.recent.retain(|known| *known != path);
+        self.data.recent.insert(0, path);
+        self.data.recent.truncate(RECENT);
+    }
+
+    pub(super) fn goto_frame(&mut self, index: usize) -> Vec<Effect> {
+        if index >= self.data.len() || (index == self.data.frame_index && self.data.error.is_none()) {
+            return Vec::new();
+        }
+        self.data.frame_index = index;
+        self.load(index)
+    }
+
+    pub(super) fn load(&mut self, index: usize) -> Vec<Effect> {
+        self.data.loading = Some(index);
+        self.data.error = None;
+        vec![Effect::Load(index)]
+    }
+
+    pub(super) fn frame_loaded(&mut self, index: usize, result: Result<Arc<Frame>, DatasetError>) -> Vec<Effect> {
+        if self.data.loading != Some(index) {
+            return Vec::new();
+        }
+        self.data.loading = None;
+        let frame = match result {
+            Ok(frame) => frame,
+            Err(error) => {
+                let text = error.to_string();
+                self.data.playing = false;
+                self.data.error = Some(text.clone());
+                self.data.frame = None;
+                self.note(LogLevel::Error, text);
+                return self.leave_frame();
+            }
+        };
+        let warm = self.warm_params();
+        let mut effects = self.leave_frame();
+        for note in &frame.notes {
+            self.note(LogLevel::Info, format!("{}: {note}", frame.name));
+        }
+        self.data.frame = Some(frame);
+        effects.extend(self.begin_fit(index, warm));
+        effects
+    }
+
+    /// The parameters that a warm start would take from the fit on screen.
+    pub(super) fn warm_params(&self) -> Option<Pppr> {
+        if !self.warm_start {
+            return None;
+        }
+        let branch = self.fit.branch()?;
+        branch.state_at(branch.head()).filter(|(iteration, _)| *iteration > 0).map(|(_, state)| state.params.clone())
+    }
+
+    /// Puts the fit on screen aside, so that coming back finds it again.
+    pub(super) fn leave_frame(&mut self) -> Vec<Effect> {
+        let mut fit = std::mem::take(&mut self.fit);
+        if fit.problem.is_none() {
+            return Vec::new();
+        }
+        fit.shown = None;
+        fit.status = FitStatus::Paused;
+        fit.history.shrink(KEPT_FIT_BYTES);
+        self.left.retain(|frame| *frame != fit.frame);
+        if fit.head() > 0 || fit.history.branches().len() > 1 {
+            self.left.push_back(fit.frame);
+            self.fits.insert(fit.frame, fit);
+            while self.left.len() > KEPT_FITS {
+                if let Some(oldest) = self.left.pop_front() {
+                    self.fits.remove(&oldest);
+                }
+            }
+        }
+        vec![Effect::Send(WorkerCommand::Discard)]
+    }
+
+    /// Prepares the fit of the frame on screen: the one that was left there, a warm start, or a new one.
+    pub(super) fn begin_fit(&mut self, index: usize, warm: Option<Pppr>) -> Vec<Effect> {
+        let resumed = self.fits.remove(&index).filter(|fit| fit.initial.is_some());
+        let (Some(dataset), Some(frame)) = (&self.data.dataset, &self.data.frame) else { return Vec::new() };
+        self.jobs += 1;
+        let (fit, start) = match resumed {
+            Some(fit) => {
+                let state = fit.branch().and_then(|b| b.state_at(b.head())).map(|(_, state)| Arc::clone(state));
+                match (state, fit.initial.clone()) {
+                    (Some(state), Some(initial)) => (fit, Start::Resume { initial, state }),
+                    _ => (Fit::default(), Start::Initialise),
+                }
+            }
+            None => (Fit::default(), warm.map_or(Start::Initialise, Start::Warm)),
+        };
+        let resuming = matches!(start, Start::Resume { .. });
+        self.fit = Fit { job: self.jobs, frame: index, status: FitStatus::Preparing, ..fit };
+        if resuming {
+            // Settings that changed meanwhile are recorded where they take effect.
+            let (id, head) = (self.fit.history.active_id(), self.fit.head());
+            self.fit.history.flag(id, head, self.config);
+        } else {
+            self.fit.history = History::new(self.config);
+            self.fit.cursor = None;
+        }
+        let info = dataset.info();
+        vec![Effect::Send(WorkerCommand::Prepare(Box::new(Prepare {
+            job: self.jobs,
+            branch: self.fit.history.active_id(),
+            radar: info.radar.clone(),
+            skeleton: info.skeleton.clone(),
+            views: info.views.clone(),
+            frame: Arc::clone(frame),
+            config: self.config,
+            precision: self.precision,
+            start,
+        })))]
+    }
+}
+
+/// A data set of which nothing is known yet.
+pub(super) fn opening(path: PathBuf) -> Opening {
+    Opening { path, stage: "looking".into(), done: 0, total: 0 }
+}

@@ -1,0 +1,186 @@
+//! Running, stepping, going back, branching, changing settings.
+
+use crate::body::Pppr;
+use crate::config::FitConfig;
+use crate::session::command::Effect;
+use crate::session::fit::FitStatus;
+use crate::session::history::difference;
+use crate::session::state::{LogLevel, Session};
+use crate::worker::WorkerCommand;
+use std::sync::Arc;
+
+impl Session {
+    pub(super) fn toggle_run(&mut self) -> Vec<Effect> {
+        if self.fit.is_running() {
+            return vec![Effect::Send(WorkerCommand::Pause)];
+        }
+        if !self.fit.is_ready() {
+            return Vec::new();
+        }
+        let (head, asked) = (self.fit.head(), self.config.iterations);
+        let target = if head < asked { asked } else { head + asked };
+        self.run_to(target)
+    }
+
+    pub(super) fn run_to(&mut self, target: usize) -> Vec<Effect> {
+        self.fit.cursor = None;
+        self.fit.status = FitStatus::Running;
+        self.fit.reason = None;
+        vec![Effect::Send(WorkerCommand::RunTo(target))]
+    }
+
+    pub(super) fn step_fit(&mut self, n: usize) -> Vec<Effect> {
+        if !self.fit.is_ready() {
+            return Vec::new();
+        }
+        let (shown, head) = (self.fit.shown_iteration(), self.fit.head());
+        if shown < head {
+            // States may be thinned out: the next one that is kept, or a step would stay where it is.
+            let wanted = (shown + n).min(head);
+            let next = self.fit.branch().and_then(|branch| branch.kept_from(wanted));
+            return self.goto_iteration(next.unwrap_or(head));
+        }
+        if self.fit.is_running() {
+            return Vec::new();
+        }
+        self.run_to(head + n)
+    }
+
+    pub(super) fn goto_iteration(&mut self, iteration: usize) -> Vec<Effect> {
+        let Some(branch) = self.fit.branch() else { return Vec::new() };
+        let wanted = iteration.clamp(branch.start(), branch.head());
+        if wanted == branch.head() {
+            return self.follow_live();
+        }
+        let Some((kept, state)) = branch.state_at(wanted) else { return Vec::new() };
+        let (id, config, state) = (branch.id, branch.config_at(kept), Arc::clone(state));
+        if self.fit.cursor == Some(kept) || !self.fit.is_ready() {
+            return Vec::new();
+        }
+        self.fit.cursor = Some(kept);
+        vec![Effect::Send(WorkerCommand::Inspect { branch: id, state, config })]
+    }
+
+    /// Back to the newest iteration: its state is looked at until the worker publishes a newer one.
+    pub(super) fn follow_live(&mut self) -> Vec<Effect> {
+        if self.fit.cursor.take().is_none() || self.fit.is_running() {
+            return Vec::new();
+        }
+        self.inspect_head()
+    }
+
+    pub(super) fn inspect_head(&self) -> Vec<Effect> {
+        let Some(branch) = self.fit.branch() else { return Vec::new() };
+        let Some((_, state)) = branch.state_at(branch.head()) else { return Vec::new() };
+        let (id, config, state) = (branch.id, branch.newest_config(), Arc::clone(state));
+        vec![Effect::Send(WorkerCommand::Inspect { branch: id, state, config })]
+    }
+
+    pub(super) fn reset(&mut self) -> Vec<Effect> {
+        let Some(frame) = self.data.frame.as_ref().map(|frame| frame.index) else { return Vec::new() };
+        self.fits.remove(&frame);
+        self.summaries.remove(&frame);
+        self.note(LogLevel::Info, "reset: a new start pose with the current settings".into());
+        self.begin_fit(frame, None)
+    }
+
+    pub(super) fn discard(&mut self) -> Vec<Effect> {
+        if !self.fit.is_ready() {
+            return Vec::new();
+        }
+        let id = self.fit.history.active_id();
+        if let Some((parent, at)) = self.fit.history.discard(id) {
+            self.note(LogLevel::Info, format!("discarded branch {id}; back on branch {parent}, which it left at {at}"));
+        } else {
+            self.fit.history.keep_start();
+            self.note(LogLevel::Info, "discarded the run; back at the start pose".into());
+        }
+        self.fit.status = FitStatus::Paused;
+        self.fit.reason = None;
+        self.continue_active()
+    }
+
+    pub(super) fn select_branch(&mut self, id: u32) -> Vec<Effect> {
+        if !self.fit.is_ready() || id == self.fit.history.active_id() {
+            return Vec::new();
+        }
+        self.fit.history.activate(id);
+        self.continue_active()
+    }
+
+    /// The worker continues at the head of the active branch, with that branch's newest settings.
+    pub(super) fn continue_active(&mut self) -> Vec<Effect> {
+        self.fit.cursor = None;
+        self.fit.status = FitStatus::Paused;
+        let Some(branch) = self.fit.branch() else { return Vec::new() };
+        let Some((_, state)) = branch.state_at(branch.head()) else { return Vec::new() };
+        let (id, config, state) = (branch.id, branch.newest_config(), Arc::clone(state));
+        self.config = FitConfig { iterations: self.config.iterations, ..config };
+        self.summarise();
+        vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: self.config })]
+    }
+
+    pub(super) fn set_config(&mut self, config: FitConfig) -> Vec<Effect> {
+        let config = match config.validated() {
+            Ok(config) => config,
+            Err(error) => {
+                self.note(LogLevel::Error, error.to_string());
+                return Vec::new();
+            }
+        };
+        if config == self.config {
+            return Vec::new();
+        }
+        let steering_only = FitConfig {
+            iterations: self.config.iterations,
+            stop_when_converged: self.config.stop_when_converged,
+            ..config
+        } == self.config;
+        self.config = config;
+        if matches!(self.fit.status, FitStatus::Idle | FitStatus::Failed(_)) {
+            return Vec::new();
+        }
+        if !steering_only && let Some(effects) = self.branch_at_cursor() {
+            return effects;
+        }
+        vec![Effect::Send(WorkerCommand::Configure(config))]
+    }
+
+    /// Where an earlier iteration is looked at: starts a branch there with the current settings.
+    pub(super) fn branch_at_cursor(&mut self) -> Option<Vec<Effect>> {
+        let at = self.fit.cursor?;
+        let branch = self.fit.branch()?;
+        let (kept, state) = branch.state_at(at).map(|(k, s)| (k, Arc::clone(s)))?;
+        let parent = branch.id;
+        let old = branch.config_at(kept);
+        // Until the worker answers with the row under the new settings, the branch begins with the one that is known.
+        let row = branch.row(kept).cloned();
+        let id = self.fit.history.begin(Some((parent, kept)), self.config);
+        if let Some(row) = row {
+            self.fit.history.push(id, row);
+        }
+        self.fit.cursor = None;
+        self.fit.status = FitStatus::Paused;
+        let what = difference(&old, &self.config);
+        let what = if what.is_empty() { "edited by hand".into() } else { what };
+        self.note(LogLevel::Info, format!("branch {id} begins at iteration {kept} of branch {parent}: {what}"));
+        Some(vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: self.config })])
+    }
+
+    pub(super) fn edit(&mut self, params: Pppr) -> Vec<Effect> {
+        if !self.fit.is_ready() {
+            return Vec::new();
+        }
+        if !params.is_finite() {
+            self.note(LogLevel::Error, "an edited parameter is not a finite number; nothing was changed".into());
+            return Vec::new();
+        }
+        // An edit needs a branch of its own, or it would rewrite the row that is already there.
+        if self.fit.cursor.is_none() && self.fit.branch().is_some_and(|b| b.rows.len() > 1) {
+            self.fit.cursor = Some(self.fit.head());
+        }
+        let mut effects = self.branch_at_cursor().unwrap_or_default();
+        effects.push(Effect::Send(WorkerCommand::Edit(Box::new(params))));
+        effects
+    }
+}

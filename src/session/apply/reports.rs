@@ -1,0 +1,138 @@
+//! What the worker reports: rows, events, snapshots.
+
+use crate::body::Group;
+use crate::diagnose::majpe_mm;
+use crate::session::command::Effect;
+use crate::session::fit::FitStatus;
+use crate::session::history::Row;
+use crate::session::state::{FrameSummary, LogLevel, Session};
+use crate::worker::{HistoryRow, Prepared, Snapshot, WorkerEvent, WorkerMessage};
+use std::sync::Arc;
+
+impl Session {
+    pub(super) fn worker_message(&mut self, message: WorkerMessage) -> Vec<Effect> {
+        match message {
+            WorkerMessage::Rows(job, rows) if job == self.fit.job => {
+                for row in rows {
+                    self.push_row(row);
+                }
+                self.summarise();
+                Vec::new()
+            }
+            WorkerMessage::Event(job, event) if job == self.fit.job => self.worker_event(event),
+            WorkerMessage::Rows(..) | WorkerMessage::Event(..) => Vec::new(),
+        }
+    }
+
+    pub(super) fn push_row(&mut self, row: HistoryRow) {
+        let majpe_mm = self.data.frame.as_ref().and_then(|frame| frame.truth.as_ref()).and_then(|truth| {
+            let positions: Vec<_> =
+                (0..row.state.params.shape().total_joints()).map(|j| row.state.params.position(j)).collect();
+            majpe_mm(&positions, &truth.joints)
+        });
+        self.fit.history.push(row.branch, Row { report: row.report, state: Some(row.state), majpe_mm });
+    }
+
+    pub(super) fn summarise(&mut self) {
+        let Some(row) = self.fit.branch().and_then(|branch| branch.rows.last()) else { return };
+        if row.report.iteration == 0 {
+            self.summaries.remove(&self.fit.frame);
+            return;
+        }
+        let known: Vec<f64> = row.report.iou.iter().flatten().copied().collect();
+        let summary = FrameSummary {
+            iterations: row.report.iteration,
+            loss: row.report.loss,
+            iou: (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64),
+            converged: row.report.converged,
+            majpe_mm: row.majpe_mm,
+        };
+        self.summaries.insert(self.fit.frame, summary);
+    }
+
+    pub(super) fn worker_event(&mut self, event: WorkerEvent) -> Vec<Effect> {
+        match event {
+            WorkerEvent::Prepared(prepared) => self.prepared(*prepared),
+            WorkerEvent::ConfigApplied { branch, iteration, config } => {
+                self.fit.history.flag(branch, iteration, config);
+                Vec::new()
+            }
+            WorkerEvent::Finished { branch, iteration, reason, run_ms } => {
+                if branch == self.fit.history.active_id() {
+                    self.fit.status = FitStatus::Paused;
+                    self.fit.run_ms = Some(run_ms);
+                    self.fit.reason = Some(reason.text());
+                    if self.fit.branch().is_some_and(|b| b.rows.len() > 2) {
+                        self.note(
+                            LogLevel::Info,
+                            format!("{} at iteration {iteration} after {run_ms:.0} ms", reason.text()),
+                        );
+                    }
+                }
+                Vec::new()
+            }
+            WorkerEvent::Failed(text) => {
+                self.fit.status = FitStatus::Paused;
+                self.fit.reason = Some("failed");
+                self.note(LogLevel::Error, text);
+                Vec::new()
+            }
+            WorkerEvent::Lost(text) => {
+                self.fit.status = FitStatus::Failed(text.clone());
+                self.fit.reason = Some("failed");
+                self.note(LogLevel::Error, text);
+                Vec::new()
+            }
+        }
+    }
+
+    pub(super) fn prepared(&mut self, prepared: Prepared) -> Vec<Effect> {
+        for warning in &prepared.warnings {
+            self.note(LogLevel::Warning, warning.clone());
+        }
+        if let Some(found) = &prepared.initialisation {
+            for note in &found.notes {
+                self.note(LogLevel::Info, note.clone());
+            }
+        }
+        let joints = prepared.initial.shape().total_joints();
+        if self.joint.is_some_and(|joint| joint >= joints) {
+            self.joint = None;
+        }
+        self.fit.problem = Some(prepared.problem);
+        self.fit.initial = Some(prepared.initial);
+        self.fit.init_ms = prepared.init_ms;
+        if prepared.initialisation.is_some() {
+            self.fit.initialisation = prepared.initialisation;
+        }
+        self.fit.status = FitStatus::Paused;
+        if let Some(cursor) = self.fit.cursor.take() {
+            return self.goto_iteration(cursor);
+        }
+        if self.view.run_on_open && self.fit.head() == 0 {
+            return self.toggle_run();
+        }
+        Vec::new()
+    }
+
+    pub(super) fn snapshot(&mut self, snapshot: Snapshot) {
+        if snapshot.job != self.fit.job || snapshot.branch != self.fit.history.active_id() {
+            return;
+        }
+        let wanted = match self.fit.cursor {
+            // An answer to a look back that is over by now would show the past as the present.
+            None => snapshot.live || snapshot.iteration == self.fit.head(),
+            Some(cursor) => !snapshot.live && snapshot.iteration == cursor,
+        };
+        if wanted {
+            self.fit.shown = Some(Arc::new(snapshot));
+        }
+    }
+
+    /// Positions of the joints that are drawn, m, world frame; empty where nothing is fitted yet.
+    pub fn shown_positions(&self) -> Vec<crate::geometry::Vec3> {
+        self.fit.shown.as_ref().map_or_else(Vec::new, |snapshot| {
+            snapshot.params.group(Group::Position).chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()
+        })
+    }
+}
