@@ -2,7 +2,7 @@
 
 use super::Shared;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::{chip, icon_button, iou_color, value_row};
+use crate::app::widgets::{Named as _, chip, icon_button, iou_color, value_row};
 use crate::config::{EmRegion, FIELDS, Field, FitConfig, Summation};
 use crate::mhp::Precision;
 use crate::session::{Command, FitStatus};
@@ -34,7 +34,7 @@ fn transport(ui: &mut Ui, shared: &mut Shared<'_>) {
     let head = fit.head();
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
-        let (sign, name) = if running { ("⏸", "Pause fit") } else { ("▶", "Run fit") };
+        let (sign, name) = if running { ("‖", "Pause fit") } else { ("▶", "Run fit") };
         let text = RichText::new(if running { format!("{sign} Pause") } else { format!("{sign} Run") });
         let response = ui.add_enabled(ready, egui::Button::new(text).min_size(egui::vec2(72.0, 24.0)));
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, ready, name));
@@ -109,6 +109,7 @@ fn branches(ui: &mut Ui, shared: &mut Shared<'_>) {
             }
         })
         .response
+        .named(egui::Role::ComboBox, "Branch")
         .on_hover_text(
             "Branches of this fit. Changing a setting at an earlier iteration starts a new one and keeps the old.",
         );

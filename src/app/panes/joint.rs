@@ -3,6 +3,7 @@
 
 use super::{Shared, empty};
 use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Named as _;
 use crate::body::{Group, Pppr};
 use crate::session::Command;
 use egui::{RichText, Ui};
@@ -105,11 +106,14 @@ fn picker(ui: &mut Ui, shared: &mut Shared<'_>) {
     ui.horizontal(|ui| {
         let text = chosen.map_or_else(|| "choose a joint".into(), name);
         let combo = egui::ComboBox::from_id_salt("joint").width(150.0).selected_text(text);
-        combo.show_ui(ui, |ui| {
-            for j in 0..total {
-                ui.selectable_value(&mut chosen, Some(j), name(j));
-            }
-        });
+        combo
+            .show_ui(ui, |ui| {
+                for j in 0..total {
+                    ui.selectable_value(&mut chosen, Some(j), name(j));
+                }
+            })
+            .response
+            .named(egui::Role::ComboBox, "Joint");
         for (sign, step, spoken) in [("◂", total.saturating_sub(1), "Previous joint"), ("▸", 1, "Next joint")] {
             let tip = format!("{spoken} of the skeleton.");
             if crate::app::widgets::icon_button(ui, sign, spoken, &tip, total > 0, false).clicked() {

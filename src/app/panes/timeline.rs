@@ -45,7 +45,7 @@ fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Toke
     for (sign, name, label, enabled) in [
         ("|◂", "First frame", "First frame", index > 0),
         ("◂", "Previous frame", "Previous frame", index > 0),
-        (if playing { "⏸" } else { "▶" }, if playing { "Stop playing" } else { "Play frames" }, "Play frames", many),
+        (if playing { "‖" } else { "▶" }, if playing { "Stop playing" } else { "Play frames" }, "Play frames", many),
         ("▸", "Next frame", "Next frame", index + 1 < count),
         ("▸|", "Last frame", "Last frame", index + 1 < count),
     ] {
@@ -110,7 +110,7 @@ fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
     caption(ui, "Iteration");
     for (sign, name, label, enabled, active) in [
         ("◂", "Iteration back", "One step back", ready && shown > start, false),
-        (if running { "⏸" } else { "▶" }, "Run or pause fit", "Run or pause", ready, running),
+        (if running { "‖" } else { "▶" }, "Run or pause fit", "Run or pause", ready, running),
         ("▸", "Iteration forward", "One step", ready && (back || !running), false),
         ("▸|", "Follow newest", "Follow newest iteration", back, false),
     ] {

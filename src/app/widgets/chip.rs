@@ -38,6 +38,20 @@ pub(crate) fn icon_button(ui: &mut Ui, sign: &str, name: &str, tooltip: &str, en
     response.on_hover_text(tooltip).on_disabled_hover_text(tooltip)
 }
 
+/// Gives a thing the name that a screen reader says, where its text does not.
+pub(crate) trait Named {
+    /// The same response, named.
+    fn named(self, role: egui::Role, name: &str) -> Self;
+}
+
+impl Named for Response {
+    fn named(self, role: egui::Role, name: &str) -> Self {
+        let enabled = self.enabled();
+        self.widget_info(|| WidgetInfo::labeled(role, enabled, name));
+        self
+    }
+}
+
 /// A name at the left and a number with its unit at the right edge, in tabular figures.
 pub(crate) fn value_row(ui: &mut Ui, name: &str, value: &str, unit: &str) -> Response {
     let tokens = Tokens::of(ui);

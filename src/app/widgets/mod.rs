@@ -3,5 +3,5 @@
 mod chip;
 mod colorbar;
 
-pub(super) use chip::{chip, icon_button, iou_color, value_row};
+pub(super) use chip::{Named, chip, icon_button, iou_color, value_row};
 pub(super) use colorbar::{ColorBar, colorbar, tick};

@@ -2,6 +2,7 @@
 
 use super::{Column, Shared};
 use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Named as _;
 use crate::render::Colormap;
 use crate::session::{ColorRange, Compare, MapScale};
 use egui::{Color32, RichText, Sense, Ui, vec2};
@@ -32,6 +33,7 @@ fn colours(ui: &mut Ui, shared: &mut Shared<'_>) {
                 .on_hover_text("The stored value divided by the map's maximum.");
         })
         .response
+        .named(egui::Role::ComboBox, "Scale")
         .on_hover_text("Scale of the colours.");
     egui::ComboBox::from_id_salt("colormap")
         .width(74.0)
@@ -46,6 +48,7 @@ fn colours(ui: &mut Ui, shared: &mut Shared<'_>) {
             }
         })
         .response
+        .named(egui::Role::ComboBox, "Colour map")
         .on_hover_text("Colour map. Viridis, inferno and magma are perceptually uniform.");
     more(ui, shared);
     let view = &shared.session.view;

@@ -1,0 +1,128 @@
+//! Dependencies point down only: what each room may use of the others, read from the sources.
+#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Each room of `src/` and the rooms that it may use besides itself.
+const MAY_USE: &[(&str, &[&str])] = &[
+    ("geometry", &[]),
+    ("config", &[]),
+    ("radar", &["geometry", "config"]),
+    ("body", &["geometry", "radar"]),
+    ("mhp", &["geometry", "config", "radar", "body"]),
+    ("diagnose", &["geometry", "config", "radar", "body", "mhp"]),
+    ("dataset", &["geometry", "config", "radar", "body"]),
+    ("render", &["geometry"]),
+    ("worker", &["geometry", "config", "radar", "body", "mhp", "dataset"]),
+    ("study", &["geometry", "config", "radar", "body", "mhp", "dataset", "diagnose"]),
+    ("session", &["geometry", "config", "radar", "body", "mhp", "dataset", "diagnose", "worker"]),
+    ("app", &["geometry", "config", "radar", "body", "mhp", "dataset", "diagnose", "worker", "session", "render"]),
+];
+
+/// Rooms that know no window and no GPU.
+const WINDOWLESS: &[&str] =
+    &["geometry", "config", "radar", "body", "mhp", "dataset", "diagnose", "worker", "session", "study"];
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(files(&path));
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+/// The code of a file, without comments.
+fn code(path: &Path) -> String {
+    let text = std::fs::read_to_string(path).unwrap();
+    let lines = text.lines().map(|line| line.split("//").next().unwrap_or_default());
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// Every room named after `crate::`, also in `crate::{a, b::c}`.
+fn used_rooms(code: &str) -> BTreeSet<String> {
+    let word =
+        |text: &str| -> String { text.trim_start().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect() };
+    let mut rooms = BTreeSet::new();
+    for (at, _) in code.match_indices("crate::") {
+        let rest = &code[at + "crate::".len()..];
+        let Some(group) = rest.strip_prefix('{') else {
+            rooms.insert(word(rest));
+            continue;
+        };
+        let (mut depth, mut start) = (0, 0);
+        for (i, c) in group.char_indices() {
+            match c {
+                '{' => depth += 1,
+                '}' if depth > 0 => depth -= 1,
+                ',' | '}' if depth == 0 => {
+                    rooms.insert(word(&group[start..i]));
+                    start = i + 1;
+                    if c == '}' {
+                        break;
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+    rooms
+}
+
+fn sources() -> Vec<(String, PathBuf)> {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let room = |path: &Path| {
+        let first = path.strip_prefix(&src).unwrap().components().next().unwrap();
+        first.as_os_str().to_str().unwrap().trim_end_matches(".rs").to_owned()
+    };
+    files(&src).into_iter().map(|path| (room(&path), path)).collect()
+}
+
+#[test]
+fn rooms_are_found_in_every_form_of_use() {
+    let text = "use crate::{body::{Pppr, Group}, radar, mhp::em::x};\nlet a = crate::config::FIELDS; pub(crate) fn f()";
+    let expected = ["body", "config", "mhp", "radar"];
+    assert_eq!(used_rooms(text).iter().map(String::as_str).collect::<Vec<_>>(), expected);
+}
+
+#[test]
+fn every_room_uses_only_what_lies_below_it() {
+    let mut seen = BTreeSet::new();
+    let mut wrong = Vec::new();
+    for (room, path) in sources() {
+        let Some((_, below)) = MAY_USE.iter().find(|(name, _)| *name == room) else { continue };
+        seen.insert(room.clone());
+        for used in used_rooms(&code(&path)) {
+            let known = MAY_USE.iter().any(|(name, _)| *name == used) || ["cli", "labels", "people"].contains(&&*used);
+            if known && used != room && !below.contains(&used.as_str()) {
+                wrong.push(format!("{} uses {used}", path.display()));
+            }
+        }
+    }
+    assert_eq!(wrong, Vec::<String>::new());
+    let expected: BTreeSet<String> = MAY_USE.iter().map(|(room, _)| (*room).to_owned()).collect();
+    assert_eq!(seen, expected, "every room of the table exists");
+}
+
+#[test]
+fn rooms_below_the_window_know_neither_egui_nor_wgpu() {
+    let mut wrong = Vec::new();
+    for (room, path) in sources() {
+        let code = code(&path);
+        let banned: &[&str] = match room.as_str() {
+            room if WINDOWLESS.contains(&room) => &["egui", "eframe", "wgpu", "rfd::"],
+            "render" => &["egui", "eframe::App", "rfd::"],
+            _ => &[],
+        };
+        // wgpu itself is taken from eframe: that is no use of the window.
+        let code = code.replace("eframe::wgpu", "wgpu").replace("eframe::egui_wgpu", "wgpu");
+        wrong.extend(banned.iter().filter(|word| code.contains(**word)).map(|w| format!("{}: {w}", path.display())));
+    }
+    assert_eq!(wrong, Vec::<String>::new());
+}

@@ -1,0 +1,546 @@
+//! The real window without a display, driven by the names that a screen reader would say.
+#![cfg(feature = "viewer")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
+
+#[path = "common/blob.rs"]
+mod blob;
+
+use egui::{Key, Modifiers, Role, pos2};
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use egui_kittest::{Harness, Node};
+use mhp_inspector::app::InspectorApp;
+use mhp_inspector::session::{Compare, Fit, FitStatus, Session, ThemeChoice};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Nothing here takes seconds; where it does, the machine is busy, not the program wrong.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// The window on a data set of its own.
+struct Window {
+    harness: Harness<'static, InspectorApp>,
+    folder: tempfile::TempDir,
+}
+
+impl Window {
+    fn empty(paths: &[PathBuf], size: [f32; 2]) -> Harness<'static, InspectorApp> {
+        Harness::builder()
+            .with_size(size)
+            .with_step_dt(1.0 / 60.0)
+            .with_max_steps(200)
+            .build_eframe(|cc| InspectorApp::new(cc, paths))
+    }
+
+    /// Frame 0 of `frames` is on screen and its fit is ready.
+    fn open(frames: usize) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        blob::write_dataset(folder.path(), frames);
+        let harness = Self::empty(&[folder.path().into()], [1440.0, 900.0]);
+        let mut window = Self { harness, folder };
+        window.ready(0);
+        window
+    }
+
+    fn session(&self) -> &Session {
+        self.harness.state().session()
+    }
+
+    fn fit(&self) -> &Fit {
+        &self.session().fit
+    }
+
+    /// Passes until something holds.
+    fn until(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
+        let deadline = Instant::now() + PATIENCE;
+        while !done(self) {
+            let log: Vec<&str> = self.session().log.iter().map(|line| line.text.as_str()).collect();
+            let fit = self.fit();
+            let at = (fit.frame, &fit.status, fit.head(), fit.cursor);
+            assert!(Instant::now() < deadline, "waited for {what}; frame, status, head, cursor {at:?}; log {log:#?}");
+            self.harness.step();
+        }
+        self.harness.step();
+    }
+
+    /// Frame `index` is on screen and what is shown is its newest iteration.
+    fn ready(&mut self, index: usize) {
+        self.until("a fit that is ready", |w| {
+            let frame = w.session().data.frame.as_ref().map(|frame| frame.index);
+            let shown = w.fit().shown.as_ref().map(|shown| shown.iteration);
+            frame == Some(index) && w.fit().is_ready() && shown == Some(w.fit().head())
+        });
+    }
+
+    fn paused_at(&mut self, iteration: usize) {
+        self.until("the end of the run", |w| {
+            w.fit().status == FitStatus::Paused
+                && w.fit().head() == iteration
+                && w.fit().shown.as_ref().is_some_and(|shown| shown.iteration == iteration)
+        });
+    }
+
+    fn named(&self, name: &str) -> bool {
+        self.harness.query_all_by_label(name).next().is_some()
+    }
+
+    fn says(&self, words: &str) -> bool {
+        self.harness.query_all_by_label_contains(words).next().is_some()
+    }
+
+    /// Clicks the one enabled button of this name with the mouse.
+    fn click(&mut self, name: &str) {
+        self.reveal(name);
+        self.node(name).click();
+        self.harness.step();
+        self.harness.remove_cursor();
+        self.harness.step();
+    }
+
+    /// The one thing of this name that can be used.
+    fn node<'a>(&'a self, name: &'a str) -> Node<'a> {
+        let usable =
+            |node: &Node<'_>| node.accesskit_node().role() != Role::Label && !node.accesskit_node().is_disabled();
+        let found: Vec<Node<'_>> = self.harness.query_all_by_label(name).filter(usable).collect();
+        match found[..] {
+            [one] => one,
+            [] => panic!("nothing usable is called {name:?}: {:?}", self.names()),
+            _ => panic!("{} things are called {name:?}: {found:?}", found.len()),
+        }
+    }
+
+    /// Scrolls a thing into view and waits until it stands still.
+    fn reveal(&mut self, name: &str) {
+        self.node(name).scroll_to_me();
+        self.harness.run_steps(2);
+        let mut still = 0;
+        while still < 3 {
+            let before = self.node(name).rect();
+            self.harness.step();
+            still = if self.node(name).rect() == before { still + 1 } else { 0 };
+        }
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.harness.root().children_recursive().filter_map(|node| node.accesskit_node().label()).collect()
+    }
+
+    fn key(&mut self, key: Key) {
+        self.harness.key_press(key);
+        self.harness.step();
+    }
+
+    fn key_with(&mut self, modifiers: Modifiers, key: Key) {
+        self.harness.key_press_modifiers(modifiers, key);
+        self.harness.step();
+    }
+
+    fn type_text(&mut self, text: &str) {
+        self.harness.event(egui::Event::Text(text.into()));
+        self.harness.run_steps(2);
+    }
+
+    /// Clicks a number, types another and confirms it with Enter.
+    fn type_value(&mut self, name: &str, value: &str) {
+        self.click(name);
+        self.key_with(Modifiers::COMMAND, Key::A);
+        self.type_text(value);
+        self.key(Key::Enter);
+        self.harness.step();
+    }
+
+    /// Presses the mouse at a share of a thing's width and lets it go at another.
+    fn drag(&mut self, name: &str, from: f32, to: f32) {
+        self.reveal(name);
+        let rect = self.node(name).rect();
+        let at = |share: f32| pos2(rect.left() + share * rect.width(), rect.center().y);
+        self.harness.hover_at(at(from));
+        self.harness.drag_at(at(from));
+        for k in 1..=4 {
+            self.harness.hover_at(at(from + (to - from) * k as f32 / 4.0));
+        }
+        self.harness.drop_at(at(to));
+        self.harness.step();
+    }
+
+    fn drop_file(&mut self, path: &Path) {
+        let file: Arc<dyn egui::DroppedFile + Send + Sync> = Arc::new(Dropped(path.into()));
+        self.harness.input_mut().dropped_files.push(file);
+        self.harness.step();
+    }
+
+    /// Runs until a run of 20 iterations has ended.
+    fn fitted(frames: usize) -> Self {
+        let mut window = Self::open(frames);
+        window.type_value("Iterations value", "20");
+        assert_eq!(window.session().config.iterations, 20);
+        window.key(Key::Enter);
+        window.paused_at(20);
+        window
+    }
+
+    /// Begins a run that takes longer than any test.
+    fn run_forever(&mut self) {
+        self.type_value("Iterations value", "100000");
+        self.key(Key::Enter);
+        self.until("some iterations", |w| w.fit().is_running() && w.fit().head() > 3);
+    }
+}
+
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|error| error.to_string())
+    }
+}
+
+#[test]
+fn a_data_set_opens_runs_pauses_and_steps() {
+    let mut window = Window::open(3);
+    assert_eq!((window.session().data.len(), window.fit().head()), (3, 0));
+    window.type_value("Iterations value", "100000");
+    window.click("Run fit");
+    window.until("some iterations", |w| w.fit().is_running() && w.fit().head() > 5);
+    window.click("Pause fit");
+    window.until("the pause", |w| w.fit().status == FitStatus::Paused);
+    let head = window.fit().head();
+    let first = window.fit().branch().unwrap().rows[0].report.loss;
+    assert!(window.fit().branch().unwrap().rows[head].report.loss < first);
+    window.click("Step forward");
+    window.paused_at(head + 1);
+    window.click("Ten steps forward");
+    window.paused_at(head + 11);
+    window.click("Step back");
+    window.until("the iteration before", |w| w.fit().shown.as_ref().is_some_and(|s| s.iteration == head + 10));
+    assert_eq!(window.fit().cursor, Some(head + 10));
+    assert!(window.says("looking back"));
+    window.click("Follow newest");
+    window.until("the newest", |w| w.fit().shown.as_ref().is_some_and(|s| s.iteration == head + 11));
+    assert_eq!(window.fit().cursor, None);
+}
+
+#[test]
+fn the_scrubber_shows_any_earlier_iteration() {
+    let mut window = Window::fitted(1);
+    window.drag("Iteration scrubber", 0.9, 0.25);
+    window.until("iteration 5", |w| w.fit().shown.as_ref().is_some_and(|s| s.iteration == 5));
+    assert_eq!(window.fit().cursor, Some(5));
+    window.drag("Iteration scrubber", 0.25, 1.0);
+    window.paused_at(20);
+    assert_eq!(window.fit().cursor, None);
+}
+
+#[test]
+fn a_setting_typed_during_a_run_takes_effect_and_is_flagged() {
+    let mut window = Window::open(1);
+    window.run_forever();
+    window.type_value("τ_pct value", "20");
+    window.until("the flag", |w| !w.fit().branch().unwrap().flags.is_empty());
+    assert!(window.fit().is_running(), "the run goes on");
+    assert_eq!(window.fit().branch().unwrap().flags[0].text, "τ_pct 10 → 20");
+    assert_eq!(window.fit().history.branches().len(), 1);
+    // Keys work after numbers were typed and sliders dragged.
+    window.key(Key::Enter);
+    window.until("the pause", |w| w.fit().status == FitStatus::Paused);
+    let head = window.fit().head();
+    window.drag("w_EM", 0.5, 0.7);
+    assert!(window.session().config.w_em != 0.5);
+    window.key(Key::Period);
+    window.paused_at(head + 1);
+    window.drag("w_kine value", 0.5, 0.9);
+    assert!(window.session().config.w_kine > 0.5);
+    window.key(Key::Comma);
+    window.until("the step back", |w| w.fit().cursor == Some(head));
+    window.key(Key::L);
+    window.until("the newest", |w| w.fit().cursor.is_none());
+    window.key(Key::Enter);
+    window.until("another run", |w| w.fit().is_running());
+    let weights: Vec<&str> = window.fit().branch().unwrap().flags.iter().map(|flag| flag.text.as_str()).collect();
+    assert!(weights.iter().any(|text| text.contains("w_EM")), "{weights:?}");
+}
+
+#[test]
+fn a_setting_changed_at_an_earlier_iteration_branches_and_discard_goes_back() {
+    let mut window = Window::fitted(1);
+    window.key_with(Modifiers::SHIFT, Key::Comma);
+    window.until("iteration 10", |w| w.fit().shown.as_ref().is_some_and(|s| s.iteration == 10));
+    window.type_value("w_EM value", "2");
+    window.paused_at(10);
+    let branches: Vec<_> = window.fit().history.branches().iter().map(|b| (b.id, b.parent, b.head())).collect();
+    assert_eq!(branches, [(0, None, 20), (1, Some((0, 10)), 10)]);
+    window.key(Key::Enter);
+    window.paused_at(20);
+    let row = |branch: u32| window.fit().history.branch(branch).unwrap().row(20).unwrap().report.terms.em;
+    assert_ne!(row(0), row(1));
+    window.click("Discard run");
+    window.until("branch 0", |w| w.fit().history.active_id() == 0);
+    window.paused_at(20);
+    assert_eq!((window.fit().history.branches().len(), window.session().config.w_em), (1, 0.5));
+    window.click("Discard run");
+    window.paused_at(0);
+}
+
+#[test]
+fn branches_are_chosen_by_name() {
+    let mut window = Window::fitted(1);
+    window.key_with(Modifiers::SHIFT, Key::Comma);
+    window.type_value("w_EM value", "2");
+    window.paused_at(10);
+    window.click("Branch");
+    window.click("branch 0: 0 → 20");
+    window.paused_at(20);
+    assert_eq!((window.fit().history.active_id(), window.session().config.w_em), (0, 0.5));
+}
+
+#[test]
+fn frames_change_at_any_time_and_fits_are_found_again() {
+    let mut window = Window::open(12);
+    window.run_forever();
+    window.key(Key::ArrowRight);
+    window.ready(1);
+    assert_eq!((window.fit().head(), window.fit().status.clone()), (0, FitStatus::Paused));
+    window.key(Key::ArrowLeft);
+    window.ready(0);
+    assert!(window.fit().head() > 3 && !window.fit().is_running(), "the fit that was left");
+    window.key(Key::End);
+    window.ready(11);
+    window.click("Previous frame");
+    window.ready(10);
+    window.key_with(Modifiers::SHIFT, Key::ArrowLeft);
+    window.ready(0);
+    window.key_with(Modifiers::COMMAND, Key::J);
+    assert!(window.named("Frame number"));
+    window.key_with(Modifiers::COMMAND, Key::A);
+    window.type_text("7");
+    window.key(Key::Enter);
+    window.ready(7);
+    assert!(!window.named("Frame number"));
+    window.drag("Timeline", 0.1, 0.3);
+    window.ready(3);
+    window.click("Frame 005");
+    window.ready(5);
+    window.key(Key::Home);
+    window.ready(0);
+    window.key(Key::Space);
+    window.until("the end of the film", |w| w.session().data.frame_index == 11 && !w.session().data.playing);
+}
+
+#[test]
+fn reset_forgets_and_warm_start_carries_over() {
+    let mut window = Window::fitted(2);
+    window.click("Fit");
+    window.click("Warm start");
+    assert!(window.session().warm_start);
+    let state = Arc::clone(window.fit().branch().unwrap().rows[20].state.as_ref().unwrap());
+    window.key(Key::ArrowRight);
+    window.ready(1);
+    assert_eq!(window.fit().initial.as_ref(), Some(&state.params));
+    window.click("Reset fit");
+    window.until("the new start pose", |w| w.fit().is_ready() && w.fit().shown.is_some());
+    assert_ne!(window.fit().initial.as_ref(), Some(&state.params), "its own start pose");
+    window.key(Key::ArrowLeft);
+    window.ready(0);
+    assert_eq!(window.fit().head(), 20);
+}
+
+#[test]
+fn keys_toggle_what_is_compared_and_the_theme() {
+    let mut window = Window::open(1);
+    let compare = |w: &Window| w.session().view.compare;
+    assert!(!window.named("Wipe position"));
+    window.key(Key::W);
+    assert_eq!(compare(&window), Compare::Wipe);
+    window.key(Key::D);
+    assert_eq!(compare(&window), Compare::Difference);
+    assert!(window.named("H_sim − H_ori map of hori"));
+    window.key(Key::D);
+    assert_eq!(compare(&window), Compare::Flip);
+    window.click("Wipe");
+    assert_eq!(compare(&window), Compare::Wipe);
+    window.key_with(Modifiers::COMMAND, Key::T);
+    assert_eq!(window.session().view.theme, ThemeChoice::Light);
+    window.key_with(Modifiers::COMMAND, Key::T);
+    assert_eq!(window.session().view.theme, ThemeChoice::Dark);
+    // While text is typed its letters are text.
+    window.click("Filter frames");
+    window.key(Key::D);
+    window.type_text("d");
+    assert_eq!(compare(&window), Compare::Wipe);
+    assert!(window.says("No frame matches"));
+}
+
+#[test]
+fn the_palette_finds_and_does_a_command() {
+    let mut window = Window::open(1);
+    window.key_with(Modifiers::COMMAND, Key::K);
+    assert!(window.named("Command palette"));
+    window.type_text("wipe");
+    window.key(Key::Enter);
+    assert_eq!(window.session().view.compare, Compare::Wipe);
+    assert!(!window.named("Command palette"));
+    window.key_with(Modifiers::COMMAND, Key::K);
+    window.type_text("no such command");
+    assert!(window.says("No command has these words."));
+    window.key(Key::Escape);
+    assert!(!window.named("Command palette"));
+    window.key(Key::Questionmark);
+    assert!(window.says("Keys and gestures"));
+    window.key(Key::Escape);
+    assert!(!window.says("Keys and gestures"));
+}
+
+#[test]
+fn a_folder_dropped_on_the_window_opens() {
+    let other = tempfile::tempdir().unwrap();
+    blob::write_dataset(other.path(), 5);
+    let mut window = Window::open(2);
+    window.run_forever();
+    window.drop_file(other.path());
+    window.until("the other data set", |w| w.session().data.len() == 5);
+    window.ready(0);
+    assert_eq!(window.fit().head(), 0);
+    let recent = &window.session().data.recent;
+    assert_eq!(recent[..], [other.path().to_path_buf(), window.folder.path().to_path_buf()]);
+    // The same folder again is opened again.
+    window.key(Key::ArrowRight);
+    window.ready(1);
+    window.drop_file(other.path());
+    window.until("the first frame", |w| w.session().data.frame_index == 0);
+    window.ready(0);
+}
+
+#[test]
+fn a_text_called_npz_is_told_and_the_window_lives_on() {
+    let mut window = Window::fitted(2);
+    let bad = window.folder.path().join("notes.npz");
+    std::fs::write(&bad, "these are my notes\n").unwrap();
+    window.drop_file(&bad);
+    window.until("the notification", |w| w.named("Dismiss notification"));
+    assert!(window.says("notes.npz"));
+    assert_eq!((window.session().data.len(), window.fit().head()), (2, 20));
+    window.click("Dismiss notification");
+    assert!(!window.named("Dismiss notification"));
+    window.key(Key::Period);
+    window.paused_at(21);
+}
+
+#[test]
+fn a_frame_deleted_while_open_is_told_and_the_others_are_fine() {
+    let mut window = Window::open(9);
+    std::fs::remove_file(window.folder.path().join("frames/008.npz")).unwrap();
+    window.key(Key::End);
+    window.until("the error", |w| w.session().data.error.is_some() && w.named("Dismiss notification"));
+    assert!(window.says("008.npz"));
+    assert!(window.says("This frame cannot be shown"));
+    window.key(Key::Home);
+    window.ready(0);
+}
+
+#[test]
+fn a_map_without_numbers_is_told_and_the_others_are_fine() {
+    use mhp_inspector::dataset::npz::{ArrayView, write};
+    let folder = tempfile::tempdir().unwrap();
+    blob::write_dataset(folder.path(), 2);
+    let nan = vec![f64::NAN; 48 * 32];
+    let maps = [("hori", ArrayView::f64(&[48, 32], &nan)), ("vert", ArrayView::f64(&[48, 32], &nan))];
+    write(&folder.path().join("frames/001.npz"), &maps).unwrap();
+    let harness = Window::empty(&[folder.path().into()], [1440.0, 900.0]);
+    let mut window = Window { harness, folder };
+    window.ready(0);
+    window.key(Key::ArrowRight);
+    window.until("the error", |w| matches!(w.fit().status, FitStatus::Failed(_)) && w.named("Dismiss notification"));
+    assert!(window.says("`hori` has no finite cell"));
+    window.harness.run_steps(3);
+    window.key(Key::ArrowLeft);
+    window.ready(0);
+}
+
+#[test]
+fn closing_during_a_run_takes_no_time() {
+    let mut window = Window::open(1);
+    window.run_forever();
+    let begun = Instant::now();
+    drop(window);
+    assert!(begun.elapsed() < Duration::from_secs(2), "{:?}", begun.elapsed());
+}
+
+#[test]
+fn a_window_without_data_says_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let nowhere = folder.path().join("nothing here");
+    let harness = Window::empty(&[nowhere], [1440.0, 900.0]);
+    let mut window = Window { harness, folder };
+    window.until("the error", |w| w.named("Dismiss notification"));
+    assert!(window.says("no such file or folder"));
+    assert!(window.says("No data set"));
+    for key in [Key::Enter, Key::Period, Key::Comma, Key::ArrowRight, Key::Space, Key::F, Key::R, Key::End] {
+        window.key(key);
+    }
+    assert_eq!(window.harness.unnamed_widgets(), Vec::<String>::new());
+}
+
+#[test]
+fn everything_that_can_be_used_has_a_name() {
+    let mut window = Window::fitted(2);
+    window.key(Key::W);
+    window.key_with(Modifiers::SHIFT, Key::Comma);
+    window.type_value("w_EM value", "2");
+    window.paused_at(10);
+    let mut unnamed = Vec::new();
+    let mut look = |window: &mut Window, place: &str| {
+        window.harness.run_steps(2);
+        let found = window.harness.unnamed_widgets();
+        unnamed.extend(found.into_iter().map(|what| format!("{place}: {what}")));
+    };
+    look(&mut window, "the panes");
+    for tab in ["Log", "Curves", "Image plane", "3-D", "IoU and error", "Kinematic limits"] {
+        window.click(tab);
+        look(&mut window, tab);
+    }
+    for menu in ["File", "Frame", "Fit", "View", "Help"] {
+        let bar: Vec<_> = window.harness.query_all_by_label(menu).map(|node| node.rect()).collect();
+        let top = bar.into_iter().min_by(|a, b| a.top().total_cmp(&b.top())).unwrap();
+        window.harness.hover_at(top.center());
+        window.harness.drag_at(top.center());
+        window.harness.drop_at(top.center());
+        look(&mut window, menu);
+        window.key(Key::Escape);
+    }
+    for (sheet, modifiers, key) in [
+        ("palette", Modifiers::COMMAND, Key::K),
+        ("help", Modifiers::NONE, Key::F1),
+        ("go to", Modifiers::COMMAND, Key::J),
+        ("path", Modifiers::COMMAND, Key::L),
+    ] {
+        window.key_with(modifiers, key);
+        look(&mut window, sheet);
+        window.key(Key::Escape);
+    }
+    // A joint, and the question about a bare file.
+    let bare = window.folder.path().join("bare.npy");
+    let map = vec![1.0; 64 * 32];
+    let array = mhp_inspector::dataset::npz::ArrayView::f64(&[64, 32], &map);
+    mhp_inspector::dataset::npz::write_npy(&bare, &array).unwrap();
+    window.drop_file(&bare);
+    window.until("the question", |w| w.says("What do these maps measure?"));
+    look(&mut window, "the question");
+    assert_eq!(unnamed, Vec::<String>::new());
+}
+
+#[test]
+fn a_window_in_which_nothing_happens_is_not_drawn_again() {
+    let mut window = Window::fitted(2);
+    window.harness.remove_cursor();
+    let delay = |w: &Window| w.harness.output().viewport_output[&egui::ViewportId::ROOT].repaint_delay;
+    window.until("rest", |w| delay(w) > Duration::from_secs(60));
+    for _ in 0..5 {
+        window.harness.step();
+        assert!(delay(&window) > Duration::from_secs(60), "{:?}", window.harness.ctx.repaint_causes());
+    }
+}
