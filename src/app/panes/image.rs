@@ -26,7 +26,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let [width, height] = image.size.map(|n| n.max(1) as f32);
     let tokens = Tokens::of(ui);
     let area = ui.available_rect_before_wrap().shrink2(vec2(8.0, 8.0));
-    let area = Rect::from_min_max(area.min, area.max - vec2(0.0, 18.0));
+    let area = Rect::from_min_max(area.min, area.max - vec2(0.0, 34.0));
     let scale = (area.width() / width).min(area.height() / height);
     let rect = Rect::from_center_size(area.center(), vec2(width, height) * scale);
     let response = ui.interact(rect, ui.scope_id().with("image plane"), egui::Sense::hover());
@@ -53,13 +53,9 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         "{width} × {height} px · {people} labelled {} · pixels of the camera, not metres: never compared with the fit{missing}",
         if people == 1 { "person" } else { "people" }
     );
-    ui.painter().text(
-        pos2(area.left(), area.bottom() + 3.0),
-        Align2::LEFT_TOP,
-        text,
-        FontId::proportional(theme::CAPTION),
-        tokens.dim,
-    );
+    let font = FontId::proportional(theme::CAPTION);
+    let galley = ui.painter().layout(text, font, tokens.dim, area.width());
+    ui.painter().galley(pos2(area.left(), area.bottom() + 4.0), galley, tokens.dim);
     if let Some(pointer) = response.hover_pos() {
         let px = (pointer - rect.min) / scale;
         response.on_hover_text_at_pointer(format!("x {:.0} px, y {:.0} px", px.x, px.y));
