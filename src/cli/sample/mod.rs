@@ -8,6 +8,8 @@ mod scene;
 pub use scene::{CHAIN, FRAME_RATE_HZ, Plane, SampleFrame, Scene, radar};
 
 use crate::body::Skeleton;
+use crate::dataset::npz::{ArrayView, NpzError, write_deflated};
+use crate::geometry::Vec3;
 use crate::radar::{Axis, PointSpread, Quantity, RadarConfig};
 use anyhow::{Context, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -56,7 +58,7 @@ pub fn write_data_set(out: &Path, frames: usize, seed: u64, mut progress: impl F
     let scene = Scene::new(seed);
     for index in 0..frames {
         let path = folder.join(frame_name(index));
-        write_frame(&path, &scene.frame(index)).with_context(|| format!("cannot write {}", path.display()))?;
+        write_frame(&path, &scene.frame(index))?;
         progress(index + 1);
     }
     let path = out.join("dataset.toml");
@@ -80,31 +82,21 @@ fn refuse_leftovers(folder: &Path, frames: usize) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn write_frame(path: &Path, frame: &SampleFrame) -> std::io::Result<()> {
-    let mut npz = npyz::npz::NpzWriter::create(path)?;
-    for (plane, map) in Plane::ALL.iter().zip(&frame.maps) {
-        let shape = plane.axes().map(|axis| axis.bins as u64);
-        write_array(&mut npz, plane.array(), &shape, map.iter().map(|&x| rounded(x as f32)))?;
+fn write_frame(path: &Path, frame: &SampleFrame) -> Result<(), NpzError> {
+    let maps: Vec<Vec<f32>> = frame.maps.iter().map(|map| map.iter().map(|&x| rounded(x as f32)).collect()).collect();
+    let flat = |vectors: &[Vec3]| -> Vec<f32> { vectors.iter().flatten().map(|&x| x as f32).collect() };
+    let (joints, velocities) = (flat(&frame.joints), flat(&frame.velocities));
+    let per_joint = [1, frame.joints.len(), 3];
+    let mut arrays: Vec<(&str, ArrayView<'_>)> = Vec::new();
+    for (plane, map) in Plane::ALL.iter().zip(&maps) {
+        arrays.push((plane.array(), ArrayView::f32(&plane.axes().map(|axis| axis.bins), map)));
     }
-    for (key, vectors) in [("joints", &frame.joints), ("velocities", &frame.velocities)] {
-        write_array(&mut npz, key, &[1, 17, 3], vectors.iter().flatten().map(|&x| x as f32))?;
-    }
-    write_array(&mut npz, "person_count", &[], std::iter::once(1i64))?;
-    write_array(&mut npz, "timestamp_s", &[], std::iter::once(frame.timestamp_s))
-}
-
-fn write_array<T: npyz::AutoSerialize>(
-    npz: &mut npyz::npz::NpzWriter<std::io::BufWriter<std::fs::File>>,
-    key: &str,
-    shape: &[u64],
-    values: impl Iterator<Item = T>,
-) -> std::io::Result<()> {
-    use npyz::WriterBuilder;
-    // The default options stamp the time of writing, and the bytes would depend on it.
-    let options = zip::write::FileOptions::default().last_modified_time(zip::DateTime::default());
-    let mut writer = npz.array(key, options)?.default_dtype().shape(shape).begin_nd()?;
-    writer.extend(values)?;
-    writer.finish()
+    arrays.push(("joints", ArrayView::f32(&per_joint, &joints)));
+    arrays.push(("velocities", ArrayView::f32(&per_joint, &velocities)));
+    arrays.push(("person_count", ArrayView::i64(&[], &[1])));
+    let timestamp_s = [frame.timestamp_s];
+    arrays.push(("timestamp_s", ArrayView::f64(&[], &timestamp_s)));
+    write_deflated(path, &arrays)
 }
 
 /// `x` with [`MANTISSA_BITS`] bits of mantissa, to nearest.
