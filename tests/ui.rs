@@ -270,8 +270,10 @@ fn a_setting_changed_at_an_earlier_iteration_branches_and_discard_goes_back() {
     let mut window = Window::fitted(1);
     window.key_with(Modifiers::SHIFT, Key::Comma);
     window.until("iteration 10", |w| w.fit().shown.as_ref().is_some_and(|s| s.iteration == 10));
-    window.type_value("w_EM value", "2");
+    // Two keystrokes: the branch that the first one begins must not take the field away from the second.
+    window.type_value("w_EM value", "2.5");
     window.paused_at(10);
+    assert_eq!(window.session().config.w_em, 2.5);
     let branches: Vec<_> = window.fit().history.branches().iter().map(|b| (b.id, b.parent, b.head())).collect();
     assert_eq!(branches, [(0, None, 20), (1, Some((0, 10)), 10)]);
     window.key(Key::Enter);
