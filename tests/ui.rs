@@ -136,6 +136,7 @@ impl Window {
     }
 
     fn type_text(&mut self, text: &str) {
+        // After an event egui draws twice: what depends on the text is there in the second pass.
         self.harness.event(egui::Event::Text(text.into()));
         self.harness.run_steps(2);
     }
@@ -270,8 +271,10 @@ fn a_setting_changed_at_an_earlier_iteration_branches_and_discard_goes_back() {
     let mut window = Window::fitted(1);
     window.key_with(Modifiers::SHIFT, Key::Comma);
     window.until("iteration 10", |w| w.fit().shown.as_ref().is_some_and(|s| s.iteration == 10));
-    window.type_value("w_EM value", "2");
+    // Two keystrokes: the branch that the first one begins must not take the field away from the second.
+    window.type_value("w_EM value", "2.5");
     window.paused_at(10);
+    assert_eq!(window.session().config.w_em, 2.5);
     let branches: Vec<_> = window.fit().history.branches().iter().map(|b| (b.id, b.parent, b.head())).collect();
     assert_eq!(branches, [(0, None, 20), (1, Some((0, 10)), 10)]);
     window.key(Key::Enter);
@@ -323,7 +326,7 @@ fn frames_change_at_any_time_and_fits_are_found_again() {
     assert!(!window.named("Frame number"));
     window.drag("Timeline", 0.1, 0.3);
     window.ready(3);
-    window.click("Frame 005");
+    window.click("Frame frames/005");
     window.ready(5);
     window.key(Key::Home);
     window.ready(0);
@@ -334,8 +337,9 @@ fn frames_change_at_any_time_and_fits_are_found_again() {
 #[test]
 fn reset_forgets_and_warm_start_carries_over() {
     let mut window = Window::fitted(2);
-    window.click("Fit");
-    window.click("Warm start");
+    window.key_with(Modifiers::COMMAND, Key::K);
+    window.type_text("warm");
+    window.key(Key::Enter);
     assert!(window.session().warm_start);
     let state = Arc::clone(window.fit().branch().unwrap().rows[20].state.as_ref().unwrap());
     window.key(Key::ArrowRight);
@@ -537,10 +541,75 @@ fn everything_that_can_be_used_has_a_name() {
 fn a_window_in_which_nothing_happens_is_not_drawn_again() {
     let mut window = Window::fitted(2);
     window.harness.remove_cursor();
+    window.harness.run_steps(5);
     let delay = |w: &Window| w.harness.output().viewport_output[&egui::ViewportId::ROOT].repaint_delay;
     window.until("rest", |w| delay(w) > Duration::from_secs(60));
     for _ in 0..5 {
         window.harness.step();
         assert!(delay(&window) > Duration::from_secs(60), "{:?}", window.harness.ctx.repaint_causes());
     }
+}
+
+/// True where pictures are drawn by Mesa's software renderer, whose pixels the committed pictures are.
+fn software_renderer(harness_adapter: Option<&str>) -> bool {
+    let name = harness_adapter.unwrap_or("no adapter");
+    let known = ["llvmpipe", "lavapipe"].iter().any(|part| name.to_lowercase().contains(part));
+    if !known {
+        println!("skipped: the pictures were drawn by llvmpipe, this is {name}");
+    }
+    known
+}
+
+fn picture(theme: ThemeChoice, name: &str) {
+    use eframe::wgpu::{Backends, Instance, InstanceDescriptor};
+    let mut wanted = InstanceDescriptor::new_without_display_handle();
+    wanted.backends = Backends::VULKAN;
+    let adapters = pollster::block_on(Instance::new(wanted).enumerate_adapters(Backends::VULKAN));
+    let adapter = adapters.first().map(|adapter| adapter.get_info().name);
+    if !software_renderer(adapter.as_deref()) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("blob");
+    blob::write_dataset(&data, 4);
+    let paths = [data];
+    let harness = Harness::builder()
+        .with_size([1000.0, 640.0])
+        .with_step_dt(1.0 / 60.0)
+        .with_max_steps(200)
+        .wgpu()
+        .build_eframe(|cc| InspectorApp::new(cc, &paths));
+    let mut window = Window { harness, folder };
+    window.ready(0);
+    if theme == ThemeChoice::Light {
+        window.key_with(Modifiers::COMMAND, Key::T);
+    }
+    window.key_with(Modifiers::SHIFT, Key::Period);
+    window.paused_at(10);
+    assert_eq!(window.session().view.theme, theme);
+    window.harness.remove_cursor();
+    window.harness.run_steps(20);
+    // Times differ from run to run.
+    let clock = |text: &str| text.contains(" ms") || text.contains(" of ");
+    let timed: Vec<_> = window
+        .harness
+        .root()
+        .children_recursive()
+        .filter(|node| node.value().is_some_and(|text| clock(&text)))
+        .map(|node| node.rect())
+        .collect();
+    for rect in timed {
+        window.harness.mask(rect);
+    }
+    window.harness.snapshot(name);
+}
+
+#[test]
+fn the_default_layout_in_the_dark() {
+    picture(ThemeChoice::Dark, "default_dark");
+}
+
+#[test]
+fn the_default_layout_in_the_light() {
+    picture(ThemeChoice::Light, "default_light");
 }

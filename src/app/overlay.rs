@@ -120,8 +120,6 @@ impl Overlay {
             }
             if field.changed() {
                 self.chosen = 0;
-                // What is found was looked up before the letter was typed.
-                ui.ctx().request_repaint();
             }
             ui.add_space(4.0);
             egui::ScrollArea::vertical().max_height(340.0).show(ui, |ui| {

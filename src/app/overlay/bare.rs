@@ -2,6 +2,7 @@
 
 use crate::app::panes::Shared;
 use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Named as _;
 use crate::body::Skeleton;
 use crate::dataset::{BareCatalog, BareChoice};
 use crate::radar::{Axis, AxisKind, Quantity, Spacing, View};
@@ -99,11 +100,13 @@ fn edit_view(ui: &mut Ui, view: &mut View) {
 }
 
 fn edit_axis(ui: &mut Ui, salt: (&str, usize), axis: &mut Axis) {
-    egui::ComboBox::from_id_salt(salt).width(92.0).selected_text(axis.kind.name()).show_ui(ui, |ui| {
+    let combo = egui::ComboBox::from_id_salt(salt).width(92.0).selected_text(axis.kind.name()).show_ui(ui, |ui| {
         for kind in AxisKind::ALL {
             ui.selectable_value(&mut axis.kind, kind, kind.name());
         }
     });
+    let spoken = format!("Kind of axis {} of {}", salt.1, salt.0);
+    combo.response.named(egui::Role::ComboBox, &spoken);
     let angular = axis.kind.is_angular();
     if angular {
         let mut sine = axis.spacing == Spacing::Sine;
@@ -129,11 +132,12 @@ fn edit_axis(ui: &mut Ui, salt: (&str, usize), axis: &mut Axis) {
 fn general(ui: &mut Ui, choice: &mut BareChoice) {
     ui.horizontal(|ui| {
         ui.label("Skeleton");
-        egui::ComboBox::from_id_salt("skeleton").selected_text(&choice.skeleton).show_ui(ui, |ui| {
+        let combo = egui::ComboBox::from_id_salt("skeleton").selected_text(&choice.skeleton).show_ui(ui, |ui| {
             for name in Skeleton::PRESETS {
                 ui.selectable_value(&mut choice.skeleton, name.to_owned(), name);
             }
         });
+        combo.response.named(egui::Role::ComboBox, "Skeleton");
         ui.checkbox(&mut choice.first_axis_is_frame, "the first axis counts frames");
     });
 }

@@ -11,7 +11,8 @@ use egui::{RichText, Ui};
 pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         transport(ui, shared);
-        status(ui, shared);
+        // In scopes of their own: what appears in them must not shift the identity of a number that is being typed below.
+        ui.scope(|ui| status(ui, shared));
         ui.separator();
         let old = shared.session.config;
         let mut config = old;
@@ -19,7 +20,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
             slider(ui, field, &mut config);
         }
         ui.separator();
-        numbers(ui, shared);
+        ui.scope(|ui| numbers(ui, shared));
         ui.separator();
         settings(ui, shared, &mut config);
         if config != old {
