@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Nothing here takes seconds; where it does, the machine is busy, not the program wrong.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// The window on a data set of its own.
 struct Window {
@@ -543,10 +543,10 @@ fn a_window_in_which_nothing_happens_is_not_drawn_again() {
     window.harness.remove_cursor();
     window.harness.run_steps(5);
     let delay = |w: &Window| w.harness.output().viewport_output[&egui::ViewportId::ROOT].repaint_delay;
-    window.until("rest", |w| delay(w) > Duration::from_secs(60));
+    window.until("rest", |w| delay(w) > Duration::from_mins(1));
     for _ in 0..5 {
         window.harness.step();
-        assert!(delay(&window) > Duration::from_secs(60), "{:?}", window.harness.ctx.repaint_causes());
+        assert!(delay(&window) > Duration::from_mins(1), "{:?}", window.harness.ctx.repaint_causes());
     }
 }
 
@@ -589,18 +589,8 @@ fn picture(theme: ThemeChoice, name: &str) {
     assert_eq!(window.session().view.theme, theme);
     window.harness.remove_cursor();
     window.harness.run_steps(20);
-    // Times differ from run to run.
-    let clock = |text: &str| text.contains(" ms") || text.contains(" of ");
-    let timed: Vec<_> = window
-        .harness
-        .root()
-        .children_recursive()
-        .filter(|node| node.value().is_some_and(|text| clock(&text)))
-        .map(|node| node.rect())
-        .collect();
-    for rect in timed {
-        window.harness.mask(rect);
-    }
+    // Times differ from run to run, and what is beside them on the bar moves with their width.
+    window.harness.mask(egui::Rect::from_min_max(pos2(90.0, 0.0), pos2(1000.0, 27.0)));
     window.harness.snapshot(name);
 }
 
