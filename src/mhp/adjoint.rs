@@ -250,12 +250,19 @@ impl Geometry {
         let mut p = self.p;
         add_scaled(&mut p, seen.u, self.d * seen.d.pass);
         add_scaled(&mut p, seen.e_rho, self.rho * seen.rho.pass);
-        add_scaled(&mut p, seen.e_h, self.h * seen.h.pass);
-        add_scaled(&mut p, seen.e_az, self.azimuth / seen.rho.value);
-        add_scaled(&mut p, seen.e_el, self.elevation / seen.d.value);
-        add_scaled(&mut p, across_h, dot(self.e_h, across_h) / seen.h.value);
+        add_scaled(&mut p, seen.e_h, self.h);
+        // Angles and unit directions come from the point itself, not from the floored lengths: so do their slopes.
+        let [x, y, z] = seen.p;
+        add_scaled(&mut p, seen.e_az, self.azimuth * inverse(x.hypot(y)));
+        add_scaled(&mut p, seen.e_el, self.elevation * inverse(norm(seen.p)));
+        add_scaled(&mut p, across_h, dot(self.e_h, across_h) * inverse(x.hypot(z)));
         (unmove(scene, trace.unmoved, p), self.v)
     }
+}
+
+/// 1/length; 0 at the one point where an angle has no slope.
+fn inverse(length_m: f64) -> f64 {
+    if length_m > 1e-12 { 1.0 / length_m } else { 0.0 }
 }
 
 /// p = p₀ max(d₀ − δ, floor)/d₀.

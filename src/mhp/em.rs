@@ -2,10 +2,10 @@
 
 use super::adjoint::{Moments, pull_back};
 use super::kernel::Kernel;
-use super::percentile::ln_percentile;
+use super::percentile::percentile;
 use super::region::Region;
 use super::scalar::Real;
-use super::simulate::{EPSILON, ln_floored};
+use super::simulate::{EPSILON, floored, ln_floored};
 use super::splat::{Scene, Splat, Trace};
 use crate::body::Pppr;
 use crate::radar::AxisKind;
@@ -84,9 +84,10 @@ struct SoftMask {
 impl SoftMask {
     fn new(ln_s: &[f64], target: &[bool], tau_pct: f64, softness: f64) -> Self {
         let ln_h: Vec<f64> = ln_s.iter().map(|&x| ln_floored(x)).collect();
-        let threshold = ln_percentile(&ln_h, 100.0 - tau_pct);
-        let iou = hard_iou(ln_h.iter().zip(target).map(|(&h, &b)| (h > threshold, b)));
-        let soft_threshold = ln_sum(threshold, SOFT_FLOOR.ln());
+        let h: Vec<f64> = ln_s.iter().map(|&x| floored(x)).collect();
+        let threshold = percentile(&h, 100.0 - tau_pct);
+        let iou = hard_iou(h.iter().zip(target).map(|(&h, &b)| (h > threshold, b)));
+        let soft_threshold = ln_sum(threshold.ln(), SOFT_FLOOR.ln());
         let soften = |&h: &f64| sigmoid((ln_sum(h, SOFT_FLOOR.ln()) - soft_threshold) / softness);
         let soft: Vec<f64> = ln_h.iter().map(soften).collect();
         let (mut common, mut union) = (0.0, 0.0);

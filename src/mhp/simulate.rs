@@ -27,6 +27,12 @@ pub(super) fn splats(scene: &Scene<'_>, params: &Pppr) -> Vec<Splat> {
     (0..params.shape().total_joints()).map(|joint| scene.splat(params, joint).0).collect()
 }
 
+/// √(S² + ε²) from ln S, in linear f64: values that differ by less than a step of ln H near the floor stay apart, and the
+/// floor itself is exactly ε, so that a strict comparison with a percentile behaves as SPEC section 4 says.
+pub(super) fn floored(ln_s: f64) -> f64 {
+    ln_s.exp().hypot(EPSILON)
+}
+
 /// H_sim of every view over its whole map, C order, f64; SPEC section 3.
 pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, params: &Pppr) -> Vec<Vec<f64>> {
     problem
@@ -47,7 +53,7 @@ fn map<T: Real>(splats: &[Splat], region: &Region, summation: Summation) -> Vec<
     let mut map = vec![f64::NEG_INFINITY; region.cells()];
     Kernel::<T>::new(splats, &region.bins, summation).forward(&mut map);
     for value in &mut map {
-        *value = ln_floored(*value).exp();
+        *value = floored(*value);
     }
     map
 }

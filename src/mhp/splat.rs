@@ -40,7 +40,7 @@ pub(super) struct Seen {
     /// ρ = √(x² + y²), m.
     pub rho: Floored,
     /// √(x² + z²), m.
-    pub h: Floored,
+    pub h: f64,
     pub azimuth: f64,
     pub elevation: f64,
     pub sin_az: f64,
@@ -80,7 +80,7 @@ impl Seen {
             p,
             d: Floored::new(norm(p), DISTANCE_FLOOR_M),
             rho: Floored::new(rho, DISTANCE_FLOOR_M),
-            h: Floored::new(h, DISTANCE_FLOOR_M),
+            h,
             azimuth,
             elevation,
             sin_az,
@@ -115,7 +115,7 @@ impl Seen {
             AxisKind::X => self.p[0],
             AxisKind::Y => self.p[1],
             AxisKind::Z => self.p[2],
-            AxisKind::DepthH => self.h.value,
+            AxisKind::DepthH => self.h,
             AxisKind::DepthV => self.rho.value,
         }
     }
