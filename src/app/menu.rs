@@ -102,12 +102,21 @@ fn status(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
             .on_hover_text("Time of the initialisation and of the last run, or iterations a second.");
         if let Some(dataset) = &session.data.dataset {
             let info = dataset.info();
-            let badge = RichText::new(&info.axes_badge).small().color(tokens.dim);
-            let tip = format!("Axes convention of this data set.\n{}", info.assumptions.join("\n"));
-            ui.add(egui::Label::new(badge).truncate()).on_hover_text(tip);
             let frame = session.data.frame.as_ref().map_or_else(String::new, |f| format!(" · {}", f.name));
-            ui.label(RichText::new(format!("{}{frame}", info.name)).font(theme::strong(12.0)))
-                .on_hover_text(info.root.display().to_string());
+            let name = format!("{}{frame}", info.name);
+            let width = ui.painter().layout_no_wrap(name.clone(), theme::strong(12.0), tokens.text).size().x;
+            let tip = format!("Axes convention of this data set: {}\n{}", info.axes_badge, info.assumptions.join("\n"));
+            // The badge gives way first: the name must be readable beside the menus.
+            let room = ui.available_width() - width - 24.0;
+            if room > 60.0 {
+                let badge = RichText::new(&info.axes_badge).small().color(tokens.dim);
+                ui.scope(|ui| {
+                    ui.set_max_width(room);
+                    ui.add(egui::Label::new(badge).truncate()).on_hover_text(&tip);
+                });
+            }
+            ui.add(egui::Label::new(RichText::new(name).font(theme::strong(12.0))).truncate())
+                .on_hover_text(format!("{}\n{tip}", info.root.display()));
         }
     });
 }

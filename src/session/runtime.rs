@@ -2,7 +2,7 @@
 
 use super::command::{Command, Effect, PickKind};
 use super::state::{LogLevel, Session};
-use crate::dataset::{Dataset, Loader, OpenJob};
+use crate::dataset::{BareChoice, Dataset, Loader, OpenJob};
 use crate::worker::Worker;
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::path::PathBuf;
@@ -22,6 +22,7 @@ pub struct Runtime {
     loader: Option<Loader>,
     opening: Option<(PathBuf, OpenJob)>,
     picked: (Sender<PathBuf>, Receiver<PathBuf>),
+    bare: (Sender<Command>, Receiver<Command>),
     startup_error: Option<String>,
 }
 
@@ -33,13 +34,22 @@ impl Runtime {
             Ok(worker) => (Some(worker), None),
             Err(error) => (None, Some(format!("no thread for the fit: {error}"))),
         };
-        Self { wake, picker, worker, loader: None, opening: None, picked: unbounded(), startup_error }
+        Self {
+            wake,
+            picker,
+            worker,
+            loader: None,
+            opening: None,
+            picked: unbounded(),
+            bare: unbounded(),
+            startup_error,
+        }
     }
 
     /// Applies a command and carries out what follows from it.
     pub fn apply(&mut self, session: &mut Session, command: Command) {
         for effect in session.apply(command) {
-            self.carry_out(session, effect);
+            self.carry_out(effect);
         }
     }
 
@@ -57,6 +67,9 @@ impl Runtime {
     }
 
     fn next_report(&mut self, session: &Session) -> Option<Command> {
+        if let Ok(command) = self.bare.1.try_recv() {
+            return Some(command);
+        }
         if let Ok(path) = self.picked.1.try_recv() {
             return Some(Command::Open(path));
         }
@@ -89,17 +102,14 @@ impl Runtime {
         })
     }
 
-    fn carry_out(&mut self, session: &mut Session, effect: Effect) {
+    fn carry_out(&mut self, effect: Effect) {
         match effect {
             Effect::Open(path) => {
                 let wake = Arc::clone(&self.wake);
                 let job = OpenJob::start(path.clone(), None, move || wake());
                 self.opening = Some((path, job));
             }
-            Effect::OpenBare(path, choice) => {
-                let result = Dataset::open_bare(&path, &choice).map(Arc::new);
-                self.apply(session, Command::Opened(path, result));
-            }
+            Effect::OpenBare(path, choice) => self.open_bare(path, choice),
             Effect::CancelOpen => {
                 if let Some((_, job)) = self.opening.take() {
                     job.cancel();
@@ -120,6 +130,19 @@ impl Runtime {
                     worker.send(command);
                 }
             }
+        }
+    }
+
+    /// Reads the file's headers, which may be slow on a network, on a thread.
+    fn open_bare(&self, path: PathBuf, choice: BareChoice) {
+        let (answer, wake) = (self.bare.0.clone(), Arc::clone(&self.wake));
+        let spawned = std::thread::Builder::new().name("open-bare".into()).spawn(move || {
+            let result = Dataset::open_bare(&path, &choice).map(Arc::new);
+            let _ = answer.send(Command::Opened(path, result));
+            wake();
+        });
+        if let Err(error) = spawned {
+            tracing::error!("no thread for opening the file: {error}");
         }
     }
 

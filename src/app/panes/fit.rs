@@ -33,7 +33,7 @@ fn transport(ui: &mut Ui, shared: &mut Shared<'_>) {
     let fit = &shared.session.fit;
     let (ready, running, shown) = (fit.is_ready(), fit.is_running(), fit.shown_iteration());
     let head = fit.head();
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
         let (sign, name) = if running { ("‖", "Pause fit") } else { ("▶", "Run fit") };
         let text = RichText::new(if running { format!("{sign} Pause") } else { format!("{sign} Run") });

@@ -239,8 +239,7 @@ fn captions(painter: &egui::Painter, rect: Rect, session: &Session, tokens: &Tok
 fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
     let mut view = shared.session.view.clone();
     egui::Frame::new().inner_margin(egui::Margin::symmetric(8, 3)).show(ui, |ui| {
-        ui.horizontal(|ui| {
-            ui.set_height(22.0);
+        ui.horizontal_wrapped(|ui| {
             ui.selectable_value(&mut view.splat_mode, SplatMode::Splat, "Splats")
                 .on_hover_text("Alpha-blended Gaussians, sorted by depth.");
             ui.selectable_value(&mut view.splat_mode, SplatMode::Ellipsoid, "Ellipsoids")

@@ -11,6 +11,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, column: Column) {
     egui::Frame::new().inner_margin(egui::Margin::symmetric(8, 3)).show(ui, |ui| {
         ui.horizontal(|ui| {
             ui.set_height(22.0);
+            ui.spacing_mut().item_spacing.x = 4.0;
             match column {
                 Column::Ori => colours(ui, shared),
                 Column::Sim => comparison(ui, shared),
@@ -24,7 +25,7 @@ fn colours(ui: &mut Ui, shared: &mut Shared<'_>) {
     let view = &shared.session.view;
     let (mut scale, mut name) = (view.scale, view.colormap.clone());
     egui::ComboBox::from_id_salt("scale")
-        .width(62.0)
+        .width(50.0)
         .selected_text(if scale == MapScale::Decibel { "dB" } else { "linear" })
         .show_ui(ui, |ui| {
             ui.selectable_value(&mut scale, MapScale::Decibel, "dB")
@@ -36,7 +37,7 @@ fn colours(ui: &mut Ui, shared: &mut Shared<'_>) {
         .named(egui::Role::ComboBox, "Scale")
         .on_hover_text("Scale of the colours.");
     egui::ComboBox::from_id_salt("colormap")
-        .width(74.0)
+        .width(66.0)
         .selected_text(&name)
         .show_ui(ui, |ui| {
             for map in Colormap::ALL.into_iter().filter(|map| *map != Colormap::Diverging) {
