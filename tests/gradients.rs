@@ -3,6 +3,11 @@
 //! The threshold of the soft mask is a percentile of H_sim and is held constant in the gradient (SPEC section 4). So
 //! that L itself can be differenced here, the soft loss is recomputed in this file, from `simulate`'s maps, with the
 //! threshold frozen at the base point; the kinematic terms are differenced as the program gives them.
+//!
+//! Beside a coherent null, |S| ≈ 0, the loss bends within one step, and a difference quotient misses the slope by more
+//! than the gradient may. A quotient that contradicts the gradient is therefore refined until it agrees with itself, and
+//! only then believed. The cases are the same in every run; a longer hunt elsewhere:
+//! `PROPTEST_CASES=5000 PROPTEST_RNG_SEED=7 cargo test --test gradients`.
 #![expect(clippy::unwrap_used, reason = "a test stops where its material is missing")]
 
 use mhp_inspector::body::{Group, Pppr, PpprShape, Skeleton};
@@ -11,6 +16,7 @@ use mhp_inspector::geometry::{Pose, rotation_from_quaternion};
 use mhp_inspector::mhp::{Objective, Precision, Problem, simulate};
 use mhp_inspector::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use std::sync::Arc;
@@ -18,6 +24,10 @@ use std::sync::Arc;
 const JOINTS: usize = 5;
 const FEATURES: usize = 6;
 const SOFT_FLOOR: f64 = 1e-30;
+/// Random scenes keep |S| above this part of the incoherent sum.
+const NULL_DEPTH: f64 = 0.02;
+/// How often a step is halved before a difference quotient is given up.
+const HALVINGS: i32 = 6;
 
 /// Steps that balance truncation and rounding; from the README of the reference cases.
 fn step(group: Group) -> f64 {
@@ -119,6 +129,15 @@ fn scene(seed: u64, kinds: &[AxisKind], summation: Summation, operators: Operato
     Scene { problem, config, params: params(2, &mut rng) }
 }
 
+/// The kinematic terms see no map, so two cells do: most of the time of the objective goes into maps.
+fn kinematic_objective(config: FitConfig, params: &Pppr) -> Objective {
+    let radar = RadarConfig { doppler_features: FEATURES, ..RadarConfig::default() };
+    let mut view = view("none", &[AxisKind::X], &mut StdRng::seed_from_u64(0));
+    view.axes[0].bins = 2;
+    let problem = Problem::new(radar, skeleton(), vec![view], &[&[0.0, 1.0]]).unwrap();
+    Objective::new(Arc::new(problem), config, Precision::F64, params).unwrap()
+}
+
 /// numpy's percentile, by the textbook.
 fn percentile(values: &[f64], q_pct: f64) -> f64 {
     let mut sorted = values.to_vec();
@@ -170,8 +189,9 @@ impl Scene {
         let base = objective.evaluate(&self.params);
         let thresholds = self.thresholds();
         prop_assert!((base.terms.em - self.em(&self.params, &thresholds)).abs() < 1e-9, "L_EM itself");
+        let mut kinematic_objective = kinematic_objective(self.config, &self.params);
         let mut kinematic = |params: &Pppr| {
-            let t = objective.evaluate(params).terms;
+            let t = kinematic_objective.evaluate(params).terms;
             t.bone + t.rigid + t.joint + t.sep + t.coll
         };
         for group in Group::ALL {
@@ -190,32 +210,68 @@ impl Scene {
     }
 }
 
-/// Fourth-order central differences on every third entry of a group, starting anywhere.
+/// How many entries of a group to go on: no divisor of a joint's share, so that each component has its turn.
+fn stride(group: Group) -> usize {
+    match group {
+        Group::Position | Group::Velocity | Group::LogScale | Group::Beta => 2,
+        Group::Rotation => 3,
+        Group::Omega => 7,
+    }
+}
+
+/// Compares some entries of a group with fourth-order central differences.
 fn compare(
     group: Group,
     what: &str,
     got: &[f64],
-    h: f64,
+    step: f64,
     params: &Pppr,
     mut loss: impl FnMut(&Pppr) -> f64,
 ) -> Result<(), TestCaseError> {
     let largest = got.iter().fold(0.0, |m: f64, g| m.max(g.abs()));
-    for i in (0..got.len()).step_by(if group == Group::Omega { 7 } else { 2 }) {
-        let mut at = |k: f64| {
+    // What rounding of the loss leaves of a quotient grows as the step shrinks.
+    let limit = |h: f64| 2e-5 * largest + 4e-15 / h + 1e-10;
+    for i in (0..got.len()).step_by(stride(group)) {
+        let mut at = |offset: f64| {
             let mut moved = params.clone();
-            moved.group_mut(group)[i] += k * h;
+            moved.group_mut(group)[i] += offset;
             loss(&moved)
         };
-        let slope = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * h);
-        let limit = 2e-5 * largest + 1e-16 / h * 40.0 + 1e-10;
+        let mut quotient = |h: f64| (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+        let coarse = quotient(step);
+        if (got[i] - coarse).abs() <= limit(step) {
+            continue;
+        }
+        let entry = format!("{what}, {} [{i}]: {} by hand", group.key(), got[i]);
+        let Some((h, slope)) = settle(&mut quotient, coarse, step, limit) else {
+            let fail = format!("{entry}, {coarse} by differences, which do not settle as their step shrinks");
+            return Err(TestCaseError::fail(fail));
+        };
         prop_assert!(
-            (got[i] - slope).abs() <= limit,
-            "{what}, {} [{i}]: {} by hand, {slope} by differences, at most {limit:.2e} of {largest:.2e} apart",
-            group.key(),
-            got[i]
+            (got[i] - slope).abs() <= limit(h),
+            "{entry}, {slope} by differences at step {h:.2e}, at most {:.2e} of {largest:.2e} apart",
+            limit(h)
         );
     }
     Ok(())
+}
+
+/// Halves the step until two quotients in a row agree within the limit; the last step and its quotient. Their
+/// truncation error falls sixteenfold each time, so the last is much nearer than the limit. What the gradient says has
+/// no part in it.
+fn settle(
+    mut quotient: impl FnMut(f64) -> f64,
+    mut coarse: f64,
+    step: f64,
+    limit: impl Fn(f64) -> f64,
+) -> Option<(f64, f64)> {
+    (1..=HALVINGS).find_map(|k| {
+        let h = step * 0.5_f64.powi(k);
+        let fine = quotient(h);
+        let settled = (fine - coarse).abs() <= limit(h);
+        coarse = fine;
+        settled.then_some((h, fine))
+    })
 }
 
 fn kinds() -> impl Strategy<Value = Vec<AxisKind>> {
@@ -235,7 +291,12 @@ fn operators() -> impl Strategy<Value = Operators> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 48,
+        rng_seed: RngSeed::Fixed(1),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn agree_with_central_differences(
@@ -247,7 +308,7 @@ proptest! {
     ) {
         let summation = if coherent { Summation::Coherent } else { Summation::Incoherent };
         let scene = scene(seed, &kinds, summation, operators, offset_m);
-        prop_assume!(scene.depth_of_nulls() > 0.02);
+        prop_assume!(scene.depth_of_nulls() > NULL_DEPTH);
         scene.check()?;
     }
 }
@@ -258,12 +319,46 @@ fn every_axis_kind_alone() {
     for kind in AxisKind::ALL {
         for seed in 0..40 {
             let scene = scene(seed, &[kind, AxisKind::Z], Summation::Coherent, Operators::default(), 0.03);
-            if scene.depth_of_nulls() > 0.02 {
+            if scene.depth_of_nulls() > NULL_DEPTH {
                 let verdict = scene.check();
                 assert!(verdict.is_ok(), "{}: {verdict:?}", kind.name());
                 break;
             }
             assert!(seed < 39, "no scene without a null for {}", kind.name());
         }
+    }
+}
+
+/// Scenes with a lit cell that almost cancels: the first quotients are wrong there and the gradient is not.
+#[test]
+fn beside_a_null() {
+    use AxisKind::{Azimuth, Cone, DepthV, Elevation, X, Z};
+    let all = Operators::default();
+    let no_angle = Operators { angle: false, ..all };
+    for (seed, kinds, operators, offset_m) in [
+        (10998409863981825022, &[Elevation, Elevation] as &[_], all, 0.0),
+        (11496887695202309176, &[DepthV, Azimuth, Cone], all, 0.08),
+        (6729971952418478566, &[X, DepthV, Z], no_angle, 0.08),
+    ] {
+        let scene = scene(seed, kinds, Summation::Coherent, operators, offset_m);
+        assert!(scene.depth_of_nulls() < 1.1 * NULL_DEPTH, "no null in {kinds:?}");
+        let verdict = scene.check();
+        assert!(verdict.is_ok(), "{kinds:?}: {verdict:?}");
+    }
+}
+
+/// One entry of each group wrong by a thousandth of the largest: the comparison must see it.
+#[test]
+fn slightly_wrong_gradients_are_caught() {
+    let kinds = [AxisKind::Range, AxisKind::Azimuth, AxisKind::Doppler];
+    let scene = scene(3, &kinds, Summation::Coherent, Operators::default(), 0.03);
+    let objective = Objective::new(Arc::clone(&scene.problem), scene.config, Precision::F64, &scene.params);
+    let gradient = objective.unwrap().evaluate(&scene.params).em_gradient;
+    let thresholds = scene.thresholds();
+    for group in Group::ALL {
+        let mut got = gradient.group(group).to_vec();
+        got[0] += 1e-3 * got.iter().fold(0.0, |m: f64, g| m.max(g.abs()));
+        let verdict = compare(group, "L_EM", &got, step(group), &scene.params, |p| scene.em(p, &thresholds));
+        assert!(verdict.is_err(), "{} was wrong and passed", group.key());
     }
 }
