@@ -30,7 +30,9 @@ pub(super) fn splats(scene: &Scene<'_>, params: &Pppr) -> Vec<Splat> {
 /// √(S² + ε²) from ln S, in linear f64: values that differ by less than a step of ln H near the floor stay apart, and the
 /// floor itself is exactly ε, so that a strict comparison with a percentile behaves as SPEC section 4 says.
 pub(super) fn floored(ln_s: f64) -> f64 {
-    ln_s.exp().hypot(EPSILON)
+    let s = ln_s.exp();
+    // As written in SPEC: a more exact hypotenuse would decide ties at the floor differently. Beyond 1e150 ε is nothing.
+    if s > 1e150 { s } else { (s * s + EPSILON * EPSILON).sqrt() }
 }
 
 /// H_sim of every view over its whole map, C order, f64; SPEC section 3.
