@@ -113,7 +113,8 @@ impl Bench {
 
     fn finished(&mut self, branch: u32, iteration: usize) {
         let reason = StopReason::Iterations;
-        self.event(self.job(), WorkerEvent::Finished { branch, iteration, reason, run_ms: 3.0 });
+        let run = self.session.fit.run.0;
+        self.event(self.job(), WorkerEvent::Finished { run, branch, iteration, reason, run_ms: 3.0 });
     }
 
     fn snapshot(&mut self, job: JobId, branch: u32, iteration: usize, live: bool) {
@@ -327,7 +328,7 @@ fn a_frame_that_cannot_be_read_is_told_and_the_next_one_is_fine() {
 fn a_run_goes_to_the_asked_iterations_and_then_as_many_more() {
     let mut bench = Bench::new();
     let effects = bench.apply(Command::ToggleRun);
-    assert!(matches!(sent(&effects), WorkerCommand::RunTo(100)));
+    assert!(matches!(sent(&effects), WorkerCommand::RunTo { target: 100, .. }));
     assert!(bench.session.fit.is_running());
     assert!(bench.apply(Command::StepFit(1)).is_empty(), "no step during a run");
     let effects = bench.apply(Command::ToggleRun);
@@ -340,7 +341,7 @@ fn a_run_goes_to_the_asked_iterations_and_then_as_many_more() {
         (FitStatus::Paused, Some("all iterations done"))
     );
     let effects = bench.apply(Command::ToggleRun);
-    assert!(matches!(sent(&effects), WorkerCommand::RunTo(200)));
+    assert!(matches!(sent(&effects), WorkerCommand::RunTo { target: 200, .. }));
     let summary = &bench.session.summaries[&0];
     assert_eq!((summary.iterations, summary.iou, summary.converged), (100, Some(0.375), false));
 }
@@ -364,7 +365,7 @@ fn commands_to_the_optimiser_need_a_fit() {
     }
     assert_eq!(bench.session.fit.status, FitStatus::Preparing);
     bench.answer(prepare);
-    assert!(matches!(sent(&bench.apply(Command::ToggleRun)), WorkerCommand::RunTo(100)));
+    assert!(matches!(sent(&bench.apply(Command::ToggleRun)), WorkerCommand::RunTo { target: 100, .. }));
 }
 
 #[test]
@@ -398,7 +399,7 @@ fn looking_back_and_forward_again() {
     let effects = bench.apply(Command::StepFit(5));
     assert!(matches!(sent(&effects), WorkerCommand::Inspect { state, .. } if state.iteration == 10));
     assert_eq!(bench.session.fit.cursor, None, "the newest iteration is live");
-    assert!(matches!(sent(&bench.apply(Command::StepFit(1))), WorkerCommand::RunTo(11)));
+    assert!(matches!(sent(&bench.apply(Command::StepFit(1))), WorkerCommand::RunTo { target: 11, .. }));
     bench.finished(0, 10);
     bench.apply(Command::StepBack(usize::MAX));
     assert_eq!(bench.session.fit.cursor, Some(0));
@@ -449,7 +450,7 @@ fn a_setting_changed_at_an_earlier_iteration_starts_a_branch() {
     assert_eq!((bench.session.fit.cursor, bench.session.fit.shown_iteration()), (None, 6));
     assert!(bench.session.log.back().unwrap().text.contains("w_EM 0.5 → 2"));
     // A step that is asked for before the worker has answered is a step from there.
-    assert!(matches!(sent(&bench.apply(Command::StepFit(1))), WorkerCommand::RunTo(7)));
+    assert!(matches!(sent(&bench.apply(Command::StepFit(1))), WorkerCommand::RunTo { target: 7, .. }));
     let job = bench.job();
     bench.rows(job, 1, 6..=8);
     bench.finished(1, 8);
@@ -691,7 +692,7 @@ fn a_run_begins_by_itself_only_where_asked() {
         init_ms: 0.0,
     };
     let effects = bench.event(job, WorkerEvent::Prepared(Box::new(prepared)));
-    assert!(matches!(sent(&effects), WorkerCommand::RunTo(100)));
+    assert!(matches!(sent(&effects), WorkerCommand::RunTo { target: 100, .. }));
     assert_eq!(bench.session.notice.as_ref().unwrap().2, "the region has no cell");
 }
 
@@ -738,4 +739,20 @@ fn the_log_is_bounded() {
     assert_eq!(session.notice, None, "information is not a notification");
     session.apply(Command::ClearLog);
     assert!(session.log.is_empty());
+}
+
+#[test]
+fn the_end_of_an_older_run_does_not_end_the_newer_one() {
+    let mut bench = Bench::new();
+    let job = bench.job();
+    bench.apply(Command::StepFit(4));
+    bench.rows(job, 0, 1..=4);
+    let old = bench.session.fit.run.0;
+    bench.apply(Command::Discard);
+    bench.apply(Command::ToggleRun);
+    let reason = StopReason::Iterations;
+    bench.event(job, WorkerEvent::Finished { run: old, branch: 0, iteration: 4, reason, run_ms: 3.0 });
+    assert!(bench.session.fit.is_running(), "the end of the discarded run came late");
+    bench.finished(0, 100);
+    assert!(!bench.session.fit.is_running());
 }

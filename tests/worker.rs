@@ -104,7 +104,7 @@ impl Rig {
 
     /// Begins a run that never ends by itself and answers the rows of at least `steps` iterations.
     fn run_forever(&mut self, steps: usize) -> Vec<HistoryRow> {
-        self.send(WorkerCommand::RunTo(FOREVER));
+        self.send(WorkerCommand::RunTo { target: FOREVER, run: 1 });
         self.more_rows(steps)
     }
 
@@ -192,7 +192,7 @@ fn preparing_answers_the_start_pose_its_row_and_a_picture_of_it() {
 fn a_run_gives_every_row_once_and_in_order() {
     let mut rig = Rig::new();
     let (first, _) = rig.prepared();
-    rig.send(WorkerCommand::RunTo(60));
+    rig.send(WorkerCommand::RunTo { target: 60, run: 1 });
     let (rows, at, reason) = rig.finish();
     assert_eq!((at, reason), (60, StopReason::Iterations));
     assert_eq!(iterations(&rows), (1..=60).collect::<Vec<_>>());
@@ -201,7 +201,7 @@ fn a_run_gives_every_row_once_and_in_order() {
     let snapshot = rig.snapshot(|snapshot| snapshot.iteration == 60);
     assert_eq!(snapshot.params, rows[59].state.params);
     assert_eq!(snapshot.iterations_per_s, 0.0, "at its end a run is paused");
-    rig.send(WorkerCommand::RunTo(61));
+    rig.send(WorkerCommand::RunTo { target: 61, run: 1 });
     assert_eq!(iterations(&rig.finish().0), [61]);
 }
 
@@ -209,9 +209,9 @@ fn a_run_gives_every_row_once_and_in_order() {
 fn a_run_that_is_already_there_says_so() {
     let mut rig = Rig::new();
     rig.prepared();
-    rig.send(WorkerCommand::RunTo(5));
+    rig.send(WorkerCommand::RunTo { target: 5, run: 1 });
     rig.finish();
-    rig.send(WorkerCommand::RunTo(3));
+    rig.send(WorkerCommand::RunTo { target: 3, run: 1 });
     let (rows, at, reason) = rig.finish();
     assert_eq!((rows.len(), at, reason), (0, 5, StopReason::Iterations));
 }
@@ -235,7 +235,7 @@ fn pause_stops_after_the_step_and_nothing_follows() {
     assert!(rig.worker.poll().is_none());
     // A pause of what does not run is no event.
     rig.send(WorkerCommand::Pause);
-    rig.send(WorkerCommand::RunTo(at + 1));
+    rig.send(WorkerCommand::RunTo { target: at + 1, run: 1 });
     let (rows, ..) = rig.finish();
     assert_eq!(iterations(&rows), [at + 1]);
 }
@@ -279,25 +279,25 @@ fn settings_changed_before_the_first_step_give_row_0_anew() {
 fn a_branch_with_the_same_settings_repeats_the_run_bit_for_bit() {
     let mut rig = Rig::new();
     let (first, _) = rig.prepared();
-    rig.send(WorkerCommand::RunTo(25));
+    rig.send(WorkerCommand::RunTo { target: 25, run: 1 });
     let (mut rows, ..) = rig.finish();
     rows.insert(0, first);
     // Other settings meanwhile must leave no trace.
     let other = FitConfig { learning_rate: 0.02, tau_pct: 30.0, softness: 0.1, ..FitConfig::default() };
     rig.send(WorkerCommand::Configure(other));
     rig.rows_until(1, |event| matches!(event, WorkerEvent::ConfigApplied { iteration: 25, .. }));
-    rig.send(WorkerCommand::RunTo(30));
+    rig.send(WorkerCommand::RunTo { target: 30, run: 1 });
     rig.finish();
     let config = FitConfig::default();
     rig.send(WorkerCommand::Branch { branch: 1, state: Arc::clone(&rows[7].state), config });
-    rig.send(WorkerCommand::RunTo(25));
+    rig.send(WorkerCommand::RunTo { target: 25, run: 1 });
     let (again, at, _) = rig.finish();
     assert_eq!(at, 25);
     assert!(again.iter().all(|row| row.branch == 1));
     same(&again, &rows[7..]);
     // And with other settings it is another run from the first step on.
     rig.send(WorkerCommand::Branch { branch: 2, state: Arc::clone(&rows[7].state), config: other });
-    rig.send(WorkerCommand::RunTo(8));
+    rig.send(WorkerCommand::RunTo { target: 8, run: 1 });
     let (differs, ..) = rig.finish();
     assert_eq!(iterations(&differs), [7, 8]);
     assert_weights(&differs, &other);
@@ -308,14 +308,14 @@ fn a_branch_with_the_same_settings_repeats_the_run_bit_for_bit() {
 fn a_fit_that_is_resumed_goes_on_bit_for_bit() {
     let mut rig = Rig::new();
     let (_, prepared) = rig.prepared();
-    rig.send(WorkerCommand::RunTo(20));
+    rig.send(WorkerCommand::RunTo { target: 20, run: 1 });
     let (rows, ..) = rig.finish();
     let start = Start::Resume { initial: prepared.initial, state: Arc::clone(&rows[9].state) };
     rig.prepare_with(1, FitConfig::default(), start);
     let (none, event) = rig.rows_until(1, |event| matches!(event, WorkerEvent::Prepared(_)));
     let WorkerEvent::Prepared(prepared) = event else { panic!("{event:?}") };
     assert!(none.is_empty() && prepared.initialisation.is_none());
-    rig.send(WorkerCommand::RunTo(20));
+    rig.send(WorkerCommand::RunTo { target: 20, run: 1 });
     same(&rig.finish().0, &rows[10..]);
 }
 
@@ -333,7 +333,7 @@ fn a_new_job_ends_the_old_one_and_its_messages() {
     rig.waiting.push_front(message);
     let (rows, _) = rig.rows_until(2, |event| matches!(event, WorkerEvent::Prepared(_)));
     assert_eq!(iterations(&rows), [0]);
-    rig.send(WorkerCommand::RunTo(3));
+    rig.send(WorkerCommand::RunTo { target: 3, run: 1 });
     let (rows, _) = rig.rows_until(2, |event| matches!(event, WorkerEvent::Finished { iteration: 3, .. }));
     assert_eq!(iterations(&rows), [1, 2, 3]);
     assert_eq!(rig.snapshot(|snapshot| snapshot.iteration == 3).job, 2);
@@ -349,11 +349,11 @@ fn a_panic_is_told_and_the_thread_takes_another_job() {
     let WorkerEvent::Lost(text) = event else { panic!("{event:?}") };
     assert!(text.contains("internal error") && text.contains("asked to panic"), "{text}");
     // The job is gone: asking it for more is answered, not ignored.
-    rig.send(WorkerCommand::RunTo(FOREVER));
+    rig.send(WorkerCommand::RunTo { target: FOREVER, run: 1 });
     rig.rows_until(1, |event| matches!(event, WorkerEvent::Lost(_)));
     rig.prepare_with(1, FitConfig::default(), Start::Initialise);
     rig.rows_until(1, |event| matches!(event, WorkerEvent::Prepared(_)));
-    rig.send(WorkerCommand::RunTo(2));
+    rig.send(WorkerCommand::RunTo { target: 2, run: 1 });
     assert_eq!(iterations(&rig.finish().0), [1, 2]);
 }
 
@@ -384,7 +384,7 @@ fn an_impossible_edit_is_told_and_the_job_stays() {
     let mut good = prepared.initial.clone();
     good.group_mut(mhp_inspector::body::Group::Position)[4] += 0.01;
     rig.send(WorkerCommand::Edit(Box::new(good.clone())));
-    rig.send(WorkerCommand::RunTo(1));
+    rig.send(WorkerCommand::RunTo { target: 1, run: 1 });
     let (rows, ..) = rig.finish();
     assert_eq!(iterations(&rows), [0, 1]);
     assert_eq!(rows[0].state.params, good);
@@ -470,10 +470,10 @@ fn every_command_in_the_queue_is_obeyed_in_order() {
     let state: Arc<FitState> = first.state;
     for branch in 1..=200 {
         rig.send(WorkerCommand::Branch { branch, state: Arc::clone(&state), config: FitConfig::default() });
-        rig.send(WorkerCommand::RunTo(1));
+        rig.send(WorkerCommand::RunTo { target: 1, run: 1 });
         rig.send(WorkerCommand::Pause);
     }
-    rig.send(WorkerCommand::RunTo(2));
+    rig.send(WorkerCommand::RunTo { target: 2, run: 1 });
     let mut branches = Vec::new();
     loop {
         match rig.message() {

@@ -54,8 +54,13 @@ pub struct Prepare {
 pub enum WorkerCommand {
     /// Set up a job, replacing the old one; it stays paused.
     Prepare(Box<Prepare>),
-    /// Run until this iteration.
-    RunTo(usize),
+    /// Run until an iteration.
+    RunTo {
+        /// The iteration.
+        target: usize,
+        /// Comes back with the run's end, so that the end of an older run is not taken for this one's.
+        run: u64,
+    },
     /// Stop after the current step; the job stays.
     Pause,
     /// Take effect at the next step.
@@ -156,6 +161,8 @@ pub enum WorkerEvent {
     },
     /// A run ended.
     Finished {
+        /// The run's number.
+        run: u64,
         /// The branch.
         branch: u32,
         /// Where it stands.

@@ -32,6 +32,8 @@ struct Job {
     /// A second objective with the same EM region, for looking at states that are not the current one.
     viewer: Objective,
     target: usize,
+    /// Number of the newest run.
+    run: u64,
     rows: Vec<HistoryRow>,
     run_began: Instant,
     steps_in_run: usize,
@@ -143,7 +145,7 @@ impl Thread {
                             self.event(WorkerEvent::Failed(error.to_string()));
                         }
                     }
-                } else if matches!(command, WorkerCommand::RunTo(_)) {
+                } else if matches!(command, WorkerCommand::RunTo { .. }) {
                     self.event(WorkerEvent::Lost("there is no fit to run: reset it".into()));
                 }
             }
@@ -239,6 +241,7 @@ impl Job {
             fitter,
             viewer,
             target: 0,
+            run: 0,
             rows: Vec::new(),
             run_began: now,
             steps_in_run: 0,
@@ -263,6 +266,7 @@ impl Job {
 
     fn finished(&self, reason: StopReason) -> WorkerEvent {
         WorkerEvent::Finished {
+            run: self.run,
             branch: self.branch,
             iteration: self.iteration(),
             reason,
@@ -290,8 +294,8 @@ impl Job {
 
     fn handle(&mut self, command: WorkerCommand) -> Result<Reply, FitError> {
         match command {
-            WorkerCommand::RunTo(target) => {
-                self.target = target;
+            WorkerCommand::RunTo { target, run } => {
+                (self.target, self.run) = (target, run);
                 self.run_began = Instant::now();
                 self.steps_in_run = 0;
                 if !self.is_running() {

@@ -26,7 +26,8 @@ impl Session {
         self.fit.cursor = None;
         self.fit.status = FitStatus::Running;
         self.fit.reason = None;
-        vec![Effect::Send(WorkerCommand::RunTo(target))]
+        self.fit.run = (self.fit.run.0 + 1, self.fit.head());
+        vec![Effect::Send(WorkerCommand::RunTo { target, run: self.fit.run.0 })]
     }
 
     pub(super) fn step_fit(&mut self, n: usize) -> Vec<Effect> {

@@ -57,12 +57,13 @@ impl Session {
                 self.fit.history.flag(branch, iteration, config);
                 Vec::new()
             }
-            WorkerEvent::Finished { branch, iteration, reason, run_ms } => {
-                if branch == self.fit.history.active_id() {
+            WorkerEvent::Finished { run, branch, iteration, reason, run_ms } => {
+                if run == self.fit.run.0 && branch == self.fit.history.active_id() {
                     self.fit.status = FitStatus::Paused;
                     self.fit.run_ms = Some(run_ms);
                     self.fit.reason = Some(reason.text());
-                    if self.fit.branch().is_some_and(|b| b.rows.len() > 2) {
+                    // A single step is seen on the screen; the log is for runs.
+                    if iteration > self.fit.run.1 + 1 {
                         self.note(
                             LogLevel::Info,
                             format!("{} at iteration {iteration} after {run_ms:.0} ms", reason.text()),
