@@ -264,7 +264,12 @@ fn slider(ui: &mut Ui, field: &Field, config: &mut FitConfig) {
         response.on_hover_text(&tip);
         let speed = if value == 0.0 { 0.001 } else { value.abs() * 0.01 };
         let digits = if field.key == "iterations" { 0 } else { 6 };
-        let drag = egui::DragValue::new(&mut value).range(lo..=hi).speed(speed).max_decimals(digits).suffix(field.unit);
+        let drag = egui::DragValue::new(&mut value)
+            .update_while_editing(false)
+            .range(lo..=hi)
+            .speed(speed)
+            .max_decimals(digits)
+            .suffix(field.unit);
         let response = ui.add_sized([62.0, 20.0], drag);
         let spoken = format!("{} value", field.label);
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, &spoken));
@@ -306,7 +311,8 @@ fn region(ui: &mut Ui, config: &mut FitConfig) {
             config.em_region = EmRegion::default();
         }
         if let EmRegion::HalfWidth(half) = &mut config.em_region {
-            let drag = egui::DragValue::new(half).range(0.1..=20.0).speed(0.01).suffix(" m");
+            let drag =
+                egui::DragValue::new(half).update_while_editing(false).range(0.1..=20.0).speed(0.01).suffix(" m");
             let response = ui.add(drag);
             response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, "EM region half width"));
             response.on_hover_text("Half width of the box around the person's start pose. Default 1.25 m.");

@@ -64,7 +64,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
                 for (i, name) in names.iter().enumerate() {
                     ui.label(RichText::new(format!("   {name}")).color(tokens.dim));
                     let value = &mut edited.joint_mut(group, joint)[i];
-                    let drag = egui::DragValue::new(value).speed(speed).fixed_decimals(4);
+                    let drag = egui::DragValue::new(value).update_while_editing(false).speed(speed).fixed_decimals(4);
                     let response = ui.add_enabled(editable, drag);
                     let spoken = format!("{title} {name}");
                     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, editable, &spoken));
