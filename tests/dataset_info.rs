@@ -40,7 +40,7 @@ fn text_tells_axes_values_labels_and_assumptions() {
     for wanted in [
         "layout      mmvr\n",
         "frames      1 in 1 sequence, 15 a second\n",
-        "axes        Cartesian · rows: depth 8→0 m, row 0 far · columns: y −1…4 m to the right (hm_hori), z −2…3 m up (hm_vert)\n",
+        "axes        Cartesian · rows: depth 8→0 m, row 0 far · columns: y 1→−4 m from left to right (hm_hori), z −2…3 m up (hm_vert)\n",
         "skeleton    coco17, 17 joints, 19 bones\n",
         "assumed     radar: ",
         "time        2.000 s\n",

@@ -45,7 +45,7 @@ fn the_real_mmvr_frame_is_read_as_measured() {
     assert_eq!((dataset.frame_name(0).as_str(), dataset.sequence(0)), ("mmvr/00383", "mmvr"));
     assert_eq!(
         info.axes_badge,
-        "Cartesian · rows: depth 8→0 m, row 0 far · columns: y −1…4 m to the right (hm_hori), z −2…3 m up (hm_vert)"
+        "Cartesian · rows: depth 8→0 m, row 0 far · columns: y 1→−4 m from left to right (hm_hori), z −2…3 m up (hm_vert)"
     );
     let frame = dataset.load(0).unwrap();
     assert_eq!(frame.notes, Vec::<String>::new());

@@ -520,6 +520,7 @@ pub(crate) fn tooltip(command: &UserCommand) -> String {
 pub(crate) fn pressed(ctx: &egui::Context) -> Vec<&'static UserCommand> {
     let focused = ctx.memory(egui::Memory::focused);
     let typing = focused.is_some_and(|id| egui::text_edit::TextEditState::load(ctx, id).is_some());
+    let popup = egui::Popup::is_any_open(ctx);
     let mut found = Vec::new();
     ctx.input_mut(|input| {
         input.events.retain(|event| {
@@ -529,6 +530,10 @@ pub(crate) fn pressed(ctx: &egui::Context) -> Vec<&'static UserCommand> {
                 return true;
             }
             if typing && !(held.0 && matches!(key, Key::K | Key::P | Key::Q | Key::O | Key::T) || *key == Key::F1) {
+                return true;
+            }
+            // An open menu keeps the keys that close it and move in it.
+            if popup && !held.0 {
                 return true;
             }
             // A widget that has the keyboard keeps its own keys.

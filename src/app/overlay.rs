@@ -29,6 +29,8 @@ enum Sheet {
 pub(super) struct Overlay {
     sheet: Sheet,
     query: String,
+    /// Shown in an empty field.
+    hint: String,
     chosen: usize,
     fresh: bool,
     notices: Vec<(f64, LogLevel, String)>,
@@ -50,12 +52,12 @@ impl Overlay {
 
     pub(super) fn open_goto(&mut self, current: usize) {
         self.toggle(Sheet::Goto);
-        self.query = current.to_string();
+        self.hint = current.to_string();
     }
 
     pub(super) fn open_path(&mut self, start: Option<&PathBuf>) {
         self.toggle(Sheet::Path);
-        self.query = start.map(|path| path.display().to_string()).unwrap_or_default();
+        self.hint = start.map(|path| path.display().to_string()).unwrap_or_default();
     }
 
     fn toggle(&mut self, sheet: Sheet) {
@@ -152,7 +154,8 @@ impl Overlay {
         let response = modal(ui, "goto").show(ui.ctx(), |ui| {
             ui.set_width(260.0);
             ui.label(format!("Frame, 0 to {last}"));
-            let field = ui.add(egui::TextEdit::singleline(&mut self.query).desired_width(f32::INFINITY));
+            let field =
+                ui.add(egui::TextEdit::singleline(&mut self.query).hint_text(&self.hint).desired_width(f32::INFINITY));
             field.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Frame number"));
             if self.fresh {
                 field.request_focus();

@@ -2,8 +2,8 @@
 
 use crate::radar::{Axis, AxisKind, Spacing, View};
 
-/// One axis in words, for example `depth 8→0 m, row 0 far` or `y −1…4 m to the right`. The numbers are the outer edges of
-/// the first and the last bin; a falling `y` is told as what it is for a reader of the map, a distance to the right.
+/// One axis in words, for example `depth 8→0 m, row 0 far` or `y 1→−4 m from left to right`. The numbers are the outer edges
+/// of the first and the last bin, with the signs that the map's own ticks have.
 pub fn axis_words(axis: &Axis, position: &str) -> String {
     let (first, last) = (axis.shown_at(-0.5), axis.shown_at(axis.bins as f64 - 0.5));
     let (name, unit) = (axis.shown_name(), axis.shown_unit());
@@ -14,8 +14,8 @@ pub fn axis_words(axis: &Axis, position: &str) -> String {
         format!("{}, {position} 0 {}", span(first, last, "→"), if falling { at_high } else { at_low })
     };
     let words = match axis.kind {
-        AxisKind::Y if falling => format!("{} to the right", span(-first, -last, "…")),
-        AxisKind::Y => format!("{} to the left", span(first, last, "…")),
+        AxisKind::Y if falling => format!("{} from left to right", span(first, last, "→")),
+        AxisKind::Y => format!("{} from right to left", span(first, last, "→")),
         AxisKind::Z if falling => format!("{} downward", span(first, last, "→")),
         AxisKind::Z => format!("{} up", span(first, last, "…")),
         AxisKind::Azimuth | AxisKind::Cone => end("right", "left"),

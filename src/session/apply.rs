@@ -104,11 +104,7 @@ impl Session {
 
     /// Writes a line to the log; warnings and errors also become the notice.
     pub(super) fn note(&mut self, level: LogLevel, text: String) {
-        match level {
-            LogLevel::Info => tracing::debug!("{text}"),
-            LogLevel::Warning => tracing::warn!("{text}"),
-            LogLevel::Error => tracing::error!("{text}"),
-        }
+        tracing::debug!("{text}");
         if level != LogLevel::Info {
             let count = self.notice.as_ref().map_or(0, |(count, ..)| *count);
             self.notice = Some((count + 1, level, text.clone()));

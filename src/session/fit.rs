@@ -40,6 +40,8 @@ pub struct Fit {
     pub initialisation: Option<Initialisation>,
     /// Milliseconds that took.
     pub init_ms: f64,
+    /// Parameters were edited by hand.
+    pub edited: bool,
     /// Number of the newest run, and the iteration that it began at.
     pub run: (u64, usize),
     /// Milliseconds of the last run.

@@ -2,15 +2,17 @@
 
 use super::{Shared, empty};
 use crate::app::theme::{self, Tokens};
-use crate::session::{Branch, Command, Row};
-use egui::{Color32, RichText, Ui};
-use egui_plot::{Line, Plot, PlotPoint, PlotPoints, Points, Text, VLine};
+use crate::session::{Branch, Command, FitStatus, History, Row};
+use egui::{Color32, Ui};
+use egui_plot::{Line, Plot, PlotPoint, PlotPoints, Points, VLine};
 
 /// What the plot remembers.
 #[derive(Default)]
 pub(in crate::app) struct State {
     reset: bool,
     tab: Tab,
+    /// The shown iteration before the last click.
+    before_click: usize,
 }
 
 impl State {
@@ -41,13 +43,21 @@ fn curve(key: &str, name: &str, width: f32, value: impl Fn(&Row) -> Option<f64> 
 
 pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let fit = &shared.session.fit;
-    let Some(branch) = fit.branch().filter(|b| !b.rows.is_empty()) else {
-        return empty(
-            ui,
-            "No iterations yet",
-            "Press Enter to run the fit; loss, IoU and error appear here as it runs.",
-        );
+    let blank;
+    let branch = match fit.branch().filter(|b| !b.rows.is_empty()) {
+        Some(branch) => branch,
+        // The plot stays while the next frame is prepared.
+        None if fit.status == FitStatus::Preparing => {
+            let config = shared.session.config;
+            blank = Branch { id: 0, parent: None, config, rows: Vec::new(), flags: Vec::new() };
+            &blank
+        }
+        None => {
+            let how = "Press Enter to run the fit; loss, IoU and error appear here as it runs.";
+            return empty(ui, "No iterations yet", shared.session.data.error.as_deref().unwrap_or(how));
+        }
     };
+    let rows = lineage(&fit.history, branch);
     let curves = curves(shared, branch, state.tab);
     toolbar(ui, shared, state, &curves);
     let fit = &shared.session.fit;
@@ -75,55 +85,83 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     if std::mem::take(&mut state.reset) {
         plot = plot.reset();
     }
-    let lines: Vec<(Vec<PlotPoint>, &Curve)> =
-        curves.iter().filter(|c| !hidden.contains(&c.key)).map(|c| (points(branch, c, log), c)).collect();
-    let others: Vec<(u32, Vec<PlotPoint>)> = fit
+    let lines: Vec<(Vec<Vec<PlotPoint>>, &Curve)> =
+        curves.iter().filter(|c| !hidden.contains(&c.key)).map(|c| (points(&rows, c, log), c)).collect();
+    let others: Vec<(u32, Vec<Vec<PlotPoint>>)> = fit
         .history
         .branches()
         .iter()
         .filter(|b| b.id != branch.id)
-        .filter_map(|b| Some((b.id, points(b, curves.first()?, log))))
+        .filter_map(|b| Some((b.id, points(&b.rows.iter().collect::<Vec<_>>(), curves.first()?, log))))
         .collect();
     let shown = fit.shown_iteration();
     let response = plot.show(ui, |plot| {
-        for (id, points) in &others {
-            let name = format!("branch {id}");
-            plot.line(Line::new(name, PlotPoints::Borrowed(points)).color(tokens.dim.gamma_multiply(0.5)).width(1.0));
+        for (id, pieces) in &others {
+            for piece in pieces {
+                let line = Line::new(format!("branch {id}"), PlotPoints::Borrowed(piece));
+                plot.line(line.color(tokens.dim.gamma_multiply(0.8)).width(1.2));
+            }
         }
-        for (points, c) in &lines {
+        for (pieces, c) in &lines {
             let color = tokens.curve(&c.key);
-            if points.len() == 1 {
-                let one: Vec<[f64; 2]> = points.iter().map(|p| [p.x, p.y]).collect();
-                plot.points(Points::new(c.name.clone(), one).color(color).radius(2.5));
+            for piece in pieces {
+                if let [only] = piece.as_slice() {
+                    plot.points(Points::new(c.name.clone(), vec![[only.x, only.y]]).color(color).radius(2.5));
+                }
+                plot.line(Line::new(c.name.clone(), PlotPoints::Borrowed(piece)).color(color).width(c.width));
             }
-            plot.line(Line::new(c.name.clone(), PlotPoints::Borrowed(points)).color(color).width(c.width));
         }
-        let top = plot.plot_bounds().max()[1];
-        let mut free_from = f32::NEG_INFINITY;
         for flag in &branch.flags {
-            let x = flag.iteration as f64;
-            plot.vline(VLine::new(flag.text.clone(), x).color(tokens.warn.gamma_multiply(0.7)).width(1.0));
-            // A dragged slider leaves many flags; texts are written where there is room.
-            let at = plot.screen_from_plot(PlotPoint::new(x, top)).x;
-            if at < free_from {
-                continue;
-            }
-            free_from = at + 12.0 + 5.5 * flag.text.chars().count() as f32;
-            let text = RichText::new(format!("◆ {}", flag.text)).size(10.0);
-            plot.text(
-                Text::new("flag", PlotPoint::new(x, top), text).color(tokens.warn).anchor(egui::Align2::LEFT_TOP),
-            );
+            let line = VLine::new(flag.text.clone(), flag.iteration as f64);
+            plot.vline(line.color(tokens.warn.gamma_multiply(0.7)).width(1.0));
         }
         plot.vline(VLine::new("shown iteration", shown as f64).color(tokens.accent).width(1.0));
         (plot.pointer_coordinate(), plot.response().clone())
     });
+    flag_texts(ui, &response, branch, &tokens);
     let (pointer, inner) = response.inner;
     inner.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "Curves"));
-    if inner.clicked()
+    if inner.double_clicked() {
+        // The first click of the two has moved the cursor; the gesture was for the plot.
+        shared.send(Command::GotoIteration(state.before_click));
+    } else if inner.clicked()
         && let Some(at) = pointer
     {
+        state.before_click = shown;
         shared.send(Command::GotoIteration(at.x.round().clamp(0.0, 1e9) as usize));
     }
+}
+
+/// What changed at each flag, where there is room: a dragged slider leaves many. Painted over the plot, not in it, so
+/// that no text takes part in the plot's bounds.
+fn flag_texts<R>(ui: &Ui, response: &egui_plot::PlotResponse<R>, branch: &Branch, tokens: &Tokens) {
+    let frame = *response.transform.frame();
+    let painter = ui.painter().with_clip_rect(frame.intersect(ui.clip_rect()));
+    let mut free_from = frame.left();
+    for flag in &branch.flags {
+        let x = response.transform.position_from_point(&PlotPoint::new(flag.iteration as f64, 0.0)).x;
+        if !(frame.left()..=frame.right()).contains(&x) || x < free_from {
+            continue;
+        }
+        let font = egui::FontId::proportional(10.0);
+        let galley = painter.layout_no_wrap(format!("◆ {}", flag.text), font, tokens.warn);
+        let left = (x + 3.0).min(frame.right() - galley.size().x - 3.0);
+        free_from = left + galley.size().x + 6.0;
+        painter.galley(egui::pos2(left, frame.top() + 2.0), galley, tokens.warn);
+    }
+}
+
+/// The rows of a branch with those of its parents before it: the way that led to its head.
+fn lineage<'a>(history: &'a History, branch: &'a Branch) -> Vec<&'a Row> {
+    let mut pieces: Vec<Vec<&Row>> = vec![branch.rows.iter().collect()];
+    let (mut from, mut parent) = (branch.start(), branch.parent);
+    while let Some((id, at)) = parent {
+        let Some(before) = history.branch(id) else { break };
+        let last = at.min(from);
+        pieces.push(before.rows.iter().filter(|row| row.report.iteration < last).collect());
+        (from, parent) = (before.start().min(last), before.parent);
+    }
+    pieces.into_iter().rev().flatten().collect()
 }
 
 fn curves(shared: &Shared<'_>, branch: &Branch, tab: Tab) -> Vec<Curve> {
@@ -163,17 +201,21 @@ fn curves(shared: &Shared<'_>, branch: &Branch, tab: Tab) -> Vec<Curve> {
     }
 }
 
-/// The points of a curve; on a logarithmic scale values that are not positive have none.
-fn points(branch: &Branch, curve: &Curve, log: bool) -> Vec<PlotPoint> {
-    branch
-        .rows
-        .iter()
-        .filter_map(|row| {
-            let value = (curve.value)(row)?;
-            let y = if log { (value > 1e-7).then(|| value.log10())? } else { value };
-            y.is_finite().then(|| PlotPoint::new(row.report.iteration as f64, y))
-        })
-        .collect()
+/// The points of a curve, in pieces: where there is no value (or on a logarithmic scale none above 1e−7) the line breaks.
+fn points(rows: &[&Row], curve: &Curve, log: bool) -> Vec<Vec<PlotPoint>> {
+    let mut pieces: Vec<Vec<PlotPoint>> = vec![Vec::new()];
+    for row in rows {
+        let value = (curve.value)(row).filter(|v| v.is_finite() && (!log || *v > 1e-7));
+        match (value, pieces.last_mut()) {
+            (Some(value), Some(piece)) => {
+                let y = if log { value.log10() } else { value };
+                piece.push(PlotPoint::new(row.report.iteration as f64, y));
+            }
+            _ => pieces.push(Vec::new()),
+        }
+    }
+    pieces.retain(|piece| !piece.is_empty());
+    pieces
 }
 
 fn label(hover: &egui_plot::HoverPosition<'_>, log: bool) -> Option<String> {

@@ -9,11 +9,11 @@ use crate::session::{Command, FitStatus};
 use egui::{RichText, Ui};
 
 pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
+    transport(ui, shared);
+    // In scopes of their own: what appears in them must not shift the identity of a number that is being typed below.
+    ui.scope(|ui| status(ui, shared));
+    ui.separator();
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        transport(ui, shared);
-        // In scopes of their own: what appears in them must not shift the identity of a number that is being typed below.
-        ui.scope(|ui| status(ui, shared));
-        ui.separator();
         let old = shared.session.config;
         let mut config = old;
         for field in FIELDS.iter().take(3) {
@@ -74,9 +74,9 @@ fn status(ui: &mut Ui, shared: &mut Shared<'_>) {
     ui.horizontal_wrapped(|ui| {
         chip(ui, word, color);
         if let Some(row) = fit.shown_row() {
-            if row.report.converged {
+            if row.report.converged && row.report.iteration > 0 && !fit.is_running() {
                 chip(ui, "✓ converged", tokens.ok).on_hover_text(
-                    "L < 1, or L changed by less than 0.5 % over five iterations; every joint finite and every bone within 0.5–1.5 of its reference.",
+                    "The criterion holds: L < 1, or L changed by less than 0.5 % over five iterations; every joint finite and every bone within 0.5–1.5 of its reference.",
                 );
             }
             if let Some(reason) = fit.reason {
@@ -87,9 +87,8 @@ fn status(ui: &mut Ui, shared: &mut Shared<'_>) {
             ui.label(RichText::new(why).small().color(tokens.bad));
         }
     });
-    if fit.history.branches().len() > 1 {
-        branches(ui, shared);
-    }
+    // Always there: a branch that begins while a slider is dragged must not move the slider.
+    branches(ui, shared);
 }
 
 fn branches(ui: &mut Ui, shared: &mut Shared<'_>) {
@@ -123,12 +122,16 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
     let tokens = Tokens::of(ui);
     let fit = &shared.session.fit;
     let Some(row) = fit.shown_row() else {
-        let text = if fit.status == FitStatus::Preparing {
-            "The start pose is being sought."
-        } else {
-            "No fit: open a frame."
-        };
-        ui.label(RichText::new(text).color(tokens.dim));
+        // The same rows without numbers, so that nothing jumps while the next frame is prepared.
+        let arrays =
+            shared.session.data.dataset.iter().flat_map(|d| &d.info().views).map(|v| format!("IoU {}", v.array));
+        let names = ["Iteration", "L total", "L_EM", "L_bone", "L_rigid", "L_joint"].map(str::to_owned);
+        for name in names.into_iter().chain(arrays) {
+            value_row(ui, &name, "—", "");
+        }
+        if let Some(error) = &shared.session.data.error {
+            ui.label(RichText::new(error).small().color(tokens.bad));
+        }
         return;
     };
     let report = &row.report;

@@ -43,6 +43,8 @@ pub(in crate::app) struct State {
     hovered: Option<(usize, [usize; 2])>,
     hovered_next: Option<(usize, [usize; 2])>,
     pass: u64,
+    /// Shift is held over the pane that is drawn: H_ori and H_sim are flipped in all its views.
+    flipped: bool,
     /// The data set that the windows belong to.
     dataset: Option<std::sync::Weak<crate::dataset::Dataset>>,
 }
@@ -103,13 +105,15 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, colu
     state.windows.resize(views.len(), Window::default());
     state.pictures.update(session, views, frame);
     toolbar::show(ui, shared, column);
-    if column != Column::Ori && session.fit.shown.is_none() {
-        return match &session.fit.status {
-            crate::session::FitStatus::Failed(why) => empty(ui, "No fit", why),
-            _ => empty(ui, "Preparing the fit…", "The start pose is being sought in the maps."),
-        };
+    if column != Column::Ori
+        && session.fit.shown.is_none()
+        && let crate::session::FitStatus::Failed(why) = &session.fit.status
+    {
+        return empty(ui, "No fit", why);
     }
     let area = ui.available_rect_before_wrap();
+    let pointer = ui.input(|i| i.pointer.hover_pos().filter(|_| i.modifiers.shift));
+    state.flipped = column != Column::Masks && pointer.is_some_and(|p| area.contains(p));
     for (i, rect) in arrange(area, views, session.view.true_proportions).into_iter().enumerate() {
         let builder = UiBuilder::new().max_rect(rect).id_salt(("map", i));
         ui.scope_builder(builder, |ui| one(ui, shared, state, column, i, rect));
@@ -151,9 +155,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     let session = shared.session;
     let Some(view) = session.data.dataset.as_ref().and_then(|d| d.info().views.get(index)) else { return };
     let orientation = Orientation::of(view);
-    let flipped = ui.input(|i| i.modifiers.shift)
-        && ui.input(|i| i.pointer.hover_pos()).is_some_and(|p| rect.contains(p))
-        && column != Column::Masks;
+    let flipped = state.flipped;
     let content = match (column, flipped) {
         (Column::Masks, _) => Content::Masks,
         (Column::Ori, false) | (Column::Sim, true) => Content::Ori,

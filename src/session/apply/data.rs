@@ -129,7 +129,7 @@ impl Session {
         fit.status = FitStatus::Paused;
         fit.history.shrink(KEPT_FIT_BYTES);
         self.left.retain(|frame| *frame != fit.frame);
-        if fit.head() > 0 || fit.history.branches().len() > 1 {
+        if fit.edited || fit.head() > 0 || fit.history.branches().len() > 1 {
             self.left.push_back(fit.frame);
             self.fits.insert(fit.frame, fit);
             while self.left.len() > KEPT_FITS {

@@ -180,6 +180,7 @@ impl Session {
         if self.fit.cursor.is_none() && self.fit.branch().is_some_and(|b| b.rows.len() > 1) {
             self.fit.cursor = Some(self.fit.head());
         }
+        self.fit.edited = true;
         let mut effects = self.branch_at_cursor().unwrap_or_default();
         effects.push(Effect::Send(WorkerCommand::Edit(Box::new(params))));
         effects

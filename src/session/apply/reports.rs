@@ -39,11 +39,10 @@ impl Session {
             self.summaries.remove(&self.fit.frame);
             return;
         }
-        let known: Vec<f64> = row.report.iou.iter().flatten().copied().collect();
         let summary = FrameSummary {
             iterations: row.report.iteration,
             loss: row.report.loss,
-            iou: (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64),
+            iou: mean_known(&row.report.iou),
             converged: row.report.converged,
             majpe_mm: row.majpe_mm,
         };
@@ -125,6 +124,14 @@ impl Session {
             None => snapshot.live || snapshot.iteration == self.fit.head(),
             Some(cursor) => !snapshot.live && snapshot.iteration == cursor,
         };
+        // Settings may have changed since the newest row was made; the list tells what holds now.
+        if snapshot.live
+            && snapshot.iteration == self.fit.head()
+            && let Some(summary) = self.summaries.get_mut(&self.fit.frame)
+        {
+            summary.loss = snapshot.evaluation.loss;
+            summary.iou = mean_known(&snapshot.evaluation.iou);
+        }
         if wanted {
             self.fit.shown = Some(Arc::new(snapshot));
         }
@@ -136,4 +143,10 @@ impl Session {
             snapshot.params.group(Group::Position).chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()
         })
     }
+}
+
+/// The mean over the views whose IoU is defined.
+fn mean_known(iou: &[Option<f64>]) -> Option<f64> {
+    let known: Vec<f64> = iou.iter().flatten().copied().collect();
+    (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
 }

@@ -33,8 +33,8 @@ pub(super) fn title(
             });
             iou.map_or_else(|| "IoU —".to_owned(), |iou| format!("IoU {iou:.3}"))
         }
-        Content::Ori | Content::Sim => String::new(),
-        Content::Difference => "H_sim − H_ori".into(),
+        _ if session.fit.shown.is_none() && content != Content::Ori => "preparing…".into(),
+        _ => content.name().to_owned(),
     };
     let font = if content == Content::Masks { theme::mono(theme::CAPTION) } else { caption };
     painter.text(name.right_top() + vec2(8.0, 0.0), Align2::LEFT_TOP, text, font, tokens.dim);
@@ -283,6 +283,13 @@ pub(super) fn probe(
             Some((stored, shown)) => format!("{name}  {stored:>11.4e}  {shown:>8.2} {unit_text}"),
             None => format!("{name}  —"),
         });
+    }
+    if session.view.compare == crate::session::Compare::Difference
+        && let [Some((_, ori)), Some((_, sim))] = pictures.values(index, pixel)
+    {
+        let floor = pictures.limits(index, Content::Ori).0;
+        let difference = sim.max(floor) - ori.max(floor);
+        lines.push(format!("Δ      {difference:>20.2} {} (from {floor:.0} up)", pictures.unit(Content::Difference)));
     }
     if let Some([ori, sim, inside]) = pictures.mask_at(index, pixel) {
         let mask = match (ori, sim) {
