@@ -33,7 +33,7 @@
 //! | [`session`] | the state behind the window and the only function that changes it |
 //! | [`worker`] | the thread that runs a fit, and its protocol |
 //! | [`study`] | batch runs and their tables |
-//! | [`diagnose`] | metrics: IoU, MAJPE, PA-MAJPE |
+//! | [`diagnose`] | metrics: MAJPE, PA-MAJPE |
 //! | [`mhp`] | initialisation, forward model, objective, Adam, convergence, the fitter's one `step` |
 //! | [`dataset`] | frames, the generic manifest, MMVR, npz; lazy loading and a cache with a byte budget |
 //! | [`body`] | skeleton topologies, the PPPR parameters, a walking body |

@@ -1,4 +1,4 @@
-//! How good a fit is: joint errors with and without alignment, and the IoU of masks.
+//! How good a fit is: joint errors with and without alignment. (The IoU of masks belongs to the objective.)
 //!
 //! The alignment is Horn's: the rotation between two centred point sets is the eigenvector of the largest eigenvalue of
 //! a symmetric 4×4 matrix, found by Jacobi rotations. It cannot reflect, so a mirrored skeleton stays wrong.
@@ -47,13 +47,6 @@ pub fn joint_errors(estimate: &[Vec3], truth: &[Vec3], joints: usize) -> Option<
         errors.pa_majpe_mm += pa_majpe_mm(estimated[a], true_persons[b])? / count;
     }
     (!pairs.is_empty()).then_some(errors)
-}
-
-/// |a ∩ b| / |a ∪ b|; `None` where both are empty.
-pub fn iou(a: &[bool], b: &[bool]) -> Option<f64> {
-    let both = a.iter().zip(b).filter(|(a, b)| **a && **b).count();
-    let either = a.iter().zip(b).filter(|(a, b)| **a || **b).count();
-    (either > 0).then(|| both as f64 / either as f64)
 }
 
 /// Pairs persons by repeatedly taking the closest two that are left, in order of distance.
@@ -193,11 +186,5 @@ mod tests {
         assert!(joint_errors(&swapped, &truth, 5).unwrap().majpe_mm < 1e-9);
         assert!(joint_errors(&BODY, &truth, 5).unwrap().pa_majpe_mm < 1e-9);
         assert_eq!(joint_errors(&BODY, &truth, 4), None);
-    }
-
-    #[test]
-    fn iou_of_empty_masks_is_undefined() {
-        assert_eq!(iou(&[false, false], &[false, false]), None);
-        assert_eq!(iou(&[true, true, false], &[false, true, true]), Some(1.0 / 3.0));
     }
 }

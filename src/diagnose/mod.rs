@@ -2,4 +2,4 @@
 
 mod metrics;
 
-pub use metrics::{JointErrors, iou, joint_errors, majpe_mm, pa_majpe_mm};
+pub use metrics::{JointErrors, joint_errors, majpe_mm, pa_majpe_mm};

@@ -29,5 +29,5 @@ pub use init::{Initialisation, Peak, initialise};
 pub use objective::{Masks, Objective, masks};
 pub use problem::Problem;
 pub use region::Region;
-pub use simulate::{simulate, simulate_joint};
+pub use simulate::simulate;
 pub use types::{Evaluation, FitError, Precision, StepReport, StopReason, Terms};

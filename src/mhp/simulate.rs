@@ -59,13 +59,3 @@ fn map<T: Real>(splats: &[Splat], region: &Region, summation: Summation) -> Vec<
     }
     map
 }
-
-/// |A_j K_j| of one flat joint over a view's whole map, C order: who lit this cell. Empty where there is no such view
-/// or joint.
-pub fn simulate_joint(problem: &Problem, config: &FitConfig, view: usize, params: &Pppr, joint: usize) -> Vec<f64> {
-    let Some(view) = problem.views.get(view).filter(|_| joint < params.shape().total_joints()) else {
-        return Vec::new();
-    };
-    let splat = Scene { radar: &problem.radar, view, config }.splat(params, joint).0;
-    map::<f64>(&[splat], &Region::whole(view), Summation::Incoherent)
-}
