@@ -4,7 +4,7 @@ use super::{Shared, empty};
 use crate::app::theme::{self, Tokens};
 use crate::session::{Branch, Command, FitStatus, History, Row};
 use egui::{Color32, Ui};
-use egui_plot::{Line, Plot, PlotPoint, PlotPoints, Points, VLine};
+use egui_plot::{GridMark, Line, Plot, PlotPoint, PlotPoints, Points, VLine};
 
 /// What the plot remembers.
 #[derive(Default)]
@@ -77,7 +77,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         .y_axis_min_width(44.0)
         .label_formatter(move |hover| label(hover, log));
     if log {
-        plot = plot.y_axis_formatter(|mark, _| power(mark.value));
+        plot = plot.y_axis_formatter(|mark, _| power(mark.value)).y_grid_spacer(|input| decades(input.bounds));
     }
     if state.tab == Tab::Quality {
         plot = plot.include_y(0.0).include_y(1.0);
@@ -226,6 +226,20 @@ fn label(hover: &egui_plot::HoverPosition<'_>, log: bool) -> Option<String> {
         }
         egui_plot::HoverPosition::Elsewhere { .. } => None,
     }
+}
+
+/// The grid of a log₁₀ axis: decades, and 2 and 5 between them where no more than three are seen.
+fn decades((lo, hi): (f64, f64)) -> Vec<GridMark> {
+    let between: &[f64] = if hi - lo < 3.0 { &[2.0, 5.0] } else { &[] };
+    let (first, last) = (lo.floor().max(-40.0) as i32, hi.ceil().min(40.0) as i32);
+    (first..=last)
+        .flat_map(|decade| {
+            let base = f64::from(decade);
+            let fine = between.iter().map(move |m| GridMark { value: base + m.log10(), step_size: 0.3 });
+            std::iter::once(GridMark { value: base, step_size: 1.0 }).chain(fine)
+        })
+        .filter(|mark| (lo..=hi).contains(&mark.value))
+        .collect()
 }
 
 /// A tick of a log₁₀ axis.
