@@ -231,7 +231,7 @@ pub const FIELDS: &[Field] = &[
     },
     Field {
         key: "surface_offset_m",
-        label: "δ (surface offset)",
+        label: "δ (skin)",
         help: "The echo of a body comes from its skin, not from the joint: p is moved this far towards the radar. 0 is the paper.",
         unit: "m",
         range: (0.0, 0.5),

@@ -149,15 +149,14 @@ impl InspectorApp {
         self.dropped = dropped;
     }
 
-    /// Plays frames at the asked rate, never faster than they can be read.
+    /// Plays frames at the data set's rate, never faster than they can be read.
     fn play(&mut self, ctx: &egui::Context) {
         if !self.session.data.playing {
             self.last_play = None;
             return;
         }
         let rate = self.session.data.dataset.as_ref().and_then(|d| d.info().frame_rate_hz).unwrap_or(10.0);
-        let fps = if self.session.view.play_fps > 0.0 { self.session.view.play_fps } else { rate };
-        let pause = 1.0 / fps.clamp(0.1, 60.0);
+        let pause = 1.0 / rate.clamp(0.1, 60.0);
         let now = ctx.input(|i| i.time);
         let since = self.last_play.map_or(f64::INFINITY, |last| now - last);
         if since >= pause && self.session.data.loading.is_none() {

@@ -102,11 +102,6 @@ impl Fmcw {
         self.samples as f64 * self.radar.range_resolution_m()
     }
 
-    /// Radial speed at which the Doppler frequency wraps, λ/(4 T), m/s.
-    pub fn unambiguous_speed_mps(&self) -> f64 {
-        self.radar.wavelength_m() / (4.0 * self.chirp_interval_s())
-    }
-
     /// The frame of a scene: `at(t)` gives the moving scatterers at t seconds from the middle of the frame, `still` those
     /// that never move. No noise, no quantisation: see [`AdcCube::digitise`].
     pub fn synthesise(&self, still: &[Scatterer], at: impl Fn(f64) -> Vec<Scatterer> + Sync) -> AdcCube {

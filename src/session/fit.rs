@@ -2,7 +2,6 @@
 
 use super::history::{Branch, History, Row};
 use crate::body::Pppr;
-use crate::config::FitConfig;
 use crate::mhp::{Initialisation, Problem};
 use crate::worker::{JobId, Snapshot};
 use std::sync::Arc;
@@ -85,10 +84,5 @@ impl Fit {
     /// True while stepping.
     pub fn is_running(&self) -> bool {
         self.status == FitStatus::Running
-    }
-
-    /// The settings in force at the iteration that is looked at.
-    pub fn shown_config(&self) -> Option<FitConfig> {
-        self.branch().map(|branch| branch.config_at(self.shown_iteration()))
     }
 }

@@ -131,8 +131,6 @@ pub struct ViewState {
     pub log_loss: bool,
     /// Curves switched off, by name.
     pub hidden_curves: Vec<String>,
-    /// Frames a second when playing; 0 takes the data set's rate.
-    pub play_fps: f64,
     /// Order of the frame list.
     pub frame_sort: FrameSort,
     /// Scale of the whole interface.
@@ -167,7 +165,6 @@ impl Default for ViewState {
             show_gradients: false,
             log_loss: true,
             hidden_curves: Vec::new(),
-            play_fps: 0.0,
             frame_sort: FrameSort::default(),
             zoom: 1.0,
             run_on_open: false,

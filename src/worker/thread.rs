@@ -257,7 +257,7 @@ impl Job {
     }
 
     fn iteration(&self) -> usize {
-        self.fitter.report().iteration
+        self.fitter.iteration()
     }
 
     fn is_running(&self) -> bool {

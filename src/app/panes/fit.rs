@@ -272,7 +272,7 @@ fn slider(ui: &mut Ui, field: &Field, config: &mut FitConfig) {
             .range(lo..=hi)
             .speed(speed)
             .max_decimals(digits)
-            .suffix(field.unit);
+            .suffix(if field.unit == "m" { " m" } else { field.unit });
         let response = ui.add_sized([62.0, 20.0], drag);
         let spoken = format!("{} value", field.label);
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, &spoken));
