@@ -33,12 +33,14 @@
 //! | [`session`] | the state behind the window and the only function that changes it |
 //! | [`worker`] | the thread that runs a fit, and its protocol |
 //! | [`study`] | batch runs and their tables |
-//! | [`diagnose`] | metrics: MAJPE, PA-MAJPE |
+//! | [`labels`] | tags, notes, verdicts, the journal that keeps them, agreement |
+//! | [`diagnose`] | metrics: MAJPE, PA-MAJPE; evidence for each failure mode |
 //! | [`mhp`] | initialisation, forward model, objective, Adam, convergence, the fitter's one `step` |
 //! | [`dataset`] | frames, the generic manifest, MMVR, npz; lazy loading and a cache with a byte budget |
 //! | [`body`] | skeleton topologies, the PPPR parameters, a walking body |
 //! | [`radar`] | chirp, axes, views, point-spread functions, FMCW synthesis and the FFT chain |
 //! | [`config`] | `FitConfig`: defaults, ranges, help text; the only source for files, command line and sliders |
+//! | [`folders`] | where the user's settings, labels and caches lie |
 //! | [`geometry`] | 3-vectors, 3×3 matrices, quaternions, the spherical triad |
 
 pub mod body;
@@ -46,7 +48,9 @@ pub mod cli;
 pub mod config;
 pub mod dataset;
 pub mod diagnose;
+pub mod folders;
 pub mod geometry;
+pub mod labels;
 pub mod mhp;
 pub mod radar;
 pub mod study;

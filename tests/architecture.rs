@@ -7,22 +7,35 @@ use std::path::{Path, PathBuf};
 /// Each room of `src/` and the rooms that it may use besides itself.
 const MAY_USE: &[(&str, &[&str])] = &[
     ("geometry", &[]),
+    ("folders", &[]),
+    ("labels", &["folders"]),
     ("config", &[]),
     ("radar", &["geometry", "config"]),
     ("body", &["geometry", "radar"]),
     ("mhp", &["geometry", "config", "radar", "body"]),
-    ("diagnose", &["geometry", "config", "radar", "body", "mhp"]),
-    ("dataset", &["geometry", "config", "radar", "body"]),
+    ("diagnose", &["geometry", "config", "radar", "body", "mhp", "labels"]),
+    ("dataset", &["geometry", "folders", "config", "radar", "body"]),
     ("render", &["geometry"]),
     ("worker", &["geometry", "config", "radar", "body", "mhp", "dataset"]),
-    ("study", &["geometry", "config", "radar", "body", "mhp", "dataset", "diagnose"]),
-    ("session", &["geometry", "config", "radar", "body", "mhp", "dataset", "diagnose", "worker"]),
-    ("app", &["geometry", "config", "radar", "body", "mhp", "dataset", "diagnose", "worker", "session", "render"]),
+    ("study", &["geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose"]),
+    (
+        "session",
+        &["geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels", "study", "worker"],
+    ),
+    (
+        "app",
+        &[
+            "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels", "study",
+            "worker", "session", "render",
+        ],
+    ),
 ];
 
 /// Rooms that know no window and no GPU.
-const WINDOWLESS: &[&str] =
-    &["geometry", "config", "radar", "body", "mhp", "dataset", "diagnose", "worker", "session", "study"];
+const WINDOWLESS: &[&str] = &[
+    "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels", "worker", "session",
+    "study",
+];
 
 fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();

@@ -2,7 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
 use mhp_inspector::dataset::npz::{ArrayView, write};
-use mhp_inspector::dataset::{BareCatalog, BareChoice, HOME_VARIABLE, Remembered};
+use mhp_inspector::dataset::{BareCatalog, BareChoice, Remembered};
+use mhp_inspector::folders::HOME_VARIABLE;
 use std::path::Path;
 use std::process::Command;
 

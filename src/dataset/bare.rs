@@ -10,9 +10,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The folder of remembered choices, where the environment names one.
-pub const HOME_VARIABLE: &str = "MHP_INSPECTOR_HOME";
-
 /// The arrays of a bare file that could be maps: real numbers, 2 or 3 axes, or one more if the first counts frames.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BareCatalog {
@@ -170,10 +167,7 @@ pub struct Remembered {
 impl Remembered {
     /// The user's own: `$MHP_INSPECTOR_HOME`, else the platform's data folder. `None` where there is no home.
     pub fn of_user() -> Option<Self> {
-        let named = std::env::var_os(HOME_VARIABLE).filter(|home| !home.is_empty()).map(PathBuf::from);
-        let platform =
-            || directories::ProjectDirs::from("", "", "mhp-inspector").map(|dirs| dirs.data_dir().to_owned());
-        named.or_else(platform).map(|home| Self::in_folder(&home))
+        crate::folders::user_data().map(|home| Self::in_folder(&home))
     }
 
     /// Those kept in `folder`.

@@ -22,7 +22,7 @@ mod sample;
 mod set;
 mod words;
 
-pub use bare::{BareCatalog, BareChoice, HOME_VARIABLE, Remembered};
+pub use bare::{BareCatalog, BareChoice, Remembered};
 pub use cache::{DEFAULT_BUDGET, FrameCache};
 pub use error::DatasetError;
 pub use frame::{Frame, Heatmap, ImageAnnotations, Truth};

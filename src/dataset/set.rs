@@ -7,7 +7,9 @@ use super::words::axes_badge;
 use super::{DatasetError, Frame, Progress, generic, mmvr};
 use crate::body::Skeleton;
 use crate::radar::{RadarConfig, View};
+use sha2::{Digest as _, Sha256};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// The name of a manifest inside a data set's folder.
 pub const MANIFEST_NAME: &str = "dataset.toml";
@@ -53,6 +55,7 @@ pub struct Dataset {
     info: DatasetInfo,
     source: Source,
     start: usize,
+    fingerprint: OnceLock<String>,
 }
 
 impl Dataset {
@@ -149,7 +152,12 @@ impl Dataset {
             let expected = format!("files that match `frames = \"{pattern}\"` of {}", manifest.path.display());
             return Err(DatasetError::NoFrames { expected, path: root.to_owned() });
         }
-        Ok(Self { info: info_of(root, manifest, manifest, folder_name(root)), source: Source::Files(files), start: 0 })
+        Ok(Self {
+            info: info_of(root, manifest, manifest, folder_name(root)),
+            source: Source::Files(files),
+            start: 0,
+            fingerprint: OnceLock::new(),
+        })
     }
 
     fn open_mmvr(
@@ -183,7 +191,12 @@ impl Dataset {
                 .push("point spread: 0.06 m and 0.03 rad are assumed; MMVR does not publish its own".into());
             info.assumptions.push("quantity: amplitudes are assumed, from the spread of the values".into());
         }
-        Ok(Self { info, source: Source::Mmvr { segments, starts, frames }, start: start.unwrap_or(0) })
+        Ok(Self {
+            info,
+            source: Source::Mmvr { segments, starts, frames },
+            start: start.unwrap_or(0),
+            fingerprint: OnceLock::new(),
+        })
     }
 
     fn from_choice(catalog: &BareCatalog, choice: &BareChoice) -> Result<Self, DatasetError> {
@@ -201,7 +214,12 @@ impl Dataset {
             views: choice.views.clone(),
             notes: Vec::new(),
         };
-        Ok(Self { info, source: Source::Bare { frames, stacked: choice.first_axis_is_frame }, start: 0 })
+        Ok(Self {
+            info,
+            source: Source::Bare { frames, stacked: choice.first_axis_is_frame },
+            start: 0,
+            fingerprint: OnceLock::new(),
+        })
     }
 
     fn from_manifest(path: &Path, manifest: &Manifest) -> Result<Self, DatasetError> {
@@ -211,7 +229,7 @@ impl Dataset {
         let frames = frames_of(&manifest.views, stacked, &catalog)?;
         let mut info = info_of(path, manifest, manifest, file_stem(path));
         info.layout = Layout::Bare;
-        Ok(Self { info, source: Source::Bare { frames, stacked }, start: 0 })
+        Ok(Self { info, source: Source::Bare { frames, stacked }, start: 0, fingerprint: OnceLock::new() })
     }
 
     /// What is true of every frame.
@@ -248,6 +266,24 @@ impl Dataset {
             }
             Source::Bare { .. } => 1,
         }
+    }
+
+    /// Tells this data set from others wherever it lies: 16 hexadecimal digits of the SHA-256 of its layout, its views'
+    /// arrays and shapes, and the names of its frames. Names every frame the first time, hence not for the window's thread.
+    pub fn fingerprint(&self) -> &str {
+        self.fingerprint.get_or_init(|| {
+            let mut hash = Sha256::new();
+            hash.update(format!("{}\n", self.info.layout));
+            for view in &self.info.views {
+                let bins: Vec<usize> = view.axes.iter().map(|axis| axis.bins).collect();
+                hash.update(format!("{} {bins:?}\n", view.array));
+            }
+            for frame in 0..self.len() {
+                hash.update(self.frame_name(frame));
+                hash.update("\n");
+            }
+            hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+        })
     }
 
     /// What identifies frame `i` for a person; empty past the end.

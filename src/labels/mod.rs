@@ -1,0 +1,10 @@
+//! What people say of frames: tags, notes, review verdicts; the journal that keeps them, and how far two people agree.
+//!
+//! A [`Label`] is all that one annotator says of one frame. It is changed by a [`Change`], which names only what is
+//! added and removed, so that two windows on one data set merge instead of overwriting each other. Each act appends
+//! [`Record`]s to the annotator's journal; the newest record of a frame is its label. Nothing here knows a window, a
+//! data set or a fit: frames are names, fits are hashes.
+
+mod record;
+
+pub use record::{CellRegion, Change, FrameId, Judged, Label, Record, Tag, Tags, Verdict};

@@ -1,0 +1,410 @@
+//! Tags, labels, changes of labels, and the record of an act.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::str::FromStr;
+
+/// What a person may say of a frame's fit; several at once. F1 to F4 are the paper's failure modes (section 5.4.2).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Tag {
+    /// Static reflector dominance: stationary structures dominate the mask.
+    F1,
+    /// Near-field distortion: the person is too near for the far-field model.
+    F2,
+    /// Close multi-person superposition: the echoes of several people overlap.
+    F3,
+    /// Low-motion ambiguity: hardly any Doppler tells the person from the room.
+    F4,
+    /// No failure.
+    #[serde(rename = "clean")]
+    Clean,
+    /// The annotator cannot tell.
+    #[serde(rename = "unsure")]
+    Unsure,
+}
+
+impl Tag {
+    /// Every tag, in the order of the digits 1 2 3 4 0 5.
+    pub const ALL: [Self; 6] = [Self::F1, Self::F2, Self::F3, Self::F4, Self::Clean, Self::Unsure];
+    /// The failure modes.
+    pub const MODES: [Self; 4] = [Self::F1, Self::F2, Self::F3, Self::F4];
+
+    /// As written in journals, tables and filters: `F1` … `F4`, `clean`, `unsure`.
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::F1 => "F1",
+            Self::F2 => "F2",
+            Self::F3 => "F3",
+            Self::F4 => "F4",
+            Self::Clean => "clean",
+            Self::Unsure => "unsure",
+        }
+    }
+
+    /// What it means, in words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::F1 => "static reflector dominance",
+            Self::F2 => "near-field distortion",
+            Self::F3 => "close multi-person superposition",
+            Self::F4 => "low-motion ambiguity",
+            Self::Clean => "no failure",
+            Self::Unsure => "cannot tell",
+        }
+    }
+
+    /// The key that toggles it.
+    pub fn digit(self) -> char {
+        match self {
+            Self::F1 => '1',
+            Self::F2 => '2',
+            Self::F3 => '3',
+            Self::F4 => '4',
+            Self::Clean => '0',
+            Self::Unsure => '5',
+        }
+    }
+}
+
+impl fmt::Display for Tag {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.code())
+    }
+}
+
+impl FromStr for Tag {
+    type Err = String;
+
+    /// Upper and lower case are the same.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|tag| tag.code().eq_ignore_ascii_case(text.trim()));
+        found.ok_or_else(|| format!("`{text}` is no tag; expected F1, F2, F3, F4, clean or unsure"))
+    }
+}
+
+/// A set of tags, written as a list of codes in the order of [`Tag::ALL`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(from = "Vec<Tag>", into = "Vec<Tag>")]
+pub struct Tags(u8);
+
+impl Tags {
+    /// No tag.
+    pub const NONE: Self = Self(0);
+
+    /// True where `tag` is in the set.
+    pub fn contains(self, tag: Tag) -> bool {
+        self.0 & (1 << tag as u8) != 0
+    }
+
+    /// The set with `tag`.
+    pub fn with(self, tag: Tag) -> Self {
+        Self(self.0 | 1 << tag as u8)
+    }
+
+    /// The set without `tag`.
+    pub fn without(self, tag: Tag) -> Self {
+        Self(self.0 & !(1 << tag as u8))
+    }
+
+    /// Tags in either set.
+    pub fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Tags in this set and not in the other.
+    pub fn minus(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
+    /// True for the empty set.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The tags, in the order of [`Tag::ALL`].
+    pub fn iter(self) -> impl Iterator<Item = Tag> {
+        Tag::ALL.into_iter().filter(move |&tag| self.contains(tag))
+    }
+}
+
+impl FromIterator<Tag> for Tags {
+    fn from_iter<I: IntoIterator<Item = Tag>>(tags: I) -> Self {
+        tags.into_iter().fold(Self::NONE, Self::with)
+    }
+}
+
+impl From<Vec<Tag>> for Tags {
+    fn from(tags: Vec<Tag>) -> Self {
+        tags.into_iter().collect()
+    }
+}
+
+impl From<Tags> for Vec<Tag> {
+    fn from(tags: Tags) -> Self {
+        tags.iter().collect()
+    }
+}
+
+impl fmt::Display for Tags {
+    /// `F1 F3`; empty for no tag.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, tag) in self.iter().enumerate() {
+            let space = if i > 0 { " " } else { "" };
+            write!(f, "{space}{tag}")?;
+        }
+        Ok(())
+    }
+}
+
+impl FromStr for Tags {
+    type Err = String;
+
+    /// Codes separated by spaces, commas or semicolons.
+    fn from_str(text: &str) -> Result<Self, String> {
+        text.split([' ', ',', ';']).filter(|part| !part.is_empty()).map(str::parse).collect()
+    }
+}
+
+/// The paper's second review protocol: whose error a count mismatch is (appendix, count-matched evaluation).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// The annotation has the wrong number of people.
+    AnnotationError,
+    /// The program counted wrongly.
+    DetectionError,
+    /// Both are wrong.
+    BothIncorrect,
+    /// The mismatch is none: nobody is there and nobody was found.
+    TrueNegative,
+}
+
+impl Verdict {
+    /// Every verdict.
+    pub const ALL: [Self; 4] = [Self::AnnotationError, Self::DetectionError, Self::BothIncorrect, Self::TrueNegative];
+
+    /// As written in journals and tables.
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::AnnotationError => "annotation-error",
+            Self::DetectionError => "detection-error",
+            Self::BothIncorrect => "both-incorrect",
+            Self::TrueNegative => "true-negative",
+        }
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.code())
+    }
+}
+
+impl FromStr for Verdict {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|verdict| verdict.code().eq_ignore_ascii_case(text.trim()));
+        let expected = "annotation-error, detection-error, both-incorrect or true-negative";
+        found.ok_or_else(|| format!("`{text}` is no verdict; expected {expected}"))
+    }
+}
+
+/// A box of cells of one view.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CellRegion {
+    /// The view's array.
+    pub view: String,
+    /// First bin of each axis, inside.
+    pub lo: Vec<usize>,
+    /// Last bin of each axis, inside.
+    pub hi: Vec<usize>,
+}
+
+impl fmt::Display for CellRegion {
+    /// `hm_hori[10..=20, 30..=42]`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let axes: Vec<String> = self.lo.iter().zip(&self.hi).map(|(lo, hi)| format!("{lo}..={hi}")).collect();
+        write!(f, "{}[{}]", self.view, axes.join(", "))
+    }
+}
+
+/// All that one annotator says of one frame.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Label {
+    /// Failure modes, clean, unsure.
+    pub tags: Tags,
+    /// Free text.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub note: String,
+    /// The person that is meant, counted from 0, where one is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub person: Option<u32>,
+    /// The cells that are meant.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub region: Option<CellRegion>,
+    /// The verdict on a count mismatch.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
+}
+
+impl Label {
+    /// True where nothing is said.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// A change of a label: only what is named is touched.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Change {
+    /// Tags to add.
+    pub add: Tags,
+    /// Tags to remove.
+    pub remove: Tags,
+    /// A new note.
+    pub note: Option<String>,
+    /// Another person, or none.
+    pub person: Option<Option<u32>>,
+    /// Another region, or none.
+    pub region: Option<Option<CellRegion>>,
+    /// Another verdict, or none.
+    pub verdict: Option<Option<Verdict>>,
+}
+
+impl Change {
+    /// Adds a tag. `clean` excludes the failure modes, and they exclude it.
+    pub fn adding(tag: Tag) -> Self {
+        let remove = match tag {
+            Tag::Clean => Tag::MODES.into_iter().collect(),
+            Tag::Unsure => Tags::NONE,
+            _ => Tags::NONE.with(Tag::Clean),
+        };
+        Self { add: Tags::NONE.with(tag), remove, ..Self::default() }
+    }
+
+    /// Removes a tag.
+    pub fn removing(tag: Tag) -> Self {
+        Self { remove: Tags::NONE.with(tag), ..Self::default() }
+    }
+
+    /// What leads from one label to another: the inverse of an act is the change from its `after` to its `before`.
+    pub fn between(from: &Label, to: &Label) -> Self {
+        Self {
+            add: to.tags.minus(from.tags),
+            remove: from.tags.minus(to.tags),
+            note: (from.note != to.note).then(|| to.note.clone()),
+            person: (from.person != to.person).then_some(to.person),
+            region: (from.region != to.region).then(|| to.region.clone()),
+            verdict: (from.verdict != to.verdict).then_some(to.verdict),
+        }
+    }
+
+    /// The label after this change.
+    pub fn applied(&self, label: &Label) -> Label {
+        Label {
+            tags: label.tags.minus(self.remove).union(self.add),
+            note: self.note.clone().unwrap_or_else(|| label.note.clone()),
+            person: self.person.unwrap_or(label.person),
+            region: self.region.clone().unwrap_or_else(|| label.region.clone()),
+            verdict: self.verdict.unwrap_or(label.verdict),
+        }
+    }
+}
+
+/// Which frame is meant.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct FrameId {
+    /// The frame's name in its data set, for example `d1s1/000/00383`; this is what identifies it.
+    pub path: String,
+    /// Its index when it was labelled; a hint, for a data set may have grown since.
+    pub index: usize,
+}
+
+/// The fit that a person saw when they judged.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Judged {
+    /// Hash of the parameters on screen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fit: Option<String>,
+    /// Hash of the settings that they were fitted with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub config: Option<String>,
+    /// The iteration on screen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iteration: Option<usize>,
+    /// The program's own evidence scores at that moment, 0..1 by failure mode, whether they were shown or not.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub machine: BTreeMap<Tag, f64>,
+    /// True where those scores were on screen.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub machine_shown: bool,
+}
+
+/// One line of a journal: what a frame's label is after an act.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// Fingerprint of the data set.
+    pub dataset: String,
+    /// The frame.
+    pub frame: FrameId,
+    /// Its label after the act.
+    pub label: Label,
+    /// Who.
+    pub annotator: String,
+    /// When, RFC 3339 in UTC with milliseconds.
+    pub time: String,
+    /// The act in words: `tag F2 on 12 frames`, `undo: tag F2`.
+    pub act: String,
+    /// Version of the program.
+    pub program: String,
+    /// What was judged.
+    pub judged: Judged,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_between_two_labels_leads_from_one_to_the_other() {
+        let from = Label { tags: Tags::NONE.with(Tag::F1), note: "old".into(), person: Some(1), ..Label::default() };
+        let region = CellRegion { view: "hm".into(), lo: vec![1, 2], hi: vec![3, 4] };
+        let to = Label {
+            tags: Tags::NONE.with(Tag::F3).with(Tag::Unsure),
+            verdict: Some(Verdict::BothIncorrect),
+            region: Some(region),
+            ..Label::default()
+        };
+        assert_eq!(Change::between(&from, &to).applied(&from), to);
+        assert_eq!(Change::between(&to, &from).applied(&to), from);
+        assert_eq!(Change::between(&to, &to), Change::default());
+    }
+
+    #[test]
+    fn clean_and_the_failure_modes_exclude_each_other() {
+        let label = Change::adding(Tag::F2).applied(&Change::adding(Tag::F1).applied(&Label::default()));
+        assert_eq!(label.tags.to_string(), "F1 F2");
+        let clean = Change::adding(Tag::Clean).applied(&label);
+        assert_eq!(clean.tags.to_string(), "clean");
+        assert_eq!(Change::adding(Tag::F4).applied(&clean).tags.to_string(), "F4");
+        assert_eq!(Change::adding(Tag::Unsure).applied(&label).tags.to_string(), "F1 F2 unsure");
+    }
+
+    #[test]
+    fn tags_and_verdicts_read_back_what_they_write() {
+        for tag in Tag::ALL {
+            assert_eq!(tag.code().parse(), Ok(tag));
+        }
+        for verdict in Verdict::ALL {
+            assert_eq!(verdict.code().parse(), Ok(verdict));
+        }
+        let tags: Tags = Tag::ALL.into_iter().collect();
+        assert_eq!(tags.to_string().parse(), Ok(tags));
+        assert_eq!("f1;F3".parse::<Tags>().map(|tags| tags.to_string()), Ok("F1 F3".into()));
+        assert!("F9".parse::<Tags>().is_err_and(|why| why.contains("expected F1")));
+    }
+}
