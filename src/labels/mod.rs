@@ -2,9 +2,22 @@
 //!
 //! A [`Label`] is all that one annotator says of one frame. It is changed by a [`Change`], which names only what is
 //! added and removed, so that two windows on one data set merge instead of overwriting each other. Each act appends
-//! [`Record`]s to the annotator's journal; the newest record of a frame is its label. Nothing here knows a window, a
-//! data set or a fit: frames are names, fits are hashes.
+//! [`Record`]s to the annotator's [`Journal`]; the newest record of a frame is its label, and a [`LabelStore`] reads those
+//! of everybody. Nothing here knows a window, a data set or a fit: frames are names, fits are hashes.
+//!
+//! The files are a public format, JSON lines; `format.rs` describes all of it.
 
+mod error;
+mod format;
+mod journal;
+mod place;
 mod record;
+mod stamp;
+mod store;
+mod tail;
 
+pub use error::LabelError;
+pub use journal::{Journal, Outcome};
+pub use place::LabelPlace;
 pub use record::{CellRegion, Change, FrameId, Judged, Label, Record, Tag, Tags, Verdict};
+pub use store::{LabelStore, read_journal};
