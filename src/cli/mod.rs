@@ -1,6 +1,7 @@
 //! The command line: one file a subcommand. Arguments as typed become a validated configuration and one library call.
 
 mod common;
+mod complexity;
 mod fit;
 mod frames;
 mod info;
@@ -16,12 +17,12 @@ use std::process::ExitCode;
 
 /// The exit code of bad input: a file, a key, a value that is not what it should be.
 pub const EXIT_BAD_INPUT: u8 = 2;
-/// The exit code of a batch of which some frames could not be fitted.
+/// The exit code of a batch of which some frames could not be fitted or read.
 pub const EXIT_SOME_FAILED: u8 = 1;
 
 /// Shown under the options of `--help`.
 const HELP: &str = "\
-Exit codes: 0 done; 1 some frames of a batch could not be fitted; 2 bad input, told in one line on standard error.
+Exit codes: 0 done; 1 some frames of a batch could not be fitted or read; 2 bad input, told in one line on standard error.
 
 Examples:
   mhp-inspector
@@ -30,6 +31,8 @@ Examples:
       The window on an MMVR folder.
   mhp-inspector info data/mmvr
       What is in it: frames, views, axes, ranges of values.
+  mhp-inspector complexity data/mmvr --csv complexity.csv
+      Which frames are easy, medium, hard.
   mhp-inspector fit data/mmvr --frames 0..10 --out results
       Ten fits without a window. `mhp-inspector fit --help` tells more.";
 
@@ -48,6 +51,10 @@ pub struct Cli {
 /// The subcommands; everything the window does, one of them can do headless.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Tell which frames of a data set are hard, before anything is fitted: three statistics of each frame's maps, the
+    /// hardness that follows from their ranks, and the stratum.
+    #[command(after_help = complexity::HELP)]
+    Complexity(complexity::ComplexityArgs),
     /// Fit frames of a data set: a row a frame, a table of all, the parameters as npz.
     ///
     /// Each frame starts from the peaks of its own maps, or with --warm-start from the frame before, and takes the
@@ -81,6 +88,7 @@ pub enum Command {
 /// Whatever the subcommand could not do, naming file, key and what was expected.
 pub fn run(command: Command) -> anyhow::Result<ExitCode> {
     match command {
+        Command::Complexity(args) => complexity::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Labels(command) => labels::run(&command),

@@ -3,17 +3,14 @@
 use super::npz::{Array, NpzArchive};
 use super::{DatasetError, DatasetInfo, Frame, Heatmap, NpzError, Truth};
 use crate::geometry::Vec3;
+use std::ops::Range;
 use std::path::Path;
 
 /// Loads an npz of maps, with joints, velocities, person count and time where it has them; SPEC section 6.
 pub(super) fn load(index: usize, name: String, path: &Path, info: &DatasetInfo) -> Result<Frame, DatasetError> {
     let mut file = NpzArchive::open(path)?;
     let mut notes = Vec::new();
-    let maps = info.views.iter().map(|view| {
-        let map = file.read(&view.array)?;
-        heatmap(&file, &view.array, map, &view.shape())
-    });
-    let maps = maps.collect::<Result<Vec<_>, NpzError>>()?;
+    let maps = read_maps(&mut file, info)?;
     let truth = read_truth(&mut file, info.skeleton.joints.len())?;
     let person_count = match scalar(&mut file, "person_count")? {
         Some(count) if count >= 0.0 && count.fract() == 0.0 => Some(count as usize),
@@ -41,6 +38,41 @@ pub(super) fn load(index: usize, name: String, path: &Path, info: &DatasetInfo) 
         image: None,
         notes,
     })
+}
+
+/// The maps of an npz alone, or the arrays of a bare file that holds one frame.
+pub(super) fn maps_only(path: &Path, info: &DatasetInfo) -> Result<Vec<Heatmap>, DatasetError> {
+    Ok(read_maps(&mut NpzArchive::open(path)?, info)?)
+}
+
+fn read_maps(file: &mut NpzArchive, info: &DatasetInfo) -> Result<Vec<Heatmap>, NpzError> {
+    let maps = info.views.iter().map(|view| {
+        let map = file.read(&view.array)?;
+        heatmap(file, &view.array, map, &view.shape())
+    });
+    maps.collect()
+}
+
+/// The maps of consecutive frames of a stacked bare file, read in one pass.
+pub(super) fn stacked_maps(
+    frames: &Range<usize>,
+    path: &Path,
+    info: &DatasetInfo,
+) -> Result<Vec<Vec<Heatmap>>, DatasetError> {
+    let mut file = NpzArchive::open(path)?;
+    let mut maps: Vec<Vec<Heatmap>> = frames.clone().map(|_| Vec::with_capacity(info.views.len())).collect();
+    for view in &info.views {
+        let slabs = file.read_slabs(&view.array, frames.clone())?;
+        let shape = view.shape();
+        if slabs.shape.get(1..) != Some(&shape[..]) {
+            let expected = format!("(frames, …) of {}, the bins of its axes", super::npz::shape_text(&shape));
+            return Err(file.wrong_shape(&view.array, &slabs.shape, expected).into());
+        }
+        for (maps, cells) in maps.iter_mut().zip(slabs.data.chunks_exact(view.cells().max(1))) {
+            maps.push(Heatmap { shape: shape.clone(), data: cells.to_vec(), dtype: slabs.dtype.clone() });
+        }
+    }
+    Ok(maps)
 }
 
 /// Loads frame `index` of a bare file: the arrays themselves, or slab `index` of each.

@@ -42,12 +42,22 @@ fn load_maps(path: &Path, info: &DatasetInfo) -> Result<Vec<Heatmap>, DatasetErr
 }
 
 fn load_map(path: &Path, view: &View) -> Result<Heatmap, DatasetError> {
-    let mut file = NpzArchive::open(path)?;
+    read_map(&mut NpzArchive::open(path)?, view)
+}
+
+/// The maps alone, one after the other in this thread: for work that reads many frames side by side.
+pub(super) fn maps_only(folder: &Path, stem: &str, info: &DatasetInfo) -> Result<Vec<Heatmap>, DatasetError> {
+    let mut file = NpzArchive::open(&folder.join(format!("{stem}{RADAR_SUFFIX}")))?;
+    info.views.iter().map(|view| read_map(&mut file, view)).collect()
+}
+
+fn read_map(file: &mut NpzArchive, view: &View) -> Result<Heatmap, DatasetError> {
     let Array { shape, data, dtype } = file.read(&view.array)?;
     let expected = view.shape();
     if shape.len() == expected.len() + 1 && shape.ends_with(&expected) {
         let (got, expected) = (shape_text(&shape), shape_text(&expected));
-        return Err(DatasetError::Grouped { key: view.array.clone(), got, expected, path: path.to_owned() });
+        let path = file.path().to_owned();
+        return Err(DatasetError::Grouped { key: view.array.clone(), got, expected, path });
     }
     if shape != expected {
         let expected = format!("{}, the bins of its axes", shape_text(&expected));

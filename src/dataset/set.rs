@@ -4,15 +4,18 @@ use super::bare::{BareCatalog, BareChoice, Remembered, assumptions, frames_of};
 use super::files::{RADAR_SUFFIX, Segment, matching, segments};
 use super::manifest::{Layout, Manifest};
 use super::words::axes_badge;
-use super::{DatasetError, Frame, Progress, generic, mmvr};
+use super::{DatasetError, Frame, Heatmap, Progress, generic, mmvr};
 use crate::body::Skeleton;
 use crate::radar::{RadarConfig, View};
 use sha2::{Digest as _, Sha256};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 /// The name of a manifest inside a data set's folder.
 pub const MANIFEST_NAME: &str = "dataset.toml";
+/// Maps of a stacked file that are read in one pass, bytes: every pass reads the file from its start.
+const STACKED_BYTES: usize = 64 << 20;
 
 /// What is true of every frame of a data set.
 #[derive(Debug, Clone, PartialEq)]
@@ -341,6 +344,38 @@ impl Dataset {
                 None => Err(DatasetError::NoSuchFrame { index: i, count: self.len(), path: self.info.root.clone() }),
             },
         }
+    }
+
+    /// Frames whose maps [`Self::maps`] reads in one go: 1, or as many of a stacked file as make 64 MiB.
+    pub fn maps_at_once(&self) -> usize {
+        match &self.source {
+            Source::Bare { stacked: true, .. } => {
+                let cells: usize = self.info.views.iter().map(View::cells).sum();
+                (STACKED_BYTES / (cells * size_of::<f64>()).max(1)).max(1)
+            }
+            _ => 1,
+        }
+    }
+
+    /// The maps of consecutive frames, in this thread; at most [`Self::maps_at_once`] are asked for.
+    pub(super) fn read_maps(&self, frames: &Range<usize>) -> Result<Vec<Vec<Heatmap>>, DatasetError> {
+        let past = || DatasetError::NoSuchFrame {
+            index: frames.end.saturating_sub(1),
+            count: self.len(),
+            path: self.info.root.clone(),
+        };
+        if frames.end > self.len() {
+            return Err(past());
+        }
+        let one = match &self.source {
+            Source::Bare { stacked: true, .. } => return generic::stacked_maps(frames, &self.info.root, &self.info),
+            Source::Files(_) | Source::Bare { .. } => generic::maps_only(&self.frame_path(frames.start), &self.info),
+            Source::Mmvr { .. } => {
+                let (segment, k) = self.segment(frames.start).ok_or_else(past)?;
+                mmvr::maps_only(&segment.path, segment.stem(k), &self.info)
+            }
+        };
+        Ok(vec![one?])
     }
 
     /// The segment of frame `i` and the frame's index in it.

@@ -27,6 +27,7 @@ pub use fill::fill_missing;
 pub use fitter::{FitState, Fitter};
 pub use init::{Initialisation, Peak, initialise};
 pub use objective::{Masks, Objective, masks};
+pub(crate) use percentile::{percentile, percentiles};
 pub use problem::Problem;
 pub use region::Region;
 pub use simulate::simulate;

@@ -1,11 +1,15 @@
 //! numpy's default percentile (linear interpolation), bit for bit, so that a strict comparison with it decides as numpy's.
 
+/// Where a percentile lies among `last + 1` sorted values: the order statistic at or below it, and the weight of the next.
+fn place(last: usize, q_pct: f64) -> (usize, f64) {
+    let at = last as f64 * (q_pct / 100.0);
+    let lower = (at.floor() as usize).min(last);
+    (lower, at - lower as f64)
+}
+
 /// The two order statistics around a percentile and the weight of the upper one.
 fn neighbours(values: &[f64], q_pct: f64) -> Option<(f64, f64, f64)> {
-    let last = values.len().checked_sub(1)?;
-    let at = last as f64 * (q_pct / 100.0);
-    let lower_index = (at.floor() as usize).min(last);
-    let weight = at - lower_index as f64;
+    let (lower_index, weight) = place(values.len().checked_sub(1)?, q_pct);
     let mut scratch = values.to_vec();
     let (_, &mut lower, above) = scratch.select_nth_unstable_by(lower_index, f64::total_cmp);
     let upper = above.iter().copied().min_by(f64::total_cmp).unwrap_or(lower);
@@ -17,9 +21,47 @@ fn lerp(a: f64, b: f64, t: f64) -> f64 {
     if t >= 0.5 { b - (b - a) * (1.0 - t) } else { a + (b - a) * t }
 }
 
+fn between(a: f64, b: f64, t: f64) -> f64 {
+    if a == b { a } else { lerp(a, b, t) }
+}
+
 /// The `q_pct` percentile of `values` (q in 0 ..= 100); NaN where there are none.
 pub(crate) fn percentile(values: &[f64], q_pct: f64) -> f64 {
-    neighbours(values, q_pct).map_or(f64::NAN, |(a, b, t)| if a == b { a } else { lerp(a, b, t) })
+    neighbours(values, q_pct).map_or(f64::NAN, |(a, b, t)| between(a, b, t))
+}
+
+/// Several percentiles of `values` in one go, each as [`percentile`] gives it; `q_pct` must not fall. `scratch` is
+/// overwritten and may be handed in again, so that a scan of many maps allocates once.
+pub(crate) fn percentiles<const N: usize>(values: &[f64], q_pct: [f64; N], scratch: &mut Vec<i64>) -> [f64; N] {
+    let Some(last) = values.len().checked_sub(1) else { return [f64::NAN; N] };
+    scratch.clear();
+    scratch.extend(values.iter().map(|&x| ordered(x)));
+    // Everything before `begin` is at or below everything after it: each percentile is looked for above the one before.
+    let (mut rest, mut begin) = (&mut scratch[..], 0);
+    q_pct.map(|q| {
+        let (lower_index, weight) = place(last, q);
+        let (_, &mut lower, above) = rest.select_nth_unstable(lower_index.saturating_sub(begin));
+        let upper = above.iter().copied().min().unwrap_or(lower);
+        // The slice kept starts at the order statistic itself, for the next percentile may share it.
+        let from = lower_index.saturating_sub(begin);
+        rest = std::mem::take(&mut rest).get_mut(from..).unwrap_or_default();
+        begin = lower_index;
+        between(unordered(lower), unordered(upper), weight)
+    })
+}
+
+/// A float as an integer that sorts as [`f64::total_cmp`] does: integers are partitioned several times as fast.
+fn ordered(x: f64) -> i64 {
+    unfold(x.to_bits() as i64)
+}
+
+fn unordered(key: i64) -> f64 {
+    f64::from_bits(unfold(key) as u64)
+}
+
+/// Its own inverse.
+fn unfold(bits: i64) -> i64 {
+    bits ^ (((bits >> 63) as u64) >> 1) as i64
 }
 
 #[cfg(test)]
@@ -42,5 +84,24 @@ mod tests {
         assert_eq!(percentile(&values, 50.0), 1e-30);
         assert_eq!(percentile(&values, 100.0), 0.05);
         assert!(percentile(&[], 50.0).is_nan());
+    }
+
+    #[test]
+    fn several_at_once_are_those_one_by_one() {
+        let mut state = 1_u64;
+        let mut scratch = Vec::new();
+        for count in [1, 2, 3, 7, 40, 333] {
+            let values: Vec<f64> = (0..count)
+                .map(|_| {
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                    // Ties, both signs and both zeros.
+                    f64::from((state >> 60) as i32 - 8) * if state & 4 == 0 { 0.1 } else { -1e200 }
+                })
+                .collect();
+            for q in [[0.0, 100.0], [90.0, 95.0], [95.0, 95.0], [0.1, 0.2], [99.8, 99.9]] {
+                assert_eq!(percentiles(&values, q, &mut scratch), q.map(|q| percentile(&values, q)), "{count} {q:?}");
+            }
+        }
+        assert!(percentiles(&[], [5.0, 6.0], &mut scratch).iter().all(|x| x.is_nan()));
     }
 }

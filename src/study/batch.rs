@@ -7,7 +7,7 @@
 use super::{FitNumbers, FrameFit, FrameRow, StudyError};
 use crate::body::Pppr;
 use crate::config::FitConfig;
-use crate::dataset::{Dataset, write_pppr};
+use crate::dataset::{Dataset, panic_text, write_pppr};
 use crate::diagnose::joint_errors;
 use crate::geometry::Vec3;
 use crate::mhp::{FitError, Fitter, Precision, Problem, StopReason, initialise};
@@ -170,11 +170,8 @@ impl Batch<'_> {
 
 /// A panic is a defect in this program; one frame of thousands must not end the others.
 fn caught<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
-        let text = panic.downcast_ref::<&str>().map(ToString::to_string);
-        let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
-        Err(format!("internal error: {}", text.unwrap_or_else(|| "a panic without text".into())))
-    })
+    catch_unwind(AssertUnwindSafe(work))
+        .unwrap_or_else(|panic| Err(format!("internal error: {}", panic_text(panic.as_ref()))))
 }
 
 /// The file of a frame: its name with `_` for `/`, and with its index where two names would become one.

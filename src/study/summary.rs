@@ -11,7 +11,7 @@ const LAST: [&str; 4] = ["majpe_mm", "pa_majpe_mm", "init_ms", "fit_ms"];
 /// Columns of numbers, besides one for the IoU of each view.
 pub(super) const NUMBERS: usize = LOSSES.len() + LAST.len();
 
-/// What can go wrong with a batch as a whole.
+/// What can go wrong with a study as a whole.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// A folder or table cannot be written.
@@ -23,10 +23,29 @@ pub enum StudyError {
         path: PathBuf,
     },
     /// The operating system gives no more threads.
-    #[error("no thread to fit on: {reason}")]
+    #[error("no thread to work on: {reason}")]
     Thread {
         /// What it said.
         reason: std::io::Error,
+    },
+    /// A setting out of its range.
+    #[error("{key} is {value}; expected {expected}")]
+    Setting {
+        /// Its name.
+        key: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would have been accepted.
+        expected: &'static str,
+    },
+    /// Somebody pressed cancel.
+    #[error("cancelled")]
+    Cancelled,
+    /// A defect in this program, caught so that the window lives on.
+    #[error("internal error: {message}")]
+    Internal {
+        /// The panic's text.
+        message: String,
     },
 }
 

@@ -5,6 +5,7 @@ use super::header::{Header, Scalar, read_header};
 use super::{NpzError, shape_text, shown};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// The key under which the only array of an `.npy` file is known.
@@ -124,22 +125,33 @@ impl NpzArchive {
     /// # Errors
     /// As [`Self::read`], and where the first axis has no such index.
     pub fn read_slab(&mut self, key: &str, index: usize) -> Result<Array, NpzError> {
+        let Array { mut shape, data, dtype } = self.read_slabs(key, index..index.saturating_add(1))?;
+        shape.remove(0);
+        Ok(Array { shape, data, dtype })
+    }
+
+    /// Reads consecutive slabs of an array along its first axis in one pass: shape (slabs, …rest).
+    ///
+    /// # Errors
+    /// As [`Self::read_slab`], and for an empty range.
+    pub fn read_slabs(&mut self, key: &str, slabs: Range<usize>) -> Result<Array, NpzError> {
         let header = self.with_entry(key, |source| Ok(source.header.clone()))?;
-        let expected = || format!("a first axis longer than {index}");
-        let Some((_, shape)) = header.shape.split_first().filter(|&(&n, _)| index < n) else {
-            return Err(self.wrong_shape(key, &header.shape, expected()));
+        let inside = |n: usize| slabs.start < slabs.end && slabs.end <= n;
+        let Some((_, rest)) = header.shape.split_first().filter(|&(&n, _)| inside(n)) else {
+            let expected = format!("a first axis longer than {}", slabs.end.saturating_sub(1));
+            return Err(self.wrong_shape(key, &header.shape, expected));
         };
-        let shape = shape.to_vec();
-        let cells: usize = shape.iter().product();
+        let cells: usize = rest.iter().product();
+        let shape = [&[slabs.len()], rest].concat();
         if header.fortran {
             let whole = self.read(key)?;
-            let data = whole.data.get(index * cells..(index + 1) * cells).unwrap_or_default().to_vec();
+            let data = whole.data.get(slabs.start * cells..slabs.end * cells).unwrap_or_default().to_vec();
             return Ok(Array { shape, data, dtype: whole.dtype });
         }
-        let bytes = self.with_entry(key, |source| source.slab(index, cells))?;
-        let slab = Header { shape: shape.clone(), ..header };
-        let data = numbers(&bytes, &slab).ok_or_else(|| self.wrong_type(key, &slab, REAL))?;
-        Ok(Array { shape, data, dtype: slab.dtype })
+        let bytes = self.with_entry(key, |source| source.slabs(&slabs, cells))?;
+        let part = Header { shape: shape.clone(), ..header };
+        let data = numbers(&bytes, &part).ok_or_else(|| self.wrong_type(key, &part, REAL))?;
+        Ok(Array { shape, data, dtype: part.dtype })
     }
 
     /// Reads an array of flags: shape and elements in C order.
@@ -282,11 +294,12 @@ impl Source<'_> {
         }
     }
 
-    /// The bytes of slab `index`, of `cells` elements.
-    fn slab(&mut self, index: usize, cells: usize) -> Result<Vec<u8>, NpzError> {
+    /// The bytes of these slabs, of `cells` elements each.
+    fn slabs(&mut self, slabs: &Range<usize>, cells: usize) -> Result<Vec<u8>, NpzError> {
         self.check()?;
-        let count = (cells as u64).saturating_mul(self.header.width as u64);
-        let skip = count.saturating_mul(index as u64);
+        let slab = (cells as u64).saturating_mul(self.header.width as u64);
+        let count = slab.saturating_mul(slabs.len() as u64);
+        let skip = slab.saturating_mul(slabs.start as u64);
         let skipped = std::io::copy(&mut (&mut *self.reader).take(skip), &mut std::io::sink());
         match skipped {
             Ok(got) if got == skip => self.take(count),

@@ -1,0 +1,146 @@
+//! `complexity`: which frames of a data set are hard, as a table, CSV or JSON.
+
+mod report;
+
+use super::common::{open, print};
+use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
+use crate::dataset::{Dataset, Progress};
+use crate::study::StudyError;
+use crate::study::complexity::{Complexity, ComplexityJob, ComplexityOptions, cache_folder};
+use clap::Args;
+use crossbeam_channel::{RecvTimeoutError, bounded};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Shown under the options of `complexity --help`.
+pub(super) const HELP: &str = "\
+Statistics, each the mean over the views of a frame:
+  peak_density      cells above all their neighbours and above the percentile 100-kappa, over all cells
+  static_dominance  share of the bins above that percentile that are so in each of the last T frames of the sequence;
+                    undefined for its first T-1 frames
+  human_saliency    sum of the cells above the percentile 100-tau over the sum of the map
+hardness is the mean of their normalised ranks, human_saliency reversed: 0 is the easiest frame, 1 the hardest. stratum is
+its third: easy, medium, hard. Columns: frame peak_density static_dominance human_saliency hardness stratum; what is
+undefined is empty (null in JSON), and so is everything of a frame that cannot be read.
+
+What was measured is kept in the user's cache folder and measured again where a file has another size or time.
+
+Exit codes: 0 every frame was read; 1 some were not; 2 none was, or the input is bad.
+
+Examples:
+  mhp-inspector complexity data/mmvr
+      How many frames are easy, medium, hard; and the ten hardest.
+  mhp-inspector complexity data/mmvr --csv complexity.csv
+      The same, and a row a frame.";
+
+/// What `complexity` is told.
+#[derive(Debug, Args)]
+pub struct ComplexityArgs {
+    /// An MMVR tree or any folder inside one, a `*_radar.npz` (its folder), a folder with `dataset.toml`, or an
+    /// `.npy`/`.npz` of maps.
+    path: PathBuf,
+    /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
+    #[arg(long, value_name = "FILE")]
+    manifest: Option<PathBuf>,
+    /// Write a row a frame.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// One JSON array, an object a frame, instead of the summary.
+    #[arg(long)]
+    json: bool,
+    /// κ, %: a bin is strong above the percentile 100 − κ of its map.
+    #[arg(long, value_name = "PERCENT", default_value_t = ComplexityOptions::default().kappa_pct)]
+    kappa: f64,
+    /// T, frames: static is what is strong in the last T frames, the frame itself included.
+    #[arg(long, value_name = "FRAMES", default_value_t = ComplexityOptions::default().window)]
+    window: usize,
+    /// τ, %: the human mask is what lies above the percentile 100 − τ of its map.
+    #[arg(long, value_name = "PERCENT", default_value_t = ComplexityOptions::default().tau_pct)]
+    tau: f64,
+    /// Read every frame, and keep nothing in the cache folder.
+    #[arg(long)]
+    no_cache: bool,
+}
+
+/// Runs `complexity`.
+///
+/// # Errors
+/// Where an option or the data set is bad, FILE cannot be written, or no frame at all could be read.
+pub(super) fn run(args: &ComplexityArgs) -> anyhow::Result<ExitCode> {
+    let options = ComplexityOptions { kappa_pct: args.kappa, window: args.window, tau_pct: args.tau };
+    let options = options.validated().map_err(|error| anyhow::anyhow!("--{error}"))?;
+    if let Some(file) = &args.csv {
+        report::check_writable(file)?;
+    }
+    let dataset = Arc::new(open(&args.path, args.manifest.as_deref())?);
+    let cache = if args.no_cache { None } else { cache_folder() };
+    let complexity = compute(&dataset, options, cache)?;
+    if let Some(file) = &args.csv {
+        report::write_csv(file, &dataset, &complexity)?;
+    }
+    if args.json {
+        print(&report::json(&dataset, &complexity)?)?;
+    } else if complexity.counts.failed < dataset.len() {
+        print(&report::summary(&dataset, &complexity))?;
+    }
+    Ok(tell_failures(&dataset, &complexity))
+}
+
+/// Computes beside this thread, which moves the bar.
+fn compute(
+    dataset: &Arc<Dataset>,
+    options: ComplexityOptions,
+    cache: Option<PathBuf>,
+) -> Result<Complexity, StudyError> {
+    let (sender, done) = bounded(1);
+    let wake = move || {
+        // The receiver lives until the answer is here.
+        let _ = sender.send(());
+    };
+    let mut job = ComplexityJob::start_in(Arc::clone(dataset), options, cache, wake);
+    let bar = progress_bar(dataset.len());
+    while let Err(RecvTimeoutError::Timeout) = done.recv_timeout(Duration::from_millis(100)) {
+        show(&bar, job.progress());
+    }
+    bar.finish_and_clear();
+    let gone = || StudyError::Internal { message: "the computation ended without an answer".into() };
+    job.poll().unwrap_or_else(|| Err(gone()))
+}
+
+fn show(bar: &ProgressBar, progress: &Progress) {
+    let state = progress.state();
+    bar.set_position(state.done);
+    bar.set_message(state.stage);
+}
+
+/// On standard error, and only where somebody can see it move.
+fn progress_bar(frames: usize) -> ProgressBar {
+    if !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} frames, {msg}, {elapsed} gone, {eta} to go");
+    ProgressBar::new(frames as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+/// Failures that are told one by one.
+const TOLD: usize = 10;
+
+fn tell_failures(dataset: &Dataset, complexity: &Complexity) -> ExitCode {
+    let (failed, frames) = (complexity.failures.len(), dataset.len());
+    if failed == 0 {
+        return ExitCode::SUCCESS;
+    }
+    for (_, why) in complexity.failures.iter().take(TOLD) {
+        eprintln!("warning: {why}");
+    }
+    if failed == frames {
+        eprintln!("error: none of {frames} frames could be read");
+        return ExitCode::from(EXIT_BAD_INPUT);
+    }
+    eprintln!("warning: {failed} of {frames} frames could not be read");
+    ExitCode::from(EXIT_SOME_FAILED)
+}

@@ -1,0 +1,118 @@
+//! What `complexity` prints and writes.
+
+use crate::dataset::Dataset;
+use crate::dataset::npz::replace_file;
+use crate::study::complexity::{Complexity, FrameComplexity, Stratum};
+use anyhow::Context as _;
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Frames in the list of the hardest.
+const HARDEST: usize = 10;
+
+/// One frame, as JSON and CSV name it.
+#[derive(Serialize)]
+struct Row {
+    frame: String,
+    peak_density: Option<f64>,
+    static_dominance: Option<f64>,
+    human_saliency: Option<f64>,
+    hardness: Option<f64>,
+    stratum: Option<&'static str>,
+}
+
+fn rows<'a>(dataset: &'a Dataset, complexity: &'a Complexity) -> impl Iterator<Item = Row> + 'a {
+    complexity.frames.iter().enumerate().map(|(i, frame)| {
+        let FrameComplexity { statistics, hardness, stratum } = frame.unwrap_or_default();
+        Row {
+            frame: dataset.frame_name(i),
+            peak_density: statistics.peak_density,
+            static_dominance: statistics.static_dominance,
+            human_saliency: statistics.human_saliency,
+            hardness,
+            stratum: stratum.map(Stratum::word),
+        }
+    })
+}
+
+/// An array, a line a frame, in the order of the data set.
+pub(super) fn json(dataset: &Dataset, complexity: &Complexity) -> anyhow::Result<String> {
+    let lines = rows(dataset, complexity).map(|row| serde_json::to_string(&row).context("writing JSON"));
+    let lines = lines.collect::<anyhow::Result<Vec<_>>>()?;
+    Ok(format!("[\n{}\n]\n", lines.join(",\n")))
+}
+
+/// Refuses a file in a folder that does not exist before anything is measured.
+pub(super) fn check_writable(file: &Path) -> anyhow::Result<()> {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    anyhow::ensure!(folder.is_dir(), "{}: cannot be written: no folder {}", file.display(), folder.display());
+    anyhow::ensure!(!file.is_dir(), "{}: cannot be written: it is a folder", file.display());
+    Ok(())
+}
+
+/// Replaces `file` by a table with a row a frame.
+pub(super) fn write_csv(file: &Path, dataset: &Dataset, complexity: &Complexity) -> anyhow::Result<()> {
+    let written = replace_file(file, |out| {
+        let mut table = csv::Writer::from_writer(out);
+        for row in rows(dataset, complexity) {
+            table.serialize(row).map_err(std::io::Error::other)?;
+        }
+        table.flush()
+    });
+    written.with_context(|| format!("{}: cannot be written", file.display()))
+}
+
+/// Counts, quantiles and the hardest frames, for people.
+pub(super) fn summary(dataset: &Dataset, complexity: &Complexity) -> String {
+    let counts = &complexity.counts;
+    let mut text = format!("{}: {} frames in {} sequences\n", dataset.info().name, dataset.len(), dataset.sequences());
+    for stratum in Stratum::ALL {
+        let _ = writeln!(text, "  {:<12}{:>8}", stratum.word(), counts.in_stratum(stratum));
+    }
+    for (word, count) in [("no hardness", counts.unranked), ("unreadable", counts.failed)] {
+        if count > 0 {
+            let _ = writeln!(text, "  {word:<12}{count:>8}");
+        }
+    }
+    let _ = writeln!(text, "\n{:<18}{}  defined", "", ["min", "25 %", "median", "75 %", "max"].map(right).concat());
+    let columns: [(&str, fn(&FrameComplexity) -> Option<f64>); 4] = [
+        ("peak_density", |frame| frame.statistics.peak_density),
+        ("static_dominance", |frame| frame.statistics.static_dominance),
+        ("human_saliency", |frame| frame.statistics.human_saliency),
+        ("hardness", |frame| frame.hardness),
+    ];
+    for (name, of) in columns {
+        let values: Vec<f64> = complexity.frames.iter().flatten().filter_map(of).collect();
+        let quantiles = crate::mhp::percentiles(&values, [0.0, 25.0, 50.0, 75.0, 100.0], &mut Vec::new());
+        let cells = quantiles.map(|x| right(&number(Some(x).filter(|x| !x.is_nan())))).concat();
+        let _ = writeln!(text, "{name:<18}{cells}  {:>7}", values.len());
+    }
+    hardest(dataset, complexity, &mut text);
+    text
+}
+
+fn hardest(dataset: &Dataset, complexity: &Complexity, text: &mut String) {
+    let hardness = |(i, frame): (usize, &Option<FrameComplexity>)| Some((frame.as_ref()?.hardness?, i));
+    let mut order: Vec<(f64, usize)> = complexity.frames.iter().enumerate().filter_map(hardness).collect();
+    order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let lines: Vec<(String, &FrameComplexity)> =
+        order.iter().take(HARDEST).filter_map(|&(_, i)| Some((dataset.frame_name(i), complexity.frame(i)?))).collect();
+    let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).max("the hardest".len());
+    let head = ["hardness", "peaks", "static", "human"].map(right).concat();
+    let _ = writeln!(text, "\n{:<width$}{head}", "the hardest");
+    for (name, frame) in lines {
+        let s = &frame.statistics;
+        let cells = [frame.hardness, s.peak_density, s.static_dominance, s.human_saliency];
+        let _ = writeln!(text, "{name:<width$}{}", cells.map(|x| right(&number(x))).concat());
+    }
+}
+
+/// Two spaces and ten columns.
+fn right(text: &str) -> String {
+    format!("  {text:>10}")
+}
+
+fn number(x: Option<f64>) -> String {
+    x.map_or_else(|| "-".into(), |x| format!("{x:.6}"))
+}

@@ -1,0 +1,127 @@
+//! The whole answer: what is on disk, what has to be read, and the ranking.
+
+use super::super::StudyError;
+use super::cache::CacheFile;
+use super::plan::{Sequences, chunk_length, chunks};
+use super::scan::{Scanned, scan};
+use super::stamps::{Key, keys};
+use super::{Complexity, ComplexityOptions, rank};
+use crate::dataset::{Dataset, Progress};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// What was measured is on disk after this time at the latest, so that a scan of hours that is killed goes on there.
+const CHECKPOINT: Duration = Duration::from_secs(20);
+
+/// The complexity of every frame of a data set. `cache` is the folder of kept statistics ([`super::cache_folder`]); with
+/// it only frames are read whose files, or those of the T − 1 frames before them, have another size or time than when they
+/// were measured. Progress counts frames. On cancel what was measured is kept.
+///
+/// # Errors
+/// Where an option is out of range, there is no thread, or on cancel. A frame that cannot be read is none: it is listed in
+/// [`Complexity::failures`].
+pub fn compute(
+    dataset: &Dataset,
+    options: &ComplexityOptions,
+    cache: Option<&Path>,
+    progress: &Progress,
+) -> Result<Complexity, StudyError> {
+    compute_telling(dataset, options, cache, progress, |_| {})
+}
+
+/// As [`compute`]; `told` is called with every frame that was read.
+fn compute_telling(
+    dataset: &Dataset,
+    options: &ComplexityOptions,
+    cache: Option<&Path>,
+    progress: &Progress,
+    mut told: impl FnMut(usize),
+) -> Result<Complexity, StudyError> {
+    let options = options.validated()?;
+    let sequences = Sequences::of(dataset);
+    let mut found = match cache {
+        Some(folder) => {
+            let keys = keys(dataset, &sequences, options.window, progress)?;
+            Found::cached(CacheFile::new(folder, dataset, &options), keys)
+        }
+        None => Found::nothing(dataset.len()),
+    };
+    let unknown = found.unknown();
+    progress.begin("measuring maps", dataset.len() as u64);
+    progress.advance((dataset.len() - unknown) as u64);
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let length = chunk_length(unknown, threads, options.window, dataset.maps_at_once());
+    let chunks = chunks(&sequences, options.window, length, |i| found.is_known(i));
+    scan(dataset, &options, &chunks, threads, progress, |i, scanned| {
+        found.add(i, scanned);
+        progress.advance(1);
+        told(i);
+    })?;
+    found.keep();
+    if found.unknown() > 0 {
+        return Err(StudyError::Cancelled);
+    }
+    let Found { frames, .. } = found;
+    let (mut statistics, mut failures) = (Vec::with_capacity(frames.len()), Vec::new());
+    for (i, scanned) in frames.into_iter().enumerate() {
+        let kept = scanned.map(|scanned| scanned.kept);
+        statistics.push(kept.as_ref().and_then(|kept| kept.as_ref().ok().copied()));
+        failures.extend(kept.and_then(Result::err).map(|why| (i, why)));
+    }
+    Ok(Complexity { failures, scanned: unknown, ..rank(options, &statistics) })
+}
+
+/// What is known so far of each frame, and where it is kept.
+struct Found {
+    frames: Vec<Option<Scanned>>,
+    file: Option<(CacheFile, Vec<Option<Key>>)>,
+    /// Something was measured that is not in the file.
+    changed: bool,
+    kept_at: Instant,
+}
+
+impl Found {
+    fn nothing(frames: usize) -> Self {
+        let frames = std::iter::repeat_with(|| None).take(frames).collect();
+        Self { frames, file: None, changed: false, kept_at: Instant::now() }
+    }
+
+    fn cached(file: CacheFile, keys: Vec<Option<Key>>) -> Self {
+        let kept = file.read();
+        let known = |key: &Option<Key>| Some(Scanned { kept: kept.get(key.as_ref()?)?.clone(), lasting: true });
+        let frames: Vec<_> = keys.iter().map(known).collect();
+        let changed = frames.iter().flatten().count() != kept.len();
+        Self { frames, file: Some((file, keys)), changed, kept_at: Instant::now() }
+    }
+
+    fn is_known(&self, i: usize) -> bool {
+        matches!(self.frames.get(i), Some(Some(_)))
+    }
+
+    fn unknown(&self) -> usize {
+        self.frames.iter().filter(|frame| frame.is_none()).count()
+    }
+
+    fn add(&mut self, i: usize, scanned: Scanned) {
+        if let Some(frame) = self.frames.get_mut(i) {
+            *frame = Some(scanned);
+            self.changed = true;
+        }
+        if self.kept_at.elapsed() > CHECKPOINT {
+            self.keep();
+        }
+    }
+
+    /// Writes the file where it would say something new. Where nothing is known any more (the disk is gone) the old one
+    /// stays.
+    fn keep(&mut self) {
+        let Some((file, keys)) = self.file.as_ref().filter(|_| self.changed) else { return };
+        let lasting = |frame: &Option<Scanned>| frame.as_ref().is_some_and(|scanned| scanned.lasting);
+        if self.frames.iter().any(lasting) {
+            let rows = self.frames.iter().zip(keys).filter(|(frame, _)| lasting(frame));
+            file.write(rows.filter_map(|(frame, key)| Some(((*key)?, &frame.as_ref()?.kept))));
+        }
+        self.changed = false;
+        self.kept_at = Instant::now();
+    }
+}
