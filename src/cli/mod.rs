@@ -1,6 +1,7 @@
 //! The command line: one file a subcommand. Arguments as typed become a validated configuration and one library call.
 
 mod common;
+mod evidence;
 mod fit;
 mod frames;
 mod info;
@@ -47,6 +48,12 @@ pub struct Cli {
 /// The subcommands; everything the window does, one of them can do headless.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Tell what speaks for each failure mode of a fit, F1 to F4, in numbers: evidence, not verdicts.
+    ///
+    /// Each frame is fitted from its own peaks as `fit` does, unless --params says where the joints are. The frames before
+    /// it in its sequence are read for what stays and what moves.
+    #[command(after_help = evidence::HELP)]
+    Evidence(evidence::EvidenceArgs),
     /// Fit frames of a data set: a row a frame, a table of all, the parameters as npz.
     ///
     /// Each frame starts from the peaks of its own maps, or with --warm-start from the frame before, and takes the
@@ -77,6 +84,7 @@ pub enum Command {
 /// Whatever the subcommand could not do, naming file, key and what was expected.
 pub fn run(command: Command) -> anyhow::Result<ExitCode> {
     match command {
+        Command::Evidence(args) => evidence::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Score(args) => score::run(&args),

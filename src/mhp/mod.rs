@@ -24,9 +24,11 @@ mod types;
 
 pub use adam::Adam;
 pub use fill::fill_missing;
+pub(crate) use fill::for_neighbours;
 pub use fitter::{FitState, Fitter};
 pub use init::{Initialisation, Peak, initialise};
 pub use objective::{Masks, Objective, masks};
+pub(crate) use percentile::percentile;
 pub use problem::Problem;
 pub use region::Region;
 pub use simulate::simulate;

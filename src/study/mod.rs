@@ -1,12 +1,16 @@
-//! Batch runs and their tables: fit many frames, one row a frame.
+//! Batch runs, their tables, and what is taken home of a fit.
 //!
-//! [`run_batch`] fits, [`Summary`] writes the rows to a CSV as they come, [`Means`] sums them up. Nothing here knows a
-//! window or a terminal.
+//! [`run_batch`] fits, [`Summary`] writes the rows to a CSV as they come, [`Means`] sums them up; [`frame_evidence`] judges
+//! a frame; [`write_ply`] and [`write_curves`] export a state. Nothing here knows a window or a terminal.
 
 mod batch;
+mod evidence;
+mod export;
 mod row;
 mod summary;
 
 pub use batch::{BatchOptions, fit_frame, run_batch};
+pub use evidence::{FrameEvidence, frame_evidence, frames_before};
+pub use export::{CurveRow, curve_columns, curves_csv, ply, write_curves, write_ply};
 pub use row::{FitNumbers, FrameFit, FrameRow, Means};
 pub use summary::{StudyError, Summary, columns};
