@@ -311,6 +311,8 @@ fn an_error_of_the_sink_ends_the_batch() {
         precision: Precision::F64,
         warm_start: false,
         params_folder: Some(pppr.clone()),
+        ply: false,
+        curves_folder: None,
     };
     let mut told = Vec::new();
     let full = || StudyError::Write { reason: std::io::Error::other("disk full"), path: "summary.csv".into() };

@@ -5,7 +5,8 @@ use crate::dataset::{Dataset, Manifest, Progress};
 use crate::mhp::Precision;
 use anyhow::Context as _;
 use clap::ValueEnum;
-use std::io::{ErrorKind, Write as _};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::{ErrorKind, IsTerminal as _, Write as _};
 use std::path::Path;
 
 /// The two precisions as typed.
@@ -44,6 +45,29 @@ pub(super) fn open(path: &Path, manifest: Option<&Path>) -> anyhow::Result<Datas
 /// As [`FitConfig::from_file`].
 pub(super) fn config(file: Option<&Path>) -> anyhow::Result<FitConfig> {
     Ok(file.map(FitConfig::from_file).transpose()?.unwrap_or_default())
+}
+
+/// As [`config`], with the number of Adam steps that the command line gives.
+///
+/// # Errors
+/// As [`config`], or where the number is out of range.
+pub(super) fn settings(file: Option<&Path>, iterations: Option<usize>) -> anyhow::Result<FitConfig> {
+    let config = config(file)?;
+    match iterations {
+        Some(iterations) => FitConfig { iterations, ..config }.validated().context("--iterations"),
+        None => Ok(config),
+    }
+}
+
+/// On standard error, and only where somebody can see it move.
+pub(super) fn progress_bar(frames: usize) -> ProgressBar {
+    if !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} frames, {elapsed} gone, {eta} to go");
+    let bar = ProgressBar::new(frames as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.tick();
+    bar
 }
 
 /// Writes to standard output. That nobody reads on (`info … | head`) is no error.

@@ -2,18 +2,15 @@
 
 mod table;
 
-use super::common::{PrecisionArg, config, open, print};
-use super::frames::FrameRange;
+use super::common::{PrecisionArg, open, print, progress_bar, settings};
+use super::frames::{FrameRange, chosen};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::config::FitConfig;
-use crate::dataset::{Dataset, Layout};
+use crate::dataset::Dataset;
 use crate::study::{BatchOptions, FrameRow, Means, Summary, columns, run_batch};
 use anyhow::Context as _;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
-use std::io::IsTerminal as _;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use table::Table;
@@ -30,7 +27,9 @@ Examples:
   mhp-inspector fit data/d1s1/000/00383_radar.npz
       One frame of MMVR with the defaults; prints its row.
   mhp-inspector fit data/d1s1 --frames 0..900 --warm-start --out results
-      A minute of MMVR, each frame from the one before; writes results/summary.csv, fit.toml, pppr/*.npz.";
+      A minute of MMVR, each frame from the one before; writes results/summary.csv, fit.toml, pppr/*.npz.
+  mhp-inspector fit data/walk --frames 7 --out results --ply --curves
+      Also the Gaussians of the end as pppr/*.ply and every iteration as curves/*.csv.";
 
 /// What `fit` is told.
 #[derive(Debug, Args)]
@@ -54,6 +53,12 @@ pub struct FitArgs {
     /// `/` in its name). Without it nothing is written.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// With --out, also pppr/NAME.ply: the Gaussians for viewers of 3-D Gaussian splats, with velocity, person and joint.
+    #[arg(long, requires = "out")]
+    ply: bool,
+    /// With --out, also curves/NAME.csv: loss, terms, IoU and joint error of every iteration.
+    #[arg(long, requires = "out")]
+    curves: bool,
     /// Start each frame from the result of the one before in its sequence; one frame at a time then.
     #[arg(long)]
     warm_start: bool,
@@ -71,9 +76,9 @@ pub struct FitArgs {
 /// Where the configuration, the data set or the range of frames is bad, DIR cannot be written, or no frame at all could
 /// be fitted.
 pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
-    let config = settings(args)?;
+    let config = settings(args.config.as_deref(), args.iterations)?;
     let dataset = open(&args.path, args.manifest.as_deref())?;
-    let frames = frames(args, &dataset)?;
+    let frames = chosen(args.frames, &args.path, &dataset)?;
     let arrays: Vec<String> = dataset.info().views.iter().map(|view| view.array.clone()).collect();
     let mut summary = args.out.as_deref().map(|out| prepare(out, args, &dataset, &config, &arrays)).transpose()?;
     let options = BatchOptions {
@@ -81,6 +86,8 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
         precision: args.precision.into(),
         warm_start: args.warm_start,
         params_folder: args.out.as_deref().map(params_folder),
+        ply: args.ply,
+        curves_folder: args.out.as_deref().filter(|_| args.curves).map(curves_folder),
     };
     let bar = progress_bar(frames.len());
     let mut report = Report::new(arrays, args.json);
@@ -95,26 +102,12 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
     report.tell()
 }
 
-fn settings(args: &FitArgs) -> anyhow::Result<FitConfig> {
-    let config = config(args.config.as_deref())?;
-    match args.iterations {
-        Some(iterations) => FitConfig { iterations, ..config }.validated().context("--iterations"),
-        None => Ok(config),
-    }
-}
-
-/// The frames asked for; the one that PATH names; or all.
-fn frames(args: &FitArgs, dataset: &Dataset) -> anyhow::Result<Range<usize>> {
-    let whole = args.frames.is_none() && !(dataset.info().layout == Layout::Mmvr && args.path.is_file());
-    if whole {
-        return Ok(0..dataset.len());
-    }
-    let Some(range) = args.frames else { return Ok(dataset.start_index()..dataset.start_index() + 1) };
-    range.within(dataset.len()).map_err(|why| anyhow::anyhow!("{}: --frames: {why}", args.path.display()))
-}
-
 fn params_folder(out: &Path) -> PathBuf {
     out.join("pppr")
+}
+
+fn curves_folder(out: &Path) -> PathBuf {
+    out.join("curves")
 }
 
 /// Makes the folders, writes the settings, and opens the table: what cannot be written is told before anything is fitted.
@@ -125,8 +118,9 @@ fn prepare(
     config: &FitConfig,
     arrays: &[String],
 ) -> anyhow::Result<Summary> {
-    let folder = params_folder(out);
-    std::fs::create_dir_all(&folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    for folder in std::iter::once(params_folder(out)).chain(args.curves.then(|| curves_folder(out))) {
+        std::fs::create_dir_all(&folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    }
     let precision = match args.precision {
         PrecisionArg::F64 => "f64",
         PrecisionArg::F32 => "f32",
@@ -141,17 +135,6 @@ fn prepare(
     std::fs::write(&file, head + &config.to_toml())
         .with_context(|| format!("{}: cannot be written", file.display()))?;
     Ok(Summary::create(&out.join("summary.csv"), arrays)?)
-}
-
-/// On standard error, and only where somebody can see it move.
-fn progress_bar(frames: usize) -> ProgressBar {
-    if !std::io::stderr().is_terminal() {
-        return ProgressBar::hidden();
-    }
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} frames, {elapsed} gone, {eta} to go");
-    let bar = ProgressBar::new(frames as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.tick();
-    bar
 }
 
 /// What is printed at the end.

@@ -1,7 +1,22 @@
 //! `--frames A..B`: which frames, as a range is written in Rust.
 
+use crate::dataset::{Dataset, Layout};
 use std::ops::Range;
+use std::path::Path;
 use std::str::FromStr;
+
+/// The frames asked for; the one that `path` names; or all.
+///
+/// # Errors
+/// Where the range reaches past the end.
+pub(super) fn chosen(asked: Option<FrameRange>, path: &Path, dataset: &Dataset) -> anyhow::Result<Range<usize>> {
+    let whole = asked.is_none() && !(dataset.info().layout == Layout::Mmvr && path.is_file());
+    if whole {
+        return Ok(0..dataset.len());
+    }
+    let Some(range) = asked else { return Ok(dataset.start_index()..dataset.start_index() + 1) };
+    range.within(dataset.len()).map_err(|why| anyhow::anyhow!("{}: --frames: {why}", path.display()))
+}
 
 /// A range of frames as typed; the end is open where none was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

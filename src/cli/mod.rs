@@ -2,6 +2,7 @@
 
 mod common;
 mod complexity;
+mod evidence;
 mod fit;
 mod frames;
 mod info;
@@ -55,6 +56,12 @@ pub enum Command {
     /// hardness that follows from their ranks, and the stratum.
     #[command(after_help = complexity::HELP)]
     Complexity(complexity::ComplexityArgs),
+    /// Tell what speaks for each failure mode of a fit, F1 to F4, in numbers: evidence, not verdicts.
+    ///
+    /// Each frame is fitted from its own peaks as `fit` does, unless --params says where the joints are. The frames before
+    /// it in its sequence are read for what stays and what moves.
+    #[command(after_help = evidence::HELP)]
+    Evidence(evidence::EvidenceArgs),
     /// Fit frames of a data set: a row a frame, a table of all, the parameters as npz.
     ///
     /// Each frame starts from the peaks of its own maps, or with --warm-start from the frame before, and takes the
@@ -89,6 +96,7 @@ pub enum Command {
 pub fn run(command: Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Complexity(args) => complexity::run(&args),
+        Command::Evidence(args) => evidence::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Labels(command) => labels::run(&command),

@@ -1,5 +1,9 @@
-//! Metrics of a fit.
+//! Metrics of a fit, and the evidence for each of the paper's failure modes.
 
+mod evidence;
 mod metrics;
 
+pub use evidence::{
+    Annotated, EarlierFrame, Evidence, EvidenceInput, Finding, Place, STATIC_FRAMES, STATIC_KAPPA_PCT, evidence,
+};
 pub use metrics::{JointErrors, joint_errors, majpe_mm, pa_majpe_mm};

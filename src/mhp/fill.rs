@@ -37,7 +37,7 @@ fn neighbour_mean(map: &[f64], shape: &[usize], cell: usize) -> Option<f64> {
 }
 
 /// Calls `visit` with the flat index of each of the up to 3^D − 1 neighbours of `cell`.
-pub(super) fn for_neighbours(shape: &[usize], cell: usize, mut visit: impl FnMut(usize)) {
+pub(crate) fn for_neighbours(shape: &[usize], cell: usize, mut visit: impl FnMut(usize)) {
     let dims = shape.len();
     let mut index = vec![0_usize; dims];
     let mut rest = cell;

@@ -24,6 +24,7 @@ mod types;
 
 pub use adam::Adam;
 pub use fill::fill_missing;
+pub(crate) use fill::for_neighbours;
 pub use fitter::{FitState, Fitter};
 pub use init::{Initialisation, Peak, initialise};
 pub use objective::{Masks, Objective, masks};

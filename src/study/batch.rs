@@ -4,13 +4,13 @@
 //! are in memory than there are threads. Plain threads and not rayon's: a thread of rayon's that waits inside one fit
 //! may begin another meanwhile, and the times of both would be wrong.
 
-use super::{FitNumbers, FrameFit, FrameRow, StudyError};
+use super::{CurveRow, FitNumbers, FrameFit, FrameRow, StudyError, write_curves, write_ply};
 use crate::body::Pppr;
 use crate::config::FitConfig;
-use crate::dataset::{Dataset, panic_text, write_pppr};
-use crate::diagnose::joint_errors;
+use crate::dataset::{Dataset, Truth, panic_text, write_pppr};
+use crate::diagnose::{JointErrors, joint_errors};
 use crate::geometry::Vec3;
-use crate::mhp::{FitError, Fitter, Precision, Problem, StopReason, initialise};
+use crate::mhp::{FitError, Fitter, Precision, Problem, StepReport, StopReason, initialise};
 use crossbeam_channel::Sender;
 use std::collections::{BTreeMap, HashSet};
 use std::ops::Range;
@@ -31,6 +31,10 @@ pub struct BatchOptions {
     pub warm_start: bool,
     /// The folder that the parameters are written to, an npz a frame; it must exist.
     pub params_folder: Option<PathBuf>,
+    /// Write the Gaussians beside the parameters, a PLY a frame.
+    pub ply: bool,
+    /// The folder that every iteration is written to, a CSV a frame; it must exist.
+    pub curves_folder: Option<PathBuf>,
 }
 
 /// Fits one frame: from `start` where it is given, else from its own peaks.
@@ -42,6 +46,17 @@ pub fn fit_frame(
     index: usize,
     options: &BatchOptions,
     start: Option<Pppr>,
+) -> Result<FrameFit, String> {
+    fit_watched(dataset, index, options, start, |_, _| {})
+}
+
+/// As [`fit_frame`]; `watch` sees every iteration, the start included, with its mean joint error in mm where there is truth.
+fn fit_watched(
+    dataset: &Dataset,
+    index: usize,
+    options: &BatchOptions,
+    start: Option<Pppr>,
+    mut watch: impl FnMut(StepReport, Option<f64>),
 ) -> Result<FrameFit, String> {
     let in_file = |error: &dyn std::fmt::Display| format!("{}: {error}", dataset.frame_path(index).display());
     let frame = dataset.load(index).map_err(|error| error.to_string())?;
@@ -58,21 +73,31 @@ pub fn fit_frame(
     };
     let began = Instant::now();
     let mut fitter =
-        Fitter::new(problem, options.config, options.precision, initial).map_err(|error| in_file(&error))?;
-    let reason = run(&mut fitter).map_err(|error| in_file(&error))?;
+        Fitter::new(problem, options.config, options.precision, initial.clone()).map_err(|error| in_file(&error))?;
+    let errors = |params: &Pppr| errors(params, frame.truth.as_ref()?, info.skeleton.joints.len());
+    let reason = run(&mut fitter, |report, params| watch(report, errors(params).map(|e| e.majpe_mm)));
+    let reason = reason.map_err(|error| in_file(&error))?;
     let fit_ms = milliseconds(began);
     let (report, params) = (fitter.report(), fitter.params().clone());
-    let joints: Vec<Vec3> = (0..params.shape().total_joints()).map(|joint| params.position(joint)).collect();
-    let errors = frame.truth.and_then(|truth| joint_errors(&joints, &truth.joints, info.skeleton.joints.len()));
+    let errors = errors(&params);
     let (majpe_mm, pa_majpe_mm) = (errors.map(|e| e.majpe_mm), errors.map(|e| e.pa_majpe_mm));
-    Ok(FrameFit { numbers: FitNumbers { report, reason, majpe_mm, pa_majpe_mm, init_ms, fit_ms }, params })
+    Ok(FrameFit { numbers: FitNumbers { report, reason, majpe_mm, pa_majpe_mm, init_ms, fit_ms }, initial, params })
 }
 
-/// Steps until the configuration says to stop.
-fn run(fitter: &mut Fitter) -> Result<StopReason, FitError> {
+fn errors(params: &Pppr, truth: &Truth, joints: usize) -> Option<JointErrors> {
+    let estimate: Vec<Vec3> = (0..params.shape().total_joints()).map(|joint| params.position(joint)).collect();
+    joint_errors(&estimate, &truth.joints, joints)
+}
+
+/// Steps until the configuration says to stop; `watch` sees every iteration, the start included.
+fn run(fitter: &mut Fitter, mut watch: impl FnMut(StepReport, &Pppr)) -> Result<StopReason, FitError> {
     let config = *fitter.config();
+    watch(fitter.report(), fitter.params());
     while fitter.iteration() < config.iterations {
-        if fitter.step()?.converged && config.stop_when_converged {
+        let report = fitter.step()?;
+        let converged = report.converged;
+        watch(report, fitter.params());
+        if converged && config.stop_when_converged {
             return Ok(StopReason::Converged);
         }
     }
@@ -98,7 +123,7 @@ pub fn run_batch(
     let batch = Batch {
         dataset,
         options,
-        files: options.params_folder.as_deref().map(|folder| Files::new(folder, dataset, frames.clone())),
+        files: Files::new(dataset, frames.clone()),
         next: AtomicUsize::new(frames.start),
         end: frames.end,
     };
@@ -130,7 +155,7 @@ pub fn run_batch(
 struct Batch<'a> {
     dataset: &'a Dataset,
     options: &'a BatchOptions,
-    files: Option<Files<'a>>,
+    files: Files,
     next: AtomicUsize,
     end: usize,
 }
@@ -160,9 +185,26 @@ impl Batch<'_> {
     }
 
     fn fit_and_keep(&self, index: usize, start: Option<Pppr>) -> Result<FrameFit, String> {
-        let fit = fit_frame(self.dataset, index, self.options, start)?;
-        if let Some(files) = &self.files {
-            write_pppr(&files.path(self.dataset, index), &fit.params).map_err(|error| error.to_string())?;
+        let (dataset, options) = (self.dataset, self.options);
+        let mut rows = Vec::new();
+        let fit = fit_watched(dataset, index, options, start, |report, majpe_mm| {
+            if options.curves_folder.is_some() {
+                rows.push((report, majpe_mm));
+            }
+        })?;
+        let file = |folder: &Path, ending: &str| folder.join(self.files.name(dataset, index) + ending);
+        if let Some(folder) = &options.params_folder {
+            write_pppr(&file(folder, ".npz"), &fit.params).map_err(|error| error.to_string())?;
+        }
+        if let Some(folder) = options.params_folder.as_ref().filter(|_| options.ply) {
+            let written = write_ply(&file(folder, ".ply"), &fit.params, &dataset.info().skeleton);
+            written.map_err(|error| error.to_string())?;
+        }
+        if let Some(folder) = &options.curves_folder {
+            let arrays: Vec<String> = dataset.info().views.iter().map(|view| view.array.clone()).collect();
+            let rows =
+                rows.iter().map(|(report, majpe_mm)| CurveRow { branch: 0, report, majpe_mm: *majpe_mm, flag: None });
+            write_curves(&file(folder, ".csv"), &arrays, rows).map_err(|error| error.to_string())?;
         }
         Ok(fit)
     }
@@ -174,23 +216,21 @@ fn caught<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
         .unwrap_or_else(|panic| Err(format!("internal error: {}", panic_text(panic.as_ref()))))
 }
 
-/// The file of a frame: its name with `_` for `/`, and with its index where two names would become one.
-struct Files<'a> {
-    folder: &'a Path,
+/// The files of a frame: its name with `_` for `/`, and with its index where two names would become one.
+struct Files {
     ambiguous: HashSet<usize>,
 }
 
-impl<'a> Files<'a> {
-    fn new(folder: &'a Path, dataset: &Dataset, frames: Range<usize>) -> Self {
+impl Files {
+    fn new(dataset: &Dataset, frames: Range<usize>) -> Self {
         let mut seen = HashSet::new();
-        let ambiguous = frames.filter(|&index| !seen.insert(flat(&dataset.frame_name(index)))).collect();
-        Self { folder, ambiguous }
+        Self { ambiguous: frames.filter(|&index| !seen.insert(flat(&dataset.frame_name(index)))).collect() }
     }
 
-    fn path(&self, dataset: &Dataset, index: usize) -> PathBuf {
+    /// Without an ending.
+    fn name(&self, dataset: &Dataset, index: usize) -> String {
         let name = flat(&dataset.frame_name(index));
-        let ending = if self.ambiguous.contains(&index) { format!("_{index}.npz") } else { ".npz".to_owned() };
-        self.folder.join(name + &ending)
+        if self.ambiguous.contains(&index) { format!("{name}_{index}") } else { name }
     }
 }
 

@@ -27,6 +27,8 @@ pub struct FitNumbers {
 pub struct FrameFit {
     /// The numbers of its row.
     pub numbers: FitNumbers,
+    /// Where it began; the EM region lies around it.
+    pub initial: Pppr,
     /// Where the fit ended; SPEC section 2.
     pub params: Pppr,
 }

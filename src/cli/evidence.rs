@@ -1,0 +1,218 @@
+//! `evidence`: what speaks for each failure mode of a fit, as cards, JSON or CSV.
+
+use super::common::{PrecisionArg, open, print, progress_bar, settings};
+use super::frames::{FrameRange, chosen};
+use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
+use crate::body::Pppr;
+use crate::dataset::npz::replace_file;
+use crate::dataset::{Dataset, read_pppr};
+use crate::diagnose::{Evidence, Finding, Place};
+use crate::labels::Tag;
+use crate::mhp::Problem;
+use crate::radar::View;
+use crate::study::{BatchOptions, FrameEvidence, frame_evidence};
+use anyhow::Context as _;
+use clap::Args;
+use rayon::prelude::*;
+use serde_json::{Map, Value, json};
+use std::fmt::Write as _;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Shown under the options of `evidence --help`.
+pub(super) const HELP: &str = "\
+Scores go from 0 (nothing speaks for the mode) to 1; `-` (null in JSON, empty in CSV) where a frame cannot be judged, and the \
+text says why. They order frames for a person to judge; they are no probabilities.
+  F1  share of H_ori's mask that is bright in each of the last 5 frames, mean over the views.
+  F2  1/(1 + (r/d_F)^2): r the nearest joint's range, d_F = 2D^2/lambda the array's Fraunhofer distance.
+  F3  share of the simulated echo that two persons have in common; 0 with one person.
+  F4  1/(1 + u^2): u the joints' radial velocity in Doppler cells, or where no axis measures it how many times as
+      much as the rest of the map the EM region changed since the frame before, less one.
+
+JSON: an array of {frame, index, F1: {score, summary, findings: [{text, place}]}, F2, F3, F4}; place is null, {cells: {view, \
+lo, hi}}, {joint: N} or {frame: INDEX}. A frame that fails has `error` instead of F1 to F4.
+
+Exit codes: 0 every frame was judged; 1 some were not; 2 none was, or the input is bad.
+
+Examples:
+  mhp-inspector evidence samples/walk --frames 7
+      Fits frame 7, reads frames 3 to 6, prints four cards.
+  mhp-inspector evidence data/d1s1 --frames 0..900 --csv evidence.csv
+      A minute of MMVR as a table; add --json for the findings.";
+
+/// What `evidence` is told.
+#[derive(Debug, Args)]
+pub struct EvidenceArgs {
+    /// An MMVR tree or any folder inside one, a `*_radar.npz`, a folder with `dataset.toml`, or an `.npy`/`.npz` of maps.
+    path: PathBuf,
+    /// Frames to judge, counted from 0, as in Rust: 5..12 (12 not included), 5..=11, 5.., ..12, or 7 alone. Default: all,
+    /// or the one that PATH names.
+    #[arg(long, value_name = "A..B")]
+    frames: Option<FrameRange>,
+    /// PPPR npz of the joints, for one frame; without it each frame is fitted.
+    #[arg(long, value_name = "P.npz", conflicts_with = "iterations")]
+    params: Option<PathBuf>,
+    /// Adam steps of a frame, instead of the configuration's.
+    #[arg(long, value_name = "N")]
+    iterations: Option<usize>,
+    /// Fit configuration; without it the defaults.
+    #[arg(long, value_name = "FIT.toml")]
+    config: Option<PathBuf>,
+    /// Scalar of the per-cell kernel.
+    #[arg(long, value_enum, default_value = "f64")]
+    precision: PrecisionArg,
+    /// One JSON array instead of cards.
+    #[arg(long)]
+    json: bool,
+    /// Also write a table: frame, index, F1 to F4, their summaries, error.
+    #[arg(long, value_name = "F")]
+    csv: Option<PathBuf>,
+    /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
+    #[arg(long, value_name = "FILE")]
+    manifest: Option<PathBuf>,
+}
+
+/// Runs `evidence`.
+///
+/// # Errors
+/// Where the configuration, the data set, the range of frames or the parameters are bad, or the table cannot be written.
+pub(super) fn run(args: &EvidenceArgs) -> anyhow::Result<ExitCode> {
+    let config = settings(args.config.as_deref(), args.iterations)?;
+    let dataset = open(&args.path, args.manifest.as_deref())?;
+    let frames = chosen(args.frames, &args.path, &dataset)?;
+    let params = args.params.as_deref().map(|path| params(path, &dataset, &frames)).transpose()?;
+    let options = BatchOptions {
+        config,
+        precision: args.precision.into(),
+        warm_start: false,
+        params_folder: None,
+        ply: false,
+        curves_folder: None,
+    };
+    let bar = progress_bar(frames.len());
+    let judge = |index| {
+        let judged = frame_evidence(&dataset, index, &options, params.as_ref());
+        bar.inc(1);
+        judged
+    };
+    let judged: Vec<FrameEvidence> = frames.into_par_iter().map(judge).collect();
+    bar.finish_and_clear();
+    if let Some(path) = &args.csv {
+        let table = table(&judged).context("making the table")?;
+        let written = replace_file(path, |out| out.write_all(&table));
+        written.with_context(|| format!("{}: cannot be written", path.display()))?;
+    }
+    if args.json {
+        let rows: Vec<Value> = judged.iter().map(json_row).collect();
+        print(&(serde_json::to_string_pretty(&rows).context("writing JSON")? + "\n"))?;
+    } else {
+        print(&cards(&judged, &dataset.info().views))?;
+    }
+    Ok(end(&judged))
+}
+
+/// The parameters of the one frame that is asked for.
+fn params(path: &Path, dataset: &Dataset, frames: &Range<usize>) -> anyhow::Result<Pppr> {
+    if frames.len() != 1 {
+        let count = frames.len();
+        anyhow::bail!("{}: --params is of one frame, {count} were asked for; expected --frames N", path.display());
+    }
+    let params = read_pppr(path, None)?;
+    let info = dataset.info();
+    let frame = dataset.load(frames.start)?;
+    let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
+    let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps)
+        .with_context(|| dataset.frame_path(frames.start).display().to_string())?;
+    problem.check(&params).with_context(|| path.display().to_string())?;
+    Ok(params)
+}
+
+/// The exit code, and on standard error what failed.
+fn end(judged: &[FrameEvidence]) -> ExitCode {
+    let mut errors = judged.iter().filter_map(|frame| frame.evidence.as_ref().err());
+    let Some(first) = errors.next() else { return ExitCode::SUCCESS };
+    let (failed, count) = (1 + errors.count(), judged.len());
+    match count {
+        1 => eprintln!("error: {first}"),
+        _ if failed == count => eprintln!("error: none of {count} frames could be judged; the first: {first}"),
+        _ => eprintln!("warning: {failed} of {count} frames could not be judged; the first: {first}"),
+    }
+    ExitCode::from(if failed == count { EXIT_BAD_INPUT } else { EXIT_SOME_FAILED })
+}
+
+fn json_row(frame: &FrameEvidence) -> Value {
+    let mut row = Map::new();
+    row.insert("frame".into(), frame.frame.clone().into());
+    row.insert("index".into(), frame.index.into());
+    match &frame.evidence {
+        Ok(modes) => row.extend(modes.iter().map(|mode| {
+            let card = json!({ "score": mode.score, "summary": mode.summary, "findings": mode.findings });
+            (mode.mode.code().to_owned(), card)
+        })),
+        Err(why) => {
+            row.insert("error".into(), why.clone().into());
+        }
+    }
+    Value::Object(row)
+}
+
+/// `frame index F1 F2 F3 F4 F1_summary … F4_summary error`.
+fn table(judged: &[FrameEvidence]) -> Result<Vec<u8>, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let codes = Tag::MODES.map(|mode| mode.code().to_owned());
+    let summaries = codes.clone().map(|code| code + "_summary");
+    let head = ["frame".to_owned(), "index".to_owned()].into_iter().chain(codes).chain(summaries);
+    writer.write_record(head.chain(["error".to_owned()]))?;
+    for frame in judged {
+        let modes: &[Evidence] = frame.evidence.as_ref().map_or(&[], Vec::as_slice);
+        let find = |tag: Tag| modes.iter().find(|mode| mode.mode == tag);
+        let score = |tag| find(tag).and_then(|mode| mode.score).map(|score| score.to_string()).unwrap_or_default();
+        let summary = |tag| find(tag).map(|mode| mode.summary.clone()).unwrap_or_default();
+        let first = [frame.frame.clone(), frame.index.to_string()];
+        let cells = first.into_iter().chain(Tag::MODES.map(score)).chain(Tag::MODES.map(summary));
+        writer.write_record(cells.chain([frame.evidence.as_ref().err().cloned().unwrap_or_default()]))?;
+    }
+    writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+}
+
+/// Four cards a frame.
+fn cards(judged: &[FrameEvidence], views: &[View]) -> String {
+    let mut text = String::new();
+    for frame in judged {
+        if !text.is_empty() {
+            text.push('\n');
+        }
+        let _ = writeln!(text, "frame {}  {}", frame.index, frame.frame);
+        match &frame.evidence {
+            Err(why) => {
+                let _ = writeln!(text, "  cannot be judged: {why}");
+            }
+            Ok(modes) => modes.iter().for_each(|mode| card(&mut text, mode, views)),
+        }
+    }
+    text
+}
+
+fn card(text: &mut String, mode: &Evidence, views: &[View]) {
+    let score = mode.score.map_or_else(|| "-".to_owned(), |score| format!("{score:.2}"));
+    let title = format!("{} {}", mode.mode, mode.mode.words());
+    let _ = writeln!(text, "  {title:<36} {score:>4}  {}", mode.summary);
+    for finding in &mode.findings {
+        let _ = writeln!(text, "    · {}{}", finding.text, place(finding, views));
+    }
+}
+
+/// Where a finding is seen, in words.
+fn place(finding: &Finding, views: &[View]) -> String {
+    match &finding.place {
+        None => String::new(),
+        Some(Place::Joint(joint)) => format!(" [joint {joint}]"),
+        Some(Place::Frame(index)) => format!(" [frame {index}]"),
+        Some(Place::Cells { view, lo, hi }) => {
+            let array = views.get(*view).map_or("", |view| view.array.as_str());
+            let spans: Vec<String> = lo.iter().zip(hi).map(|(lo, hi)| format!("{lo}..={hi}")).collect();
+            format!(" [{array}[{}]]", spans.join(", "))
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! Evidence for a frame of a data set: fits it or takes given parameters, reads the frames before, judges.
+
+use super::{BatchOptions, fit_frame};
+use crate::body::Pppr;
+use crate::dataset::{Dataset, Frame};
+use crate::diagnose::{Annotated, EarlierFrame, Evidence, EvidenceInput, STATIC_FRAMES, evidence};
+use crate::mhp::{Objective, Problem, masks, simulate};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// The evidence of one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameEvidence {
+    /// Index in the data set.
+    pub index: usize,
+    /// The frame's name.
+    pub frame: String,
+    /// F1 to F4, or why the frame cannot be judged: one line that names the file.
+    pub evidence: Result<Vec<Evidence>, String>,
+}
+
+/// The frames right before frame `index` that are of its sequence, at most T − 1.
+pub fn frames_before(dataset: &Dataset, index: usize) -> Range<usize> {
+    let of_sequence = |&before: &usize| dataset.sequence(before) == dataset.sequence(index);
+    let count = (0..index).rev().take(STATIC_FRAMES - 1).take_while(of_sequence).count();
+    index - count..index
+}
+
+/// Judges frame `index` at `params`, or at the end of a fit from its own peaks. The EM region lies around the start of the
+/// fit, or around the given parameters.
+pub fn frame_evidence(dataset: &Dataset, index: usize, options: &BatchOptions, params: Option<&Pppr>) -> FrameEvidence {
+    let evidence = judge(dataset, index, options, params);
+    FrameEvidence { index, frame: dataset.frame_name(index), evidence }
+}
+
+fn judge(
+    dataset: &Dataset,
+    index: usize,
+    options: &BatchOptions,
+    params: Option<&Pppr>,
+) -> Result<Vec<Evidence>, String> {
+    let in_file = |error: &dyn std::fmt::Display| format!("{}: {error}", dataset.frame_path(index).display());
+    let info = dataset.info();
+    let frame = dataset.load(index).map_err(|error| error.to_string())?;
+    let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps_of(&frame));
+    let problem = Arc::new(problem.map_err(|error| in_file(&error))?);
+    let (initial, params) = match params {
+        Some(params) => (params.clone(), params.clone()),
+        None => fit_frame(dataset, index, options, None).map(|fit| (fit.initial, fit.params))?,
+    };
+    let objective = Objective::new(Arc::clone(&problem), options.config, options.precision, &initial);
+    let objective = objective.map_err(|error| in_file(&error))?;
+    let simulated = simulate(&problem, &options.config, options.precision, &params);
+    let masks: Vec<_> = simulated.iter().enumerate().map(|(view, map)| masks(&objective, view, map)).collect();
+    let frames = earlier(dataset, index);
+    let before: Vec<EarlierFrame<'_>> =
+        frames.iter().map(|frame| EarlierFrame { index: frame.index, maps: maps_of(frame) }).collect();
+    let annotated = Annotated {
+        persons: frame.person_count,
+        map_boxes: &frame.map_boxes,
+        image_boxes: frame.image.as_ref().map(|image| image.boxes.len()),
+    };
+    let config = &options.config;
+    Ok(evidence(&EvidenceInput {
+        problem: &problem,
+        config,
+        params: &params,
+        masks: &masks,
+        before: &before,
+        annotated,
+    }))
+}
+
+fn maps_of(frame: &Frame) -> Vec<&[f64]> {
+    frame.maps.iter().map(|map| map.data.as_slice()).collect()
+}
+
+/// The frames before `index`, oldest first; from one that cannot be read only those after it.
+fn earlier(dataset: &Dataset, index: usize) -> Vec<Frame> {
+    let newest_first = frames_before(dataset, index).rev();
+    let loaded = newest_first.map(|before| dataset.load(before).inspect_err(|error| tracing::warn!("{error}")).ok());
+    let mut frames: Vec<Frame> = loaded.map_while(|frame| frame).collect();
+    frames.reverse();
+    frames
+}

@@ -1,0 +1,63 @@
+//! Curves as CSV (RFC 4180 by the csv crate, numbers that read back exactly): one row an iteration.
+
+use crate::dataset::npz::replace_file;
+use crate::mhp::StepReport;
+use crate::study::StudyError;
+use std::path::Path;
+
+/// One iteration of one branch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CurveRow<'a> {
+    /// The branch; 0 for a fit that never went back.
+    pub branch: u32,
+    /// Loss, terms, IoU, convergence.
+    pub report: &'a StepReport,
+    /// Mean joint error against truth, mm, where there is truth.
+    pub majpe_mm: Option<f64>,
+    /// What was changed by hand from here on, in words.
+    pub flag: Option<&'a str>,
+}
+
+/// `iteration branch loss em bone rigid joint sep coll iou_<array>… majpe_mm converged flag`.
+pub fn curve_columns(arrays: &[String]) -> Vec<String> {
+    let first = ["iteration", "branch", "loss", "em", "bone", "rigid", "joint", "sep", "coll"];
+    let ious = arrays.iter().map(|array| format!("iou_{array}"));
+    let last = ["majpe_mm", "converged", "flag"].map(str::to_owned);
+    first.map(str::to_owned).into_iter().chain(ious).chain(last).collect()
+}
+
+/// The table as text, with [`curve_columns`] as its head; an IoU for each of `arrays`. What is unknown or not finite is empty.
+///
+/// # Errors
+/// None of practice: writing to memory.
+pub fn curves_csv<'a>(arrays: &[String], rows: impl IntoIterator<Item = CurveRow<'a>>) -> std::io::Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(curve_columns(arrays))?;
+    for row in rows {
+        writer.write_record(cells(arrays.len(), &row))?;
+    }
+    writer.into_inner().map_err(|error| std::io::Error::other(error.to_string()))
+}
+
+fn cells(views: usize, row: &CurveRow<'_>) -> Vec<String> {
+    let (report, t) = (row.report, &row.report.terms);
+    let losses = [report.loss, t.em, t.bone, t.rigid, t.joint, t.sep, t.coll].map(Some);
+    let ious = (0..views).map(|view| report.iou.get(view).copied().flatten());
+    let number = |x: Option<f64>| x.filter(|x| x.is_finite()).map(|x| x.to_string()).unwrap_or_default();
+    let first = [report.iteration.to_string(), row.branch.to_string()];
+    let last = [number(row.majpe_mm), report.converged.to_string(), row.flag.unwrap_or_default().to_owned()];
+    first.into_iter().chain(losses.into_iter().chain(ious).map(number)).chain(last).collect()
+}
+
+/// Writes [`curves_csv`], atomically.
+///
+/// # Errors
+/// Where the file cannot be written; an existing one is then untouched.
+pub fn write_curves<'a>(
+    path: &Path,
+    arrays: &[String],
+    rows: impl IntoIterator<Item = CurveRow<'a>>,
+) -> Result<(), StudyError> {
+    let written = curves_csv(arrays, rows).and_then(|table| replace_file(path, |out| out.write_all(&table)));
+    written.map_err(|reason| StudyError::Write { reason, path: path.to_owned() })
+}
