@@ -5,6 +5,14 @@
 //! [`Record`]s to the annotator's journal; the newest record of a frame is its label. Nothing here knows a window, a
 //! data set or a fit: frames are names, fits are hashes.
 
+mod agreement;
+mod kappa;
 mod record;
+mod statistics;
+mod table;
 
+pub use agreement::{Agreement, Dispute, MachineAgreement, against_machine, agreement, current, judgements};
+pub use kappa::{RELIABLE_FRAMES, TagAgreement};
 pub use record::{CellRegion, Change, FrameId, Judged, Label, Record, Tag, Tags, Verdict};
+pub use statistics::{AnnotatorStatistics, LabelCounts, PAUSE_S, Pace, statistics};
+pub use table::{COLUMNS, Row, Table, TableError, read_table, write_csv, write_json};

@@ -230,6 +230,27 @@ impl fmt::Display for CellRegion {
     }
 }
 
+impl FromStr for CellRegion {
+    type Err = String;
+
+    /// As it is written: `hm_hori[10..=20, 30..=42]`, first and last bin of each axis.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong =
+            || format!("`{text}` is no region; expected a view and the bins of its axes: hm_hori[10..=20, 30..=42]");
+        let (view, axes) =
+            text.trim_end().strip_suffix(']').and_then(|text| text.rsplit_once('[')).ok_or_else(wrong)?;
+        let mut region = Self { view: view.to_owned(), lo: Vec::new(), hi: Vec::new() };
+        for axis in axes.split(',').filter(|_| !axes.trim().is_empty()) {
+            let (lo, hi) = axis.split_once("..=").ok_or_else(wrong)?;
+            let bins = lo.trim().parse().and_then(|lo: usize| Ok((lo, hi.trim().parse::<usize>()?)));
+            let (lo, hi) = bins.ok().filter(|(lo, hi)| lo <= hi).ok_or_else(wrong)?;
+            region.lo.push(lo);
+            region.hi.push(hi);
+        }
+        Ok(region)
+    }
+}
+
 /// All that one annotator says of one frame.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default)]
@@ -392,6 +413,21 @@ mod tests {
         assert_eq!(clean.tags.to_string(), "clean");
         assert_eq!(Change::adding(Tag::F4).applied(&clean).tags.to_string(), "F4");
         assert_eq!(Change::adding(Tag::Unsure).applied(&label).tags.to_string(), "F1 F2 unsure");
+    }
+
+    #[test]
+    fn regions_read_back_what_they_write() {
+        let region =
+            |view: &str, lo: &[usize], hi: &[usize]| CellRegion { view: view.into(), lo: lo.into(), hi: hi.into() };
+        for region in [region("hm_hori", &[10, 30], &[20, 42]), region("a[0], b", &[0], &[0]), region("", &[], &[])] {
+            assert_eq!(region.to_string().parse(), Ok(region));
+        }
+        assert_eq!("v[1..=2,3..=4] ".parse(), Ok(region("v", &[1, 3], &[2, 4])));
+        for wrong in
+            ["", "v", "v[1..2]", "v[2..=1]", "v[1..=2", "v[1..=2,]", "v[-1..=2]", "v[1..=99999999999999999999]"]
+        {
+            assert!(wrong.parse::<CellRegion>().is_err_and(|why| why.contains("hm_hori[10..=20, 30..=42]")), "{wrong}");
+        }
     }
 
     #[test]

@@ -1,0 +1,126 @@
+//! How far two annotators agree, tag by tag, on the frames that both judged; and one annotator with the machine.
+//!
+//! A frame is judged where its label has a tag or a verdict. A remark alone (note, person, region) is no judgement, nor
+//! is a label that was taken back. A frame that was stated with nothing at all, such as a table's row of zeros, is judged
+//! to have none of the tags. Only frames judged by both count: each is one decision for every tag.
+
+use super::{Record, Tag, TagAgreement, Tags};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// One frame and tag that two annotators see differently.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct Dispute {
+    /// The frame's name.
+    pub frame: String,
+    /// The tag.
+    pub tag: Tag,
+    /// True where the first gave it.
+    pub a: bool,
+    /// True where the second did.
+    pub b: bool,
+}
+
+/// The agreement of two annotators.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Agreement {
+    /// Frames judged by both.
+    pub frames: usize,
+    /// Frames judged by the first alone; they count nowhere else.
+    pub only_in_a: usize,
+    /// Frames judged by the second alone.
+    pub only_in_b: usize,
+    /// Each tag, in the order of [`Tag::ALL`].
+    pub tags: Vec<(Tag, TagAgreement)>,
+    /// All decisions of all those tags in one 2×2 table.
+    pub pooled: TagAgreement,
+    /// Every decision that differs, by frame, then tag.
+    pub disputes: Vec<Dispute>,
+}
+
+/// The agreement of one annotator with the program's own scores.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MachineAgreement {
+    /// A is the person, B the machine; the tags are [`Tag::MODES`]. A frame counts for a mode where its score is known.
+    pub agreement: Agreement,
+    /// Frames that count and were judged with the scores on screen: those judgements are not blind.
+    pub shown: usize,
+    /// Frames that were judged without any score.
+    pub unscored: usize,
+}
+
+/// Compares two annotators: frame names and tags of the frames that each judged. Where a frame comes twice, the last
+/// counts.
+pub fn agreement<'a>(
+    a: impl IntoIterator<Item = (&'a str, Tags)>,
+    b: impl IntoIterator<Item = (&'a str, Tags)>,
+) -> Agreement {
+    let (a, b): (BTreeMap<&str, Tags>, BTreeMap<&str, Tags>) = (a.into_iter().collect(), b.into_iter().collect());
+    let common: Vec<(&str, Tags, Tags)> =
+        a.iter().filter_map(|(&frame, &tags)| Some((frame, tags, *b.get(frame)?))).collect();
+    let decide = |tag| common.iter().map(move |&(frame, a, b)| (frame, a.contains(tag), b.contains(tag)));
+    let (tags, pooled, disputes) = tables(&Tag::ALL, decide);
+    let frames = common.len();
+    Agreement { frames, only_in_a: a.len() - frames, only_in_b: b.len() - frames, tags, pooled, disputes }
+}
+
+/// Compares the failure modes that a person saw with the scores recorded at that moment; the machine says yes from
+/// `threshold` on. `records` are one annotator's, in the order of the acts.
+pub fn against_machine<'a>(records: impl IntoIterator<Item = &'a Record>, threshold: f64) -> MachineAgreement {
+    let judged: Vec<&Record> = judged(records).collect();
+    let score = |record: &Record, tag| record.judged.machine.get(&tag).copied().filter(|score| score.is_finite());
+    let scored = |record: &&Record| Tag::MODES.into_iter().any(|tag| score(record, tag).is_some());
+    let counted: Vec<&Record> = judged.iter().copied().filter(scored).collect();
+    let decide = |tag| {
+        let both = move |record: &&'a Record| {
+            let machine = score(record, tag)? >= threshold;
+            Some((record.frame.path.as_str(), record.label.tags.contains(tag), machine))
+        };
+        counted.iter().filter_map(both)
+    };
+    let (tags, pooled, disputes) = tables(&Tag::MODES, decide);
+    let unscored = judged.len() - counted.len();
+    let shown = counted.iter().filter(|record| record.judged.machine_shown).count();
+    let agreement = Agreement { frames: counted.len(), only_in_a: unscored, only_in_b: 0, tags, pooled, disputes };
+    MachineAgreement { agreement, shown, unscored }
+}
+
+type Tables = (Vec<(Tag, TagAgreement)>, TagAgreement, Vec<Dispute>);
+
+/// One table a tag, their sum, and what differs; `decide` gives frame and both answers.
+fn tables<'a, I: Iterator<Item = (&'a str, bool, bool)>>(tags: &[Tag], decide: impl Fn(Tag) -> I) -> Tables {
+    let each: Vec<(Tag, TagAgreement)> =
+        tags.iter().map(|&tag| (tag, TagAgreement::of(decide(tag).map(|(_, a, b)| (a, b))))).collect();
+    let sum = each.iter().fold([0; 4], |[both, only_a, only_b, neither], (_, tag)| {
+        [both + tag.both, only_a + tag.only_a, only_b + tag.only_b, neither + tag.neither]
+    });
+    let mut disputes: Vec<Dispute> = Vec::new();
+    for &tag in tags {
+        let differing = decide(tag).filter(|(_, a, b)| a != b);
+        disputes.extend(differing.map(|(frame, a, b)| Dispute { frame: frame.to_owned(), tag, a, b }));
+    }
+    disputes.sort();
+    (each, TagAgreement::of_counts(sum), disputes)
+}
+
+/// The frames that one annotator judged, with their tags. `records` are that annotator's, in the order of the acts.
+pub fn judgements<'a>(records: impl IntoIterator<Item = &'a Record>) -> BTreeMap<&'a str, Tags> {
+    judged(records).map(|record| (record.frame.path.as_str(), record.label.tags)).collect()
+}
+
+/// The newest record of each frame that was judged.
+fn judged<'a>(records: impl IntoIterator<Item = &'a Record>) -> impl Iterator<Item = &'a Record> {
+    current(records)
+        .filter(|Record { label, .. }| !label.tags.is_empty() || label.verdict.is_some() || label.is_empty())
+}
+
+/// The newest record of each frame, in the order of their names, without the labels that were taken back: those that
+/// said something before and say nothing now. `records` are one annotator's, in the order of the acts.
+pub fn current<'a>(records: impl IntoIterator<Item = &'a Record>) -> impl Iterator<Item = &'a Record> {
+    let mut frames: BTreeMap<&str, (bool, &Record)> = BTreeMap::new();
+    for record in records {
+        let spoke = frames.get(record.frame.path.as_str()).is_some_and(|(spoke, _)| *spoke);
+        frames.insert(&record.frame.path, (spoke || !record.label.is_empty(), record));
+    }
+    frames.into_values().filter(|(spoke, record)| !spoke || !record.label.is_empty()).map(|(_, record)| record)
+}
