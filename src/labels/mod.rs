@@ -6,12 +6,14 @@
 //! data set or a fit: frames are names, fits are hashes.
 
 mod agreement;
+mod import;
 mod kappa;
 mod record;
 mod statistics;
 mod table;
 
 pub use agreement::{Agreement, Dispute, MachineAgreement, against_machine, agreement, current, judgements};
+pub use import::{ImportPlan, plan_import};
 pub use kappa::{RELIABLE_FRAMES, TagAgreement};
 pub use record::{CellRegion, Change, FrameId, Judged, Label, Record, Tag, Tags, Verdict};
 pub use statistics::{AnnotatorStatistics, LabelCounts, PAUSE_S, Pace, statistics};

@@ -174,9 +174,12 @@ fn each_once(rows: &[Row], path: &Path) -> Result<(), TableError> {
 
 /// Text from a file for a message: a line that one can read, however long and wild it is.
 fn shortened(text: &str) -> String {
-    const MOST: usize = 60;
-    let more = if text.chars().nth(MOST).is_some() { "…" } else { "" };
-    format!("{}{more}", text.chars().take(MOST).collect::<String>().escape_debug())
+    at_most(60, text)
+}
+
+fn at_most(most: usize, text: &str) -> String {
+    let more = if text.chars().nth(most).is_some() { "…" } else { "" };
+    format!("{}{more}", text.chars().take(most).collect::<String>().escape_debug())
 }
 
 /// By index, then name, then annotator.

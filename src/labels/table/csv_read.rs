@@ -16,10 +16,10 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Table, TableError> {
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
     let header = reader.byte_headers().map_err(|error| row_error(&error, path))?.clone();
     let (columns, unknown) = columns(&header, path)?;
-    let mut rows = Vec::new();
+    let (mut rows, mut lines) = (Vec::new(), Lines { bytes, at: 0, line: 1 });
     for cells in reader.into_byte_records() {
         let cells = cells.map_err(|error| row_error(&error, path))?;
-        let line = cells.position().map_or(0, csv::Position::line);
+        let line = lines.of_row(cells.position().map_or(0, csv::Position::byte));
         if cells.len() != header.len() {
             let message = format!("{} cells; the header has {}", cells.len(), header.len());
             return Err(TableError::Row { line, message, path: path.to_owned() });
@@ -33,6 +33,30 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Table, TableError> {
 fn row_error(error: &csv::Error, path: &Path) -> TableError {
     let line = error.position().map_or(1, csv::Position::line);
     TableError::Row { line, message: error.to_string(), path: path.to_owned() }
+}
+
+/// Counts the lines up to a row. The reader's own count lags by one where lines end in CR LF, and is at the first of the
+/// blank lines before a row.
+struct Lines<'b> {
+    bytes: &'b [u8],
+    at: usize,
+    line: u64,
+}
+
+impl Lines<'_> {
+    /// The line of the row that begins at `byte` or at the first sign after it that ends no line. Rows come in order.
+    fn of_row(&mut self, byte: u64) -> u64 {
+        while let Some(sign) = self.bytes.get(self.at) {
+            let ends_line = matches!(sign, b'\r' | b'\n');
+            if self.at as u64 >= byte && !ends_line {
+                break;
+            }
+            let whole = *sign == b'\n' || (*sign == b'\r' && self.bytes.get(self.at + 1) != Some(&b'\n'));
+            self.line += u64::from(whole);
+            self.at += 1;
+        }
+        self.line
+    }
 }
 
 /// Where each known column is.

@@ -1,13 +1,17 @@
 //! Records as a JSON array.
 
-use super::{Row, Table, TableError};
+use super::{Row, Table, TableError, at_most};
 use crate::labels::Record;
 use std::io::Write;
 use std::path::Path;
 
 /// Reads an array of records.
 pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Table, TableError> {
-    let failed = |error: serde_json::Error| TableError::Json { message: error.to_string(), path: path.to_owned() };
+    let failed = |error: serde_json::Error| {
+        // The place stands at the end, and what stands before may be as long as the file.
+        let (line, column, message) = (error.line(), error.column(), at_most(100, &error.to_string()));
+        TableError::Json { message: format!("line {line}, sign {column}: {message}"), path: path.to_owned() }
+    };
     let records: Vec<Record> = serde_json::from_slice(bytes).map_err(failed)?;
     let rows: Vec<Row> = (1..).zip(records).map(|(line, record)| Row { line, record }).collect();
     match rows.iter().find(|row| row.record.frame.path.is_empty()) {

@@ -1,0 +1,41 @@
+//! Which rows of a table an import writes: it adds what is new, and never takes away what somebody said later.
+
+use super::{Record, Row};
+use time::OffsetDateTime;
+use time::format_description::well_known::Rfc3339;
+
+/// What an import would do.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ImportPlan<'r> {
+    /// Rows to write: of frames without a label, newer than the label, or all that differ.
+    pub write: Vec<&'r Row>,
+    /// Rows that say what the label says already.
+    pub same: usize,
+    /// Rows that differ and are not newer than the label: the label is kept.
+    pub kept: usize,
+}
+
+/// Compares `rows` with the newest record that `current` finds for a row's annotator and frame. `replace` writes also
+/// rows that are not newer. A row without a time is not newer than anything.
+pub fn plan_import<'r, 'c>(
+    rows: &'r [Row],
+    replace: bool,
+    current: impl Fn(&Record) -> Option<&'c Record>,
+) -> ImportPlan<'r> {
+    let mut plan = ImportPlan::default();
+    for row in rows {
+        match current(&row.record) {
+            Some(known) if known.label == row.record.label => plan.same += 1,
+            Some(known) if !known.label.is_empty() && !replace && !newer(&row.record, known) => plan.kept += 1,
+            Some(_) => plan.write.push(row),
+            None if row.record.label.is_empty() => plan.same += 1,
+            None => plan.write.push(row),
+        }
+    }
+    plan
+}
+
+fn newer(row: &Record, known: &Record) -> bool {
+    let time = |record: &Record| OffsetDateTime::parse(&record.time, &Rfc3339).ok();
+    time(row).zip(time(known)).is_some_and(|(row, known)| row > known)
+}
