@@ -1,8 +1,8 @@
 //! How far two annotators agree, tag by tag, on the frames that both judged; and one annotator with the machine.
 //!
 //! A frame is judged where its label has a tag or a verdict. A remark alone (note, person, region) is no judgement, nor
-//! is a label that was taken back. A frame that was stated with nothing at all, such as a table's row of zeros, is judged
-//! to have none of the tags. Only frames judged by both count: each is one decision for every tag.
+//! is a label that was taken back. A frame of which the first and only word is nothing at all, such as a table's row of
+//! zeros, is judged to have none of the tags. Only frames judged by both count: each is one decision for every tag.
 
 use super::{Record, Tag, TagAgreement, Tags};
 use serde::Serialize;
@@ -49,13 +49,9 @@ pub struct MachineAgreement {
     pub unscored: usize,
 }
 
-/// Compares two annotators: frame names and tags of the frames that each judged. Where a frame comes twice, the last
-/// counts.
-pub fn agreement<'a>(
-    a: impl IntoIterator<Item = (&'a str, Tags)>,
-    b: impl IntoIterator<Item = (&'a str, Tags)>,
-) -> Agreement {
-    let (a, b): (BTreeMap<&str, Tags>, BTreeMap<&str, Tags>) = (a.into_iter().collect(), b.into_iter().collect());
+/// Compares two annotators by the records of the frames that each [`judged`]. Where a frame comes twice, the last counts.
+pub fn agreement<'a>(a: impl IntoIterator<Item = &'a Record>, b: impl IntoIterator<Item = &'a Record>) -> Agreement {
+    let (a, b) = (tags_by_frame(a), tags_by_frame(b));
     let common: Vec<(&str, Tags, Tags)> =
         a.iter().filter_map(|(&frame, &tags)| Some((frame, tags, *b.get(frame)?))).collect();
     let decide = |tag| common.iter().map(move |&(frame, a, b)| (frame, a.contains(tag), b.contains(tag)));
@@ -65,9 +61,9 @@ pub fn agreement<'a>(
 }
 
 /// Compares the failure modes that a person saw with the scores recorded at that moment; the machine says yes from
-/// `threshold` on. `records` are one annotator's, in the order of the acts.
-pub fn against_machine<'a>(records: impl IntoIterator<Item = &'a Record>, threshold: f64) -> MachineAgreement {
-    let judged: Vec<&Record> = judged(records).collect();
+/// `threshold` on. `judged` are the records of the frames that one annotator [`judged()`].
+pub fn against_machine<'a>(judged: impl IntoIterator<Item = &'a Record>, threshold: f64) -> MachineAgreement {
+    let judged: Vec<&Record> = judged.into_iter().collect();
     let score = |record: &Record, tag| record.judged.machine.get(&tag).copied().filter(|score| score.is_finite());
     let scored = |record: &&Record| Tag::MODES.into_iter().any(|tag| score(record, tag).is_some());
     let counted: Vec<&Record> = judged.iter().copied().filter(scored).collect();
@@ -103,22 +99,26 @@ fn tables<'a, I: Iterator<Item = (&'a str, bool, bool)>>(tags: &[Tag], decide: i
     (each, TagAgreement::of_counts(sum), disputes)
 }
 
-/// The frames that one annotator judged, with their tags. `records` are that annotator's, in the order of the acts.
-pub fn judgements<'a>(records: impl IntoIterator<Item = &'a Record>) -> BTreeMap<&'a str, Tags> {
-    judged(records).map(|record| (record.frame.path.as_str(), record.label.tags)).collect()
+fn tags_by_frame<'a>(records: impl IntoIterator<Item = &'a Record>) -> BTreeMap<&'a str, Tags> {
+    records.into_iter().map(|record| (record.frame.path.as_str(), record.label.tags)).collect()
 }
 
-/// The newest record of each frame that was judged.
-fn judged<'a>(records: impl IntoIterator<Item = &'a Record>) -> impl Iterator<Item = &'a Record> {
-    current(records)
-        .filter(|Record { label, .. }| !label.tags.is_empty() || label.verdict.is_some() || label.is_empty())
+/// Those of one annotator's newest records, one a frame, that are judgements. An empty label is one taken back.
+pub fn judged<'a>(newest: impl IntoIterator<Item = &'a Record>) -> impl Iterator<Item = &'a Record> {
+    newest.into_iter().filter(|Record { label, .. }| !label.tags.is_empty() || label.verdict.is_some())
 }
 
-/// The newest record of each frame, in the order of their names, without the labels that were taken back: those that
-/// said something before and say nothing now. `records` are one annotator's, in the order of the acts.
-pub fn current<'a>(records: impl IntoIterator<Item = &'a Record>) -> impl Iterator<Item = &'a Record> {
+/// The records of the frames that one annotator judged, by name; `acts` is all they said, in order. Here an empty label
+/// is a judgement where nothing else was ever said of the frame.
+pub fn judged_in_acts<'a>(acts: impl IntoIterator<Item = &'a Record>) -> impl Iterator<Item = &'a Record> {
+    standing(acts).filter(|record| record.label.is_empty() || judged([*record]).next().is_some())
+}
+
+/// The newest record of each frame, by name, without those that were taken back: that said something before and say
+/// nothing now. `acts` is all that one annotator said, in order.
+pub fn standing<'a>(acts: impl IntoIterator<Item = &'a Record>) -> impl Iterator<Item = &'a Record> {
     let mut frames: BTreeMap<&str, (bool, &Record)> = BTreeMap::new();
-    for record in records {
+    for record in acts {
         let spoke = frames.get(record.frame.path.as_str()).is_some_and(|(spoke, _)| *spoke);
         frames.insert(&record.frame.path, (spoke || !record.label.is_empty(), record));
     }
