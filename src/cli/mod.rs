@@ -4,6 +4,7 @@ mod common;
 mod fit;
 mod frames;
 mod info;
+mod labels;
 pub mod sample;
 mod score;
 #[cfg(feature = "viewer")]
@@ -56,6 +57,9 @@ pub enum Command {
     /// Tell what is in a data set: layout, frames, views and axes, ranges of values, skeleton, people, labels.
     #[command(after_help = info::HELP)]
     Info(info::Args),
+    /// Tag frames and list labels: what the window writes, for scripts.
+    #[command(subcommand, after_help = labels::HELP)]
+    Labels(labels::LabelsCommand),
     /// Evaluate the objective at given parameters: simulated maps, losses and gradients.
     ///
     /// Writes an npz with `sim_<array>`, `iou_<array>`, `loss`, its terms `em bone rigid joint sep coll`, and the gradients
@@ -79,6 +83,7 @@ pub fn run(command: Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Fit(args) => fit::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Labels(command) => labels::run(&command),
         Command::Score(args) => score::run(&args),
         #[cfg(feature = "viewer")]
         Command::Screenshot(args) => screenshot::run(&args),

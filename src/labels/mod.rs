@@ -2,19 +2,36 @@
 //!
 //! A [`Label`] is all that one annotator says of one frame. It is changed by a [`Change`], which names only what is
 //! added and removed, so that two windows on one data set merge instead of overwriting each other. Each act appends
-//! [`Record`]s to the annotator's journal; the newest record of a frame is its label. Nothing here knows a window, a
-//! data set or a fit: frames are names, fits are hashes.
+//! [`Record`]s to the annotator's [`Journal`]; the newest record of a frame is its label, and a [`LabelStore`] reads those
+//! of everybody. Nothing here knows a window, a data set or a fit: frames are names, fits are hashes.
+//!
+//! The files are a public format, JSON lines; `format.rs` describes all of it.
 
+mod acts;
 mod agreement;
+mod error;
+mod format;
 mod import;
+mod journal;
 mod kappa;
+mod place;
 mod record;
+mod stamp;
 mod statistics;
+mod store;
 mod table;
+mod tail;
 
-pub use agreement::{Agreement, Dispute, MachineAgreement, against_machine, agreement, current, judgements};
+pub use acts::{place_acts, read_acts, read_labels};
+pub use agreement::{
+    Agreement, Dispute, MachineAgreement, against_machine, agreement, judged, judged_in_acts, standing,
+};
+pub use error::LabelError;
 pub use import::{ImportPlan, plan_import};
+pub use journal::{Journal, Outcome, SaidElsewhere};
 pub use kappa::{RELIABLE_FRAMES, TagAgreement};
+pub use place::LabelPlace;
 pub use record::{CellRegion, Change, FrameId, Judged, Label, Record, Tag, Tags, Verdict};
 pub use statistics::{AnnotatorStatistics, LabelCounts, PAUSE_S, Pace, statistics};
+pub use store::{LabelStore, read_journal};
 pub use table::{COLUMNS, Row, Table, TableError, read_table, write_csv, write_json};

@@ -9,7 +9,7 @@ mod csv_read;
 mod csv_write;
 mod json;
 
-use super::{Record, Tag};
+use super::{LabelError, Record, Tag};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -96,6 +96,9 @@ pub enum TableError {
         /// The file.
         path: PathBuf,
     },
+    /// It is a journal that cannot be read.
+    #[error(transparent)]
+    Journal(#[from] LabelError),
     /// It is not an array of records.
     #[error("{path}: {message}; expected a JSON array of records, as `labels export --json` writes it", path = path.display())]
     Json {

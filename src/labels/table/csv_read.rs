@@ -134,7 +134,9 @@ impl Cells<'_> {
     }
 
     fn judged(&self) -> Result<Judged, TableError> {
-        let hash = |column| Ok(Some(self.text(column)?.to_owned()).filter(|hash| !hash.is_empty()));
+        let hash = |column| -> Result<_, TableError> {
+            Ok(Some(self.text(column)?.to_owned()).filter(|hash| !hash.is_empty()))
+        };
         let mut machine = BTreeMap::new();
         for mode in Tag::MODES {
             let column = machine_column(mode);

@@ -1,0 +1,40 @@
+//! `labels`: what people say of frames, without a window.
+
+mod request;
+mod show;
+mod tag;
+
+use std::process::ExitCode;
+
+/// Shown under the options of `labels --help`.
+pub(super) const HELP: &str = "\
+Labels lie beside the data, in mhp-labels/ of a folder or <file>.mhp-labels/ of a file, one journal an annotator; in the
+user's data folder where nothing can be written beside the data.
+
+Examples:
+  mhp-inspector labels tag data/mmvr --annotator anna --frame d1s1/000/00383 --add F2
+      Tags one frame; done when it is on disk.
+  mhp-inspector labels show data/mmvr
+      Everybody's labels as they are now.";
+
+/// What to do with labels.
+#[derive(Debug, clap::Subcommand)]
+pub enum LabelsCommand {
+    /// Tag frames, as the window does: one act, on disk when the program ends.
+    #[command(after_help = tag::HELP)]
+    Tag(tag::Args),
+    /// List the labels of a data set as they are now.
+    #[command(after_help = show::HELP)]
+    Show(show::Args),
+}
+
+/// Runs a subcommand of `labels`.
+///
+/// # Errors
+/// Whatever it could not do, naming file, key and what was expected.
+pub(super) fn run(command: &LabelsCommand) -> anyhow::Result<ExitCode> {
+    match command {
+        LabelsCommand::Tag(args) => tag::run(args),
+        LabelsCommand::Show(args) => show::run(args),
+    }
+}

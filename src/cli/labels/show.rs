@@ -1,0 +1,86 @@
+//! `labels show`: everybody's labels as they are now.
+
+use crate::cli::common::{open, print};
+use crate::labels::{LabelPlace, LabelStore, Record};
+use anyhow::{Context as _, bail};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Shown under the options of `labels show --help`.
+pub(super) const HELP: &str = "\
+Exit codes: 0 told; 2 bad input. Damaged lines of a journal are told on standard error and skipped.
+
+Examples:
+  mhp-inspector labels show data/mmvr --annotator anna
+      A line a frame: annotator, frame, tags, person, verdict, region, note.
+  mhp-inspector labels show data/mmvr --json
+      An array of records, as in the journal.";
+
+/// What `labels show` is told.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The data set.
+    path: PathBuf,
+    /// Only this annotator's.
+    #[arg(long, value_name = "NAME")]
+    annotator: Option<String>,
+    /// A JSON array of records instead of text.
+    #[arg(long)]
+    json: bool,
+    /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
+    #[arg(long, value_name = "FILE")]
+    manifest: Option<PathBuf>,
+}
+
+/// Reads the journals of a data set and prints the labels that say something.
+///
+/// # Errors
+/// Where the data set or the folder of labels cannot be read, or the annotator has no labels there.
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let dataset = open(&args.path, args.manifest.as_deref())?;
+    let place = LabelPlace::of(&dataset.info().root, dataset.fingerprint())?;
+    let store = LabelStore::read(&place)?;
+    store.warnings().iter().for_each(|warning| tracing::warn!("{warning}"));
+    let everybody: Vec<&str> = store.annotators().collect();
+    let wanted = args.annotator.as_deref().map(str::trim);
+    if let Some(name) = wanted.filter(|name| !everybody.contains(name)) {
+        bail!("{}: no labels by `{name}`; there are some by {}", place.folder.display(), listed(&everybody));
+    }
+    let names = everybody.iter().filter(|name| wanted.is_none_or(|wanted| **name == wanted));
+    let records = names.flat_map(|name| store.records(name)).filter(|record| !record.label.is_empty());
+    let records: Vec<&Record> = records.collect();
+    print(&if args.json {
+        serde_json::to_string_pretty(&records).context("writing JSON")? + "\n"
+    } else {
+        as_text(&records)
+    })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn listed(names: &[&str]) -> String {
+    if names.is_empty() { "nobody".into() } else { names.join(", ") }
+}
+
+/// A line a record; columns are as wide as their widest entry.
+fn as_text(records: &[&Record]) -> String {
+    let rows: Vec<[String; 4]> = records.iter().map(|record| row(record)).collect();
+    let width = |k: usize| rows.iter().filter_map(|row| row.get(k)).map(|cell| cell.chars().count()).max();
+    let (annotator, frame, tags) = (width(0).unwrap_or(0), width(1).unwrap_or(0), width(2).unwrap_or(0));
+    rows.iter().fold(String::new(), |mut text, [a, f, t, rest]| {
+        let line = format!("{a:<annotator$}  {f:<frame$}  {t:<tags$}  {rest}");
+        let _ = writeln!(text, "{}", line.trim_end());
+        text
+    })
+}
+
+fn row(record: &Record) -> [String; 4] {
+    let label = &record.label;
+    let mut rest = Vec::new();
+    rest.extend(label.person.map(|person| format!("person {person}")));
+    rest.extend(label.verdict.map(|verdict| verdict.to_string()));
+    rest.extend(label.region.as_ref().map(ToString::to_string));
+    // A note may have several lines; a record has one.
+    rest.extend((!label.note.is_empty()).then(|| format!("{:?}", label.note)));
+    [record.annotator.clone(), record.frame.path.clone(), label.tags.to_string(), rest.join("  ")]
+}

@@ -1,0 +1,341 @@
+//! The append-only file of one annotator, and the one way to change a label.
+//!
+//! An act is a read-modify-write under the file's lock: what other windows appended is read first, the change is applied
+//! to that, and the records are on disk before anybody is told. A process that is killed at any moment leaves at worst a
+//! line without its end, which the next one closes. The file is opened anew for each act, because one that was replaced
+//! meanwhile would swallow what is written to the old.
+
+use super::format::{PROGRAM, now_ms, time_ms, time_text, write_header, write_record};
+use super::place::file_name;
+use super::stamp::Stamp;
+use super::tail::{Found, Tail, is_named};
+use super::{Change, FrameId, Judged, Label, LabelError, LabelPlace, Record};
+use std::collections::HashMap;
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, Read as _, Seek as _, SeekFrom, Write as _};
+use std::path::Path;
+
+/// How often a file that changes its identity under our hands is tried.
+const TRIES: usize = 100;
+
+/// What an act did to one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// The frame.
+    pub frame: FrameId,
+    /// Its label before, with what other windows had done to it.
+    pub before: Label,
+    /// What was written; `Change::between(&after.label, &before)` undoes it.
+    pub after: Record,
+}
+
+/// A change of one frame that was made elsewhere and is brought here, with what was known of it there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SaidElsewhere {
+    /// The frame.
+    pub frame: FrameId,
+    /// What is said of it.
+    pub change: Change,
+    /// What was judged.
+    pub judged: Judged,
+    /// When it was said, RFC 3339; what is no time is now.
+    pub time: String,
+}
+
+/// One change of an act.
+#[derive(Debug, Clone, Copy)]
+struct Part<'a> {
+    frame: &'a FrameId,
+    change: &'a Change,
+    judged: &'a Judged,
+    /// When, where that is not now.
+    time_ms: Option<i64>,
+}
+
+/// The label of a frame and when it was given.
+#[derive(Debug)]
+struct Held {
+    label: Label,
+    stamp: Stamp,
+}
+
+/// The journal of one annotator in one place.
+#[derive(Debug)]
+pub struct Journal {
+    annotator: String,
+    dataset: String,
+    /// The file that is written, then those of the same name in the folders that are only read.
+    tails: Vec<Tail>,
+    held: HashMap<String, Held>,
+    unlocked: Option<String>,
+}
+
+impl Journal {
+    /// Reads what `annotator` has said so far. The file is made by the first act.
+    ///
+    /// # Errors
+    /// For an empty name; where the file cannot be read, is of a newer version or is no journal.
+    pub fn open(place: &LabelPlace, annotator: &str, dataset: &str) -> Result<Self, LabelError> {
+        let annotator = annotator.trim();
+        if annotator.is_empty() {
+            return Err(LabelError::NoAnnotator { path: place.folder.clone() });
+        }
+        let name = file_name(annotator);
+        let mut journal = Self {
+            annotator: annotator.to_owned(),
+            dataset: dataset.to_owned(),
+            tails: place.folders().map(|folder| Tail::new(folder.join(&name))).collect(),
+            held: HashMap::new(),
+            unlocked: None,
+        };
+        journal.catch_up(None)?;
+        Ok(journal)
+    }
+
+    /// Who.
+    pub fn annotator(&self) -> &str {
+        &self.annotator
+    }
+
+    /// The file that is written.
+    pub fn path(&self) -> &Path {
+        self.tails.first().map_or(Path::new(""), Tail::path)
+    }
+
+    /// The label of the frame of this name, as of the last act of this journal.
+    pub fn label(&self, frame: &str) -> Option<&Label> {
+        self.held.get(frame).map(|held| &held.label)
+    }
+
+    /// What is wrong with the files without being an error: damaged lines, a file system without locks.
+    pub fn warnings(&self) -> Vec<String> {
+        self.tails.iter().flat_map(Tail::warnings).chain(self.unlocked.clone()).collect()
+    }
+
+    /// Applies each change to the newest label of its frame, and returns when the records are on disk. Frames whose label
+    /// does not change get no record and no outcome.
+    ///
+    /// # Errors
+    /// Where the file cannot be read or written. Nothing of the act is then to be shown as done; what was written of it is
+    /// taken back as far as the disk allows.
+    pub fn commit(
+        &mut self,
+        act: &str,
+        changes: &[(FrameId, Change)],
+        judged: &Judged,
+    ) -> Result<Vec<Outcome>, LabelError> {
+        let parts = changes.iter().map(|(frame, change)| Part { frame, change, judged, time_ms: None });
+        self.commit_parts(act, &parts.collect::<Vec<_>>())
+    }
+
+    /// As [`Self::commit`], for changes that were made elsewhere: each record keeps when it was said and what was judged.
+    ///
+    /// # Errors
+    /// As [`Self::commit`].
+    pub fn bring(&mut self, act: &str, said: &[SaidElsewhere]) -> Result<Vec<Outcome>, LabelError> {
+        let parts = said.iter().map(|SaidElsewhere { frame, change, judged, time }| {
+            let time_ms = Some(time_ms(time)).filter(|&time| time > i64::MIN);
+            Part { frame, change, judged, time_ms }
+        });
+        self.commit_parts(act, &parts.collect::<Vec<_>>())
+    }
+
+    fn commit_parts(&mut self, act: &str, parts: &[Part<'_>]) -> Result<Vec<Outcome>, LabelError> {
+        if parts.is_empty() {
+            return Ok(Vec::new());
+        }
+        let file = self.lock()?;
+        self.catch_up(Some(&file))?;
+        let outcomes = self.outcomes(act, parts);
+        self.append(&file, &outcomes)?;
+        // Where the file is a device, nothing of it can be read back.
+        self.catch_up(Some(&file))?;
+        // Closing the file gives the lock back; so does the end of the process, whatever ends it.
+        Ok(outcomes)
+    }
+
+    /// Opens the file for appending and waits for its lock.
+    fn lock(&mut self) -> Result<File, LabelError> {
+        let path = self.path().to_owned();
+        let failed = |reason| LabelError::Write { reason, path: path.clone() };
+        for _ in 0..TRIES {
+            let file = open_append(&path).map_err(failed)?;
+            if let Err(reason) = wait_for_lock(&file) {
+                self.without_locks(&reason);
+            }
+            // Between opening and locking, another process may have put another file there.
+            if is_named(&file, &path).map_err(failed)? {
+                return Ok(file);
+            }
+        }
+        Err(failed(std::io::Error::other("another program replaces it again and again")))
+    }
+
+    fn without_locks(&mut self, reason: &std::io::Error) {
+        let path = self.path().display();
+        let warning = format!(
+            "{path}: no locks on this file system ({reason}): records are appended whole, but two windows that label \
+             the same frame at the same moment may overwrite each other"
+        );
+        if self.unlocked.is_none() {
+            tracing::warn!("{warning}");
+        }
+        self.unlocked = Some(warning);
+    }
+
+    /// Folds in what was appended since the last look; `home` is the file that is written, where it is open.
+    fn catch_up(&mut self, home: Option<&File>) -> Result<(), LabelError> {
+        for _ in 0..TRIES {
+            if !self.look(home)? {
+                return Ok(());
+            }
+            tracing::warn!("{}: another file lies there now; it is read anew", self.path().display());
+            self.held.clear();
+            self.tails.iter_mut().for_each(Tail::reset);
+        }
+        let reason = std::io::Error::other("another program replaces it again and again");
+        Err(LabelError::Read { reason, path: self.path().to_owned() })
+    }
+
+    /// True where a file was replaced.
+    fn look(&mut self, home: Option<&File>) -> Result<bool, LabelError> {
+        let Self { tails, held, annotator, .. } = self;
+        for (k, tail) in tails.iter_mut().enumerate() {
+            let sink = |_, record: Record| {
+                if record.annotator == *annotator {
+                    fold(held, k, record);
+                }
+            };
+            let found = match home {
+                Some(file) if k == 0 => tail.look_in(file, sink),
+                Some(_) | None if k == 0 => tail.look(sink),
+                // What lies where nothing is written, and cannot be read, must not keep anybody from labelling.
+                _ => tail.look(sink).or_else(|error| match error {
+                    LabelError::Newer { .. } => Err(error),
+                    _ => Ok(Found::Same),
+                }),
+            };
+            if found? == Found::Replaced {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    fn outcomes(&self, act: &str, parts: &[Part<'_>]) -> Vec<Outcome> {
+        let (now, later) = (now_ms(), self.later_than(parts));
+        let mut latest: HashMap<&str, Label> = HashMap::new();
+        let mut outcomes = Vec::with_capacity(parts.len());
+        for Part { frame, change, judged, time_ms } in parts {
+            let held = || self.label(&frame.path).cloned().unwrap_or_default();
+            let before = latest.get(frame.path.as_str()).cloned().unwrap_or_else(held);
+            let label = change.applied(&before);
+            if label == before {
+                continue;
+            }
+            latest.insert(&frame.path, label.clone());
+            let mut judged = Judged::clone(judged);
+            // JSON has no other numbers.
+            judged.machine.retain(|_, score| score.is_finite());
+            let after = Record {
+                dataset: self.dataset.clone(),
+                frame: FrameId::clone(frame),
+                label,
+                annotator: self.annotator.clone(),
+                time: time_text(time_ms.unwrap_or(now).max(later)),
+                act: act.to_owned(),
+                program: PROGRAM.to_owned(),
+                judged,
+            };
+            outcomes.push(Outcome { frame: FrameId::clone(frame), before, after });
+        }
+        outcomes
+    }
+
+    /// Just after the newest label from another folder that is changed, for between files the time decides.
+    fn later_than(&self, parts: &[Part<'_>]) -> i64 {
+        let stamps = parts.iter().filter_map(|part| self.held.get(&part.frame.path)).map(|held| held.stamp);
+        let foreign = stamps.filter(|stamp| stamp.file != 0).map(|stamp| stamp.time_ms.saturating_add(1)).max();
+        foreign.unwrap_or(i64::MIN)
+    }
+
+    fn append(&self, mut file: &File, outcomes: &[Outcome]) -> Result<(), LabelError> {
+        let failed = |reason| LabelError::Write { reason, path: self.path().to_owned() };
+        let len = file.metadata().map_err(failed)?.len();
+        let bytes = self.bytes(file, len, outcomes).map_err(failed)?;
+        // Also without a record of ours: a label that is there already counts only once it is on disk.
+        let written = file.write_all(&bytes).and_then(|()| file.sync_data());
+        if let Err(reason) = written {
+            if self.unlocked.is_none() {
+                // A full disk takes half an act. That half must not be found later: nobody was shown it.
+                let _ = file.set_len(len);
+            }
+            return Err(failed(reason));
+        }
+        if len == 0 {
+            sync_names(self.path());
+        }
+        Ok(())
+    }
+
+    /// What has to be appended to a file of `len` bytes.
+    fn bytes(&self, file: &File, len: u64, outcomes: &[Outcome]) -> std::io::Result<Vec<u8>> {
+        let mut bytes = Vec::with_capacity(outcomes.len() * 512);
+        if outcomes.is_empty() {
+            return Ok(bytes);
+        }
+        if len > 0 && last_byte(file, len)? != b'\n' {
+            bytes.push(b'\n');
+        }
+        if !self.tails.first().is_some_and(Tail::has_header) {
+            write_header(&mut bytes, &self.annotator, &self.dataset)?;
+        }
+        outcomes.iter().try_for_each(|outcome| write_record(&mut bytes, &outcome.after))?;
+        Ok(bytes)
+    }
+}
+
+fn fold(held: &mut HashMap<String, Held>, file: usize, record: Record) {
+    let stamp = Stamp { time_ms: time_ms(&record.time), folder: file, file };
+    let newest = held.get(&record.frame.path).map(|held| held.stamp);
+    if let Some(stamp) = stamp.newer_than(newest) {
+        held.insert(record.frame.path, Held { label: record.label, stamp });
+    }
+}
+
+fn open_append(path: &Path) -> std::io::Result<File> {
+    let open = || OpenOptions::new().read(true).append(true).create(true).open(path);
+    match open() {
+        Err(reason) if reason.kind() == ErrorKind::NotFound => {
+            path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+            open()
+        }
+        done => done,
+    }
+}
+
+/// Waits without end: who holds the lock writes a few records and lets go, and the system lets go for the dead.
+fn wait_for_lock(file: &File) -> std::io::Result<()> {
+    loop {
+        match file.lock() {
+            Err(reason) if reason.kind() == ErrorKind::Interrupted => {}
+            done => return done,
+        }
+    }
+}
+
+fn last_byte(mut file: &File, len: u64) -> std::io::Result<u8> {
+    let mut byte = [0];
+    file.seek(SeekFrom::Start(len - 1))?;
+    file.read_exact(&mut byte)?;
+    Ok(byte[0])
+}
+
+/// Puts the names of a new file and of its folder on disk. Not every system can; the records themselves are there.
+fn sync_names(path: &Path) {
+    for folder in path.ancestors().skip(1).take(2) {
+        if let Err(reason) = File::open(folder).and_then(|folder| folder.sync_all()) {
+            tracing::debug!("{}: {reason}", folder.display());
+        }
+    }
+}
