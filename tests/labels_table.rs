@@ -207,6 +207,8 @@ fn what_is_no_table_says_what_was_expected() {
     assert!(semicolons.contains("separated by commas, found `frame;F1;F2"), "{semicolons}");
     let twice = File::of(format!("{HEAD},f1\n").as_bytes()).refusal();
     assert_eq!(twice, "line 1: column `F1` is there twice");
+    let journal = File::of(b" {\"format\":\"mhp-labels\"}\n").refusal();
+    assert!(journal.starts_with("is a journal, not a table"), "{journal}");
     let latin = [HEAD.as_bytes(), b",note\na,1,0,0,0,0,0,caf\xe9\n"].concat();
     assert_eq!(File::of(&latin).refusal(), "line 2, column `note`: is not UTF-8 text");
     assert!(File::of(&[0xff, 0xd8, 0xff, 0x00, 0x10]).refusal().starts_with("line 1: no columns `frame`"));
@@ -245,8 +247,8 @@ fn an_import_writes_what_is_new_or_newer() {
     };
     let noon = "2025-03-01T12:00:00.000Z";
     let known = ["same", "older", "newer", "untimed", "equal time"].map(|frame| record(frame, "F1", noon));
-    let taken_back = record("taken back", "", noon);
-    let known: Vec<&Record> = known.iter().chain([&taken_back]).collect();
+    let taken_back = ["taken back", "taken back later"].map(|frame| record(frame, "", noon));
+    let known: Vec<&Record> = known.iter().chain(&taken_back).collect();
     let rows = [
         record("same", "F1", "2025-03-02T12:00:00Z"),
         record("older", "F2", "2025-03-01T11:59:59.999Z"),
@@ -254,7 +256,8 @@ fn an_import_writes_what_is_new_or_newer() {
         record("newer", "F2", "2025-03-01T13:30:00+01:00"),
         record("untimed", "F2", ""),
         record("equal time", "F2", noon),
-        record("taken back", "F2", ""),
+        record("taken back", "F2", "2025-03-01T12:00:00.001Z"),
+        record("taken back later", "F2", "2025-03-01T11:00:00Z"),
         record("unknown", "F2", ""),
         record("nothing said", "", ""),
     ];
@@ -262,8 +265,8 @@ fn an_import_writes_what_is_new_or_newer() {
     let find = |row: &Record| known.iter().find(|known| known.frame == row.frame).copied();
     let plan = plan_import(&rows, false, find);
     let frames = |rows: &[&Row]| rows.iter().map(|row| row.record.frame.path.clone()).collect::<Vec<_>>();
-    assert_eq!((plan.same, plan.kept), (2, 3));
+    assert_eq!((plan.same, plan.kept), (2, 4));
     assert_eq!(frames(&plan.write), ["newer", "taken back", "unknown"]);
     let replacing = plan_import(&rows, true, find);
-    assert_eq!((replacing.same, replacing.kept, replacing.write.len()), (2, 0, 6));
+    assert_eq!((replacing.same, replacing.kept, replacing.write.len()), (2, 0, 7));
 }

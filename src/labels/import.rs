@@ -7,16 +7,17 @@ use time::format_description::well_known::Rfc3339;
 /// What an import would do.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ImportPlan<'r> {
-    /// Rows to write: of frames without a label, newer than the label, or all that differ.
+    /// Rows to write: of frames without a record, newer than the record, or all that differ.
     pub write: Vec<&'r Row>,
     /// Rows that say what the label says already.
     pub same: usize,
-    /// Rows that differ and are not newer than the label: the label is kept.
+    /// Rows that differ and are not newer than the record, which may have taken a label back: it is kept.
     pub kept: usize,
 }
 
 /// Compares `rows` with the newest record that `current` finds for a row's annotator and frame. `replace` writes also
-/// rows that are not newer. A row without a time is not newer than anything.
+/// rows that are not newer. A row without a time is not newer than anything; one that says nothing of a frame of which
+/// nothing is known is no news.
 pub fn plan_import<'r, 'c>(
     rows: &'r [Row],
     replace: bool,
@@ -26,7 +27,7 @@ pub fn plan_import<'r, 'c>(
     for row in rows {
         match current(&row.record) {
             Some(known) if known.label == row.record.label => plan.same += 1,
-            Some(known) if !known.label.is_empty() && !replace && !newer(&row.record, known) => plan.kept += 1,
+            Some(known) if !replace && !newer(&row.record, known) => plan.kept += 1,
             Some(_) => plan.write.push(row),
             None if row.record.label.is_empty() => plan.same += 1,
             None => plan.write.push(row),

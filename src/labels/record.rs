@@ -341,6 +341,7 @@ pub struct FrameId {
     /// The frame's name in its data set, for example `d1s1/000/00383`; this is what identifies it.
     pub path: String,
     /// Its index when it was labelled; a hint, for a data set may have grown since.
+    #[serde(default)]
     pub index: usize,
 }
 
@@ -365,10 +366,12 @@ pub struct Judged {
     pub machine_shown: bool,
 }
 
-/// One line of a journal: what a frame's label is after an act.
+/// One line of a journal: what a frame's label is after an act. A line that another program wrote may lack what only
+/// tells of its origin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// Fingerprint of the data set.
+    #[serde(default)]
     pub dataset: String,
     /// The frame.
     pub frame: FrameId,
@@ -379,10 +382,13 @@ pub struct Record {
     /// When, RFC 3339 in UTC with milliseconds.
     pub time: String,
     /// The act in words: `tag F2 on 12 frames`, `undo: tag F2`.
+    #[serde(default)]
     pub act: String,
     /// Version of the program.
+    #[serde(default)]
     pub program: String,
     /// What was judged.
+    #[serde(default)]
     pub judged: Judged,
 }
 

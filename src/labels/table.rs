@@ -66,6 +66,16 @@ pub enum TableError {
         /// The folder.
         path: PathBuf,
     },
+    /// It is a journal where a table was expected.
+    #[error(
+        "{path}: is a journal, not a table: it counts as soon as it lies in the data set's folder of labels; or make a \
+         table of it with `labels export`",
+        path = path.display()
+    )]
+    IsJournal {
+        /// The journal.
+        path: PathBuf,
+    },
     /// A column is missing, or there twice.
     #[error("{path}: line 1: {message}", path = path.display())]
     Header {
@@ -144,6 +154,7 @@ pub(super) fn table_of(bytes: &[u8], path: &Path) -> Result<Table, TableError> {
     let table = match first_sign(bytes) {
         None => Table::default(),
         Some(b'[') => json::read(bytes, path)?,
+        Some(b'{') => return Err(TableError::IsJournal { path: path.to_owned() }),
         Some(_) => csv_read::read(bytes, path)?,
     };
     each_once(&table.rows, path)?;
