@@ -19,7 +19,9 @@ pub fn read_labels(path: &Path) -> Result<Vec<Record>, TableError> {
         return Ok(read_acts(path)?);
     }
     let table = table_of(&bytes, path)?;
-    table.notes.iter().for_each(|note| tracing::warn!("{}: {note}", path.display()));
+    for note in &table.notes {
+        tracing::warn!("{}: {note}", path.display());
+    }
     Ok(table.rows.into_iter().map(|row| row.record).collect())
 }
 

@@ -25,12 +25,14 @@ pub fn plan_import<'r, 'c>(
 ) -> ImportPlan<'r> {
     let mut plan = ImportPlan::default();
     for row in rows {
-        match current(&row.record) {
-            Some(known) if known.label == row.record.label => plan.same += 1,
-            Some(known) if !replace && !newer(&row.record, known) => plan.kept += 1,
-            Some(_) => plan.write.push(row),
-            None if row.record.label.is_empty() => plan.same += 1,
-            None => plan.write.push(row),
+        let known = current(&row.record);
+        let said = known.map(|known| known.label.clone()).unwrap_or_default();
+        if said == row.record.label {
+            plan.same += 1;
+        } else if replace || known.is_none_or(|known| newer(&row.record, known)) {
+            plan.write.push(row);
+        } else {
+            plan.kept += 1;
         }
     }
     plan

@@ -69,16 +69,13 @@ pub struct Args {
 /// Where a file cannot be read, or has several annotators and none is named.
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let a = of_one(&args.a, args.annotator_a.as_deref(), "--annotator-a")?;
-    let text = match &args.b {
-        Some(path) => {
-            let b = of_one(path, args.annotator_b.as_deref(), "--annotator-b")?;
-            let found = compare(judged_in_acts(&a), judged_in_acts(&b));
-            if args.json { two_as_json(&found, args.disputes)? } else { two_as_text(args, &found, &a, &b) }
-        }
-        None => {
-            let found = against_machine(judged_in_acts(&a), args.threshold);
-            if args.json { machine_as_json(&found, args.disputes)? } else { machine_as_text(args, &found, &a) }
-        }
+    let text = if let Some(path) = &args.b {
+        let b = of_one(path, args.annotator_b.as_deref(), "--annotator-b")?;
+        let found = compare(judged_in_acts(&a), judged_in_acts(&b));
+        if args.json { two_as_json(&found, args.disputes)? } else { two_as_text(args, &found, &a, &b) }
+    } else {
+        let found = against_machine(judged_in_acts(&a), args.threshold);
+        if args.json { machine_as_json(&found, args.disputes)? } else { machine_as_text(args, &found, &a) }
     };
     print(&text)?;
     Ok(ExitCode::SUCCESS)

@@ -111,7 +111,9 @@ fn sheets(args: &Args, frames: &Frames<'_>) -> anyhow::Result<Sheets> {
     for path in &args.files {
         let act = format!("import from {}", path.file_name().unwrap_or_default().to_string_lossy());
         let Table { rows, notes } = read_table(path)?;
-        notes.iter().for_each(|note| tracing::warn!("{}: {note}", path.display()));
+        for note in notes {
+            tracing::warn!("{}: {note}", path.display());
+        }
         for mut row in rows {
             let place = || format!("{}: line {}", path.display(), row.line);
             let name = annotator(args, &row).with_context(place)?;

@@ -118,7 +118,7 @@ fn as_text(name: &str, one: &AnnotatorStatistics) -> String {
     let heads = Tag::ALL.map(|tag| format!("{:>7}", tag.code())).concat();
     let _ = writeln!(text, "  {:<width$} {:>7}{heads} {:>7}", "", "frames", "notes");
     for (group, counts) in rows {
-        let tags: String = counts.tags.iter().map(|n| format!("{n:>7}")).collect();
+        let tags = counts.tags.map(|n| format!("{n:>7}")).concat();
         let _ = writeln!(text, "  {group:<width$} {:>7}{tags} {:>7}", counts.frames, counts.notes);
     }
     let verdicts = Verdict::ALL.iter().zip(one.all.verdicts).filter(|(_, n)| *n > 0);

@@ -24,7 +24,7 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Table, TableError> {
             let message = format!("{} cells; the header has {}", cells.len(), header.len());
             return Err(TableError::Row { line, message, path: path.to_owned() });
         }
-        rows.push(Row { line, record: Cells { cells: &cells, columns: &columns, line, path }.record()? });
+        rows.push(Row { line, record: Cells { row: &cells, columns: &columns, line, path }.record()? });
     }
     let note = |name: &String| format!("column `{name}` is passed over; it is none of a table of labels");
     Ok(Table { rows, notes: unknown.iter().map(note).collect() })
@@ -92,7 +92,7 @@ fn columns(header: &csv::ByteRecord, path: &Path) -> Result<(Columns, Vec<String
 
 /// The cells of one row.
 struct Cells<'r> {
-    cells: &'r csv::ByteRecord,
+    row: &'r csv::ByteRecord,
     columns: &'r Columns,
     line: u64,
     path: &'r Path,
@@ -166,7 +166,7 @@ impl Cells<'_> {
 
     /// The cell as it is; empty where the table lacks the column.
     fn text(&self, column: &str) -> Result<&str, TableError> {
-        let bytes = self.columns.get(column).and_then(|&place| self.cells.get(place)).unwrap_or_default();
+        let bytes = self.columns.get(column).and_then(|&place| self.row.get(place)).unwrap_or_default();
         std::str::from_utf8(bytes).map_err(|_| self.wrong(column, "is not UTF-8 text".into()))
     }
 

@@ -34,14 +34,13 @@ fn cell(record: &Record, column: &str) -> String {
         "act" => record.act.clone(),
         "dataset" => record.dataset.clone(),
         "program" => record.program.clone(),
-        _ => match column.parse() {
-            Ok(tag) => yes(label.tags.contains(tag)),
-            Err(_) => {
-                let mode = Tag::MODES.into_iter().find(|&mode| machine_column(mode) == column);
-                optional(mode.and_then(|mode| judged.machine.get(&mode)))
-            }
-        },
+        _ => column.parse().map_or_else(|_| machine(record, column), |tag| yes(label.tags.contains(tag))),
     }
+}
+
+fn machine(record: &Record, column: &str) -> String {
+    let mode = Tag::MODES.into_iter().find(|&mode| machine_column(mode) == column);
+    optional(mode.and_then(|mode| record.judged.machine.get(&mode)))
 }
 
 /// Empty where unknown.
