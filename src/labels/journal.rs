@@ -141,14 +141,13 @@ impl Journal {
     }
 
     fn commit_parts(&mut self, act: &str, parts: &[Part<'_>]) -> Result<Vec<Outcome>, LabelError> {
-        if parts.is_empty() {
+        if parts.iter().all(|part| *part.change == Change::default()) {
             return Ok(Vec::new());
         }
         let file = self.lock()?;
         self.catch_up(Some(&file))?;
         let outcomes = self.outcomes(act, parts);
         self.append(&file, &outcomes)?;
-        // Where the file is a device, nothing of it can be read back.
         self.catch_up(Some(&file))?;
         // Closing the file gives the lock back; so does the end of the process, whatever ends it.
         Ok(outcomes)
@@ -223,10 +222,12 @@ impl Journal {
     }
 
     fn outcomes(&self, act: &str, parts: &[Part<'_>]) -> Vec<Outcome> {
-        let (now, later) = (now_ms(), self.later_than(parts));
+        // One time for all of an act; what was said elsewhere keeps its own.
+        let now = now_ms().max(self.later_than(parts));
         let mut latest: HashMap<&str, Label> = HashMap::new();
         let mut outcomes = Vec::with_capacity(parts.len());
-        for Part { frame, change, judged, time_ms } in parts {
+        for part in parts {
+            let Part { frame, change, judged, time_ms } = *part;
             let held = || self.label(&frame.path).cloned().unwrap_or_default();
             let before = latest.get(frame.path.as_str()).cloned().unwrap_or_else(held);
             let label = change.applied(&before);
@@ -234,20 +235,21 @@ impl Journal {
                 continue;
             }
             latest.insert(&frame.path, label.clone());
-            let mut judged = Judged::clone(judged);
+            let mut judged = judged.clone();
             // JSON has no other numbers.
             judged.machine.retain(|_, score| score.is_finite());
+            let time = time_ms.map_or(now, |said| said.max(self.later_than(std::slice::from_ref(part))));
             let after = Record {
                 dataset: self.dataset.clone(),
-                frame: FrameId::clone(frame),
+                frame: frame.clone(),
                 label,
                 annotator: self.annotator.clone(),
-                time: time_text(time_ms.unwrap_or(now).max(later)),
+                time: time_text(time),
                 act: act.to_owned(),
                 program: PROGRAM.to_owned(),
                 judged,
             };
-            outcomes.push(Outcome { frame: FrameId::clone(frame), before, after });
+            outcomes.push(Outcome { frame: frame.clone(), before, after });
         }
         outcomes
     }

@@ -13,16 +13,16 @@ use std::process::ExitCode;
 
 /// Shown under the options of `labels agreement --help`.
 pub(super) const HELP: &str = "\
-Compared are the frames that both judged: a frame is judged where it has a tag or a verdict, or a table has a row for it
+Compared are the frames that both judged: a frame is judged where it has a tag or a verdict, or a table has a row for it \
 that says nothing at all (none of the tags). A note alone is no judgement, nor is a label that was taken back.
 
-JSON: {\"F1\": {\"kappa\", \"raw\", \"both\", \"only_a\", \"only_b\", \"neither\", ...}, ..., \"pooled\": {...}} for F1 F2 F3 F4
-clean unsure. kappa is Cohen's, null where undefined: no frame in common, or the same one answer by both everywhere. raw
-is the share of equal decisions, null without a frame. pooled takes the decisions of all six tags as one table. Besides:
-frames, prevalence_a, prevalence_b, unreliable (why kappa should not be trusted, or null), and with --disputes the frames
+JSON: {\"F1\": {\"kappa\", \"raw\", \"both\", \"only_a\", \"only_b\", \"neither\", ...}, ..., \"pooled\": {...}} for F1 F2 F3 F4 \
+clean unsure. kappa is Cohen's, null where undefined: no frame in common, or the same one answer by both everywhere. raw \
+is the share of equal decisions, null without a frame. pooled takes the decisions of all six tags as one table. Besides: \
+frames, prevalence_a, prevalence_b, unreliable (why kappa should not be trusted, or null), and with --disputes the frames \
 seen differently; in pooled also frames_only_in_a, frames_only_in_b.
 
-With --machine B is the program: its scores of F1 to F4 at the moment of judging, yes from --threshold on; pooled then
+With --machine B is the program: its scores of F1 to F4 at the moment of judging, yes from --threshold on; pooled then \
 counts machine_shown, the frames judged with the scores on screen, which are not blind, and unscored.
 
 Exit codes: 0 compared; 2 bad input.

@@ -11,10 +11,10 @@ use std::process::ExitCode;
 
 /// Shown under the options of `labels export --help`.
 pub(super) const HELP: &str = "\
-Columns: frame index annotator time F1 F2 F3 F4 clean unsure verdict person region note judged_fit judged_config
-judged_iteration machine_F1 machine_F2 machine_F3 machine_F4 machine_shown act dataset program. Tags are 1 or 0, what is
-unknown is empty; region is view[first..=last, first..=last]. A row is what one annotator says of one frame now, by index,
-name and annotator; labels that were taken back have none. Text is quoted as RFC 4180 asks and never changed. The JSON is
+Columns: frame index annotator time F1 F2 F3 F4 clean unsure verdict person region note judged_fit judged_config \
+judged_iteration machine_F1 machine_F2 machine_F3 machine_F4 machine_shown act dataset program. Tags are 1 or 0, what is \
+unknown is empty; region is view[first..=last, first..=last]. A row is what one annotator says of one frame now, by index, \
+name and annotator; labels that were taken back have none. Text is quoted as RFC 4180 asks and never changed. The JSON is \
 an array of records as in the journal. F is replaced whole or not at all; `-` is standard output.
 
 Exit codes: 0 written; 2 bad input, or F cannot be written.

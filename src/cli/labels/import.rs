@@ -14,13 +14,13 @@ use std::process::ExitCode;
 
 /// Shown under the options of `labels import --help`.
 pub(super) const HELP: &str = "\
-CSV with a header; `frame` and the tags F1 F2 F3 F4 clean unsure must be there, in any order, tags as 1/0, true/false,
-yes/no or nothing. `labels export --help` lists the columns that may be there too; others are passed over with a note. A
+CSV with a header; `frame` and the tags F1 F2 F3 F4 clean unsure must be there, in any order, tags as 1/0, true/false, \
+yes/no or nothing. `labels export --help` lists the columns that may be there too; others are passed over with a note. A \
 JSON array of records is read as well.
 
-Each row is an act of its annotator, `import from FILE`, and replaces the label of its frame: where there is none, and
-where the row's time is later than the label's; other labels are kept and counted. Rows that say what the label says
-already write nothing. Nothing is ever deleted: the journal keeps what was there. Where one row is wrong nothing is
+Each row is an act of its annotator, `import from FILE`, and replaces the label of its frame: where there is none, and \
+where the row's time is later than the label's; other labels are kept and counted. Rows that say what the label says \
+already write nothing. Nothing is ever deleted: the journal keeps what was there. Where one row is wrong nothing is \
 imported.
 
 Exit codes: 0 on disk; 2 bad input, or a journal cannot be written.

@@ -12,8 +12,8 @@ use std::process::ExitCode;
 
 /// Shown under the options of `labels stats --help`.
 pub(super) const HELP: &str = "\
-JSON: an object an annotator with frames, tags, verdicts, notes, groups (the same counts by scene), acts, first, last,
-days, hours, median_s. Days and hours are UTC. median_s is the median time from one act to the next, gaps of more than
+JSON: an object an annotator with frames, tags, verdicts, notes, groups (the same counts by scene), acts, first, last, \
+days, hours, median_s. Days and hours are UTC. median_s is the median time from one act to the next, gaps of more than \
 ten minutes left out. Labels that were taken back do not count, the acts do.
 
 Exit codes: 0 told; 2 bad input.
