@@ -29,6 +29,29 @@ pub struct Outcome {
     pub after: Record,
 }
 
+/// A change of one frame that was made elsewhere and is brought here, with what was known of it there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SaidElsewhere {
+    /// The frame.
+    pub frame: FrameId,
+    /// What is said of it.
+    pub change: Change,
+    /// What was judged.
+    pub judged: Judged,
+    /// When it was said, RFC 3339; what is no time is now.
+    pub time: String,
+}
+
+/// One change of an act.
+#[derive(Debug, Clone, Copy)]
+struct Part<'a> {
+    frame: &'a FrameId,
+    change: &'a Change,
+    judged: &'a Judged,
+    /// When, where that is not now.
+    time_ms: Option<i64>,
+}
+
 /// The label of a frame and when it was given.
 #[derive(Debug)]
 struct Held {
@@ -101,14 +124,30 @@ impl Journal {
         changes: &[(FrameId, Change)],
         judged: &Judged,
     ) -> Result<Vec<Outcome>, LabelError> {
-        if changes.is_empty() {
+        let parts = changes.iter().map(|(frame, change)| Part { frame, change, judged, time_ms: None });
+        self.commit_parts(act, &parts.collect::<Vec<_>>())
+    }
+
+    /// As [`Self::commit`], for changes that were made elsewhere: each record keeps when it was said and what was judged.
+    ///
+    /// # Errors
+    /// As [`Self::commit`].
+    pub fn bring(&mut self, act: &str, said: &[SaidElsewhere]) -> Result<Vec<Outcome>, LabelError> {
+        let parts = said.iter().map(|SaidElsewhere { frame, change, judged, time }| {
+            let time_ms = Some(time_ms(time)).filter(|&time| time > i64::MIN);
+            Part { frame, change, judged, time_ms }
+        });
+        self.commit_parts(act, &parts.collect::<Vec<_>>())
+    }
+
+    fn commit_parts(&mut self, act: &str, parts: &[Part<'_>]) -> Result<Vec<Outcome>, LabelError> {
+        if parts.iter().all(|part| *part.change == Change::default()) {
             return Ok(Vec::new());
         }
         let file = self.lock()?;
         self.catch_up(Some(&file))?;
-        let outcomes = self.outcomes(act, changes, judged);
+        let outcomes = self.outcomes(act, parts);
         self.append(&file, &outcomes)?;
-        // Where the file is a device, nothing of it can be read back.
         self.catch_up(Some(&file))?;
         // Closing the file gives the lock back; so does the end of the process, whatever ends it.
         Ok(outcomes)
@@ -182,14 +221,13 @@ impl Journal {
         Ok(false)
     }
 
-    fn outcomes(&self, act: &str, changes: &[(FrameId, Change)], judged: &Judged) -> Vec<Outcome> {
-        let mut judged = judged.clone();
-        // JSON has no other numbers.
-        judged.machine.retain(|_, score| score.is_finite());
-        let time = time_text(self.time_of(changes));
+    fn outcomes(&self, act: &str, parts: &[Part<'_>]) -> Vec<Outcome> {
+        // One time for all of an act; what was said elsewhere keeps its own.
+        let now = now_ms().max(self.later_than(parts));
         let mut latest: HashMap<&str, Label> = HashMap::new();
-        let mut outcomes = Vec::with_capacity(changes.len());
-        for (frame, change) in changes {
+        let mut outcomes = Vec::with_capacity(parts.len());
+        for part in parts {
+            let Part { frame, change, judged, time_ms } = *part;
             let held = || self.label(&frame.path).cloned().unwrap_or_default();
             let before = latest.get(frame.path.as_str()).cloned().unwrap_or_else(held);
             let label = change.applied(&before);
@@ -197,26 +235,30 @@ impl Journal {
                 continue;
             }
             latest.insert(&frame.path, label.clone());
+            let mut judged = judged.clone();
+            // JSON has no other numbers.
+            judged.machine.retain(|_, score| score.is_finite());
+            let time = time_ms.map_or(now, |said| said.max(self.later_than(std::slice::from_ref(part))));
             let after = Record {
                 dataset: self.dataset.clone(),
                 frame: frame.clone(),
                 label,
                 annotator: self.annotator.clone(),
-                time: time.clone(),
+                time: time_text(time),
                 act: act.to_owned(),
                 program: PROGRAM.to_owned(),
-                judged: judged.clone(),
+                judged,
             };
             outcomes.push(Outcome { frame: frame.clone(), before, after });
         }
         outcomes
     }
 
-    /// Now, or just after the newest label from another folder, for between files the time decides.
-    fn time_of(&self, changes: &[(FrameId, Change)]) -> i64 {
-        let stamps = changes.iter().filter_map(|(frame, _)| self.held.get(&frame.path)).map(|held| held.stamp);
+    /// Just after the newest label from another folder that is changed, for between files the time decides.
+    fn later_than(&self, parts: &[Part<'_>]) -> i64 {
+        let stamps = parts.iter().filter_map(|part| self.held.get(&part.frame.path)).map(|held| held.stamp);
         let foreign = stamps.filter(|stamp| stamp.file != 0).map(|stamp| stamp.time_ms.saturating_add(1)).max();
-        now_ms().max(foreign.unwrap_or(i64::MIN))
+        foreign.unwrap_or(i64::MIN)
     }
 
     fn append(&self, mut file: &File, outcomes: &[Outcome]) -> Result<(), LabelError> {

@@ -7,17 +7,31 @@
 //!
 //! The files are a public format, JSON lines; `format.rs` describes all of it.
 
+mod acts;
+mod agreement;
 mod error;
 mod format;
+mod import;
 mod journal;
+mod kappa;
 mod place;
 mod record;
 mod stamp;
+mod statistics;
 mod store;
+mod table;
 mod tail;
 
+pub use acts::{place_acts, read_acts, read_labels};
+pub use agreement::{
+    Agreement, Dispute, MachineAgreement, against_machine, agreement, judged, judged_in_acts, standing,
+};
 pub use error::LabelError;
-pub use journal::{Journal, Outcome};
+pub use import::{ImportPlan, plan_import};
+pub use journal::{Journal, Outcome, SaidElsewhere};
+pub use kappa::{RELIABLE_FRAMES, TagAgreement};
 pub use place::LabelPlace;
 pub use record::{CellRegion, Change, FrameId, Judged, Label, Record, Tag, Tags, Verdict};
+pub use statistics::{AnnotatorStatistics, LabelCounts, PAUSE_S, Pace, statistics};
 pub use store::{LabelStore, read_journal};
+pub use table::{COLUMNS, Row, Table, TableError, read_table, write_csv, write_json};

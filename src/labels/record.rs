@@ -230,6 +230,27 @@ impl fmt::Display for CellRegion {
     }
 }
 
+impl FromStr for CellRegion {
+    type Err = String;
+
+    /// As it is written: `hm_hori[10..=20, 30..=42]`, first and last bin of each axis.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong =
+            || format!("`{text}` is no region; expected a view and the bins of its axes: hm_hori[10..=20, 30..=42]");
+        let (view, axes) =
+            text.trim_end().strip_suffix(']').and_then(|text| text.rsplit_once('[')).ok_or_else(wrong)?;
+        let mut region = Self { view: view.to_owned(), lo: Vec::new(), hi: Vec::new() };
+        for axis in axes.split(',').filter(|_| !axes.trim().is_empty()) {
+            let (lo, hi) = axis.split_once("..=").ok_or_else(wrong)?;
+            let bins = lo.trim().parse().and_then(|lo: usize| Ok((lo, hi.trim().parse::<usize>()?)));
+            let (lo, hi) = bins.ok().filter(|(lo, hi)| lo <= hi).ok_or_else(wrong)?;
+            region.lo.push(lo);
+            region.hi.push(hi);
+        }
+        Ok(region)
+    }
+}
+
 /// All that one annotator says of one frame.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default)]
@@ -320,6 +341,7 @@ pub struct FrameId {
     /// The frame's name in its data set, for example `d1s1/000/00383`; this is what identifies it.
     pub path: String,
     /// Its index when it was labelled; a hint, for a data set may have grown since.
+    #[serde(default)]
     pub index: usize,
 }
 
@@ -344,10 +366,12 @@ pub struct Judged {
     pub machine_shown: bool,
 }
 
-/// One line of a journal: what a frame's label is after an act.
+/// One line of a journal: what a frame's label is after an act. A line that another program wrote may lack what only
+/// tells of its origin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// Fingerprint of the data set.
+    #[serde(default)]
     pub dataset: String,
     /// The frame.
     pub frame: FrameId,
@@ -358,10 +382,13 @@ pub struct Record {
     /// When, RFC 3339 in UTC with milliseconds.
     pub time: String,
     /// The act in words: `tag F2 on 12 frames`, `undo: tag F2`.
+    #[serde(default)]
     pub act: String,
     /// Version of the program.
+    #[serde(default)]
     pub program: String,
     /// What was judged.
+    #[serde(default)]
     pub judged: Judged,
 }
 
@@ -392,6 +419,21 @@ mod tests {
         assert_eq!(clean.tags.to_string(), "clean");
         assert_eq!(Change::adding(Tag::F4).applied(&clean).tags.to_string(), "F4");
         assert_eq!(Change::adding(Tag::Unsure).applied(&label).tags.to_string(), "F1 F2 unsure");
+    }
+
+    #[test]
+    fn regions_read_back_what_they_write() {
+        let region =
+            |view: &str, lo: &[usize], hi: &[usize]| CellRegion { view: view.into(), lo: lo.into(), hi: hi.into() };
+        for region in [region("hm_hori", &[10, 30], &[20, 42]), region("a[0], b", &[0], &[0]), region("", &[], &[])] {
+            assert_eq!(region.to_string().parse(), Ok(region));
+        }
+        assert_eq!("v[1..=2,3..=4] ".parse(), Ok(region("v", &[1, 3], &[2, 4])));
+        for wrong in
+            ["", "v", "v[1..2]", "v[2..=1]", "v[1..=2", "v[1..=2,]", "v[-1..=2]", "v[1..=99999999999999999999]"]
+        {
+            assert!(wrong.parse::<CellRegion>().is_err_and(|why| why.contains("hm_hori[10..=20, 30..=42]")), "{wrong}");
+        }
     }
 
     #[test]

@@ -242,7 +242,7 @@ fn fold(people: &mut BTreeMap<String, Person>, lines: &mut Vec<LineAt>, span: Sp
 }
 
 /// The journals in a folder, in the order of their names; none where there is no folder.
-fn journals_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+pub(super) fn journals_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let entries = match std::fs::read_dir(folder) {
         Err(reason) if reason.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
         entries => entries?,

@@ -1,7 +1,12 @@
 //! `labels`: what people say of frames, without a window.
 
+mod agreement;
+mod export;
+mod import;
 mod request;
 mod show;
+mod source;
+mod stats;
 mod tag;
 
 use std::process::ExitCode;
@@ -26,6 +31,18 @@ pub enum LabelsCommand {
     /// List the labels of a data set as they are now.
     #[command(after_help = show::HELP)]
     Show(show::Args),
+    /// Tell how far two annotators agree, tag by tag: Cohen's kappa, raw agreement, counts.
+    #[command(after_help = agreement::HELP)]
+    Agreement(agreement::Args),
+    /// Write labels as CSV or JSON.
+    #[command(after_help = export::HELP)]
+    Export(export::Args),
+    /// Bring labels from CSV into the journals of a data set.
+    #[command(after_help = import::HELP)]
+    Import(import::Args),
+    /// Count labels: by tag, scene, day; and the time that one took.
+    #[command(after_help = stats::HELP)]
+    Stats(stats::Args),
 }
 
 /// Runs a subcommand of `labels`.
@@ -36,5 +53,9 @@ pub(super) fn run(command: &LabelsCommand) -> anyhow::Result<ExitCode> {
     match command {
         LabelsCommand::Tag(args) => tag::run(args),
         LabelsCommand::Show(args) => show::run(args),
+        LabelsCommand::Agreement(args) => agreement::run(args),
+        LabelsCommand::Export(args) => export::run(args),
+        LabelsCommand::Import(args) => import::run(args),
+        LabelsCommand::Stats(args) => stats::run(args),
     }
 }

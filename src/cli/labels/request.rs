@@ -86,6 +86,11 @@ impl<'a> Frames<'a> {
         FrameId { path: self.dataset.frame_name(index), index }
     }
 
+    /// The frame with this name.
+    pub(super) fn named(&self, name: &str) -> Option<FrameId> {
+        self.by_name.get(name).map(|&index| self.at(index))
+    }
+
     /// The frame with this name; where there is none, with this index.
     ///
     /// # Errors

@@ -1,0 +1,156 @@
+//! `labels import`: labels that were exported, or made elsewhere, into the journals of a data set.
+
+use super::request::Frames;
+use super::source::counted;
+use crate::cli::common::{open, print};
+use crate::labels::{
+    Change, FrameId, Journal, LabelPlace, LabelStore, Row, SaidElsewhere, Table, plan_import, read_table,
+};
+use anyhow::{Context as _, anyhow, bail};
+use std::collections::{BTreeMap, HashMap};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Shown under the options of `labels import --help`.
+pub(super) const HELP: &str = "\
+CSV with a header; `frame` and the tags F1 F2 F3 F4 clean unsure must be there, in any order, tags as 1/0, true/false, \
+yes/no or nothing. `labels export --help` lists the columns that may be there too; others are passed over with a note. A \
+JSON array of records is read as well.
+
+Each row is an act of its annotator, `import from FILE`, and replaces the label of its frame: where there is none, and \
+where the row's time is later than the label's; other labels are kept and counted. Rows that say what the label says \
+already write nothing. Nothing is ever deleted: the journal keeps what was there. Where one row is wrong nothing is \
+imported.
+
+Exit codes: 0 on disk; 2 bad input, or a journal cannot be written.
+
+Examples:
+  mhp-inspector labels import data/mmvr anna.csv bo.csv
+      The rows of both, each to the journal of its annotator.
+  mhp-inspector labels import data/mmvr sheet.csv --annotator anna --replace
+      All rows as anna's, also over labels that are newer.";
+
+/// What `labels import` is told.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The data set.
+    path: PathBuf,
+    /// Exported labels.
+    #[arg(required = true, value_name = "CSV")]
+    files: Vec<PathBuf>,
+    /// Whose labels these are, instead of what each row says.
+    #[arg(long, value_name = "NAME")]
+    annotator: Option<String>,
+    /// Replace labels that differ also where they are newer.
+    #[arg(long)]
+    replace: bool,
+    /// Take rows of frames that the data set does not have.
+    #[arg(long)]
+    keep_unknown: bool,
+    /// Tell what would be done, and do nothing.
+    #[arg(long)]
+    dry_run: bool,
+    /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
+    #[arg(long, value_name = "FILE")]
+    manifest: Option<PathBuf>,
+}
+
+/// The rows of one annotator, and the act that each file is.
+type Sheets = BTreeMap<String, Vec<(String, Vec<Row>)>>;
+
+/// Reads everything, then writes.
+///
+/// # Errors
+/// Where a file, a row, the data set or a journal is bad: then nothing is written. Where writing fails.
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let dataset = open(&args.path, args.manifest.as_deref())?;
+    let place = LabelPlace::of(&dataset.info().root, dataset.fingerprint())?;
+    let sheets = sheets(args, &Frames::new(&dataset))?;
+    let store = LabelStore::read(&place)?;
+    let open = |name: &String| Journal::open(&place, name, dataset.fingerprint());
+    let journals = sheets.keys().map(open).collect::<Result<Vec<_>, _>>()?;
+    for ((name, files), mut journal) in sheets.iter().zip(journals) {
+        let (mut written, mut same, mut kept) = (0, 0, 0);
+        for (act, rows) in files {
+            let plan = plan_import(rows, args.replace, |row| store.label(name, &row.frame.path));
+            (same, kept) = (same + plan.same, kept + plan.kept);
+            let said: Vec<SaidElsewhere> = plan.write.iter().map(|row| said(row, &journal)).collect();
+            written += if args.dry_run { said.len() } else { journal.bring(act, &said)?.len() };
+        }
+        print(&told(args, name, [written, same, kept], journal.path()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn told(args: &Args, name: &str, [written, same, kept]: [usize; 3], path: &Path) -> String {
+    let verb = if args.dry_run { "would be imported" } else { "imported" };
+    let mut text = format!("{name}: {} {verb}, {same} the same", counted(written, "label"));
+    if kept > 0 {
+        let _ = write!(text, ", {kept} kept because the row is not newer (--replace takes the row)");
+    }
+    format!("{text}; in {}\n", path.display())
+}
+
+/// The whole label, as a change of the one that is there.
+fn said(row: &Row, journal: &Journal) -> SaidElsewhere {
+    let record = &row.record;
+    let before = journal.label(&record.frame.path).cloned().unwrap_or_default();
+    SaidElsewhere {
+        frame: record.frame.clone(),
+        change: Change::between(&before, &record.label),
+        judged: record.judged.clone(),
+        time: record.time.clone(),
+    }
+}
+
+/// Reads all files and gives each row its annotator and its frame.
+fn sheets(args: &Args, frames: &Frames<'_>) -> anyhow::Result<Sheets> {
+    let mut sheets = Sheets::new();
+    let mut seen: HashMap<(String, String), (PathBuf, u64)> = HashMap::new();
+    for path in &args.files {
+        let act = format!("import from {}", path.file_name().unwrap_or_default().to_string_lossy());
+        let Table { rows, notes } = read_table(path)?;
+        for note in notes {
+            tracing::warn!("{}: {note}", path.display());
+        }
+        for mut row in rows {
+            let place = || format!("{}: line {}", path.display(), row.line);
+            let name = annotator(args, &row).with_context(place)?;
+            let frame = frame(args, &row, frames).map_err(|why| anyhow!("{why}")).with_context(place)?;
+            let key = (name.clone(), frame.path.clone());
+            if let Some((first, line)) = seen.insert(key, (path.clone(), row.line)) {
+                let (frame, first) = (&frame.path, first.display());
+                bail!("{}: frame `{frame}` of `{name}` is also on line {line} of {first}; expected one row", place());
+            }
+            row.record.frame = frame;
+            let files = sheets.entry(name).or_default();
+            match files.last_mut() {
+                Some((last, rows)) if *last == act => rows.push(row),
+                _ => files.push((act.clone(), vec![row])),
+            }
+        }
+    }
+    Ok(sheets)
+}
+
+fn annotator(args: &Args, row: &Row) -> anyhow::Result<String> {
+    let name = args.annotator.as_deref().unwrap_or(&row.record.annotator).trim();
+    if name.is_empty() {
+        bail!("no annotator; expected a name in the column `annotator`, or --annotator NAME");
+    }
+    Ok(name.to_owned())
+}
+
+/// The frame of this name in the data set.
+fn frame(args: &Args, row: &Row, frames: &Frames<'_>) -> Result<FrameId, String> {
+    match frames.named(&row.record.frame.path) {
+        Some(frame) => Ok(frame),
+        None if args.keep_unknown => Ok(row.record.frame.clone()),
+        None => Err(format!(
+            "frame `{}` is not in the data set {}; --keep-unknown takes such rows",
+            row.record.frame.path.escape_debug(),
+            args.path.display()
+        )),
+    }
+}

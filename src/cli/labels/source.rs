@@ -1,0 +1,56 @@
+//! Where labels come from as typed: a data set, a journal, or a table that was exported.
+
+use crate::cli::common::open;
+use crate::labels::{LabelPlace, Record, place_acts, read_labels};
+use anyhow::{Context as _, bail};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// The endings of files that are data, not labels.
+const DATA: [&str; 3] = ["npz", "npy", "toml"];
+
+/// Every record of `path`, in the order of the acts.
+///
+/// # Errors
+/// Where it is none of the three, or cannot be read.
+pub(super) fn acts(path: &Path, manifest: Option<&Path>) -> anyhow::Result<Vec<Record>> {
+    let ending = path.extension().unwrap_or_default();
+    if !path.is_dir() && !DATA.iter().any(|known| ending.eq_ignore_ascii_case(known)) {
+        return Ok(read_labels(path)?);
+    }
+    let expected = "expected a data set, a journal (*.labels.jsonl), or labels exported as CSV or JSON";
+    let dataset = open(path, manifest).context(expected)?;
+    Ok(place_acts(&LabelPlace::of(&dataset.info().root, dataset.fingerprint())?)?)
+}
+
+/// The annotators, in the order of their names.
+pub(super) fn annotators(acts: &[Record]) -> Vec<&str> {
+    acts.iter().map(|record| record.annotator.as_str()).collect::<BTreeSet<_>>().into_iter().collect()
+}
+
+/// Only what `annotator` said, where one is named.
+///
+/// # Errors
+/// Where that one said nothing, naming those who did.
+pub(super) fn only(mut acts: Vec<Record>, annotator: Option<&str>, path: &Path) -> anyhow::Result<Vec<Record>> {
+    let Some(name) = annotator.map(str::trim) else { return Ok(acts) };
+    let names = annotators(&acts);
+    if !names.contains(&name) {
+        bail!("{}: no labels by `{name}`; there are some by {}", path.display(), listed(&names));
+    }
+    acts.retain(|record| record.annotator == name);
+    Ok(acts)
+}
+
+/// Names for a message.
+pub(super) fn listed(names: &[&str]) -> String {
+    if names.is_empty() {
+        return "nobody".into();
+    }
+    names.iter().map(|name| if name.is_empty() { "(no name)" } else { name }).collect::<Vec<_>>().join(", ")
+}
+
+/// `1 frame`, `2 frames`.
+pub(super) fn counted(count: usize, one: &str) -> String {
+    format!("{count} {one}{}", if count == 1 { "" } else { "s" })
+}
