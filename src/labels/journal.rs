@@ -101,14 +101,13 @@ impl Journal {
         changes: &[(FrameId, Change)],
         judged: &Judged,
     ) -> Result<Vec<Outcome>, LabelError> {
-        if changes.is_empty() {
+        if changes.iter().all(|(_, change)| *change == Change::default()) {
             return Ok(Vec::new());
         }
         let file = self.lock()?;
         self.catch_up(Some(&file))?;
         let outcomes = self.outcomes(act, changes, judged);
         self.append(&file, &outcomes)?;
-        // Where the file is a device, nothing of it can be read back.
         self.catch_up(Some(&file))?;
         // Closing the file gives the lock back; so does the end of the process, whatever ends it.
         Ok(outcomes)
@@ -161,9 +160,9 @@ impl Journal {
     fn look(&mut self, home: Option<&File>) -> Result<bool, LabelError> {
         let Self { tails, held, annotator, .. } = self;
         for (k, tail) in tails.iter_mut().enumerate() {
-            let sink = |_, record: Record| {
+            let sink = |_, record: Box<Record>| {
                 if record.annotator == *annotator {
-                    fold(held, k, record);
+                    fold(held, k, *record);
                 }
             };
             let found = match home {
