@@ -5,7 +5,7 @@ use super::sets::{SHAPES, Set, cells, file, open};
 use mhp_inspector::dataset::npz::{ArrayView, write_npy};
 use mhp_inspector::dataset::{Dataset, Manifest, Progress};
 use mhp_inspector::study::StudyError;
-use mhp_inspector::study::complexity::{Complexity, ComplexityOptions, compute};
+use mhp_inspector::study::complexity::{Complexity, ComplexityOptions, Stratum, compute};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -26,7 +26,7 @@ fn assert_same(complexity: &Complexity, wanted: &[Option<Row>], what: &str) {
         let got: Option<Row> = got.map(|frame| {
             let s = frame.statistics;
             let statistics = [s.peak_density, s.static_dominance, s.human_saliency];
-            (statistics, frame.hardness, frame.stratum.map(|stratum| stratum.word()))
+            (statistics, frame.hardness, frame.stratum.map(Stratum::word))
         });
         let same = match (&got, want) {
             (Some(got), Some(want)) => {
@@ -130,6 +130,27 @@ fn a_stacked_file_is_one_sequence() {
     let complexity = computed(&dataset, &ComplexityOptions::default());
     let wanted = naive::complexity(&set.frames(), &SHAPES[..1], &ComplexityOptions::default());
     assert_same(&complexity, &wanted, "stacked");
+}
+
+/// What of a stacked file cannot be used fails frame by frame, although many are read at once.
+#[test]
+fn frames_of_a_stacked_file_fail_one_by_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(Set::mixed(&[1], 1).folder().path().join("dataset.toml")).unwrap();
+    let manifest = Manifest::parse(&text.replace("\"plane\"", "\"array\""), Path::new("stack.toml")).unwrap();
+    let path = folder.path().join("stack.npy");
+    let mut stack: Vec<f64> = (0..7 * 72).map(|i| f64::from(i * i % 101)).collect();
+    stack[3 * 72..4 * 72].fill(f64::NAN);
+    write_npy(&path, &ArrayView::f64(&[7, 9, 8], &stack)).unwrap();
+    let dataset = Dataset::open_with_manifest(&path, &manifest, &Progress::new()).unwrap();
+    let complexity = computed(&dataset, &ComplexityOptions::default());
+    assert_eq!(complexity.failures.iter().map(|f| f.0).collect::<Vec<_>>(), [3]);
+    assert!(complexity.failures[0].1.contains("stack.npy: array `array` has no finite cell"));
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() - 8]).unwrap();
+    let complexity = computed(&dataset, &ComplexityOptions::default());
+    assert_eq!((complexity.counts.failed, complexity.frames.len()), (7, 7));
+    assert!(complexity.failures.iter().all(|f| f.1.contains("stack.npy: array `array`")), "{:?}", complexity.failures);
 }
 
 fn reference(name: &str) -> Vec<Option<Row>> {

@@ -11,7 +11,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 /// Far longer than anything here takes; a test that waits this long has failed.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 fn start(dataset: &Arc<Dataset>, cache: Option<&Path>) -> (ComplexityJob, Receiver<()>) {
     let (sender, woken) = channel();

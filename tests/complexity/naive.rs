@@ -28,9 +28,9 @@ fn are_neighbours(shape: &[usize], a: usize, b: usize) -> bool {
     a != b && coordinates(shape, a).iter().zip(coordinates(shape, b)).all(|(x, y)| (x - y).abs() <= 1)
 }
 
-pub(crate) fn fill(map: &mut Vec<f64>, shape: &[usize]) {
+pub(crate) fn fill(map: &mut [f64], shape: &[usize]) {
     while map.iter().any(|x| !x.is_finite()) {
-        let before = map.clone();
+        let before = map.to_vec();
         for cell in 0..map.len() {
             let around: Vec<f64> = (0..map.len())
                 .filter(|&b| are_neighbours(shape, cell, b))
@@ -56,15 +56,16 @@ fn mean(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
+/// Sequence and maps; `None` where the frame cannot be read.
+pub(crate) type Maps = Option<(usize, Vec<Vec<f64>>)>;
+
 /// `frames`: sequence and maps of each frame, `None` where it cannot be read. `None` in, `None` out.
-pub(crate) fn complexity(
-    frames: &[Option<(usize, Vec<Vec<f64>>)>],
-    shapes: &[&[usize]],
-    options: &ComplexityOptions,
-) -> Vec<Option<Row>> {
+pub(crate) fn complexity(frames: &[Maps], shapes: &[&[usize]], options: &ComplexityOptions) -> Vec<Option<Row>> {
     let mut frames = frames.to_vec();
     for (_, maps) in frames.iter_mut().flatten() {
-        maps.iter_mut().zip(shapes).for_each(|(map, shape)| fill(map, shape));
+        for (map, shape) in maps.iter_mut().zip(shapes) {
+            fill(map, shape);
+        }
     }
     let above = |map: &[f64], percent: f64| {
         let limit = percentile(map, 100.0 - percent);

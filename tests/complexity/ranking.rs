@@ -66,7 +66,7 @@ proptest! {
         prop_assert_eq!(counts.easy + counts.medium + counts.hard, n);
         prop_assert_eq!(counts.unranked + counts.failed, all.len() - n);
         // With numpy's percentile at least ⌊(n − 1)/3⌋ + 1 frames lie at or below the first bound.
-        prop_assert!(n == 0 || counts.easy > (n - 1) / 3 || (n - 1) % 3 == 0 && counts.easy >= (n - 1) / 3);
+        prop_assert!(n == 0 || counts.easy > (n - 1) / 3 || (n - 1).is_multiple_of(3) && counts.easy >= (n - 1) / 3);
         prop_assert!(counts.hard <= n.div_ceil(3));
     }
 

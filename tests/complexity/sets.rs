@@ -1,5 +1,6 @@
 //! Small data sets with everything in them that is awkward.
 
+use super::naive::Maps;
 use mhp_inspector::dataset::npz::{ArrayView, write};
 use mhp_inspector::dataset::{Dataset, Progress};
 use std::path::{Path, PathBuf};
@@ -58,7 +59,7 @@ impl Set {
     }
 
     /// For the other implementation: the maps of each frame and its sequence.
-    pub(crate) fn frames(&self) -> Vec<Option<(usize, Vec<Vec<f64>>)>> {
+    pub(crate) fn frames(&self) -> Vec<Maps> {
         let frames = self.sequences.iter().enumerate();
         frames.flat_map(|(s, frames)| frames.iter().map(move |maps| Some((s, maps[..self.views].to_vec())))).collect()
     }
