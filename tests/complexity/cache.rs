@@ -155,7 +155,8 @@ fn a_damaged_cache_is_ignored_and_replaced() {
         bytes[at] ^= 0x40;
         bytes
     };
-    let middle = whole.windows(8).position(|bytes| bytes == kept_number(&kept).to_le_bytes()).unwrap();
+    let number = kept_number(&kept).to_le_bytes();
+    let middle = whole.windows(8).position(|bytes| bytes == number).unwrap();
     for bytes in [vec![], b"text".to_vec(), whole[..whole.len() / 2].to_vec(), flipped(middle)] {
         std::fs::write(&path, bytes).unwrap();
         assert_eq!(kept.compute().scanned, 9);

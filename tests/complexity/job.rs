@@ -1,10 +1,10 @@
-//! Beside the window: the answer, progress, cancel and what is left of a cancelled scan, a large tree.
+//! Beside the window: the answer, progress, cancel; a large tree.
 
 use super::sets::{Set, open};
 use super::tree::tree;
 use mhp_inspector::dataset::{Dataset, Progress};
 use mhp_inspector::study::StudyError;
-use mhp_inspector::study::complexity::{Complexity, ComplexityJob, ComplexityOptions, cached_share, compute};
+use mhp_inspector::study::complexity::{Complexity, ComplexityJob, ComplexityOptions, compute};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -55,32 +55,6 @@ fn a_cancelled_job_says_so_and_a_dropped_one_stops() {
     let told = job.progress().clone();
     drop(job);
     assert!(told.is_cancelled());
-}
-
-#[test]
-fn a_cancelled_scan_goes_on_where_it_stopped() {
-    let (folder, home) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    tree(folder.path(), 4000, 4);
-    let dataset = Arc::new(open(folder.path()));
-    let (mut job, woken) = start(&dataset, Some(home.path()));
-    let begun = Instant::now();
-    loop {
-        let state = job.progress().state();
-        if state.stage == "measuring maps" && state.done >= 100 {
-            break;
-        }
-        assert!(begun.elapsed() < PATIENCE);
-        std::thread::yield_now();
-    }
-    job.cancel();
-    assert!(matches!(wait(&mut job, &woken), Err(StudyError::Cancelled)), "4000 frames take longer than a look at one");
-    let kept = cached_share(&dataset, &ComplexityOptions::default(), Some(home.path())) * 4000.0;
-    assert!((100.0..4000.0).contains(&kept), "{kept}");
-    let (mut job, woken) = start(&dataset, Some(home.path()));
-    let resumed = wait(&mut job, &woken).unwrap();
-    assert_eq!(resumed.scanned, 4000 - kept.round() as usize);
-    let whole = compute(&dataset, &ComplexityOptions::default(), None, &Progress::new()).unwrap();
-    assert_eq!(resumed.frames, whole.frames);
 }
 
 /// `cargo test --release --test complexity -- --ignored --nocapture` measures; MHP_TREE_OUT keeps the tree.
