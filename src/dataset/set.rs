@@ -285,7 +285,8 @@ impl Dataset {
                 hash.update(self.frame_name(frame));
                 hash.update("\n");
             }
-            hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+            let digest: [u8; 32] = hash.finalize().into();
+            format!("{:016x}", digest.first_chunk().map_or(0, |first| u64::from_be_bytes(*first)))
         })
     }
 

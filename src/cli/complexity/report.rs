@@ -11,6 +11,9 @@ use std::path::Path;
 /// Frames in the list of the hardest.
 const HARDEST: usize = 10;
 
+/// A number of a frame.
+type Column = fn(&FrameComplexity) -> Option<f64>;
+
 /// One frame, as JSON and CSV name it.
 #[derive(Serialize)]
 struct Row {
@@ -66,7 +69,9 @@ pub(super) fn write_csv(file: &Path, dataset: &Dataset, complexity: &Complexity)
 /// Counts, quantiles and the hardest frames, for people.
 pub(super) fn summary(dataset: &Dataset, complexity: &Complexity) -> String {
     let counts = &complexity.counts;
-    let mut text = format!("{}: {} frames in {} sequences\n", dataset.info().name, dataset.len(), dataset.sequences());
+    let counted = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+    let (frames, sequences) = (counted(dataset.len(), "frame"), counted(dataset.sequences(), "sequence"));
+    let mut text = format!("{}: {frames} in {sequences}\n", dataset.info().name);
     for stratum in Stratum::ALL {
         let _ = writeln!(text, "  {:<12}{:>8}", stratum.word(), counts.in_stratum(stratum));
     }
@@ -76,7 +81,7 @@ pub(super) fn summary(dataset: &Dataset, complexity: &Complexity) -> String {
         }
     }
     let _ = writeln!(text, "\n{:<18}{}  defined", "", ["min", "25 %", "median", "75 %", "max"].map(right).concat());
-    let columns: [(&str, fn(&FrameComplexity) -> Option<f64>); 4] = [
+    let columns: [(&str, Column); 4] = [
         ("peak_density", |frame| frame.statistics.peak_density),
         ("static_dominance", |frame| frame.statistics.static_dominance),
         ("human_saliency", |frame| frame.statistics.human_saliency),

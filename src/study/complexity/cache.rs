@@ -64,8 +64,9 @@ impl CacheFile {
             "tau_pct": options.tau_pct,
         });
         let head = head.to_string();
-        let name: String = Sha256::digest(&head).iter().take(8).map(|byte| format!("{byte:02x}")).collect();
-        Self { path: folder.join(format!("{name}.npz")), head }
+        let digest: [u8; 32] = Sha256::digest(&head).into();
+        let name = digest.first_chunk().map_or(0, |first| u64::from_be_bytes(*first));
+        Self { path: folder.join(format!("{name:016x}.npz")), head }
     }
 
     /// How many frames it holds, from the headers alone.

@@ -125,3 +125,44 @@ impl Found {
         self.kept_at = Instant::now();
     }
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+mod tests {
+    use super::super::cached_share;
+    use super::*;
+    use crate::dataset::npz::{ArrayView, write};
+
+    const FRAMES: usize = 400;
+    const MANIFEST: &str = "layout = \"npz\"\nframes = \"*.npz\"\nskeleton = \"coco17\"\n[[view]]\narray = \"hm\"\n\
+        psf = { range_m = 0.1, azimuth_rad = 0.1, elevation_rad = 0.0, doppler_mps = 0.1 }\n\
+        axes = [ { kind = \"depth_h\", bins = 4, lo = 4.0, hi = 0.0 }, { kind = \"y\", bins = 5, lo = 2.0, hi = -2.0 } ]";
+
+    #[test]
+    fn a_cancelled_scan_goes_on_where_it_stopped() {
+        let (folder, home) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        std::fs::write(folder.path().join("dataset.toml"), MANIFEST).unwrap();
+        for k in 0..FRAMES {
+            let map: Vec<f64> = (0..20).map(|cell| ((cell * 7 + k * 13) % 31) as f64).collect();
+            let file = folder.path().join(format!("{k:04}.npz"));
+            write(&file, &[("hm", ArrayView::f64(&[4, 5], &map))]).unwrap();
+        }
+        let dataset = Dataset::open(folder.path(), &Progress::new()).unwrap();
+        let (options, cache) = (ComplexityOptions::default(), Some(home.path()));
+        let (progress, mut seen) = (Progress::new(), 0);
+        let cancelled = compute_telling(&dataset, &options, cache, &progress, |_| {
+            seen += 1;
+            if seen == 100 {
+                progress.cancel();
+            }
+        });
+        assert!(matches!(cancelled, Err(StudyError::Cancelled)), "few results wait, so that the threads stop soon");
+        assert!((100..FRAMES).contains(&seen), "{seen}");
+        let kept = cached_share(&dataset, &options, cache) * FRAMES as f64;
+        assert_eq!(kept.round() as usize, seen, "all that was measured is kept");
+        let mut read = 0;
+        let resumed = compute_telling(&dataset, &options, cache, &Progress::new(), |_| read += 1).unwrap();
+        assert_eq!((resumed.scanned, read), (FRAMES - seen, FRAMES - seen));
+        assert_eq!(resumed.frames, compute(&dataset, &options, None, &Progress::new()).unwrap().frames);
+    }
+}

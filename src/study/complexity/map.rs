@@ -166,7 +166,9 @@ mod tests {
     fn the_sum_does_not_depend_on_the_order_and_does_not_overflow() {
         let sum = |terms: &[f64]| {
             let mut sum = Sum::default();
-            terms.iter().for_each(|&x| sum.add(x));
+            for &x in terms {
+                sum.add(x);
+            }
             sum.value()
         };
         assert_eq!(sum(&[1e16, 1.0, -1e16]), 1.0);
