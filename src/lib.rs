@@ -32,7 +32,7 @@
 //! | [`cli`] | one file a subcommand |
 //! | [`session`] | the state behind the window and the only function that changes it |
 //! | [`worker`] | the thread that runs a fit, and its protocol |
-//! | [`study`] | batch runs and their tables |
+//! | [`study`] | batch runs and their tables; which frames are hard |
 //! | [`labels`] | tags, notes, verdicts, the journal that keeps them, agreement |
 //! | [`diagnose`] | metrics: MAJPE, PA-MAJPE; evidence for each failure mode |
 //! | [`mhp`] | initialisation, forward model, objective, Adam, convergence, the fitter's one `step` |
