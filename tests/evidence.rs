@@ -316,11 +316,8 @@ fn f2_is_one_half_at_the_fraunhofer_distance_of_an_even_array() {
     assert!((found.score.unwrap() - 0.5).abs() < 2e-3, "{found:?}");
     assert_eq!(found.findings[0].place, Some(Place::Joint(0)), "the nearest joint");
     assert!(found.summary.contains("1.00 of its far field's beginning"), "{}", found.summary);
-    assert!(
-        has(found, "a wave from there") || has(found, "A wave from there is 22° off") || has(found, "23° off"),
-        "{found:?}"
-    );
-    assert!(has(found, "narrower than the array itself") == (fraunhofer * 0.435 > fraunhofer), "{found:?}");
+    // 22.5° at the Fraunhofer distance: rounded either way.
+    assert!(has(found, "A wave from there is 22° off") || has(found, "A wave from there is 23° off"), "{found:?}");
 }
 
 #[test]
@@ -346,8 +343,10 @@ fn f3_falls_as_two_people_part() {
     assert!(apart(0.0) > 0.999, "{}", apart(0.0));
     let scores: Vec<f64> = (0..=20).map(|k| apart(0.1 * f64::from(k))).collect();
     assert!(scores.windows(2).all(|pair| pair[1] <= pair[0] + 1e-12), "{scores:?}");
-    // Beside each other they share the vertical map still; one behind the other they share nothing.
-    assert!(scores[2] > 0.8 && scores[20] < 0.6, "{scores:?}");
+    assert!(scores[2] > 0.5 && scores[20] < 0.01, "{scores:?}");
+    // Beside each other they still share the vertical map, and the findings say so.
+    let beside = &at(cartesian(), people(&[[3.0, -1.0], [3.0, 1.0]])).judge()[2];
+    assert!(has(beside, "`vert`: they share 100 % of their echo") || has(beside, "`vert`: they share 9"), "{beside:?}");
     let behind = score(&at(cartesian(), people(&[[2.0, 0.0], [4.5, 0.8]])), 2);
     assert!(behind < 0.05, "{behind}");
 }
@@ -414,7 +413,8 @@ fn f4_without_doppler_looks_at_the_change_of_the_map() {
     assert!(still.score.unwrap() > 0.9 && moved.score.unwrap() < 0.3, "{still:?} {moved:?}");
     let scores: Vec<f64> = (0..=6).map(|k| score(&walk(2, 0.025 * f64::from(k), 0.5), 3)).collect();
     assert!(scores.windows(2).all(|pair| pair[1] <= pair[0]), "{scores:?}");
-    let change = moved.findings.iter().find(|f| f.text.contains("the rest of the map (median) by")).unwrap();
+    let change =
+        moved.findings.iter().find(|f| f.text.contains("times as much a cell as the rest of the map")).unwrap();
     assert_eq!(change.place, Some(Place::Frame(40)));
     assert!(has(moved, "No axis of these maps measures velocity") && has(moved, "λ/(2 T_frame) = 0.15 m/s"));
     let alone = &walk(1, 0.0, 0.5).judge()[3];
@@ -427,7 +427,7 @@ fn f4_has_no_score_where_nothing_lies_outside_the_region() {
     let mut scene = walk(2, 0.1, 0.5);
     scene.config.em_region = EmRegion::Full;
     let found = &scene.judge()[3];
-    assert_eq!(found.score, None, "{found:?}");
+    assert_eq!((found.score, found.summary.contains("the whole map")), (None, true), "{found:?}");
 }
 
 #[test]

@@ -26,7 +26,7 @@ Scores go from 0 (nothing speaks for the mode) to 1; `-` (null in JSON, empty in
 text says why. They order frames for a person to judge; they are no probabilities.
   F1  share of H_ori's mask that is bright in each of the last 5 frames, mean over the views.
   F2  1/(1 + (r/d_F)^2): r the nearest joint's range, d_F = 2D^2/lambda the array's Fraunhofer distance.
-  F3  share of the simulated echo that two persons have in common; 0 with one person.
+  F3  share of the simulated echo that two persons have in common, in the view that parts them best; 0 with one person.
   F4  1/(1 + u^2): u the joints' radial velocity in Doppler cells, or where no axis measures it how many times as
       much as the rest of the map the EM region changed since the frame before, less one.
 

@@ -47,12 +47,15 @@ pub(super) fn judge(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Evidence {
         let summary = "It needs a Doppler axis or the frame before this one in the sequence.".to_owned();
         return Evidence { mode: Tag::F4, score: None, summary, findings: velocity.into_iter().collect() };
     };
-    let summary = format!(
-        "Since the frame before, the EM region changed {} in the view that shows motion best.",
-        times(change.ratio)
-    );
+    let summary = match change.ratio {
+        Some(ratio) => {
+            format!("Since the frame before, the EM region changed {} in the view that shows it best.", times(ratio))
+        }
+        None => "The EM region is the whole map: there is no rest to compare its change with.".to_owned(),
+    };
+    let score = change.ratio.map(|ratio| falling((ratio - 1.0).max(0.0)));
     let findings = change.findings.into_iter().chain(velocity).collect();
-    Evidence { mode: Tag::F4, score: Some(change.score), summary, findings }
+    Evidence { mode: Tag::F4, score, summary, findings }
 }
 
 /// What a view with a Doppler axis says.
@@ -105,33 +108,28 @@ fn fitted_velocity(input: &EvidenceInput<'_>) -> Option<Finding> {
 
 /// The change since the frame before.
 struct Change {
-    score: f64,
-    /// c/c₀ of the view with the lowest score.
-    ratio: f64,
+    /// The highest c/c₀ of the views; `None` where no view has cells inside and outside the EM region.
+    ratio: Option<f64>,
     findings: Vec<Finding>,
 }
 
-/// `None` without a frame before, or where no view has cells inside and outside the EM region.
+/// `None` without a frame before.
 fn by_change(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Option<Change> {
     let before = past.last()?;
-    let mut best: Option<Change> = None;
-    let mut findings = Vec::new();
+    let mut change = Change { ratio: None, findings: Vec::new() };
     for (index, view) in input.problem.views.iter().enumerate() {
         let found = masks_of(input, index).zip(before.maps.get(index)).and_then(|(masks, old)| {
             view_change(index, view, input.problem.map(index), old, &masks.inside, before.index)
         });
         let Some((ratio, told)) = found else {
             let text = format!("`{}`: the EM region is the whole map; there is no rest to compare with.", view.array);
-            findings.push(Finding::new(text, None));
+            change.findings.push(Finding::new(text, None));
             continue;
         };
-        findings.extend(told);
-        let score = falling((ratio - 1.0).max(0.0));
-        if best.as_ref().is_none_or(|best| score < best.score) {
-            best = Some(Change { score, ratio, findings: Vec::new() });
-        }
+        change.findings.extend(told);
+        change.ratio = Some(change.ratio.map_or(ratio, |highest: f64| highest.max(ratio)));
     }
-    best.map(|best| Change { findings, ..best })
+    Some(change)
 }
 
 /// c/c₀ of one view (infinite where the rest did not change at all and the region did), and what to say of it.
@@ -153,15 +151,13 @@ fn view_change(
         return None;
     }
     let (change, floor) = (mean(within)?, percentile(&around, 50.0));
-    let level = mean(new.iter().zip(inside).filter(|(_, inside)| **inside).map(|(h, _)| h.abs() / 2.0))?;
+    let sums = new.iter().zip(old).map(|(new, old)| new.abs() / 2.0 + old.abs() / 2.0);
+    let level = mean(sums.zip(inside).filter(|(_, inside)| **inside).map(|(sum, _)| sum))?;
     let ratio = if change == 0.0 { 0.0 } else { change / floor };
-    let of_level = |x: f64| if level > 0.0 { percent(x / level) } else { "0 %".to_owned() };
     let text = format!(
-        "`{}`: since the frame before, the EM region changed by {} of its mean level, the rest of the map (median) by {} of that \
-         level: {}.",
+        "`{}`: since the frame before, the EM region changed by {} (Σ|H − H'|/Σ(H + H')), {}.",
         view.array,
-        of_level(change),
-        of_level(floor),
+        percent(if level > 0.0 { change / level } else { 0.0 }),
         times(ratio)
     );
     let mut findings = vec![Finding::new(text, Some(Place::Frame(before)))];
@@ -187,8 +183,8 @@ fn where_it_changed(index: usize, view: &View, changes: &[f64], inside: &[bool])
 
 fn times(ratio: f64) -> String {
     if ratio.is_finite() {
-        format!("{ratio:.1} times as much as the rest")
+        format!("{ratio:.1} times as much a cell as the rest of the map")
     } else {
-        "while the rest did not".to_owned()
+        "while the rest of the map did not".to_owned()
     }
 }

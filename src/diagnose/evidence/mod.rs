@@ -2,7 +2,7 @@
 //!
 //! [`evidence`] is a pure function of one fitted frame and the frames before it. Each mode has a file and a score that
 //! rises with what speaks for the mode; every score says its formula in its file's head and in its findings. A score is
-//! none of a probability: it orders frames, and a person judges them.
+//! no probability: it orders frames, and a person judges them.
 
 mod cells;
 mod low_motion;

@@ -4,9 +4,10 @@
 //! they are. With p and q the two maps, each divided by its sum (a near person must not hide that a far one is covered):
 //!
 //! ```text
-//! score = the highest, over pairs of persons, of the mean over views of Σ min(p, q)
+//! score = the highest, over pairs of persons, of the lowest, over views that show both, of Σ min(p, q)
 //! ```
 //!
+//! The lowest, because one view that keeps two people apart is enough to tell them apart; the findings have every view.
 //! Σ min(p, q) is 1 for equal maps, 0 for maps with no common cell, and one minus their total variation distance; it falls
 //! as the two part. Where the data set annotates more people than are fitted, the labelled boxes on the maps stand in, with
 //! the common part of two boxes as a share of the smaller one. One person alone scores 0.
@@ -14,7 +15,7 @@
 use super::cells::{members, place};
 use super::resolution::{FWHM, Resolution};
 use super::words::{cell_box, length, percent};
-use super::{Evidence, EvidenceInput, Finding, Place, mean};
+use super::{Evidence, EvidenceInput, Finding, Place};
 use crate::body::{Group, Pppr, PpprShape};
 use crate::config::{FitConfig, Summation};
 use crate::geometry::{Vec3, add, norm, scale, sub};
@@ -66,10 +67,10 @@ fn by_boxes(input: &EvidenceInput<'_>, fitted: usize, annotated: usize) -> Judge
     let views = input.problem.views.iter().zip(input.annotated.map_boxes).enumerate();
     let pairs: Vec<(f64, Finding)> = views.filter_map(|(k, (view, boxes))| closest_boxes(k, view, boxes)).collect();
     let count = format!("{annotated} people are annotated and {fitted} fitted");
-    let Some(score) = mean(pairs.iter().map(|pair| pair.0)) else {
+    let Some(score) = pairs.iter().map(|pair| pair.0).min_by(f64::total_cmp) else {
         return (None, format!("{count}: how much their echoes overlap is unknown."), Vec::new());
     };
-    let summary = format!("{count}: their labelled boxes on the maps share {}.", percent(score));
+    let summary = format!("{count}: in the view that parts them best, two labelled boxes share {}.", percent(score));
     (Some(score), summary, pairs.into_iter().map(|pair| pair.1).collect())
 }
 
@@ -105,14 +106,14 @@ fn by_maps(input: &EvidenceInput<'_>) -> Judged {
     let judged = pairs.filter_map(|(a, b)| {
         let shares: Vec<Option<f64>> =
             alone[a].iter().zip(&alone[b]).map(|(p, q)| common(p.as_ref()?, q.as_ref()?)).collect();
-        Some((mean(shares.iter().copied().flatten())?, a, b, shares))
+        Some((shares.iter().copied().flatten().min_by(f64::total_cmp)?, a, b, shares))
     });
     let Some((score, a, b, shares)) = judged.max_by(|x, y| x.0.total_cmp(&y.0)) else {
         return (None, "No view shows the echoes of two of the fitted people.".to_owned(), Vec::new());
     };
     let apart_m = norm(sub(centre(input.params, a), centre(input.params, b)));
     let pair = format!("Persons {} and {}, {} apart,", a + 1, b + 1, length(apart_m));
-    let summary = format!("{pair} share {} of their echo on the maps.", percent(score));
+    let summary = format!("{pair} share {} of their echo in the view that parts them best.", percent(score));
     let views = input.problem.views.iter().enumerate().zip(shares);
     let findings = views.map(|((k, view), share)| {
         let apart = apart(view, input.params, a, b);

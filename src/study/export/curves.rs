@@ -29,7 +29,7 @@ pub fn curve_columns(arrays: &[String]) -> Vec<String> {
 /// The table as text, with [`curve_columns`] as its head; an IoU for each of `arrays`. What is unknown or not finite is empty.
 ///
 /// # Errors
-/// None of practice: writing to memory.
+/// Where the table cannot be made in memory.
 pub fn curves_csv<'a>(arrays: &[String], rows: impl IntoIterator<Item = CurveRow<'a>>) -> std::io::Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(curve_columns(arrays))?;
