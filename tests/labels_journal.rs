@@ -6,7 +6,7 @@
 mod labels;
 
 use labels::{Case, commit, frame, name, tags};
-use mhp_inspector::labels::{Change, Journal, Judged, Label, LabelStore, Record, Tag, Tags, read_journal};
+use mhp_inspector::labels::{Change, Journal, Judged, Label, LabelStore, Record, Tag, read_journal};
 use rand::rngs::StdRng;
 use rand::{Rng as _, SeedableRng as _};
 use serde_json::{Value, json};

@@ -200,9 +200,9 @@ impl Journal {
     fn look(&mut self, home: Option<&File>) -> Result<bool, LabelError> {
         let Self { tails, held, annotator, .. } = self;
         for (k, tail) in tails.iter_mut().enumerate() {
-            let sink = |_, record: Record| {
+            let sink = |_, record: Box<Record>| {
                 if record.annotator == *annotator {
-                    fold(held, k, record);
+                    fold(held, k, *record);
                 }
             };
             let found = match home {

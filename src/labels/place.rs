@@ -117,8 +117,8 @@ pub(super) fn file_name(annotator: &str) -> String {
     let word: String = lower.chars().take(24).map(|c| if plain(c) { c } else { '-' }).collect();
     let word = word.trim_matches('-');
     let word = if word.is_empty() || DEVICES.contains(&word) { "annotator" } else { word };
-    let hash: String = Sha256::digest(annotator).iter().take(6).map(|byte| format!("{byte:02x}")).collect();
-    format!("{word}.{hash}{ENDING}")
+    let hash = Sha256::digest(annotator).iter().take(6).fold(0, |hash: u64, &byte| hash << 8 | u64::from(byte));
+    format!("{word}.{hash:012x}{ENDING}")
 }
 
 #[cfg(test)]

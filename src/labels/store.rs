@@ -34,7 +34,8 @@ struct LineAt {
 /// The newest record of a frame.
 #[derive(Debug)]
 struct Slot {
-    record: Record,
+    /// Boxed, because a table of a million frames moves its entries when it grows.
+    record: Box<Record>,
     stamp: Stamp,
     last_line: u32,
 }
@@ -118,7 +119,7 @@ impl LabelStore {
     /// The newest record of each frame, in the order of frames: by index, then by name. Some labels may be empty.
     pub fn records(&self, annotator: &str) -> impl Iterator<Item = &Record> {
         let frames = self.people.get(annotator).into_iter().flat_map(|person| person.frames.values());
-        let mut records: Vec<&Record> = frames.map(|slot| &slot.record).collect();
+        let mut records: Vec<&Record> = frames.map(|slot| &*slot.record).collect();
         records.sort_unstable_by(|a, b| in_frame_order(a, b));
         records.into_iter()
     }
@@ -216,7 +217,7 @@ impl LabelStore {
     }
 }
 
-fn fold(people: &mut BTreeMap<String, Person>, lines: &mut Vec<LineAt>, span: Span, stamp: Stamp, record: Record) {
+fn fold(people: &mut BTreeMap<String, Person>, lines: &mut Vec<LineAt>, span: Span, stamp: Stamp, record: Box<Record>) {
     if !people.contains_key(&record.annotator) {
         people.insert(record.annotator.clone(), Person::default());
     }
@@ -227,17 +228,14 @@ fn fold(people: &mut BTreeMap<String, Person>, lines: &mut Vec<LineAt>, span: Sp
     if let Some(stamp) = stamp.newer_than(person.last.as_ref().map(|last| last.0)) {
         person.last = Some((stamp, record.frame.path.clone()));
     }
-    match slot {
-        Some(slot) => {
-            slot.last_line = number;
-            if let Some(stamp) = stamp.newer_than(Some(slot.stamp)) {
-                (slot.record, slot.stamp) = (record, stamp);
-            }
-        }
-        None => {
-            let path = record.frame.path.clone();
-            person.frames.insert(path, Slot { record, stamp, last_line: number });
-        }
+    let Some(slot) = slot else {
+        let path = record.frame.path.clone();
+        person.frames.insert(path, Slot { record, stamp, last_line: number });
+        return;
+    };
+    slot.last_line = number;
+    if let Some(stamp) = stamp.newer_than(Some(slot.stamp)) {
+        (slot.record, slot.stamp) = (record, stamp);
     }
 }
 
@@ -273,7 +271,7 @@ pub fn read_journal(path: &Path) -> Result<Vec<Record>, LabelError> {
     tail.warnings().for_each(|warning| tracing::warn!("{warning}"));
     let people: BTreeMap<String, Person> = people;
     let slots = people.into_values().flat_map(|person| person.frames.into_values());
-    let mut records: Vec<Record> = slots.map(|slot| slot.record).collect();
+    let mut records: Vec<Record> = slots.map(|slot| *slot.record).collect();
     records.sort_unstable_by(in_frame_order);
     Ok(records)
 }

@@ -112,7 +112,7 @@ impl Tail {
     ///
     /// # Errors
     /// Where the file cannot be read, is of a newer version, or is no journal. A file that is not there has no records.
-    pub(super) fn look(&mut self, sink: impl FnMut(Span, Record)) -> Result<Found, LabelError> {
+    pub(super) fn look(&mut self, sink: impl FnMut(Span, Box<Record>)) -> Result<Found, LabelError> {
         let missing = if self.offset > 0 || self.seen.is_some() { Found::Replaced } else { Found::Same };
         match std::fs::metadata(&self.path) {
             Err(reason) if reason.kind() == ErrorKind::NotFound => return Ok(missing),
@@ -130,7 +130,7 @@ impl Tail {
     ///
     /// # Errors
     /// As [`Self::look`].
-    pub(super) fn look_in(&mut self, file: &File, sink: impl FnMut(Span, Record)) -> Result<Found, LabelError> {
+    pub(super) fn look_in(&mut self, file: &File, sink: impl FnMut(Span, Box<Record>)) -> Result<Found, LabelError> {
         let meta = file.metadata().map_err(|reason| self.unreadable(reason))?;
         if meta.is_dir() {
             return Err(self.unreadable(ErrorKind::IsADirectory.into()));
@@ -165,7 +165,7 @@ impl Tail {
     }
 
     /// Reads from the place of reading, where the file stands, up to `end`: bytes that come later may be half a line.
-    fn read_lines(&mut self, file: &File, end: u64, mut sink: impl FnMut(Span, Record)) -> Result<(), LabelError> {
+    fn read_lines(&mut self, file: &File, end: u64, mut sink: impl FnMut(Span, Box<Record>)) -> Result<(), LabelError> {
         let mut reader = BufReader::with_capacity(1 << 18, file.take(end - self.offset));
         let mut line = Vec::new();
         self.torn = None;
@@ -184,12 +184,12 @@ impl Tail {
         }
     }
 
-    fn take(&mut self, line: &[u8], sink: &mut impl FnMut(Span, Record)) -> Result<(), LabelError> {
+    fn take(&mut self, line: &[u8], sink: &mut impl FnMut(Span, Box<Record>)) -> Result<(), LabelError> {
         let ended = line.ends_with(b"\n");
         match parse(line, &self.path)? {
             Line::Record(record) => {
                 (self.has_record, self.foreign) = (true, None);
-                sink(Span { offset: self.offset, len: line.len() as u32 }, *record);
+                sink(Span { offset: self.offset, len: line.len() as u32 }, record);
             }
             Line::Header => (self.has_header, self.foreign) = (true, None),
             Line::Blank if ended => {}

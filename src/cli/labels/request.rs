@@ -6,6 +6,7 @@ use serde::{Deserialize, Deserializer};
 use std::collections::HashMap;
 
 /// One act on one frame, as a line of `labels tag --from-stdin` says it.
+#[expect(clippy::option_option, reason = "left out, taken back and given are three things to ask for")]
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Request {
@@ -56,6 +57,7 @@ fn name_or_index<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<St
 }
 
 /// A field that is there, perhaps `null`.
+#[expect(clippy::option_option, reason = "left out, taken back and given are three things to ask for")]
 fn or_null<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<Option<Option<T>>, D::Error> {
     Option::deserialize(deserializer).map(Some)
 }
