@@ -282,7 +282,8 @@ impl Dataset {
                 hash.update(self.frame_name(frame));
                 hash.update("\n");
             }
-            hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+            let first = hash.finalize().iter().take(8).fold(0, |first: u64, &byte| first << 8 | u64::from(byte));
+            format!("{first:016x}")
         })
     }
 
