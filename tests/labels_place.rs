@@ -1,5 +1,5 @@
 //! Where labels lie, whose file is whose, and what the program says of them.
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "tests fail by panicking")]
+#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
 #[path = "common/labels.rs"]
 mod labels;
@@ -115,7 +115,9 @@ fn a_journal_that_belongs_to_somebody_else_is_named() {
     let case = Case::new(1);
     let set = |path: &Path, mode: u32| std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode)).unwrap();
     std::fs::create_dir_all(case.home()).unwrap();
-    [case.folder.path(), &case.home(), &case.data()].iter().for_each(|path| set(path, 0o777));
+    for path in [case.folder.path(), &case.home(), &case.data()] {
+        set(path, 0o777);
+    }
     let run = |arguments: &[&str]| {
         let mut command = case.program(arguments);
         if std::fs::metadata("/proc/self").is_ok_and(|meta| meta.uid() == 0) {

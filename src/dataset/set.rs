@@ -285,8 +285,8 @@ impl Dataset {
                 hash.update(self.frame_name(frame));
                 hash.update("\n");
             }
-            let digest: [u8; 32] = hash.finalize().into();
-            format!("{:016x}", digest.first_chunk().map_or(0, |first| u64::from_be_bytes(*first)))
+            let first = hash.finalize().iter().take(8).fold(0, |first: u64, &byte| first << 8 | u64::from(byte));
+            format!("{first:016x}")
         })
     }
 

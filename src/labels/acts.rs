@@ -32,7 +32,7 @@ pub fn read_labels(path: &Path) -> Result<Vec<Record>, TableError> {
 pub fn read_acts(path: &Path) -> Result<Vec<Record>, LabelError> {
     let file = File::open(path).map_err(|reason| LabelError::Read { reason, path: path.to_owned() })?;
     let (mut tail, mut records) = (Tail::new(path.to_owned()), Vec::new());
-    tail.look_in(&file, |_, record| records.push(record))?;
+    tail.look_in(&file, |_, record| records.push(*record))?;
     tail.warnings().for_each(|warning| tracing::warn!("{warning}"));
     Ok(records)
 }
