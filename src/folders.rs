@@ -23,3 +23,9 @@ pub fn user_data() -> Option<PathBuf> {
 pub fn user_cache() -> Option<PathBuf> {
     named().map(|home| home.join("cache")).or_else(|| platform().map(|dirs| dirs.cache_dir().to_owned()))
 }
+
+/// What the operating system calls the user; `annotator` where it does not say.
+pub fn user_name() -> String {
+    let named = ["USER", "LOGNAME", "USERNAME"].into_iter().filter_map(|name| std::env::var(name).ok());
+    named.map(|name| name.trim().to_owned()).find(|name| !name.is_empty()).unwrap_or_else(|| "annotator".into())
+}

@@ -17,7 +17,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("dataset", &["geometry", "folders", "config", "radar", "body"]),
     ("render", &["geometry"]),
     ("worker", &["geometry", "config", "radar", "body", "mhp", "dataset"]),
-    ("study", &["geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose"]),
+    ("study", &["geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels"]),
     (
         "session",
         &["geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels", "study", "worker"],
@@ -112,7 +112,7 @@ fn every_room_uses_only_what_lies_below_it() {
         let Some((_, below)) = MAY_USE.iter().find(|(name, _)| *name == room) else { continue };
         seen.insert(room.clone());
         for used in used_rooms(&code(&path)) {
-            let known = MAY_USE.iter().any(|(name, _)| *name == used) || ["cli", "labels", "people"].contains(&&*used);
+            let known = MAY_USE.iter().any(|(name, _)| *name == used) || ["cli", "people"].contains(&&*used);
             if known && used != room && !below.contains(&used.as_str()) {
                 wrong.push(format!("{} uses {used}", path.display()));
             }

@@ -25,7 +25,7 @@ fn open(path: &Path) -> Result<Dataset, DatasetError> {
 }
 
 fn names(dataset: &Dataset) -> Vec<String> {
-    (0..dataset.len()).map(|i| dataset.frame_name(i)).collect()
+    (0..dataset.len()).map(|i| dataset.frame_name(i).to_owned()).collect()
 }
 
 /// A frame of MMVR as its authors write it, without companions.
@@ -42,7 +42,7 @@ fn the_real_mmvr_frame_is_read_as_measured() {
     let dataset = open(&shared.join("data/mmvr/00383_radar.npz")).unwrap();
     let info = dataset.info();
     assert_eq!((info.layout, dataset.len(), dataset.start_index()), (Layout::Mmvr, 1, 0));
-    assert_eq!((dataset.frame_name(0).as_str(), dataset.sequence(0)), ("mmvr/00383", "mmvr"));
+    assert_eq!((dataset.frame_name(0), dataset.sequence(0)), ("mmvr/00383", "mmvr"));
     assert_eq!(
         info.axes_badge,
         "Cartesian · rows: depth 8→0 m, row 0 far · columns: y 1→−4 m from left to right (hm_hori), z −2…3 m up (hm_vert)"
@@ -131,7 +131,7 @@ fn an_mmvr_tree_opens_at_any_depth_in_natural_order() {
     assert_eq!(names(&dataset), ["d9s1/001/00002", "d9s1/001/00010", "d10s1/000/00001", "d11s1/000/00000"]);
     assert_eq!((dataset.sequences(), dataset.sequence(1), dataset.sequence(2)), (3, "d9s1/001", "d10s1/000"));
     assert_eq!(dataset.frame_path(2), root.join("P1/d10s1/000/00001_radar.npz"));
-    assert_eq!((dataset.frame_name(4), dataset.sequence(4)), (String::new(), "MMVR"));
+    assert_eq!((dataset.frame_name(4), dataset.sequence(4)), ("", "MMVR"));
     assert!(matches!(dataset.load(4), Err(DatasetError::NoSuchFrame { index: 4, count: 4, .. })));
 
     assert_eq!(open(&root.join("P1")).unwrap().len(), 3);
@@ -283,10 +283,7 @@ fn a_bare_file_asks_once_and_is_remembered() {
     choice.frame_rate_hz = Some(20.0);
     choice.views[0].axes[1].lo = 0.3;
     let dataset = Dataset::open_bare_remembering(&path, &choice, Some(&remembered)).unwrap();
-    assert_eq!(
-        (dataset.len(), dataset.info().layout, dataset.frame_name(1).as_str()),
-        (2, Layout::Bare, "maps/000001")
-    );
+    assert_eq!((dataset.len(), dataset.info().layout, dataset.frame_name(1)), (2, Layout::Bare, "maps/000001"));
     let frame = dataset.load(1).unwrap();
     assert_eq!((frame.maps[1].shape.as_slice(), frame.maps[1].data[0]), ([6, 4].as_slice(), 24.0));
     assert_eq!(frame.timestamp_s, Some(0.05));

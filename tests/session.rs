@@ -48,8 +48,20 @@ impl Bench {
         bench
     }
 
+    /// What follows for data and fit; labels, strata and evidence are tested elsewhere.
     fn apply(&mut self, command: Command) -> Vec<Effect> {
-        self.session.apply(command)
+        let mut effects = self.session.apply(command);
+        effects.retain(|effect| {
+            !matches!(
+                effect,
+                Effect::OpenLabels { .. }
+                    | Effect::RefreshLabels
+                    | Effect::ComputeStrata { .. }
+                    | Effect::CancelStrata
+                    | Effect::Evidence(_)
+            )
+        });
+        effects
     }
 
     /// The frame that was asked for arrives; answers what the worker is told.

@@ -9,7 +9,7 @@ use egui::{Key, Modifiers, Role, pos2};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use egui_kittest::{Harness, Node};
 use mhp_inspector::app::InspectorApp;
-use mhp_inspector::session::{Compare, Fit, FitStatus, Session, ThemeChoice};
+use mhp_inspector::session::{Command, Compare, Fit, FitStatus, LabelStatus, Session, StrataStatus, ThemeChoice};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -69,6 +69,21 @@ impl Window {
             let frame = w.session().data.frame.as_ref().map(|frame| frame.index);
             let shown = w.fit().shown.as_ref().map(|shown| shown.iteration);
             frame == Some(index) && w.fit().is_ready() && shown == Some(w.fit().head())
+        });
+    }
+
+    fn apply(&mut self, command: Command) {
+        self.harness.state_mut().apply(command);
+    }
+
+    /// The frames are graded, the journals are open, the evidence is that of the fit on screen.
+    fn at_rest(&mut self) {
+        self.until("strata, labels and evidence", |w| {
+            let session = w.session();
+            session.strata.status == StrataStatus::Ready
+                && session.labels.status == LabelStatus::Ready
+                && session.evidence_of(session.data.frame_index).is_some()
+                && !session.evidence_is_stale()
         });
     }
 
@@ -580,6 +595,7 @@ fn picture(theme: ThemeChoice, name: &str) {
         .wgpu()
         .build_eframe(|cc| InspectorApp::new(cc, &paths));
     let mut window = Window { harness, folder };
+    window.apply(Command::SetAnnotator("ada".into()));
     window.ready(0);
     if theme == ThemeChoice::Light {
         window.key_with(Modifiers::COMMAND, Key::T);
@@ -587,6 +603,7 @@ fn picture(theme: ThemeChoice, name: &str) {
     window.key_with(Modifiers::SHIFT, Key::Period);
     window.paused_at(10);
     assert_eq!(window.session().view.theme, theme);
+    window.at_rest();
     window.harness.remove_cursor();
     window.harness.run_steps(20);
     // Times differ from run to run, and what is beside them on the bar moves with their width.

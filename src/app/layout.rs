@@ -30,6 +30,14 @@ pub enum PaneKind {
     Image,
     /// The log.
     Log,
+    /// Tags, notes and evidence.
+    Modes,
+    /// Pinned fits.
+    Compare,
+    /// How far annotators agree.
+    Agreement,
+    /// Counts of labels.
+    Statistics,
 }
 
 impl PaneKind {
@@ -46,6 +54,10 @@ impl PaneKind {
             Self::Joint => "Joint",
             Self::Image => "Image plane",
             Self::Log => "Log",
+            Self::Modes => "Failure modes",
+            Self::Compare => "Compare",
+            Self::Agreement => "Agreement",
+            Self::Statistics => "Statistics",
         }
     }
 }
@@ -53,6 +65,8 @@ impl PaneKind {
 /// The tree of tiles.
 pub(crate) struct Layout {
     tree: Tree<PaneKind>,
+    /// A pane whose tab was right-clicked, and what was chosen.
+    asked: Option<PaneKind>,
 }
 
 impl Default for Layout {
@@ -66,15 +80,19 @@ impl Default for Layout {
         let scene = tabs(&mut tiles, vec![scene, image]);
         let curves = tiles.insert_pane(PaneKind::Curves);
         let log = tiles.insert_pane(PaneKind::Log);
-        let curves = tabs(&mut tiles, vec![curves, log]);
+        let [compare, agreement, statistics] =
+            [PaneKind::Compare, PaneKind::Agreement, PaneKind::Statistics].map(|pane| tiles.insert_pane(pane));
+        let curves = tabs(&mut tiles, vec![curves, compare, agreement, statistics, log]);
         let below = linear(&mut tiles, LinearDir::Horizontal, &[(scene, 1.0), (curves, 1.0)]);
         let middle = linear(&mut tiles, LinearDir::Vertical, &[(maps, 1.12), (below, 1.0)]);
         let frames = tiles.insert_pane(PaneKind::Frames);
         let fit = tiles.insert_pane(PaneKind::Fit);
         let joint = tiles.insert_pane(PaneKind::Joint);
-        let right = linear(&mut tiles, LinearDir::Vertical, &[(fit, 1.5), (joint, 1.0)]);
-        let root = linear(&mut tiles, LinearDir::Horizontal, &[(frames, 0.17), (middle, 0.62), (right, 0.25)]);
-        Self { tree: Tree::new(egui::Id::unique("panes"), root, tiles) }
+        let modes = tiles.insert_pane(PaneKind::Modes);
+        let fit = tabs(&mut tiles, vec![fit, joint]);
+        let right = linear(&mut tiles, LinearDir::Vertical, &[(fit, 1.0), (modes, 1.25)]);
+        let root = linear(&mut tiles, LinearDir::Horizontal, &[(frames, 0.235), (middle, 0.6), (right, 0.25)]);
+        Self { tree: Tree::new(egui::Id::unique("panes"), root, tiles), asked: None }
     }
 }
 
@@ -94,7 +112,7 @@ impl Layout {
     /// A stored tree; one without a single pane is replaced by the default.
     pub(crate) fn restored(tree: Tree<PaneKind>) -> Self {
         if tree.root().is_some() && tree.tiles.iter().any(|(_, tile)| matches!(tile, Tile::Pane(_))) {
-            Self { tree }
+            Self { tree, asked: None }
         } else {
             Self::default()
         }
@@ -105,11 +123,27 @@ impl Layout {
         &self.tree
     }
 
+    /// Where a pane was drawn in the last pass, points; `None` where it is behind another tab.
+    pub(crate) fn rect(&self, pane: PaneKind) -> Option<egui::Rect> {
+        let (id, _) = self.tree.tiles.iter().find(|(_, tile)| matches!(tile, Tile::Pane(kind) if *kind == pane))?;
+        self.tree.tiles.rect(*id)
+    }
+
+    /// Brings a pane to the front; one that was closed is not brought back.
+    pub(crate) fn show_pane(&mut self, pane: PaneKind) {
+        self.tree.make_active(|_, tile| matches!(tile, Tile::Pane(kind) if *kind == pane));
+    }
+
+    /// The pane of which a picture was asked for on its tab.
+    pub(crate) fn take_asked(&mut self) -> Option<PaneKind> {
+        self.asked.take()
+    }
+
     /// Draws every pane in what is left of the window.
     pub(crate) fn show(&mut self, ui: &mut egui::Ui, shared: &mut Shared<'_>, states: &mut PaneStates) {
         let tokens = Tokens::of(ui);
         egui::CentralPanel::default().frame(egui::Frame::new().fill(tokens.stroke)).show(ui, |ui| {
-            let mut behavior = Behavior { shared, states };
+            let mut behavior = Behavior { shared, states, asked: &mut self.asked };
             self.tree.ui(&mut behavior, ui);
         });
     }
@@ -118,6 +152,7 @@ impl Layout {
 struct Behavior<'a, 'b> {
     shared: &'a mut Shared<'b>,
     states: &'a mut PaneStates,
+    asked: &'a mut Option<PaneKind>,
 }
 
 impl egui_tiles::Behavior<PaneKind> for Behavior<'_, '_> {
@@ -135,6 +170,19 @@ impl egui_tiles::Behavior<PaneKind> for Behavior<'_, '_> {
 
     fn tab_title_for_pane(&mut self, pane: &PaneKind) -> egui::WidgetText {
         egui::RichText::new(pane.title()).font(theme::strong(12.0)).into()
+    }
+
+    fn on_tab_button(&mut self, tiles: &mut Tiles<PaneKind>, tile: TileId, response: egui::Response) -> egui::Response {
+        if let Some(Tile::Pane(pane)) = tiles.get(tile) {
+            response.context_menu(|ui| {
+                let tip = "As it is on screen, without the rest of the window.";
+                if ui.button("Save picture of this pane…").on_hover_text(tip).clicked() {
+                    *self.asked = Some(*pane);
+                    ui.close();
+                }
+            });
+        }
+        response
     }
 
     fn tab_bar_height(&self, _style: &egui::Style) -> f32 {

@@ -1,9 +1,9 @@
 //! The bar at the top: menus from the command table, and the status of data set, frame and fit.
 
-use super::commands::{COMMANDS, Menu, shortcut_text, tooltip};
+use super::commands::{Menu, all, shortcut_text, tooltip};
 use super::panes::Shared;
 use super::theme::{self, Tokens};
-use crate::session::{Command, FitStatus};
+use crate::session::{Command, FitStatus, LabelMode};
 use egui::{RichText, Ui};
 
 pub(super) fn bar(ui: &mut Ui, shared: &mut Shared<'_>) {
@@ -23,19 +23,22 @@ pub(super) fn bar(ui: &mut Ui, shared: &mut Shared<'_>) {
 
 fn items(ui: &mut Ui, shared: &mut Shared<'_>, menu: Menu) {
     ui.set_min_width(230.0);
-    for command in COMMANDS.iter().filter(|command| command.menu == menu) {
+    for command in all().filter(|command| command.menu == menu) {
         if menu == Menu::File && command.label == "Quit" {
             recent(ui, shared);
             ui.separator();
         }
         let enabled = (command.enabled)(shared.session);
-        let mut button = egui::Button::new(command.label);
+        let mut button = egui::Button::new(command.text(shared.session));
         if let Some(&keys) = command.keys.first() {
             button = button.shortcut_text(shortcut_text(keys));
         }
         let mark = match command.label {
             "Warm start" => shared.session.warm_start,
             "Play frames" => shared.session.data.playing,
+            "Explore" => shared.session.view.label_mode == LabelMode::Explore,
+            "Label for agreement" => shared.session.view.label_mode == LabelMode::Agreement,
+            "Review counts" => shared.session.view.label_mode == LabelMode::CountReview,
             _ => false,
         };
         let response = ui.add_enabled(enabled, button.selected(mark));

@@ -4,11 +4,13 @@
 //! them are applied at the end. Nothing repaints unless something changed: threads wake the window.
 
 mod commands;
+mod figure;
 mod layout;
 mod map_image;
 mod menu;
 mod overlay;
 mod panes;
+mod sharing;
 mod theme;
 mod widgets;
 
@@ -28,6 +30,7 @@ pub const APP_ID: &str = "mhp-inspector";
 const VIEW_KEY: &str = "view";
 const RECENT_KEY: &str = "recent";
 const LAYOUT_KEY: &str = "layout";
+const ANNOTATOR_KEY: &str = "annotator";
 
 /// The application behind the window.
 pub struct InspectorApp {
@@ -36,6 +39,7 @@ pub struct InspectorApp {
     layout: Layout,
     panes: PaneStates,
     overlay: Overlay,
+    pictures: sharing::Pictures,
     notices_seen: u64,
     last_play: Option<f64>,
     applied_zoom: f32,
@@ -48,13 +52,16 @@ impl InspectorApp {
         theme::install(&cc.egui_ctx);
         let mut session = Session::default();
         let mut layout = Layout::default();
+        let mut annotator = crate::folders::user_name();
         if let Some(storage) = cc.storage {
+            annotator = eframe::get_value(storage, ANNOTATOR_KEY).unwrap_or(annotator);
             session.view = eframe::get_value::<ViewState>(storage, VIEW_KEY).unwrap_or_default();
             session.data.recent = eframe::get_value(storage, RECENT_KEY).unwrap_or_default();
             if let Some(stored) = eframe::get_value(storage, LAYOUT_KEY) {
                 layout = Layout::restored(stored);
             }
         }
+        session.apply(Command::SetAnnotator(annotator));
         let ctx = cc.egui_ctx.clone();
         let runtime = Runtime::new(Arc::new(move || ctx.request_repaint()), Some(Arc::new(overlay::pick)));
         let mut app = Self {
@@ -63,6 +70,7 @@ impl InspectorApp {
             layout,
             panes: PaneStates::new(cc.wgpu_render_state.clone()),
             overlay: Overlay::default(),
+            pictures: sharing::Pictures::default(),
             notices_seen: 0,
             last_play: None,
             applied_zoom: 1.0,
@@ -100,6 +108,8 @@ impl InspectorApp {
         match act {
             Act::Session(command) => self.apply(command),
             Act::App(act) => self.app_act(ctx, act),
+            Act::Write(kind, path) => self.save(ctx, kind, path),
+            Act::ShowCells { view, lo, hi } => self.panes.maps.show_cells(&self.session, view, &lo, &hi),
         }
     }
 
@@ -120,6 +130,17 @@ impl InspectorApp {
             AppAct::ZoomIn => self.set_zoom(self.session.view.zoom + 0.1),
             AppAct::ZoomOut => self.set_zoom(self.session.view.zoom - 0.1),
             AppAct::ZoomReset => self.set_zoom(1.0),
+            AppAct::Save(kind) => self.ask_save(kind),
+            AppAct::SaveSession => self.save_session_again(ctx),
+            AppAct::OpenSession => self.overlay.open_session(),
+            AppAct::CopyPicture => self.copy_picture(ctx),
+            AppAct::CopyPath => self.copy_path(ctx),
+            AppAct::FocusFilter => self.panes.frames.focus_filter(),
+            AppAct::FocusNote => {
+                self.layout.show_pane(PaneKind::Modes);
+                self.panes.modes.focus_note();
+            }
+            AppAct::MarkCells => self.panes.maps.mark_cells(),
             AppAct::FullScreen => {
                 let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
                 ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!full));
@@ -188,6 +209,8 @@ impl eframe::App for InspectorApp {
             ctx.set_zoom_factor(self.applied_zoom);
         }
         self.runtime.poll(&mut self.session);
+        self.take_restored();
+        self.take_pictures(ctx);
         self.take_drops(ctx);
         self.play(ctx);
         if self.runtime.is_busy() {
@@ -214,6 +237,9 @@ impl eframe::App for InspectorApp {
             self.overlay.show(ui, &mut shared);
         }
         let ctx = ui.ctx().clone();
+        if let Some(pane) = self.layout.take_asked() {
+            acts.push(Act::App(AppAct::Save(commands::SaveKind::Picture(Some(pane)))));
+        }
         for act in acts {
             self.act(&ctx, act);
         }
@@ -224,6 +250,7 @@ impl eframe::App for InspectorApp {
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         eframe::set_value(storage, VIEW_KEY, &self.session.view);
         eframe::set_value(storage, RECENT_KEY, &self.session.data.recent);
+        eframe::set_value(storage, ANNOTATOR_KEY, &self.session.labels.annotator);
         eframe::set_value(storage, LAYOUT_KEY, self.layout.stored());
     }
 }

@@ -1,8 +1,9 @@
 //! What lies over the panes: palette, help sheet, about, go to, the question about a bare file's axes, notifications.
 
 mod bare;
+mod files;
 
-use super::commands::{COMMANDS, Menu, UserCommand, shortcut_text};
+use super::commands::{Menu, SaveKind, UserCommand, all, shortcut_text};
 use super::panes::Shared;
 use super::theme::{self, Tokens};
 use crate::session::{Command, LogLevel, PickKind};
@@ -22,6 +23,8 @@ enum Sheet {
     About,
     Goto,
     Path,
+    Session,
+    Save(SaveKind),
 }
 
 /// What lies over the panes.
@@ -35,6 +38,7 @@ pub(super) struct Overlay {
     fresh: bool,
     notices: Vec<(f64, LogLevel, String)>,
     bare: bare::State,
+    files: files::State,
 }
 
 impl Overlay {
@@ -88,6 +92,8 @@ impl Overlay {
             Sheet::About => sheet(ui, "About MHP Inspector", 460.0, about),
             Sheet::Goto => self.goto(ui, shared),
             Sheet::Path => self.path(ui, shared),
+            Sheet::Session => self.session_path(ui, shared),
+            Sheet::Save(kind) => self.save(ui, shared, kind),
         };
         if close {
             self.sheet = Sheet::None;
@@ -105,7 +111,7 @@ impl Overlay {
             let text = format!("{} {} {}", c.label, c.menu.title(), c.tooltip).to_lowercase();
             words.iter().all(|word| text.contains(word.as_str()))
         };
-        let found: Vec<&UserCommand> = COMMANDS.iter().filter(fits).collect();
+        let found: Vec<&UserCommand> = all().filter(fits).collect();
         let last = found.len().saturating_sub(1);
         self.chosen = (self.chosen + usize::from(down)).min(last).saturating_sub(usize::from(up));
         let mut done = false;
@@ -127,8 +133,9 @@ impl Overlay {
             egui::ScrollArea::vertical().max_height(340.0).show(ui, |ui| {
                 for (i, command) in found.iter().enumerate() {
                     let enabled = (command.enabled)(shared.session);
-                    let mut button =
-                        egui::Button::new(command.label).selected(i == self.chosen).min_size(vec2(440.0, 22.0));
+                    let mut button = egui::Button::new(command.text(shared.session))
+                        .selected(i == self.chosen)
+                        .min_size(vec2(440.0, 22.0));
                     let keys = command.keys.first().map(|&k| shortcut_text(k)).unwrap_or_default();
                     button = button.shortcut_text(keys).frame_when_inactive(false);
                     let response = ui.add_enabled(enabled, button).on_hover_text(command.tooltip);
@@ -202,7 +209,11 @@ impl Overlay {
         let tokens = Tokens::of(ui);
         let mut closed = None;
         for (i, (until, level, text)) in self.notices.iter().enumerate() {
-            let color = if *level == LogLevel::Error { tokens.bad } else { tokens.warn };
+            let (sign, color) = match level {
+                LogLevel::Error => ("■", tokens.bad),
+                LogLevel::Warning => ("▲", tokens.warn),
+                LogLevel::Info => ("●", tokens.accent),
+            };
             let offset = vec2(-12.0, -74.0 - 64.0 * i as f32);
             egui::Area::new(egui::Id::unique(("notice", i)))
                 .anchor(Align2::RIGHT_BOTTOM, offset)
@@ -211,7 +222,7 @@ impl Overlay {
                     egui::Frame::popup(ui.style()).stroke(egui::Stroke::new(1.0, color)).show(ui, |ui| {
                         ui.set_max_width(420.0);
                         ui.horizontal(|ui| {
-                            ui.label(RichText::new(if *level == LogLevel::Error { "■" } else { "▲" }).color(color));
+                            ui.label(RichText::new(sign).color(color));
                             ui.add(egui::Label::new(RichText::new(text).small()).wrap());
                             let close = ui.small_button("✕");
                             close.widget_info(|| {
@@ -265,9 +276,9 @@ fn help(ui: &mut Ui) {
     let tokens = Tokens::of(ui);
     ui.columns(2, |columns| {
         for (i, menu) in Menu::ALL.into_iter().enumerate() {
-            let ui = &mut columns[usize::from(i >= 3)];
+            let ui = &mut columns[usize::from(i >= 4)];
             ui.label(RichText::new(menu.title()).font(theme::strong(13.0)));
-            for command in COMMANDS.iter().filter(|c| c.menu == menu && !c.keys.is_empty()) {
+            for command in all().filter(|c| c.menu == menu && !c.keys.is_empty()) {
                 key_row(ui, &shortcut_text(command.keys[0]), command.label, &tokens);
             }
             ui.add_space(8.0);
@@ -315,4 +326,22 @@ pub(super) fn pick(kind: PickKind) -> Option<PathBuf> {
             dialog.add_filter("Radar data", &["npz", "npy", "toml"]).add_filter("All files", &["*"]).pick_file()
         }
     }
+}
+
+/// Shows the desktop's dialog for a file to write; blocks, so it is called on a thread of its own.
+fn pick_save(suggested: &std::path::Path) -> Option<PathBuf> {
+    let mut dialog = rfd::FileDialog::new().set_title("Save as");
+    if let Some(folder) = suggested.parent() {
+        dialog = dialog.set_directory(folder);
+    }
+    if let Some(name) = suggested.file_name() {
+        dialog = dialog.set_file_name(name.to_string_lossy());
+    }
+    dialog.save_file()
+}
+
+/// Shows the desktop's dialog for a session file; blocks like [`pick`].
+fn pick_session() -> Option<PathBuf> {
+    let dialog = rfd::FileDialog::new().set_title("Open a session");
+    dialog.add_filter("Session", &["mhp-session"]).add_filter("All files", &["*"]).pick_file()
 }

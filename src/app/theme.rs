@@ -1,7 +1,9 @@
 //! The look: tokens, fonts, spacing. Every colour of the window comes from here; only data is saturated.
 
 use crate::body::Side;
+use crate::labels::Tag;
 use crate::session::ThemeChoice;
+use crate::study::complexity::Stratum;
 use egui::{Color32, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Stroke, TextStyle, Visuals};
 use std::sync::Arc;
 
@@ -106,6 +108,28 @@ impl Tokens {
             Side::Left => self.left,
             Side::Right => self.right,
             Side::Middle => self.dim,
+        }
+    }
+
+    /// The colour of a stratum; a letter or a height says the same.
+    pub(crate) fn stratum(&self, stratum: Stratum) -> Color32 {
+        match stratum {
+            Stratum::Easy => self.ok,
+            Stratum::Medium => self.warn,
+            Stratum::Hard => self.bad,
+        }
+    }
+
+    /// The colour of a tag; its code says the same.
+    pub(crate) fn tag(&self, tag: Tag) -> Color32 {
+        let pick = |on_dark: u32, on_light: u32| rgb(if self.dark { on_dark } else { on_light });
+        match tag {
+            Tag::F1 => pick(0xF2655C, 0xC6372E),
+            Tag::F2 => pick(0xC792EA, 0x7A3DB8),
+            Tag::F3 => pick(0xF2B84B, 0xA66A00),
+            Tag::F4 => pick(0x4DA3FF, 0x1769C2),
+            Tag::Clean => self.ok,
+            Tag::Unsure => self.dim,
         }
     }
 

@@ -1,6 +1,7 @@
 //! PPPR: the parameters of every joint, and their gradients, which have the same shape.
 
 use crate::geometry::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// A group of parameters: the unit of learning rates, gradients and npz keys; SPEC section 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -38,7 +39,7 @@ impl Group {
 }
 
 /// Sizes of a [`Pppr`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PpprShape {
     /// Persons.
     pub persons: usize,
@@ -80,10 +81,34 @@ impl PpprShape {
 
 /// The parameters of all joints of all persons (or their gradients, or Adam's moments): one flat array a group,
 /// ordered (person, joint, component); SPEC section 2.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Unchecked")]
 pub struct Pppr {
     shape: PpprShape,
     groups: [Vec<f64>; 6],
+}
+
+/// What a file says, before its sizes are compared.
+#[derive(Deserialize)]
+struct Unchecked {
+    shape: PpprShape,
+    groups: [Vec<f64>; 6],
+}
+
+impl TryFrom<Unchecked> for Pppr {
+    type Error = String;
+
+    fn try_from(Unchecked { shape, groups }: Unchecked) -> Result<Self, String> {
+        for (group, numbers) in Group::ALL.into_iter().zip(&groups) {
+            let joints = shape.persons.checked_mul(shape.joints).unwrap_or(usize::MAX);
+            let expected = joints.checked_mul(shape.width(group)).unwrap_or(usize::MAX);
+            if numbers.len() != expected {
+                let (key, found) = (group.key(), numbers.len());
+                return Err(format!("`{key}` has {found} numbers; expected {expected}"));
+            }
+        }
+        Ok(Self { shape, groups })
+    }
 }
 
 impl Pppr {

@@ -6,7 +6,7 @@ use super::common::{open, print};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::dataset::{Dataset, Progress};
 use crate::study::StudyError;
-use crate::study::complexity::{Complexity, ComplexityJob, ComplexityOptions, cache_folder};
+use crate::study::complexity::{Complexity, ComplexityJob, ComplexityOptions, cache_folder, json, write_csv};
 use clap::Args;
 use crossbeam_channel::{RecvTimeoutError, bounded};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -80,10 +80,10 @@ pub(super) fn run(args: &ComplexityArgs) -> anyhow::Result<ExitCode> {
     let cache = if args.no_cache { None } else { cache_folder() };
     let complexity = compute(&dataset, options, cache)?;
     if let Some(file) = &args.csv {
-        report::write_csv(file, &dataset, &complexity)?;
+        write_csv(file, &dataset, &complexity)?;
     }
     if args.json {
-        print(&report::json(&dataset, &complexity)?)?;
+        print(&json(&dataset, &complexity)?)?;
     } else if complexity.counts.failed < dataset.len() {
         print(&report::summary(&dataset, &complexity))?;
     }

@@ -8,6 +8,7 @@ use super::{DatasetError, Frame, Heatmap, Progress, generic, mmvr};
 use crate::body::Skeleton;
 use crate::radar::{RadarConfig, View};
 use sha2::{Digest as _, Sha256};
+use std::fmt::Write as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -52,13 +53,62 @@ enum Source {
     Bare { frames: usize, stacked: bool },
 }
 
+impl Source {
+    fn names(&self, dataset: &str) -> Names {
+        let mut names = Names::default();
+        match self {
+            Self::Mmvr { segments, .. } => {
+                for segment in segments {
+                    for k in 0..segment.len() {
+                        names.push(format_args!("{}/{}", segment.sequence, segment.stem(k)));
+                    }
+                }
+            }
+            Self::Files(files) => {
+                for file in files {
+                    names.push(format_args!("{}", file.with_extension("").to_string_lossy()));
+                }
+            }
+            Self::Bare { frames, stacked: true } => {
+                for i in 0..*frames {
+                    names.push(format_args!("{dataset}/{i:06}"));
+                }
+            }
+            Self::Bare { .. } => names.push(format_args!("{dataset}")),
+        }
+        names
+    }
+}
+
 /// An open data set: an index of names. Frames are read by [`Self::load`], from any thread.
 #[derive(Debug)]
 pub struct Dataset {
     info: DatasetInfo,
     source: Source,
     start: usize,
+    names: Names,
     fingerprint: OnceLock<String>,
+}
+
+/// The frames' names, one after the other in one text.
+#[derive(Debug, Default)]
+struct Names {
+    text: String,
+    ends: Vec<u32>,
+}
+
+impl Names {
+    fn push(&mut self, name: std::fmt::Arguments<'_>) {
+        // Writing to a text does not fail.
+        let _ = self.text.write_fmt(name);
+        self.ends.push(self.text.len() as u32);
+    }
+
+    fn get(&self, i: usize) -> &str {
+        let end = self.ends.get(i).copied().unwrap_or_default() as usize;
+        let start = i.checked_sub(1).and_then(|before| self.ends.get(before)).copied().unwrap_or_default() as usize;
+        self.text.get(start..end).unwrap_or_default()
+    }
 }
 
 impl Dataset {
@@ -155,12 +205,7 @@ impl Dataset {
             let expected = format!("files that match `frames = \"{pattern}\"` of {}", manifest.path.display());
             return Err(DatasetError::NoFrames { expected, path: root.to_owned() });
         }
-        Ok(Self {
-            info: info_of(root, manifest, manifest, folder_name(root)),
-            source: Source::Files(files),
-            start: 0,
-            fingerprint: OnceLock::new(),
-        })
+        Ok(Self::of(info_of(root, manifest, manifest, folder_name(root)), Source::Files(files), 0))
     }
 
     fn open_mmvr(
@@ -194,12 +239,7 @@ impl Dataset {
                 .push("point spread: 0.06 m and 0.03 rad are assumed; MMVR does not publish its own".into());
             info.assumptions.push("quantity: amplitudes are assumed, from the spread of the values".into());
         }
-        Ok(Self {
-            info,
-            source: Source::Mmvr { segments, starts, frames },
-            start: start.unwrap_or(0),
-            fingerprint: OnceLock::new(),
-        })
+        Ok(Self::of(info, Source::Mmvr { segments, starts, frames }, start.unwrap_or(0)))
     }
 
     fn from_choice(catalog: &BareCatalog, choice: &BareChoice) -> Result<Self, DatasetError> {
@@ -217,12 +257,7 @@ impl Dataset {
             views: choice.views.clone(),
             notes: Vec::new(),
         };
-        Ok(Self {
-            info,
-            source: Source::Bare { frames, stacked: choice.first_axis_is_frame },
-            start: 0,
-            fingerprint: OnceLock::new(),
-        })
+        Ok(Self::of(info, Source::Bare { frames, stacked: choice.first_axis_is_frame }, 0))
     }
 
     fn from_manifest(path: &Path, manifest: &Manifest) -> Result<Self, DatasetError> {
@@ -232,7 +267,12 @@ impl Dataset {
         let frames = frames_of(&manifest.views, stacked, &catalog)?;
         let mut info = info_of(path, manifest, manifest, file_stem(path));
         info.layout = Layout::Bare;
-        Ok(Self { info, source: Source::Bare { frames, stacked }, start: 0, fingerprint: OnceLock::new() })
+        Ok(Self::of(info, Source::Bare { frames, stacked }, 0))
+    }
+
+    fn of(info: DatasetInfo, source: Source, start: usize) -> Self {
+        let names = source.names(&info.name);
+        Self { info, source, start, names, fingerprint: OnceLock::new() }
     }
 
     /// What is true of every frame.
@@ -291,17 +331,8 @@ impl Dataset {
     }
 
     /// What identifies frame `i` for a person; empty past the end.
-    pub fn frame_name(&self, i: usize) -> String {
-        match &self.source {
-            Source::Mmvr { .. } => {
-                self.segment(i).map(|(s, k)| format!("{}/{}", s.sequence, s.stem(k))).unwrap_or_default()
-            }
-            Source::Files(files) => {
-                files.get(i).map(|file| file.with_extension("").to_string_lossy().into_owned()).unwrap_or_default()
-            }
-            Source::Bare { stacked: true, .. } => format!("{}/{i:06}", self.info.name),
-            Source::Bare { .. } => self.info.name.clone(),
-        }
+    pub fn frame_name(&self, i: usize) -> &str {
+        self.names.get(i)
     }
 
     /// What frame `i` follows the one before in: MMVR's session and segment, a folder, or the data set.
@@ -336,7 +367,7 @@ impl Dataset {
         if i >= self.len() {
             return Err(DatasetError::NoSuchFrame { index: i, count: self.len(), path: self.info.root.clone() });
         }
-        let (name, path) = (self.frame_name(i), self.frame_path(i));
+        let (name, path) = (self.frame_name(i).to_owned(), self.frame_path(i));
         match &self.source {
             Source::Files(_) => generic::load(i, name, &path, &self.info),
             Source::Bare { stacked, .. } => generic::load_bare(i, name, &path, *stacked, &self.info),

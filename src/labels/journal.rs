@@ -128,6 +128,19 @@ impl Journal {
         self.commit_parts(act, &parts.collect::<Vec<_>>())
     }
 
+    /// As [`Self::commit`], where each frame was judged on a fit of its own.
+    ///
+    /// # Errors
+    /// As [`Self::commit`].
+    pub fn commit_each(
+        &mut self,
+        act: &str,
+        changes: &[(FrameId, Change, Judged)],
+    ) -> Result<Vec<Outcome>, LabelError> {
+        let parts = changes.iter().map(|(frame, change, judged)| Part { frame, change, judged, time_ms: None });
+        self.commit_parts(act, &parts.collect::<Vec<_>>())
+    }
+
     /// As [`Self::commit`], for changes that were made elsewhere: each record keeps when it was said and what was judged.
     ///
     /// # Errors

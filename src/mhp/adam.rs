@@ -1,13 +1,14 @@
 //! Adam with bias correction over the groups of PPPR; SPEC section 4. No renormalisation between steps.
 
 use crate::body::{Group, Pppr, PpprShape};
+use serde::{Deserialize, Serialize};
 
 const BETA_1: f64 = 0.9;
 const BETA_2: f64 = 0.999;
 const EPSILON: f64 = 1e-8;
 
 /// The two moments, and how many steps they have seen.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Adam {
     /// Exponential mean of the gradient.
     pub first: Pppr,

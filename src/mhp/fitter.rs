@@ -5,10 +5,11 @@ use super::convergence::{LOOK_BACK, converged};
 use super::{Evaluation, FitError, Objective, Precision, Problem, StepReport};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Everything that another step needs: restoring it continues the run bit for bit under the same configuration.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitState {
     /// Adam steps taken.
     pub iteration: usize,

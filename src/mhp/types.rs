@@ -47,7 +47,7 @@ pub struct Evaluation {
 }
 
 /// What is known of the fit after `iteration` Adam steps (0: the initial pose).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StepReport {
     /// Adam steps taken.
     pub iteration: usize,

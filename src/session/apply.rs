@@ -1,18 +1,35 @@
 //! The only mutator: a command in, effects out.
 //!
-//! Here is the table from commands to functions; `data` opens and loads, `fit` steers the optimiser, `reports` takes in what
-//! the worker says.
+//! Here is the table from commands to functions; `data` opens and loads, `queue` filters and orders the frames, `labels`
+//! writes what people say, `diagnosis` takes in strata and evidence, `fit` steers the optimiser, `reports` takes in what the
+//! worker says.
 
 mod data;
+mod diagnosis;
+mod export;
 mod fit;
+mod labels;
+mod pins;
+mod queue;
 mod reports;
+mod restore;
+
+pub(super) use reports::mean_known;
 
 use super::command::{Command, Effect};
 use super::state::{LOG_LINES, LogLevel, LogLine, Session};
+use super::strata::StrataStatus;
 
 impl Session {
     /// Applies one command and answers what the outside has to do for it.
     pub fn apply(&mut self, command: Command) -> Vec<Effect> {
+        let mut effects = self.dispatch(command);
+        effects.extend(self.ask_evidence());
+        self.refresh_queue();
+        effects
+    }
+
+    fn dispatch(&mut self, command: Command) -> Vec<Effect> {
         match command {
             Command::Open(path) => self.open(path),
             Command::Pick(kind) => vec![Effect::Pick(kind)],
@@ -37,14 +54,50 @@ impl Session {
             }
             Command::Opened(path, result) => self.opened(path, result),
             Command::GotoFrame(index) => self.goto_frame(index),
-            Command::StepFrames(by) => {
-                let last = self.data.len().saturating_sub(1);
-                let target = self.data.frame_index.saturating_add_signed(by).min(last);
-                if self.data.playing && target == self.data.frame_index {
-                    self.data.playing = false;
-                }
-                self.goto_frame(target)
+            Command::StepFrames(by) => self.step_frames(by),
+            Command::StepQueue(by) => self.step_queue(by),
+            Command::NextUntagged => self.next_untagged(),
+            Command::GotoLastEdited => self.goto_last_edited(),
+            Command::SetFilter(text) => self.set_filter(text),
+            Command::SetSort(sort) => self.set_sort(sort),
+            Command::SaveView(name) => self.save_view(&name),
+            Command::UseView(name) => self.use_view(&name),
+            Command::RemoveView(name) => {
+                self.view.saved_views.retain(|view| view.name != name);
+                Vec::new()
             }
+            Command::SelectFrames(frames) => {
+                self.labels.selection = frames.into_iter().filter(|&frame| frame < self.data.len()).collect();
+                Vec::new()
+            }
+            Command::ToggleTag(tag) => self.toggle_tag(tag),
+            Command::SetNote(note) => self.set_note(note),
+            Command::SetPerson(person) => self.set_person(person),
+            Command::SetRegion(region) => self.set_region(region),
+            Command::SetVerdict(verdict) => self.set_verdict(verdict),
+            Command::ClearLabel => self.clear_label(),
+            Command::Undo => self.undo(),
+            Command::Redo => self.redo(),
+            Command::SetAnnotator(name) => self.set_annotator(&name),
+            Command::LabelsOpened(result) => self.labels_opened(result),
+            Command::LabelsWritten(written) => self.labels_written(written),
+            Command::LabelsRefreshed(table) => self.labels_refreshed(table),
+            Command::RefreshLabels => vec![Effect::RefreshLabels],
+            Command::ComputeStrata => self.compute_strata(),
+            Command::CancelStrata => vec![Effect::CancelStrata],
+            Command::StrataProgress { done, total } => {
+                if let StrataStatus::Running { done: shown, total: of } = &mut self.strata.status {
+                    (*shown, *of) = (done, total);
+                }
+                Vec::new()
+            }
+            Command::StrataDone(result) => self.strata_done(result),
+            Command::PinFit => self.pin_fit(),
+            Command::RemovePin(id) => self.remove_pin(id),
+            Command::RenamePin(id, name) => self.rename_pin(id, &name),
+            Command::SetBaseline(id) => self.set_baseline(id),
+            Command::PinDrawn(id, result) => self.pin_drawn(id, result),
+            Command::EvidenceFound(frame, fit, result) => self.evidence_found(frame, fit, result),
             Command::FrameLoaded(index, result) => self.frame_loaded(index, result),
             Command::TogglePlay => {
                 self.data.playing = !self.data.playing && self.data.len() > 1;
@@ -84,9 +137,16 @@ impl Session {
                 Vec::new()
             }
             Command::SetView(view) => {
+                self.stale |= view.sort != self.view.sort || view.label_mode != self.view.label_mode;
                 self.view = *view;
                 Vec::new()
             }
+            Command::Export(what, path) => self.export(what, path),
+            Command::SaveSession(path, window) => self.save_session(path, window),
+            Command::OpenSession(path) => vec![Effect::ReadSession(path)],
+            Command::SessionRead(path, result) => self.session_read(path, result),
+            Command::TaskDone(result) => self.task_done(result),
+            Command::RunTask(task) => vec![Effect::Run(task)],
             Command::Log(level, text) => {
                 self.note(level, text);
                 Vec::new()
@@ -100,6 +160,13 @@ impl Session {
                 Vec::new()
             }
         }
+    }
+
+    /// Tells something that needs no attention later: a line of the log and a notification.
+    pub(super) fn hint(&mut self, text: String) {
+        self.note(LogLevel::Info, text.clone());
+        let count = self.notice.as_ref().map_or(0, |(count, ..)| *count);
+        self.notice = Some((count + 1, LogLevel::Info, text));
     }
 
     /// Writes a line to the log; warnings and errors also become the notice.

@@ -1,11 +1,20 @@
 //! What can be asked of a session, and what it asks of the outside.
 
+use super::evidence::EvidenceRequest;
+use super::file::SessionFile;
+use super::labels::{ActKind, LabelTable};
+use super::pins::Pin;
+use super::queue::Sort;
 use super::view::ViewState;
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::{BareChoice, Dataset, DatasetError, Frame};
+use crate::diagnose::Evidence;
+use crate::labels::{CellRegion, Change, FrameId, Judged, Label, LabelPlace, Record, Tag, Verdict};
 use crate::mhp::Precision;
+use crate::study::complexity::Complexity;
 use crate::worker::{Snapshot, WorkerCommand, WorkerMessage};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -44,8 +53,77 @@ pub enum Command {
     Opened(PathBuf, Result<Arc<Dataset>, DatasetError>),
     /// Show a frame.
     GotoFrame(usize),
-    /// Show the frame this many further.
+    /// Show the frame this many further in time, among those that match the filter.
     StepFrames(isize),
+    /// Show the frame this many further in the queue.
+    StepQueue(isize),
+    /// Show the next frame of the queue that this annotator has not judged.
+    NextUntagged,
+    /// Show the frame that this annotator labelled last.
+    GotoLastEdited,
+    /// Filter the list.
+    SetFilter(String),
+    /// Order the list.
+    SetSort(Sort),
+    /// Keep the filter and the order under a name.
+    SaveView(String),
+    /// Filter and order as kept.
+    UseView(String),
+    /// Forget a kept view.
+    RemoveView(String),
+    /// Select these frames for the next act of labelling.
+    SelectFrames(BTreeSet<usize>),
+    /// Add the tag to the targets, or remove it where all have it.
+    ToggleTag(Tag),
+    /// Set the note.
+    SetNote(String),
+    /// Set the person that is meant.
+    SetPerson(Option<u32>),
+    /// Set the cells that are meant.
+    SetRegion(Option<CellRegion>),
+    /// Set the verdict.
+    SetVerdict(Option<Verdict>),
+    /// Say nothing of the targets any more.
+    ClearLabel,
+    /// Take the last act of labelling back.
+    Undo,
+    /// Do it again.
+    Redo,
+    /// Somebody else labels.
+    SetAnnotator(String),
+    /// Report: the journals were read.
+    LabelsOpened(Result<(LabelPlace, LabelTable, Vec<String>), String>),
+    /// Report: an act was written, or not.
+    LabelsWritten(Written),
+    /// Report: others wrote.
+    LabelsRefreshed(LabelTable),
+    /// Read what others wrote.
+    RefreshLabels,
+    /// Compute strata.
+    ComputeStrata,
+    /// Give up computing strata.
+    CancelStrata,
+    /// Report: computing strata got on.
+    StrataProgress {
+        /// Frames done.
+        done: u64,
+        /// Of how many.
+        total: u64,
+    },
+    /// Report: computing strata ended; `Ok(None)` where nothing was kept from an earlier run and none was begun.
+    StrataDone(Result<Option<Arc<Complexity>>, String>),
+    /// Keep the state on screen to compare others with.
+    PinFit,
+    /// Forget a pinned state.
+    RemovePin(u32),
+    /// Give a pinned state another name.
+    RenamePin(u32, String),
+    /// Compare with this one.
+    SetBaseline(Option<u32>),
+    /// Report: the maps of a pinned state.
+    PinDrawn(u32, Result<Box<Snapshot>, String>),
+    /// Report: the evidence of a fit.
+    EvidenceFound(usize, String, Result<Vec<Evidence>, String>),
     /// Report: a frame was read.
     FrameLoaded(usize, Result<Arc<Frame>, DatasetError>),
     /// Play or stop playing frames.
@@ -82,12 +160,115 @@ pub enum Command {
     SelectJoint(Option<usize>),
     /// How things are shown.
     SetView(Box<ViewState>),
+    /// Write something to a file.
+    Export(Export, PathBuf),
+    /// Keep everything in a session file; with what only the window knows.
+    SaveSession(PathBuf, serde_json::Value),
+    /// Open a session file.
+    OpenSession(PathBuf),
+    /// Report: a session file was read.
+    SessionRead(PathBuf, Result<Box<SessionFile>, String>),
+    /// Report: something was written, or not.
+    TaskDone(Result<String, String>),
+    /// Write a picture that the window drew.
+    RunTask(Task),
     /// Write a line to the log.
     Log(super::LogLevel, String),
     /// Empty the log.
     ClearLog,
     /// Forget the recently opened.
     ClearRecent,
+}
+
+/// What can be taken home of a session, besides pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Export {
+    /// Every iteration of the fit on screen, CSV.
+    Curves,
+    /// The Gaussians on screen, PLY.
+    Gaussians,
+    /// The parameters on screen, npz.
+    Parameters,
+    /// Labels, CSV.
+    LabelsCsv,
+    /// Labels, JSON.
+    LabelsJson,
+    /// Complexity of every frame, CSV.
+    Strata,
+}
+
+impl Export {
+    /// What it is, in words.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Curves => "curves",
+            Self::Gaussians => "Gaussians",
+            Self::Parameters => "parameters",
+            Self::LabelsCsv | Self::LabelsJson => "labels",
+            Self::Strata => "strata",
+        }
+    }
+
+    /// The usual ending of its file.
+    pub fn ending(self) -> &'static str {
+        match self {
+            Self::Curves | Self::LabelsCsv | Self::Strata => "csv",
+            Self::Gaussians => "ply",
+            Self::Parameters => "npz",
+            Self::LabelsJson => "json",
+        }
+    }
+}
+
+/// Work for a thread, which answers a line for a person.
+pub struct Task(pub(super) Box<dyn FnOnce() -> Result<String, String> + Send>);
+
+impl Task {
+    /// Work that answers what was done, or why it was not.
+    pub fn new(work: impl FnOnce() -> Result<String, String> + Send + 'static) -> Self {
+        Self(Box::new(work))
+    }
+}
+
+impl std::fmt::Debug for Task {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Task")
+    }
+}
+
+/// A pinned fit whose maps are to be computed.
+#[derive(Debug, Clone)]
+pub struct PinRequest {
+    /// To read its frame.
+    pub dataset: Arc<Dataset>,
+    /// The pin.
+    pub pin: Pin,
+}
+
+/// An act of labelling, to be written.
+#[derive(Debug, Clone)]
+pub struct Commit {
+    /// Comes back with the answer.
+    pub id: u64,
+    /// Done, undone or done again.
+    pub kind: ActKind,
+    /// In words.
+    pub act: String,
+    /// The change of each frame, and the fit that was judged.
+    pub changes: Vec<(FrameId, Change, Judged)>,
+}
+
+/// The journal's answer to a [`Commit`].
+#[derive(Debug)]
+pub struct Written {
+    /// That of the commit.
+    pub id: u64,
+    /// That of the commit.
+    pub kind: ActKind,
+    /// That of the commit.
+    pub act: String,
+    /// Frame, label before, record after; or why nothing was written.
+    pub result: Result<Vec<(FrameId, Label, Record)>, String>,
 }
 
 /// What the session asks of the outside.
@@ -107,4 +288,32 @@ pub enum Effect {
     Load(usize),
     /// Tell the worker.
     Send(WorkerCommand),
+    /// Read the journals and open this annotator's.
+    OpenLabels {
+        /// Whose frames are labelled.
+        dataset: Arc<Dataset>,
+        /// Who labels.
+        annotator: String,
+    },
+    /// Write an act.
+    CommitLabels(Commit),
+    /// Read what others wrote.
+    RefreshLabels,
+    /// Compute strata on all cores.
+    ComputeStrata {
+        /// Of these frames.
+        dataset: Arc<Dataset>,
+        /// Only take what an earlier run left.
+        only_kept: bool,
+    },
+    /// Stop computing strata.
+    CancelStrata,
+    /// Do this on a thread.
+    Run(Task),
+    /// Read a session file on a thread.
+    ReadSession(PathBuf),
+    /// Compute the maps of a pinned fit on a thread.
+    DrawPin(Box<PinRequest>),
+    /// Gather evidence.
+    Evidence(Box<EvidenceRequest>),
 }

@@ -100,6 +100,18 @@ impl History {
         history
     }
 
+    /// A history with one branch, as a file kept it: every row, few states.
+    pub(super) fn restored(config: FitConfig, rows: Vec<super::pins::PinRow>, states: Vec<FitState>) -> Self {
+        let mut history = Self::new(config);
+        let mut states: Vec<Arc<FitState>> = states.into_iter().map(Arc::new).collect();
+        for super::pins::PinRow { report, majpe_mm } in rows {
+            let at = states.iter().position(|state| state.iteration == report.iteration);
+            let state = at.map(|at| states.swap_remove(at));
+            history.push(0, Row { report, state, majpe_mm });
+        }
+        history
+    }
+
     /// Starts a branch, makes it the active one and answers its number.
     pub fn begin(&mut self, parent: Option<(u32, usize)>, config: FitConfig) -> u32 {
         let id = self.next_id;
@@ -122,6 +134,20 @@ impl History {
     /// The branch that a run continues.
     pub fn active(&self) -> Option<&Branch> {
         self.branch(self.active)
+    }
+
+    /// The rows of the active branch with those of its parents before it: the way that led to its head.
+    pub fn lineage(&self) -> Vec<&Row> {
+        let Some(branch) = self.active() else { return Vec::new() };
+        let mut pieces: Vec<Vec<&Row>> = vec![branch.rows.iter().collect()];
+        let (mut from, mut parent) = (branch.start(), branch.parent);
+        while let Some((id, at)) = parent {
+            let Some(before) = self.branch(id) else { break };
+            let last = at.min(from);
+            pieces.push(before.rows.iter().filter(|row| row.report.iteration < last).collect());
+            (from, parent) = (before.start().min(last), before.parent);
+        }
+        pieces.into_iter().rev().flatten().collect()
     }
 
     /// Number of the active branch.
@@ -251,7 +277,7 @@ fn state_bytes(state: &Arc<FitState>) -> usize {
 }
 
 /// What differs between two configurations, in words: `τ_pct 10 → 15`.
-pub(super) fn difference(old: &FitConfig, new: &FitConfig) -> String {
+pub fn difference(old: &FitConfig, new: &FitConfig) -> String {
     let mut parts: Vec<String> = FIELDS
         .iter()
         .filter(|field| (field.get)(old) != (field.get)(new))

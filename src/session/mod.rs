@@ -6,15 +6,27 @@
 
 mod apply;
 mod command;
+mod evidence;
+mod file;
 mod fit;
 mod history;
+mod labels;
+mod pins;
+mod queue;
 mod runtime;
 mod state;
+mod strata;
 mod view;
 
-pub use command::{Command, Effect, PickKind};
+pub use command::{Command, Commit, Effect, Export, PickKind, PinRequest, Task, Written};
+pub use evidence::EvidenceRequest;
+pub use file::{SavedDataset, SavedFit, SavedFrame, SavedPin, SessionFile, SessionFileError};
 pub use fit::{Fit, FitStatus};
-pub use history::{Branch, Flag, History, Row};
+pub use history::{Branch, Flag, History, Row, difference};
+pub use labels::{Act, ActKind, LabelMode, LabelStatus, LabelTable, Labels, Visible};
+pub use pins::{MOST_PINS, Pin, PinRow, Pins, numbers};
+pub use queue::{Facts, Number, Queue, Rule, SYNTAX, SavedView, Sort, SortKey};
 pub use runtime::{Picker, Runtime, Wake};
-pub use state::{Data, FrameSummary, LogLevel, LogLine, Opening, Session};
-pub use view::{ColorRange, Compare, FrameSort, MapScale, SplatMode, ThemeChoice, ViewState};
+pub use state::{Data, FitHashes, FrameSummary, LogLevel, LogLine, Opening, Session};
+pub use strata::{Strata, StrataStatus};
+pub use view::{Against, ColorRange, Compare, MapScale, SplatMode, Strip, ThemeChoice, ViewState};

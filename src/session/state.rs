@@ -1,6 +1,12 @@
 //! The session's fields.
 
+use super::evidence::EvidenceState;
+use super::file::SessionFile;
 use super::fit::Fit;
+use super::labels::Labels;
+use super::pins::Pins;
+use super::queue::Queue;
+use super::strata::Strata;
 use super::view::ViewState;
 use crate::config::FitConfig;
 use crate::dataset::{BareCatalog, Dataset, Frame};
@@ -98,6 +104,21 @@ pub struct FrameSummary {
     pub converged: bool,
     /// MAJPE, mm, where there is truth.
     pub majpe_mm: Option<f64>,
+    /// Why the last run ended.
+    pub reason: Option<String>,
+    /// What identifies the fit; `None` for one that was read from a table.
+    pub hashes: Option<FitHashes>,
+}
+
+/// What identifies a fit: a label remembers it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FitHashes {
+    /// Hash of the parameters.
+    pub fit: String,
+    /// Hash of the settings.
+    pub config: String,
+    /// The iteration.
+    pub iteration: usize,
 }
 
 /// Everything behind the window.
@@ -113,6 +134,18 @@ pub struct Session {
     pub(super) left: VecDeque<usize>,
     /// One line a fitted frame.
     pub summaries: BTreeMap<usize, FrameSummary>,
+    /// The frame list.
+    pub queue: Queue,
+    /// The list must be filled again.
+    pub(super) stale: bool,
+    /// How hard the frames are.
+    pub strata: Strata,
+    /// What people say of the frames.
+    pub labels: Labels,
+    /// What the machine says of the fit on screen.
+    pub(super) evidence: EvidenceState,
+    /// Fits that others are compared with.
+    pub pins: Pins,
     /// Settings.
     pub config: FitConfig,
     /// Scalar of the kernel.
@@ -127,5 +160,11 @@ pub struct Session {
     pub log: VecDeque<LogLine>,
     /// The newest error, for a notification; counts up so that the same text twice is told twice.
     pub notice: Option<(u64, LogLevel, String)>,
+    /// Where the session was saved to or opened from.
+    pub session_path: Option<PathBuf>,
+    /// A session file whose data set is being opened.
+    pub(super) restoring: Option<(PathBuf, Box<SessionFile>)>,
+    /// What a session file says of the window, for the window to take.
+    pub(super) restored_window: Option<serde_json::Value>,
     pub(super) jobs: JobId,
 }

@@ -1,5 +1,8 @@
 //! How things are shown: kept over frame changes and restarts, never touched by a fit.
 
+use super::labels::LabelMode;
+use super::queue::{SavedView, Sort};
+use crate::labels::Tag;
 use serde::{Deserialize, Serialize};
 
 /// Light, dark, or whatever the desktop says.
@@ -61,6 +64,16 @@ pub enum Compare {
     Difference,
 }
 
+/// What H_sim is compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Against {
+    /// The measured map.
+    #[default]
+    Ori,
+    /// H_sim of the baseline among the pinned fits.
+    Baseline,
+}
+
 /// How the Gaussians are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum SplatMode {
@@ -71,14 +84,16 @@ pub enum SplatMode {
     Ellipsoid,
 }
 
-/// Order of the frame list.
+/// What the strip over the frames shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum FrameSort {
-    /// As in the data set.
+pub enum Strip {
+    /// Easy, medium, hard.
     #[default]
-    Index,
-    /// Lowest mean IoU first; frames without a fit last.
+    Stratum,
+    /// Mean IoU of each fit.
     Iou,
+    /// Tags.
+    Tags,
 }
 
 /// Everything about the view that a person sets.
@@ -97,6 +112,8 @@ pub struct ViewState {
     pub colormap: String,
     /// What the H_sim pane shows.
     pub compare: Compare,
+    /// What flip, wipe and difference compare H_sim with.
+    pub against: Against,
     /// Where the wipe's line is, 0..1 of the map's width.
     pub wipe: f32,
     /// Draw maps whose axes are metres to scale.
@@ -132,7 +149,23 @@ pub struct ViewState {
     /// Curves switched off, by name.
     pub hidden_curves: Vec<String>,
     /// Order of the frame list.
-    pub frame_sort: FrameSort,
+    pub sort: Sort,
+    /// Columns of the frame list that are not shown, by their keys.
+    pub hidden_columns: Vec<String>,
+    /// Kept filters.
+    pub saved_views: Vec<SavedView>,
+    /// What the strip over the frames shows.
+    pub strip: Strip,
+    /// What labelling is for.
+    pub label_mode: LabelMode,
+    /// In agreement mode, the machine's evidence is hidden until the frame is tagged.
+    pub blind: bool,
+    /// Failure modes whose findings are unfolded.
+    pub open_cards: Vec<Tag>,
+    /// Print units, τ, iteration, seed and version under every picture.
+    pub figure: bool,
+    /// Draw the baseline's skeleton.
+    pub show_baseline: bool,
     /// Scale of the whole interface.
     pub zoom: f32,
     /// Begin to fit a frame as soon as it is shown.
@@ -148,6 +181,7 @@ impl Default for ViewState {
             shared_range: true,
             colormap: "viridis".into(),
             compare: Compare::default(),
+            against: Against::default(),
             wipe: 0.5,
             true_proportions: false,
             show_region: true,
@@ -165,7 +199,15 @@ impl Default for ViewState {
             show_gradients: false,
             log_loss: true,
             hidden_curves: Vec::new(),
-            frame_sort: FrameSort::default(),
+            sort: Sort::default(),
+            hidden_columns: ["peaks", "static", "saliency", "reason", "by"].map(str::to_owned).to_vec(),
+            saved_views: Vec::new(),
+            strip: Strip::default(),
+            label_mode: LabelMode::default(),
+            blind: true,
+            open_cards: Vec::new(),
+            figure: false,
+            show_baseline: true,
             zoom: 1.0,
             run_on_open: false,
         }

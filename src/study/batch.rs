@@ -174,7 +174,7 @@ impl Batch<'_> {
                 before = Some((index, fit.params));
                 fit.numbers
             });
-            if outbox.send(FrameRow { index, frame: self.dataset.frame_name(index), fit }).is_err() {
+            if outbox.send(FrameRow { index, frame: self.dataset.frame_name(index).to_owned(), fit }).is_err() {
                 return;
             }
         }
@@ -224,12 +224,12 @@ struct Files {
 impl Files {
     fn new(dataset: &Dataset, frames: Range<usize>) -> Self {
         let mut seen = HashSet::new();
-        Self { ambiguous: frames.filter(|&index| !seen.insert(flat(&dataset.frame_name(index)))).collect() }
+        Self { ambiguous: frames.filter(|&index| !seen.insert(flat(dataset.frame_name(index)))).collect() }
     }
 
     /// Without an ending.
     fn name(&self, dataset: &Dataset, index: usize) -> String {
-        let name = flat(&dataset.frame_name(index));
+        let name = flat(dataset.frame_name(index));
         if self.ambiguous.contains(&index) { format!("{name}_{index}") } else { name }
     }
 }

@@ -2,9 +2,10 @@
 
 use super::{BatchOptions, fit_frame};
 use crate::body::Pppr;
+use crate::config::FitConfig;
 use crate::dataset::{Dataset, Frame};
 use crate::diagnose::{Annotated, EarlierFrame, Evidence, EvidenceInput, STATIC_FRAMES, evidence};
-use crate::mhp::{Objective, Problem, masks, simulate};
+use crate::mhp::{Masks, Objective, Problem, masks, simulate};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -30,7 +31,7 @@ pub fn frames_before(dataset: &Dataset, index: usize) -> Range<usize> {
 /// fit, or around the given parameters.
 pub fn frame_evidence(dataset: &Dataset, index: usize, options: &BatchOptions, params: Option<&Pppr>) -> FrameEvidence {
     let evidence = judge(dataset, index, options, params);
-    FrameEvidence { index, frame: dataset.frame_name(index), evidence }
+    FrameEvidence { index, frame: dataset.frame_name(index).to_owned(), evidence }
 }
 
 fn judge(
@@ -52,7 +53,20 @@ fn judge(
     let objective = objective.map_err(|error| in_file(&error))?;
     let simulated = simulate(&problem, &options.config, options.precision, &params);
     let masks: Vec<_> = simulated.iter().enumerate().map(|(view, map)| masks(&objective, view, map)).collect();
-    let frames = earlier(dataset, index);
+    Ok(state_evidence(dataset, &frame, &problem, &options.config, &params, &masks))
+}
+
+/// Judges a state of a fit of `frame`: its parameters and the masks of each view over its whole map. Reads the frames
+/// before; one that cannot be read, and those before it, count as absent.
+pub fn state_evidence(
+    dataset: &Dataset,
+    frame: &Frame,
+    problem: &Problem,
+    config: &FitConfig,
+    params: &Pppr,
+    masks: &[Masks],
+) -> Vec<Evidence> {
+    let frames = earlier(dataset, frame.index);
     let before: Vec<EarlierFrame<'_>> =
         frames.iter().map(|frame| EarlierFrame { index: frame.index, maps: maps_of(frame) }).collect();
     let annotated = Annotated {
@@ -60,15 +74,7 @@ fn judge(
         map_boxes: &frame.map_boxes,
         image_boxes: frame.image.as_ref().map(|image| image.boxes.len()),
     };
-    let config = &options.config;
-    Ok(evidence(&EvidenceInput {
-        problem: &problem,
-        config,
-        params: &params,
-        masks: &masks,
-        before: &before,
-        annotated,
-    }))
+    evidence(&EvidenceInput { problem, config, params, masks, before: &before, annotated })
 }
 
 fn maps_of(frame: &Frame) -> Vec<&[f64]> {

@@ -12,7 +12,7 @@ mod row;
 mod summary;
 
 pub use batch::{BatchOptions, fit_frame, run_batch};
-pub use evidence::{FrameEvidence, frame_evidence, frames_before};
+pub use evidence::{FrameEvidence, frame_evidence, frames_before, state_evidence};
 pub use export::{CurveRow, curve_columns, curves_csv, ply, write_curves, write_ply};
 pub use row::{FitNumbers, FrameFit, FrameRow, Means};
 pub use summary::{StudyError, Summary, columns};

@@ -1,10 +1,11 @@
 //! Loss, terms, IoU and MAJPE over the iterations, with flags where settings changed and a cursor that can be dragged.
 
 use super::{Shared, empty};
+use crate::app::figure;
 use crate::app::theme::{self, Tokens};
-use crate::session::{Branch, Command, FitStatus, History, Row};
+use crate::session::{Branch, Command, FitStatus, PinRow, Row, numbers};
 use egui::{Color32, Ui};
-use egui_plot::{GridMark, Line, Plot, PlotPoint, PlotPoints, Points, VLine};
+use egui_plot::{GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, VLine};
 
 /// What the plot remembers.
 #[derive(Default)]
@@ -57,7 +58,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             return empty(ui, "No iterations yet", shared.session.data.error.as_deref().unwrap_or(how));
         }
     };
-    let rows = lineage(&fit.history, branch);
+    let rows = fit.history.lineage();
     let curves = curves(shared, branch, state.tab);
     toolbar(ui, shared, state, &curves);
     let fit = &shared.session.fit;
@@ -94,12 +95,19 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         .filter(|b| b.id != branch.id)
         .filter_map(|b| Some((b.id, points(&b.rows.iter().collect::<Vec<_>>(), curves.first()?, log))))
         .collect();
+    let pinned = pinned(shared, state.tab, log);
     let shown = fit.shown_iteration();
     let response = plot.show(ui, |plot| {
         for (id, pieces) in &others {
             for piece in pieces {
                 let line = Line::new(format!("branch {id}"), PlotPoints::Borrowed(piece));
                 plot.line(line.color(tokens.dim.gamma_multiply(0.8)).width(1.2));
+            }
+        }
+        for (name, pieces) in &pinned {
+            for piece in pieces {
+                let line = Line::new(name.clone(), PlotPoints::Borrowed(piece));
+                plot.line(line.color(tokens.warn.gamma_multiply(0.8)).width(1.2).style(LineStyle::dashed_loose()));
             }
         }
         for (pieces, c) in &lines {
@@ -119,6 +127,11 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         (plot.pointer_coordinate(), plot.response().clone())
     });
     flag_texts(ui, &response, branch, &tokens);
+    if shared.session.view.figure {
+        let what = if state.tab == Tab::Loss { "unweighted terms and L" } else { "IoU; MAJPE in m" };
+        let painter = ui.painter().with_clip_rect(ui.clip_rect());
+        figure::print(&painter, *response.transform.frame(), &format!("{what} · {}", figure::caption(shared.session)));
+    }
     let (pointer, inner) = response.inner;
     inner.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "Curves"));
     if inner.double_clicked() {
@@ -130,6 +143,21 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         state.before_click = shown;
         shared.send(Command::GotoIteration(at.x.round().clamp(0.0, 1e9) as usize));
     }
+}
+
+/// The main curve of each pinned fit: L, or the mean IoU.
+fn pinned(shared: &Shared<'_>, tab: Tab, log: bool) -> Vec<(String, Vec<Vec<PlotPoint>>)> {
+    let pins = shared.session.pins.list().iter();
+    pins.map(|pin| {
+        let value = |row: &PinRow| match tab {
+            Tab::Loss => Some(row.report.loss),
+            Tab::Quality => numbers(&row.report, None)[1],
+        };
+        let what = if tab == Tab::Loss { "L" } else { "mean IoU" };
+        let pieces = pieces(pin.rows.iter().map(|row| (row.report.iteration, value(row))), log);
+        (format!("{} · {what}", pin.name), pieces)
+    })
+    .collect()
 }
 
 /// What changed at each flag, where there is room: a dragged slider leaves many. Painted over the plot, not in it, so
@@ -149,19 +177,6 @@ fn flag_texts<R>(ui: &Ui, response: &egui_plot::PlotResponse<R>, branch: &Branch
         free_from = left + galley.size().x + 6.0;
         painter.galley(egui::pos2(left, frame.top() + 2.0), galley, tokens.warn);
     }
-}
-
-/// The rows of a branch with those of its parents before it: the way that led to its head.
-fn lineage<'a>(history: &'a History, branch: &'a Branch) -> Vec<&'a Row> {
-    let mut pieces: Vec<Vec<&Row>> = vec![branch.rows.iter().collect()];
-    let (mut from, mut parent) = (branch.start(), branch.parent);
-    while let Some((id, at)) = parent {
-        let Some(before) = history.branch(id) else { break };
-        let last = at.min(from);
-        pieces.push(before.rows.iter().filter(|row| row.report.iteration < last).collect());
-        (from, parent) = (before.start().min(last), before.parent);
-    }
-    pieces.into_iter().rev().flatten().collect()
 }
 
 fn curves(shared: &Shared<'_>, branch: &Branch, tab: Tab) -> Vec<Curve> {
@@ -203,13 +218,17 @@ fn curves(shared: &Shared<'_>, branch: &Branch, tab: Tab) -> Vec<Curve> {
 
 /// The points of a curve, in pieces: where there is no value (or on a logarithmic scale none above 1e−7) the line breaks.
 fn points(rows: &[&Row], curve: &Curve, log: bool) -> Vec<Vec<PlotPoint>> {
+    pieces(rows.iter().map(|row| (row.report.iteration, (curve.value)(row))), log)
+}
+
+fn pieces(values: impl Iterator<Item = (usize, Option<f64>)>, log: bool) -> Vec<Vec<PlotPoint>> {
     let mut pieces: Vec<Vec<PlotPoint>> = vec![Vec::new()];
-    for row in rows {
-        let value = (curve.value)(row).filter(|v| v.is_finite() && (!log || *v > 1e-7));
+    for (iteration, value) in values {
+        let value = value.filter(|v| v.is_finite() && (!log || *v > 1e-7));
         match (value, pieces.last_mut()) {
             (Some(value), Some(piece)) => {
                 let y = if log { value.log10() } else { value };
-                piece.push(PlotPoint::new(row.report.iteration as f64, y));
+                piece.push(PlotPoint::new(iteration as f64, y));
             }
             _ => pieces.push(Vec::new()),
         }

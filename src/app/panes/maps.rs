@@ -2,9 +2,11 @@
 
 mod overlay;
 mod picture;
+mod region;
 mod toolbar;
 
 use super::{Shared, empty};
+use crate::app::figure;
 use crate::app::map_image::Orientation;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{ColorBar, colorbar};
@@ -45,6 +47,8 @@ pub(in crate::app) struct State {
     pass: u64,
     /// Shift is held over the pane that is drawn: H_ori and H_sim are flipped in all its views.
     flipped: bool,
+    highlight: Option<region::Highlight>,
+    marking: region::Marking,
     /// The data set that the windows belong to.
     dataset: Option<std::sync::Weak<crate::dataset::Dataset>>,
 }
@@ -52,6 +56,20 @@ pub(in crate::app) struct State {
 impl State {
     pub(in crate::app) fn reset(&mut self) {
         self.windows.clear();
+    }
+
+    /// What is seen of each view, for a session file.
+    pub(in crate::app) fn stored(&self) -> Vec<[f32; 4]> {
+        self.windows.iter().map(|w| [w.min[0], w.min[1], w.max[0], w.max[1]]).collect()
+    }
+
+    /// Puts back what a session file says.
+    pub(in crate::app) fn restore(&mut self, stored: Vec<[f32; 4]>, session: &Session) {
+        self.dataset = session.data.dataset.as_ref().map(std::sync::Arc::downgrade);
+        let valid =
+            |w: &[f32; 4]| w.iter().all(|x| (0.0..=1.0).contains(x)) && w[2] - w[0] > 0.01 && w[3] - w[1] > 0.01;
+        let window = |w: [f32; 4]| Window { min: [w[0], w[1]], max: [w[2], w[3]] };
+        self.windows = stored.into_iter().map(|w| if valid(&w) { window(w) } else { Window::default() }).collect();
     }
 
     /// Zooms every map to the EM region.
@@ -158,7 +176,8 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     let flipped = state.flipped;
     let content = match (column, flipped) {
         (Column::Masks, _) => Content::Masks,
-        (Column::Ori, false) | (Column::Sim, true) => Content::Ori,
+        (Column::Ori, false) => Content::Ori,
+        (Column::Sim, true) => state.pictures.reference(),
         (Column::Ori, true) => Content::Sim,
         (Column::Sim, false) => match session.view.compare {
             Compare::Flip | Compare::Wipe => Content::Sim,
@@ -173,11 +192,22 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
         return;
     }
     let tokens = Tokens::of(ui);
-    overlay::title(ui, rect, plot, view, content, &tokens, session);
-    let name = format!("{} map of {}", content.name(), view.array);
+    overlay::title(ui, rect, plot, view, content, state.pictures.reference(), &tokens, session);
+    let what = match (content, state.pictures.reference()) {
+        (Content::Difference, Content::Base) => "H_sim − baseline",
+        (Content::Difference, _) => "H_sim − H_ori",
+        _ => content.name(),
+    };
+    let name = format!("{what} map of {}", view.array);
     let response = ui.interact(plot, ui.scope_id().with("plot"), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, &name));
-    navigate(ui, &response, plot, &mut state.windows[index]);
+    let (marking, marked) = state.mark(ui, &response, plot, index, view);
+    if let Some(region) = marked {
+        shared.send(crate::session::Command::SetRegion(Some(region)));
+    }
+    if !marking {
+        navigate(ui, &response, plot, &mut state.windows[index]);
+    }
     let window = state.windows[index];
     let painter = ui.painter().with_clip_rect(plot.intersect(ui.clip_rect()));
     painter.rect_filled(plot, 0.0, theme::MASK_GROUND);
@@ -187,8 +217,13 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     }
     let to_screen = |unit: [f64; 2]| screen(plot, window, unit);
     overlay::draw(&painter, session, view, index, orientation, &to_screen, &tokens);
+    state.draw_regions(&painter, session, index, view, &to_screen, &tokens);
     overlay::axes(ui, plot, view, orientation, window, &tokens);
     ui.painter().rect_stroke(plot, 0.0, egui::Stroke::new(1.0, tokens.stroke), egui::StrokeKind::Outside);
+    if session.view.figure {
+        let unit = if content == Content::Masks { "masks" } else { state.pictures.unit(content) };
+        figure::print(&painter, plot, &format!("{what} {} · {unit} · {}", view.array, figure::caption(session)));
+    }
     if let Some(pointer) = response.hover_pos() {
         let unit = unit_at(plot, window, pointer);
         if let Some(pixel) = overlay::pixel_at(view, orientation, unit) {
@@ -269,12 +304,12 @@ fn navigate(ui: &Ui, response: &egui::Response, plot: Rect, window: &mut Window)
     *window = moved;
 }
 
-/// The line between H_ori (left) and H_sim (right), and H_ori left of it.
+/// The line between what is compared with (left) and H_sim (right), and the former left of it.
 fn wipe(ui: &Ui, shared: &mut Shared<'_>, state: &State, index: usize, plot: Rect, window: Window) {
     let x = plot.min.x + plot.width() * shared.session.view.wipe;
     let left = Rect::from_min_max(plot.min, pos2(x, plot.max.y));
     let painter = ui.painter().with_clip_rect(left.intersect(ui.clip_rect()));
-    state.pictures.paint(ui, &painter, plot, window_rect(window), index, Content::Ori);
+    state.pictures.paint(ui, &painter, plot, window_rect(window), index, state.pictures.reference());
     let tokens = Tokens::of(ui);
     let handle = Rect::from_center_size(pos2(x, plot.center().y), vec2(10.0, plot.height()));
     let response = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag());

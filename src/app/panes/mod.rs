@@ -1,5 +1,7 @@
 //! The panes: each draws a part of the session and sends what is asked of it.
 
+mod agreement;
+mod compare;
 mod curves;
 mod fit;
 mod frames;
@@ -7,12 +9,16 @@ mod image;
 mod joint;
 mod log;
 mod maps;
+mod modes;
 mod scene;
+mod statistics;
 pub(super) mod timeline;
 
 use super::PaneKind;
 use super::commands::{Act, AppAct, command};
 use super::theme::{self, Tokens};
+use crate::diagnose::Place;
+use crate::labels::CellRegion;
 use crate::session::{Command, Session, ViewState};
 
 /// What every pane gets.
@@ -34,6 +40,23 @@ impl Shared<'_> {
         self.acts.push(Act::App(act));
     }
 
+    /// Shows where a finding is seen.
+    pub(super) fn show_place(&mut self, place: Place) {
+        match place {
+            Place::Joint(joint) => self.send(Command::SelectJoint(Some(joint))),
+            Place::Frame(frame) => self.send(Command::GotoFrame(frame)),
+            Place::Cells { view, lo, hi } => self.acts.push(Act::ShowCells { view, lo, hi }),
+        }
+    }
+
+    /// Shows the cells that a label marks.
+    pub(super) fn show_region(&mut self, region: &CellRegion) {
+        let views = self.session.data.dataset.iter().flat_map(|dataset| &dataset.info().views);
+        if let Some(view) = views.into_iter().position(|view| view.array == region.view) {
+            self.acts.push(Act::ShowCells { view, lo: region.lo.clone(), hi: region.hi.clone() });
+        }
+    }
+
     /// Does the user command called `label`, if it is enabled.
     pub(super) fn invoke(&mut self, label: &str) {
         if let Some(command) = command(label).filter(|c| (c.enabled)(self.session)) {
@@ -51,12 +74,25 @@ impl Shared<'_> {
     }
 }
 
+/// What a session file keeps of the panes.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+pub(super) struct Stored {
+    /// The camera of the 3-D view, where it was moved.
+    pub(super) camera: Option<scene::StoredCamera>,
+    /// The part of each view's maps that is seen: left, top, right, bottom, 0..1.
+    pub(super) maps: Vec<[f32; 4]>,
+}
+
 /// What the panes remember between passes: textures, zoom, camera. None of it is a user's work.
 pub(super) struct PaneStates {
     pub(super) maps: maps::State,
     pub(super) scene: scene::State,
     pub(super) curves: curves::State,
+    pub(super) agreement: agreement::State,
+    pub(super) statistics: statistics::State,
+    pub(super) compare: compare::State,
     pub(super) frames: frames::State,
+    pub(super) modes: modes::State,
     pub(super) joint: joint::State,
     pub(super) image: image::State,
     pub(super) timeline: timeline::State,
@@ -68,7 +104,11 @@ impl PaneStates {
             maps: maps::State::default(),
             scene: scene::State::new(render_state),
             curves: curves::State::default(),
+            agreement: agreement::State::default(),
+            statistics: statistics::State::default(),
+            compare: compare::State::default(),
             frames: frames::State::default(),
+            modes: modes::State::default(),
             joint: joint::State::default(),
             image: image::State::default(),
             timeline: timeline::State::default(),
@@ -100,6 +140,10 @@ pub(super) fn show(pane: PaneKind, ui: &mut egui::Ui, shared: &mut Shared<'_>, s
         PaneKind::Joint => joint::show(ui, shared, &mut states.joint),
         PaneKind::Image => image::show(ui, shared, &mut states.image),
         PaneKind::Log => log::show(ui, shared),
+        PaneKind::Compare => compare::show(ui, shared, &mut states.compare),
+        PaneKind::Agreement => agreement::show(ui, shared, &mut states.agreement),
+        PaneKind::Statistics => statistics::show(ui, shared, &mut states.statistics),
+        PaneKind::Modes => modes::show(ui, shared, &mut states.modes),
     }
 }
 

@@ -7,6 +7,7 @@ mod build;
 
 use super::{Shared, empty};
 use crate::app::commands::AppAct;
+use crate::app::figure;
 use crate::app::theme::{self, Tokens};
 use crate::render::{Camera, Scene, SceneRenderer, Vec2, Vec3, pick, shapes};
 use crate::session::{Command, Session, SplatMode};
@@ -27,7 +28,25 @@ pub(in crate::app) struct State {
     dataset: Option<std::sync::Weak<crate::dataset::Dataset>>,
 }
 
+/// A camera as a session file keeps it: target x, y, z, distance, yaw, pitch.
+pub(in crate::app) type StoredCamera = [f32; 6];
+
 impl State {
+    /// The camera, where it was moved.
+    pub(in crate::app) fn stored(&self) -> Option<StoredCamera> {
+        let c = self.camera?;
+        Some([c.target.x, c.target.y, c.target.z, c.distance, c.yaw, c.pitch])
+    }
+
+    /// Puts a camera back.
+    pub(in crate::app) fn restore(&mut self, stored: Option<StoredCamera>, session: &Session) {
+        self.dataset = session.data.dataset.as_ref().map(std::sync::Arc::downgrade);
+        self.camera =
+            stored.filter(|numbers| numbers.iter().all(|x| x.is_finite())).map(|[x, y, z, distance, yaw, pitch]| {
+                Camera { target: Vec3::new(x, y, z), distance, yaw, pitch, ..Camera::default() }
+            });
+    }
+
     pub(in crate::app) fn new(gpu: Option<RenderState>) -> Self {
         let renderer = gpu.as_ref().map(|s| SceneRenderer::new(&s.device, &s.queue, s.target_format));
         Self { gpu, renderer, texture: None, camera: None, dataset: None }
@@ -124,6 +143,10 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             let at = rect.min + vec2(seen.px.x, seen.px.y) / scale + vec2(6.0, -6.0);
             painter.text(at, Align2::LEFT_BOTTOM, text, egui::FontId::proportional(theme::CAPTION), color);
         }
+    }
+    if shared.session.view.figure {
+        let text = format!("metres, z up · {}", figure::caption(shared.session));
+        figure::print(&painter, rect.with_max_x(rect.max.x - 190.0), &text);
     }
     captions(&painter, rect, shared.session, &tokens, state);
     interact(ui, shared, state, &response, rect, viewport, scale, &scene, &camera);
@@ -223,7 +246,14 @@ fn captions(painter: &egui::Painter, rect: Rect, session: &Session, tokens: &Tok
     painter.text(rect.right_bottom() - vec2(8.0, 6.0), Align2::RIGHT_BOTTOM, text, small.clone(), tokens.dim);
     let mut x = rect.right() - 8.0;
     let has_truth = session.data.frame.as_ref().is_some_and(|f| f.truth.is_some()) && session.view.show_truth;
-    let keys = [("right", tokens.right, true), ("left", tokens.left, true), ("truth", tokens.ok, has_truth)];
+    let baseline = session.pins.baseline().filter(|_| session.view.show_baseline);
+    let name = baseline.map_or_else(String::new, |pin| format!("baseline {}", pin.name));
+    let keys = [
+        ("right", tokens.right, true),
+        ("left", tokens.left, true),
+        ("truth", tokens.ok, has_truth),
+        (name.as_str(), tokens.warn, baseline.is_some()),
+    ];
     for (word, color, shown) in keys {
         if shown {
             let drawn = painter.text(pos2(x, rect.top() + 6.0), Align2::RIGHT_TOP, word, small.clone(), color);
@@ -257,6 +287,8 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
                 ui.checkbox(&mut view.show_truth, "Truth")
                     .on_hover_text("The data set's joints in metres, where it has them.");
                 ui.checkbox(&mut view.show_initial, "Start pose");
+                ui.checkbox(&mut view.show_baseline, "Baseline")
+                    .on_hover_text("The skeleton of the baseline among the pinned fits.");
                 ui.checkbox(&mut view.show_grid, "Ground grid");
                 ui.checkbox(&mut view.show_frustum, "Radar and field of view");
             })

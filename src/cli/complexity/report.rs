@@ -1,10 +1,7 @@
 //! What `complexity` prints and writes.
 
 use crate::dataset::Dataset;
-use crate::dataset::npz::replace_file;
 use crate::study::complexity::{Complexity, FrameComplexity, Stratum};
-use anyhow::Context as _;
-use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -14,56 +11,12 @@ const HARDEST: usize = 10;
 /// A number of a frame.
 type Column = fn(&FrameComplexity) -> Option<f64>;
 
-/// One frame, as JSON and CSV name it.
-#[derive(Serialize)]
-struct Row {
-    frame: String,
-    peak_density: Option<f64>,
-    static_dominance: Option<f64>,
-    human_saliency: Option<f64>,
-    hardness: Option<f64>,
-    stratum: Option<&'static str>,
-}
-
-fn rows<'a>(dataset: &'a Dataset, complexity: &'a Complexity) -> impl Iterator<Item = Row> + 'a {
-    complexity.frames.iter().enumerate().map(|(i, frame)| {
-        let FrameComplexity { statistics, hardness, stratum } = frame.unwrap_or_default();
-        Row {
-            frame: dataset.frame_name(i),
-            peak_density: statistics.peak_density,
-            static_dominance: statistics.static_dominance,
-            human_saliency: statistics.human_saliency,
-            hardness,
-            stratum: stratum.map(Stratum::word),
-        }
-    })
-}
-
-/// An array, a line a frame, in the order of the data set.
-pub(super) fn json(dataset: &Dataset, complexity: &Complexity) -> anyhow::Result<String> {
-    let lines = rows(dataset, complexity).map(|row| serde_json::to_string(&row).context("writing JSON"));
-    let lines = lines.collect::<anyhow::Result<Vec<_>>>()?;
-    Ok(format!("[\n{}\n]\n", lines.join(",\n")))
-}
-
 /// Refuses a file in a folder that does not exist before anything is measured.
 pub(super) fn check_writable(file: &Path) -> anyhow::Result<()> {
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     anyhow::ensure!(folder.is_dir(), "{}: cannot be written: no folder {}", file.display(), folder.display());
     anyhow::ensure!(!file.is_dir(), "{}: cannot be written: it is a folder", file.display());
     Ok(())
-}
-
-/// Replaces `file` by a table with a row a frame.
-pub(super) fn write_csv(file: &Path, dataset: &Dataset, complexity: &Complexity) -> anyhow::Result<()> {
-    let written = replace_file(file, |out| {
-        let mut table = csv::Writer::from_writer(out);
-        for row in rows(dataset, complexity) {
-            table.serialize(row).map_err(std::io::Error::other)?;
-        }
-        table.flush()
-    });
-    written.with_context(|| format!("{}: cannot be written", file.display()))
 }
 
 /// Counts, quantiles and the hardest frames, for people.
@@ -101,8 +54,11 @@ fn hardest(dataset: &Dataset, complexity: &Complexity, text: &mut String) {
     let hardness = |(i, frame): (usize, &Option<FrameComplexity>)| Some((frame.as_ref()?.hardness?, i));
     let mut order: Vec<(f64, usize)> = complexity.frames.iter().enumerate().filter_map(hardness).collect();
     order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    let lines: Vec<(String, &FrameComplexity)> =
-        order.iter().take(HARDEST).filter_map(|&(_, i)| Some((dataset.frame_name(i), complexity.frame(i)?))).collect();
+    let lines: Vec<(String, &FrameComplexity)> = order
+        .iter()
+        .take(HARDEST)
+        .filter_map(|&(_, i)| Some((dataset.frame_name(i).to_owned(), complexity.frame(i)?)))
+        .collect();
     let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).max("the hardest".len());
     let head = ["hardness", "peaks", "static", "human"].map(right).concat();
     let _ = writeln!(text, "\n{:<width$}{head}", "the hardest");

@@ -73,7 +73,7 @@ impl<'a> Frames<'a> {
     pub(super) fn new(dataset: &'a Dataset) -> Self {
         let mut by_name = HashMap::with_capacity(dataset.len());
         for index in 0..dataset.len() {
-            by_name.entry(dataset.frame_name(index)).or_insert(index);
+            by_name.entry(dataset.frame_name(index).to_owned()).or_insert(index);
         }
         Self { dataset, by_name }
     }
@@ -85,7 +85,7 @@ impl<'a> Frames<'a> {
 
     /// The frame with this index.
     pub(super) fn at(&self, index: usize) -> FrameId {
-        FrameId { path: self.dataset.frame_name(index), index }
+        FrameId { path: self.dataset.frame_name(index).to_owned(), index }
     }
 
     /// The frame with this name.

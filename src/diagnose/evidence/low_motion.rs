@@ -74,7 +74,7 @@ fn by_doppler(input: &EvidenceInput<'_>, view: &View) -> Option<Measured> {
     let (rms_mps, fastest, fastest_mps) = radial(input, view)?;
     let cells = rms_mps / cell_mps;
     let text = format!(
-        "`{}`: the joints move at {rms_mps:.2} m/s radially (root mean square), {} fastest at {:.2} m/s; a Doppler cell is \
+        "{}: the joints move at {rms_mps:.2} m/s radially (root mean square), {} fastest at {:.2} m/s; a Doppler cell is \
          {cell_mps:.2} m/s.",
         view.array,
         joint(input.problem, input.params, fastest),
@@ -122,7 +122,7 @@ fn by_change(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Option<Change> {
             view_change(index, view, input.problem.map(index), old, &masks.inside, before.index)
         });
         let Some((ratio, told)) = found else {
-            let text = format!("`{}`: the EM region is the whole map; there is no rest to compare with.", view.array);
+            let text = format!("{}: the EM region is the whole map; there is no rest to compare with.", view.array);
             change.findings.push(Finding::new(text, None));
             continue;
         };
@@ -155,7 +155,7 @@ fn view_change(
     let level = mean(sums.zip(inside).filter(|(_, inside)| **inside).map(|(sum, _)| sum))?;
     let ratio = if change == 0.0 { 0.0 } else { change / floor };
     let text = format!(
-        "`{}`: since the frame before, the EM region changed by {} (Σ|H − H'|/Σ(H + H')), {}.",
+        "{}: since the frame before, the EM region changed by {} (Σ|H − H'|/Σ(H + H')), {}.",
         view.array,
         percent(if level > 0.0 { change / level } else { 0.0 }),
         times(ratio)
@@ -177,7 +177,7 @@ fn where_it_changed(index: usize, view: &View, changes: &[f64], inside: &[bool])
     let strong: Vec<bool> = changes.iter().map(|&c| c > 0.0 && c >= SHOWN_SHARE * largest).collect();
     let place = place(index, &view.shape(), &largest_patch(&view.shape(), &strong))?;
     let Place::Cells { lo, hi, .. } = &place else { return None };
-    let text = format!("`{}`: it changed most at {}.", view.array, cell_box(view, lo, hi));
+    let text = format!("{}: it changed most at {}.", view.array, cell_box(view, lo, hi));
     Some(Finding::new(text, Some(place)))
 }
 

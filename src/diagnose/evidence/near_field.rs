@@ -51,7 +51,7 @@ pub(super) fn judge(input: &EvidenceInput<'_>) -> Evidence {
         return Evidence { mode: Tag::F2, score: None, summary, findings: Vec::new() };
     };
     let summary = format!(
-        "The nearest joint is {} from the radar of `{}`, {:.2} of its far field's beginning at {}.",
+        "The nearest joint is {} from the radar of {}, {:.2} of its far field's beginning at {}.",
         length(worst.range_m),
         worst.view.array,
         worst.range_m / worst.fraunhofer_m,
@@ -75,7 +75,7 @@ fn look<'a>(view: &'a View, wavelength_m: f64, params: &Pppr) -> Option<Seen<'a>
 
 fn nearest(input: &EvidenceInput<'_>, seen: &Seen<'_>) -> Finding {
     let text = format!(
-        "`{}`: {} is nearest, {}; the far field begins at 2D²/λ = {}. A wave from there is {:.0}° off a plane one at the \
+        "{}: {} is nearest, {}; the far field begins at 2D²/λ = {}. A wave from there is {:.0}° off a plane one at the \
          array's edge (22.5° is the customary limit).",
         seen.view.array,
         joint(input.problem, input.params, seen.joint),
@@ -96,7 +96,7 @@ fn widths(seen: &[Seen<'_>], wavelength_m: f64) -> Vec<Finding> {
         }
         told.push(one.sigma_rad);
         let alike = seen.iter().filter(|other| other.sigma_rad == one.sigma_rad);
-        let arrays: Vec<String> = alike.map(|other| format!("`{}`", other.view.array)).collect();
+        let arrays: Vec<String> = alike.map(|other| format!("{}", other.view.array)).collect();
         let text = format!(
             "{}: D = 0.488 λ/σ_θ = {} from the point spread σ_θ = {:.2}° and λ = {}, as of an evenly weighted array; a tapered \
              one is wider, and its far field farther.",
@@ -127,7 +127,7 @@ fn smear(input: &EvidenceInput<'_>, seen: &Seen<'_>) -> Finding {
         ""
     };
     let text = format!(
-        "`{}`: there the model smears it by {} across{on_map} (half-value width); {name} itself is {} wide.{narrow}",
+        "{}: there the model smears it by {} across{on_map} (half-value width); {name} itself is {} wide.{narrow}",
         seen.view.array,
         length(smear_m),
         length(own_m)

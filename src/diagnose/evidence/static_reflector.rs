@@ -53,7 +53,7 @@ fn mostly_at(seen: &[Seen<'_>]) -> String {
     // The last of equals would be taken; reversed, the first view's is.
     let largest = seen.iter().rev().max_by_key(|seen| seen.patch.len());
     largest.and_then(|seen| Some((seen, seen.patch_box()?))).map_or_else(String::new, |(seen, (lo, hi))| {
-        format!(", the largest patch at {} in `{}`", cell_box(seen.view, &lo, &hi), seen.view.array)
+        format!(", the largest patch at {} in {}", cell_box(seen.view, &lo, &hi), seen.view.array)
     })
 }
 
@@ -101,12 +101,12 @@ fn findings(input: &EvidenceInput<'_>, seen: &[Seen<'_>], frames: usize) -> Vec<
     }
     for seen in seen {
         let Some(share) = seen.share() else {
-            findings.push(Finding::new(format!("`{}`: the mask of H_ori is empty.", seen.view.array), None));
+            findings.push(Finding::new(format!("{}: the mask of H_ori is empty.", seen.view.array), None));
             continue;
         };
         let [mask, still] = seen.counts;
         let text = format!(
-            "`{}`: {still} of the mask's {} ({}) are bright in each of {frames} frames.",
+            "{}: {still} of the mask's {} ({}) are bright in each of {frames} frames.",
             seen.view.array,
             cells(mask),
             percent(share)
@@ -125,7 +125,7 @@ fn patch(seen: &Seen<'_>) -> Option<Finding> {
     let (lo, hi) = seen.patch_box()?;
     let missed = seen.patch.iter().filter(|&&cell| seen.masks.sim.get(cell) != Some(&true)).count();
     let text = format!(
-        "`{}`: the largest static patch has {}, at {}; H_sim does not explain {} of it.",
+        "{}: the largest static patch has {}, at {}; H_sim does not explain {} of it.",
         seen.view.array,
         cells(seen.patch.len()),
         cell_box(seen.view, &lo, &hi),
@@ -160,7 +160,7 @@ fn on_joints(input: &EvidenceInput<'_>, seen: &Seen<'_>) -> Finding {
         "the rest is no part of the fitted body"
     };
     let text = format!(
-        "`{}`: {} of the static cells lie within one resolution cell of a fitted joint: {meaning}.",
+        "{}: {} of the static cells lie within one resolution cell of a fitted joint: {meaning}.",
         seen.view.array,
         percent(share)
     );

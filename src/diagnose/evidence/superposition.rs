@@ -45,7 +45,7 @@ fn annotations(input: &EvidenceInput<'_>) -> (Vec<Finding>, Option<usize>) {
     let labels = &input.annotated;
     let boxes = labels.map_boxes.iter().zip(&input.problem.views).filter(|(boxes, _)| !boxes.is_empty());
     let mut parts: Vec<String> = labels.persons.iter().map(|n| format!("{n} by its count of people")).collect();
-    parts.extend(boxes.map(|(boxes, view)| format!("{} by the boxes on `{}`", boxes.len(), view.array)));
+    parts.extend(boxes.map(|(boxes, view)| format!("{} by the boxes on {}", boxes.len(), view.array)));
     parts.extend(labels.image_boxes.map(|n| format!("{n} in the camera image")));
     let count = labels.persons.or_else(|| labels.map_boxes.iter().map(Vec::len).chain(labels.image_boxes).max());
     let count = count.filter(|_| !parts.is_empty());
@@ -86,7 +86,7 @@ fn closest_boxes(index: usize, view: &View, boxes: &[[f64; 4]]) -> Option<(f64, 
     let cell = |(k, x): (usize, f64)| (x.round().max(0.0) as usize).min(view.shape()[k].saturating_sub(1));
     let lo = (0..2).map(|k| (k, corners(k).into_iter().fold(f64::INFINITY, f64::min))).map(cell).collect();
     let hi = (0..2).map(|k| (k, corners(k).into_iter().fold(f64::NEG_INFINITY, f64::max))).map(cell).collect();
-    let text = format!("`{}`: two labelled boxes share {} of the smaller one.", view.array, percent(share));
+    let text = format!("{}: two labelled boxes share {} of the smaller one.", view.array, percent(share));
     Some((share, Finding::new(text, Some(Place::Cells { view: index, lo, hi }))))
 }
 
@@ -118,14 +118,14 @@ fn by_maps(input: &EvidenceInput<'_>) -> Judged {
     let findings = views.map(|((k, view), share)| {
         let apart = apart(view, input.params, a, b);
         let Some(share) = share else {
-            return Finding::new(format!("`{}` does not show both; {apart}.", view.array), None);
+            return Finding::new(format!("{} does not show both; {apart}.", view.array), None);
         };
         let overlap = alone[a][k].as_ref().zip(alone[b][k].as_ref()).and_then(|(p, q)| overlap(k, view, p, q));
         let at = match &overlap {
             Some(Place::Cells { lo, hi, .. }) => format!(", at {}", cell_box(view, lo, hi)),
             _ => String::new(),
         };
-        Finding::new(format!("`{}`: they share {} of their echo{at}; {apart}.", view.array, percent(share)), overlap)
+        Finding::new(format!("{}: they share {} of their echo{at}; {apart}.", view.array, percent(share)), overlap)
     });
     (Some(score), summary, findings.collect())
 }

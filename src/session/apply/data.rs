@@ -5,6 +5,7 @@ use crate::dataset::{Dataset, DatasetError, Frame};
 use crate::session::command::Effect;
 use crate::session::fit::{Fit, FitStatus};
 use crate::session::history::History;
+use crate::session::pins::Pins;
 use crate::session::state::{LogLevel, Opening, RECENT, Session};
 use crate::worker::{Prepare, Start, WorkerCommand};
 use std::path::PathBuf;
@@ -31,10 +32,12 @@ impl Session {
                 return Vec::new();
             }
             Err(DatasetError::Cancelled) => {
+                self.restoring = None;
                 self.note(LogLevel::Info, format!("opening {} was cancelled", path.display()));
                 return Vec::new();
             }
             Err(error) => {
+                self.restoring = None;
                 self.note(LogLevel::Error, error.to_string());
                 return Vec::new();
             }
@@ -53,13 +56,18 @@ impl Session {
         self.fits.clear();
         self.left.clear();
         self.summaries.clear();
+        self.pins = Pins::default();
         self.data.frame = None;
         self.data.playing = false;
         self.data.dataset = Some(Arc::clone(&dataset));
         self.joint = None;
-        effects.push(Effect::UseDataset(dataset));
+        effects.push(Effect::UseDataset(Arc::clone(&dataset)));
+        let (start, pins) = self.restore(&dataset).unwrap_or((start, Vec::new()));
+        effects.extend(pins);
         self.data.frame_index = start;
         effects.extend(self.load(start));
+        effects.extend(self.open_labels());
+        effects.extend(self.begin_strata());
         effects
     }
 
@@ -75,7 +83,12 @@ impl Session {
             return Vec::new();
         }
         self.data.frame_index = index;
-        self.load(index)
+        if let Some(at) = self.queue.position(index) {
+            self.queue.last_position = at;
+        }
+        let mut effects = self.load(index);
+        effects.push(Effect::RefreshLabels);
+        effects
     }
 
     pub(super) fn load(&mut self, index: usize) -> Vec<Effect> {

@@ -1,5 +1,6 @@
 //! What the worker reports: rows, events, snapshots.
 
+use super::diagnosis::hashes;
 use crate::body::Group;
 use crate::diagnose::majpe_mm;
 use crate::session::command::Effect;
@@ -37,9 +38,16 @@ impl Session {
         let Some(row) = self.fit.branch().and_then(|branch| branch.rows.last()) else { return };
         if row.report.iteration == 0 {
             self.summaries.remove(&self.fit.frame);
+            self.stale = true;
             return;
         }
+        let hashes = row.state.as_ref().map(|state| {
+            let config = self.fit.branch().map_or(self.config, super::super::Branch::newest_config);
+            hashes(&state.params, &config, row.report.iteration)
+        });
         let summary = FrameSummary {
+            reason: self.fit.reason.map(str::to_owned),
+            hashes,
             iterations: row.report.iteration,
             loss: row.report.loss,
             iou: mean_known(&row.report.iou),
@@ -47,6 +55,7 @@ impl Session {
             majpe_mm: row.majpe_mm,
         };
         self.summaries.insert(self.fit.frame, summary);
+        self.stale = true;
     }
 
     pub(super) fn worker_event(&mut self, event: WorkerEvent) -> Vec<Effect> {
@@ -61,6 +70,10 @@ impl Session {
                     self.fit.status = FitStatus::Paused;
                     self.fit.run_ms = Some(run_ms);
                     self.fit.reason = Some(reason.text());
+                    if let Some(summary) = self.summaries.get_mut(&self.fit.frame) {
+                        summary.reason = Some(reason.text().to_owned());
+                    }
+                    self.stale = true;
                     // A single step is seen on the screen; the log is for runs.
                     if iteration > self.fit.run.1 + 1 {
                         self.note(
@@ -146,7 +159,7 @@ impl Session {
 }
 
 /// The mean over the views whose IoU is defined.
-fn mean_known(iou: &[Option<f64>]) -> Option<f64> {
+pub(in crate::session) fn mean_known(iou: &[Option<f64>]) -> Option<f64> {
     let known: Vec<f64> = iou.iter().flatten().copied().collect();
     (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
 }

@@ -20,6 +20,7 @@ mod plan;
 mod rank;
 mod scan;
 mod stamps;
+mod table;
 mod types;
 
 pub use cache::{cache_folder, cached_share};
@@ -27,4 +28,5 @@ pub use compute::compute;
 pub use job::ComplexityJob;
 pub use options::ComplexityOptions;
 pub use rank::rank;
+pub use table::{json, write_csv};
 pub use types::{Complexity, Counts, FrameComplexity, Statistics, Stratum};

@@ -18,6 +18,7 @@ pub(super) fn title(
     plot: Rect,
     view: &View,
     content: Content,
+    reference: Content,
     tokens: &Tokens,
     session: &Session,
 ) {
@@ -34,6 +35,12 @@ pub(super) fn title(
             iou.map_or_else(|| "IoU —".to_owned(), |iou| format!("IoU {iou:.3}"))
         }
         _ if session.fit.shown.is_none() && content != Content::Ori => "preparing…".into(),
+        Content::Difference if reference == Content::Base => "H_sim − baseline".into(),
+        Content::Difference => "H_sim − H_ori".into(),
+        Content::Base => {
+            let pin = session.pins.baseline();
+            pin.map_or_else(String::new, |pin| format!("H_sim of {} ({})", pin.name, pin.frame_name))
+        }
         _ => content.name().to_owned(),
     };
     let font = if content == Content::Masks { theme::mono(theme::CAPTION) } else { caption };

@@ -5,7 +5,7 @@ use crate::app::theme;
 use crate::dataset::Frame;
 use crate::radar::View;
 use crate::render::Colormap;
-use crate::session::{ColorRange, MapScale, Session, ViewState};
+use crate::session::{Against, ColorRange, MapScale, Session, ViewState};
 use crate::worker::Snapshot;
 use egui::{Color32, ColorImage, Painter, Rect, TextureHandle, TextureOptions, Ui};
 use std::cell::RefCell;
@@ -17,6 +17,8 @@ use std::sync::Arc;
 pub(super) enum Content {
     Ori,
     Sim,
+    /// H_sim of the baseline.
+    Base,
     Difference,
     Masks,
 }
@@ -26,7 +28,8 @@ impl Content {
         match self {
             Self::Ori => "H_ori",
             Self::Sim => "H_sim",
-            Self::Difference => "H_sim − H_ori",
+            Self::Base => "H_sim of the baseline",
+            Self::Difference => "Difference",
             Self::Masks => "Masks",
         }
     }
@@ -40,6 +43,7 @@ struct ViewPictures {
     ori: Option<Shown>,
     sim_stored: Vec<f64>,
     sim: Option<Shown>,
+    base: Option<Shown>,
     masks: Option<[Vec<bool>; 3]>,
     ori_limits: (f64, f64),
     sim_limits: (f64, f64),
@@ -52,6 +56,7 @@ pub(super) struct Pictures {
     views: Vec<ViewPictures>,
     frame: Option<Arc<Frame>>,
     snapshot: Option<Arc<Snapshot>>,
+    baseline: Option<Arc<Snapshot>>,
     look: Option<Look>,
     /// With whether the texture shows what the maps are now.
     textures: RefCell<HashMap<(usize, Content), (TextureHandle, bool)>>,
@@ -66,6 +71,7 @@ struct Look {
     colormap: Colormap,
     hatch: bool,
     mask_opacity: f32,
+    against: Against,
 }
 
 impl Look {
@@ -78,6 +84,7 @@ impl Look {
             colormap: colormap.unwrap_or_default(),
             hatch: view.show_clipped,
             mask_opacity: view.mask_opacity,
+            against: view.against,
         }
     }
 }
@@ -97,7 +104,9 @@ impl Pictures {
         let new_frame = !same(self.frame.as_ref(), Some(frame));
         let new_snapshot = !same(self.snapshot.as_ref(), session.fit.shown.as_ref());
         let new_look = self.look.as_ref() != Some(&look);
-        if !(new_frame || new_snapshot || new_look) {
+        let baseline = session.pins.baseline().and_then(|pin| pin.snapshot.clone());
+        let new_baseline = !same(self.baseline.as_ref(), baseline.as_ref());
+        if !(new_frame || new_snapshot || new_look || new_baseline) {
             return;
         }
         let all = new_frame || new_look;
@@ -112,6 +121,11 @@ impl Pictures {
                 pictures.ori_limits = limits(&ori.values, look.range);
                 pictures.ori = Some(ori);
             }
+            if all || new_baseline {
+                let map = baseline.as_ref().and_then(|base| base.h_sim.get(i)).filter(|map| map.len() == view.cells());
+                pictures.base =
+                    map.map(|map| shown(&orientation.picture(view, map), look.scale, view.quantity.db_factor()));
+            }
             if all || new_snapshot {
                 pictures.take_snapshot(session.fit.shown.as_deref(), i, view, &look);
             }
@@ -121,6 +135,7 @@ impl Pictures {
         }
         self.frame = Some(Arc::clone(frame));
         self.snapshot.clone_from(&session.fit.shown);
+        self.baseline = baseline;
         self.look = Some(look);
     }
 
@@ -152,10 +167,17 @@ impl Pictures {
             Content::Sim => paint(&pictures.sim.as_ref()?.values, pictures.sim_limits, look.colormap),
             Content::Difference => {
                 let limit = pictures.difference_limit;
-                paint(&pictures.difference()?, (-limit, limit), Colormap::Diverging)
+                paint(&pictures.difference(self.reference())?, (-limit, limit), Colormap::Diverging)
             }
+            Content::Base => paint(&pictures.base.as_ref()?.values, pictures.sim_limits, look.colormap),
             Content::Masks => pictures.mask_image(look.mask_opacity)?,
         })
+    }
+
+    /// What H_sim is compared with: the baseline's H_sim where that was chosen and is there, else H_ori.
+    pub(super) fn reference(&self) -> Content {
+        let chosen = self.look.as_ref().is_some_and(|look| look.against == Against::Baseline);
+        if chosen && self.baseline.is_some() { Content::Base } else { Content::Ori }
     }
 
     pub(super) fn colormap(&self, content: Content) -> Colormap {
@@ -168,7 +190,7 @@ impl Pictures {
     pub(super) fn limits(&self, view: usize, content: Content) -> (f64, f64) {
         let Some(pictures) = self.views.get(view) else { return (0.0, 1.0) };
         match content {
-            Content::Sim => pictures.sim_limits,
+            Content::Sim | Content::Base => pictures.sim_limits,
             Content::Difference => (-pictures.difference_limit, pictures.difference_limit),
             _ => pictures.ori_limits,
         }
@@ -225,9 +247,11 @@ impl ViewPictures {
             .map(|masks| [&masks.ori, &masks.sim, &masks.inside].map(|mask| orientation.mask_picture(view, mask)));
     }
 
-    /// H_sim − H_ori, both clipped to the limits' floor, so that −400 dB of nothing does not hide the rest.
-    fn difference(&self) -> Option<Vec<f64>> {
-        let (ori, sim) = (self.ori.as_ref()?, self.sim.as_ref()?);
+    /// H_sim less what it is compared with, both clipped to the limits' floor, so that −400 dB of nothing does not hide the
+    /// rest.
+    fn difference(&self, reference: Content) -> Option<Vec<f64>> {
+        let (ori, sim) =
+            (if reference == Content::Base { &self.base } else { &self.ori }.as_ref()?, self.sim.as_ref()?);
         let floor = self.ori_limits.0;
         Some(sim.values.iter().zip(&ori.values).map(|(s, o)| s.max(floor) - o.max(floor)).collect())
     }

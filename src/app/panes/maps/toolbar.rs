@@ -4,7 +4,7 @@ use super::{Column, Shared};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::render::Colormap;
-use crate::session::{ColorRange, Compare, MapScale};
+use crate::session::{Against, ColorRange, Compare, MapScale};
 use egui::{Color32, RichText, Sense, Ui, vec2};
 
 pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, column: Column) {
@@ -109,6 +109,20 @@ fn comparison(ui: &mut Ui, shared: &mut Shared<'_>) {
         .on_hover_text("H_sim − H_ori, colours diverging about zero. Key: D");
     if mode != shared.session.view.compare {
         shared.set_view(|v| v.compare = mode);
+    }
+    if let Some(baseline) = shared.session.pins.baseline() {
+        let on = shared.session.view.against == Against::Baseline;
+        let tip = format!(
+            "Compare with H_sim of the baseline {} ({}, iteration {}) instead of H_ori. Key: B",
+            baseline.name,
+            baseline.frame_name,
+            baseline.iteration()
+        );
+        let text = format!("vs {}", baseline.name);
+        let button = ui.selectable_label(on, text).named(egui::Role::Button, "Compare with the baseline");
+        if button.on_hover_text(tip).clicked() {
+            shared.invoke("Compare with the baseline");
+        }
     }
 }
 

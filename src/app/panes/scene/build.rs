@@ -68,6 +68,13 @@ pub(super) fn scene(session: &Session, camera: &Camera, tokens: &Tokens, px: f32
         let stroke = Stroke { color: rgba(tokens.ok, 0.85), width_px: 1.5 * px };
         bones(&mut scene.lines, &dataset.info().skeleton, &truth.joints, &|_| stroke);
     }
+    if look.show_baseline
+        && let (Some(pin), Some(dataset)) = (session.pins.baseline(), &session.data.dataset)
+    {
+        let positions: Vec<_> = (0..pin.params.shape().total_joints()).map(|j| pin.params.position(j)).collect();
+        let stroke = Stroke { color: rgba(tokens.warn, 0.85), width_px: 1.5 * px };
+        bones(&mut scene.lines, &dataset.info().skeleton, &positions, &|_| stroke);
+    }
     (scene, labels)
 }
 

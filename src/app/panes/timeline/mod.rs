@@ -1,15 +1,18 @@
-//! The bottom strip: frames coloured by IoU with their transport, and the iterations with theirs.
+//! The bottom strip: frames coloured by stratum, IoU or tags with their transport, and the iterations with theirs.
+
+mod strip;
 
 use super::Shared;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::{icon_button, iou_color};
-use crate::session::Command;
+use crate::app::widgets::{Named as _, icon_button};
+use crate::session::{Command, Strip};
 use egui::{Rect, RichText, Sense, Stroke, Ui, pos2, vec2};
 
 /// What the strip remembers.
 #[derive(Default)]
 pub(in crate::app) struct State {
     drag_frame: Option<usize>,
+    strip: strip::Strips,
 }
 
 /// Draws the strip at the bottom of the window.
@@ -35,12 +38,32 @@ fn caption(ui: &mut Ui, text: &str) {
     });
 }
 
+/// What the strip shows, in the place of its caption.
+fn choose_strip(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let names = [(Strip::Stratum, "Stratum"), (Strip::Iou, "IoU"), (Strip::Tags, "Tags")];
+    let now = shared.session.view.strip;
+    ui.allocate_ui_with_layout(vec2(CAPTION, 22.0), egui::Layout::left_to_right(egui::Align::Center), |ui| {
+        ui.set_min_width(CAPTION);
+        let name = names.iter().find(|(strip, _)| *strip == now).map_or("", |(_, name)| *name);
+        let button = ui.menu_button(RichText::new(format!("{name} ▾")).small(), |ui| {
+            for (strip, name) in names {
+                if ui.selectable_label(strip == now, name).clicked() {
+                    shared.set_view(|view| view.strip = strip);
+                    ui.close();
+                }
+            }
+        });
+        let tip = "What the strip over all frames shows: bars for stratum or IoU, marks for tags.";
+        button.response.named(egui::Role::Button, "Strip shows").on_hover_text(tip);
+    });
+}
+
 fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tokens) {
     let (count, index, playing) = {
         let data = &shared.session.data;
         (data.len(), data.frame_index, data.playing)
     };
-    caption(ui, "Frame");
+    choose_strip(ui, shared);
     let many = count > 1;
     for (sign, name, label, enabled) in [
         ("|◂", "First frame", "First frame", index > 0),
@@ -59,7 +82,7 @@ fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Toke
     response.widget_info(|| egui::WidgetInfo::slider(many, index as f64, "Timeline"));
     ui.painter().rect_filled(rect, 2.0, tokens.canvas);
     if count > 0 {
-        strip(ui, shared, rect, count, tokens);
+        state.strip.paint(ui, shared.session, rect, tokens);
         let at = |x: f32| (((x - rect.left()) / rect.width() * count as f32).floor().max(0.0) as usize).min(count - 1);
         if let Some(pointer) = response.interact_pointer_pos().filter(|_| response.dragged() || response.clicked()) {
             let wanted = at(pointer.x);
@@ -74,30 +97,16 @@ fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Toke
         ui.painter().vline(x, rect.y_range(), Stroke::new(2.0, tokens.accent));
         if let (Some(pointer), Some(dataset)) = (response.hover_pos(), &shared.session.data.dataset) {
             let i = at(pointer.x);
-            let summary = shared.session.summaries.get(&i);
-            let iou = summary.and_then(|s| s.iou).map_or_else(|| "not fitted".into(), |x| format!("IoU {x:.3}"));
-            response.on_hover_text_at_pointer(format!("{i} · {}\n{iou}", dataset.frame_name(i)));
+            let facts = shared.session.facts(i);
+            let stratum = facts.stratum.map_or("not graded", |stratum| stratum.word());
+            let iou = facts.iou.map_or_else(|| "not fitted".into(), |x| format!("IoU {x:.3}"));
+            let tags = if facts.tags.is_empty() { "no tag".into() } else { facts.tags.to_string() };
+            response.on_hover_text_at_pointer(format!("{i} · {}\n{stratum} · {iou} · {tags}", dataset.frame_name(i)));
         }
     }
     ui.painter().rect_stroke(rect, 2.0, Stroke::new(1.0, tokens.stroke), egui::StrokeKind::Inside);
     let text = if count == 0 { "—".into() } else { format!("{} / {}", index, count - 1) };
     numbers(ui, &text, if shared.session.data.loading.is_some() { "reading…" } else { "" });
-}
-
-/// IoU of each fitted frame as a bar: its height and colour say the same.
-fn strip(ui: &Ui, shared: &Shared<'_>, rect: Rect, count: usize, tokens: &Tokens) {
-    let width = (rect.width() / count as f32).max(1.0);
-    for (&i, summary) in &shared.session.summaries {
-        if let Some(iou) = summary.iou {
-            let x = rect.left() + i as f32 / count as f32 * rect.width();
-            let height = (iou as f32).clamp(0.08, 1.0) * (rect.height() - 4.0);
-            let bar = Rect::from_min_max(
-                pos2(x, rect.bottom() - 2.0 - height),
-                pos2(x + width.max(2.0) - if width > 4.0 { 1.0 } else { 0.0 }, rect.bottom() - 2.0),
-            );
-            ui.painter().rect_filled(bar, 0.0, iou_color(tokens, iou));
-        }
-    }
 }
 
 fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {

@@ -1,148 +1,53 @@
-//! The one table of user commands: label, tooltip, shortcut, when enabled, what it does. Menus, palette, help sheet and
-//! keys all read it; a test holds that no two commands share a key.
+//! The commands about data, frames, fits and views.
 
+use super::{Act, AppAct, Menu, UserCommand};
 use crate::session::{Command, Compare, PickKind, Session, ThemeChoice, ViewState};
 use egui::{Key, Modifiers};
 
-/// The menu that a command is in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Menu {
-    /// Opening and leaving.
-    File,
-    /// Frames.
-    Frame,
-    /// The optimiser.
-    Fit,
-    /// How things are shown.
-    View,
-    /// Help.
-    Help,
-}
+pub(super) const NONE: Modifiers = Modifiers::NONE;
+pub(super) const SHIFT: Modifiers = Modifiers::SHIFT;
+pub(super) const CTRL: Modifiers = Modifiers::COMMAND;
+pub(super) const CTRL_SHIFT: Modifiers = Modifiers::COMMAND.plus(Modifiers::SHIFT);
 
-impl Menu {
-    /// In the order of the menu bar.
-    pub(crate) const ALL: [Self; 5] = [Self::File, Self::Frame, Self::Fit, Self::View, Self::Help];
-
-    /// The title on the bar.
-    pub(crate) fn title(self) -> &'static str {
-        match self {
-            Self::File => "File",
-            Self::Frame => "Frame",
-            Self::Fit => "Fit",
-            Self::View => "View",
-            Self::Help => "Help",
-        }
-    }
-}
-
-/// What only the window can do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum AppAct {
-    /// Close the window.
-    Quit,
-    /// Show or hide the palette.
-    Palette,
-    /// Show or hide the help sheet.
-    Help,
-    /// Show or hide what this program is.
-    About,
-    /// Type the number of a frame.
-    GotoFrame,
-    /// Type the path of a data set.
-    OpenPath,
-    /// The panes as they were at first.
-    ResetLayout,
-    /// Zoom of maps and curves and the camera as they were at first.
-    ResetViews,
-    /// Zoom the maps to the person and the camera to the selection.
-    Focus,
-    /// Look from the radar.
-    CameraRadar,
-    /// Look from above.
-    CameraTop,
-    /// Look from the side.
-    CameraSide,
-    /// Larger interface.
-    ZoomIn,
-    /// Smaller interface.
-    ZoomOut,
-    /// Interface at its normal size.
-    ZoomReset,
-    /// Fill the screen.
-    FullScreen,
-}
-
-/// What a command does.
-#[derive(Debug)]
-pub(crate) enum Act {
-    /// Change the session.
-    Session(Command),
-    /// Change the window.
-    App(AppAct),
-}
-
-/// A key with its modifiers.
-pub(crate) type Shortcut = (Modifiers, Key);
-
-/// One command.
-pub(crate) struct UserCommand {
-    /// Sentence case, unique.
-    pub(crate) label: &'static str,
-    /// One sentence: what it does.
-    pub(crate) tooltip: &'static str,
-    /// Its menu.
-    pub(crate) menu: Menu,
-    /// Its keys; the first is shown.
-    pub(crate) keys: &'static [Shortcut],
-    /// Whether it would do something now.
-    pub(crate) enabled: fn(&Session) -> bool,
-    /// What it does.
-    pub(crate) act: fn(&Session) -> Act,
-}
-
-const NONE: Modifiers = Modifiers::NONE;
-const SHIFT: Modifiers = Modifiers::SHIFT;
-const CTRL: Modifiers = Modifiers::COMMAND;
-const CTRL_SHIFT: Modifiers = Modifiers::COMMAND.plus(Modifiers::SHIFT);
-
-fn always(_: &Session) -> bool {
+pub(super) fn always(_: &Session) -> bool {
     true
 }
 
-fn has_frames(s: &Session) -> bool {
+pub(super) fn has_frames(s: &Session) -> bool {
     s.data.len() > 1
 }
 
-fn ready(s: &Session) -> bool {
+pub(super) fn ready(s: &Session) -> bool {
     s.fit.is_ready()
 }
 
-fn has_frame(s: &Session) -> bool {
+pub(super) fn has_frame(s: &Session) -> bool {
     s.data.frame.is_some()
 }
 
-fn not_first(s: &Session) -> bool {
+pub(super) fn not_first(s: &Session) -> bool {
     s.data.frame_index > 0
 }
 
-fn not_last(s: &Session) -> bool {
+pub(super) fn not_last(s: &Session) -> bool {
     s.data.frame_index + 1 < s.data.len()
 }
 
-fn view(s: &Session, change: impl FnOnce(&mut ViewState)) -> Act {
+pub(super) fn view(s: &Session, change: impl FnOnce(&mut ViewState)) -> Act {
     let mut view = s.view.clone();
     change(&mut view);
     Act::Session(Command::SetView(Box::new(view)))
 }
 
-fn compare(s: &Session, mode: Compare) -> Act {
+pub(super) fn compare(s: &Session, mode: Compare) -> Act {
     view(s, |v| v.compare = if v.compare == mode { Compare::Flip } else { mode })
 }
 
-/// Every command, in the order of its menu.
-pub(crate) const COMMANDS: &[UserCommand] = &[
+/// Commands about data, frames, fits and views, in the order of their menus.
+pub(super) const COMMANDS: &[UserCommand] = &[
     UserCommand {
         label: "Open folder…",
+        title: None,
         tooltip: "Open a data set: an MMVR tree or any folder inside one, or a folder with dataset.toml.",
         menu: Menu::File,
         keys: &[(CTRL, Key::O)],
@@ -151,6 +56,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Open file…",
+        title: None,
         tooltip: "Open one *_radar.npz, a dataset.toml, or a bare .npy or .npz of maps.",
         menu: Menu::File,
         keys: &[(CTRL_SHIFT, Key::O)],
@@ -159,6 +65,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Open path…",
+        title: None,
         tooltip: "Type or paste the path of a data set; needs no file dialog.",
         menu: Menu::File,
         keys: &[(CTRL, Key::L)],
@@ -167,6 +74,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Quit",
+        title: None,
         tooltip: "Close the window. A fit that runs is stopped after its step.",
         menu: Menu::File,
         keys: &[(CTRL, Key::Q)],
@@ -175,6 +83,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Play frames",
+        title: None,
         tooltip: "Show one frame after the other at the data set's rate; again to stop.",
         menu: Menu::Frame,
         keys: &[(NONE, Key::Space)],
@@ -183,6 +92,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Next frame",
+        title: None,
         tooltip: "One frame forward.",
         menu: Menu::Frame,
         keys: &[(NONE, Key::ArrowRight)],
@@ -191,6 +101,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Previous frame",
+        title: None,
         tooltip: "One frame back.",
         menu: Menu::Frame,
         keys: &[(NONE, Key::ArrowLeft)],
@@ -199,6 +110,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Ten frames forward",
+        title: None,
         tooltip: "Ten frames forward, at most to the last.",
         menu: Menu::Frame,
         keys: &[(SHIFT, Key::ArrowRight)],
@@ -207,6 +119,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Ten frames back",
+        title: None,
         tooltip: "Ten frames back, at most to the first.",
         menu: Menu::Frame,
         keys: &[(SHIFT, Key::ArrowLeft)],
@@ -215,6 +128,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Hundred frames forward",
+        title: None,
         tooltip: "A hundred frames forward, at most to the last.",
         menu: Menu::Frame,
         keys: &[(NONE, Key::PageDown)],
@@ -223,6 +137,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Hundred frames back",
+        title: None,
         tooltip: "A hundred frames back, at most to the first.",
         menu: Menu::Frame,
         keys: &[(NONE, Key::PageUp)],
@@ -231,6 +146,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "First frame",
+        title: None,
         tooltip: "The first frame of the data set.",
         menu: Menu::Frame,
         keys: &[(NONE, Key::Home)],
@@ -239,6 +155,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Last frame",
+        title: None,
         tooltip: "The last frame of the data set.",
         menu: Menu::Frame,
         keys: &[(NONE, Key::End)],
@@ -247,6 +164,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Go to frame…",
+        title: None,
         tooltip: "Type a frame's number.",
         menu: Menu::Frame,
         keys: &[(CTRL, Key::J)],
@@ -255,6 +173,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Run or pause",
+        title: None,
         tooltip: "Run the asked number of iterations in the background, or pause the run after its step.",
         menu: Menu::Fit,
         keys: &[(NONE, Key::Enter)],
@@ -263,6 +182,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "One step",
+        title: None,
         tooltip: "One iteration forward: in the history while an earlier one is shown, else one Adam step.",
         menu: Menu::Fit,
         keys: &[(NONE, Key::Period)],
@@ -271,6 +191,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Ten steps",
+        title: None,
         tooltip: "Ten iterations forward: in the history while an earlier one is shown, else ten Adam steps.",
         menu: Menu::Fit,
         keys: &[(SHIFT, Key::Period)],
@@ -279,6 +200,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "One step back",
+        title: None,
         tooltip: "Show the iteration before. Changing a setting there starts a branch and keeps this one.",
         menu: Menu::Fit,
         keys: &[(NONE, Key::Comma)],
@@ -287,6 +209,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Ten steps back",
+        title: None,
         tooltip: "Show the tenth iteration before.",
         menu: Menu::Fit,
         keys: &[(SHIFT, Key::Comma)],
@@ -295,6 +218,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Follow newest iteration",
+        title: None,
         tooltip: "Leave the earlier iteration that is shown and follow the run again.",
         menu: Menu::Fit,
         keys: &[(NONE, Key::L)],
@@ -303,6 +227,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Reset fit",
+        title: None,
         tooltip: "Forget every iteration of this frame and find a new start pose with the current settings.",
         menu: Menu::Fit,
         keys: &[(CTRL, Key::R)],
@@ -311,6 +236,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Discard run",
+        title: None,
         tooltip: "Remove this branch and go back to where it began; on the first branch, back to the start pose.",
         menu: Menu::Fit,
         keys: &[(CTRL, Key::Backspace)],
@@ -319,6 +245,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Warm start",
+        title: None,
         tooltip: "Start the next frame from this frame's result instead of from its own peaks.",
         menu: Menu::Fit,
         keys: &[],
@@ -327,6 +254,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Difference H_sim − H_ori",
+        title: None,
         tooltip: "Show the difference in the H_sim pane, colours diverging about zero; again for H_sim.",
         menu: Menu::View,
         keys: &[(NONE, Key::D)],
@@ -335,6 +263,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Wipe H_ori | H_sim",
+        title: None,
         tooltip: "H_ori left of a line that can be dragged, H_sim right of it; again for H_sim.",
         menu: Menu::View,
         keys: &[(NONE, Key::W)],
@@ -343,6 +272,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Auto-contrast",
+        title: None,
         tooltip: "Set the colour limits to the 2nd and 99.8th percentile again.",
         menu: Menu::View,
         keys: &[(NONE, Key::C)],
@@ -351,6 +281,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Focus the person",
+        title: None,
         tooltip: "Zoom the maps to the region that is fitted and the camera to the selected joint or the person.",
         menu: Menu::View,
         keys: &[(NONE, Key::F)],
@@ -359,6 +290,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Reset view",
+        title: None,
         tooltip: "Whole maps, whole curves, and the camera as at first.",
         menu: Menu::View,
         keys: &[(NONE, Key::R)],
@@ -367,6 +299,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "View from the radar",
+        title: None,
         tooltip: "Put the camera at the radar, looking along its boresight.",
         menu: Menu::View,
         keys: &[(NONE, Key::V)],
@@ -375,6 +308,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "View from above",
+        title: None,
         tooltip: "Put the camera above the scene.",
         menu: Menu::View,
         keys: &[(NONE, Key::T)],
@@ -383,6 +317,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "View from the side",
+        title: None,
         tooltip: "Put the camera to the right of the scene.",
         menu: Menu::View,
         keys: &[(NONE, Key::S)],
@@ -391,14 +326,22 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Clear selection",
-        tooltip: "Select no joint.",
+        title: None,
+        tooltip: "Select no frame for tagging any more; again to select no joint.",
         menu: Menu::View,
         keys: &[(NONE, Key::Escape)],
-        enabled: |s| s.joint.is_some(),
-        act: |_| Act::Session(Command::SelectJoint(None)),
+        enabled: |s| s.joint.is_some() || !s.labels.selection.is_empty(),
+        act: |s| {
+            Act::Session(if s.labels.selection.is_empty() {
+                Command::SelectJoint(None)
+            } else {
+                Command::SelectFrames(std::collections::BTreeSet::new())
+            })
+        },
     },
     UserCommand {
         label: "Light or dark",
+        title: None,
         tooltip: "Switch between the light and the dark theme.",
         menu: Menu::View,
         keys: &[(CTRL, Key::T)],
@@ -411,6 +354,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Larger interface",
+        title: None,
         tooltip: "Scale everything up.",
         menu: Menu::View,
         keys: &[(CTRL, Key::Plus), (CTRL, Key::Equals)],
@@ -419,6 +363,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Smaller interface",
+        title: None,
         tooltip: "Scale everything down.",
         menu: Menu::View,
         keys: &[(CTRL, Key::Minus)],
@@ -427,6 +372,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Normal size",
+        title: None,
         tooltip: "Scale of 100 %.",
         menu: Menu::View,
         keys: &[(CTRL, Key::Num0)],
@@ -435,6 +381,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Full screen",
+        title: None,
         tooltip: "Fill the screen; again to leave.",
         menu: Menu::View,
         keys: &[(NONE, Key::F11)],
@@ -443,6 +390,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Reset layout",
+        title: None,
         tooltip: "Put every pane back where it was at first.",
         menu: Menu::View,
         keys: &[],
@@ -451,6 +399,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Command palette…",
+        title: None,
         tooltip: "Find and do any command by typing.",
         menu: Menu::Help,
         keys: &[(CTRL, Key::K), (CTRL, Key::P)],
@@ -459,6 +408,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "Keys and gestures",
+        title: None,
         tooltip: "Every shortcut on one sheet.",
         menu: Menu::Help,
         keys: &[(SHIFT, Key::Questionmark), (NONE, Key::Questionmark), (SHIFT, Key::Slash), (NONE, Key::F1)],
@@ -467,6 +417,7 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
     },
     UserCommand {
         label: "About",
+        title: None,
         tooltip: "What this program is, its version and its licences.",
         menu: Menu::Help,
         keys: &[],
@@ -474,98 +425,3 @@ pub(crate) const COMMANDS: &[UserCommand] = &[
         act: |_| Act::App(AppAct::About),
     },
 ];
-
-/// The command called `label`.
-pub(crate) fn command(label: &str) -> Option<&'static UserCommand> {
-    COMMANDS.iter().find(|command| command.label == label)
-}
-
-/// A shortcut as it is printed: `Ctrl+Shift+O`.
-pub(crate) fn shortcut_text((modifiers, key): Shortcut) -> String {
-    let key_text = match key {
-        Key::ArrowLeft => "←",
-        Key::ArrowRight => "→",
-        Key::Period => ".",
-        Key::Comma => ",",
-        Key::Plus => "+",
-        Key::Minus => "−",
-        Key::Questionmark => return "?".into(),
-        Key::Escape => "Esc",
-        Key::PageUp => "Page up",
-        Key::PageDown => "Page down",
-        Key::Num0 => "0",
-        other => other.name(),
-    };
-    let mut text = String::new();
-    if modifiers.command {
-        text.push_str(if cfg!(target_os = "macos") { "⌘" } else { "Ctrl+" });
-    }
-    if modifiers.shift {
-        text.push_str("Shift+");
-    }
-    text + key_text
-}
-
-/// Tooltip with the shortcut at its end.
-pub(crate) fn tooltip(command: &UserCommand) -> String {
-    command.keys.first().map_or_else(
-        || command.tooltip.to_owned(),
-        |&keys| format!("{}\nKey: {}", command.tooltip, shortcut_text(keys)),
-    )
-}
-
-/// The commands whose keys were pressed in this pass; their key events are taken out of the input.
-///
-/// While text is being typed nothing is taken except function keys and combinations with Ctrl that text fields do not use.
-pub(crate) fn pressed(ctx: &egui::Context) -> Vec<&'static UserCommand> {
-    let focused = ctx.memory(egui::Memory::focused);
-    let typing = focused.is_some_and(|id| egui::text_edit::TextEditState::load(ctx, id).is_some());
-    let popup = egui::Popup::is_any_open(ctx);
-    let mut found = Vec::new();
-    ctx.input_mut(|input| {
-        input.events.retain(|event| {
-            let egui::Event::Key { key, pressed: true, modifiers, .. } = event else { return true };
-            let held = (modifiers.command || modifiers.ctrl, modifiers.shift);
-            if modifiers.alt {
-                return true;
-            }
-            if typing && !(held.0 && matches!(key, Key::K | Key::P | Key::Q | Key::O | Key::T) || *key == Key::F1) {
-                return true;
-            }
-            // An open menu keeps the keys that close it and move in it.
-            if popup && !held.0 {
-                return true;
-            }
-            // A widget that has the keyboard keeps its own keys.
-            if focused.is_some() && !held.0 && matches!(key, Key::Space | Key::Enter | Key::Escape | Key::Tab) {
-                return true;
-            }
-            let hit = COMMANDS
-                .iter()
-                .find(|command| command.keys.iter().any(|(m, k)| k == key && (m.command, m.shift) == held));
-            found.extend(hit);
-            hit.is_none()
-        });
-    });
-    found
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::collections::HashSet;
-
-    #[test]
-    fn no_two_commands_share_a_key_or_a_label() {
-        let mut keys = HashSet::new();
-        let mut labels = HashSet::new();
-        for command in COMMANDS {
-            assert!(labels.insert(command.label), "two commands are called {}", command.label);
-            assert!(!command.tooltip.is_empty(), "{} has no tooltip", command.label);
-            for &(m, k) in command.keys {
-                assert!(keys.insert((m.command, m.shift, k)), "{} clashes on {}", command.label, shortcut_text((m, k)));
-            }
-        }
-        assert!(COMMANDS.len() > 30);
-    }
-}

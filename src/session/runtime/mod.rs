@@ -1,10 +1,19 @@
 //! The threads behind a session: carries effects out, and brings reports back as commands.
 
+mod evidence;
+mod labels;
+
 use super::command::{Command, Effect, PickKind};
+use super::file::SessionFile;
 use super::state::{LogLevel, Session};
-use crate::dataset::{BareChoice, Dataset, Loader, OpenJob};
+use super::strata::StrataStatus;
+use crate::dataset::{Dataset, Loader, OpenJob};
+use crate::study::StudyError;
+use crate::study::complexity::{ComplexityJob, ComplexityOptions, cache_folder, cached_share};
 use crate::worker::Worker;
 use crossbeam_channel::{Receiver, Sender, unbounded};
+use evidence::{Ask, EvidenceKeeper};
+use labels::LabelKeeper;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -14,7 +23,10 @@ pub type Wake = Arc<dyn Fn() + Send + Sync>;
 /// Shows a file dialog and answers the choice; runs on a thread of its own.
 pub type Picker = Arc<dyn Fn(PickKind) -> Option<PathBuf> + Send + Sync>;
 
-/// The worker, the loader and the opener.
+/// Smaller data sets are graded faster than a cache is worth.
+const CACHE_FROM: usize = 200;
+
+/// The worker, the loader, the opener, and those that keep labels, grade frames and gather evidence.
 pub struct Runtime {
     wake: Wake,
     picker: Option<Picker>,
@@ -22,8 +34,11 @@ pub struct Runtime {
     loader: Option<Loader>,
     opening: Option<(PathBuf, OpenJob)>,
     picked: (Sender<PathBuf>, Receiver<PathBuf>),
-    bare: (Sender<Command>, Receiver<Command>),
+    answers: (Sender<Command>, Receiver<Command>),
     startup_error: Option<String>,
+    labels: LabelKeeper,
+    evidence: EvidenceKeeper,
+    grading: Option<ComplexityJob>,
 }
 
 impl Runtime {
@@ -35,13 +50,16 @@ impl Runtime {
             Err(error) => (None, Some(format!("no thread for the fit: {error}"))),
         };
         Self {
+            labels: LabelKeeper::start(&wake),
+            evidence: EvidenceKeeper::start(&wake),
+            grading: None,
             wake,
             picker,
             worker,
             loader: None,
             opening: None,
             picked: unbounded(),
-            bare: unbounded(),
+            answers: unbounded(),
             startup_error,
         }
     }
@@ -67,7 +85,7 @@ impl Runtime {
     }
 
     fn next_report(&mut self, session: &Session) -> Option<Command> {
-        if let Ok(command) = self.bare.1.try_recv() {
+        if let Ok(command) = self.answers.1.try_recv() {
             return Some(command);
         }
         if let Ok(path) = self.picked.1.try_recv() {
@@ -78,6 +96,11 @@ impl Runtime {
         }
         if let Some((index, result)) = self.loader.as_ref().and_then(Loader::poll) {
             return Some(Command::FrameLoaded(index, result));
+        }
+        if let Some(command) =
+            self.labels.poll().or_else(|| self.evidence.poll()).or_else(|| self.grading_report(session))
+        {
+            return Some(command);
         }
         let worker = self.worker.as_ref()?;
         // Rows and events first: a snapshot may be of a branch that an event announces.
@@ -109,7 +132,10 @@ impl Runtime {
                 let job = OpenJob::start(path.clone(), None, move || wake());
                 self.opening = Some((path, job));
             }
-            Effect::OpenBare(path, choice) => self.open_bare(path, choice),
+            Effect::OpenBare(path, choice) => self.on_thread("open-bare", move || {
+                let result = Dataset::open_bare(&path, &choice).map(Arc::new);
+                Command::Opened(path, result)
+            }),
             Effect::CancelOpen => {
                 if let Some((_, job)) = self.opening.take() {
                     job.cancel();
@@ -125,6 +151,22 @@ impl Runtime {
                     loader.request(index);
                 }
             }
+            Effect::OpenLabels { dataset, annotator } => self.labels.open(dataset, annotator),
+            Effect::CommitLabels(commit) => self.labels.commit(commit),
+            Effect::RefreshLabels => self.labels.refresh(),
+            Effect::ComputeStrata { dataset, only_kept } => self.grade(dataset, only_kept),
+            Effect::CancelStrata => {
+                if let Some(job) = &self.grading {
+                    job.cancel();
+                }
+            }
+            Effect::Evidence(request) => self.evidence.ask(Ask::Evidence(request)),
+            Effect::DrawPin(request) => self.evidence.ask(Ask::Pin(request)),
+            Effect::Run(task) => self.on_thread("export", move || Command::TaskDone((task.0)())),
+            Effect::ReadSession(path) => self.on_thread("session-file", move || {
+                let read = SessionFile::read(&path).map(Box::new).map_err(|error| error.to_string());
+                Command::SessionRead(path, read)
+            }),
             Effect::Send(command) => {
                 if let Some(worker) = &self.worker {
                     worker.send(command);
@@ -133,16 +175,44 @@ impl Runtime {
         }
     }
 
-    /// Reads the file's headers, which may be slow on a network, on a thread.
-    fn open_bare(&self, path: PathBuf, choice: BareChoice) {
-        let (answer, wake) = (self.bare.0.clone(), Arc::clone(&self.wake));
-        let spawned = std::thread::Builder::new().name("open-bare".into()).spawn(move || {
-            let result = Dataset::open_bare(&path, &choice).map(Arc::new);
-            let _ = answer.send(Command::Opened(path, result));
+    /// Grades the frames, with what an earlier run left; or takes only that.
+    fn grade(&mut self, dataset: Arc<Dataset>, only_kept: bool) {
+        let options = ComplexityOptions::default();
+        let cache = cache_folder().filter(|_| dataset.len() >= CACHE_FROM);
+        if only_kept && cached_share(&dataset, &options, cache.as_deref()) < 1.0 {
+            self.grading = None;
+            let _ = self.answers.0.send(Command::StrataDone(Ok(None)));
+            return (self.wake)();
+        }
+        let wake = Arc::clone(&self.wake);
+        self.grading = Some(ComplexityJob::start_in(dataset, options, cache, move || wake()));
+    }
+
+    fn grading_report(&mut self, session: &Session) -> Option<Command> {
+        let job = self.grading.as_mut()?;
+        if let Some(result) = job.poll() {
+            self.grading = None;
+            return Some(Command::StrataDone(match result {
+                Ok(complexity) => Ok(Some(Arc::new(complexity))),
+                Err(StudyError::Cancelled) => Ok(None),
+                Err(error) => Err(error.to_string()),
+            }));
+        }
+        let state = job.progress().state();
+        let StrataStatus::Running { done, total } = session.strata.status else { return None };
+        ((done, total) != (state.done, state.total))
+            .then_some(Command::StrataProgress { done: state.done, total: state.total })
+    }
+
+    /// Does something that may be slow on a thread of its own; its answer comes back as a report.
+    fn on_thread(&self, name: &str, work: impl FnOnce() -> Command + Send + 'static) {
+        let (answer, wake) = (self.answers.0.clone(), Arc::clone(&self.wake));
+        let spawned = std::thread::Builder::new().name(name.into()).spawn(move || {
+            let _ = answer.send(work());
             wake();
         });
         if let Err(error) = spawned {
-            tracing::error!("no thread for opening the file: {error}");
+            tracing::error!("no thread for {name}: {error}");
         }
     }
 
@@ -164,6 +234,6 @@ impl Runtime {
 
     /// True while something is under way whose progress is worth showing soon.
     pub fn is_busy(&self) -> bool {
-        self.opening.is_some()
+        self.opening.is_some() || self.grading.is_some()
     }
 }

@@ -1,0 +1,264 @@
+//! The one table of user commands: label, tooltip, shortcut, when enabled, what it does. Menus, palette, help sheet and
+//! keys all read it; a test holds that no two commands share a key.
+
+mod labels;
+mod sharing;
+mod table;
+
+use super::PaneKind;
+use crate::session::{Command, Export, Session};
+use egui::{Key, Modifiers};
+use std::path::PathBuf;
+
+/// The menu that a command is in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Menu {
+    /// Opening and leaving.
+    File,
+    /// Undo, redo, select.
+    Edit,
+    /// Frames.
+    Frame,
+    /// The optimiser.
+    Fit,
+    /// Tags and notes.
+    Labels,
+    /// How things are shown.
+    View,
+    /// Help.
+    Help,
+}
+
+impl Menu {
+    /// In the order of the menu bar.
+    pub(crate) const ALL: [Self; 7] =
+        [Self::File, Self::Edit, Self::Frame, Self::Fit, Self::Labels, Self::View, Self::Help];
+
+    /// The title on the bar.
+    pub(crate) fn title(self) -> &'static str {
+        match self {
+            Self::File => "File",
+            Self::Edit => "Edit",
+            Self::Frame => "Frame",
+            Self::Fit => "Fit",
+            Self::Labels => "Labels",
+            Self::View => "View",
+            Self::Help => "Help",
+        }
+    }
+}
+
+/// What only the window can do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum AppAct {
+    /// Close the window.
+    Quit,
+    /// Show or hide the palette.
+    Palette,
+    /// Show or hide the help sheet.
+    Help,
+    /// Show or hide what this program is.
+    About,
+    /// Type the number of a frame.
+    GotoFrame,
+    /// Type the path of a data set.
+    OpenPath,
+    /// The panes as they were at first.
+    ResetLayout,
+    /// Zoom of maps and curves and the camera as they were at first.
+    ResetViews,
+    /// Zoom the maps to the person and the camera to the selection.
+    Focus,
+    /// Look from the radar.
+    CameraRadar,
+    /// Look from above.
+    CameraTop,
+    /// Look from the side.
+    CameraSide,
+    /// Larger interface.
+    ZoomIn,
+    /// Smaller interface.
+    ZoomOut,
+    /// Interface at its normal size.
+    ZoomReset,
+    /// Fill the screen.
+    FullScreen,
+    /// Put the text cursor into the filter of the frame list.
+    FocusFilter,
+    /// Put the text cursor into the note.
+    FocusNote,
+    /// The next drag on a map marks cells.
+    MarkCells,
+    /// Ask where to write something.
+    Save(SaveKind),
+    /// Write the session where it was last, or ask.
+    SaveSession,
+    /// Type the path of a session file.
+    OpenSession,
+    /// Put the picture of the window on the clipboard.
+    CopyPicture,
+    /// Put the frame's path on the clipboard.
+    CopyPath,
+}
+
+/// What can be written to a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum SaveKind {
+    /// What the session knows.
+    Export(Export),
+    /// The session file.
+    Session,
+    /// A picture of the window, or of one pane.
+    Picture(Option<PaneKind>),
+}
+
+/// What a command does.
+#[derive(Debug)]
+pub(crate) enum Act {
+    /// Change the session.
+    Session(Command),
+    /// Change the window.
+    App(AppAct),
+    /// Write something to a file.
+    Write(SaveKind, PathBuf),
+    /// Show these cells of a view's map.
+    ShowCells {
+        /// Index of the view.
+        view: usize,
+        /// First bin of each axis.
+        lo: Vec<usize>,
+        /// Last bin of each axis.
+        hi: Vec<usize>,
+    },
+}
+
+impl UserCommand {
+    /// What a menu says.
+    pub(crate) fn text(&self, session: &Session) -> String {
+        self.title.map_or_else(|| self.label.to_owned(), |title| title(session))
+    }
+}
+
+/// A key with its modifiers.
+pub(crate) type Shortcut = (Modifiers, Key);
+
+/// One command.
+pub(crate) struct UserCommand {
+    /// Sentence case, unique.
+    pub(crate) label: &'static str,
+    /// What its menu says instead where that depends on the session: `Undo: tag F2 on 12 frames`.
+    pub(crate) title: Option<fn(&Session) -> String>,
+    /// One sentence: what it does.
+    pub(crate) tooltip: &'static str,
+    /// Its menu.
+    pub(crate) menu: Menu,
+    /// Its keys; the first is shown.
+    pub(crate) keys: &'static [Shortcut],
+    /// Whether it would do something now.
+    pub(crate) enabled: fn(&Session) -> bool,
+    /// What it does.
+    pub(crate) act: fn(&Session) -> Act,
+}
+
+/// Every command; those of one menu are in its order.
+pub(crate) fn all() -> impl Iterator<Item = &'static UserCommand> {
+    table::COMMANDS.iter().chain(labels::COMMANDS).chain(sharing::COMMANDS)
+}
+
+/// The command called `label`.
+pub(crate) fn command(label: &str) -> Option<&'static UserCommand> {
+    all().find(|command| command.label == label)
+}
+
+/// A shortcut as it is printed: `Ctrl+Shift+O`.
+pub(crate) fn shortcut_text((modifiers, key): Shortcut) -> String {
+    let key_text = match key {
+        Key::ArrowLeft => "←",
+        Key::ArrowRight => "→",
+        Key::Period => ".",
+        Key::Comma => ",",
+        Key::Plus => "+",
+        Key::Minus => "−",
+        Key::Questionmark => return "?".into(),
+        Key::Escape => "Esc",
+        Key::PageUp => "Page up",
+        Key::PageDown => "Page down",
+        Key::Num0 => "0",
+        Key::OpenBracket => "[",
+        Key::CloseBracket => "]",
+        other => other.name(),
+    };
+    let mut text = String::new();
+    if modifiers.command {
+        text.push_str(if cfg!(target_os = "macos") { "⌘" } else { "Ctrl+" });
+    }
+    if modifiers.shift {
+        text.push_str("Shift+");
+    }
+    text + key_text
+}
+
+/// Tooltip with the shortcut at its end.
+pub(crate) fn tooltip(command: &UserCommand) -> String {
+    command.keys.first().map_or_else(
+        || command.tooltip.to_owned(),
+        |&keys| format!("{}\nKey: {}", command.tooltip, shortcut_text(keys)),
+    )
+}
+
+/// The commands whose keys were pressed in this pass; their key events are taken out of the input.
+///
+/// While text is being typed nothing is taken except function keys and combinations with Ctrl that text fields do not use.
+pub(crate) fn pressed(ctx: &egui::Context) -> Vec<&'static UserCommand> {
+    let focused = ctx.memory(egui::Memory::focused);
+    let typing = focused.is_some_and(|id| egui::text_edit::TextEditState::load(ctx, id).is_some());
+    let popup = egui::Popup::is_any_open(ctx);
+    let mut found = Vec::new();
+    ctx.input_mut(|input| {
+        input.events.retain(|event| {
+            let egui::Event::Key { key, pressed: true, modifiers, .. } = event else { return true };
+            let held = (modifiers.command || modifiers.ctrl, modifiers.shift);
+            if modifiers.alt {
+                return true;
+            }
+            if typing
+                && !(held.0 && matches!(key, Key::K | Key::P | Key::Q | Key::O | Key::T | Key::S | Key::F)
+                    || *key == Key::F1)
+            {
+                return true;
+            }
+            // An open menu keeps the keys that close it and move in it.
+            if popup && !held.0 {
+                return true;
+            }
+            // A widget that has the keyboard keeps its own keys.
+            if focused.is_some() && !held.0 && matches!(key, Key::Space | Key::Enter | Key::Escape | Key::Tab) {
+                return true;
+            }
+            let hit = all().find(|command| command.keys.iter().any(|(m, k)| k == key && (m.command, m.shift) == held));
+            found.extend(hit);
+            hit.is_none()
+        });
+    });
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn no_two_commands_share_a_key_or_a_label() {
+        let mut keys = HashSet::new();
+        let mut labels = HashSet::new();
+        for command in all() {
+            assert!(labels.insert(command.label), "two commands are called {}", command.label);
+            assert!(!command.tooltip.is_empty(), "{} has no tooltip", command.label);
+            for &(m, k) in command.keys {
+                assert!(keys.insert((m.command, m.shift, k)), "{} clashes on {}", command.label, shortcut_text((m, k)));
+            }
+        }
+        assert!(all().count() > 60);
+    }
+}

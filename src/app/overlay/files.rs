@@ -1,0 +1,133 @@
+//! Sheets that ask for a file: one to write, or a session file to open.
+
+use super::{Overlay, modal};
+use crate::app::commands::{Act, SaveKind};
+use crate::app::panes::Shared;
+use crate::app::theme::Tokens;
+use crate::session::Command;
+use egui::{Key, RichText, Ui};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// What a file dialog answered, once it did.
+#[derive(Default)]
+pub(super) struct State {
+    picked: Arc<Mutex<Option<PathBuf>>>,
+}
+
+impl State {
+    /// Shows a dialog on a thread of its own; its answer comes into the field.
+    fn browse(&self, ctx: &egui::Context, pick: impl FnOnce() -> Option<PathBuf> + Send + 'static) {
+        let (picked, ctx) = (Arc::clone(&self.picked), ctx.clone());
+        let spawned = std::thread::Builder::new().name("file-dialog".into()).spawn(move || {
+            if let Some(path) = pick() {
+                *picked.lock().unwrap_or_else(PoisonError::into_inner) = Some(path);
+                ctx.request_repaint();
+            }
+        });
+        if let Err(error) = spawned {
+            tracing::error!("no thread for the file dialog: {error}");
+        }
+    }
+
+    fn take(&self) -> Option<PathBuf> {
+        self.picked.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+}
+
+fn what(kind: SaveKind) -> (&'static str, &'static str) {
+    match kind {
+        SaveKind::Session => {
+            ("Save the session", "Frame, iteration, fit, pins, camera and layout. Data are not copied.")
+        }
+        SaveKind::Picture(None) => ("Save a picture of the window", "PNG, as it is on screen."),
+        SaveKind::Picture(Some(_)) => ("Save a picture of the pane", "PNG, as it is on screen."),
+        SaveKind::Export(what) => match what {
+            crate::session::Export::Curves => ("Export curves", "CSV: every iteration and branch of this fit."),
+            crate::session::Export::Gaussians => ("Export Gaussians", "PLY: the layout of 3-D Gaussian splatting."),
+            crate::session::Export::Parameters => ("Export parameters", "npz: PPPR of the iteration on screen."),
+            crate::session::Export::LabelsCsv => ("Export labels", "CSV: a row a frame and annotator."),
+            crate::session::Export::LabelsJson => ("Export labels", "JSON: everything that was recorded."),
+            crate::session::Export::Strata => ("Export strata", "CSV: hardness and its parts of every frame."),
+        },
+    }
+}
+
+impl Overlay {
+    /// Asks where to write something.
+    pub(in crate::app) fn open_save(&mut self, kind: SaveKind, suggested: &Path) {
+        self.toggle(super::Sheet::Save(kind));
+        self.query = suggested.display().to_string();
+        self.files = State::default();
+    }
+
+    /// Asks for a session file.
+    pub(in crate::app) fn open_session(&mut self) {
+        self.toggle(super::Sheet::Session);
+        self.files = State::default();
+    }
+
+    pub(super) fn save(&mut self, ui: &mut Ui, shared: &mut Shared<'_>, kind: SaveKind) -> bool {
+        let tokens = Tokens::of(ui);
+        let (title, how) = what(kind);
+        let mut done = false;
+        let response = modal(ui, "save").show(ui.ctx(), |ui| {
+            ui.set_width(620.0);
+            ui.label(RichText::new(title).font(crate::app::theme::strong(16.0)));
+            ui.label(RichText::new(how).small().color(tokens.dim));
+            let browse = |suggested: PathBuf| move || super::pick_save(&suggested);
+            let chosen = self.path_field(ui, "Save to", "Save", browse);
+            if Path::new(self.query.trim()).is_file() {
+                ui.label(RichText::new("△ The file is there already and will be replaced.").small().color(tokens.warn));
+            }
+            if let Some(path) = chosen {
+                shared.acts.push(Act::Write(kind, path));
+                done = true;
+            }
+        });
+        done || response.should_close()
+    }
+
+    pub(super) fn session_path(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
+        let mut done = false;
+        let response = modal(ui, "session").show(ui.ctx(), |ui| {
+            ui.set_width(620.0);
+            ui.label(RichText::new("Open a session").font(crate::app::theme::strong(16.0)));
+            let browse = |_: PathBuf| super::pick_session;
+            if let Some(path) = self.path_field(ui, "Session file", "Open", browse) {
+                shared.send(Command::OpenSession(path));
+                done = true;
+            }
+        });
+        done || response.should_close()
+    }
+
+    /// A field for a path with a button that does it and one that browses; answers the path when it is to be used.
+    fn path_field<P: FnOnce() -> Option<PathBuf> + Send + 'static>(
+        &mut self,
+        ui: &mut Ui,
+        name: &str,
+        verb: &str,
+        browse: impl FnOnce(PathBuf) -> P,
+    ) -> Option<PathBuf> {
+        if let Some(path) = self.files.take() {
+            self.query = path.display().to_string();
+        }
+        let field = egui::TextEdit::singleline(&mut self.query).font(egui::TextStyle::Monospace);
+        let field = ui.add(field.desired_width(f32::INFINITY));
+        field.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, name));
+        if std::mem::take(&mut self.fresh) {
+            field.request_focus();
+        }
+        let typed = self.query.trim().to_owned();
+        let mut clicked = false;
+        ui.horizontal(|ui| {
+            clicked = ui.add_enabled(!typed.is_empty(), egui::Button::new(verb)).clicked();
+            if ui.button("Browse…").on_hover_text("The desktop's file dialog.").clicked() {
+                self.files.browse(ui.ctx(), browse(PathBuf::from(&typed)));
+            }
+        });
+        let enter = ui.input(|i| i.key_pressed(Key::Enter));
+        (!typed.is_empty() && (clicked || enter)).then(|| PathBuf::from(typed))
+    }
+}

@@ -1,0 +1,239 @@
+//! How far two annotators agree, or one and the machine: a row a tag, and the frames in dispute one click away.
+
+use super::{Shared, empty};
+use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Named as _;
+use crate::labels::{Agreement, Dispute, Record, Tag, TagAgreement, against_machine, agreement, judged};
+use crate::session::{Command, Labels};
+use egui::{RichText, Role, Ui};
+
+/// The machine as one of the two.
+const MACHINE: &str = "machine";
+/// The machine says yes from this score on.
+const THRESHOLD: f64 = 0.5;
+
+/// Whose labels are compared, what came out, and which disputes are listed.
+#[derive(Default)]
+pub(in crate::app) struct State {
+    pair: [String; 2],
+    found: Option<(Key, Found)>,
+    listed: Option<Listed>,
+}
+
+/// What the comparison was made from.
+type Key = (u64, [String; 2]);
+
+struct Found {
+    agreement: Agreement,
+    remark: Option<String>,
+}
+
+/// A cell of a table: the tag, and what A and B said.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Listed {
+    tag: Tag,
+    a: bool,
+    b: bool,
+}
+
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    let labels = &shared.session.labels;
+    let names: Vec<&String> = labels.table().iter().filter(|(_, r)| !r.is_empty()).map(|(name, _)| name).collect();
+    if names.is_empty() {
+        let how = "Once somebody has tagged frames, choose two annotators, or one and the machine, to see Cohen's κ of each \
+                   tag and the frames in dispute. Another annotator's journal lies beside the data, or comes with \
+                   `mhp-inspector labels import`.";
+        return empty(ui, "No labels to compare", how);
+    }
+    let tokens = Tokens::of(ui);
+    if !names.iter().any(|name| **name == state.pair[0]) {
+        let mine = names.iter().find(|name| ***name == labels.annotator);
+        state.pair[0].clone_from(mine.unwrap_or(&names[0]));
+    }
+    if state.pair[1] != MACHINE && (!names.iter().any(|name| **name == state.pair[1]) || state.pair[0] == state.pair[1])
+    {
+        let other = names.iter().find(|name| ***name != state.pair[0]);
+        state.pair[1] = other.map_or_else(|| MACHINE.to_owned(), |name| (*name).clone());
+    }
+    choose(ui, state, &names);
+    let key = (labels.revision, state.pair.clone());
+    if state.found.as_ref().is_none_or(|(known, _)| *known != key) {
+        state.found = Some((key, compute(labels, &state.pair)));
+    }
+    let Some((_, found)) = &state.found else { return };
+    let mut listed = state.listed;
+    egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
+        summary(ui, found, &state.pair, &tokens);
+        table(ui, &found.agreement, &mut listed, &tokens);
+        disputes(ui, shared, &found.agreement.disputes, listed, &state.pair, &tokens);
+    });
+    state.listed = listed;
+}
+
+fn choose(ui: &mut Ui, state: &mut State, names: &[&String]) {
+    ui.horizontal(|ui| {
+        for (k, word) in ["A", "B"].into_iter().enumerate() {
+            ui.label(RichText::new(word).font(theme::strong(12.0)));
+            let mut chosen = state.pair[k].clone();
+            let menu =
+                egui::ComboBox::from_id_salt(("annotator", k)).width(110.0).selected_text(&chosen).show_ui(ui, |ui| {
+                    for name in names {
+                        ui.selectable_value(&mut chosen, (*name).clone(), *name);
+                    }
+                    if k == 1 {
+                        let tip =
+                            "The evidence scores that were recorded when A judged; from 0.5 on the machine says yes.";
+                        ui.selectable_value(&mut chosen, MACHINE.to_owned(), MACHINE).on_hover_text(tip);
+                    }
+                });
+            menu.response.named(Role::ComboBox, &format!("Annotator {word}"));
+            if chosen != state.pair[k] {
+                state.pair[k] = chosen;
+                state.listed = None;
+            }
+        }
+    });
+}
+
+fn compute(labels: &Labels, pair: &[String; 2]) -> Found {
+    let records = |name: &String| -> Vec<&Record> {
+        let all = labels.table().get(name).into_iter().flat_map(|records| records.values());
+        judged(all).collect()
+    };
+    let a = records(&pair[0]);
+    if pair[1] != MACHINE {
+        return Found { agreement: agreement(a, records(&pair[1])), remark: None };
+    }
+    let machine = against_machine(a, THRESHOLD);
+    let mut remarks = Vec::new();
+    if machine.shown > 0 {
+        remarks.push(format!(
+            "{} of {} were judged with the scores on screen: not blind",
+            machine.shown, machine.agreement.frames
+        ));
+    }
+    if machine.unscored > 0 {
+        remarks.push(format!("{} were judged without a score", machine.unscored));
+    }
+    Found { agreement: machine.agreement, remark: (!remarks.is_empty()).then(|| remarks.join("; ")) }
+}
+
+fn summary(ui: &mut Ui, found: &Found, pair: &[String; 2], tokens: &Tokens) {
+    let agreement = &found.agreement;
+    let mut text = format!("{} frames judged by both", agreement.frames);
+    if pair[1] != MACHINE {
+        text +=
+            &format!(" · {} only by {} · {} only by {}", agreement.only_in_a, pair[0], agreement.only_in_b, pair[1]);
+    }
+    ui.label(RichText::new(text).small().color(tokens.dim));
+    if let Some(remark) = &found.remark {
+        ui.label(RichText::new(format!("△ {remark}")).small().color(tokens.warn));
+    }
+}
+
+fn table(ui: &mut Ui, agreement: &Agreement, listed: &mut Option<Listed>, tokens: &Tokens) {
+    egui::Grid::new("agreement").num_columns(9).spacing([12.0, 3.0]).show(ui, |ui| {
+        for (title, tip) in [
+            ("", ""),
+            ("κ", "Cohen's kappa: agreement beyond chance; 1 full, 0 none. – where undefined: both always said the same one thing."),
+            ("raw", "Share of equal decisions."),
+            ("both", "Frames that both tagged."),
+            ("only A", "Frames that only A tagged. Click the number to list them."),
+            ("only B", "Frames that only B tagged. Click the number to list them."),
+            ("neither", "Frames that neither tagged."),
+            ("prev. A", "Prevalence: share of frames that A tagged."),
+            ("prev. B", "Prevalence: share of frames that B tagged."),
+        ] {
+            ui.label(RichText::new(title).small().color(tokens.dim)).on_hover_text(tip);
+        }
+        ui.end_row();
+        for (tag, row) in &agreement.tags {
+            ui.label(RichText::new(tag.code()).font(theme::strong(12.0)).color(tokens.tag(*tag))).on_hover_text(tag.words());
+            cells(ui, row, Some(*tag), listed, tokens);
+        }
+        ui.label(RichText::new("pooled").font(theme::strong(12.0))).on_hover_text("All decisions of all tags in one table.");
+        cells(ui, &agreement.pooled, None, listed, tokens);
+    });
+}
+
+fn cells(ui: &mut Ui, row: &TagAgreement, tag: Option<Tag>, listed: &mut Option<Listed>, tokens: &Tokens) {
+    let number = |value: Option<f64>, digits: usize| value.map_or_else(|| "–".into(), |x| format!("{x:.digits$}"));
+    let mono = |text: String| RichText::new(text).font(theme::mono(theme::CAPTION));
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 3.0;
+        ui.label(mono(number(row.kappa, 2)));
+        if let Some(why) = &row.unreliable {
+            ui.label(RichText::new("△").small().color(tokens.warn)).on_hover_text(format!("Not reliable: {why}"));
+        }
+    });
+    ui.label(mono(number(row.raw, 2)));
+    ui.label(mono(row.both.to_string()));
+    for (a, count, word) in [(true, row.only_a, "only A"), (false, row.only_b, "only B")] {
+        match tag.filter(|_| count > 0) {
+            Some(tag) => {
+                let cell = Listed { tag, a, b: !a };
+                let on = *listed == Some(cell);
+                let button = ui.selectable_label(on, mono(count.to_string()));
+                if button
+                    .named(Role::Button, &format!("{tag} {word}"))
+                    .on_hover_text("List these frames below.")
+                    .clicked()
+                {
+                    *listed = (!on).then_some(cell);
+                }
+            }
+            None => {
+                ui.label(mono(count.to_string()));
+            }
+        }
+    }
+    ui.label(mono(row.neither.to_string()));
+    for share in [row.prevalence_a, row.prevalence_b] {
+        ui.label(mono(number(share.map(|x| x * 100.0), 0) + if share.is_some() { " %" } else { "" }));
+    }
+    ui.end_row();
+}
+
+/// The frames in dispute, each a link.
+fn disputes(
+    ui: &mut Ui,
+    shared: &mut Shared<'_>,
+    disputes: &[Dispute],
+    listed: Option<Listed>,
+    pair: &[String; 2],
+    tokens: &Tokens,
+) {
+    let wanted = |d: &&Dispute| listed.is_none_or(|cell| (d.tag, d.a, d.b) == (cell.tag, cell.a, cell.b));
+    let found: Vec<&Dispute> = disputes.iter().filter(wanted).collect();
+    let title = match listed {
+        Some(Listed { tag, a, .. }) => {
+            format!("{} frames where only {} gave {tag}", found.len(), pair[usize::from(!a)])
+        }
+        None => format!("{} decisions in dispute", found.len()),
+    };
+    ui.add_space(4.0);
+    ui.label(RichText::new(title).small().color(tokens.dim));
+    let labels = &shared.session.labels;
+    let index = |frame: &str| {
+        let records = labels.table().values().flat_map(|records| records.values());
+        records.into_iter().find(|record| record.frame.path == frame).map(|record| record.frame.index)
+    };
+    let mut go = None;
+    for dispute in found.iter().take(200) {
+        ui.horizontal(|ui| {
+            ui.label(RichText::new(dispute.tag.code()).small().color(tokens.tag(dispute.tag)));
+            let link = ui.link(RichText::new(&dispute.frame).small());
+            if link.named(Role::Link, &format!("Dispute {} {}", dispute.tag, dispute.frame)).clicked() {
+                go = index(&dispute.frame);
+            }
+            let who = if dispute.a { &pair[0] } else { &pair[1] };
+            ui.label(RichText::new(format!("by {who} only")).small().color(tokens.dim));
+        });
+    }
+    if found.len() > 200 {
+        ui.label(RichText::new(format!("and {} more", found.len() - 200)).small().color(tokens.dim));
+    }
+    if let Some(frame) = go {
+        shared.send(Command::GotoFrame(frame));
+    }
+}

@@ -1,0 +1,231 @@
+//! The columns of the frame list: title, width, what they sort by, and how a cell is drawn.
+
+use crate::app::theme::{self, Tokens};
+use crate::app::widgets::iou_color;
+use crate::session::{Facts, SortKey};
+use egui::{Align2, Color32, FontId, Painter, Rect, pos2};
+
+/// One column.
+pub(super) struct Column {
+    /// Its name in the settings.
+    pub(super) key: &'static str,
+    /// Over the column.
+    pub(super) title: &'static str,
+    /// In full, for the menu of columns and for screen readers.
+    pub(super) name: &'static str,
+    /// What it means.
+    pub(super) tip: &'static str,
+    /// What a click on the title sorts by.
+    pub(super) sort: SortKey,
+    /// Points.
+    pub(super) width: f32,
+    /// Numbers are right-aligned.
+    pub(super) right: bool,
+}
+
+/// Every column, from left to right.
+pub(super) const COLUMNS: &[Column] = &[
+    Column {
+        key: "index",
+        title: "#",
+        name: "Index",
+        tip: "Index in the data set, from 0.",
+        sort: SortKey::Index,
+        width: 36.0,
+        right: true,
+    },
+    Column {
+        key: "frame",
+        title: "Frame",
+        name: "Frame",
+        tip: "The frame's name; the whole of it is in the tooltip of a row.",
+        sort: SortKey::Index,
+        width: 50.0,
+        right: false,
+    },
+    Column {
+        key: "stratum",
+        title: "S",
+        name: "Stratum",
+        tip: "Easy, medium or hard: thirds of the data set by hardness.",
+        sort: SortKey::Stratum,
+        width: 14.0,
+        right: false,
+    },
+    Column {
+        key: "hardness",
+        title: "Hard",
+        name: "Hardness",
+        tip: "Mean of the rank-normalised ρ_peak, s_static and 1 − r_human, 0 to 1.",
+        sort: SortKey::Hardness,
+        width: 30.0,
+        right: true,
+    },
+    Column {
+        key: "peaks",
+        title: "ρ_peak",
+        name: "Peak density",
+        tip: "ρ_peak: local maxima above the 95th percentile, divided by the number of cells; in thousandths.",
+        sort: SortKey::PeakDensity,
+        width: 44.0,
+        right: true,
+    },
+    Column {
+        key: "static",
+        title: "s_static",
+        name: "Static dominance",
+        tip: "s_static: share of the strongest 5 % of cells that were so in each of the last 5 frames of the sequence; \
+              undefined (–) for the first 4.",
+        sort: SortKey::StaticDominance,
+        width: 48.0,
+        right: true,
+    },
+    Column {
+        key: "saliency",
+        title: "r_human",
+        name: "Human saliency",
+        tip: "r_human: share of the map's sum that lies in its strongest 10 % of cells.",
+        sort: SortKey::HumanSaliency,
+        width: 50.0,
+        right: true,
+    },
+    Column {
+        key: "iou",
+        title: "IoU",
+        name: "IoU",
+        tip: "Mean forward-consistency IoU of the frame's newest fit.",
+        sort: SortKey::Iou,
+        width: 30.0,
+        right: true,
+    },
+    Column {
+        key: "converged",
+        title: "C",
+        name: "Converged",
+        tip: "✓ the fit met the convergence criterion, ✕ it did not.",
+        sort: SortKey::Converged,
+        width: 14.0,
+        right: false,
+    },
+    Column {
+        key: "reason",
+        title: "Ended",
+        name: "Reason",
+        tip: "Why the last run of the fit ended.",
+        sort: SortKey::Converged,
+        width: 96.0,
+        right: false,
+    },
+    Column {
+        key: "tags",
+        title: "Tags",
+        name: "Tags",
+        tip: "Tags that have been given; in agreement mode only your own.",
+        sort: SortKey::Tags,
+        width: 52.0,
+        right: false,
+    },
+    Column {
+        key: "majpe",
+        title: "mm",
+        name: "MAJPE",
+        tip: "MAJPE in mm, where the data set has joints in metres.",
+        sort: SortKey::Majpe,
+        width: 30.0,
+        right: true,
+    },
+    Column {
+        key: "by",
+        title: "By",
+        name: "Annotator",
+        tip: "Who labelled the frame.",
+        sort: SortKey::Annotator,
+        width: 64.0,
+        right: false,
+    },
+];
+
+/// A number with `digits`, or a dash where it is not known.
+fn number(value: Option<f64>, digits: usize) -> String {
+    value.map_or_else(|| "–".into(), |x| format!("{x:.digits$}"))
+}
+
+/// Text and colour of a cell.
+fn text(column: &Column, facts: &Facts<'_>, tokens: &Tokens) -> (String, Color32) {
+    let dim = |text: String| (text, tokens.dim);
+    let fitted = facts.iterations.is_some();
+    match column.key {
+        "index" => dim(facts.index.to_string()),
+        "frame" => {
+            let short = facts.name.rsplit('/').next().unwrap_or(facts.name);
+            (short.to_owned(), if facts.readable { tokens.text } else { tokens.bad })
+        }
+        "hardness" => (number(facts.hardness, 2), tokens.text),
+        "peaks" => dim(number(facts.peak_density.map(|x| x * 1000.0), 2)),
+        "static" => dim(number(facts.static_dominance, 2)),
+        "saliency" => dim(number(facts.human_saliency, 2)),
+        "iou" => match facts.iou {
+            Some(iou) => (format!("{iou:.2}"), iou_color(tokens, iou)),
+            None => dim(if fitted { "–".into() } else { String::new() }),
+        },
+        "converged" => match facts.converged {
+            Some(true) => ("✓".into(), tokens.ok),
+            Some(false) => ("✕".into(), tokens.warn),
+            None => dim(String::new()),
+        },
+        "reason" => dim(facts.reason.unwrap_or_default().to_owned()),
+        "majpe" => (facts.majpe_mm.map_or_else(String::new, |mm| format!("{mm:.0}")), tokens.text),
+        "by" => dim(facts.annotators.join(", ")),
+        _ => dim(String::new()),
+    }
+}
+
+/// Draws a cell into `rect`.
+pub(super) fn cell(painter: &Painter, rect: Rect, column: &Column, facts: &Facts<'_>, tokens: &Tokens) {
+    let painter = painter.with_clip_rect(rect.intersect(painter.clip_rect()));
+    let y = rect.center().y;
+    match column.key {
+        "stratum" => {
+            let Some(stratum) = facts.stratum else { return };
+            let font = theme::strong(theme::CAPTION);
+            let letter = stratum.letter();
+            painter.text(pos2(rect.center().x, y), Align2::CENTER_CENTER, letter, font, tokens.stratum(stratum));
+        }
+        "tags" => {
+            let mut x = rect.left();
+            for tag in facts.tags.iter() {
+                let font = FontId::proportional(theme::CAPTION);
+                let text = painter.text(pos2(x, y), Align2::LEFT_CENTER, tag.code(), font, tokens.tag(tag));
+                x = text.right() + 4.0;
+            }
+            if facts.tags.is_empty()
+                && let Some(verdict) = facts.verdict
+            {
+                let font = FontId::proportional(theme::CAPTION);
+                painter.text(pos2(x, y), Align2::LEFT_CENTER, verdict.code(), font, tokens.dim);
+            }
+        }
+        _ => {
+            let (text, color) = text(column, facts, tokens);
+            let font = if column.right { theme::mono(theme::CAPTION) } else { FontId::proportional(12.0) };
+            let (at, align) = if column.right {
+                (pos2(rect.right(), y), Align2::RIGHT_CENTER)
+            } else {
+                (pos2(rect.left(), y), Align2::LEFT_CENTER)
+            };
+            painter.text(at, align, text, font, color);
+        }
+    }
+}
+
+/// What a screen reader says of a row besides its name.
+pub(super) fn spoken(facts: &Facts<'_>) -> String {
+    let mut parts = Vec::new();
+    parts.extend(facts.stratum.map(|stratum| stratum.word().to_owned()));
+    parts.extend(facts.iou.map(|iou| format!("IoU {iou:.2}")));
+    parts.extend(facts.converged.map(|yes| if yes { "converged" } else { "not converged" }.to_owned()));
+    if !facts.tags.is_empty() {
+        parts.push(format!("tagged {}", facts.tags));
+    }
+    parts.join(", ")
+}

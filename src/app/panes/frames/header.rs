@@ -1,0 +1,214 @@
+//! Over the rows: the filter, kept views, what is found, how far the grading is, and the columns' titles.
+
+use super::columns::{COLUMNS, Column};
+use super::{GAP, ROW, State};
+use crate::app::panes::Shared;
+use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Named as _;
+use crate::session::{Command, SYNTAX, Sort, SortKey, StrataStatus};
+use egui::{Align2, RichText, Role, Sense, Ui, pos2, vec2};
+use std::collections::BTreeSet;
+
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tokens) {
+    filter(ui, shared, state, tokens);
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        quick(ui, shared, state);
+        views(ui, shared, state);
+        column_menu(ui, shared);
+    });
+    grading(ui, shared, tokens);
+    found(ui, shared, tokens);
+}
+
+fn filter(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tokens) {
+    let session = shared.session;
+    let mut text = state.filter.clone().unwrap_or_else(|| session.queue.text.clone());
+    let wrong = session.queue.error.clone();
+    let field = egui::TextEdit::singleline(&mut text)
+        .hint_text("Filter: stratum:hard iou<0.5 -tag:F1")
+        .text_color_opt(wrong.is_some().then_some(tokens.bad))
+        .desired_width(ui.available_width() - 8.0);
+    let response = ui.add(field).named(Role::TextInput, "Filter frames");
+    if std::mem::take(&mut state.focus_filter) {
+        response.request_focus();
+    }
+    if response.changed() {
+        shared.send(Command::SetFilter(text.clone()));
+    }
+    state.filter = response.has_focus().then_some(text);
+    response.on_hover_text(SYNTAX);
+    if let Some(wrong) = wrong {
+        ui.label(RichText::new(wrong).small().color(tokens.bad));
+    }
+}
+
+/// The filters that are wanted most, one click each; again to take them away.
+fn quick(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    for (name, term, tip) in [
+        ("Hard", "stratum:hard", "Only frames of the hard stratum."),
+        ("Untagged", "tag:none", "Only frames without a tag."),
+        ("Fitted", "fitted:yes", "Only frames with a fit."),
+    ] {
+        let text = &shared.session.queue.text;
+        let on = text.split_whitespace().any(|part| part == term);
+        let button = ui.selectable_label(on, RichText::new(name).small());
+        if button.on_hover_text(format!("{tip}\nFilter: {term}")).clicked() {
+            let mut parts: Vec<&str> = text.split_whitespace().filter(|part| *part != term).collect();
+            if !on {
+                parts.push(term);
+            }
+            let text = parts.join(" ");
+            state.filter = None;
+            shared.send(Command::SetFilter(text));
+        }
+    }
+}
+
+fn views(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    let button = ui.menu_button(RichText::new("Views").small(), |ui| {
+        ui.set_min_width(220.0);
+        let kept = shared.session.view.saved_views.clone();
+        if kept.is_empty() {
+            ui.label(RichText::new("A view keeps a filter and an order under a name.").small());
+        }
+        for view in kept {
+            ui.horizontal(|ui| {
+                if ui.button(&view.name).on_hover_text(format!("Filter: {}", view.rule)).clicked() {
+                    state.filter = None;
+                    shared.send(Command::UseView(view.name.clone()));
+                    ui.close();
+                }
+                let remove = ui.small_button("✕").named(Role::Button, &format!("Remove view {}", view.name));
+                if remove.clicked() {
+                    shared.send(Command::RemoveView(view.name.clone()));
+                }
+            });
+        }
+        ui.separator();
+        ui.horizontal(|ui| {
+            let field = egui::TextEdit::singleline(&mut state.view_name).hint_text("Name").desired_width(140.0);
+            ui.add(field).named(Role::TextInput, "Name of the view");
+            let ready = !state.view_name.trim().is_empty() && shared.session.queue.error.is_none();
+            let keep = ui.add_enabled(ready, egui::Button::new("Keep"));
+            if keep.on_hover_text("Keep the filter and the order as they are now.").clicked() {
+                shared.send(Command::SaveView(std::mem::take(&mut state.view_name)));
+                ui.close();
+            }
+        });
+    });
+    button.response.on_hover_text("Kept filters. It is the rule that is kept, not the frames it found.");
+}
+
+fn column_menu(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let button = ui.menu_button(RichText::new("Columns").small(), |ui| {
+        for column in COLUMNS.iter().filter(|column| column.key != "frame") {
+            let mut on = !shared.session.view.hidden_columns.iter().any(|key| key == column.key);
+            if ui.checkbox(&mut on, column.name).on_hover_text(column.tip).changed() {
+                shared.set_view(|view| {
+                    view.hidden_columns.retain(|key| key != column.key);
+                    if !on {
+                        view.hidden_columns.push(column.key.to_owned());
+                    }
+                });
+            }
+        }
+    });
+    button.response.on_hover_text("Which columns the list has.");
+}
+
+/// Progress of the grading, or how to begin it.
+fn grading(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
+    match shared.session.strata.status.clone() {
+        StrataStatus::Running { done, total } => {
+            ui.horizontal(|ui| {
+                let share = if total > 0 { done as f32 / total as f32 } else { 0.0 };
+                let text = format!("grading {done} of {total}");
+                let bar = egui::ProgressBar::new(share).desired_height(14.0).text(RichText::new(text).small());
+                ui.add(bar.desired_width((ui.available_width() - 64.0).max(60.0)));
+                let cancel = ui.small_button("Cancel").on_hover_text("Stop; what was read is kept for the next time.");
+                if cancel.named(Role::Button, "Cancel grading").clicked() {
+                    shared.send(Command::CancelStrata);
+                }
+            });
+        }
+        StrataStatus::Absent | StrataStatus::Failed(_) => {
+            let frames = shared.session.data.len();
+            let label = format!("Grade {frames} frames");
+            let tip = "Read every frame and sort the data set into easy, medium and hard, without labels (in the \
+                       background, on all cores). The result is kept.";
+            if ui.small_button(label).on_hover_text(tip).clicked() {
+                shared.send(Command::ComputeStrata);
+            }
+            if let StrataStatus::Failed(why) = &shared.session.strata.status {
+                ui.label(RichText::new(why).small().color(tokens.bad));
+            }
+        }
+        StrataStatus::Ready => {}
+    }
+}
+
+/// How many frames there are, where the one on screen is among them, and what a tag would be for.
+fn found(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
+    let session = shared.session;
+    let words = session.queue_words();
+    let place = session
+        .queue
+        .position(session.data.frame_index)
+        .map_or_else(String::new, |at| format!("{} of {}", at + 1, session.queue.rows().len()));
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(words).small().color(tokens.dim))
+            .on_hover_text("N and Shift+N go along this list; the arrow keys go along time, among the same frames.");
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.label(RichText::new(place).font(theme::mono(theme::CAPTION)).color(tokens.dim));
+        });
+    });
+    let selected = session.labels.selection.len();
+    if selected > 0 {
+        ui.horizontal(|ui| {
+            let text = format!("{selected} selected: tags go to them");
+            ui.label(RichText::new(text).small().color(tokens.accent));
+            if ui.small_button("Clear").named(Role::Button, "Clear frame selection").clicked() {
+                shared.send(Command::SelectFrames(BTreeSet::new()));
+            }
+        });
+    }
+}
+
+/// The titles; a click sorts, another turns the order round.
+pub(super) fn titles(
+    ui: &mut Ui,
+    shared: &mut Shared<'_>,
+    columns: &[&Column],
+    extent: &dyn Fn(&Column) -> f32,
+    tokens: &Tokens,
+) {
+    let sort = shared.session.view.sort;
+    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
+    let mut x = rect.left() + 2.0;
+    for column in columns {
+        let width = extent(column);
+        let at = egui::Rect::from_min_max(pos2(x, rect.top()), pos2(x + width, rect.bottom()));
+        x += width + GAP;
+        let active = sort.key == column.sort && (column.sort != SortKey::Index || column.key == "index");
+        let id = ui.scope_id().with(("title", column.key));
+        let response = ui.interact(at.expand2(vec2(GAP / 2.0, 0.0)), id, Sense::click());
+        let name = format!("Sort by {}", column.name);
+        response.widget_info(|| egui::WidgetInfo::selected(Role::Button, true, active, &name));
+        let color = if active || response.hovered() { tokens.text } else { tokens.dim };
+        let mark = if active && sort != Sort::default() { if sort.descending { "▾" } else { "▴" } } else { "" };
+        let (anchor, align) = if column.right {
+            (pos2(at.right(), at.center().y), Align2::RIGHT_CENTER)
+        } else {
+            (pos2(at.left(), at.center().y), Align2::LEFT_CENTER)
+        };
+        let font = egui::FontId::proportional(theme::CAPTION);
+        let painter = ui.painter().with_clip_rect(at.expand2(vec2(GAP, 0.0)).intersect(ui.clip_rect()));
+        painter.text(anchor, align, format!("{}{mark}", column.title), font, color);
+        if response.on_hover_text(format!("{}\nClick to sort, again to turn the order round.", column.tip)).clicked() {
+            let descending = if sort.key == column.sort { !sort.descending } else { false };
+            shared.send(Command::SetSort(Sort { key: column.sort, descending }));
+        }
+    }
+    ui.painter().hline(rect.x_range(), rect.bottom(), egui::Stroke::new(1.0, tokens.stroke));
+}

@@ -1,0 +1,185 @@
+//! The frame list: a filter, an order, and one row a frame; only the rows that are seen are drawn.
+
+mod columns;
+mod header;
+
+use super::{Shared, empty};
+use crate::app::theme::{self, Tokens};
+use crate::session::{Command, Session};
+use columns::{COLUMNS, Column, cell, spoken};
+use egui::{RichText, Sense, Ui, pos2, vec2};
+use std::collections::BTreeSet;
+
+const ROW: f32 = 20.0;
+const GAP: f32 = 5.0;
+
+/// What the list remembers.
+#[derive(Default)]
+pub(in crate::app) struct State {
+    /// The filter while it is being typed.
+    filter: Option<String>,
+    /// Name of a view to be kept.
+    view_name: String,
+    focus_filter: bool,
+    shown: Option<(usize, u64)>,
+    /// Where a range of rows begins that Shift extends.
+    anchor: Option<usize>,
+}
+
+impl State {
+    /// Puts the text cursor into the filter.
+    pub(in crate::app) fn focus_filter(&mut self) {
+        self.focus_filter = true;
+    }
+}
+
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    let session = shared.session;
+    if session.data.dataset.is_none() {
+        return empty(ui, "No data set", "Open one with Ctrl+O, or drop a folder on the window.");
+    }
+    let tokens = Tokens::of(ui);
+    header::show(ui, shared, state, &tokens);
+    let columns: Vec<&Column> =
+        COLUMNS.iter().filter(|column| !session.view.hidden_columns.iter().any(|key| key == column.key)).collect();
+    let wanted: f32 = columns.iter().map(|column| column.width + GAP).sum::<f32>() + 4.0;
+    let width = wanted.max(ui.available_width());
+    // The name takes what the numbers leave.
+    let spare = width - wanted;
+    let extent = |column: &Column| column.width + if column.key == "frame" { spare } else { 0.0 };
+    egui::ScrollArea::horizontal().auto_shrink(false).show(ui, |ui| {
+        ui.set_min_width(width);
+        header::titles(ui, shared, &columns, &extent, &tokens);
+        rows(ui, shared, state, &columns, &extent, &tokens);
+    });
+}
+
+fn rows(
+    ui: &mut Ui,
+    shared: &mut Shared<'_>,
+    state: &mut State,
+    columns: &[&Column],
+    extent: &dyn Fn(&Column) -> f32,
+    tokens: &Tokens,
+) {
+    let session = shared.session;
+    let current = session.data.frame_index;
+    let mut area = egui::ScrollArea::vertical().auto_shrink(false);
+    let key = (current, session.queue.revision);
+    if state.shown != Some(key) {
+        // Another frame is brought into sight; a list that was made anew stays where it was scrolled to.
+        let moved = state.shown.is_none_or(|(frame, _)| frame != current);
+        state.shown = Some(key);
+        if let Some(at) = session.queue.position(current).filter(|_| moved) {
+            let height = ui.available_height();
+            area = area.vertical_scroll_offset((at as f32 * ROW - height / 2.0).max(0.0));
+        }
+    }
+    ui.spacing_mut().item_spacing.y = 0.0;
+    let mut clicked = None;
+    area.show_rows(ui, ROW, session.queue.rows().len(), |ui, range| {
+        for &index in &session.queue.rows()[range] {
+            if row(ui, session, index as usize, columns, extent, tokens) {
+                clicked = Some(index as usize);
+            }
+        }
+    });
+    if session.queue.rows().is_empty() {
+        ui.label(RichText::new("No frame matches the filter.").color(tokens.dim));
+    }
+    if let Some(index) = clicked {
+        let (ctrl, shift) = ui.input(|i| (i.modifiers.command, i.modifiers.shift));
+        click(shared, state, index, ctrl, shift);
+    }
+}
+
+/// A click shows a frame; with Ctrl it joins or leaves the selection, with Shift the rows from the last click join it.
+fn click(shared: &mut Shared<'_>, state: &mut State, index: usize, ctrl: bool, shift: bool) {
+    let session = shared.session;
+    let mut selection = session.labels.selection.clone();
+    if shift {
+        let anchor = state.anchor.unwrap_or(session.data.frame_index);
+        let ends = (session.queue.position(anchor), session.queue.position(index));
+        if let (Some(a), Some(b)) = ends {
+            selection.extend(session.queue.rows()[a.min(b)..=a.max(b)].iter().map(|&row| row as usize));
+            return shared.send(Command::SelectFrames(selection));
+        }
+    }
+    state.anchor = Some(index);
+    if ctrl {
+        if !selection.remove(&index) {
+            selection.insert(index);
+        }
+        return shared.send(Command::SelectFrames(selection));
+    }
+    if !selection.is_empty() {
+        shared.send(Command::SelectFrames(BTreeSet::new()));
+    }
+    shared.send(Command::GotoFrame(index));
+}
+
+fn row(
+    ui: &mut Ui,
+    session: &Session,
+    index: usize,
+    columns: &[&Column],
+    extent: &dyn Fn(&Column) -> f32,
+    tokens: &Tokens,
+) -> bool {
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
+    let facts = session.facts(index);
+    let current = index == session.data.frame_index;
+    let selected = session.labels.selection.contains(&index);
+    response.widget_info(|| {
+        let name = format!("Frame {}", facts.name);
+        let mut info = egui::WidgetInfo::selected(egui::Role::Button, true, current || selected, name);
+        info.current_text_value = Some(spoken(&facts));
+        info
+    });
+    let painter = ui.painter();
+    if current {
+        painter.rect_filled(rect, 2.0, tokens.accent.gamma_multiply(0.3));
+    } else if selected {
+        painter.rect_filled(rect, 0.0, tokens.accent.gamma_multiply(0.14));
+    } else if response.hovered() {
+        painter.rect_filled(rect, 2.0, tokens.raised);
+    }
+    if selected {
+        let bar = egui::Rect::from_min_size(rect.min, vec2(2.0, rect.height()));
+        painter.rect_filled(bar, 0.0, tokens.accent);
+    }
+    let mut x = rect.left() + 2.0;
+    for column in columns {
+        let width = extent(column);
+        let at = egui::Rect::from_min_max(pos2(x, rect.top()), pos2(x + width, rect.bottom()));
+        cell(painter, at, column, &facts, tokens);
+        x += width + GAP;
+    }
+    response.on_hover_ui(|ui| tooltip(ui, session, index)).clicked()
+}
+
+fn tooltip(ui: &mut Ui, session: &Session, index: usize) {
+    let facts = session.facts(index);
+    ui.label(format!("{} · {}", facts.scene, facts.name));
+    let number = |value: Option<f64>| value.map_or_else(|| "undefined".into(), |x| format!("{x:.3}"));
+    if let Some(hardness) = facts.hardness {
+        let word = facts.stratum.map_or("ungraded", |stratum| stratum.word());
+        ui.label(format!("{word}, hardness {hardness:.3}"));
+        let peaks = facts.peak_density.map_or_else(|| "undefined".into(), |x| format!("{x:.5}"));
+        let (stat, human) = (number(facts.static_dominance), number(facts.human_saliency));
+        ui.label(format!("ρ_peak {peaks} · s_static {stat} · r_human {human}"));
+    }
+    if let (Some(n), Some(loss)) = (facts.iterations, facts.loss) {
+        let word = if facts.converged == Some(true) { "converged" } else { "not converged" };
+        let majpe = facts.majpe_mm.map_or_else(String::new, |mm| format!(" · MAJPE {mm:.1} mm"));
+        ui.label(format!("{n} iterations · L {loss:.4} · {word}{majpe}"));
+    }
+    if !facts.tags.is_empty() {
+        ui.label(format!("{} by {}", facts.tags, facts.annotators.join(", ")));
+    }
+    if !facts.note.is_empty() {
+        ui.label(facts.note);
+    }
+    let hint = "Click to show. Ctrl+click and Shift+click select frames to tag together.";
+    ui.label(RichText::new(hint).font(egui::FontId::proportional(theme::CAPTION)).weak());
+}

@@ -1,0 +1,204 @@
+//! Boxes of cells: those that a label marks, drawn with the mouse, and those that a finding points at.
+
+use super::{State, unit_at};
+use crate::app::map_image::Orientation;
+use crate::app::theme::Tokens;
+use crate::labels::CellRegion;
+use crate::radar::View;
+use crate::session::Session;
+use egui::{FontId, Painter, Pos2, Rect, Stroke, Ui, vec2};
+
+/// A box of cells that is pointed at, until the frame changes.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Highlight {
+    frame: usize,
+    view: usize,
+    lo: Vec<usize>,
+    hi: Vec<usize>,
+}
+
+/// Whether the mouse marks cells.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Marking {
+    /// The next drag marks, with or without Ctrl.
+    pub(super) armed: bool,
+    /// View and picture coordinates where the drag began.
+    pub(super) from: Option<(usize, [f64; 2])>,
+    /// Where the pointer is.
+    to: [f64; 2],
+}
+
+impl State {
+    /// The next drag on a map marks cells; again to leave it.
+    pub(in crate::app) fn mark_cells(&mut self) {
+        self.marking.armed = !self.marking.armed;
+    }
+
+    /// Points at cells and zooms the map to them.
+    pub(in crate::app) fn show_cells(&mut self, session: &Session, view: usize, lo: &[usize], hi: &[usize]) {
+        let Some(v) = session.data.dataset.as_ref().and_then(|dataset| dataset.info().views.get(view)) else { return };
+        let Some([min, max]) = unit_box(v, lo, hi) else { return };
+        let frame = session.data.frame_index;
+        self.highlight = Some(Highlight { frame, view, lo: lo.to_vec(), hi: hi.to_vec() });
+        if let Some(window) = self.windows.get_mut(view) {
+            for axis in 0..2 {
+                // The cells take a third of the map, so that what is around them is seen too.
+                let span = ((max[axis] - min[axis]) * 3.0).clamp(0.25, 1.0);
+                let low = (0.5 * (min[axis] + max[axis]) - 0.5 * span).clamp(0.0, 1.0 - span);
+                (window.min[axis], window.max[axis]) = (low, low + span);
+            }
+        }
+    }
+
+    /// Draws what is pointed at and what the label marks.
+    pub(super) fn draw_regions(
+        &self,
+        painter: &Painter,
+        session: &Session,
+        index: usize,
+        view: &View,
+        to_screen: &dyn Fn([f64; 2]) -> Pos2,
+        tokens: &Tokens,
+    ) {
+        if let Some((_, from)) = self.marking.from.filter(|(view, _)| *view == index) {
+            let rect = Rect::from_two_pos(to_screen(from), to_screen(self.marking.to));
+            painter.rect_stroke(rect, 0.0, Stroke::new(1.5, tokens.accent), egui::StrokeKind::Middle);
+        }
+        let label = session.labels.label(session.data.frame_index);
+        if let Some(region) = label.region.as_ref().filter(|region| region.view == view.array) {
+            let text = if label.tags.is_empty() { "marked".into() } else { label.tags.to_string() };
+            outline(painter, view, &region.lo, &region.hi, to_screen, &text, tokens);
+        }
+        if let Some(h) = self.highlight.as_ref().filter(|h| h.view == index && h.frame == session.data.frame_index) {
+            outline(painter, view, &h.lo, &h.hi, to_screen, "here", tokens);
+        }
+    }
+
+    /// A drag with Ctrl, or any drag while armed, marks cells. True while it does, so that it does not pan.
+    pub(super) fn mark(
+        &mut self,
+        ui: &Ui,
+        response: &egui::Response,
+        plot: Rect,
+        index: usize,
+        view: &View,
+    ) -> (bool, Option<CellRegion>) {
+        let window = self.windows.get(index).copied().unwrap_or_default();
+        let pointer = response.interact_pointer_pos();
+        if response.drag_started()
+            && (self.marking.armed || ui.input(|i| i.modifiers.command))
+            && let Some(origin) = ui.input(|i| i.pointer.press_origin())
+        {
+            self.marking.from = Some((index, unit_at(plot, window, origin)));
+        }
+        if self.marking.armed && response.hovered() {
+            ui.ctx().set_cursor_icon(egui::CursorIcon::Crosshair);
+        }
+        let Some((_, from)) = self.marking.from.filter(|(view, _)| *view == index) else { return (false, None) };
+        let to = pointer.map_or(from, |pointer| unit_at(plot, window, pointer));
+        self.marking.to = to;
+        if response.dragged() {
+            return (true, None);
+        }
+        self.marking = Marking::default();
+        (true, region(view, from, to))
+    }
+}
+
+/// The cells between two points of the picture.
+fn region(view: &View, from: [f64; 2], to: [f64; 2]) -> Option<CellRegion> {
+    let o = Orientation::of(view);
+    let [width, height] = o.size(view);
+    let pixel = |at: f64, size: usize| ((at * size as f64).floor().max(0.0) as usize).min(size.saturating_sub(1));
+    let columns = [from[0], to[0]].map(|x| pixel(x, width));
+    let rows = [from[1], to[1]].map(|y| pixel(y, height));
+    let across = columns.map(|column| if o.horizontal_from_left { column } else { width - 1 - column });
+    let up = rows.map(|row| if o.vertical_from_top { row } else { height - 1 - row });
+    let mut lo = vec![0; view.axes.len()];
+    let mut hi: Vec<usize> = view.axes.iter().map(|axis| axis.bins.saturating_sub(1)).collect();
+    for (axis, ends) in [(o.horizontal, across), (o.vertical, up)] {
+        *lo.get_mut(axis)? = ends[0].min(ends[1]);
+        *hi.get_mut(axis)? = ends[0].max(ends[1]);
+    }
+    Some(CellRegion { view: view.array.clone(), lo, hi })
+}
+
+/// Corners of a box of cells in picture coordinates, lower first; `None` where the box is not of this view.
+fn unit_box(view: &View, lo: &[usize], hi: &[usize]) -> Option<[[f32; 2]; 2]> {
+    if lo.len() != view.axes.len() || hi.len() != view.axes.len() {
+        return None;
+    }
+    let o = Orientation::of(view);
+    let corner = |bins: &[usize], by: f64| -> Vec<f64> { bins.iter().map(|&bin| bin as f64 + by).collect() };
+    let a = o.unit_from_bins(view, &corner(lo, -0.5));
+    let b = o.unit_from_bins(view, &corner(hi, 0.5));
+    let ends = |axis: usize| (a[axis].min(b[axis]) as f32, a[axis].max(b[axis]) as f32);
+    let ((x0, x1), (y0, y1)) = (ends(0), ends(1));
+    Some([[x0, y0], [x1, y1]])
+}
+
+fn outline(
+    painter: &Painter,
+    view: &View,
+    lo: &[usize],
+    hi: &[usize],
+    to_screen: &dyn Fn([f64; 2]) -> Pos2,
+    text: &str,
+    tokens: &Tokens,
+) {
+    let Some([min, max]) = unit_box(view, lo, hi) else { return };
+    let at = |p: [f32; 2]| to_screen([f64::from(p[0]), f64::from(p[1])]);
+    let rect = Rect::from_two_pos(at(min), at(max));
+    painter.rect_stroke(
+        rect.expand(2.0),
+        0.0,
+        Stroke::new(3.0, egui::Color32::from_black_alpha(120)),
+        egui::StrokeKind::Middle,
+    );
+    painter.rect_stroke(rect.expand(2.0), 0.0, Stroke::new(1.5, egui::Color32::WHITE), egui::StrokeKind::Middle);
+    let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(10.0), egui::Color32::WHITE);
+    let size = galley.size();
+    let corner = rect.left_top() + vec2(-2.0, -3.0 - size.y);
+    painter.rect_filled(Rect::from_min_size(corner, size + vec2(6.0, 1.0)), 2.0, tokens.accent.gamma_multiply(0.85));
+    painter.galley(corner + vec2(3.0, 0.0), galley, egui::Color32::WHITE);
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::panic, reason = "tests")]
+    use super::*;
+    use crate::radar::{Axis, AxisKind, PointSpread, Quantity, Spacing};
+
+    fn view() -> View {
+        let axis = |kind, bins, lo, hi| Axis { kind, bins, lo, hi, spacing: Spacing::Linear };
+        View {
+            array: "hm".into(),
+            quantity: Quantity::Amplitude,
+            psf: PointSpread::default(),
+            pose: crate::geometry::Pose::default(),
+            axes: vec![axis(AxisKind::DepthH, 40, 4.0, 0.0), axis(AxisKind::Y, 20, 1.0, -1.0)],
+            region: None,
+        }
+    }
+
+    /// What is drawn with the mouse is shown where it was drawn.
+    #[test]
+    fn a_drawn_box_comes_back_where_it_was_drawn() {
+        let view = view();
+        for (from, to) in [([0.101, 0.201], [0.349, 0.399]), ([0.349, 0.399], [0.101, 0.201])] {
+            let Some(region) = region(&view, from, to) else { panic!("a region") };
+            assert_eq!((region.view.as_str(), region.lo.len()), ("hm", 2));
+            let Some([min, max]) = unit_box(&view, &region.lo, &region.hi) else { panic!("a box") };
+            let near = |a: f32, b: f32| (a - b).abs() < 1e-5;
+            assert!(
+                near(min[0], 0.1) && near(max[0], 0.35) && near(min[1], 0.2) && near(max[1], 0.4),
+                "{min:?} {max:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_box_of_another_view_is_not_drawn() {
+        assert_eq!(unit_box(&view(), &[1], &[2]), None);
+    }
+}

@@ -1,0 +1,128 @@
+//! One card a failure mode: a score, a sentence with the decisive number, and findings that lead to where they are seen.
+
+use crate::app::panes::Shared;
+use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Named as _;
+use crate::diagnose::{Evidence, Finding, Place};
+use crate::session::FitStatus;
+use egui::{RichText, Role, Sense, Ui, vec2};
+
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
+    let session = shared.session;
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Evidence").font(theme::strong(12.0))).on_hover_text(
+            "What the numbers say for each failure mode: 0 nothing speaks for it, 1 everything does. Evidence, not a \
+             verdict: the tag is yours.",
+        );
+        if session.fit.is_running() || session.evidence_is_stale() {
+            let text = if session.fit.is_running() { "of the last pause" } else { "gathering…" };
+            ui.label(RichText::new(text).small().color(tokens.dim));
+        }
+    });
+    if session.evidence_hidden() {
+        let text = "Hidden until you have tagged this frame (blind mode).";
+        ui.label(RichText::new(text).small().color(tokens.dim));
+        return;
+    }
+    match session.evidence_of(session.data.frame_index) {
+        Some(cards) => {
+            for card in cards {
+                one(ui, shared, card, tokens);
+            }
+        }
+        None => {
+            let text = match &session.fit.status {
+                FitStatus::Failed(why) => why.as_str(),
+                _ => "Gathered as soon as the frame has a fit that rests.",
+            };
+            ui.label(RichText::new(text).small().color(tokens.dim));
+        }
+    }
+}
+
+fn one(ui: &mut Ui, shared: &mut Shared<'_>, card: &Evidence, tokens: &Tokens) {
+    let frame = egui::Frame::new()
+        .fill(tokens.raised)
+        .stroke(egui::Stroke::new(1.0, tokens.stroke))
+        .corner_radius(4)
+        .inner_margin(egui::Margin::symmetric(8, 6));
+    let response = frame.show(ui, |ui| {
+        ui.set_min_width(ui.available_width());
+        ui.spacing_mut().item_spacing.y = 3.0;
+        ui.horizontal(|ui| {
+            ui.label(RichText::new(card.mode.code()).font(theme::strong(12.0)).color(tokens.tag(card.mode)));
+            ui.add(egui::Label::new(RichText::new(card.mode.words()).small()).truncate());
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| score(ui, card, tokens));
+        });
+        ui.add(egui::Label::new(RichText::new(&card.summary).small()).wrap());
+        if !card.findings.is_empty() {
+            details(ui, shared, card, tokens);
+        }
+    });
+    let name = format!("{} card", card.mode);
+    let score = card.score.map_or_else(|| "not judged".into(), |score| format!("score {score:.2}"));
+    response.response.widget_info(|| {
+        let mut info = egui::WidgetInfo::labeled(Role::Label, true, &name);
+        info.current_text_value = Some(format!("{score}. {}", card.summary));
+        info
+    });
+}
+
+/// The findings, folded away until somebody wants them; which cards are open is kept with the view.
+fn details(ui: &mut Ui, shared: &mut Shared<'_>, card: &Evidence, tokens: &Tokens) {
+    let open = shared.session.view.open_cards.contains(&card.mode);
+    let count = card.findings.len();
+    let text = format!("{} {count} finding{}", if open { "▾" } else { "▸" }, if count == 1 { "" } else { "s" });
+    let link = egui::Button::new(RichText::new(text).small().color(tokens.accent)).frame(false).selected(false);
+    let response = ui.add(link);
+    let name = format!("Findings of {}", card.mode);
+    response.widget_info(|| egui::WidgetInfo::selected(Role::Button, true, open, &name));
+    if response.on_hover_text("The numbers behind the score, and where each is seen.").clicked() {
+        shared.set_view(|view| {
+            if open {
+                view.open_cards.retain(|mode| *mode != card.mode);
+            } else {
+                view.open_cards.push(card.mode);
+            }
+        });
+    }
+    if open {
+        for finding in &card.findings {
+            line(ui, shared, card, finding, tokens);
+        }
+    }
+}
+
+/// The number with a bar of the same length.
+fn score(ui: &mut Ui, card: &Evidence, tokens: &Tokens) {
+    let text = card.score.map_or_else(|| "–".into(), |score| format!("{score:.2}"));
+    ui.label(RichText::new(text).font(theme::mono(12.0)));
+    let (rect, _) = ui.allocate_exact_size(vec2(56.0, 6.0), Sense::hover());
+    ui.painter().rect_filled(rect, 2.0, tokens.stroke);
+    if let Some(score) = card.score {
+        let filled = egui::Rect::from_min_size(rect.min, vec2(rect.width() * score as f32, rect.height()));
+        ui.painter().rect_filled(filled, 2.0, tokens.tag(card.mode));
+    }
+}
+
+fn line(ui: &mut Ui, shared: &mut Shared<'_>, card: &Evidence, finding: &Finding, tokens: &Tokens) {
+    let text = RichText::new(format!("· {}", finding.text)).small().color(tokens.dim);
+    let Some(place) = &finding.place else {
+        ui.add(egui::Label::new(text).wrap());
+        return;
+    };
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.add(egui::Label::new(text).wrap());
+        let (word, tip) = match place {
+            Place::Cells { .. } => ("show", "Zoom the maps to these cells."),
+            Place::Joint(_) => ("select", "Select the joint."),
+            Place::Frame(_) => ("go", "Show that frame."),
+        };
+        let link = ui.link(RichText::new(word).small());
+        let name = format!("{word} where {} is seen: {}", card.mode, finding.text);
+        if link.named(Role::Link, &name).on_hover_text(tip).clicked() {
+            shared.show_place(place.clone());
+        }
+    });
+}

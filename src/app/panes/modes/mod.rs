@@ -1,0 +1,284 @@
+//! Failure modes: the tags of a frame, its note, and the machine's evidence for each mode.
+
+mod cards;
+
+use super::{Shared, empty};
+use crate::app::commands::{AppAct, command, tooltip};
+use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Named as _;
+use crate::labels::{Tag, Verdict};
+use crate::session::{Command, LabelMode, LabelStatus, Session};
+use egui::{RichText, Role, Ui, vec2};
+
+/// What the pane remembers: fields while they are typed in.
+#[derive(Default)]
+pub(in crate::app) struct State {
+    note: Option<(Vec<usize>, String)>,
+    annotator: Option<String>,
+    focus_note: bool,
+}
+
+impl State {
+    /// Puts the text cursor into the note.
+    pub(in crate::app) fn focus_note(&mut self) {
+        self.focus_note = true;
+    }
+}
+
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    if shared.session.data.dataset.is_none() {
+        return empty(
+            ui,
+            "No frame to tag",
+            "Open a data set; tags, notes and the evidence for each mode appear here.",
+        );
+    }
+    let tokens = Tokens::of(ui);
+    egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        ui.spacing_mut().item_spacing.y = 6.0;
+        mode(ui, shared);
+        targets(ui, shared, &tokens);
+        match shared.session.view.label_mode {
+            LabelMode::CountReview => verdicts(ui, shared, &tokens),
+            LabelMode::Explore | LabelMode::Agreement => tags(ui, shared, &tokens),
+        }
+        note(ui, shared, state);
+        details(ui, shared, &tokens);
+        said(ui, shared.session, &tokens);
+        cards::show(ui, shared, &tokens);
+        ui.add_space(2.0);
+        journal(ui, shared, state, &tokens);
+    });
+}
+
+fn mode(ui: &mut Ui, shared: &mut Shared<'_>) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        for mode in LabelMode::ALL {
+            let on = shared.session.view.label_mode == mode;
+            if ui.selectable_label(on, RichText::new(mode.title()).small()).on_hover_text(mode.words()).clicked() {
+                shared.set_view(|view| view.label_mode = mode);
+            }
+        }
+        if shared.session.view.label_mode == LabelMode::Agreement {
+            let mut blind = shared.session.view.blind;
+            let tip =
+                "Hide the machine's evidence until you have tagged the frame, so that agreement with it is honest.";
+            if ui.checkbox(&mut blind, RichText::new("blind").small()).on_hover_text(tip).changed() {
+                shared.set_view(|view| view.blind = blind);
+            }
+        }
+    });
+}
+
+/// What a tag would be given to.
+fn targets(ui: &mut Ui, shared: &Shared<'_>, tokens: &Tokens) {
+    let selected = shared.session.labels.selection.len();
+    if selected > 0 {
+        let text = format!("Tags go to {selected} selected frames (Esc clears the selection).");
+        ui.label(RichText::new(text).small().color(tokens.accent));
+    }
+}
+
+/// Tags that every target has.
+fn common(session: &Session) -> impl Fn(Tag) -> bool + '_ {
+    let targets = session.label_targets();
+    move |tag| !targets.is_empty() && targets.iter().all(|&frame| session.labels.label(frame).tags.contains(tag))
+}
+
+fn tags(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
+    let has = common(shared.session);
+    let on: Vec<bool> = Tag::ALL.iter().map(|&tag| has(tag)).collect();
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(3.0, 4.0);
+        ui.spacing_mut().button_padding.x = 5.0;
+        for (tag, on) in Tag::ALL.into_iter().zip(on) {
+            tag_chip(ui, shared, tag, on, tokens);
+        }
+    });
+}
+
+/// A chip with the digit that toggles it.
+fn tag_chip(ui: &mut Ui, shared: &mut Shared<'_>, tag: Tag, on: bool, tokens: &Tokens) {
+    let color = tokens.tag(tag);
+    let mut text = egui::text::LayoutJob::default();
+    let part =
+        |font, color| egui::TextFormat { font_id: font, color, valign: egui::Align::Center, ..Default::default() };
+    let (digit, word) = if on { (tokens.canvas, tokens.canvas) } else { (tokens.dim, tokens.text) };
+    text.append(&tag.digit().to_string(), 0.0, part(theme::mono(10.0), digit));
+    text.append(tag.code(), 4.0, part(theme::strong(12.0), word));
+    let button = egui::Button::new(text)
+        .fill(if on { color } else { tokens.raised })
+        .stroke(egui::Stroke::new(1.0, if on { color } else { tokens.stroke }))
+        .min_size(vec2(38.0, 24.0));
+    let response = ui.add(button);
+    let name = format!("Tag {tag}");
+    response.widget_info(|| egui::WidgetInfo::selected(Role::CheckBox, true, on, &name));
+    let tip = format!("{}: {}.\nKey: {}", tag.code(), tag.words(), tag.digit());
+    if response.on_hover_text(tip).clicked() {
+        shared.send(Command::ToggleTag(tag));
+    }
+}
+
+/// The second review protocol: whose count is wrong.
+fn verdicts(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
+    let session = shared.session;
+    let annotated = session.data.frame.as_ref().and_then(|frame| frame.person_count);
+    let fitted = session.fit.initial.as_ref().map(|initial| initial.shape().persons);
+    let count = |n: Option<usize>| n.map_or_else(|| "unknown".into(), |n| n.to_string());
+    let mismatch = matches!((annotated, fitted), (Some(a), Some(b)) if a != b);
+    let words = format!("Annotated persons {} · fitted {}", count(annotated), count(fitted));
+    ui.label(RichText::new(words).color(if mismatch { tokens.warn } else { tokens.text }));
+    let now = session.labels.label(session.data.frame_index).verdict;
+    for (digit, verdict, words) in [
+        ('6', Verdict::AnnotationError, "the annotation has the wrong number of people"),
+        ('7', Verdict::DetectionError, "the fit has the wrong number of people"),
+        ('8', Verdict::BothIncorrect, "both have"),
+        ('9', Verdict::TrueNegative, "nobody is there and nobody was found"),
+    ] {
+        let on = now == Some(verdict);
+        let text = format!("{digit}  {}", verdict.code().replace('-', " "));
+        let response = ui.add(egui::Button::selectable(on, text).min_size(vec2(150.0, 22.0)));
+        let name = format!("Verdict {verdict}");
+        response.widget_info(|| egui::WidgetInfo::selected(Role::CheckBox, true, on, &name));
+        if response.on_hover_text(format!("Verdict: {words}.\nKey: {digit}")).clicked() {
+            shared.send(Command::SetVerdict((!on).then_some(verdict)));
+        }
+    }
+}
+
+/// The note is written when the field is left; Escape takes back what was typed.
+fn note(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    let targets = shared.session.label_targets();
+    let stored = || targets.first().map_or_else(String::new, |&frame| shared.session.labels.label(frame).note);
+    // What was being typed for another frame belongs to that frame and was sent when the field lost it.
+    let mut text = match &state.note {
+        Some((frames, typed)) if *frames == targets => typed.clone(),
+        _ => stored(),
+    };
+    let field = egui::TextEdit::multiline(&mut text)
+        .hint_text("Note")
+        .desired_rows(1)
+        .return_key(Some(egui::KeyboardShortcut::new(egui::Modifiers::SHIFT, egui::Key::Enter)))
+        .desired_width(f32::INFINITY);
+    let response = ui.add(field).named(Role::TextInput, "Note");
+    if std::mem::take(&mut state.focus_note) {
+        response.request_focus();
+    }
+    let escape = ui.input(|i| i.key_pressed(egui::Key::Escape));
+    let enter = response.has_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter) && !i.modifiers.shift);
+    if enter {
+        response.surrender_focus();
+    }
+    if enter || (response.lost_focus() && !escape) {
+        if text != stored() {
+            shared.send(Command::SetNote(text));
+        }
+        state.note = None;
+    } else {
+        state.note = response.has_focus().then_some((targets, text));
+    }
+    response.on_hover_text(
+        "Free text, written when you leave the field or press Enter. Shift+Enter begins a line, Esc takes it back.",
+    );
+}
+
+/// Person and region of the frame on screen.
+fn details(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
+    let label = shared.session.labels.label(shared.session.data.frame_index);
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new("Person").small().color(tokens.dim));
+        let text = label.person.map_or_else(|| "any".to_owned(), |person| person.to_string());
+        let menu = egui::ComboBox::from_id_salt("person").width(52.0).selected_text(text).show_ui(ui, |ui| {
+            for (person, name) in
+                std::iter::once((None, "any".to_owned())).chain((0..6).map(|n| (Some(n), n.to_string())))
+            {
+                if ui.selectable_label(label.person == person, name).clicked() {
+                    shared.send(Command::SetPerson(person));
+                }
+            }
+        });
+        menu.response.named(Role::ComboBox, "Person").on_hover_text("The person that the tags are about, from 0.");
+        let tip = command("Mark cells").map(tooltip).unwrap_or_default();
+        match &label.region {
+            Some(region) => {
+                let shown =
+                    ui.link(RichText::new(region.to_string()).small()).on_hover_text("Show the cells on the map.");
+                if shown.clicked() {
+                    shared.show_region(region);
+                }
+                if ui.small_button("✕").named(Role::Button, "Unmark cells").on_hover_text("Unmark the cells.").clicked()
+                {
+                    shared.send(Command::SetRegion(None));
+                }
+            }
+            None => {
+                if ui.small_button("Mark cells").on_hover_text(tip).clicked() {
+                    shared.app(AppAct::MarkCells);
+                }
+            }
+        }
+    });
+}
+
+/// What was judged, and what others say.
+fn said(ui: &mut Ui, session: &Session, tokens: &Tokens) {
+    let frame = session.data.frame_index;
+    if let Some(record) = session.labels.mine(frame)
+        && let Some(text) = session.judged_elsewhere(record)
+    {
+        let tip = format!("{} at {} with version {}.", record.act, record.time, record.program);
+        ui.label(RichText::new(format!("△ {text}")).small().color(tokens.warn)).on_hover_text(tip);
+    }
+    let others = session.labels.others(frame).count();
+    if others == 0 {
+        return;
+    }
+    if session.view.label_mode == LabelMode::Agreement {
+        let text = format!("Labels of {others} other{} are hidden in this mode.", if others == 1 { "" } else { "s" });
+        ui.label(RichText::new(text).small().color(tokens.dim));
+        return;
+    }
+    for record in session.labels.others(frame) {
+        let note = if record.label.note.is_empty() { String::new() } else { format!(" “{}”", record.label.note) };
+        let verdict = record.label.verdict.map_or_else(String::new, |verdict| format!(" {verdict}"));
+        let text = format!("{}: {}{verdict}{note}", record.annotator, record.label.tags);
+        ui.label(RichText::new(text).small().color(tokens.dim))
+            .on_hover_text(format!("{}, {}", record.act, record.time));
+    }
+}
+
+/// Who labels, how much, and where it is kept.
+fn journal(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tokens) {
+    let labels = &shared.session.labels;
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new("Annotator").small().color(tokens.dim));
+        let mut name = state.annotator.clone().unwrap_or_else(|| labels.annotator.clone());
+        let field = egui::TextEdit::singleline(&mut name).desired_width(96.0);
+        let response = ui.add(field).named(Role::TextInput, "Annotator");
+        if response.lost_focus() {
+            state.annotator = None;
+            if name != labels.annotator {
+                shared.send(Command::SetAnnotator(name));
+            }
+        } else {
+            state.annotator = response.has_focus().then_some(name);
+        }
+        response.on_hover_text("Whose labels these are. Each annotator has a journal of their own.");
+    });
+    let labels = &shared.session.labels;
+    let (text, color) = match (&labels.status, &labels.place) {
+        (LabelStatus::Failed(why), _) => (format!("■ labels cannot be written: {why}"), tokens.bad),
+        (LabelStatus::Ready, Some(place)) if place.beside_data => {
+            (format!("{} labelled · every act is on disk beside the data", labels.count()), tokens.dim)
+        }
+        (LabelStatus::Ready, Some(place)) => {
+            let why = place.reason.as_deref().unwrap_or("the data's folder cannot be written");
+            (format!("△ {} labelled · kept in {} because {why}", labels.count(), place.folder.display()), tokens.warn)
+        }
+        _ => ("reading the journals…".into(), tokens.dim),
+    };
+    let folder =
+        labels.place.as_ref().map_or_else(String::new, |place| format!("Journals: {}", place.folder.display()));
+    ui.label(RichText::new(text).small().color(color)).on_hover_text(folder);
+}

@@ -1,0 +1,151 @@
+//! Counts of labels: tags by stratum, by scene or by day, for one annotator or all.
+
+use super::{Shared, empty};
+use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Named as _;
+use crate::labels::{Record, Tag};
+use crate::session::Session;
+use egui::{RichText, Role, Sense, Ui, vec2};
+use std::collections::BTreeMap;
+
+/// What the rows are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Group {
+    #[default]
+    Stratum,
+    Scene,
+    Day,
+}
+
+/// How the counts are grouped, whose they are, and what they were made from.
+#[derive(Default)]
+pub(in crate::app) struct State {
+    group: Group,
+    /// `None` for everybody.
+    annotator: Option<String>,
+    rows: Option<(Key, Vec<Row>)>,
+}
+
+type Key = (u64, Group, Option<String>, bool);
+
+struct Row {
+    name: String,
+    /// Frames of the group, where that is known.
+    frames: Option<usize>,
+    labelled: usize,
+    tags: [usize; Tag::ALL.len()],
+}
+
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    let session = shared.session;
+    if session.labels.table().values().all(|records| records.values().all(|r| r.label.is_empty())) {
+        let how = "Tag frames with the keys 1 to 5 and 0. Here you then see how often each tag was given, by stratum, by \
+                   scene and by day.";
+        return empty(ui, "No labels yet", how);
+    }
+    let tokens = Tokens::of(ui);
+    controls(ui, session, state);
+    let graded = session.strata.result().is_some();
+    let key = (session.labels.revision, state.group, state.annotator.clone(), graded);
+    if state.rows.as_ref().is_none_or(|(known, _)| *known != key) {
+        state.rows = Some((key, rows(session, state.group, state.annotator.as_deref())));
+    }
+    let Some((_, rows)) = &state.rows else { return };
+    egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| table(ui, rows, &tokens));
+}
+
+fn controls(ui: &mut Ui, session: &Session, state: &mut State) {
+    ui.horizontal(|ui| {
+        for (group, word) in [(Group::Stratum, "By stratum"), (Group::Scene, "By scene"), (Group::Day, "Over time")] {
+            ui.selectable_value(&mut state.group, group, RichText::new(word).small());
+        }
+        let text = state.annotator.clone().unwrap_or_else(|| "everybody".into());
+        let menu = egui::ComboBox::from_id_salt("whose").width(100.0).selected_text(text).show_ui(ui, |ui| {
+            ui.selectable_value(&mut state.annotator, None, "everybody");
+            for name in session.labels.table().keys() {
+                ui.selectable_value(&mut state.annotator, Some(name.clone()), name);
+            }
+        });
+        menu.response.named(Role::ComboBox, "Whose labels").on_hover_text("Whose labels are counted.");
+    });
+}
+
+fn rows(session: &Session, group: Group, annotator: Option<&str>) -> Vec<Row> {
+    let mut groups: BTreeMap<(usize, String), Row> = BTreeMap::new();
+    let tables = session.labels.table().iter().filter(|(name, _)| annotator.is_none_or(|wanted| wanted == *name));
+    for (&frame, record) in tables.flat_map(|(_, records)| records).filter(|(_, r)| !r.label.is_empty()) {
+        let name = name_of(session, group, frame, record);
+        let row = groups.entry(name.clone()).or_insert_with(|| Row {
+            frames: frames_of(session, group, &name),
+            name: name.1,
+            labelled: 0,
+            tags: [0; Tag::ALL.len()],
+        });
+        row.labelled += 1;
+        for (count, tag) in row.tags.iter_mut().zip(Tag::ALL) {
+            *count += usize::from(record.label.tags.contains(tag));
+        }
+    }
+    let mut rows: Vec<Row> = groups.into_values().collect();
+    let mut all = Row { name: "all".into(), frames: Some(session.data.len()), labelled: 0, tags: [0; Tag::ALL.len()] };
+    for row in &rows {
+        all.labelled += row.labelled;
+        for (sum, count) in all.tags.iter_mut().zip(row.tags) {
+            *sum += count;
+        }
+    }
+    rows.push(all);
+    rows
+}
+
+/// The group's place in the table, and its name.
+fn name_of(session: &Session, group: Group, frame: usize, record: &Record) -> (usize, String) {
+    match group {
+        Group::Stratum => match session.strata.of(frame).and_then(|complexity| complexity.stratum) {
+            Some(stratum) => (stratum as usize, stratum.word().into()),
+            None => (9, "not graded".into()),
+        },
+        Group::Scene => (0, session.data.dataset.as_ref().map_or("", |dataset| dataset.sequence(frame)).into()),
+        Group::Day => (0, record.time.get(..10).unwrap_or("unknown").into()),
+    }
+}
+
+fn frames_of(session: &Session, group: Group, name: &(usize, String)) -> Option<usize> {
+    use crate::study::complexity::Stratum;
+    let counts = &session.strata.result()?.counts;
+    let stratum = Stratum::ALL.into_iter().find(|stratum| group == Group::Stratum && stratum.word() == name.1)?;
+    Some(counts.in_stratum(stratum))
+}
+
+fn table(ui: &mut Ui, rows: &[Row], tokens: &Tokens) {
+    let most = rows.iter().rev().skip(1).flat_map(|row| row.tags).max().unwrap_or(1).max(1);
+    egui::Grid::new("statistics").num_columns(2 + Tag::ALL.len()).spacing([12.0, 4.0]).show(ui, |ui| {
+        ui.label("");
+        ui.label(RichText::new("labelled").small().color(tokens.dim));
+        for tag in Tag::ALL {
+            ui.label(RichText::new(tag.code()).small().color(tokens.tag(tag))).on_hover_text(tag.words());
+        }
+        ui.end_row();
+        for row in rows {
+            let total = row.name == "all";
+            let name = RichText::new(&row.name);
+            ui.label(if total { name.font(theme::strong(12.0)) } else { name });
+            let of = row.frames.map_or_else(String::new, |frames| format!(" of {frames}"));
+            ui.label(RichText::new(format!("{}{of}", row.labelled)).font(theme::mono(theme::CAPTION)));
+            for (tag, count) in Tag::ALL.into_iter().zip(row.tags) {
+                ui.horizontal(|ui| {
+                    ui.spacing_mut().item_spacing.x = 4.0;
+                    let text = RichText::new(format!("{count:>3}")).font(theme::mono(theme::CAPTION));
+                    ui.label(if count == 0 { text.color(tokens.dim) } else { text });
+                    if !total {
+                        let (rect, _) = ui.allocate_exact_size(vec2(36.0, 8.0), Sense::hover());
+                        let share = count as f32 / most as f32;
+                        let bar = egui::Rect::from_min_size(rect.min, vec2(rect.width() * share, rect.height()));
+                        ui.painter().rect_filled(bar, 1.0, tokens.tag(tag));
+                    }
+                });
+            }
+            ui.end_row();
+        }
+    });
+}

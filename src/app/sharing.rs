@@ -1,0 +1,182 @@
+//! Taking things home from the window: pictures, and what only the window knows of a session.
+
+use super::InspectorApp;
+use super::commands::SaveKind;
+use super::layout::{Layout, PaneKind};
+use super::panes::PaneStates;
+use crate::session::{Command, Export, LogLevel, Session, Task};
+use egui::{ColorImage, Context, Rect};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// What only the window knows of a session.
+#[derive(Serialize, Deserialize)]
+struct WindowState {
+    layout: egui_tiles::Tree<PaneKind>,
+    panes: super::panes::Stored,
+}
+
+/// Pictures that were asked for and are not drawn yet.
+#[derive(Default)]
+pub(super) struct Pictures {
+    drawn: Arc<Mutex<Vec<(Wanted, Arc<ColorImage>)>>>,
+}
+
+/// What a picture is for.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Wanted {
+    /// A file, of the window or a part of it (points).
+    File(PathBuf, Option<Rect>),
+    /// The clipboard.
+    Clipboard,
+}
+
+impl Pictures {
+    /// Asks for a picture of the next pass.
+    fn ask(&self, ctx: &Context, wanted: Wanted) {
+        let drawn = Arc::clone(&self.drawn);
+        let waker = ctx.clone();
+        ctx.request_screenshot(move |image: Arc<ColorImage>| {
+            drawn.lock().unwrap_or_else(PoisonError::into_inner).push((wanted, image));
+            waker.request_repaint();
+        });
+        ctx.request_repaint();
+    }
+
+    fn take(&self) -> Vec<(Wanted, Arc<ColorImage>)> {
+        std::mem::take(&mut self.drawn.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// The part of a picture inside `rect`, points.
+fn cropped(image: &ColorImage, rect: Option<Rect>, scale: f32) -> ColorImage {
+    rect.map_or_else(|| image.clone(), |rect| image.region(&rect.expand(0.0), Some(scale)))
+}
+
+fn write_png(image: &ColorImage, path: &Path) -> Result<String, String> {
+    let [width, height] = image.size;
+    let bytes: Vec<u8> = image.pixels.iter().flat_map(egui::Color32::to_array).collect();
+    let failed = |reason: String| format!("{}: cannot be written: {reason}", path.display());
+    let picture = image::RgbaImage::from_raw(width as u32, height as u32, bytes);
+    let picture = picture.ok_or_else(|| failed("the picture is empty".into()))?;
+    picture.save_with_format(path, image::ImageFormat::Png).map_err(|error| failed(error.to_string()))?;
+    Ok(format!("picture of {width} × {height} pixels written to {}", path.display()))
+}
+
+/// Where something would be written, unless a person says otherwise: beside what was written last, else in the folder that
+/// the program was started in.
+fn suggestion(session: &Session, kind: SaveKind) -> PathBuf {
+    let folder = session.session_path.as_ref().and_then(|path| path.parent().map(Path::to_path_buf));
+    let folder = folder.or_else(|| std::env::current_dir().ok()).unwrap_or_default();
+    let dataset = session.data.dataset.as_ref().map_or("session", |dataset| dataset.info().name.as_str());
+    let frame = session.data.frame.as_ref().map_or("", |frame| frame.name.as_str());
+    let iteration = session.fit.shown_iteration();
+    let of_frame = |ending: &str| format!("{dataset}-{frame}-it{iteration}.{ending}");
+    let name = match kind {
+        SaveKind::Session => format!("{dataset}.mhp-session"),
+        SaveKind::Picture(None) => of_frame("png"),
+        SaveKind::Picture(Some(pane)) => format!("{dataset}-{frame}-it{iteration}-{}.png", pane.title()),
+        SaveKind::Export(what @ (Export::LabelsCsv | Export::LabelsJson)) => {
+            format!("{dataset}-labels.{}", what.ending())
+        }
+        SaveKind::Export(Export::Strata) => format!("{dataset}-strata.csv"),
+        SaveKind::Export(what) => of_frame(what.ending()),
+    };
+    let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' };
+    folder.join(name.chars().map(plain).collect::<String>())
+}
+
+impl InspectorApp {
+    /// Asks where to write something.
+    pub(super) fn ask_save(&mut self, kind: SaveKind) {
+        let path = suggestion(&self.session, kind);
+        self.overlay.open_save(kind, &path);
+    }
+
+    /// Writes the session where it was last, or asks.
+    pub(super) fn save_session_again(&mut self, ctx: &Context) {
+        match self.session.session_path.clone() {
+            Some(path) => self.save(ctx, SaveKind::Session, path),
+            None => self.ask_save(SaveKind::Session),
+        }
+    }
+
+    /// Writes something.
+    pub(super) fn save(&mut self, ctx: &Context, kind: SaveKind, path: PathBuf) {
+        match kind {
+            SaveKind::Export(what) => self.apply(Command::Export(what, path)),
+            SaveKind::Session => {
+                let window = WindowState { layout: self.layout.stored().clone(), panes: self.panes.stored() };
+                match serde_json::to_value(&window) {
+                    Ok(window) => self.apply(Command::SaveSession(path, window)),
+                    Err(error) => {
+                        self.apply(Command::Log(LogLevel::Error, format!("the session was not saved: {error}")))
+                    }
+                }
+            }
+            SaveKind::Picture(pane) => {
+                let rect = pane.and_then(|pane| self.layout.rect(pane));
+                self.pictures.ask(ctx, Wanted::File(path, rect));
+            }
+        }
+    }
+
+    /// Puts the picture of the window on the clipboard.
+    pub(super) fn copy_picture(&mut self, ctx: &Context) {
+        self.pictures.ask(ctx, Wanted::Clipboard);
+    }
+
+    /// Puts the path of the frame's file on the clipboard.
+    pub(super) fn copy_path(&mut self, ctx: &Context) {
+        if let (Some(dataset), Some(frame)) = (&self.session.data.dataset, &self.session.data.frame) {
+            ctx.copy_text(dataset.frame_path(frame.index).display().to_string());
+            self.overlay.notify(LogLevel::Info, "path copied".into(), ctx.input(|i| i.time));
+        }
+    }
+
+    /// Carries out what was asked of the pictures that are drawn by now.
+    pub(super) fn take_pictures(&mut self, ctx: &Context) {
+        let scale = ctx.pixels_per_point();
+        for (wanted, image) in self.pictures.take() {
+            match wanted {
+                Wanted::File(path, rect) => {
+                    let image = cropped(&image, rect, scale);
+                    self.apply(Command::RunTask(Task::new(move || write_png(&image, &path))));
+                }
+                Wanted::Clipboard => {
+                    ctx.copy_image((*image).clone());
+                    self.overlay.notify(LogLevel::Info, "picture copied".into(), ctx.input(|i| i.time));
+                }
+            }
+        }
+    }
+
+    /// Puts back what a session file says of the window.
+    pub(super) fn take_restored(&mut self) {
+        let Some(window) = self.session.take_restored_window() else { return };
+        match serde_json::from_value::<WindowState>(window) {
+            Ok(state) => {
+                self.layout = Layout::restored(state.layout);
+                self.panes.restore(state.panes, &self.session);
+            }
+            Err(error) => {
+                let text = format!("camera and layout of the session could not be put back: {error}");
+                self.apply(Command::Log(LogLevel::Warning, text));
+            }
+        }
+    }
+}
+
+impl PaneStates {
+    /// Camera and zoom of the maps, to be kept in a session file.
+    pub(super) fn stored(&self) -> super::panes::Stored {
+        super::panes::Stored { camera: self.scene.stored(), maps: self.maps.stored() }
+    }
+
+    /// Puts camera and zoom back.
+    pub(super) fn restore(&mut self, stored: super::panes::Stored, session: &Session) {
+        self.scene.restore(stored.camera, session);
+        self.maps.restore(stored.maps, session);
+    }
+}

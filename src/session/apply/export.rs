@@ -1,0 +1,121 @@
+//! Taking things home: curves, Gaussians, parameters, labels, strata, the session itself. What is to be written is gathered
+//! here; a thread of the runtime writes it.
+
+use crate::dataset::npz::replace_file;
+use crate::dataset::write_pppr;
+use crate::labels::{Record, write_csv, write_json};
+use crate::session::command::{Effect, Export, Task};
+use crate::session::file::SessionFile;
+use crate::session::state::{LogLevel, Session};
+use crate::study::{CurveRow, complexity, write_curves, write_ply};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+impl Session {
+    pub(super) fn export(&mut self, what: Export, path: PathBuf) -> Vec<Effect> {
+        let task = match what {
+            Export::Curves => self.curves_task(path),
+            Export::Gaussians => self.gaussians_task(path),
+            Export::Parameters => self.parameters_task(path),
+            Export::LabelsCsv => self.labels_task(path, false),
+            Export::LabelsJson => self.labels_task(path, true),
+            Export::Strata => self.strata_task(path),
+        };
+        match task {
+            Some(task) => vec![Effect::Run(task)],
+            None => {
+                self.note(LogLevel::Error, format!("{}: there is nothing to export yet", what.title()));
+                Vec::new()
+            }
+        }
+    }
+
+    /// Every branch of the fit on screen, iteration by iteration.
+    fn curves_task(&self, path: PathBuf) -> Option<Task> {
+        let history = self.fit.history.clone();
+        let arrays: Vec<String> = self.fit.problem.as_ref()?.views.iter().map(|view| view.array.clone()).collect();
+        Some(Task::new(move || {
+            let rows = history.branches().iter().flat_map(|branch| {
+                branch.rows.iter().map(move |row| CurveRow {
+                    branch: branch.id,
+                    report: &row.report,
+                    majpe_mm: row.majpe_mm,
+                    flag: branch.flags.iter().find(|f| f.iteration == row.report.iteration).map(|f| f.text.as_str()),
+                })
+            });
+            write_curves(&path, &arrays, rows).map_err(|error| error.to_string())?;
+            Ok(written(&path))
+        }))
+    }
+
+    fn gaussians_task(&self, path: PathBuf) -> Option<Task> {
+        let (shown, problem) = (Arc::clone(self.fit.shown.as_ref()?), Arc::clone(self.fit.problem.as_ref()?));
+        Some(Task::new(move || {
+            write_ply(&path, &shown.params, &problem.skeleton).map_err(|error| error.to_string())?;
+            Ok(written(&path))
+        }))
+    }
+
+    fn parameters_task(&self, path: PathBuf) -> Option<Task> {
+        let shown = Arc::clone(self.fit.shown.as_ref()?);
+        Some(Task::new(move || {
+            write_pppr(&path, &shown.params).map_err(|error| error.to_string())?;
+            Ok(written(&path))
+        }))
+    }
+
+    /// Everybody's labels; in agreement mode only one's own, so that nothing hidden leaves through this door.
+    fn labels_task(&self, path: PathBuf, json: bool) -> Option<Task> {
+        self.labels.place.as_ref()?;
+        let mut records: Vec<Record> = Vec::new();
+        for (annotator, frames) in self.labels.table() {
+            let hidden =
+                self.view.label_mode == crate::session::LabelMode::Agreement && *annotator != self.labels.annotator;
+            if !hidden {
+                records.extend(frames.values().filter(|record| !record.label.is_empty()).cloned());
+            }
+        }
+        records.sort_by(|a, b| {
+            (a.frame.index, &a.frame.path, &a.annotator).cmp(&(b.frame.index, &b.frame.path, &b.annotator))
+        });
+        Some(Task::new(move || {
+            let count = records.len();
+            let fill = if json { write_json } else { write_csv };
+            replace_file(&path, |mut out| fill(&mut out, &records))
+                .map_err(|reason| format!("{}: cannot be written: {reason}", path.display()))?;
+            Ok(format!("{count} labels written to {}", path.display()))
+        }))
+    }
+
+    fn strata_task(&self, path: PathBuf) -> Option<Task> {
+        let (dataset, strata) = (Arc::clone(self.data.dataset.as_ref()?), Arc::clone(self.strata.result()?));
+        Some(Task::new(move || {
+            complexity::write_csv(&path, &dataset, &strata).map_err(|error| error.to_string())?;
+            Ok(written(&path))
+        }))
+    }
+
+    pub(super) fn save_session(&mut self, path: PathBuf, window: serde_json::Value) -> Vec<Effect> {
+        let Some(file) = SessionFile::of(self, window) else {
+            self.note(LogLevel::Error, "there is no session to save: no data set is open".into());
+            return Vec::new();
+        };
+        self.session_path = Some(path.clone());
+        vec![Effect::Run(Task::new(move || {
+            file.write(&path).map_err(|error| error.to_string())?;
+            Ok(format!("session saved to {}", path.display()))
+        }))]
+    }
+
+    pub(super) fn task_done(&mut self, result: Result<String, String>) -> Vec<Effect> {
+        match result {
+            Ok(text) => self.hint(text),
+            Err(why) => self.note(LogLevel::Error, why),
+        }
+        Vec::new()
+    }
+}
+
+fn written(path: &Path) -> String {
+    format!("written to {}", path.display())
+}

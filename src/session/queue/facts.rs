@@ -1,0 +1,153 @@
+//! What the frame list knows of one frame, gathered for filtering and sorting.
+
+use crate::labels::{Tags, Verdict};
+use crate::study::complexity::Stratum;
+
+/// One frame's row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Facts<'a> {
+    /// Index in the data set.
+    pub index: usize,
+    /// Name.
+    pub name: &'a str,
+    /// The sequence that it belongs to.
+    pub scene: &'a str,
+    /// False where its file could not be read.
+    pub readable: bool,
+    /// Easy, medium or hard.
+    pub stratum: Option<Stratum>,
+    /// Mean of the rank-normalised statistics, 0..1.
+    pub hardness: Option<f64>,
+    /// ρ_peak.
+    pub peak_density: Option<f64>,
+    /// s_static.
+    pub static_dominance: Option<f64>,
+    /// r_human.
+    pub human_saliency: Option<f64>,
+    /// Mean forward-consistency IoU.
+    pub iou: Option<f64>,
+    /// L.
+    pub loss: Option<f64>,
+    /// Iterations done.
+    pub iterations: Option<usize>,
+    /// The convergence criterion.
+    pub converged: Option<bool>,
+    /// Why the run ended.
+    pub reason: Option<&'a str>,
+    /// MAJPE, mm.
+    pub majpe_mm: Option<f64>,
+    /// Tags that may be seen.
+    pub tags: Tags,
+    /// The annotator's note.
+    pub note: &'a str,
+    /// The annotator's verdict.
+    pub verdict: Option<Verdict>,
+    /// Who labelled it, as far as that may be seen.
+    pub annotators: Vec<&'a str>,
+}
+
+impl Default for Facts<'_> {
+    fn default() -> Self {
+        Self {
+            index: 0,
+            name: "",
+            scene: "",
+            readable: true,
+            stratum: None,
+            hardness: None,
+            peak_density: None,
+            static_dominance: None,
+            human_saliency: None,
+            iou: None,
+            loss: None,
+            iterations: None,
+            converged: None,
+            reason: None,
+            majpe_mm: None,
+            tags: Tags::NONE,
+            note: "",
+            verdict: None,
+            annotators: Vec::new(),
+        }
+    }
+}
+
+/// A number of a frame that can be compared and sorted by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Number {
+    /// Index in the data set.
+    Index,
+    /// Hardness.
+    Hardness,
+    /// ρ_peak.
+    PeakDensity,
+    /// s_static.
+    StaticDominance,
+    /// r_human.
+    HumanSaliency,
+    /// Mean IoU.
+    Iou,
+    /// L.
+    Loss,
+    /// Iterations.
+    Iterations,
+    /// MAJPE, mm.
+    Majpe,
+}
+
+impl Number {
+    /// Every number.
+    pub const ALL: [Self; 9] = [
+        Self::Index,
+        Self::Hardness,
+        Self::PeakDensity,
+        Self::StaticDominance,
+        Self::HumanSaliency,
+        Self::Iou,
+        Self::Loss,
+        Self::Iterations,
+        Self::Majpe,
+    ];
+
+    /// As written in a filter.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Index => "index",
+            Self::Hardness => "hardness",
+            Self::PeakDensity => "peaks",
+            Self::StaticDominance => "static",
+            Self::HumanSaliency => "saliency",
+            Self::Iou => "iou",
+            Self::Loss => "loss",
+            Self::Iterations => "iterations",
+            Self::Majpe => "majpe",
+        }
+    }
+
+    /// The number called `key`.
+    pub fn of(key: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|number| number.key() == key)
+    }
+
+    /// True where it changes while a fit runs.
+    pub fn is_of_fit(self) -> bool {
+        matches!(self, Self::Iou | Self::Loss | Self::Iterations | Self::Majpe)
+    }
+}
+
+impl Facts<'_> {
+    /// A number of this frame.
+    pub fn number(&self, number: Number) -> Option<f64> {
+        match number {
+            Number::Index => Some(self.index as f64),
+            Number::Hardness => self.hardness,
+            Number::PeakDensity => self.peak_density,
+            Number::StaticDominance => self.static_dominance,
+            Number::HumanSaliency => self.human_saliency,
+            Number::Iou => self.iou,
+            Number::Loss => self.loss,
+            Number::Iterations => self.iterations.map(|n| n as f64),
+            Number::Majpe => self.majpe_mm,
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! The queue: which frames are in the list, and in what order.
+//!
+//! A [`Rule`] chooses them and a [`Sort`] orders them. What "next" means follows from both: along the queue it is the next
+//! row, along time it is the next frame that matches.
+
+mod facts;
+mod rule;
+
+pub use facts::{Facts, Number};
+pub use rule::{Rule, SYNTAX};
+
+use crate::labels::Tags;
+use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
+
+/// What the list is ordered by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum SortKey {
+    /// As in the data set.
+    #[default]
+    Index,
+    /// Easy to hard.
+    Stratum,
+    /// Hardness.
+    Hardness,
+    /// ρ_peak.
+    PeakDensity,
+    /// s_static.
+    StaticDominance,
+    /// r_human.
+    HumanSaliency,
+    /// Mean IoU.
+    Iou,
+    /// Converged or not.
+    Converged,
+    /// MAJPE.
+    Majpe,
+    /// Tags, in the order of their digits.
+    Tags,
+    /// Who labelled it.
+    Annotator,
+}
+
+/// Order of the list. Frames without a value come last, whichever way it is sorted; equal ones stay in the data set's order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Sort {
+    /// By what.
+    pub key: SortKey,
+    /// Largest first.
+    pub descending: bool,
+}
+
+/// A filter with an order, kept under a name. It is the rule that is kept, not the frames it found.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SavedView {
+    /// Its name.
+    pub name: String,
+    /// The filter's text.
+    pub rule: String,
+    /// The order.
+    pub sort: Sort,
+}
+
+/// The frames of the list.
+#[derive(Debug, Default)]
+pub struct Queue {
+    /// The filter as typed.
+    pub text: String,
+    /// Why the text is no filter; the list then keeps the last one that was.
+    pub error: Option<String>,
+    /// The filter in force.
+    pub rule: Rule,
+    /// Frames in the order of the list.
+    rows: Vec<u32>,
+    /// The same frames in the order of the data set.
+    matching: Vec<u32>,
+    /// Position of each frame in `rows`; `u32::MAX` for one that does not match.
+    positions: Vec<u32>,
+    /// Where in `rows` the frame on screen was when it last was there.
+    pub(super) last_position: usize,
+    /// Counts up with every change of the rows.
+    pub revision: u64,
+}
+
+const ABSENT: u32 = u32::MAX;
+
+impl Queue {
+    /// Frames in the order of the list.
+    pub fn rows(&self) -> &[u32] {
+        &self.rows
+    }
+
+    /// Frames that match, in the order of the data set.
+    pub fn matching(&self) -> &[u32] {
+        &self.matching
+    }
+
+    /// Where a frame is in the list.
+    pub fn position(&self, frame: usize) -> Option<usize> {
+        self.positions.get(frame).copied().filter(|&at| at != ABSENT).map(|at| at as usize)
+    }
+
+    /// True where a frame matches the filter.
+    pub fn contains(&self, frame: usize) -> bool {
+        self.position(frame).is_some()
+    }
+
+    /// Takes a new filter. One that cannot be understood leaves the last one in force.
+    pub(super) fn set_text(&mut self, text: String) {
+        match Rule::parse(&text) {
+            Ok(rule) => (self.rule, self.error) = (rule, None),
+            Err(error) => self.error = Some(error),
+        }
+        self.text = text;
+    }
+
+    /// Fills the list again: `frames` facts in the order of the data set.
+    pub(super) fn fill<'a>(&mut self, frames: usize, sort: Sort, facts: impl Fn(usize) -> Facts<'a>) {
+        let mut keyed: Vec<(Key, u32)> = Vec::with_capacity(frames);
+        for frame in 0..frames {
+            let row = facts(frame);
+            if self.rule.matches(&row) {
+                keyed.push((key(sort.key, &row), frame as u32));
+            }
+        }
+        self.matching = keyed.iter().map(|&(_, frame)| frame).collect();
+        if sort != Sort::default() {
+            keyed.sort_by(|(a, i), (b, j)| a.order(*b, sort.descending).then(i.cmp(j)));
+        }
+        self.rows = keyed.into_iter().map(|(_, frame)| frame).collect();
+        self.positions.clear();
+        self.positions.resize(frames, ABSENT);
+        for (at, &frame) in self.rows.iter().enumerate() {
+            if let Some(position) = self.positions.get_mut(frame as usize) {
+                *position = at as u32;
+            }
+        }
+        self.revision += 1;
+    }
+
+    /// The row `by` further in the list than `frame`; `None` at its ends. From a frame that left the list, the first step
+    /// is to the row that took its place.
+    pub fn step(&self, frame: usize, by: isize) -> Option<usize> {
+        let last = self.rows.len().checked_sub(1)?;
+        let target = match self.position(frame) {
+            Some(at) => at.checked_add_signed(by).filter(|&to| to <= last)?,
+            None if by > 0 => (self.last_position + by as usize - 1).min(last),
+            None => self.last_position.checked_sub(by.unsigned_abs())?.min(last),
+        };
+        self.rows.get(target).map(|&frame| frame as usize)
+    }
+
+    /// The next row after `frame` for which `wanted` holds, from the top again after the end; never `frame` itself.
+    pub fn next_where(&self, frame: usize, wanted: impl Fn(usize) -> bool) -> Option<usize> {
+        let start = self.position(frame).map_or(self.last_position, |at| at + 1);
+        let (before, after) = self.rows.split_at(start.min(self.rows.len()));
+        let mut frames = after.iter().chain(before).map(|&row| row as usize);
+        frames.find(|&row| row != frame && wanted(row))
+    }
+
+    /// The matching frame `by` further in the order of the data set, at most the last; `None` where there is none that way.
+    pub fn step_in_time(&self, frame: usize, by: isize) -> Option<usize> {
+        let at = self.matching.partition_point(|&row| (row as usize) < frame);
+        let here = self.matching.get(at).is_some_and(|&row| row as usize == frame);
+        let last = self.matching.len().checked_sub(1)?;
+        let target = if by >= 0 {
+            let first = if here { at } else { at.saturating_sub(1) };
+            let steps = if !here && at == 0 { by as usize - 1 } else { by as usize };
+            (first + steps).min(last)
+        } else {
+            at.checked_sub(1)?;
+            at.saturating_sub(by.unsigned_abs())
+        };
+        self.matching.get(target).map(|&row| row as usize).filter(|&row| row != frame)
+    }
+}
+
+/// A value to sort by; `Nothing` is last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Key {
+    Nothing,
+    Number(f64),
+    Tags(Tags),
+    /// The first letters of a name, enough to order by.
+    Text([u8; 8]),
+}
+
+impl Key {
+    fn order(self, other: Self, descending: bool) -> Ordering {
+        let way = |ordering: Ordering| if descending { ordering.reverse() } else { ordering };
+        match (self, other) {
+            (Self::Nothing, Self::Nothing) => Ordering::Equal,
+            (Self::Nothing, _) => Ordering::Greater,
+            (_, Self::Nothing) => Ordering::Less,
+            (Self::Number(a), Self::Number(b)) => way(a.total_cmp(&b)),
+            (Self::Tags(a), Self::Tags(b)) => way(tag_rank(a).cmp(&tag_rank(b))),
+            (Self::Text(a), Self::Text(b)) => way(a.cmp(&b)),
+            _ => Ordering::Equal,
+        }
+    }
+}
+
+/// Sets of tags in the order of their lowest digit.
+fn tag_rank(tags: Tags) -> Vec<u8> {
+    tags.iter().map(|tag| tag as u8).collect()
+}
+
+fn key(key: SortKey, facts: &Facts<'_>) -> Key {
+    let number = |value: Option<f64>| value.filter(|x| !x.is_nan()).map_or(Key::Nothing, Key::Number);
+    match key {
+        SortKey::Index => Key::Number(facts.index as f64),
+        SortKey::Stratum => number(facts.stratum.map(|stratum| f64::from(stratum as u8))),
+        SortKey::Hardness => number(facts.hardness),
+        SortKey::PeakDensity => number(facts.peak_density),
+        SortKey::StaticDominance => number(facts.static_dominance),
+        SortKey::HumanSaliency => number(facts.human_saliency),
+        SortKey::Iou => number(facts.iou),
+        SortKey::Converged => number(facts.converged.map(|yes| f64::from(u8::from(yes)))),
+        SortKey::Majpe => number(facts.majpe_mm),
+        SortKey::Tags if facts.tags.is_empty() => Key::Nothing,
+        SortKey::Tags => Key::Tags(facts.tags),
+        SortKey::Annotator => facts.annotators.first().map_or(Key::Nothing, |name| {
+            let mut text = [0; 8];
+            for (to, from) in text.iter_mut().zip(name.bytes()) {
+                *to = from.to_ascii_lowercase();
+            }
+            Key::Text(text)
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn queue(text: &str, sort: Sort, iou: &[Option<f64>]) -> Queue {
+        let mut queue = Queue::default();
+        queue.set_text(text.into());
+        queue.fill(iou.len(), sort, |index| Facts { index, iou: iou[index], ..Facts::default() });
+        queue
+    }
+
+    const IOU: [Option<f64>; 6] = [Some(0.5), None, Some(0.1), Some(0.5), None, Some(0.3)];
+
+    #[test]
+    fn unknown_values_are_last_either_way_and_ties_keep_their_order() {
+        let by = |descending| queue("", Sort { key: SortKey::Iou, descending }, &IOU).rows().to_vec();
+        assert_eq!(by(false), [2, 5, 0, 3, 1, 4]);
+        assert_eq!(by(true), [0, 3, 5, 2, 1, 4]);
+    }
+
+    #[test]
+    fn next_follows_the_list_and_time_follows_the_data_set() {
+        let sort = Sort { key: SortKey::Iou, descending: false };
+        let mut q = queue("iou<0.5", sort, &IOU);
+        assert_eq!(q.rows(), [2, 5]);
+        assert_eq!((q.step(2, 1), q.step(5, 1), q.step(5, -1), q.step(2, -1)), (Some(5), None, Some(2), None));
+        assert_eq!((q.step_in_time(0, 1), q.step_in_time(2, 1), q.step_in_time(3, 1)), (Some(2), Some(5), Some(5)));
+        assert_eq!((q.step_in_time(5, 1), q.step_in_time(5, -1), q.step_in_time(3, -10)), (None, Some(2), Some(2)));
+        assert_eq!((q.step_in_time(0, 10), q.step_in_time(1, -1)), (Some(5), None));
+        assert_eq!((q.contains(2), q.contains(0), q.position(5)), (true, false, Some(1)));
+        // Frame 2 leaves the list, as one does that is tagged under `tag:none`: the next one is what took its place.
+        q.last_position = 0;
+        q.set_text("iou<0.5 -index=2".into());
+        q.fill(IOU.len(), sort, |index| Facts { index, iou: IOU[index], ..Facts::default() });
+        assert_eq!((q.step(2, 1), q.step(2, -1)), (Some(5), None));
+    }
+
+    #[test]
+    fn a_search_goes_round_but_not_to_itself() {
+        let q = queue("", Sort::default(), &IOU);
+        assert_eq!(q.next_where(3, |frame| IOU[frame].is_none()), Some(4));
+        assert_eq!(q.next_where(4, |frame| IOU[frame].is_none()), Some(1));
+        assert_eq!(q.next_where(2, |frame| frame == 2), None);
+    }
+
+    #[test]
+    fn a_wrong_filter_keeps_the_last_one() {
+        let mut q = queue("iou<0.2", Sort::default(), &IOU);
+        q.set_text("iou<".into());
+        assert!(q.error.as_ref().is_some_and(|why| why.contains("not a number")));
+        q.fill(IOU.len(), Sort::default(), |index| Facts { index, iou: IOU[index], ..Facts::default() });
+        assert_eq!(q.rows(), [2]);
+        q.set_text(String::new());
+        assert_eq!(q.error, None);
+    }
+
+    #[test]
+    fn an_empty_list_has_no_next() {
+        let q = queue("iou>9", Sort::default(), &IOU);
+        assert_eq!((q.step(0, 1), q.step_in_time(0, 1), q.next_where(0, |_| true)), (None, None, None));
+    }
+}

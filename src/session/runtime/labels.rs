@@ -1,0 +1,198 @@
+//! The thread that keeps the journals: an act is written there, so that a slow disk never holds the window up, and is shown
+//! only when the answer is back.
+
+use super::Wake;
+use crate::dataset::Dataset;
+use crate::labels::{FrameId, Journal, LabelPlace, LabelStore, Record};
+use crate::session::command::{Command, Commit, Written};
+use crate::session::labels::LabelTable;
+use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Acts that may wait to be written.
+const WAITING: usize = 256;
+
+enum Request {
+    Open(Arc<Dataset>, String),
+    Commit(Commit),
+    Refresh,
+}
+
+/// The window's end.
+pub(super) struct LabelKeeper {
+    requests: Sender<Request>,
+    answers: Receiver<Command>,
+    told: Sender<Command>,
+    wake: Wake,
+}
+
+impl LabelKeeper {
+    /// Starts the thread `labels`; it ends with its keeper, after the acts that wait.
+    pub(super) fn start(wake: &Wake) -> Self {
+        let (requests, inbox) = bounded(WAITING);
+        let (told, answers) = unbounded();
+        let (answer, waker) = (told.clone(), Arc::clone(wake));
+        let spawned = std::thread::Builder::new().name("labels".into()).spawn(move || {
+            let mut keeper = Keeper::default();
+            while let Ok(request) = inbox.recv() {
+                if let Some(command) = keeper.answer(request) {
+                    if answer.send(command).is_err() {
+                        return;
+                    }
+                    waker();
+                }
+            }
+        });
+        if let Err(reason) = spawned {
+            tracing::error!("no thread for labels: {reason}");
+        }
+        Self { requests, answers, told, wake: Arc::clone(wake) }
+    }
+
+    pub(super) fn open(&self, dataset: Arc<Dataset>, annotator: String) {
+        if self.requests.try_send(Request::Open(dataset, annotator)).is_err() {
+            self.tell(Command::LabelsOpened(Err("the thread that keeps labels does not answer".into())));
+        }
+    }
+
+    pub(super) fn commit(&self, commit: Commit) {
+        if let Err(TrySendError::Full(request) | TrySendError::Disconnected(request)) =
+            self.requests.try_send(Request::Commit(commit))
+            && let Request::Commit(Commit { id, kind, act, .. }) = request
+        {
+            let result = Err("the disk does not keep up with the acts before it".into());
+            self.tell(Command::LabelsWritten(Written { id, kind, act, result }));
+        }
+    }
+
+    /// What others wrote is looked for when there is time.
+    pub(super) fn refresh(&self) {
+        let _ = self.requests.try_send(Request::Refresh);
+    }
+
+    pub(super) fn poll(&self) -> Option<Command> {
+        self.answers.try_recv().ok()
+    }
+
+    fn tell(&self, command: Command) {
+        // The other end is held by this very keeper.
+        let _ = self.told.send(command);
+        (self.wake)();
+    }
+}
+
+/// The thread's end.
+#[derive(Default)]
+struct Keeper {
+    open: Option<Open>,
+}
+
+struct Open {
+    dataset: Arc<Dataset>,
+    journal: Journal,
+    store: LabelStore,
+    /// Frames by name; made when a record's index is not that of its name.
+    names: Option<HashMap<String, usize>>,
+}
+
+impl Keeper {
+    fn answer(&mut self, request: Request) -> Option<Command> {
+        match request {
+            Request::Open(dataset, annotator) => {
+                self.open = None;
+                Some(Command::LabelsOpened(self.begin(dataset, &annotator)))
+            }
+            Request::Commit(Commit { id, kind, act, changes }) => {
+                let result = match &mut self.open {
+                    Some(open) => open.commit(&act, &changes),
+                    None => Err("the journal is not open".into()),
+                };
+                Some(Command::LabelsWritten(Written { id, kind, act, result }))
+            }
+            Request::Refresh => {
+                let open = self.open.as_mut()?;
+                match open.store.refresh() {
+                    Ok(true) => Some(Command::LabelsRefreshed(open.table())),
+                    Ok(false) => None,
+                    Err(error) => {
+                        tracing::warn!("{error}");
+                        None
+                    }
+                }
+            }
+        }
+    }
+
+    fn begin(
+        &mut self,
+        dataset: Arc<Dataset>,
+        annotator: &str,
+    ) -> Result<(LabelPlace, LabelTable, Vec<String>), String> {
+        let place = LabelPlace::of(&dataset.info().root, dataset.fingerprint()).map_err(|error| error.to_string())?;
+        let journal = Journal::open(&place, annotator, dataset.fingerprint()).map_err(|error| error.to_string())?;
+        let store = LabelStore::read(&place).map_err(|error| error.to_string())?;
+        let mut open = Open { dataset, journal, store, names: None };
+        let table = open.table();
+        let mut warnings = open.store.warnings().to_vec();
+        warnings.extend(open.unknown());
+        self.open = Some(open);
+        Ok((place, table, warnings))
+    }
+}
+
+impl Open {
+    fn commit(
+        &mut self,
+        act: &str,
+        changes: &[(FrameId, crate::labels::Change, crate::labels::Judged)],
+    ) -> Result<Vec<(FrameId, crate::labels::Label, Record)>, String> {
+        let outcomes = self.journal.commit_each(act, changes).map_err(|error| error.to_string())?;
+        // Our own records are no news to be told again.
+        if let Err(error) = self.store.refresh() {
+            tracing::warn!("{error}");
+        }
+        Ok(outcomes.into_iter().map(|outcome| (outcome.frame, outcome.before, outcome.after)).collect())
+    }
+
+    /// Everybody's records by the frames of this data set. A record's index is a hint: its name decides.
+    fn table(&mut self) -> LabelTable {
+        let mut table = LabelTable::new();
+        let annotators: Vec<String> = self.store.annotators().map(str::to_owned).collect();
+        for annotator in annotators {
+            let records: Vec<Record> = self.store.records(&annotator).cloned().collect();
+            let mut frames = HashMap::with_capacity(records.len());
+            for mut record in records {
+                if let Some(index) = self.index(&record.frame) {
+                    record.frame.index = index;
+                    frames.insert(index, record);
+                }
+            }
+            table.insert(annotator, frames);
+        }
+        table
+    }
+
+    fn index(&mut self, frame: &FrameId) -> Option<usize> {
+        if self.dataset.frame_name(frame.index) == frame.path {
+            return Some(frame.index);
+        }
+        let dataset = &self.dataset;
+        let all = || (0..dataset.len()).map(|index| (dataset.frame_name(index).to_owned(), index)).collect();
+        self.names.get_or_insert_with(all).get(&frame.path).copied()
+    }
+
+    /// Labels of frames that the data set does not have.
+    fn unknown(&mut self) -> Option<String> {
+        let annotators: Vec<String> = self.store.annotators().map(str::to_owned).collect();
+        let frames: Vec<FrameId> =
+            annotators.iter().flat_map(|name| self.store.records(name)).map(|record| record.frame.clone()).collect();
+        let unknown: Vec<&FrameId> = frames.iter().filter(|frame| self.index(frame).is_none()).collect();
+        let first = unknown.first()?;
+        let count = unknown.len();
+        Some(format!(
+            "{count} labels are of frames that are not in this data set, for example {}; they are kept",
+            first.path
+        ))
+    }
+}
