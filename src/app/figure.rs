@@ -2,7 +2,7 @@
 
 use super::theme;
 use crate::session::Session;
-use egui::{Align2, Color32, FontId, Painter, Rect, vec2};
+use egui::{Align2, Color32, FontId, Painter, Rect, Role, WidgetInfo, vec2};
 
 /// What every picture of a fit has in common: frame, iteration, τ, weights, seed, version.
 pub(super) fn caption(session: &Session) -> String {
@@ -18,6 +18,13 @@ pub(super) fn caption(session: &Session) -> String {
         config.w_kine,
         env!("CARGO_PKG_VERSION")
     )
+}
+
+/// What a screen reader says of a picture: its name, and its caption where one is printed.
+pub(super) fn spoken(name: &str, caption: Option<&str>) -> WidgetInfo {
+    let mut info = WidgetInfo::labeled(Role::Canvas, true, name);
+    info.current_text_value = caption.map(str::to_owned);
+    info
 }
 
 /// Prints a caption along the lower edge of a picture, on a ground of its own, in as many lines as it needs.

@@ -127,13 +127,14 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         (plot.pointer_coordinate(), plot.response().clone())
     });
     flag_texts(ui, &response, branch, &tokens);
-    if shared.session.view.figure {
-        let what = if state.tab == Tab::Loss { "unweighted terms and L" } else { "IoU; MAJPE in m" };
+    let what = if state.tab == Tab::Loss { "unweighted terms and L" } else { "IoU; MAJPE in m" };
+    let caption = shared.session.view.figure.then(|| format!("{what} · {}", figure::caption(shared.session)));
+    if let Some(caption) = &caption {
         let painter = ui.painter().with_clip_rect(ui.clip_rect());
-        figure::print(&painter, *response.transform.frame(), &format!("{what} · {}", figure::caption(shared.session)));
+        figure::print(&painter, *response.transform.frame(), caption);
     }
     let (pointer, inner) = response.inner;
-    inner.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "Curves"));
+    inner.widget_info(|| figure::spoken("Curves", caption.as_deref()));
     if inner.double_clicked() {
         // The first click of the two has moved the cursor; the gesture was for the plot.
         shared.send(Command::GotoIteration(state.before_click));

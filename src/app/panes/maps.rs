@@ -200,7 +200,10 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     };
     let name = format!("{what} map of {}", view.array);
     let response = ui.interact(plot, ui.scope_id().with("plot"), Sense::click_and_drag());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, &name));
+    let unit = if content == Content::Masks { "masks" } else { state.pictures.unit(content) };
+    let caption = || format!("{what} {} · {unit} · {}", view.array, figure::caption(session));
+    let caption = session.view.figure.then(caption);
+    response.widget_info(|| figure::spoken(&name, caption.as_deref()));
     let (marking, marked) = state.mark(ui, &response, plot, index, view);
     if let Some(region) = marked {
         shared.send(crate::session::Command::SetRegion(Some(region)));
@@ -220,9 +223,8 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     state.draw_regions(&painter, session, index, view, &to_screen, &tokens);
     overlay::axes(ui, plot, view, orientation, window, &tokens);
     ui.painter().rect_stroke(plot, 0.0, egui::Stroke::new(1.0, tokens.stroke), egui::StrokeKind::Outside);
-    if session.view.figure {
-        let unit = if content == Content::Masks { "masks" } else { state.pictures.unit(content) };
-        figure::print(&painter, plot, &format!("{what} {} · {unit} · {}", view.array, figure::caption(session)));
+    if let Some(caption) = &caption {
+        figure::print(&painter, plot, caption);
     }
     if let Some(pointer) = response.hover_pos() {
         let unit = unit_at(plot, window, pointer);

@@ -119,7 +119,9 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         return;
     }
     let response = ui.interact(rect, ui.scope_id().with("scene"), Sense::click_and_drag());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "3-D scene"));
+    let caption = || format!("metres, z up · {}", figure::caption(shared.session));
+    let caption = shared.session.view.figure.then(caption);
+    response.widget_info(|| figure::spoken("3-D scene", caption.as_deref()));
     let mut camera = state.camera.unwrap_or_else(|| overview(shared.session));
     let tokens = Tokens::of(ui);
     let scale = ui.ctx().pixels_per_point();
@@ -144,9 +146,8 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             painter.text(at, Align2::LEFT_BOTTOM, text, egui::FontId::proportional(theme::CAPTION), color);
         }
     }
-    if shared.session.view.figure {
-        let text = format!("metres, z up · {}", figure::caption(shared.session));
-        figure::print(&painter, rect.with_max_x(rect.max.x - 190.0), &text);
+    if let Some(caption) = &caption {
+        figure::print(&painter, rect.with_max_x(rect.max.x - 190.0), caption);
     }
     captions(&painter, rect, shared.session, &tokens, state);
     interact(ui, shared, state, &response, rect, viewport, scale, &scene, &camera);

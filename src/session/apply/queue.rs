@@ -71,7 +71,7 @@ impl Session {
         match self.queue.next_where(self.data.frame_index, |frame| !self.labels.is_judged(frame)) {
             Some(frame) => self.goto_frame(frame),
             None => {
-                self.hint(format!("every frame is tagged: {}", self.queue_words()));
+                self.hint(format!("no other frame is untagged: {}", self.queue_words()));
                 Vec::new()
             }
         }

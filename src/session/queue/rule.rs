@@ -94,6 +94,15 @@ impl Rule {
         })
     }
 
+    /// True where the answer depends on labels.
+    pub fn reads_labels(&self) -> bool {
+        self.terms.iter().any(|term| match &term.test {
+            Test::Tags { .. } => true,
+            Test::Word(word, _) => matches!(word, Word::Note | Word::By | Word::Verdict),
+            Test::Name(_) | Test::Compare(..) => false,
+        })
+    }
+
     /// True where a frame with these facts matches.
     pub fn matches(&self, facts: &Facts<'_>) -> bool {
         self.terms.iter().all(|term| term.test.holds(facts) != term.negated)
@@ -332,5 +341,13 @@ mod tests {
     fn only_rules_about_fits_follow_a_run() {
         assert!(Rule::parse("iou<0.5").unwrap().reads_fits());
         assert!(!Rule::parse("stratum:hard tag:F1 hardness>0.5 00").unwrap().reads_fits());
+    }
+
+    #[test]
+    fn only_rules_about_labels_follow_tags() {
+        for text in ["-tag:none", "note:wall", "by:ada", "verdict:true-negative"] {
+            assert!(Rule::parse(text).unwrap().reads_labels(), "{text}");
+        }
+        assert!(!Rule::parse("stratum:hard iou<0.5 00").unwrap().reads_labels());
     }
 }
