@@ -62,7 +62,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, card: &Evidence, tokens: &Tokens) {
     let name = format!("{} card", card.mode);
     let score = card.score.map_or_else(|| "not judged".into(), |score| format!("score {score:.2}"));
     response.response.widget_info(|| {
-        let mut info = egui::WidgetInfo::labeled(Role::Label, true, &name);
+        let mut info = egui::WidgetInfo::labeled(Role::Group, true, &name);
         info.current_text_value = Some(format!("{score}. {}", card.summary));
         info
     });
