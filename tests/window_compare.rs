@@ -256,7 +256,7 @@ fn refuse<S: PartialEq + std::fmt::Debug>(
     assert!(window.told(words) && window.told("bad.mhp-session"), "{words}: {:?}", window.session().notice);
     window.harness.run_steps(3);
     assert_eq!(state(window), (before, errors + 1), "{words}");
-    window.click("Dismiss notification");
+    window.dismiss_all();
 }
 
 #[test]
@@ -298,7 +298,7 @@ fn what_is_exported_reads_back() {
     let ply = file(&window, "gaussians.ply");
     window.save_as("Export Gaussians as PLY…", &ply);
     let bytes = std::fs::read(&ply).unwrap();
-    let header = String::from_utf8_lossy(&bytes[..bytes.len().min(200)]).into_owned();
+    let header = String::from_utf8_lossy(&bytes[..bytes.len().min(1500)]).into_owned();
     assert!(header.starts_with("ply\n") && header.contains("element vertex 17"), "{header}");
 
     window.at_rest();
@@ -317,19 +317,18 @@ fn what_is_exported_reads_back() {
 #[test]
 fn captions_say_what_a_figure_shows() {
     let mut window = run_ten(1, 0);
-    let value = |w: &Window, name: &str| w.value(name);
-    assert_eq!(value(&window, "H_sim map of hori"), "");
+    assert_eq!(window.texts_of("H_sim map of hori"), "");
     window.key_with(Modifiers::SHIFT, Key::F);
     window.harness.run_steps(2);
     for name in ["H_ori map of hori", "H_sim map of vert", "Masks map of hori", "3-D scene", "Curves"] {
-        let caption = value(&window, name);
+        let caption = window.texts_of(name);
         for part in
             ["frames/000", "iteration 10", "τ_pct 10 %", "seed", concat!("inspector ", env!("CARGO_PKG_VERSION"))]
         {
             assert!(caption.contains(part), "{name}: {part} in {caption:?}");
         }
     }
-    assert!(value(&window, "3-D scene").starts_with("metres"));
+    assert!(window.texts_of("3-D scene").starts_with("metres"));
 }
 
 /// False, with the reason printed, where nothing can draw pictures.
@@ -369,8 +368,8 @@ fn pictures_have_the_size_of_what_they_show() {
     assert!(picture.pixels().any(|pixel| *pixel != first), "something was drawn");
 
     let pane = window.folder.path().join("pane.png");
-    let map = window.node("H_sim map of hori").rect();
-    window.node("H_sim").click_secondary();
+    let map = window.node("Masks map of hori").rect();
+    window.node("Masks").click_secondary();
     window.harness.run_steps(2);
     window.click("Save picture of this pane…");
     window.answer_path("Save to", &pane);

@@ -251,7 +251,8 @@ impl SessionFile {
     /// # Errors
     /// Where it is at neither of its paths.
     pub fn dataset_path(&self, file: &Path) -> Result<PathBuf, SessionFileError> {
-        let beside = self.dataset.relative.as_ref().and_then(|way| Some(file.parent()?.join(way)));
+        let beside =
+            self.dataset.relative.as_ref().and_then(|way| Some(file.parent()?.join(way).components().collect()));
         let found = beside.into_iter().chain([self.dataset.absolute.clone()]).find(|path| path.exists());
         let gone = || SessionFileError::NoDataset { dataset: self.dataset.absolute.clone(), path: file.to_owned() };
         found.ok_or_else(gone)

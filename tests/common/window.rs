@@ -266,6 +266,24 @@ impl Window {
         assert!(last.text.contains("written to") || last.text.contains("saved to"), "{}", last.text);
     }
 
+    /// Closes every notification.
+    pub(crate) fn dismiss_all(&mut self) {
+        while self.named("Dismiss notification") {
+            if let Some(button) = self.harness.query_all_by_label("Dismiss notification").next() {
+                button.click();
+            }
+            self.harness.run_steps(2);
+        }
+        self.harness.remove_cursor();
+        self.harness.step();
+    }
+
+    /// What a screen reader says of all things of this name.
+    pub(crate) fn texts_of(&self, name: &str) -> String {
+        let values = self.harness.query_all_by_label(name).filter_map(|node| node.value());
+        values.collect::<Vec<_>>().join("\n")
+    }
+
     /// The newest error or hint contains these words.
     pub(crate) fn told(&self, words: &str) -> bool {
         self.session().notice.as_ref().is_some_and(|(_, _, text)| text.contains(words))

@@ -4,7 +4,7 @@
 use super::Wake;
 use crate::body::Pppr;
 use crate::dataset::panic_text;
-use crate::mhp::{Objective, Problem, masks, simulate};
+use crate::mhp::{Objective, Precision, Problem, masks, simulate};
 use crate::session::command::{Command, PinRequest};
 use crate::session::evidence::EvidenceRequest;
 use crate::worker::Snapshot;
@@ -100,7 +100,8 @@ fn drawn(request: &PinRequest) -> Result<Snapshot, String> {
     let objective = Objective::new(Arc::clone(&problem), pin.config, pin.precision, &pin.initial);
     let mut objective = objective.map_err(|error| in_file(&error))?;
     let evaluation = objective.evaluate(&pin.params);
-    let h_sim = simulate(&problem, &pin.config, pin.precision, &pin.params);
+    // Pictures are in single precision, as the worker's: a pin looks the same before and after it was kept in a file.
+    let h_sim = simulate(&problem, &pin.config, Precision::F32, &pin.params);
     let masks = h_sim.iter().enumerate().map(|(view, map)| masks(&objective, view, map)).collect();
     Ok(Snapshot {
         job: 0,
