@@ -1,8 +1,8 @@
 //! Captions for figures: what a picture shows, printed small under it, so that it can still be told apart in a year.
 
-use super::theme;
+use super::theme::{self, Tokens};
 use crate::session::Session;
-use egui::{Align2, Color32, FontId, Painter, Rect, vec2};
+use egui::{FontId, Rect, Ui, pos2};
 
 /// What every picture of a fit has in common: frame, iteration, τ, weights, seed, version.
 pub(super) fn caption(session: &Session) -> String {
@@ -20,12 +20,12 @@ pub(super) fn caption(session: &Session) -> String {
     )
 }
 
-/// Prints a caption along the lower edge of a picture, on a ground of its own, in as many lines as it needs.
-pub(super) fn print(painter: &Painter, rect: Rect, text: &str) {
+/// Prints a caption at the lower end of `rect`, in as many lines as it needs, and answers what is left above it.
+pub(super) fn print(ui: &Ui, rect: Rect, text: &str) -> Rect {
+    let tokens = Tokens::of(ui);
     let font = FontId::proportional(theme::CAPTION - 2.0);
-    let galley = painter.layout(text.to_owned(), font, Color32::WHITE, (rect.width() - 8.0).max(40.0));
-    let size = galley.size() + vec2(8.0, 4.0);
-    let ground = Align2::LEFT_BOTTOM.align_size_within_rect(size, rect);
-    painter.rect_filled(ground, 0.0, Color32::from_black_alpha(170));
-    painter.galley(ground.min + vec2(4.0, 2.0), galley, Color32::WHITE);
+    let galley = ui.painter().layout(text.to_owned(), font, tokens.dim, (rect.width() - 16.0).max(40.0));
+    let top = rect.max.y - galley.size().y - 4.0;
+    ui.painter().galley(pos2(rect.min.x + 8.0, top), galley, tokens.dim);
+    rect.with_max_y(top - 2.0)
 }

@@ -41,6 +41,24 @@ pub enum PaneKind {
 }
 
 impl PaneKind {
+    /// Every pane.
+    pub const ALL: [Self; 14] = [
+        Self::Frames,
+        Self::HOri,
+        Self::HSim,
+        Self::Masks,
+        Self::Scene,
+        Self::Curves,
+        Self::Fit,
+        Self::Joint,
+        Self::Image,
+        Self::Log,
+        Self::Modes,
+        Self::Compare,
+        Self::Agreement,
+        Self::Statistics,
+    ];
+
     /// The title on its tab.
     pub fn title(self) -> &'static str {
         match self {

@@ -32,6 +32,11 @@ impl Session {
     fn dispatch(&mut self, command: Command) -> Vec<Effect> {
         match command {
             Command::Open(path) => self.open(path),
+            Command::OpenAt(path, aim) => {
+                let effects = self.open(path);
+                self.aim = aim;
+                effects
+            }
             Command::Pick(kind) => vec![Effect::Pick(kind)],
             Command::OpenBare(path, choice) => {
                 self.data.bare = None;

@@ -77,6 +77,15 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         .include_x(shared.session.config.iterations.min(20_000).max(fit.head()) as f64)
         .y_axis_min_width(44.0)
         .label_formatter(move |hover| label(hover, log));
+    if shared.session.view.figure {
+        let what = if state.tab == Tab::Loss { "L and its unweighted terms" } else { "IoU; MAJPE in m" };
+        let left = figure::print(
+            ui,
+            ui.available_rect_before_wrap(),
+            &format!("{what} · {}", figure::caption(shared.session)),
+        );
+        plot = plot.height(left.height());
+    }
     if log {
         plot = plot.y_axis_formatter(|mark, _| power(mark.value)).y_grid_spacer(|input| decades(input.bounds));
     }
@@ -127,11 +136,6 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         (plot.pointer_coordinate(), plot.response().clone())
     });
     flag_texts(ui, &response, branch, &tokens);
-    if shared.session.view.figure {
-        let what = if state.tab == Tab::Loss { "unweighted terms and L" } else { "IoU; MAJPE in m" };
-        let painter = ui.painter().with_clip_rect(ui.clip_rect());
-        figure::print(&painter, *response.transform.frame(), &format!("{what} · {}", figure::caption(shared.session)));
-    }
     let (pointer, inner) = response.inner;
     inner.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "Curves"));
     if inner.double_clicked() {

@@ -114,7 +114,11 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         state.camera = Some(overview(shared.session));
     }
     toolbar(ui, shared);
-    let rect = ui.available_rect_before_wrap();
+    let mut rect = ui.available_rect_before_wrap();
+    if shared.session.view.figure {
+        let text = format!("3-D, metres, z up · {}", figure::caption(shared.session));
+        rect = figure::print(ui, rect, &text);
+    }
     if rect.width() < 16.0 || rect.height() < 16.0 {
         return;
     }
@@ -143,10 +147,6 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             let at = rect.min + vec2(seen.px.x, seen.px.y) / scale + vec2(6.0, -6.0);
             painter.text(at, Align2::LEFT_BOTTOM, text, egui::FontId::proportional(theme::CAPTION), color);
         }
-    }
-    if shared.session.view.figure {
-        let text = format!("metres, z up · {}", figure::caption(shared.session));
-        figure::print(&painter, rect.with_max_x(rect.max.x - 190.0), &text);
     }
     captions(&painter, rect, shared.session, &tokens, state);
     interact(ui, shared, state, &response, rect, viewport, scale, &scene, &camera);

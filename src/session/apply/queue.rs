@@ -136,6 +136,7 @@ impl Session {
             reason: summary.and_then(|s| s.reason.as_deref()),
             majpe_mm: summary.and_then(|s| s.majpe_mm),
             tags: visible.tags,
+            own_tags: mine.map(|record| record.label.tags).unwrap_or_default(),
             note: mine.map_or("", |record| record.label.note.as_str()),
             verdict: mine.and_then(|record| record.label.verdict),
             annotators: visible.annotators,

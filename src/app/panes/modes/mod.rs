@@ -91,7 +91,7 @@ fn tags(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
     let on: Vec<bool> = Tag::ALL.iter().map(|&tag| has(tag)).collect();
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(3.0, 4.0);
-        ui.spacing_mut().button_padding.x = 5.0;
+        ui.spacing_mut().button_padding.x = 3.0;
         for (tag, on) in Tag::ALL.into_iter().zip(on) {
             tag_chip(ui, shared, tag, on, tokens);
         }
@@ -110,7 +110,7 @@ fn tag_chip(ui: &mut Ui, shared: &mut Shared<'_>, tag: Tag, on: bool, tokens: &T
     let button = egui::Button::new(text)
         .fill(if on { color } else { tokens.raised })
         .stroke(egui::Stroke::new(1.0, if on { color } else { tokens.stroke }))
-        .min_size(vec2(38.0, 24.0));
+        .min_size(vec2(36.0, 24.0));
     let response = ui.add(button);
     let name = format!("Tag {tag}");
     response.widget_info(|| egui::WidgetInfo::selected(Role::CheckBox, true, on, &name));
