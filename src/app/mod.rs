@@ -163,7 +163,8 @@ impl InspectorApp {
             AppAct::Save(kind) => self.ask_save(kind),
             AppAct::SaveSession => self.save_session_again(ctx),
             AppAct::OpenSession => self.overlay.open_session(),
-            AppAct::CopyPicture => self.copy_picture(ctx),
+            AppAct::CopyPicture(pane) => self.copy_picture(ctx, pane),
+            AppAct::ShowPane(pane) => self.layout.show_pane(pane),
             AppAct::CopyPath => self.copy_path(ctx),
             AppAct::FocusFilter => self.panes.frames.focus_filter(),
             AppAct::FocusNote => {
@@ -267,9 +268,7 @@ impl eframe::App for InspectorApp {
             self.overlay.show(ui, &mut shared);
         }
         let ctx = ui.ctx().clone();
-        if let Some(pane) = self.layout.take_asked() {
-            acts.push(Act::App(AppAct::Save(commands::SaveKind::Picture(Some(pane)))));
-        }
+        acts.extend(self.layout.take_asked().map(Act::App));
         for act in acts {
             self.act(&ctx, act);
         }

@@ -28,8 +28,8 @@ pub(super) struct Pictures {
 pub(super) enum Wanted {
     /// A file, of the window or a part of it (points).
     File(PathBuf, Option<Rect>),
-    /// The clipboard.
-    Clipboard,
+    /// The clipboard, of the window or a part of it (points).
+    Clipboard(Option<Rect>),
 }
 
 impl Pictures {
@@ -51,7 +51,7 @@ impl Pictures {
 
 /// The part of a picture inside `rect`, points.
 fn cropped(image: &ColorImage, rect: Option<Rect>, scale: f32) -> ColorImage {
-    rect.map_or_else(|| image.clone(), |rect| image.region(&rect.expand(0.0), Some(scale)))
+    rect.map_or_else(|| image.clone(), |rect| image.region(&rect, Some(scale)))
 }
 
 fn write_png(image: &ColorImage, path: &Path) -> Result<String, String> {
@@ -122,9 +122,10 @@ impl InspectorApp {
         }
     }
 
-    /// Puts the picture of the window on the clipboard.
-    pub(super) fn copy_picture(&mut self, ctx: &Context) {
-        self.pictures.ask(ctx, Wanted::Clipboard);
+    /// Puts the picture of the window, or of one pane, on the clipboard.
+    pub(super) fn copy_picture(&mut self, ctx: &Context, pane: Option<PaneKind>) {
+        let rect = pane.and_then(|pane| self.layout.rect(pane));
+        self.pictures.ask(ctx, Wanted::Clipboard(rect));
     }
 
     /// Puts the path of the frame's file on the clipboard.
@@ -144,8 +145,8 @@ impl InspectorApp {
                     let image = cropped(&image, rect, scale);
                     self.apply(Command::RunTask(Task::new(move || write_png(&image, &path))));
                 }
-                Wanted::Clipboard => {
-                    ctx.copy_image((*image).clone());
+                Wanted::Clipboard(rect) => {
+                    ctx.copy_image(cropped(&image, rect, scale));
                     self.overlay.notify(LogLevel::Info, "picture copied".into(), ctx.input(|i| i.time));
                 }
             }
