@@ -4,217 +4,17 @@
 
 #[path = "common/blob.rs"]
 mod blob;
+#[path = "common/window.rs"]
+#[expect(dead_code, reason = "other tests do more with a window")]
+mod window;
 
-use egui::{Key, Modifiers, Role, pos2};
-use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use egui_kittest::{Harness, Node};
+use egui::{Key, Modifiers, pos2};
+use egui_kittest::Harness;
 use mhp_inspector::app::InspectorApp;
-use mhp_inspector::session::{Command, Compare, Fit, FitStatus, LabelStatus, Session, StrataStatus, ThemeChoice};
-use std::path::{Path, PathBuf};
+use mhp_inspector::session::{Command, Compare, FitStatus, ThemeChoice};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-
-/// Nothing here takes seconds; where it does, the machine is busy, not the program wrong.
-const PATIENCE: Duration = Duration::from_mins(1);
-
-/// The window on a data set of its own.
-struct Window {
-    harness: Harness<'static, InspectorApp>,
-    folder: tempfile::TempDir,
-}
-
-impl Window {
-    fn empty(paths: &[PathBuf], size: [f32; 2]) -> Harness<'static, InspectorApp> {
-        Harness::builder()
-            .with_size(size)
-            .with_step_dt(1.0 / 60.0)
-            .with_max_steps(200)
-            .build_eframe(|cc| InspectorApp::new(cc, paths))
-    }
-
-    /// Frame 0 of `frames` is on screen and its fit is ready.
-    fn open(frames: usize) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        blob::write_dataset(folder.path(), frames);
-        let harness = Self::empty(&[folder.path().into()], [1440.0, 900.0]);
-        let mut window = Self { harness, folder };
-        window.ready(0);
-        window
-    }
-
-    fn session(&self) -> &Session {
-        self.harness.state().session()
-    }
-
-    fn fit(&self) -> &Fit {
-        &self.session().fit
-    }
-
-    /// Passes until something holds.
-    fn until(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
-        let deadline = Instant::now() + PATIENCE;
-        while !done(self) {
-            let log: Vec<&str> = self.session().log.iter().map(|line| line.text.as_str()).collect();
-            let fit = self.fit();
-            let at = (fit.frame, &fit.status, fit.head(), fit.cursor);
-            assert!(Instant::now() < deadline, "waited for {what}; frame, status, head, cursor {at:?}; log {log:#?}");
-            self.harness.step();
-        }
-        self.harness.step();
-    }
-
-    /// Frame `index` is on screen and what is shown is its newest iteration.
-    fn ready(&mut self, index: usize) {
-        self.until("a fit that is ready", |w| {
-            let frame = w.session().data.frame.as_ref().map(|frame| frame.index);
-            let shown = w.fit().shown.as_ref().map(|shown| shown.iteration);
-            frame == Some(index) && w.fit().is_ready() && shown == Some(w.fit().head())
-        });
-    }
-
-    fn apply(&mut self, command: Command) {
-        self.harness.state_mut().apply(command);
-    }
-
-    /// The frames are graded, the journals are open, the evidence is that of the fit on screen.
-    fn at_rest(&mut self) {
-        self.until("strata, labels and evidence", |w| {
-            let session = w.session();
-            session.strata.status == StrataStatus::Ready
-                && session.labels.status == LabelStatus::Ready
-                && session.evidence_of(session.data.frame_index).is_some()
-                && !session.evidence_is_stale()
-        });
-    }
-
-    fn paused_at(&mut self, iteration: usize) {
-        self.until("the end of the run", |w| {
-            w.fit().status == FitStatus::Paused
-                && w.fit().head() == iteration
-                && w.fit().shown.as_ref().is_some_and(|shown| shown.iteration == iteration)
-        });
-    }
-
-    fn named(&self, name: &str) -> bool {
-        self.harness.query_all_by_label(name).next().is_some()
-    }
-
-    fn says(&self, words: &str) -> bool {
-        self.harness.query_all_by_label_contains(words).next().is_some()
-    }
-
-    /// Clicks the one enabled button of this name with the mouse.
-    fn click(&mut self, name: &str) {
-        self.reveal(name);
-        self.node(name).click();
-        self.harness.step();
-        self.harness.remove_cursor();
-        self.harness.step();
-    }
-
-    /// The one thing of this name that can be used.
-    fn node<'a>(&'a self, name: &'a str) -> Node<'a> {
-        let usable =
-            |node: &Node<'_>| node.accesskit_node().role() != Role::Label && !node.accesskit_node().is_disabled();
-        let found: Vec<Node<'_>> = self.harness.query_all_by_label(name).filter(usable).collect();
-        match found[..] {
-            [one] => one,
-            [] => panic!("nothing usable is called {name:?}: {:?}", self.names()),
-            _ => panic!("{} things are called {name:?}: {found:?}", found.len()),
-        }
-    }
-
-    /// Scrolls a thing into view and waits until it stands still.
-    fn reveal(&mut self, name: &str) {
-        self.node(name).scroll_to_me();
-        self.harness.run_steps(2);
-        let mut still = 0;
-        while still < 3 {
-            let before = self.node(name).rect();
-            self.harness.step();
-            still = if self.node(name).rect() == before { still + 1 } else { 0 };
-        }
-    }
-
-    fn names(&self) -> Vec<String> {
-        self.harness.root().children_recursive().filter_map(|node| node.accesskit_node().label()).collect()
-    }
-
-    fn key(&mut self, key: Key) {
-        self.harness.key_press(key);
-        self.harness.step();
-    }
-
-    fn key_with(&mut self, modifiers: Modifiers, key: Key) {
-        self.harness.key_press_modifiers(modifiers, key);
-        self.harness.step();
-    }
-
-    fn type_text(&mut self, text: &str) {
-        // After an event egui draws twice: what depends on the text is there in the second pass.
-        self.harness.event(egui::Event::Text(text.into()));
-        self.harness.run_steps(2);
-    }
-
-    /// Clicks a number, types another and confirms it with Enter.
-    fn type_value(&mut self, name: &str, value: &str) {
-        self.click(name);
-        self.key_with(Modifiers::COMMAND, Key::A);
-        self.type_text(value);
-        self.key(Key::Enter);
-        self.harness.step();
-    }
-
-    /// Presses the mouse at a share of a thing's width and lets it go at another.
-    fn drag(&mut self, name: &str, from: f32, to: f32) {
-        self.reveal(name);
-        let rect = self.node(name).rect();
-        let at = |share: f32| pos2(rect.left() + share * rect.width(), rect.center().y);
-        self.harness.hover_at(at(from));
-        self.harness.drag_at(at(from));
-        for k in 1..=4 {
-            self.harness.hover_at(at(from + (to - from) * k as f32 / 4.0));
-        }
-        self.harness.drop_at(at(to));
-        self.harness.step();
-    }
-
-    fn drop_file(&mut self, path: &Path) {
-        let file: Arc<dyn egui::DroppedFile + Send + Sync> = Arc::new(Dropped(path.into()));
-        self.harness.input_mut().dropped_files.push(file);
-        self.harness.step();
-    }
-
-    /// Runs until a run of 20 iterations has ended.
-    fn fitted(frames: usize) -> Self {
-        let mut window = Self::open(frames);
-        window.type_value("Iterations value", "20");
-        assert_eq!(window.session().config.iterations, 20);
-        window.key(Key::Enter);
-        window.paused_at(20);
-        window
-    }
-
-    /// Begins a run that takes longer than any test.
-    fn run_forever(&mut self) {
-        self.type_value("Iterations value", "100000");
-        self.key(Key::Enter);
-        self.until("some iterations", |w| w.fit().is_running() && w.fit().head() > 3);
-    }
-}
-
-#[derive(Debug)]
-struct Dropped(PathBuf);
-
-impl egui::DroppedFile for Dropped {
-    fn path(&self) -> &Path {
-        &self.0
-    }
-
-    fn bytes(&self) -> Result<Vec<u8>, String> {
-        std::fs::read(&self.0).map_err(|error| error.to_string())
-    }
-}
+use window::Window;
 
 #[test]
 fn a_data_set_opens_runs_pauses_and_steps() {
@@ -518,16 +318,23 @@ fn everything_that_can_be_used_has_a_name() {
         unnamed.extend(found.into_iter().map(|what| format!("{place}: {what}")));
     };
     look(&mut window, "the panes");
-    for tab in ["Log", "Curves", "Image plane", "3-D", "IoU and error", "Kinematic limits"] {
+    window.key(Key::P);
+    for tab in [
+        "Log",
+        "Compare",
+        "Agreement",
+        "Statistics",
+        "Curves",
+        "Image plane",
+        "3-D",
+        "IoU and error",
+        "Kinematic limits",
+    ] {
         window.click(tab);
         look(&mut window, tab);
     }
-    for menu in ["File", "Frame", "Fit", "View", "Help"] {
-        let bar: Vec<_> = window.harness.query_all_by_label(menu).map(|node| node.rect()).collect();
-        let top = bar.into_iter().min_by(|a, b| a.top().total_cmp(&b.top())).unwrap();
-        window.harness.hover_at(top.center());
-        window.harness.drag_at(top.center());
-        window.harness.drop_at(top.center());
+    for menu in ["File", "Edit", "Frame", "Fit", "Labels", "View", "Help"] {
+        window.open_menu(menu);
         look(&mut window, menu);
         window.key(Key::Escape);
     }

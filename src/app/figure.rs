@@ -2,10 +2,15 @@
 
 use super::theme::{self, Tokens};
 use crate::session::Session;
-use egui::{FontId, Rect, Ui, pos2};
+use egui::{FontId, Rect, Role, Ui, WidgetInfo, pos2};
+
+/// The caption of a picture that shows `what`, where captions are printed.
+pub(super) fn of(session: &Session, what: &str) -> Option<String> {
+    session.view.figure.then(|| format!("{what} · {}", caption(session)))
+}
 
 /// What every picture of a fit has in common: frame, iteration, τ, weights, seed, version.
-pub(super) fn caption(session: &Session) -> String {
+fn caption(session: &Session) -> String {
     let Some(frame) = &session.data.frame else { return String::new() };
     let config = session.fit.shown.as_ref().map_or(session.config, |shown| shown.config);
     // The fit draws no random number: it has no seed to print.
@@ -20,8 +25,17 @@ pub(super) fn caption(session: &Session) -> String {
     )
 }
 
-/// Prints a caption at the lower end of `rect`, in as many lines as it needs, and answers what is left above it.
-pub(super) fn print(ui: &Ui, rect: Rect, text: &str) -> Rect {
+/// What a screen reader says of a picture: its name, and its caption where one is printed.
+pub(super) fn spoken(name: &str, caption: Option<&str>) -> WidgetInfo {
+    let mut info = WidgetInfo::labeled(Role::Canvas, true, name);
+    info.current_text_value = caption.map(str::to_owned);
+    info
+}
+
+/// Prints a caption, where there is one, at the lower end of `rect`, in as many lines as it needs, and answers what is left
+/// above it.
+pub(super) fn print(ui: &Ui, rect: Rect, caption: Option<&str>) -> Rect {
+    let Some(text) = caption else { return rect };
     let tokens = Tokens::of(ui);
     let font = FontId::proportional(theme::CAPTION - 2.0);
     let galley = ui.painter().layout(text.to_owned(), font, tokens.dim, (rect.width() - 16.0).max(40.0));

@@ -20,8 +20,10 @@ struct WindowState {
 /// Pictures that were asked for and are not drawn yet.
 #[derive(Default)]
 pub(super) struct Pictures {
-    drawn: Arc<Mutex<Vec<(Wanted, Arc<ColorImage>)>>>,
+    drawn: Arc<Mutex<Vec<Drawn>>>,
 }
+
+type Drawn = (Wanted, Arc<ColorImage>);
 
 /// What a picture is for.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,7 +46,7 @@ impl Pictures {
         ctx.request_repaint();
     }
 
-    fn take(&self) -> Vec<(Wanted, Arc<ColorImage>)> {
+    fn take(&self) -> Vec<Drawn> {
         std::mem::take(&mut self.drawn.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
@@ -111,7 +113,7 @@ impl InspectorApp {
                 match serde_json::to_value(&window) {
                     Ok(window) => self.apply(Command::SaveSession(path, window)),
                     Err(error) => {
-                        self.apply(Command::Log(LogLevel::Error, format!("the session was not saved: {error}")))
+                        self.apply(Command::Log(LogLevel::Error, format!("the session was not saved: {error}")));
                     }
                 }
             }

@@ -101,6 +101,11 @@ impl LabelStore {
         Err(LabelError::Read { reason, path: self.place.folder.clone() })
     }
 
+    /// Number of records that were read, the older ones of a frame too.
+    pub fn lines(&self) -> usize {
+        self.lines.len()
+    }
+
     /// Where the labels lie.
     pub fn place(&self) -> &LabelPlace {
         &self.place

@@ -31,8 +31,13 @@ impl Session {
 
     fn dispatch(&mut self, command: Command) -> Vec<Effect> {
         match command {
-            Command::Open(path) => self.open(path),
+            Command::Open(path) => {
+                // Asked for by a person: what a session file said of another data set is void.
+                self.restoring = None;
+                self.open(path)
+            }
             Command::OpenAt(path, aim) => {
+                self.restoring = None;
                 let effects = self.open(path);
                 self.aim = aim;
                 effects
@@ -44,10 +49,12 @@ impl Session {
                 vec![Effect::OpenBare(path, choice)]
             }
             Command::DismissBare => {
+                self.restoring = None;
                 self.data.bare = None;
                 Vec::new()
             }
             Command::CancelOpen => {
+                self.restoring = None;
                 self.data.opening = None;
                 vec![Effect::CancelOpen]
             }
@@ -76,7 +83,7 @@ impl Session {
                 Vec::new()
             }
             Command::ToggleTag(tag) => self.toggle_tag(tag),
-            Command::SetNote(note) => self.set_note(note),
+            Command::SetNote(frames, note) => self.set_note(&frames, note),
             Command::SetPerson(person) => self.set_person(person),
             Command::SetRegion(region) => self.set_region(region),
             Command::SetVerdict(verdict) => self.set_verdict(verdict),
@@ -84,7 +91,7 @@ impl Session {
             Command::Undo => self.undo(),
             Command::Redo => self.redo(),
             Command::SetAnnotator(name) => self.set_annotator(&name),
-            Command::LabelsOpened(result) => self.labels_opened(result),
+            Command::LabelsOpened(id, result) => self.labels_opened(id, result),
             Command::LabelsWritten(written) => self.labels_written(written),
             Command::LabelsRefreshed(table) => self.labels_refreshed(table),
             Command::RefreshLabels => vec![Effect::RefreshLabels],

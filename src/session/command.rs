@@ -86,8 +86,8 @@ pub enum Command {
     SelectFrames(BTreeSet<usize>),
     /// Add the tag to the targets, or remove it where all have it.
     ToggleTag(Tag),
-    /// Set the note.
-    SetNote(String),
+    /// Set the note of these frames: those that it was typed for, wherever the window went meanwhile.
+    SetNote(Vec<usize>, String),
     /// Set the person that is meant.
     SetPerson(Option<u32>),
     /// Set the cells that are meant.
@@ -102,8 +102,8 @@ pub enum Command {
     Redo,
     /// Somebody else labels.
     SetAnnotator(String),
-    /// Report: the journals were read.
-    LabelsOpened(Result<(LabelPlace, LabelTable, Vec<String>), String>),
+    /// Report: the journals were read, as was asked under this number.
+    LabelsOpened(u64, Result<(LabelPlace, LabelTable, Vec<String>), String>),
     /// Report: an act was written, or not.
     LabelsWritten(Written),
     /// Report: others wrote.
@@ -301,6 +301,8 @@ pub enum Effect {
     Send(WorkerCommand),
     /// Read the journals and open this annotator's.
     OpenLabels {
+        /// Comes back with the answer.
+        id: u64,
         /// Whose frames are labelled.
         dataset: Arc<Dataset>,
         /// Who labels.

@@ -123,10 +123,22 @@ pub struct SavedFit {
     pub states: Vec<FitState>,
     /// An earlier iteration that is looked at.
     pub cursor: Option<usize>,
-    /// Settings in force, as `FIT.toml`.
+    /// Settings at the first iteration, as `FIT.toml`.
     pub config: String,
+    /// Where they were changed, ascending.
+    #[serde(default)]
+    pub changes: Vec<SavedChange>,
     /// Parameters were edited by hand.
     pub edited: bool,
+}
+
+/// A change of settings on the way.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct SavedChange {
+    /// The last iteration with the old ones.
+    pub after: usize,
+    /// The new ones, as `FIT.toml`.
+    pub config: String,
 }
 
 /// A pinned fit.
@@ -229,7 +241,8 @@ impl SessionFile {
     }
 
     fn configs(&self) -> impl Iterator<Item = &str> {
-        let fit = self.fit.iter().map(|fit| fit.config.as_str());
+        let changes = self.fit.iter().flat_map(|fit| fit.changes.iter().map(|change| change.config.as_str()));
+        let fit = self.fit.iter().map(|fit| fit.config.as_str()).chain(changes);
         std::iter::once(self.config.as_str()).chain(fit).chain(self.pins.iter().map(|pin| pin.config.as_str()))
     }
 
@@ -259,12 +272,15 @@ fn saved_fit(session: &Session) -> Option<SavedFit> {
     let head = branch.state_at(branch.head()).filter(|(at, _)| *at == branch.head())?.1;
     let shown = fit.cursor.and_then(|at| branch.state_at(at)).filter(|(at, _)| *at != branch.head());
     let rows = fit.history.lineage();
+    let (config, changes) = fit.history.settings_on_the_way()?;
+    let changes = changes.into_iter().map(|(after, config)| SavedChange { after, config: config.to_toml() });
     Some(SavedFit {
         initial,
         rows: rows.iter().map(|row| PinRow { report: row.report.clone(), majpe_mm: row.majpe_mm }).collect(),
         states: std::iter::once(head).chain(shown.map(|(_, state)| state)).map(|state| (**state).clone()).collect(),
         cursor: shown.map(|(at, _)| at),
-        config: branch.newest_config().to_toml(),
+        config: config.to_toml(),
+        changes: changes.collect(),
         edited: fit.edited,
     })
 }

@@ -100,14 +100,23 @@ impl History {
         history
     }
 
-    /// A history with one branch, as a file kept it: every row, few states.
-    pub(super) fn restored(config: FitConfig, rows: Vec<super::pins::PinRow>, states: Vec<FitState>) -> Self {
+    /// A history with one branch, as a file kept it: the settings at its beginning, every row, few states, and where the
+    /// settings changed.
+    pub(super) fn restored(
+        config: FitConfig,
+        rows: Vec<super::pins::PinRow>,
+        states: Vec<FitState>,
+        changes: Vec<(usize, FitConfig)>,
+    ) -> Self {
         let mut history = Self::new(config);
         let mut states: Vec<Arc<FitState>> = states.into_iter().map(Arc::new).collect();
         for super::pins::PinRow { report, majpe_mm } in rows {
             let at = states.iter().position(|state| state.iteration == report.iteration);
             let state = at.map(|at| states.swap_remove(at));
             history.push(0, Row { report, state, majpe_mm });
+        }
+        for (iteration, config) in changes {
+            history.flag(0, iteration, config);
         }
         history
     }
@@ -138,13 +147,41 @@ impl History {
 
     /// The rows of the active branch with those of its parents before it: the way that led to its head.
     pub fn lineage(&self) -> Vec<&Row> {
+        self.way().into_iter().map(|(_, row)| row).collect()
+    }
+
+    /// The settings in force at the first row of [`Self::lineage`], and where they changed on the way: the last iteration
+    /// with the old ones, and the new ones.
+    pub(super) fn settings_on_the_way(&self) -> Option<(FitConfig, Vec<(usize, FitConfig)>)> {
+        let way = self.way();
+        let (branch, first) = way.first()?;
+        let begin = branch.config_at(first.report.iteration);
+        let (mut now, mut before, mut changes) = (begin, first.report.iteration, Vec::new());
+        for (branch, row) in &way {
+            let config = branch.config_at(row.report.iteration);
+            if config != now {
+                changes.push((before, config));
+                now = config;
+            }
+            before = row.report.iteration;
+        }
+        let newest = self.active()?.newest_config();
+        if newest != now {
+            changes.push((before, newest));
+        }
+        Some((begin, changes))
+    }
+
+    /// The lineage, each row with its branch.
+    fn way(&self) -> Vec<(&Branch, &Row)> {
         let Some(branch) = self.active() else { return Vec::new() };
-        let mut pieces: Vec<Vec<&Row>> = vec![branch.rows.iter().collect()];
+        let mut pieces: Vec<Vec<(&Branch, &Row)>> = vec![branch.rows.iter().map(|row| (branch, row)).collect()];
         let (mut from, mut parent) = (branch.start(), branch.parent);
         while let Some((id, at)) = parent {
             let Some(before) = self.branch(id) else { break };
             let last = at.min(from);
-            pieces.push(before.rows.iter().filter(|row| row.report.iteration < last).collect());
+            let rows = before.rows.iter().filter(|row| row.report.iteration < last);
+            pieces.push(rows.map(|row| (before, row)).collect());
             (from, parent) = (before.start().min(last), before.parent);
         }
         pieces.into_iter().rev().flatten().collect()

@@ -110,6 +110,8 @@ pub struct Labels {
     /// Acts under way.
     pub(super) pending: Vec<(u64, Vec<(FrameId, Change)>)>,
     pub(super) next_act: u64,
+    /// Number of the reading of the journals that is waited for.
+    pub(super) opening: u64,
     pub(super) table: LabelTable,
     pub(super) undo: Vec<Act>,
     pub(super) redo: Vec<Act>,
@@ -185,10 +187,19 @@ impl Labels {
         self.redo.last().filter(|_| self.pending.is_empty()).map(|act| act.name.as_str())
     }
 
+    /// Drops the act that an undo or a redo was for.
+    pub(super) fn forget(&mut self, kind: ActKind) {
+        match kind {
+            ActKind::Do => {}
+            ActKind::Undo => drop(self.undo.pop()),
+            ActKind::Redo => drop(self.redo.pop()),
+        }
+    }
+
     /// Forgets the journals; the annotator stays.
     pub(super) fn close(&mut self) {
         let (annotator, revision, next_act) = (std::mem::take(&mut self.annotator), self.revision + 1, self.next_act);
-        *self = Self { annotator, revision, next_act, ..Self::default() };
+        *self = Self { annotator, next_act, revision, ..Self::default() };
     }
 
     /// Takes in what a commit wrote.
@@ -202,7 +213,7 @@ impl Labels {
         }
         self.revision += 1;
         if changes.is_empty() {
-            return;
+            return self.forget(kind);
         }
         match kind {
             ActKind::Do => {
@@ -212,8 +223,15 @@ impl Labels {
                     self.undo.remove(0);
                 }
             }
-            ActKind::Undo => self.redo.push(Act { name, changes: reversed(changes) }),
-            ActKind::Redo => self.undo.push(Act { name, changes }),
+            // The stacks change only now: an act that could not be written is still there to be taken back.
+            ActKind::Undo => {
+                self.undo.pop();
+                self.redo.push(Act { name, changes: reversed(changes) });
+            }
+            ActKind::Redo => {
+                self.redo.pop();
+                self.undo.push(Act { name, changes });
+            }
         }
     }
 }

@@ -20,7 +20,7 @@ mod view;
 
 pub use command::{Aim, Command, Commit, Effect, Export, PickKind, PinRequest, Task, Written};
 pub use evidence::EvidenceRequest;
-pub use file::{SavedDataset, SavedFit, SavedFrame, SavedPin, SessionFile, SessionFileError};
+pub use file::{SavedChange, SavedDataset, SavedFit, SavedFrame, SavedPin, SessionFile, SessionFileError};
 pub use fit::{Fit, FitStatus};
 pub use history::{Branch, Flag, History, Row, difference};
 pub use labels::{Act, ActKind, LabelMode, LabelStatus, LabelTable, Labels, Visible};

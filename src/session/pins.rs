@@ -86,10 +86,13 @@ impl Pins {
         self.get(self.baseline?)
     }
 
-    /// A name that no pin has: A to Z, then A2 ….
+    /// A name that no pin has: A to Z, then A2 …, from the number of pins that were made on.
     pub(super) fn next_name(&self) -> String {
-        let letter = char::from(b'A' + (self.made % 26) as u8);
-        let round = self.made / 26;
-        if round == 0 { letter.to_string() } else { format!("{letter}{}", round + 1) }
+        let name = |made: u32| {
+            let (letter, round) = (char::from(b'A' + (made % 26) as u8), made / 26);
+            if round == 0 { letter.to_string() } else { format!("{letter}{}", round + 1) }
+        };
+        let free = |name: &String| self.list.iter().all(|pin| pin.name != *name);
+        (self.made..=u32::MAX).map(name).find(free).unwrap_or_default()
     }
 }

@@ -5,7 +5,7 @@
 use mhp_inspector::dataset::npz::{ArrayView, write};
 use std::path::Path;
 
-const MANIFEST: &str = r#"
+pub(crate) const MANIFEST: &str = r#"
 name = "blob"
 layout = "npz"
 frames = "frames/*.npz"
@@ -65,18 +65,24 @@ pub(crate) fn write_dataset(folder: &Path, frames: usize) {
     std::fs::create_dir_all(folder.join("frames")).unwrap();
     std::fs::write(folder.join("dataset.toml"), MANIFEST).unwrap();
     for index in 0..frames {
-        let joints: Vec<[f64; 3]> = BODY.map(|[y, z]| [3.0, y + 0.06 * index as f64, z - 0.2]).into_iter().collect();
-        let hori = map(index as u64, |depth, y| blob(&joints, |p| [p[0].hypot(p[2]) - depth, p[1] - y]), [2.0, -2.0]);
-        let vert =
-            map(index as u64 + 99, |depth, z| blob(&joints, |p| [p[0].hypot(p[1]) - depth, p[2] - z]), [-2.0, 2.0]);
-        let flat = joints.concat();
-        let arrays = [
-            ("hori", ArrayView::f64(&[48, 32], &hori)),
-            ("vert", ArrayView::f64(&[48, 32], &vert)),
-            ("joints", ArrayView::f64(&[1, 17, 3], &flat)),
-        ];
-        write(&folder.join(format!("frames/{index:03}.npz")), &arrays).unwrap();
+        write_frame(&folder.join(format!("frames/{index:03}.npz")), index, &|_, _| 0.0);
     }
+}
+
+/// Writes one frame: the person as in frame `index` of [`write_dataset`], and `others`, by depth and distance across, in
+/// both views.
+pub(crate) fn write_frame(path: &Path, index: usize, others: &dyn Fn(f64, f64) -> f64) {
+    let joints: Vec<[f64; 3]> = BODY.map(|[y, z]| [3.0, y + 0.06 * index as f64, z - 0.2]).into_iter().collect();
+    let hori = |depth: f64, y: f64| blob(&joints, |p| [p[0].hypot(p[2]) - depth, p[1] - y]) + others(depth, y);
+    let vert = |depth: f64, z: f64| blob(&joints, |p| [p[0].hypot(p[1]) - depth, p[2] - z]) + others(depth, z);
+    let (hori, vert) = (map(index as u64, hori, [2.0, -2.0]), map(index as u64 + 99, vert, [-2.0, 2.0]));
+    let flat = joints.concat();
+    let arrays = [
+        ("hori", ArrayView::f64(&[48, 32], &hori)),
+        ("vert", ArrayView::f64(&[48, 32], &vert)),
+        ("joints", ArrayView::f64(&[1, 17, 3], &flat)),
+    ];
+    write(path, &arrays).unwrap();
 }
 
 /// The echo of the body where its joints are `offset` metres from a cell.

@@ -77,15 +77,9 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         .include_x(shared.session.config.iterations.min(20_000).max(fit.head()) as f64)
         .y_axis_min_width(44.0)
         .label_formatter(move |hover| label(hover, log));
-    if shared.session.view.figure {
-        let what = if state.tab == Tab::Loss { "L and its unweighted terms" } else { "IoU; MAJPE in m" };
-        let left = figure::print(
-            ui,
-            ui.available_rect_before_wrap(),
-            &format!("{what} · {}", figure::caption(shared.session)),
-        );
-        plot = plot.height(left.height());
-    }
+    let what = if state.tab == Tab::Loss { "L and its unweighted terms" } else { "IoU; MAJPE in m" };
+    let caption = figure::of(shared.session, what);
+    plot = plot.height(figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref()).height());
     if log {
         plot = plot.y_axis_formatter(|mark, _| power(mark.value)).y_grid_spacer(|input| decades(input.bounds));
     }
@@ -137,7 +131,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     });
     flag_texts(ui, &response, branch, &tokens);
     let (pointer, inner) = response.inner;
-    inner.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "Curves"));
+    inner.widget_info(|| figure::spoken("Curves", caption.as_deref()));
     if inner.double_clicked() {
         // The first click of the two has moved the cursor; the gesture was for the plot.
         shared.send(Command::GotoIteration(state.before_click));

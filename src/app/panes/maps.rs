@@ -189,12 +189,9 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
         (Content::Difference, _) => "H_sim − H_ori",
         _ => content.name(),
     };
-    let rect = if session.view.figure {
-        let unit = if content == Content::Masks { "masks" } else { state.pictures.unit(content) };
-        figure::print(ui, rect, &format!("{what} {} · {unit} · {}", view.array, figure::caption(session)))
-    } else {
-        rect
-    };
+    let unit = if content == Content::Masks { "masks" } else { state.pictures.unit(content) };
+    let caption = figure::of(session, &format!("{what} {} · {unit}", view.array));
+    let rect = figure::print(ui, rect, caption.as_deref());
     // The masks have no colour bar, but keep its place: the three columns must line up.
     let bar_width = 46.0;
     let inner = Rect::from_min_max(rect.min + vec2(42.0, 20.0), rect.max - vec2(4.0 + bar_width, 30.0));
@@ -206,7 +203,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     overlay::title(ui, rect, plot, view, content, state.pictures.reference(), &tokens, session);
     let name = format!("{what} map of {}", view.array);
     let response = ui.interact(plot, ui.scope_id().with("plot"), Sense::click_and_drag());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, &name));
+    response.widget_info(|| figure::spoken(&name, caption.as_deref()));
     let (marking, marked) = state.mark(ui, &response, plot, index, view);
     if let Some(region) = marked {
         shared.send(crate::session::Command::SetRegion(Some(region)));

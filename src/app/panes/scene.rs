@@ -114,16 +114,13 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         state.camera = Some(overview(shared.session));
     }
     toolbar(ui, shared);
-    let mut rect = ui.available_rect_before_wrap();
-    if shared.session.view.figure {
-        let text = format!("3-D, metres, z up · {}", figure::caption(shared.session));
-        rect = figure::print(ui, rect, &text);
-    }
+    let caption = figure::of(shared.session, "3-D, metres, z up");
+    let rect = figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref());
     if rect.width() < 16.0 || rect.height() < 16.0 {
         return;
     }
     let response = ui.interact(rect, ui.scope_id().with("scene"), Sense::click_and_drag());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "3-D scene"));
+    response.widget_info(|| figure::spoken("3-D scene", caption.as_deref()));
     let mut camera = state.camera.unwrap_or_else(|| overview(shared.session));
     let tokens = Tokens::of(ui);
     let scale = ui.ctx().pixels_per_point();

@@ -3,6 +3,7 @@
 use crate::body::Pppr;
 use crate::dataset::{Dataset, DatasetError, Frame};
 use crate::session::command::{Aim, Effect};
+use crate::session::evidence::EvidenceState;
 use crate::session::fit::{Fit, FitStatus};
 use crate::session::history::History;
 use crate::session::pins::Pins;
@@ -58,6 +59,7 @@ impl Session {
         self.left.clear();
         self.summaries.clear();
         self.pins = Pins::default();
+        self.evidence = EvidenceState::default();
         self.data.frame = None;
         self.data.playing = false;
         self.data.dataset = Some(Arc::clone(&dataset));

@@ -1,8 +1,9 @@
 //! Acts of labelling: what a key or a field asks for becomes a commit; what the journal acknowledges becomes visible.
 
 use crate::labels::{CellRegion, Change, FrameId, Judged, Label, LabelPlace, Record, Tag, Verdict};
-use crate::session::command::{Commit, Effect};
+use crate::session::command::{Commit, Effect, Written};
 use crate::session::labels::{ActKind, LabelMode, LabelStatus, LabelTable};
+use crate::session::queue::SortKey;
 use crate::session::state::{LogLevel, Session};
 
 impl Session {
@@ -21,9 +22,8 @@ impl Session {
         self.commit(&format!("{verb} {tag}"), &frames, &change)
     }
 
-    pub(super) fn set_note(&mut self, note: String) -> Vec<Effect> {
-        let frames = self.label_targets();
-        self.commit("note", &frames, &Change { note: Some(note), ..Change::default() })
+    pub(super) fn set_note(&mut self, frames: &[usize], note: String) -> Vec<Effect> {
+        self.commit("note", frames, &Change { note: Some(note), ..Change::default() })
     }
 
     pub(super) fn set_person(&mut self, person: Option<u32>) -> Vec<Effect> {
@@ -93,55 +93,61 @@ impl Session {
 
     /// The fit that is judged when `frame` is labelled now: the one on screen, or the one that was left there.
     fn judged(&self, frame: usize) -> Judged {
-        let summary = self.summaries.get(&frame).and_then(|summary| summary.hashes.clone());
-        if frame != self.data.frame_index {
+        // While another frame is being read, the fit on screen is still that of the frame before.
+        let shown = self.shown_hashes().filter(|_| self.fit.frame == frame);
+        let Some(hashes) = shown else {
+            let summary = self.summaries.get(&frame).and_then(|summary| summary.hashes.clone());
             return summary.map_or_else(Judged::default, |hashes| Judged {
                 fit: Some(hashes.fit),
                 config: Some(hashes.config),
                 iteration: Some(hashes.iteration),
                 ..Judged::default()
             });
-        }
-        let hashes = self.shown_hashes();
-        let machine = self.evidence_of(frame).into_iter().flatten();
-        let machine = machine.filter_map(|evidence| Some((evidence.mode, evidence.score?))).collect();
+        };
+        // Scores of an older fit say nothing of the one that is judged.
+        let machine = self.evidence_of(frame).filter(|_| !self.evidence_is_stale()).into_iter().flatten();
         Judged {
-            fit: hashes.as_ref().map(|h| h.fit.clone()),
-            config: hashes.as_ref().map(|h| h.config.clone()),
-            iteration: hashes.map(|h| h.iteration),
-            machine,
-            machine_shown: !self.evidence_hidden(),
+            fit: Some(hashes.fit),
+            config: Some(hashes.config),
+            iteration: Some(hashes.iteration),
+            machine: machine.filter_map(|evidence| Some((evidence.mode, evidence.score?))).collect(),
+            machine_shown: !self.evidence_hidden_of(frame),
         }
     }
 
     /// True while the evidence of the frame on screen is hidden: in blind mode, until the annotator has judged it.
     pub fn evidence_hidden(&self) -> bool {
-        self.view.label_mode == LabelMode::Agreement && self.view.blind && !self.labels.is_judged(self.data.frame_index)
+        self.evidence_hidden_of(self.data.frame_index)
+    }
+
+    fn evidence_hidden_of(&self, frame: usize) -> bool {
+        self.view.label_mode == LabelMode::Agreement && self.view.blind && !self.labels.is_judged(frame)
     }
 
     pub(super) fn undo(&mut self) -> Vec<Effect> {
         if self.labels.undo_name().is_none() {
             return Vec::new();
         }
-        let Some(act) = self.labels.undo.pop() else { return Vec::new() };
+        let Some(act) = self.labels.undo.last().cloned() else { return Vec::new() };
         let changes =
             act.changes.iter().map(|(id, before, after)| (id.index, Change::between(after, before))).collect();
-        self.again(ActKind::Undo, act.name, changes)
+        self.again(ActKind::Undo, &act.name, changes)
     }
 
     pub(super) fn redo(&mut self) -> Vec<Effect> {
         if self.labels.redo_name().is_none() {
             return Vec::new();
         }
-        let Some(act) = self.labels.redo.pop() else { return Vec::new() };
+        let Some(act) = self.labels.redo.last().cloned() else { return Vec::new() };
         let changes =
             act.changes.iter().map(|(id, before, after)| (id.index, Change::between(before, after))).collect();
-        self.again(ActKind::Redo, act.name, changes)
+        self.again(ActKind::Redo, &act.name, changes)
     }
 
-    fn again(&mut self, kind: ActKind, name: String, changes: Vec<(usize, Change)>) -> Vec<Effect> {
-        let effects = self.commit_each(kind, name.clone(), changes);
+    fn again(&mut self, kind: ActKind, name: &str, changes: Vec<(usize, Change)>) -> Vec<Effect> {
+        let effects = self.commit_each(kind, name.to_owned(), changes);
         if effects.is_empty() {
+            self.labels.forget(kind);
             self.hint(format!("“{name}” is gone already: another window changed the same labels"));
         }
         effects
@@ -150,8 +156,12 @@ impl Session {
     /// The journals were read, or could not be.
     pub(super) fn labels_opened(
         &mut self,
+        id: u64,
         result: Result<(LabelPlace, LabelTable, Vec<String>), String>,
     ) -> Vec<Effect> {
+        if id != self.labels.opening {
+            return Vec::new();
+        }
         match result {
             Ok((place, table, warnings)) => {
                 for warning in warnings {
@@ -174,15 +184,21 @@ impl Session {
             }
         }
         self.labels.revision += 1;
+        self.stale = true;
         Vec::new()
     }
 
     /// The journal acknowledged an act, or could not write it.
-    pub(super) fn labels_written(&mut self, written: crate::session::command::Written) -> Vec<Effect> {
-        let crate::session::command::Written { id, kind, act, result } = written;
-        self.labels.pending.retain(|(pending, _)| *pending != id);
+    pub(super) fn labels_written(&mut self, written: Written) -> Vec<Effect> {
+        let Written { id, kind, act, result } = written;
+        // An act for a journal that was closed meanwhile is on disk, but no longer of what is on screen.
+        let Some(at) = self.labels.pending.iter().position(|(pending, _)| *pending == id) else { return Vec::new() };
+        self.labels.pending.remove(at);
         match result {
-            Ok(outcomes) => self.labels.written(kind, act, outcomes),
+            Ok(outcomes) => {
+                self.labels.written(kind, act, outcomes);
+                self.labels_changed();
+            }
             Err(why) => {
                 self.note(LogLevel::Error, format!("“{act}” was not written and is not done: {why}"));
             }
@@ -192,9 +208,18 @@ impl Session {
 
     /// Another window or another annotator wrote.
     pub(super) fn labels_refreshed(&mut self, table: LabelTable) -> Vec<Effect> {
-        self.labels.table = table;
-        self.labels.revision += 1;
+        if self.labels.status == LabelStatus::Ready {
+            self.labels.table = table;
+            self.labels.revision += 1;
+            self.labels_changed();
+        }
         Vec::new()
+    }
+
+    /// Fills the list again where its filter or its order depends on labels.
+    fn labels_changed(&mut self) {
+        let ordered = matches!(self.view.sort.key, SortKey::Tags | SortKey::Annotator);
+        self.stale |= ordered || self.queue.rule.reads_labels();
     }
 
     pub(super) fn set_annotator(&mut self, name: &str) -> Vec<Effect> {
@@ -215,7 +240,10 @@ impl Session {
         let Some(dataset) = self.data.dataset.clone() else { return Vec::new() };
         self.labels.close();
         self.labels.status = LabelStatus::Opening;
-        vec![Effect::OpenLabels { dataset, annotator: self.labels.annotator.clone() }]
+        self.labels.next_act += 1;
+        let id = self.labels.next_act;
+        self.labels.opening = id;
+        vec![Effect::OpenLabels { id, dataset, annotator: self.labels.annotator.clone() }]
     }
 
     /// What a record says of the fit on screen: `None` where it was judged on the very same, or on none.

@@ -66,7 +66,9 @@ impl Session {
     pub(super) fn pin_drawn(&mut self, id: u32, result: Result<Box<Snapshot>, String>) -> Vec<Effect> {
         match result {
             Ok(snapshot) => {
-                if let Some(pin) = self.pins.list.iter_mut().find(|pin| pin.id == id) {
+                // Numbers begin anew with every data set: a late answer is told by its parameters.
+                let same = |pin: &&mut Pin| pin.id == id && pin.params == snapshot.params;
+                if let Some(pin) = self.pins.list.iter_mut().find(same) {
                     pin.snapshot = Some(Arc::new(*snapshot));
                 }
             }

@@ -113,7 +113,8 @@ fn resumed(saved: SavedFit, frame: usize, path: &Path) -> Option<Fit> {
     if !whole || saved.states.is_empty() {
         return None;
     }
-    let history = History::restored(config(&saved.config, path)?, saved.rows, saved.states);
+    let changes = saved.changes.iter().filter_map(|change| Some((change.after, config(&change.config, path)?)));
+    let history = History::restored(config(&saved.config, path)?, saved.rows, saved.states, changes.collect());
     Some(Fit {
         frame,
         status: FitStatus::Paused,

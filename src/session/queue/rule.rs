@@ -4,7 +4,8 @@
 //! A bare word is looked for in the frame's name. What a frame has no value for satisfies no comparison.
 
 use super::facts::{Facts, Number};
-use crate::labels::Tag;
+use crate::labels::{Tag, Verdict};
+use crate::study::complexity::Stratum;
 
 /// A parsed filter. The empty text matches every frame.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -94,6 +95,15 @@ impl Rule {
         })
     }
 
+    /// True where the answer depends on labels.
+    pub fn reads_labels(&self) -> bool {
+        self.terms.iter().any(|term| match &term.test {
+            Test::Tags { .. } => true,
+            Test::Word(word, _) => matches!(word, Word::Note | Word::By | Word::Verdict),
+            Test::Name(_) | Test::Compare(..) => false,
+        })
+    }
+
     /// True where a frame with these facts matches.
     pub fn matches(&self, facts: &Facts<'_>) -> bool {
         self.terms.iter().all(|term| term.test.holds(facts) != term.negated)
@@ -122,11 +132,11 @@ impl Word {
         let is = |text: Option<&str>| text.is_some_and(|text| text.eq_ignore_ascii_case(value));
         let yes = matches!(value, "yes" | "true" | "1");
         match self {
-            Self::Stratum => is(facts.stratum.map(|stratum| stratum.word())),
+            Self::Stratum => is(facts.stratum.map(Stratum::word)),
             Self::Scene => contains(facts.scene, value),
             Self::Note => contains(facts.note, value),
             Self::By => facts.annotators.iter().any(|name| contains(name, value)),
-            Self::Verdict => is(facts.verdict.map(|verdict| verdict.code())),
+            Self::Verdict => is(facts.verdict.map(Verdict::code)),
             Self::Reason => facts.reason.is_some_and(|reason| contains(reason, value)),
             Self::Converged => facts.converged == Some(yes),
             Self::Fitted => facts.iterations.is_some() == yes,
@@ -332,5 +342,13 @@ mod tests {
     fn only_rules_about_fits_follow_a_run() {
         assert!(Rule::parse("iou<0.5").unwrap().reads_fits());
         assert!(!Rule::parse("stratum:hard tag:F1 hardness>0.5 00").unwrap().reads_fits());
+    }
+
+    #[test]
+    fn only_rules_about_labels_follow_tags() {
+        for text in ["-tag:none", "note:wall", "by:ada", "verdict:true-negative"] {
+            assert!(Rule::parse(text).unwrap().reads_labels(), "{text}");
+        }
+        assert!(!Rule::parse("stratum:hard iou<0.5 00").unwrap().reads_labels());
     }
 }

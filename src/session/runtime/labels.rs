@@ -14,7 +14,7 @@ use std::sync::Arc;
 const WAITING: usize = 256;
 
 enum Request {
-    Open(Arc<Dataset>, String),
+    Open(u64, Arc<Dataset>, String),
     Commit(Commit),
     Refresh,
 }
@@ -50,9 +50,9 @@ impl LabelKeeper {
         Self { requests, answers, told, wake: Arc::clone(wake) }
     }
 
-    pub(super) fn open(&self, dataset: Arc<Dataset>, annotator: String) {
-        if self.requests.try_send(Request::Open(dataset, annotator)).is_err() {
-            self.tell(Command::LabelsOpened(Err("the thread that keeps labels does not answer".into())));
+    pub(super) fn open(&self, id: u64, dataset: Arc<Dataset>, annotator: String) {
+        if self.requests.try_send(Request::Open(id, dataset, annotator)).is_err() {
+            self.tell(Command::LabelsOpened(id, Err("the thread that keeps labels does not answer".into())));
         }
     }
 
@@ -92,6 +92,8 @@ struct Open {
     dataset: Arc<Dataset>,
     journal: Journal,
     store: LabelStore,
+    /// What others wrote came in with an act of our own and is still to be told.
+    unseen: bool,
     /// Frames by name; made when a record's index is not that of its name.
     names: Option<HashMap<String, usize>>,
 }
@@ -99,9 +101,9 @@ struct Open {
 impl Keeper {
     fn answer(&mut self, request: Request) -> Option<Command> {
         match request {
-            Request::Open(dataset, annotator) => {
+            Request::Open(id, dataset, annotator) => {
                 self.open = None;
-                Some(Command::LabelsOpened(self.begin(dataset, &annotator)))
+                Some(Command::LabelsOpened(id, self.begin(dataset, &annotator)))
             }
             Request::Commit(Commit { id, kind, act, changes }) => {
                 let result = match &mut self.open {
@@ -112,7 +114,8 @@ impl Keeper {
             }
             Request::Refresh => {
                 let open = self.open.as_mut()?;
-                match open.store.refresh() {
+                let news = open.store.refresh().map(|more| more | std::mem::take(&mut open.unseen));
+                match news {
                     Ok(true) => Some(Command::LabelsRefreshed(open.table())),
                     Ok(false) => None,
                     Err(error) => {
@@ -132,7 +135,7 @@ impl Keeper {
         let place = LabelPlace::of(&dataset.info().root, dataset.fingerprint()).map_err(|error| error.to_string())?;
         let journal = Journal::open(&place, annotator, dataset.fingerprint()).map_err(|error| error.to_string())?;
         let store = LabelStore::read(&place).map_err(|error| error.to_string())?;
-        let mut open = Open { dataset, journal, store, names: None };
+        let mut open = Open { dataset, journal, store, unseen: false, names: None };
         let table = open.table();
         let mut warnings = open.store.warnings().to_vec();
         warnings.extend(open.unknown());
@@ -148,9 +151,11 @@ impl Open {
         changes: &[(FrameId, crate::labels::Change, crate::labels::Judged)],
     ) -> Result<Vec<(FrameId, crate::labels::Label, Record)>, String> {
         let outcomes = self.journal.commit_each(act, changes).map_err(|error| error.to_string())?;
-        // Our own records are no news to be told again.
-        if let Err(error) = self.store.refresh() {
-            tracing::warn!("{error}");
+        // Our own records are no news to be told again; what others wrote meanwhile is.
+        let known = self.store.lines();
+        match self.store.refresh() {
+            Ok(_) => self.unseen |= self.store.lines() != known + outcomes.len(),
+            Err(error) => tracing::warn!("{error}"),
         }
         Ok(outcomes.into_iter().map(|outcome| (outcome.frame, outcome.before, outcome.after)).collect())
     }

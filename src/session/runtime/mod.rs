@@ -151,7 +151,7 @@ impl Runtime {
                     loader.request(index);
                 }
             }
-            Effect::OpenLabels { dataset, annotator } => self.labels.open(dataset, annotator),
+            Effect::OpenLabels { id, dataset, annotator } => self.labels.open(id, dataset, annotator),
             Effect::CommitLabels(commit) => self.labels.commit(commit),
             Effect::RefreshLabels => self.labels.refresh(),
             Effect::ComputeStrata { dataset, only_kept } => self.grade(dataset, only_kept),

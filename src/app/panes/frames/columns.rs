@@ -236,5 +236,6 @@ pub(super) fn spoken(facts: &Facts<'_>) -> String {
     if !facts.tags.is_empty() {
         parts.push(format!("tagged {}", facts.tags));
     }
+    parts.extend(facts.verdict.map(|verdict| format!("verdict {verdict}")));
     parts.join(", ")
 }

@@ -24,20 +24,17 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
         ui.label(RichText::new(text).small().color(tokens.dim));
         return;
     }
-    match session.evidence_of(session.data.frame_index) {
-        Some(cards) => {
-            for card in cards {
-                one(ui, shared, card, tokens);
-            }
+    if let Some(cards) = session.evidence_of(session.data.frame_index) {
+        for card in cards {
+            one(ui, shared, card, tokens);
         }
-        None => {
-            let text = match &session.fit.status {
-                FitStatus::Failed(why) => why.as_str(),
-                _ => "Gathered as soon as the frame has a fit that rests.",
-            };
-            ui.label(RichText::new(text).small().color(tokens.dim));
-        }
+        return;
     }
+    let text = match &session.fit.status {
+        FitStatus::Failed(why) => why.as_str(),
+        _ => "Gathered as soon as the frame has a fit that rests.",
+    };
+    ui.label(RichText::new(text).small().color(tokens.dim));
 }
 
 fn one(ui: &mut Ui, shared: &mut Shared<'_>, card: &Evidence, tokens: &Tokens) {
@@ -62,7 +59,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, card: &Evidence, tokens: &Tokens) {
     let name = format!("{} card", card.mode);
     let score = card.score.map_or_else(|| "not judged".into(), |score| format!("score {score:.2}"));
     response.response.widget_info(|| {
-        let mut info = egui::WidgetInfo::labeled(Role::Label, true, &name);
+        let mut info = egui::WidgetInfo::labeled(Role::Group, true, &name);
         info.current_text_value = Some(format!("{score}. {}", card.summary));
         info
     });

@@ -151,12 +151,16 @@ fn verdicts(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
 /// The note is written when the field is left; Escape takes back what was typed.
 fn note(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let targets = shared.session.label_targets();
-    let stored = || targets.first().map_or_else(String::new, |&frame| shared.session.labels.label(frame).note);
-    // What was being typed for another frame belongs to that frame and was sent when the field lost it.
-    let mut text = match &state.note {
-        Some((frames, typed)) if *frames == targets => typed.clone(),
-        _ => stored(),
-    };
+    let labels = &shared.session.labels;
+    let note_of = |frames: &[usize]| frames.first().map_or_else(String::new, |&frame| labels.label(frame).note);
+    let stored = note_of(&targets);
+    // What was being typed when the frame or the selection changed belongs to the frames that it was typed for.
+    if let Some((frames, typed)) = state.note.take_if(|(frames, _)| *frames != targets)
+        && typed != note_of(&frames)
+    {
+        shared.send(Command::SetNote(frames, typed));
+    }
+    let mut text = state.note.as_ref().map_or_else(|| stored.clone(), |(_, typed)| typed.clone());
     let field = egui::TextEdit::multiline(&mut text)
         .hint_text("Note")
         .desired_rows(1)
@@ -172,8 +176,8 @@ fn note(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         response.surrender_focus();
     }
     if enter || (response.lost_focus() && !escape) {
-        if text != stored() {
-            shared.send(Command::SetNote(text));
+        if text != stored {
+            shared.send(Command::SetNote(targets, text));
         }
         state.note = None;
     } else {
