@@ -35,8 +35,8 @@ impl EvidenceRequest {
 pub(super) struct EvidenceState {
     /// Frame and fit that were asked for last.
     pub(super) asked: Option<(usize, String)>,
-    /// The answer to it.
-    pub(super) found: Option<Result<Vec<Evidence>, String>>,
-    /// An older answer for the same frame, shown until the newer one is there.
+    /// The newest answer, and the fit that it is on: an older one of the same frame is shown until the newer one is there.
+    pub(super) found: Option<(String, Result<Vec<Evidence>, String>)>,
+    /// The frame that the answer is on.
     pub(super) frame: usize,
 }

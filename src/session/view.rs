@@ -213,3 +213,14 @@ impl Default for ViewState {
         }
     }
 }
+
+impl ViewState {
+    /// With sizes and shares that can be drawn, whatever a file says.
+    pub(super) fn in_range(mut self) -> Self {
+        self.zoom = self.zoom.clamp(0.7, 2.0);
+        self.wipe = self.wipe.clamp(0.0, 1.0);
+        self.mask_opacity = self.mask_opacity.clamp(0.0, 1.0);
+        self.splat_sigma = self.splat_sigma.clamp(0.5, 4.0);
+        self
+    }
+}

@@ -7,7 +7,7 @@ mod table;
 
 use super::PaneKind;
 use crate::session::{Command, Export, Session};
-use egui::{Key, Modifiers};
+use egui::{Id, Key, Modifiers};
 use std::path::PathBuf;
 
 /// The menu that a command is in.
@@ -214,6 +214,7 @@ pub(crate) fn tooltip(command: &UserCommand) -> String {
 pub(crate) fn pressed(ctx: &egui::Context) -> Vec<&'static UserCommand> {
     let focused = ctx.memory(egui::Memory::focused);
     let typing = focused.is_some_and(|id| egui::text_edit::TextEditState::load(ctx, id).is_some());
+    let was_typing = ctx.data_mut(|data| std::mem::replace(data.get_temp_mut_or_default(Id::unique("typing")), typing));
     let popup = egui::Popup::is_any_open(ctx);
     let mut found = Vec::new();
     ctx.input_mut(|input| {
@@ -227,6 +228,10 @@ pub(crate) fn pressed(ctx: &egui::Context) -> Vec<&'static UserCommand> {
                 && !(held.0 && matches!(key, Key::K | Key::P | Key::Q | Key::O | Key::T | Key::S | Key::F)
                     || *key == Key::F1)
             {
+                return true;
+            }
+            // A field gives the keyboard up before the pass that Esc is seen in, and must still see that it was Esc.
+            if was_typing && *key == Key::Escape {
                 return true;
             }
             // An open menu keeps the keys that close it and move in it.

@@ -100,26 +100,26 @@ impl Session {
         fit: String,
         result: Result<Vec<Evidence>, String>,
     ) -> Vec<Effect> {
-        if self.evidence.asked == Some((frame, fit)) {
+        if self.evidence.asked.as_ref().is_some_and(|asked| (asked.0, &asked.1) == (frame, &fit)) {
             if let Err(why) = &result {
                 self.note(LogLevel::Warning, format!("no evidence for this frame: {why}"));
             }
-            self.evidence.found = Some(result);
+            self.evidence.found = Some((fit, result));
         }
         Vec::new()
     }
 
     /// The newest evidence on a frame, F1 to F4 in order.
     pub fn evidence_of(&self, frame: usize) -> Option<&[Evidence]> {
-        let found = self.evidence.found.as_ref().filter(|_| self.evidence.frame == frame)?;
+        let (_, found) = self.evidence.found.as_ref().filter(|_| self.evidence.frame == frame)?;
         found.as_deref().ok()
     }
 
     /// True while the evidence on screen is older than the fit on screen.
     pub fn evidence_is_stale(&self) -> bool {
         let shown = self.shown_hashes().map(|hashes| format!("{}{}", hashes.fit, hashes.config));
-        shown.is_none_or(|key| self.evidence.asked.as_ref().is_none_or(|(_, asked)| *asked != key))
-            || self.evidence.found.is_none()
+        let found = self.evidence.found.as_ref().filter(|_| self.evidence.frame == self.fit.frame);
+        shown.is_none_or(|key| found.is_none_or(|(of, _)| *of != key))
     }
 }
 

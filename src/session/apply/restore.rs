@@ -45,16 +45,24 @@ impl Session {
             return None;
         };
         self.session_path = Some(path.clone());
-        self.view = file.view;
+        self.view = file.view.in_range();
         self.config = config(&file.config, &path).unwrap_or(self.config);
         self.precision = precision(file.single_precision);
         self.warm_start = file.warm_start;
         self.joint = file.joint;
         self.queue.set_text(file.filter);
         self.stale = true;
-        if let Some(fit) = file.fit.and_then(|fit| resumed(fit, frame, &path)) {
-            self.fits.insert(frame, fit);
-            self.left.push_back(frame);
+        match file.fit.map(|fit| resumed(fit, frame, &path)) {
+            Some(Some(fit)) => {
+                self.fits.insert(frame, fit);
+                self.left.push_back(frame);
+            }
+            Some(None) => {
+                let text =
+                    "its fit is not whole and was left out: a state is missing, or its numbers do not fit together";
+                self.note(LogLevel::Warning, format!("{}: {text}", path.display()));
+            }
+            None => {}
         }
         self.restored_window = Some(file.window);
         let mut effects = Vec::new();
@@ -110,7 +118,8 @@ fn resumed(saved: SavedFit, frame: usize, path: &Path) -> Option<Fit> {
     let shape = saved.initial.shape();
     let fits = |params: &crate::body::Pppr| params.shape() == shape;
     let whole = saved.states.iter().all(|s| fits(&s.params) && fits(&s.adam.first) && fits(&s.adam.second));
-    if !whole || saved.states.is_empty() {
+    let head = saved.rows.last()?.report.iteration;
+    if !whole || !saved.states.iter().any(|state| state.iteration == head) {
         return None;
     }
     let changes = saved.changes.iter().filter_map(|change| Some((change.after, config(&change.config, path)?)));

@@ -6,6 +6,7 @@ use crate::app::panes::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::session::{Command, SYNTAX, Sort, SortKey, StrataStatus};
+use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Align2, RichText, Role, Sense, Ui, pos2, vec2};
 use std::collections::BTreeSet;
 
@@ -66,8 +67,14 @@ fn quick(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     }
 }
 
+/// A menu that stays open while something in it is typed or ticked.
+fn staying(title: &str) -> MenuButton<'_> {
+    let config = MenuConfig::new().close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
+    MenuButton::new(RichText::new(title).small()).config(config)
+}
+
 fn views(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
-    let button = ui.menu_button(RichText::new("Views").small(), |ui| {
+    let (button, _) = staying("Views").ui(ui, |ui| {
         ui.set_min_width(220.0);
         let kept = shared.session.view.saved_views.clone();
         if kept.is_empty() {
@@ -98,11 +105,11 @@ fn views(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             }
         });
     });
-    button.response.on_hover_text("Kept filters. It is the rule that is kept, not the frames it found.");
+    button.on_hover_text("Kept filters. It is the rule that is kept, not the frames it found.");
 }
 
 fn column_menu(ui: &mut Ui, shared: &mut Shared<'_>) {
-    let button = ui.menu_button(RichText::new("Columns").small(), |ui| {
+    let (button, _) = staying("Columns").ui(ui, |ui| {
         for column in COLUMNS.iter().filter(|column| column.key != "frame") {
             let mut on = !shared.session.view.hidden_columns.iter().any(|key| key == column.key);
             if ui.checkbox(&mut on, column.name).on_hover_text(column.tip).changed() {
@@ -115,7 +122,7 @@ fn column_menu(ui: &mut Ui, shared: &mut Shared<'_>) {
             }
         }
     });
-    button.response.on_hover_text("Which columns the list has.");
+    button.on_hover_text("Which columns the list has.");
 }
 
 /// Progress of the grading, or how to begin it.

@@ -22,10 +22,19 @@ pub(super) struct Highlight {
 pub(super) struct Marking {
     /// The next drag marks, with or without Ctrl.
     pub(super) armed: bool,
-    /// View and picture coordinates where the drag began.
-    pub(super) from: Option<(usize, [f64; 2])>,
+    /// Where the drag began.
+    pub(super) from: Option<Begun>,
     /// Where the pointer is.
     to: [f64; 2],
+}
+
+/// Where a drag began. The three columns draw the same views: the drag is that of one of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Begun {
+    column: egui::Id,
+    view: usize,
+    /// Picture coordinates.
+    at: [f64; 2],
 }
 
 impl State {
@@ -60,8 +69,8 @@ impl State {
         to_screen: &dyn Fn([f64; 2]) -> Pos2,
         tokens: &Tokens,
     ) {
-        if let Some((_, from)) = self.marking.from.filter(|(view, _)| *view == index) {
-            let rect = Rect::from_two_pos(to_screen(from), to_screen(self.marking.to));
+        if let Some(begun) = self.marking.from.filter(|begun| begun.view == index) {
+            let rect = Rect::from_two_pos(to_screen(begun.at), to_screen(self.marking.to));
             painter.rect_stroke(rect, 0.0, Stroke::new(1.5, tokens.accent), egui::StrokeKind::Middle);
         }
         let label = session.labels.label(session.data.frame_index);
@@ -89,12 +98,14 @@ impl State {
             && (self.marking.armed || ui.input(|i| i.modifiers.command))
             && let Some(origin) = ui.input(|i| i.pointer.press_origin())
         {
-            self.marking.from = Some((index, unit_at(plot, window, origin)));
+            self.marking.from = Some(Begun { column: response.id, view: index, at: unit_at(plot, window, origin) });
         }
         if self.marking.armed && response.hovered() {
             ui.ctx().set_cursor_icon(egui::CursorIcon::Crosshair);
         }
-        let Some((_, from)) = self.marking.from.filter(|(view, _)| *view == index) else { return (false, None) };
+        let Some(Begun { at: from, .. }) = self.marking.from.filter(|begun| begun.column == response.id) else {
+            return (false, None);
+        };
         let to = pointer.map_or(from, |pointer| unit_at(plot, window, pointer));
         self.marking.to = to;
         if response.dragged() {
