@@ -1,6 +1,6 @@
 //! The real window without a display, driven by the names that a screen reader would say.
 #![cfg(feature = "viewer")]
-#![expect(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
+#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
 #[path = "common/blob.rs"]
 mod blob;

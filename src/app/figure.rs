@@ -1,11 +1,16 @@
 //! Captions for figures: what a picture shows, printed small under it, so that it can still be told apart in a year.
 
-use super::theme;
+use super::theme::{self, Tokens};
 use crate::session::Session;
-use egui::{Align2, Color32, FontId, Painter, Rect, Role, WidgetInfo, vec2};
+use egui::{FontId, Rect, Role, Ui, WidgetInfo, pos2};
+
+/// The caption of a picture that shows `what`, where captions are printed.
+pub(super) fn of(session: &Session, what: &str) -> Option<String> {
+    session.view.figure.then(|| format!("{what} · {}", caption(session)))
+}
 
 /// What every picture of a fit has in common: frame, iteration, τ, weights, seed, version.
-pub(super) fn caption(session: &Session) -> String {
+fn caption(session: &Session) -> String {
     let Some(frame) = &session.data.frame else { return String::new() };
     let config = session.fit.shown.as_ref().map_or(session.config, |shown| shown.config);
     // The fit draws no random number: it has no seed to print.
@@ -27,12 +32,14 @@ pub(super) fn spoken(name: &str, caption: Option<&str>) -> WidgetInfo {
     info
 }
 
-/// Prints a caption along the lower edge of a picture, on a ground of its own, in as many lines as it needs.
-pub(super) fn print(painter: &Painter, rect: Rect, text: &str) {
+/// Prints a caption, where there is one, at the lower end of `rect`, in as many lines as it needs, and answers what is left
+/// above it.
+pub(super) fn print(ui: &Ui, rect: Rect, caption: Option<&str>) -> Rect {
+    let Some(text) = caption else { return rect };
+    let tokens = Tokens::of(ui);
     let font = FontId::proportional(theme::CAPTION - 2.0);
-    let galley = painter.layout(text.to_owned(), font, Color32::WHITE, (rect.width() - 8.0).max(40.0));
-    let size = galley.size() + vec2(8.0, 4.0);
-    let ground = Align2::LEFT_BOTTOM.align_size_within_rect(size, rect);
-    painter.rect_filled(ground, 0.0, Color32::from_black_alpha(170));
-    painter.galley(ground.min + vec2(4.0, 2.0), galley, Color32::WHITE);
+    let galley = ui.painter().layout(text.to_owned(), font, tokens.dim, (rect.width() - 16.0).max(40.0));
+    let top = rect.max.y - galley.size().y - 4.0;
+    ui.painter().galley(pos2(rect.min.x + 8.0, top), galley, tokens.dim);
+    rect.with_max_y(top - 2.0)
 }

@@ -1,5 +1,6 @@
 //! Where the panes are: a tree of tiles that can be dragged, resized, stored and reset.
 
+use super::commands::{AppAct, SaveKind};
 use super::panes::{self, PaneStates, Shared};
 use super::theme::{self, Tokens};
 use egui_tiles::{
@@ -41,6 +42,24 @@ pub enum PaneKind {
 }
 
 impl PaneKind {
+    /// Every pane.
+    pub const ALL: [Self; 14] = [
+        Self::Frames,
+        Self::HOri,
+        Self::HSim,
+        Self::Masks,
+        Self::Scene,
+        Self::Curves,
+        Self::Fit,
+        Self::Joint,
+        Self::Image,
+        Self::Log,
+        Self::Modes,
+        Self::Compare,
+        Self::Agreement,
+        Self::Statistics,
+    ];
+
     /// The title on its tab.
     pub fn title(self) -> &'static str {
         match self {
@@ -66,7 +85,7 @@ impl PaneKind {
 pub(crate) struct Layout {
     tree: Tree<PaneKind>,
     /// A pane whose tab was right-clicked, and what was chosen.
-    asked: Option<PaneKind>,
+    asked: Option<AppAct>,
 }
 
 impl Default for Layout {
@@ -134,8 +153,8 @@ impl Layout {
         self.tree.make_active(|_, tile| matches!(tile, Tile::Pane(kind) if *kind == pane));
     }
 
-    /// The pane of which a picture was asked for on its tab.
-    pub(crate) fn take_asked(&mut self) -> Option<PaneKind> {
+    /// What was asked for on a tab.
+    pub(crate) fn take_asked(&mut self) -> Option<AppAct> {
         self.asked.take()
     }
 
@@ -152,7 +171,7 @@ impl Layout {
 struct Behavior<'a, 'b> {
     shared: &'a mut Shared<'b>,
     states: &'a mut PaneStates,
-    asked: &'a mut Option<PaneKind>,
+    asked: &'a mut Option<AppAct>,
 }
 
 impl egui_tiles::Behavior<PaneKind> for Behavior<'_, '_> {
@@ -177,7 +196,11 @@ impl egui_tiles::Behavior<PaneKind> for Behavior<'_, '_> {
             response.context_menu(|ui| {
                 let tip = "As it is on screen, without the rest of the window.";
                 if ui.button("Save picture of this pane…").on_hover_text(tip).clicked() {
-                    *self.asked = Some(*pane);
+                    *self.asked = Some(AppAct::Save(SaveKind::Picture(Some(*pane))));
+                    ui.close();
+                }
+                if ui.button("Copy picture of this pane").on_hover_text(tip).clicked() {
+                    *self.asked = Some(AppAct::CopyPicture(Some(*pane)));
                     ui.close();
                 }
             });

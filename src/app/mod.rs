@@ -14,7 +14,7 @@ mod sharing;
 mod theme;
 mod widgets;
 
-use crate::session::{Command, LogLevel, Runtime, Session, ViewState};
+use crate::session::{Aim, Command, LogLevel, Runtime, Session, ViewState};
 use commands::{Act, AppAct};
 use layout::Layout;
 use overlay::Overlay;
@@ -31,6 +31,17 @@ const VIEW_KEY: &str = "view";
 const RECENT_KEY: &str = "recent";
 const LAYOUT_KEY: &str = "layout";
 const ANNOTATOR_KEY: &str = "annotator";
+
+/// What the window begins with.
+#[derive(Debug, Clone, Default)]
+pub struct Begin {
+    /// Data sets; the first one opens, the others become recents.
+    pub paths: Vec<PathBuf>,
+    /// Where to begin in it.
+    pub aim: Aim,
+    /// A session file, instead of all that.
+    pub session: Option<PathBuf>,
+}
 
 /// The application behind the window.
 pub struct InspectorApp {
@@ -49,6 +60,11 @@ pub struct InspectorApp {
 impl InspectorApp {
     /// The window's application; `paths` are opened, or without one the bundled sample where it can be found.
     pub fn new(cc: &eframe::CreationContext<'_>, paths: &[PathBuf]) -> Self {
+        Self::begin(cc, &Begin { paths: paths.to_vec(), ..Begin::default() })
+    }
+
+    /// The window's application, begun as the command line says.
+    pub fn begin(cc: &eframe::CreationContext<'_>, begin: &Begin) -> Self {
         theme::install(&cc.egui_ctx);
         let mut session = Session::default();
         let mut layout = Layout::default();
@@ -76,14 +92,18 @@ impl InspectorApp {
             applied_zoom: 1.0,
             dropped: None,
         };
-        match paths.first().cloned().or_else(crate::dataset::bundled_sample) {
-            Some(path) => app.apply(Command::Open(path)),
+        if let Some(session) = &begin.session {
+            app.apply(Command::OpenSession(session.clone()));
+            return app;
+        }
+        match begin.paths.first().cloned().or_else(crate::dataset::bundled_sample) {
+            Some(path) => app.apply(Command::OpenAt(path, begin.aim.clone())),
             None => app.apply(Command::Log(
                 LogLevel::Info,
                 "the bundled sample was not found; open a data set with File > Open folder".into(),
             )),
         }
-        for extra in paths.iter().skip(1) {
+        for extra in begin.paths.iter().skip(1) {
             app.session.data.recent.push(extra.clone());
         }
         app
@@ -97,6 +117,16 @@ impl InspectorApp {
     /// Applies a command as if a person had given it.
     pub fn apply(&mut self, command: Command) {
         self.runtime.apply(&mut self.session, command);
+    }
+
+    /// Brings a pane to the front.
+    pub fn show_pane(&mut self, pane: PaneKind) {
+        self.layout.show_pane(pane);
+    }
+
+    /// Where a pane was drawn in the last pass, points; `None` where it is behind another tab.
+    pub fn pane_rect(&self, pane: PaneKind) -> Option<egui::Rect> {
+        self.layout.rect(pane)
     }
 
     /// Zooms the maps to the person and the camera to the selection.
@@ -133,7 +163,8 @@ impl InspectorApp {
             AppAct::Save(kind) => self.ask_save(kind),
             AppAct::SaveSession => self.save_session_again(ctx),
             AppAct::OpenSession => self.overlay.open_session(),
-            AppAct::CopyPicture => self.copy_picture(ctx),
+            AppAct::CopyPicture(pane) => self.copy_picture(ctx, pane),
+            AppAct::ShowPane(pane) => self.layout.show_pane(pane),
             AppAct::CopyPath => self.copy_path(ctx),
             AppAct::FocusFilter => self.panes.frames.focus_filter(),
             AppAct::FocusNote => {
@@ -237,9 +268,7 @@ impl eframe::App for InspectorApp {
             self.overlay.show(ui, &mut shared);
         }
         let ctx = ui.ctx().clone();
-        if let Some(pane) = self.layout.take_asked() {
-            acts.push(Act::App(AppAct::Save(commands::SaveKind::Picture(Some(pane)))));
-        }
+        acts.extend(self.layout.take_asked().map(Act::App));
         for act in acts {
             self.act(&ctx, act);
         }
@@ -259,7 +288,7 @@ impl eframe::App for InspectorApp {
 ///
 /// # Errors
 /// Where there is no display or no graphics adapter.
-pub fn run(paths: Vec<PathBuf>) -> anyhow::Result<()> {
+pub fn run(begin: Begin) -> anyhow::Result<()> {
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_app_id(APP_ID)
@@ -270,6 +299,6 @@ pub fn run(paths: Vec<PathBuf>) -> anyhow::Result<()> {
         renderer: eframe::Renderer::Wgpu,
         ..Default::default()
     };
-    eframe::run_native(APP_ID, options, Box::new(move |cc| Ok(Box::new(InspectorApp::new(cc, &paths)))))
+    eframe::run_native(APP_ID, options, Box::new(move |cc| Ok(Box::new(InspectorApp::begin(cc, &begin)))))
         .map_err(|error| anyhow::anyhow!("the window cannot be opened: {error}"))
 }

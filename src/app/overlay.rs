@@ -10,8 +10,10 @@ use crate::session::{Command, LogLevel, PickKind};
 use egui::{Align2, Key, RichText, Ui, vec2};
 use std::path::PathBuf;
 
-/// Seconds that a notification stays.
+/// Seconds that a notification of something wrong stays.
 const NOTICE_S: f64 = 8.0;
+/// Seconds that one of something done stays.
+const HINT_S: f64 = 4.0;
 
 /// Which sheet is open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -77,7 +79,8 @@ impl Overlay {
     }
 
     pub(super) fn notify(&mut self, level: LogLevel, text: String, now: f64) {
-        self.notices.push((now + NOTICE_S, level, text));
+        let stays = if level == LogLevel::Info { HINT_S } else { NOTICE_S };
+        self.notices.push((now + stays, level, text));
         let surplus = self.notices.len().saturating_sub(4);
         self.notices.drain(..surplus);
     }

@@ -20,16 +20,18 @@ struct WindowState {
 /// Pictures that were asked for and are not drawn yet.
 #[derive(Default)]
 pub(super) struct Pictures {
-    drawn: Arc<Mutex<Vec<(Wanted, Arc<ColorImage>)>>>,
+    drawn: Arc<Mutex<Vec<Drawn>>>,
 }
+
+type Drawn = (Wanted, Arc<ColorImage>);
 
 /// What a picture is for.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Wanted {
     /// A file, of the window or a part of it (points).
     File(PathBuf, Option<Rect>),
-    /// The clipboard.
-    Clipboard,
+    /// The clipboard, of the window or a part of it (points).
+    Clipboard(Option<Rect>),
 }
 
 impl Pictures {
@@ -44,14 +46,14 @@ impl Pictures {
         ctx.request_repaint();
     }
 
-    fn take(&self) -> Vec<(Wanted, Arc<ColorImage>)> {
+    fn take(&self) -> Vec<Drawn> {
         std::mem::take(&mut self.drawn.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
 /// The part of a picture inside `rect`, points.
 fn cropped(image: &ColorImage, rect: Option<Rect>, scale: f32) -> ColorImage {
-    rect.map_or_else(|| image.clone(), |rect| image.region(&rect.expand(0.0), Some(scale)))
+    rect.map_or_else(|| image.clone(), |rect| image.region(&rect, Some(scale)))
 }
 
 fn write_png(image: &ColorImage, path: &Path) -> Result<String, String> {
@@ -111,7 +113,7 @@ impl InspectorApp {
                 match serde_json::to_value(&window) {
                     Ok(window) => self.apply(Command::SaveSession(path, window)),
                     Err(error) => {
-                        self.apply(Command::Log(LogLevel::Error, format!("the session was not saved: {error}")))
+                        self.apply(Command::Log(LogLevel::Error, format!("the session was not saved: {error}")));
                     }
                 }
             }
@@ -122,9 +124,10 @@ impl InspectorApp {
         }
     }
 
-    /// Puts the picture of the window on the clipboard.
-    pub(super) fn copy_picture(&mut self, ctx: &Context) {
-        self.pictures.ask(ctx, Wanted::Clipboard);
+    /// Puts the picture of the window, or of one pane, on the clipboard.
+    pub(super) fn copy_picture(&mut self, ctx: &Context, pane: Option<PaneKind>) {
+        let rect = pane.and_then(|pane| self.layout.rect(pane));
+        self.pictures.ask(ctx, Wanted::Clipboard(rect));
     }
 
     /// Puts the path of the frame's file on the clipboard.
@@ -144,8 +147,8 @@ impl InspectorApp {
                     let image = cropped(&image, rect, scale);
                     self.apply(Command::RunTask(Task::new(move || write_png(&image, &path))));
                 }
-                Wanted::Clipboard => {
-                    ctx.copy_image((*image).clone());
+                Wanted::Clipboard(rect) => {
+                    ctx.copy_image(cropped(&image, rect, scale));
                     self.overlay.notify(LogLevel::Info, "picture copied".into(), ctx.input(|i| i.time));
                 }
             }

@@ -100,8 +100,8 @@ impl TryFrom<Unchecked> for Pppr {
 
     fn try_from(Unchecked { shape, groups }: Unchecked) -> Result<Self, String> {
         for (group, numbers) in Group::ALL.into_iter().zip(&groups) {
-            let joints = shape.persons.checked_mul(shape.joints).unwrap_or(usize::MAX);
-            let expected = joints.checked_mul(shape.width(group)).unwrap_or(usize::MAX);
+            let joints = shape.persons.saturating_mul(shape.joints);
+            let expected = joints.saturating_mul(shape.width(group));
             if numbers.len() != expected {
                 let (key, found) = (group.key(), numbers.len());
                 return Err(format!("`{key}` has {found} numbers; expected {expected}"));

@@ -12,7 +12,7 @@ mod score;
 #[cfg(feature = "viewer")]
 mod screenshot;
 
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -28,8 +28,10 @@ Exit codes: 0 done; 1 some frames of a batch could not be fitted or read; 2 bad 
 Examples:
   mhp-inspector
       The window on the bundled sample.
-  mhp-inspector data/mmvr
-      The window on an MMVR folder.
+  mhp-inspector data/mmvr --frame 12 --iteration 40
+      The window on an MMVR folder, at frame 12 after 40 iterations.
+  mhp-inspector --session talk.mhp-session
+      The window as it was when the session was saved.
   mhp-inspector info data/mmvr
       What is in it: frames, views, axes, ranges of values.
   mhp-inspector complexity data/mmvr --csv complexity.csv
@@ -44,9 +46,35 @@ pub struct Cli {
     /// What to do; without a subcommand the window opens.
     #[command(subcommand)]
     pub command: Option<Command>,
+    /// What the window begins with.
+    #[command(flatten)]
+    pub window: WindowArgs,
+}
+
+/// What the window begins with.
+#[derive(Debug, Args)]
+pub struct WindowArgs {
     /// Data sets or files to open in the window: an MMVR tree or any folder inside one, a `*_radar.npz`, a folder with
     /// `dataset.toml`, or an `.npy`/`.npz` of maps. Without one, the bundled sample opens.
     pub paths: Vec<PathBuf>,
+    /// Show this frame first: a name as in the frame list, or an index from 0.
+    #[arg(long, value_name = "FRAME")]
+    pub frame: Option<String>,
+    /// Run its fit until this iteration.
+    #[arg(long, value_name = "K")]
+    pub iteration: Option<usize>,
+    /// Open a session file: the same frame, iteration, camera, pins and layout.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["paths", "frame", "iteration"])]
+    pub session: Option<PathBuf>,
+}
+
+#[cfg(feature = "viewer")]
+impl WindowArgs {
+    /// As the window takes it.
+    pub fn begin(self) -> crate::app::Begin {
+        let aim = crate::session::Aim { frame: self.frame, iteration: self.iteration };
+        crate::app::Begin { paths: self.paths, aim, session: self.session }
+    }
 }
 
 /// The subcommands; everything the window does, one of them can do headless.

@@ -1,9 +1,9 @@
 //! `screenshot`: the real window, drawn offscreen after a number of iterations.
 
 use super::common::config;
-use crate::app::InspectorApp;
+use crate::app::{Begin, InspectorApp, PaneKind};
 use crate::config::FitConfig;
-use crate::session::{Command, FitStatus, ThemeChoice};
+use crate::session::{Command, FitStatus, LabelStatus, StrataStatus, ThemeChoice};
 use anyhow::{Context as _, bail};
 use clap::{Args, ValueEnum};
 use egui_kittest::Harness;
@@ -23,13 +23,19 @@ Examples:
   mhp-inspector screenshot data/mmvr --iterations 60 --out fit.png
       The window after 60 Adam steps on the first frame.
   mhp-inspector screenshot data/mmvr --iterations 0 --size 1920x1080 --theme light --focus --out start.png
-      The start pose, the maps zoomed to the fitted region.";
+      The start pose, the maps zoomed to the fitted region.
+  mhp-inspector screenshot --session talk.mhp-session --pane H_sim --figure --scale 2 --out h_sim.png
+      One pane of a saved session, with a caption, for a figure.";
 
 /// What `screenshot` is told.
 #[derive(Debug, Args)]
 pub struct ScreenshotArgs {
     /// An MMVR tree or any folder inside one, a `*_radar.npz`, a folder with `dataset.toml`, or an `.npy`/`.npz` of maps.
-    path: PathBuf,
+    #[arg(required_unless_present = "session")]
+    path: Option<PathBuf>,
+    /// A session file instead of a data set; frame, iterations, settings and theme are then its own.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["path", "frame", "iterations", "config", "focus", "joint"])]
+    session: Option<PathBuf>,
     /// The frame, counted from 0.
     #[arg(long, value_name = "I", default_value_t = 0)]
     frame: usize,
@@ -48,9 +54,15 @@ pub struct ScreenshotArgs {
     /// Pixels a point: 2 for a high-density screen.
     #[arg(long, value_name = "S", default_value_t = 1.0)]
     scale: f32,
-    /// Theme.
-    #[arg(long, value_enum, default_value = "dark")]
-    theme: ThemeArg,
+    /// Theme; without it that of the session file, or dark.
+    #[arg(long, value_enum)]
+    theme: Option<ThemeArg>,
+    /// Save this pane alone, called as on its tab, for example H_sim.
+    #[arg(long, value_name = "NAME")]
+    pane: Option<String>,
+    /// Print units, τ, iteration, seed and version small under every picture.
+    #[arg(long)]
+    figure: bool,
     /// Zoom the maps to the fitted region.
     #[arg(long)]
     focus: bool,
@@ -86,7 +98,8 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
 /// written.
 pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
     let config = config(args.config.as_deref())?;
-    let paths = vec![args.path.clone()];
+    let begin = Begin { paths: args.path.iter().cloned().collect(), session: args.session.clone(), ..Begin::default() };
+    let pane = args.pane.as_deref().map(pane_called).transpose()?;
     let mut harness = Harness::builder()
         .with_size([args.size.0 as f32, args.size.1 as f32])
         .with_pixels_per_point(args.scale)
@@ -94,26 +107,65 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
         .allow_missing_glyphs()
         .with_render_cursor(false)
         .wgpu()
-        .build_eframe(|cc| InspectorApp::new(cc, &paths));
+        .build_eframe(|cc| InspectorApp::begin(cc, &begin));
     set_up(&mut harness, args, config)?;
+    if let Some(pane) = pane {
+        harness.state_mut().show_pane(pane);
+    }
     harness.run_steps(3);
-    let picture = harness.render().map_err(|e| anyhow::anyhow!("the window cannot be drawn: {e}"))?;
+    let mut picture = harness.render().map_err(|e| anyhow::anyhow!("the window cannot be drawn: {e}"))?;
+    if let Some(pane) = pane {
+        let rect = harness.state().pane_rect(pane).with_context(|| format!("the pane {} is not open", pane.title()))?;
+        let px = |x: f32| (x * args.scale).round() as u32;
+        let (x, y, width, height) = (px(rect.min.x), px(rect.min.y), px(rect.width()), px(rect.height()));
+        picture = image::imageops::crop_imm(&picture, x, y, width, height).to_image();
+    }
     picture.save(&args.out).with_context(|| format!("{}: cannot be written", args.out.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 
 fn set_up(harness: &mut Harness<'_, InspectorApp>, args: &ScreenshotArgs, config: FitConfig) -> anyhow::Result<()> {
-    let mut view = harness.state().session().view.clone();
-    view.theme = match args.theme {
-        ThemeArg::Dark => ThemeChoice::Dark,
-        ThemeArg::Light => ThemeChoice::Light,
-    };
-    harness.state_mut().apply(Command::SetView(Box::new(view)));
-    harness.state_mut().apply(Command::SetConfig(config));
+    if args.session.is_none() {
+        harness.state_mut().apply(Command::SetConfig(config));
+    }
     until(harness, "the data set", |app| app.session().data.dataset.is_some() && app.session().data.opening.is_none())?;
+    let mut view = harness.state().session().view.clone();
+    match args.theme {
+        Some(ThemeArg::Dark) => view.theme = ThemeChoice::Dark,
+        Some(ThemeArg::Light) => view.theme = ThemeChoice::Light,
+        None => {}
+    }
+    view.figure |= args.figure;
+    harness.state_mut().apply(Command::SetView(Box::new(view)));
+    if args.session.is_none() {
+        fit(harness, args)?;
+    }
+    until(harness, "the fit, strata, labels and evidence", |app| {
+        let session = app.session();
+        let graded = !matches!(session.strata.status, StrataStatus::Running { .. });
+        let labelled = session.labels.status != LabelStatus::Opening;
+        let settled = session.fit.is_ready() && !session.fit.is_running() && !session.evidence_is_stale();
+        let drawn = session.pins.list().iter().all(|pin| pin.snapshot.is_some());
+        graded && labelled && settled && drawn
+    })?;
+    if args.focus {
+        harness.state_mut().focus();
+    }
+    Ok(())
+}
+
+fn pane_called(name: &str) -> anyhow::Result<PaneKind> {
+    let names: Vec<&str> = PaneKind::ALL.iter().map(|pane| pane.title()).collect();
+    let found = PaneKind::ALL.into_iter().find(|pane| pane.title().eq_ignore_ascii_case(name));
+    found.with_context(|| format!("no pane is called {name}; expected one of {}", names.join(", ")))
+}
+
+/// Goes to the frame and takes the asked iterations.
+fn fit(harness: &mut Harness<'_, InspectorApp>, args: &ScreenshotArgs) -> anyhow::Result<()> {
     let frames = harness.state().session().data.len();
     if args.frame >= frames {
-        bail!("{}: frame {} was asked for; expected 0 ..= {}", args.path.display(), args.frame, frames - 1);
+        let path = args.path.clone().unwrap_or_default();
+        bail!("{}: frame {} was asked for; expected 0 ..= {}", path.display(), args.frame, frames - 1);
     }
     harness.state_mut().apply(Command::GotoFrame(args.frame));
     until(harness, "the start pose", |app| {
@@ -132,9 +184,6 @@ fn set_up(harness: &mut Harness<'_, InspectorApp>, args: &ScreenshotArgs, config
         let joint = problem.as_ref().and_then(|p| p.skeleton.joint(name));
         let Some(joint) = joint else { bail!("no joint is called {name}") };
         harness.state_mut().apply(Command::SelectJoint(Some(joint)));
-    }
-    if args.focus {
-        harness.state_mut().focus();
     }
     Ok(())
 }

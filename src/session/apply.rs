@@ -36,6 +36,12 @@ impl Session {
                 self.restoring = None;
                 self.open(path)
             }
+            Command::OpenAt(path, aim) => {
+                self.restoring = None;
+                let effects = self.open(path);
+                self.aim = aim;
+                effects
+            }
             Command::Pick(kind) => vec![Effect::Pick(kind)],
             Command::OpenBare(path, choice) => {
                 self.data.bare = None;

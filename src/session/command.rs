@@ -27,11 +27,22 @@ pub enum PickKind {
     File,
 }
 
+/// Where to begin in a data set.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Aim {
+    /// A frame's name, or its index.
+    pub frame: Option<String>,
+    /// Run the fit until this iteration.
+    pub iteration: Option<usize>,
+}
+
 /// A change of the session: by a person, or a report of a thread.
 #[derive(Debug)]
 pub enum Command {
     /// Open a data set.
     Open(PathBuf),
+    /// Open a data set at a frame and an iteration.
+    OpenAt(PathBuf, Aim),
     /// Show a dialog.
     Pick(PickKind),
     /// Open a bare file with these axes.

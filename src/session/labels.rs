@@ -199,7 +199,7 @@ impl Labels {
     /// Forgets the journals; the annotator stays.
     pub(super) fn close(&mut self) {
         let (annotator, revision, next_act) = (std::mem::take(&mut self.annotator), self.revision + 1, self.next_act);
-        *self = Self { annotator, revision, next_act, ..Self::default() };
+        *self = Self { annotator, next_act, revision, ..Self::default() };
     }
 
     /// Takes in what a commit wrote.

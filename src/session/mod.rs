@@ -18,7 +18,7 @@ mod state;
 mod strata;
 mod view;
 
-pub use command::{Command, Commit, Effect, Export, PickKind, PinRequest, Task, Written};
+pub use command::{Aim, Command, Commit, Effect, Export, PickKind, PinRequest, Task, Written};
 pub use evidence::EvidenceRequest;
 pub use file::{SavedChange, SavedDataset, SavedFit, SavedFrame, SavedPin, SessionFile, SessionFileError};
 pub use fit::{Fit, FitStatus};

@@ -1,5 +1,6 @@
 //! The session's fields.
 
+use super::command::Aim;
 use super::evidence::EvidenceState;
 use super::file::SessionFile;
 use super::fit::Fit;
@@ -162,6 +163,8 @@ pub struct Session {
     pub notice: Option<(u64, LogLevel, String)>,
     /// Where the session was saved to or opened from.
     pub session_path: Option<PathBuf>,
+    /// Where to begin in the data set that is being opened.
+    pub(super) aim: Aim,
     /// A session file whose data set is being opened.
     pub(super) restoring: Option<(PathBuf, Box<SessionFile>)>,
     /// What a session file says of the window, for the window to take.

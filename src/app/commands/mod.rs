@@ -95,8 +95,10 @@ pub(crate) enum AppAct {
     SaveSession,
     /// Type the path of a session file.
     OpenSession,
-    /// Put the picture of the window on the clipboard.
-    CopyPicture,
+    /// Put the picture of the window, or of one pane, on the clipboard.
+    CopyPicture(Option<PaneKind>),
+    /// Bring a pane to the front.
+    ShowPane(PaneKind),
     /// Put the frame's path on the clipboard.
     CopyPath,
 }

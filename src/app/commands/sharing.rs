@@ -2,6 +2,7 @@
 
 use super::table::{CTRL, CTRL_SHIFT, NONE, SHIFT, always, has_frame, view};
 use super::{Act, AppAct, Menu, SaveKind, UserCommand};
+use crate::app::PaneKind;
 use crate::session::{Against, Command, Export, Session};
 use egui::Key;
 
@@ -116,7 +117,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         menu: Menu::Edit,
         keys: &[(CTRL, Key::C)],
         enabled: always,
-        act: |_| Act::App(AppAct::CopyPicture),
+        act: |_| Act::App(AppAct::CopyPicture(None)),
     },
     UserCommand {
         label: "Copy path of the frame",
@@ -153,5 +154,101 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         keys: &[(SHIFT, Key::F)],
         enabled: always,
         act: |s| view(s, |v| v.figure = !v.figure),
+    },
+    UserCommand {
+        label: "Show Curves",
+        title: None,
+        tooltip: "Bring the pane Curves to the front.",
+        menu: Menu::View,
+        keys: &[(CTRL, Key::Num1)],
+        enabled: always,
+        act: |_| Act::App(AppAct::ShowPane(PaneKind::Curves)),
+    },
+    UserCommand {
+        label: "Show Compare",
+        title: None,
+        tooltip: "Bring the pane Compare to the front.",
+        menu: Menu::View,
+        keys: &[(CTRL, Key::Num2)],
+        enabled: always,
+        act: |_| Act::App(AppAct::ShowPane(PaneKind::Compare)),
+    },
+    UserCommand {
+        label: "Show Agreement",
+        title: None,
+        tooltip: "Bring the pane Agreement to the front.",
+        menu: Menu::View,
+        keys: &[(CTRL, Key::Num3)],
+        enabled: always,
+        act: |_| Act::App(AppAct::ShowPane(PaneKind::Agreement)),
+    },
+    UserCommand {
+        label: "Show Statistics",
+        title: None,
+        tooltip: "Bring the pane Statistics to the front.",
+        menu: Menu::View,
+        keys: &[(CTRL, Key::Num4)],
+        enabled: always,
+        act: |_| Act::App(AppAct::ShowPane(PaneKind::Statistics)),
+    },
+    UserCommand {
+        label: "Show Log",
+        title: None,
+        tooltip: "Bring the pane Log to the front.",
+        menu: Menu::View,
+        keys: &[(CTRL, Key::Num5)],
+        enabled: always,
+        act: |_| Act::App(AppAct::ShowPane(PaneKind::Log)),
+    },
+    UserCommand {
+        label: "Show Fit",
+        title: None,
+        tooltip: "Bring the pane Fit to the front.",
+        menu: Menu::View,
+        keys: &[(CTRL, Key::Num6)],
+        enabled: always,
+        act: |_| Act::App(AppAct::ShowPane(PaneKind::Fit)),
+    },
+    UserCommand {
+        label: "Show Joint",
+        title: None,
+        tooltip: "Bring the pane Joint to the front.",
+        menu: Menu::View,
+        keys: &[(CTRL, Key::Num7)],
+        enabled: always,
+        act: |_| Act::App(AppAct::ShowPane(PaneKind::Joint)),
+    },
+    UserCommand {
+        label: "Show 3-D",
+        title: None,
+        tooltip: "Bring the pane 3-D to the front.",
+        menu: Menu::View,
+        keys: &[(CTRL, Key::Num8)],
+        enabled: always,
+        act: |_| Act::App(AppAct::ShowPane(PaneKind::Scene)),
+    },
+    UserCommand {
+        label: "Show Image plane",
+        title: None,
+        tooltip: "Bring the pane Image plane to the front.",
+        menu: Menu::View,
+        keys: &[(CTRL, Key::Num9)],
+        enabled: always,
+        act: |_| Act::App(AppAct::ShowPane(PaneKind::Image)),
+    },
+    UserCommand {
+        label: "Select this frame",
+        title: None,
+        tooltip: "Add the frame on screen to those that tags go to, or take it out.",
+        menu: Menu::Edit,
+        keys: &[(NONE, Key::X)],
+        enabled: has_frame,
+        act: |s| {
+            let mut frames = s.labels.selection.clone();
+            if !frames.remove(&s.data.frame_index) {
+                frames.insert(s.data.frame_index);
+            }
+            Act::Session(Command::SelectFrames(frames))
+        },
     },
 ];

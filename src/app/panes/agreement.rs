@@ -120,11 +120,13 @@ fn compute(labels: &Labels, pair: &[String; 2]) -> Found {
 
 fn summary(ui: &mut Ui, found: &Found, pair: &[String; 2], tokens: &Tokens) {
     let agreement = &found.agreement;
-    let mut text = format!("{} frames judged by both", agreement.frames);
-    if pair[1] != MACHINE {
-        text +=
-            &format!(" · {} only by {} · {} only by {}", agreement.only_in_a, pair[0], agreement.only_in_b, pair[1]);
-    }
+    let both = format!("{} frames judged by both", agreement.frames);
+    let text = if pair[1] == MACHINE {
+        both
+    } else {
+        let (a, b) = (agreement.only_in_a, agreement.only_in_b);
+        format!("{both} · {a} only by {} · {b} only by {}", pair[0], pair[1])
+    };
     ui.label(RichText::new(text).small().color(tokens.dim));
     if let Some(remark) = &found.remark {
         ui.label(RichText::new(format!("△ {remark}")).small().color(tokens.warn));

@@ -77,6 +77,9 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         .include_x(shared.session.config.iterations.min(20_000).max(fit.head()) as f64)
         .y_axis_min_width(44.0)
         .label_formatter(move |hover| label(hover, log));
+    let what = if state.tab == Tab::Loss { "L and its unweighted terms" } else { "IoU; MAJPE in m" };
+    let caption = figure::of(shared.session, what);
+    plot = plot.height(figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref()).height());
     if log {
         plot = plot.y_axis_formatter(|mark, _| power(mark.value)).y_grid_spacer(|input| decades(input.bounds));
     }
@@ -127,12 +130,6 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         (plot.pointer_coordinate(), plot.response().clone())
     });
     flag_texts(ui, &response, branch, &tokens);
-    let what = if state.tab == Tab::Loss { "unweighted terms and L" } else { "IoU; MAJPE in m" };
-    let caption = shared.session.view.figure.then(|| format!("{what} · {}", figure::caption(shared.session)));
-    if let Some(caption) = &caption {
-        let painter = ui.painter().with_clip_rect(ui.clip_rect());
-        figure::print(&painter, *response.transform.frame(), caption);
-    }
     let (pointer, inner) = response.inner;
     inner.widget_info(|| figure::spoken("Curves", caption.as_deref()));
     if inner.double_clicked() {

@@ -184,6 +184,14 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
             Compare::Difference => Content::Difference,
         },
     };
+    let what = match (content, state.pictures.reference()) {
+        (Content::Difference, Content::Base) => "H_sim − baseline",
+        (Content::Difference, _) => "H_sim − H_ori",
+        _ => content.name(),
+    };
+    let unit = if content == Content::Masks { "masks" } else { state.pictures.unit(content) };
+    let caption = figure::of(session, &format!("{what} {} · {unit}", view.array));
+    let rect = figure::print(ui, rect, caption.as_deref());
     // The masks have no colour bar, but keep its place: the three columns must line up.
     let bar_width = 46.0;
     let inner = Rect::from_min_max(rect.min + vec2(42.0, 20.0), rect.max - vec2(4.0 + bar_width, 30.0));
@@ -193,16 +201,8 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     }
     let tokens = Tokens::of(ui);
     overlay::title(ui, rect, plot, view, content, state.pictures.reference(), &tokens, session);
-    let what = match (content, state.pictures.reference()) {
-        (Content::Difference, Content::Base) => "H_sim − baseline",
-        (Content::Difference, _) => "H_sim − H_ori",
-        _ => content.name(),
-    };
     let name = format!("{what} map of {}", view.array);
     let response = ui.interact(plot, ui.scope_id().with("plot"), Sense::click_and_drag());
-    let unit = if content == Content::Masks { "masks" } else { state.pictures.unit(content) };
-    let caption = || format!("{what} {} · {unit} · {}", view.array, figure::caption(session));
-    let caption = session.view.figure.then(caption);
     response.widget_info(|| figure::spoken(&name, caption.as_deref()));
     let (marking, marked) = state.mark(ui, &response, plot, index, view);
     if let Some(region) = marked {
@@ -223,9 +223,6 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     state.draw_regions(&painter, session, index, view, &to_screen, &tokens);
     overlay::axes(ui, plot, view, orientation, window, &tokens);
     ui.painter().rect_stroke(plot, 0.0, egui::Stroke::new(1.0, tokens.stroke), egui::StrokeKind::Outside);
-    if let Some(caption) = &caption {
-        figure::print(&painter, plot, caption);
-    }
     if let Some(pointer) = response.hover_pos() {
         let unit = unit_at(plot, window, pointer);
         if let Some(pixel) = overlay::pixel_at(view, orientation, unit) {

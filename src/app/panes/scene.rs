@@ -114,13 +114,12 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         state.camera = Some(overview(shared.session));
     }
     toolbar(ui, shared);
-    let rect = ui.available_rect_before_wrap();
+    let caption = figure::of(shared.session, "3-D, metres, z up");
+    let rect = figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref());
     if rect.width() < 16.0 || rect.height() < 16.0 {
         return;
     }
     let response = ui.interact(rect, ui.scope_id().with("scene"), Sense::click_and_drag());
-    let caption = || format!("metres, z up · {}", figure::caption(shared.session));
-    let caption = shared.session.view.figure.then(caption);
     response.widget_info(|| figure::spoken("3-D scene", caption.as_deref()));
     let mut camera = state.camera.unwrap_or_else(|| overview(shared.session));
     let tokens = Tokens::of(ui);
@@ -145,9 +144,6 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             let at = rect.min + vec2(seen.px.x, seen.px.y) / scale + vec2(6.0, -6.0);
             painter.text(at, Align2::LEFT_BOTTOM, text, egui::FontId::proportional(theme::CAPTION), color);
         }
-    }
-    if let Some(caption) = &caption {
-        figure::print(&painter, rect.with_max_x(rect.max.x - 190.0), caption);
     }
     captions(&painter, rect, shared.session, &tokens, state);
     interact(ui, shared, state, &response, rect, viewport, scale, &scene, &camera);

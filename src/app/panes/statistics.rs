@@ -6,7 +6,7 @@ use crate::app::widgets::Named as _;
 use crate::labels::{Record, Tag};
 use crate::session::Session;
 use egui::{RichText, Role, Sense, Ui, vec2};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What the rows are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -32,7 +32,7 @@ struct Row {
     name: String,
     /// Frames of the group, where that is known.
     frames: Option<usize>,
-    labelled: usize,
+    labelled: BTreeSet<usize>,
     tags: [usize; Tag::ALL.len()],
 }
 
@@ -78,18 +78,23 @@ fn rows(session: &Session, group: Group, annotator: Option<&str>) -> Vec<Row> {
         let row = groups.entry(name.clone()).or_insert_with(|| Row {
             frames: frames_of(session, group, &name),
             name: name.1,
-            labelled: 0,
+            labelled: BTreeSet::new(),
             tags: [0; Tag::ALL.len()],
         });
-        row.labelled += 1;
+        row.labelled.insert(frame);
         for (count, tag) in row.tags.iter_mut().zip(Tag::ALL) {
             *count += usize::from(record.label.tags.contains(tag));
         }
     }
     let mut rows: Vec<Row> = groups.into_values().collect();
-    let mut all = Row { name: "all".into(), frames: Some(session.data.len()), labelled: 0, tags: [0; Tag::ALL.len()] };
+    let mut all = Row {
+        name: "all".into(),
+        frames: Some(session.data.len()),
+        labelled: BTreeSet::new(),
+        tags: [0; Tag::ALL.len()],
+    };
     for row in &rows {
-        all.labelled += row.labelled;
+        all.labelled.extend(&row.labelled);
         for (sum, count) in all.tags.iter_mut().zip(row.tags) {
             *sum += count;
         }
@@ -131,14 +136,14 @@ fn table(ui: &mut Ui, rows: &[Row], tokens: &Tokens) {
             let name = RichText::new(&row.name);
             ui.label(if total { name.font(theme::strong(12.0)) } else { name });
             let of = row.frames.map_or_else(String::new, |frames| format!(" of {frames}"));
-            ui.label(RichText::new(format!("{}{of}", row.labelled)).font(theme::mono(theme::CAPTION)));
+            ui.label(RichText::new(format!("{}{of}", row.labelled.len())).font(theme::mono(theme::CAPTION)));
             for (tag, count) in Tag::ALL.into_iter().zip(row.tags) {
                 ui.horizontal(|ui| {
                     ui.spacing_mut().item_spacing.x = 4.0;
                     let text = RichText::new(format!("{count:>3}")).font(theme::mono(theme::CAPTION));
                     ui.label(if count == 0 { text.color(tokens.dim) } else { text });
                     if !total {
-                        let (rect, _) = ui.allocate_exact_size(vec2(36.0, 8.0), Sense::hover());
+                        let (rect, _) = ui.allocate_exact_size(vec2(24.0, 8.0), Sense::hover());
                         let share = count as f32 / most as f32;
                         let bar = egui::Rect::from_min_size(rect.min, vec2(rect.width() * share, rect.height()));
                         ui.painter().rect_filled(bar, 1.0, tokens.tag(tag));

@@ -96,7 +96,7 @@ fn widths(seen: &[Seen<'_>], wavelength_m: f64) -> Vec<Finding> {
         }
         told.push(one.sigma_rad);
         let alike = seen.iter().filter(|other| other.sigma_rad == one.sigma_rad);
-        let arrays: Vec<String> = alike.map(|other| format!("{}", other.view.array)).collect();
+        let arrays: Vec<String> = alike.map(|other| other.view.array.clone()).collect();
         let text = format!(
             "{}: D = 0.488 λ/σ_θ = {} from the point spread σ_θ = {:.2}° and λ = {}, as of an evenly weighted array; a tapered \
              one is wider, and its far field farther.",

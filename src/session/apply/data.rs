@@ -2,7 +2,7 @@
 
 use crate::body::Pppr;
 use crate::dataset::{Dataset, DatasetError, Frame};
-use crate::session::command::Effect;
+use crate::session::command::{Aim, Effect};
 use crate::session::evidence::EvidenceState;
 use crate::session::fit::{Fit, FitStatus};
 use crate::session::history::History;
@@ -20,6 +20,7 @@ const KEPT_FIT_BYTES: usize = 4 << 20;
 impl Session {
     pub(super) fn open(&mut self, path: PathBuf) -> Vec<Effect> {
         self.data.bare = None;
+        self.aim = Aim::default();
         self.data.opening = Some(opening(path.clone()));
         vec![Effect::Open(path)]
     }
@@ -64,6 +65,7 @@ impl Session {
         self.data.dataset = Some(Arc::clone(&dataset));
         self.joint = None;
         effects.push(Effect::UseDataset(Arc::clone(&dataset)));
+        let start = self.aimed(&dataset).unwrap_or(start);
         let (start, pins) = self.restore(&dataset).unwrap_or((start, Vec::new()));
         effects.extend(pins);
         self.data.frame_index = start;
@@ -71,6 +73,18 @@ impl Session {
         effects.extend(self.open_labels());
         effects.extend(self.begin_strata());
         effects
+    }
+
+    /// The frame that was asked for by name or index.
+    fn aimed(&mut self, dataset: &Dataset) -> Option<usize> {
+        let wanted = self.aim.frame.take()?;
+        let index = wanted.parse().ok().filter(|&index: &usize| index < dataset.len());
+        let found = index.or_else(|| (0..dataset.len()).find(|&index| dataset.frame_name(index) == wanted));
+        if found.is_none() {
+            let text = format!("no frame {wanted}: expected a name, or an index from 0 to {}", dataset.len() - 1);
+            self.note(LogLevel::Error, text);
+        }
+        found
     }
 
     pub(super) fn remember(&mut self, path: PathBuf) {

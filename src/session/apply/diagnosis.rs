@@ -125,7 +125,10 @@ impl Session {
 
 /// Hashes of parameters (little-endian doubles) and settings (their TOML): the first 16 hexadecimal digits of SHA-256.
 pub(super) fn hashes(params: &Pppr, config: &FitConfig, iteration: usize) -> FitHashes {
-    let text = |hash: Sha256| hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+    let text = |hash: Sha256| {
+        let digest: [u8; 32] = hash.finalize().into();
+        format!("{:016x}", digest.first_chunk().map_or(0, |first| u64::from_be_bytes(*first)))
+    };
     let mut fit = Sha256::new();
     for x in Group::ALL.iter().flat_map(|&group| params.group(group)) {
         fit.update(x.to_le_bytes());

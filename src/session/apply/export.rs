@@ -21,13 +21,10 @@ impl Session {
             Export::LabelsJson => self.labels_task(path, true),
             Export::Strata => self.strata_task(path),
         };
-        match task {
-            Some(task) => vec![Effect::Run(task)],
-            None => {
-                self.note(LogLevel::Error, format!("{}: there is nothing to export yet", what.title()));
-                Vec::new()
-            }
+        if task.is_none() {
+            self.note(LogLevel::Error, format!("{}: there is nothing to export yet", what.title()));
         }
+        task.map(Effect::Run).into_iter().collect()
     }
 
     /// Every branch of the fit on screen, iteration by iteration.

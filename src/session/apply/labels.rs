@@ -131,7 +131,7 @@ impl Session {
         let Some(act) = self.labels.undo.last().cloned() else { return Vec::new() };
         let changes =
             act.changes.iter().map(|(id, before, after)| (id.index, Change::between(after, before))).collect();
-        self.again(ActKind::Undo, act.name, changes)
+        self.again(ActKind::Undo, &act.name, changes)
     }
 
     pub(super) fn redo(&mut self) -> Vec<Effect> {
@@ -141,11 +141,11 @@ impl Session {
         let Some(act) = self.labels.redo.last().cloned() else { return Vec::new() };
         let changes =
             act.changes.iter().map(|(id, before, after)| (id.index, Change::between(before, after))).collect();
-        self.again(ActKind::Redo, act.name, changes)
+        self.again(ActKind::Redo, &act.name, changes)
     }
 
-    fn again(&mut self, kind: ActKind, name: String, changes: Vec<(usize, Change)>) -> Vec<Effect> {
-        let effects = self.commit_each(kind, name.clone(), changes);
+    fn again(&mut self, kind: ActKind, name: &str, changes: Vec<(usize, Change)>) -> Vec<Effect> {
+        let effects = self.commit_each(kind, name.to_owned(), changes);
         if effects.is_empty() {
             self.labels.forget(kind);
             self.hint(format!("“{name}” is gone already: another window changed the same labels"));

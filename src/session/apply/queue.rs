@@ -42,39 +42,33 @@ impl Session {
 
     /// Along the queue: the next row, in the order of the list.
     pub(super) fn step_queue(&mut self, by: isize) -> Vec<Effect> {
-        match self.queue.step(self.data.frame_index, by) {
-            Some(frame) => self.goto_frame(frame),
-            None => {
-                let end = if by > 0 { "end" } else { "beginning" };
-                self.hint(format!("this is the {end} of the queue: {}", self.queue_words()));
-                Vec::new()
-            }
+        if let Some(frame) = self.queue.step(self.data.frame_index, by) {
+            return self.goto_frame(frame);
         }
+        let end = if by > 0 { "end" } else { "beginning" };
+        self.hint(format!("this is the {end} of the queue: {}", self.queue_words()));
+        Vec::new()
     }
 
     /// Along time: the next frame that matches, in the order of the data set.
     pub(super) fn step_frames(&mut self, by: isize) -> Vec<Effect> {
-        match self.queue.step_in_time(self.data.frame_index, by) {
-            Some(frame) => self.goto_frame(frame),
-            None => {
-                if self.data.playing {
-                    self.data.playing = false;
-                } else if !self.queue.rule.is_empty() {
-                    self.hint(format!("no frame further that way: {}", self.queue_words()));
-                }
-                Vec::new()
-            }
+        if let Some(frame) = self.queue.step_in_time(self.data.frame_index, by) {
+            return self.goto_frame(frame);
         }
+        if self.data.playing {
+            self.data.playing = false;
+        } else if !self.queue.rule.is_empty() {
+            self.hint(format!("no frame further that way: {}", self.queue_words()));
+        }
+        Vec::new()
     }
 
     pub(super) fn next_untagged(&mut self) -> Vec<Effect> {
-        match self.queue.next_where(self.data.frame_index, |frame| !self.labels.is_judged(frame)) {
-            Some(frame) => self.goto_frame(frame),
-            None => {
-                self.hint(format!("no other frame is untagged: {}", self.queue_words()));
-                Vec::new()
-            }
+        if let Some(frame) = self.queue.next_where(self.data.frame_index, |frame| !self.labels.is_judged(frame)) {
+            return self.goto_frame(frame);
         }
+        self.hint(format!("no other frame is untagged: {}", self.queue_words()));
+        Vec::new()
     }
 
     pub(super) fn goto_last_edited(&mut self) -> Vec<Effect> {
@@ -136,6 +130,7 @@ impl Session {
             reason: summary.and_then(|s| s.reason.as_deref()),
             majpe_mm: summary.and_then(|s| s.majpe_mm),
             tags: visible.tags,
+            own_tags: mine.map(|record| record.label.tags).unwrap_or_default(),
             note: mine.map_or("", |record| record.label.note.as_str()),
             verdict: mine.and_then(|record| record.label.verdict),
             annotators: visible.annotators,

@@ -122,6 +122,9 @@ impl Session {
         if let Some(cursor) = self.fit.cursor.take() {
             return self.goto_iteration(cursor);
         }
+        if let Some(iteration) = self.aim.iteration.take().filter(|&iteration| iteration > self.fit.head()) {
+            return self.run_to(iteration);
+        }
         if self.view.run_on_open && self.fit.head() == 0 {
             return self.toggle_run();
         }

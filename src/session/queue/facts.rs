@@ -36,8 +36,10 @@ pub struct Facts<'a> {
     pub reason: Option<&'a str>,
     /// MAJPE, mm.
     pub majpe_mm: Option<f64>,
-    /// Tags that may be seen.
+    /// Tags that may be seen, by whomever.
     pub tags: Tags,
+    /// Those that the annotator gave.
+    pub own_tags: Tags,
     /// The annotator's note.
     pub note: &'a str,
     /// The annotator's verdict.
@@ -65,6 +67,7 @@ impl Default for Facts<'_> {
             reason: None,
             majpe_mm: None,
             tags: Tags::NONE,
+            own_tags: Tags::NONE,
             note: "",
             verdict: None,
             annotators: Vec::new(),

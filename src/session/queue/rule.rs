@@ -4,7 +4,8 @@
 //! A bare word is looked for in the frame's name. What a frame has no value for satisfies no comparison.
 
 use super::facts::{Facts, Number};
-use crate::labels::Tag;
+use crate::labels::{Tag, Verdict};
+use crate::study::complexity::Stratum;
 
 /// A parsed filter. The empty text matches every frame.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -131,11 +132,11 @@ impl Word {
         let is = |text: Option<&str>| text.is_some_and(|text| text.eq_ignore_ascii_case(value));
         let yes = matches!(value, "yes" | "true" | "1");
         match self {
-            Self::Stratum => is(facts.stratum.map(|stratum| stratum.word())),
+            Self::Stratum => is(facts.stratum.map(Stratum::word)),
             Self::Scene => contains(facts.scene, value),
             Self::Note => contains(facts.note, value),
             Self::By => facts.annotators.iter().any(|name| contains(name, value)),
-            Self::Verdict => is(facts.verdict.map(|verdict| verdict.code())),
+            Self::Verdict => is(facts.verdict.map(Verdict::code)),
             Self::Reason => facts.reason.is_some_and(|reason| contains(reason, value)),
             Self::Converged => facts.converged == Some(yes),
             Self::Fitted => facts.iterations.is_some() == yes,

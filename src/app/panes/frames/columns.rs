@@ -2,6 +2,7 @@
 
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::iou_color;
+use crate::labels::Verdict;
 use crate::session::{Facts, SortKey};
 use egui::{Align2, Color32, FontId, Painter, Rect, pos2};
 
@@ -120,7 +121,7 @@ pub(super) const COLUMNS: &[Column] = &[
         key: "tags",
         title: "Tags",
         name: "Tags",
-        tip: "Tags that have been given; in agreement mode only your own.",
+        tip: "Tags that have been given, those of others faint; in agreement mode only your own.",
         sort: SortKey::Tags,
         width: 52.0,
         right: false,
@@ -195,14 +196,22 @@ pub(super) fn cell(painter: &Painter, rect: Rect, column: &Column, facts: &Facts
             let mut x = rect.left();
             for tag in facts.tags.iter() {
                 let font = FontId::proportional(theme::CAPTION);
-                let text = painter.text(pos2(x, y), Align2::LEFT_CENTER, tag.code(), font, tokens.tag(tag));
+                let fade = if facts.own_tags.contains(tag) { 1.0 } else { 0.45 };
+                let color = tokens.tag(tag).gamma_multiply(fade);
+                let text = painter.text(pos2(x, y), Align2::LEFT_CENTER, tag.code(), font, color);
                 x = text.right() + 4.0;
             }
             if facts.tags.is_empty()
                 && let Some(verdict) = facts.verdict
             {
                 let font = FontId::proportional(theme::CAPTION);
-                painter.text(pos2(x, y), Align2::LEFT_CENTER, verdict.code(), font, tokens.dim);
+                let short = match verdict {
+                    Verdict::AnnotationError => "annot. err",
+                    Verdict::DetectionError => "detect. err",
+                    Verdict::BothIncorrect => "both err",
+                    Verdict::TrueNegative => "true neg.",
+                };
+                painter.text(pos2(x, y), Align2::LEFT_CENTER, short, font, tokens.dim);
             }
         }
         _ => {

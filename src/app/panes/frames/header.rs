@@ -13,7 +13,8 @@ use std::collections::BTreeSet;
 pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tokens) {
     filter(ui, shared, state, tokens);
     ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.spacing_mut().item_spacing.x = 2.0;
+        ui.spacing_mut().button_padding.x = 5.0;
         quick(ui, shared, state);
         views(ui, shared, state);
         column_menu(ui, shared);

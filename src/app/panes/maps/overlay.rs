@@ -11,6 +11,7 @@ use crate::radar::{Axis, AxisKind, View};
 use crate::session::Session;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, pos2, vec2};
 
+#[expect(clippy::too_many_arguments, reason = "where it is drawn, and what the title tells")]
 /// Title line of a map: array, what it shows, IoU.
 pub(super) fn title(
     ui: &Ui,

@@ -24,20 +24,17 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
         ui.label(RichText::new(text).small().color(tokens.dim));
         return;
     }
-    match session.evidence_of(session.data.frame_index) {
-        Some(cards) => {
-            for card in cards {
-                one(ui, shared, card, tokens);
-            }
+    if let Some(cards) = session.evidence_of(session.data.frame_index) {
+        for card in cards {
+            one(ui, shared, card, tokens);
         }
-        None => {
-            let text = match &session.fit.status {
-                FitStatus::Failed(why) => why.as_str(),
-                _ => "Gathered as soon as the frame has a fit that rests.",
-            };
-            ui.label(RichText::new(text).small().color(tokens.dim));
-        }
+        return;
     }
+    let text = match &session.fit.status {
+        FitStatus::Failed(why) => why.as_str(),
+        _ => "Gathered as soon as the frame has a fit that rests.",
+    };
+    ui.label(RichText::new(text).small().color(tokens.dim));
 }
 
 fn one(ui: &mut Ui, shared: &mut Shared<'_>, card: &Evidence, tokens: &Tokens) {

@@ -6,7 +6,7 @@ use super::{Shared, empty};
 use crate::app::commands::{AppAct, command, tooltip};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
-use crate::labels::{Tag, Verdict};
+use crate::labels::{CellRegion, Tag, Verdict};
 use crate::session::{Command, LabelMode, LabelStatus, Session};
 use egui::{RichText, Role, Ui, vec2};
 
@@ -15,6 +15,7 @@ use egui::{RichText, Role, Ui, vec2};
 pub(in crate::app) struct State {
     note: Option<(Vec<usize>, String)>,
     annotator: Option<String>,
+    region: Option<String>,
     focus_note: bool,
 }
 
@@ -43,7 +44,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             LabelMode::Explore | LabelMode::Agreement => tags(ui, shared, &tokens),
         }
         note(ui, shared, state);
-        details(ui, shared, &tokens);
+        details(ui, shared, state, &tokens);
         said(ui, shared.session, &tokens);
         cards::show(ui, shared, &tokens);
         ui.add_space(2.0);
@@ -91,7 +92,7 @@ fn tags(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
     let on: Vec<bool> = Tag::ALL.iter().map(|&tag| has(tag)).collect();
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(3.0, 4.0);
-        ui.spacing_mut().button_padding.x = 5.0;
+        ui.spacing_mut().button_padding.x = 3.0;
         for (tag, on) in Tag::ALL.into_iter().zip(on) {
             tag_chip(ui, shared, tag, on, tokens);
         }
@@ -110,7 +111,7 @@ fn tag_chip(ui: &mut Ui, shared: &mut Shared<'_>, tag: Tag, on: bool, tokens: &T
     let button = egui::Button::new(text)
         .fill(if on { color } else { tokens.raised })
         .stroke(egui::Stroke::new(1.0, if on { color } else { tokens.stroke }))
-        .min_size(vec2(38.0, 24.0));
+        .min_size(vec2(36.0, 24.0));
     let response = ui.add(button);
     let name = format!("Tag {tag}");
     response.widget_info(|| egui::WidgetInfo::selected(Role::CheckBox, true, on, &name));
@@ -188,7 +189,7 @@ fn note(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
 }
 
 /// Person and region of the frame on screen.
-fn details(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
+fn details(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tokens) {
     let label = shared.session.labels.label(shared.session.data.frame_index);
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new("Person").small().color(tokens.dim));
@@ -204,25 +205,59 @@ fn details(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
         });
         menu.response.named(Role::ComboBox, "Person").on_hover_text("The person that the tags are about, from 0.");
         let tip = command("Mark cells").map(tooltip).unwrap_or_default();
-        match &label.region {
-            Some(region) => {
-                let shown =
-                    ui.link(RichText::new(region.to_string()).small()).on_hover_text("Show the cells on the map.");
-                if shown.clicked() {
-                    shared.show_region(region);
-                }
-                if ui.small_button("✕").named(Role::Button, "Unmark cells").on_hover_text("Unmark the cells.").clicked()
-                {
-                    shared.send(Command::SetRegion(None));
-                }
+        if ui.small_button("Mark cells").on_hover_text(tip).clicked() {
+            shared.app(AppAct::MarkCells);
+        }
+        if let Some(region) = &label.region {
+            if ui.small_button("Show").named(Role::Button, "Show marked cells").clicked() {
+                shared.show_region(region);
             }
-            None => {
-                if ui.small_button("Mark cells").on_hover_text(tip).clicked() {
-                    shared.app(AppAct::MarkCells);
-                }
+            if ui.small_button("✕").named(Role::Button, "Unmark cells").on_hover_text("Unmark the cells.").clicked() {
+                shared.send(Command::SetRegion(None));
             }
         }
     });
+    region(ui, shared, state, label.region.as_ref(), tokens);
+}
+
+/// The marked cells as text, which can be typed: without a mouse there is no other way.
+fn region(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, known: Option<&CellRegion>, tokens: &Tokens) {
+    let stored = known.map(ToString::to_string).unwrap_or_default();
+    let mut text = state.region.clone().unwrap_or_else(|| stored.clone());
+    let views = shared.session.data.dataset.as_ref().map_or(&[][..], |dataset| &dataset.info().views[..]);
+    let hint =
+        views.first().map_or_else(String::new, |view| format!("cells, for example {}[10..=20, 30..=42]", view.array));
+    let field = egui::TextEdit::singleline(&mut text).hint_text(hint).font(egui::FontId::proportional(theme::CAPTION));
+    let response = ui.add(field.desired_width(f32::INFINITY)).named(Role::TextInput, "Marked cells");
+    let wrong = || {
+        let region: CellRegion = text.parse().map_err(|why: String| why)?;
+        let view = views.iter().find(|view| view.array == region.view);
+        let view = view.ok_or_else(|| format!("no view is called {}", region.view))?;
+        let inside = region.lo.len() == view.axes.len()
+            && view.axes.iter().zip(&region.hi).all(|(axis, &hi)| hi < axis.bins)
+            && region.lo.iter().zip(&region.hi).all(|(lo, hi)| lo <= hi);
+        if inside { Ok(region) } else { Err(format!("{} has {:?} cells", view.array, view.shape())) }
+    };
+    let read = if text.trim().is_empty() { Ok(None) } else { wrong().map(Some) };
+    if let Err(why) = &read
+        && text != stored
+    {
+        ui.label(RichText::new(why).small().color(tokens.bad));
+    }
+    let escape = ui.input(|i| i.key_pressed(egui::Key::Escape));
+    if response.lost_focus() {
+        state.region = None;
+        if let (Ok(region), false) = (read, escape)
+            && text != stored
+        {
+            shared.send(Command::SetRegion(region));
+        }
+    } else {
+        state.region = response.has_focus().then_some(text);
+    }
+    response.on_hover_text(
+        "The cells that your label is about: drag a box on a map (key G), or type them. Empty for none.",
+    );
 }
 
 /// What was judged, and what others say.
