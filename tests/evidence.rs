@@ -377,10 +377,7 @@ fn f3_of_one_person_asks_the_labels() {
     assert_eq!(boxed.score, Some(0.5), "half of the smaller box is common");
     let place = Place::Cells { view: 0, lo: vec![10, 10], hi: vec![25, 20] };
     assert_eq!(boxed.findings[0].place, Some(place));
-    assert!(has(
-        boxed,
-        "2 by its count of people, 2 by the boxes on hori, 1 by the boxes on vert, 2 in the camera"
-    ));
+    assert!(has(boxed, "2 by its count of people, 2 by the boxes on hori, 1 by the boxes on vert, 2 in the camera"));
 }
 
 /// A person who moves radially at `mps`, seen by a Doppler view.

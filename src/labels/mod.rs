@@ -24,7 +24,7 @@ mod tail;
 
 pub use acts::{place_acts, read_acts, read_labels};
 pub use agreement::{
-    Agreement, Dispute, MachineAgreement, against_machine, agreement, judged, judged_in_acts, standing,
+    Agreement, Dispute, MachineAgreement, against_machine, agreement, compare_tags, judged, judged_in_acts, standing,
 };
 pub use error::LabelError;
 pub use import::{ImportPlan, plan_import};

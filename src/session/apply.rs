@@ -67,7 +67,9 @@ impl Session {
                 Vec::new()
             }
             Command::SelectFrames(frames) => {
-                self.labels.selection = frames.into_iter().filter(|&frame| frame < self.data.len()).collect();
+                let mut frames = frames;
+                frames.split_off(&self.data.len());
+                self.labels.select(frames);
                 Vec::new()
             }
             Command::ToggleTag(tag) => self.toggle_tag(tag),

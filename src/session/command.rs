@@ -1,8 +1,9 @@
 //! What can be asked of a session, and what it asks of the outside.
 
+use super::acts::{ActKind, Asked, Done};
 use super::evidence::EvidenceRequest;
 use super::file::SessionFile;
-use super::labels::{ActKind, LabelTable};
+use super::labels::LabelTable;
 use super::pins::Pin;
 use super::queue::Sort;
 use super::view::ViewState;
@@ -10,11 +11,11 @@ use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::{BareChoice, Dataset, DatasetError, Frame};
 use crate::diagnose::Evidence;
-use crate::labels::{CellRegion, Change, FrameId, Judged, Label, LabelPlace, Record, Tag, Verdict};
+use crate::labels::{CellRegion, Judged, LabelPlace, Tag, Verdict};
 use crate::mhp::Precision;
 use crate::study::complexity::Complexity;
 use crate::worker::{Snapshot, WorkerCommand, WorkerMessage};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -92,7 +93,7 @@ pub enum Command {
     /// Somebody else labels.
     SetAnnotator(String),
     /// Report: the journals were read.
-    LabelsOpened(Result<(LabelPlace, LabelTable, Vec<String>), String>),
+    LabelsOpened(Result<Box<OpenedLabels>, String>),
     /// Report: an act was written, or not.
     LabelsWritten(Written),
     /// Report: others wrote.
@@ -254,8 +255,46 @@ pub struct Commit {
     pub kind: ActKind,
     /// In words.
     pub act: String,
-    /// The change of each frame, and the fit that was judged.
-    pub changes: Vec<(FrameId, Change, Judged)>,
+    /// To name the frames.
+    pub dataset: Arc<Dataset>,
+    /// What is asked of which frames.
+    pub asked: Asked,
+    /// The fits that were judged, of the frames that have one.
+    pub judged: BTreeMap<usize, Judged>,
+}
+
+/// What was found when the journals were opened.
+#[derive(Debug)]
+pub struct OpenedLabels {
+    /// Where they are.
+    pub place: LabelPlace,
+    /// Everybody's labels.
+    pub table: LabelTable,
+    /// The frame that the annotator labelled last.
+    pub last_edited: Option<usize>,
+    /// What had to be skipped.
+    pub warnings: Vec<String>,
+}
+
+/// Something large that is not needed any more: freeing a hundred thousand records takes longer than a pass may.
+pub struct Trash(Box<dyn std::any::Any + Send>);
+
+impl Trash {
+    /// Of anything.
+    pub(super) fn new(what: impl Send + 'static) -> Self {
+        Self(Box::new(what))
+    }
+
+    /// Frees it, here and now.
+    pub(super) fn free(self) {
+        drop(self.0);
+    }
+}
+
+impl std::fmt::Debug for Trash {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Trash")
+    }
 }
 
 /// The journal's answer to a [`Commit`].
@@ -267,8 +306,8 @@ pub struct Written {
     pub kind: ActKind,
     /// That of the commit.
     pub act: String,
-    /// Frame, label before, record after; or why nothing was written.
-    pub result: Result<Vec<(FrameId, Label, Record)>, String>,
+    /// What was written, or why nothing was.
+    pub result: Result<Done, String>,
 }
 
 /// What the session asks of the outside.
@@ -316,4 +355,6 @@ pub enum Effect {
     DrawPin(Box<PinRequest>),
     /// Gather evidence.
     Evidence(Box<EvidenceRequest>),
+    /// Free this on a thread.
+    Free(Trash),
 }

@@ -4,6 +4,7 @@
 //! thread, no window and no GPU, so every behaviour of the window can be tested without one. Panes read the session and
 //! send commands; threads report back by commands too.
 
+mod acts;
 mod apply;
 mod command;
 mod evidence;
@@ -13,19 +14,22 @@ mod history;
 mod labels;
 mod pins;
 mod queue;
+mod records;
 mod runtime;
 mod state;
 mod strata;
 mod view;
 
-pub use command::{Command, Commit, Effect, Export, PickKind, PinRequest, Task, Written};
+pub use acts::{Act, ActKind, Asked, Changes, Done};
+pub use command::{Command, Commit, Effect, Export, OpenedLabels, PickKind, PinRequest, Task, Trash, Written};
 pub use evidence::EvidenceRequest;
 pub use file::{SavedDataset, SavedFit, SavedFrame, SavedPin, SessionFile, SessionFileError};
 pub use fit::{Fit, FitStatus};
 pub use history::{Branch, Flag, History, Row, difference};
-pub use labels::{Act, ActKind, LabelMode, LabelStatus, LabelTable, Labels, Visible};
+pub use labels::{LabelMode, LabelStatus, LabelTable, Labels};
 pub use pins::{MOST_PINS, Pin, PinRow, Pins, numbers};
-pub use queue::{Facts, Number, Queue, Rule, SYNTAX, SavedView, Sort, SortKey};
+pub use queue::{Facts, Number, Queue, Reads, Rule, SYNTAX, SavedView, Sort, SortKey};
+pub use records::Records;
 pub use runtime::{Picker, Runtime, Wake};
 pub use state::{Data, FitHashes, FrameSummary, LogLevel, LogLine, Opening, Session};
 pub use strata::{Strata, StrataStatus};

@@ -134,6 +134,8 @@ pub struct Session {
     pub(super) left: VecDeque<usize>,
     /// One line a fitted frame.
     pub summaries: BTreeMap<usize, FrameSummary>,
+    /// Counts up with every change of them.
+    pub(super) summarised: u64,
     /// The frame list.
     pub queue: Queue,
     /// The list must be filled again.
@@ -167,4 +169,11 @@ pub struct Session {
     /// What a session file says of the window, for the window to take.
     pub(super) restored_window: Option<serde_json::Value>,
     pub(super) jobs: JobId,
+}
+
+impl Session {
+    /// Counts up with every change of [`Self::summaries`].
+    pub fn summaries_revision(&self) -> u64 {
+        self.summarised
+    }
 }

@@ -14,7 +14,7 @@ fn fitted(s: &Session) -> bool {
 }
 
 fn labelled(s: &Session) -> bool {
-    s.labels.table().values().any(|records| records.values().any(|record| !record.label.is_empty()))
+    s.labels.table().values().any(|records| !records.is_empty())
 }
 
 /// Commands about comparing and sharing, in the order of their menus.

@@ -56,6 +56,7 @@ impl Session {
         self.fits.clear();
         self.left.clear();
         self.summaries.clear();
+        self.summarised += 1;
         self.pins = Pins::default();
         self.data.frame = None;
         self.data.playing = false;

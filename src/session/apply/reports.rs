@@ -36,6 +36,7 @@ impl Session {
 
     pub(super) fn summarise(&mut self) {
         let Some(row) = self.fit.branch().and_then(|branch| branch.rows.last()) else { return };
+        self.summarised += 1;
         if row.report.iteration == 0 {
             self.summaries.remove(&self.fit.frame);
             self.stale = true;
@@ -144,6 +145,7 @@ impl Session {
         {
             summary.loss = snapshot.evaluation.loss;
             summary.iou = mean_known(&snapshot.evaluation.iou);
+            self.summarised += 1;
         }
         if wanted {
             self.fit.shown = Some(Arc::new(snapshot));

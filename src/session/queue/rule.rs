@@ -3,7 +3,7 @@
 //! Terms are separated by spaces and must all hold; a `-` before a term negates it; `a|b` after a colon means either.
 //! A bare word is looked for in the frame's name. What a frame has no value for satisfies no comparison.
 
-use super::facts::{Facts, Number};
+use super::facts::{Facts, Number, Reads};
 use crate::labels::Tag;
 
 /// A parsed filter. The empty text matches every frame.
@@ -85,6 +85,11 @@ impl Rule {
         self.terms.is_empty()
     }
 
+    /// Which facts the answer depends on.
+    pub fn reads(&self) -> Reads {
+        self.terms.iter().fold(Reads::default(), |reads, term| reads.or(term.test.reads()))
+    }
+
     /// True where the answer depends on fits, which change while one runs.
     pub fn reads_fits(&self) -> bool {
         self.terms.iter().any(|term| match &term.test {
@@ -101,6 +106,22 @@ impl Rule {
 }
 
 impl Test {
+    fn reads(&self) -> Reads {
+        let none = Reads::default();
+        match self {
+            Self::Name(_) => Reads { name: true, ..none },
+            Self::Tags { .. } => Reads { tags: true, ..none },
+            Self::Compare(number, ..) => number.reads(),
+            Self::Word(word, _) => match word {
+                Word::Stratum | Word::Readable => Reads { strata: true, ..none },
+                Word::Scene => Reads { scene: true, ..none },
+                Word::Note | Word::Verdict => Reads { said: true, ..none },
+                Word::By => Reads { annotators: true, ..none },
+                Word::Reason | Word::Converged | Word::Fitted => Reads { fit: true, ..none },
+            },
+        }
+    }
+
     fn holds(&self, facts: &Facts<'_>) -> bool {
         match self {
             Self::Name(part) => contains(facts.name, part),

@@ -13,10 +13,14 @@ use egui::{RichText, Role, Ui, vec2};
 /// What the pane remembers: fields while they are typed in.
 #[derive(Default)]
 pub(in crate::app) struct State {
-    note: Option<(Vec<usize>, String)>,
+    /// What is being typed, and for which frames: the one on screen, the selection, and how often that changed.
+    note: Option<(NoteFor, String)>,
     annotator: Option<String>,
     focus_note: bool,
 }
+
+/// Frame on screen, or the state of the selection.
+type NoteFor = Result<usize, u64>;
 
 impl State {
     /// Puts the text cursor into the note.
@@ -80,20 +84,13 @@ fn targets(ui: &mut Ui, shared: &Shared<'_>, tokens: &Tokens) {
     }
 }
 
-/// Tags that every target has.
-fn common(session: &Session) -> impl Fn(Tag) -> bool + '_ {
-    let targets = session.label_targets();
-    move |tag| !targets.is_empty() && targets.iter().all(|&frame| session.labels.label(frame).tags.contains(tag))
-}
-
 fn tags(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
-    let has = common(shared.session);
-    let on: Vec<bool> = Tag::ALL.iter().map(|&tag| has(tag)).collect();
+    let common = shared.session.labels.common_tags(&shared.session.label_targets());
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(3.0, 4.0);
         ui.spacing_mut().button_padding.x = 5.0;
-        for (tag, on) in Tag::ALL.into_iter().zip(on) {
-            tag_chip(ui, shared, tag, on, tokens);
+        for tag in Tag::ALL {
+            tag_chip(ui, shared, tag, common.contains(tag), tokens);
         }
     });
 }
@@ -149,11 +146,13 @@ fn verdicts(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
 
 /// The note is written when the field is left; Escape takes back what was typed.
 fn note(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
-    let targets = shared.session.label_targets();
-    let stored = || targets.first().map_or_else(String::new, |&frame| shared.session.labels.label(frame).note);
+    let session = shared.session;
+    let first = session.labels.selection.first().copied();
+    let targets = if first.is_some() { Err(session.labels.selection_revision) } else { Ok(session.data.frame_index) };
+    let stored = || session.labels.label(first.unwrap_or(session.data.frame_index)).note;
     // What was being typed for another frame belongs to that frame and was sent when the field lost it.
     let mut text = match &state.note {
-        Some((frames, typed)) if *frames == targets => typed.clone(),
+        Some((typed_for, typed)) if *typed_for == targets => typed.clone(),
         _ => stored(),
     };
     let field = egui::TextEdit::multiline(&mut text)
