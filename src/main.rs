@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use mhp_inspector::cli::{Cli, EXIT_BAD_INPUT, run};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -15,7 +16,7 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let done = match cli.command {
         Some(command) => run(command),
-        None => open_window(cli.paths),
+        None => open_window(cli.paths, cli.results),
     };
     done.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");
@@ -24,11 +25,11 @@ fn main() -> ExitCode {
 }
 
 #[cfg(feature = "viewer")]
-fn open_window(paths: Vec<std::path::PathBuf>) -> anyhow::Result<ExitCode> {
-    mhp_inspector::app::run(paths).map(|()| ExitCode::SUCCESS)
+fn open_window(paths: Vec<PathBuf>, results: Option<PathBuf>) -> anyhow::Result<ExitCode> {
+    mhp_inspector::app::run(paths, results).map(|()| ExitCode::SUCCESS)
 }
 
 #[cfg(not(feature = "viewer"))]
-fn open_window(_: Vec<std::path::PathBuf>) -> anyhow::Result<ExitCode> {
+fn open_window(_: Vec<PathBuf>, _: Option<PathBuf>) -> anyhow::Result<ExitCode> {
     anyhow::bail!("this build has no window (it was made without the feature `viewer`); try --help")
 }

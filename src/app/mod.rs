@@ -133,6 +133,7 @@ impl InspectorApp {
             AppAct::Save(kind) => self.ask_save(kind),
             AppAct::SaveSession => self.save_session_again(ctx),
             AppAct::OpenSession => self.overlay.open_session(),
+            AppAct::LoadResults => self.overlay.load_results(),
             AppAct::CopyPicture => self.copy_picture(ctx),
             AppAct::CopyPath => self.copy_path(ctx),
             AppAct::FocusFilter => self.panes.frames.focus_filter(),
@@ -154,7 +155,7 @@ impl InspectorApp {
         self.apply(Command::SetView(Box::new(view)));
     }
 
-    /// Files dropped on the window.
+    /// Files dropped on the window: a table is results, anything else a data set.
     fn take_drops(&mut self, ctx: &egui::Context) {
         let dropped = ctx.input(|i| {
             i.raw
@@ -165,7 +166,8 @@ impl InspectorApp {
         if dropped != self.dropped
             && let Some(path) = dropped.clone()
         {
-            self.apply(Command::Open(path));
+            let table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
+            self.apply(if table { Command::LoadResults(path) } else { Command::Open(path) });
         }
         self.dropped = dropped;
     }
@@ -255,11 +257,11 @@ impl eframe::App for InspectorApp {
     }
 }
 
-/// Opens the window and returns when it is closed.
+/// Opens the window, with a table of results of the first data set where there is one, and returns when it is closed.
 ///
 /// # Errors
 /// Where there is no display or no graphics adapter.
-pub fn run(paths: Vec<PathBuf>) -> anyhow::Result<()> {
+pub fn run(paths: Vec<PathBuf>, results: Option<PathBuf>) -> anyhow::Result<()> {
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_app_id(APP_ID)
@@ -270,6 +272,16 @@ pub fn run(paths: Vec<PathBuf>) -> anyhow::Result<()> {
         renderer: eframe::Renderer::Wgpu,
         ..Default::default()
     };
-    eframe::run_native(APP_ID, options, Box::new(move |cc| Ok(Box::new(InspectorApp::new(cc, &paths)))))
-        .map_err(|error| anyhow::anyhow!("the window cannot be opened: {error}"))
+    eframe::run_native(
+        APP_ID,
+        options,
+        Box::new(move |cc| {
+            let mut app = InspectorApp::new(cc, &paths);
+            if let Some(results) = results {
+                app.apply(Command::LoadResults(results));
+            }
+            Ok(Box::new(app))
+        }),
+    )
+    .map_err(|error| anyhow::anyhow!("the window cannot be opened: {error}"))
 }

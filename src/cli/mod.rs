@@ -47,6 +47,9 @@ pub struct Cli {
     /// Data sets or files to open in the window: an MMVR tree or any folder inside one, a `*_radar.npz`, a folder with
     /// `dataset.toml`, or an `.npy`/`.npz` of maps. Without one, the bundled sample opens.
     pub paths: Vec<PathBuf>,
+    /// Take the results of a batch into the frame list: the `summary.csv` that `fit --out` wrote.
+    #[arg(long, value_name = "FILE")]
+    pub results: Option<PathBuf>,
 }
 
 /// The subcommands; everything the window does, one of them can do headless.

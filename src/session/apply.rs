@@ -13,6 +13,7 @@ mod pins;
 mod queue;
 mod reports;
 mod restore;
+mod results;
 
 pub(super) use reports::mean_known;
 
@@ -147,6 +148,8 @@ impl Session {
             Command::SaveSession(path, window) => self.save_session(path, window),
             Command::OpenSession(path) => vec![Effect::ReadSession(path)],
             Command::SessionRead(path, result) => self.session_read(path, result),
+            Command::LoadResults(path) => self.load_results(path),
+            Command::ResultsRead(path, result) => self.results_read(&path, result),
             Command::TaskDone(result) => self.task_done(result),
             Command::RunTask(task) => vec![Effect::Run(task)],
             Command::Log(level, text) => {

@@ -6,6 +6,7 @@ use super::file::SessionFile;
 use super::labels::LabelTable;
 use super::pins::Pin;
 use super::queue::Sort;
+use super::results::FoundResults;
 use super::view::ViewState;
 use crate::body::Pppr;
 use crate::config::FitConfig;
@@ -169,6 +170,10 @@ pub enum Command {
     OpenSession(PathBuf),
     /// Report: a session file was read.
     SessionRead(PathBuf, Result<Box<SessionFile>, String>),
+    /// Take the results of a batch, a table that `fit --out` wrote, into the frame list.
+    LoadResults(PathBuf),
+    /// Report: such a table was read and its frames were found in the data set, or not.
+    ResultsRead(PathBuf, Result<Box<FoundResults>, String>),
     /// Report: something was written, or not.
     TaskDone(Result<String, String>),
     /// Write a picture that the window drew.
@@ -351,6 +356,8 @@ pub enum Effect {
     Run(Task),
     /// Read a session file on a thread.
     ReadSession(PathBuf),
+    /// Read a table of results on a thread, and find its frames in this data set.
+    ReadResults(PathBuf, Arc<Dataset>),
     /// Compute the maps of a pinned fit on a thread.
     DrawPin(Box<PinRequest>),
     /// Gather evidence.

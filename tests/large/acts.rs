@@ -279,7 +279,33 @@ impl Window {
         self.apply(Command::SetFilter(String::new()));
     }
 
-    fn results(&mut self, _tree: &Path) {
-        self.repeat("idle at the end", 60, |_, _| {});
+    /// A table with a row for every frame, as `fit --out` writes it.
+    fn results(&mut self, tree: &Path) {
+        let dataset = self.session().data.dataset.clone().unwrap();
+        let mut text = "frame,iterations,converged,reason,loss,iou_hm_hori,iou_hm_vert,majpe_mm\n".to_owned();
+        for index in 0..dataset.len() {
+            let iou = (index % 997) as f64 / 997.0;
+            let (name, yes) = (dataset.frame_name(index), index % 3 == 0);
+            text += &format!("{name},40,{yes},iterations,{},{iou},{iou},{}\n", 5.0 - iou, 900.0 - iou * 800.0);
+        }
+        let table = tree.join("../summary.csv");
+        std::fs::write(&table, text).unwrap();
+        let all = |s: &Session| s.summaries.len() == s.data.len();
+        self.measured("loading results of every frame", all, Some(Command::LoadResults(table.clone())));
+        self.repeat("idle, every frame with a result", 60, |_, _| {});
+        for rule in ["iou<0.5", "stratum:hard iou<0.5 converged:no -tag:F1 00042"] {
+            let name = format!("filter: {rule}");
+            self.measured(&name, |s| s.queue.text == rule, Some(Command::SetFilter(rule.into())));
+        }
+        self.apply(Command::SetFilter(String::new()));
+        for key in [SortKey::Iou, SortKey::Converged, SortKey::Majpe] {
+            let sort = Sort { key, descending: true };
+            self.measured(&format!("sorting {sort:?}"), |s| s.view.sort == sort, Some(Command::SetSort(sort)));
+        }
+        let before = self.session().summaries_revision();
+        let again = |s: &Session| s.summaries_revision() > before;
+        self.measured("loading them again, sorted by MAJPE", again, Some(Command::LoadResults(table)));
+        self.strips();
+        self.scroll();
     }
 }

@@ -95,6 +95,8 @@ pub(crate) enum AppAct {
     SaveSession,
     /// Type the path of a session file.
     OpenSession,
+    /// Type the path of a table of results.
+    LoadResults,
     /// Put the picture of the window on the clipboard.
     CopyPicture,
     /// Put the frame's path on the clipboard.

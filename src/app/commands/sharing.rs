@@ -29,6 +29,15 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         act: |_| Act::App(AppAct::OpenSession),
     },
     UserCommand {
+        label: "Load results…",
+        title: None,
+        tooltip: "Take IoU, convergence, reason and MAJPE of a whole batch into the list: the summary.csv of `fit --out`.",
+        menu: Menu::File,
+        keys: &[],
+        enabled: |s| s.data.dataset.is_some(),
+        act: |_| Act::App(AppAct::LoadResults),
+    },
+    UserCommand {
         label: "Save session",
         title: None,
         tooltip: "Write frame, iteration, camera, pins and layout to the session file; asks where the first time.",

@@ -141,9 +141,9 @@ impl Session {
             && let Some(summary) = self.summaries.get(&index)
         {
             facts.iou = summary.iou;
-            facts.loss = Some(summary.loss);
-            facts.iterations = Some(summary.iterations);
-            facts.converged = Some(summary.converged);
+            facts.loss = summary.loss;
+            facts.iterations = summary.iterations;
+            facts.converged = summary.converged;
             facts.reason = summary.reason.as_deref();
             facts.majpe_mm = summary.majpe_mm;
         }

@@ -38,8 +38,7 @@ impl Session {
         let Some(row) = self.fit.branch().and_then(|branch| branch.rows.last()) else { return };
         self.summarised += 1;
         if row.report.iteration == 0 {
-            self.summaries.remove(&self.fit.frame);
-            self.stale = true;
+            self.forget_summary(self.fit.frame);
             return;
         }
         let hashes = row.state.as_ref().map(|state| {
@@ -49,13 +48,22 @@ impl Session {
         let summary = FrameSummary {
             reason: self.fit.reason.map(str::to_owned),
             hashes,
-            iterations: row.report.iteration,
-            loss: row.report.loss,
+            iterations: Some(row.report.iteration),
+            loss: Some(row.report.loss),
             iou: mean_known(&row.report.iou),
-            converged: row.report.converged,
+            converged: Some(row.report.converged),
             majpe_mm: row.majpe_mm,
         };
         self.summaries.insert(self.fit.frame, summary);
+        self.stale = true;
+    }
+
+    /// Forgets what a fit in this session said of a frame; what a table of results says of it stays.
+    pub(super) fn forget_summary(&mut self, frame: usize) {
+        if self.summaries.get(&frame).is_some_and(|summary| summary.hashes.is_some()) {
+            self.summaries.remove(&frame);
+        }
+        self.summarised += 1;
         self.stale = true;
     }
 
@@ -143,7 +151,7 @@ impl Session {
             && snapshot.iteration == self.fit.head()
             && let Some(summary) = self.summaries.get_mut(&self.fit.frame)
         {
-            summary.loss = snapshot.evaluation.loss;
+            summary.loss = Some(snapshot.evaluation.loss);
             summary.iou = mean_known(&snapshot.evaluation.iou);
             self.summarised += 1;
         }

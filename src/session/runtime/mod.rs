@@ -5,6 +5,7 @@ mod labels;
 
 use super::command::{Command, Effect, PickKind, Trash};
 use super::file::SessionFile;
+use super::results::FoundResults;
 use super::state::{LogLevel, Session};
 use super::strata::StrataStatus;
 use crate::dataset::{Dataset, Loader, OpenJob};
@@ -167,6 +168,10 @@ impl Runtime {
             Effect::ReadSession(path) => self.on_thread("session-file", move || {
                 let read = SessionFile::read(&path).map(Box::new).map_err(|error| error.to_string());
                 Command::SessionRead(path, read)
+            }),
+            Effect::ReadResults(path, dataset) => self.on_thread("results", move || {
+                let read = FoundResults::read(&path, &dataset).map(Box::new);
+                Command::ResultsRead(path, read)
             }),
             Effect::Send(command) => {
                 if let Some(worker) = &self.worker {
