@@ -4,7 +4,7 @@
 //! once, so that a frame costs eight bytes and the window's thread never touches a label of them.
 
 use crate::labels::{Change, Label, Record, Tags};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 /// Why a commit was asked for.
@@ -166,6 +166,8 @@ pub struct Done {
     pub changes: Changes,
     /// The records, one a frame of `changes`, in the same order.
     pub records: Vec<Arc<Record>>,
+    /// The frames whose records have the machine's scores.
+    pub scored: BTreeSet<usize>,
 }
 
 #[cfg(test)]

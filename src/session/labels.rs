@@ -213,12 +213,12 @@ impl Labels {
 
     /// Takes in what a commit wrote; gives the records that were replaced.
     pub(super) fn written(&mut self, kind: ActKind, name: String, done: Done) -> Vec<Arc<Record>> {
-        let Done { changes, records } = done;
+        let Done { changes, records, scored } = done;
         let mine = self.table.entry(self.annotator.clone()).or_default();
         let mut replaced = Vec::new();
         for ((frame, _, after), record) in changes.iter().zip(records) {
             self.last_edited = Some(frame);
-            replaced.extend(mine.insert(frame, record, after));
+            replaced.extend(mine.insert(frame, record, after, scored.contains(&frame)));
         }
         self.revision += 1;
         if !changes.is_empty() {

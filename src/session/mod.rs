@@ -3,6 +3,13 @@
 //! [`Session::apply`] takes a [`Command`] and answers [`Effect`]s, requests to the outside: open, load, run. It needs no
 //! thread, no window and no GPU, so every behaviour of the window can be tested without one. Panes read the session and
 //! send commands; threads report back by commands too.
+//!
+//! **Time.** A pass of the window has 16 ms of its thread, also on 100,000 frames. What takes longer is an [`Effect`]: it
+//! is done by a thread of the [`Runtime`] and comes back as a command. `tests/large.rs` measures it.
+//!
+//! **Memory.** A window on 100,000 frames, all of them labelled, graded and with results, takes less than 1 GiB besides
+//! the pictures: frames that were read up to 512 MiB ([`crate::dataset::DEFAULT_BUDGET`]), the states of one fit up to
+//! 128 MiB, what can be undone up to 64 MiB; a label takes about 1 KiB, a row of results 0.3 KiB, a frame's strata 0.1 KiB.
 
 mod acts;
 mod apply;

@@ -1,7 +1,7 @@
 //! One annotator's labels by frame.
 //!
-//! A slot a frame and, beside it, the two bytes that lists and strips ask for a hundred thousand times a pass: whether
-//! anything is said, and the tags. The records themselves are shared with the thread that keeps the journals.
+//! A slot a frame and, beside it, the bytes that lists and strips ask for a hundred thousand times a pass: whether
+//! anything is said, the tags, and whether the machine's scores are known. The records themselves are shared with the thread that keeps the journals.
 
 use crate::labels::{Label, Record, Tags};
 use std::sync::Arc;
@@ -11,6 +11,7 @@ use std::sync::Arc;
 struct Mark {
     said: bool,
     tags: Tags,
+    scored: bool,
 }
 
 /// The newest record of each frame by one annotator.
@@ -59,14 +60,26 @@ impl Records {
         self.said_tags().filter(move |&(frame, tags)| !tags.is_empty() || verdict(frame))
     }
 
-    /// Takes in a record whose label is `label`; gives the one that it replaces.
-    pub(super) fn insert(&mut self, frame: usize, record: Arc<Record>, label: &Label) -> Option<Arc<Record>> {
+    /// True where the machine's own scores were recorded with the label.
+    pub fn is_scored(&self, frame: usize) -> bool {
+        self.marks.get(frame).is_some_and(|mark| mark.scored)
+    }
+
+    /// Takes in a record whose label is `label`, with or without scores; gives the one that it replaces. The record is not
+    /// looked at: of a hundred thousand, that alone would take a pass.
+    pub(super) fn insert(
+        &mut self,
+        frame: usize,
+        record: Arc<Record>,
+        label: &Label,
+        scored: bool,
+    ) -> Option<Arc<Record>> {
         if self.slots.len() <= frame {
             self.slots.resize(frame + 1, None);
             self.marks.resize(frame + 1, Mark::default());
         }
         let (slot, mark) = (self.slots.get_mut(frame)?, self.marks.get_mut(frame)?);
-        let now = Mark { said: !label.is_empty(), tags: label.tags };
+        let now = Mark { said: !label.is_empty(), tags: label.tags, scored };
         self.said = self.said - usize::from(mark.said) + usize::from(now.said);
         *mark = now;
         slot.replace(record)
@@ -78,8 +91,8 @@ impl FromIterator<(usize, Arc<Record>)> for Records {
     fn from_iter<I: IntoIterator<Item = (usize, Arc<Record>)>>(records: I) -> Self {
         let mut all = Self::default();
         for (frame, record) in records {
-            let label = record.label.clone();
-            all.insert(frame, record, &label);
+            let (label, scored) = (record.label.clone(), !record.judged.machine.is_empty());
+            all.insert(frame, record, &label, scored);
         }
         all
     }

@@ -147,8 +147,10 @@ fn between(a: &Records, b: &Records) -> Found {
 
 /// One person and the machine's scores at that time.
 fn with_machine(a: &Records) -> Found {
-    let judged: Vec<(usize, &Record)> = a.judged().filter_map(|(frame, _)| Some((frame, a.get(frame)?))).collect();
+    let (scored, others): (Vec<_>, Vec<_>) = a.judged().map(|(frame, _)| frame).partition(|&frame| a.is_scored(frame));
+    let judged: Vec<(usize, &Record)> = scored.into_iter().filter_map(|frame| Some((frame, a.get(frame)?))).collect();
     let machine = against_machine(judged.iter().map(|(_, record)| *record), THRESHOLD);
+    let unscored = machine.unscored + others.len();
     let frames: HashMap<&str, usize> = if machine.agreement.disputes.is_empty() {
         HashMap::new()
     } else {
@@ -159,16 +161,16 @@ fn with_machine(a: &Records) -> Found {
     if machine.shown > 0 {
         remarks.push(format!("{} of {counted} were judged with the scores on screen: not blind", machine.shown));
     }
-    if machine.unscored > 0 {
-        remarks.push(format!("{} were judged without a score", machine.unscored));
+    if unscored > 0 {
+        remarks.push(format!("{unscored} were judged without a score"));
     }
     let place = |dispute: &crate::labels::Dispute| {
         Some(Dispute { frame: *frames.get(dispute.frame.as_str())?, tag: dispute.tag, a: dispute.a })
     };
     let disputes = machine.agreement.disputes.iter().filter_map(place).collect();
-    let crate::labels::Agreement { only_in_a, only_in_b, tags, pooled, .. } = machine.agreement;
+    let crate::labels::Agreement { only_in_b, tags, pooled, .. } = machine.agreement;
     let remark = (!remarks.is_empty()).then(|| remarks.join("; "));
-    Found { frames: counted, only_in_a, only_in_b, tags, pooled, disputes, remark }
+    Found { frames: counted, only_in_a: unscored, only_in_b, tags, pooled, disputes, remark }
 }
 
 fn summary(ui: &mut Ui, found: &Found, pair: &[String; 2], tokens: &Tokens) {

@@ -2,7 +2,7 @@
 
 use crate::session::command::Effect;
 use crate::session::queue::{Facts, Reads, SavedView, Sort};
-use crate::session::state::{LogLevel, Session};
+use crate::session::state::{FrameSummary, LogLevel, Session};
 
 impl Session {
     pub(super) fn set_filter(&mut self, text: String) -> Vec<Effect> {
@@ -106,7 +106,13 @@ impl Session {
         }
         let mut queue = std::mem::take(&mut self.queue);
         let reads = queue.reads(self.view.sort);
-        queue.fill(self.data.len(), self.view.sort, |frame| self.facts_of(frame, reads));
+        // Frames come in order, and so do the summaries: one walk along both, instead of a search for each.
+        let mut summaries = self.summaries.iter().peekable();
+        queue.fill(self.data.len(), self.view.sort, |frame| {
+            while reads.fit && summaries.next_if(|(at, _)| **at < frame).is_some() {}
+            let summary = summaries.peek().filter(|(at, _)| **at == frame).map(|(_, summary)| *summary);
+            self.facts_of(frame, reads, summary)
+        });
         self.queue = queue;
         if let Some(at) = self.queue.position(self.data.frame_index) {
             self.queue.last_position = at;
@@ -120,11 +126,11 @@ impl Session {
 
     /// Everything that the list knows of a frame.
     pub fn facts(&self, index: usize) -> Facts<'_> {
-        self.facts_of(index, Reads::ALL)
+        self.facts_of(index, Reads::ALL, self.summaries.get(&index))
     }
 
     /// What the list knows of a frame, as far as it is asked for.
-    fn facts_of(&self, index: usize, reads: Reads) -> Facts<'_> {
+    fn facts_of<'a>(&'a self, index: usize, reads: Reads, summary: Option<&'a FrameSummary>) -> Facts<'a> {
         let mut facts = Facts { index, ..Facts::default() };
         let Some(dataset) = &self.data.dataset else { return facts };
         let mode = self.view.label_mode;
@@ -138,7 +144,7 @@ impl Session {
             self.add_strata(&mut facts);
         }
         if reads.fit
-            && let Some(summary) = self.summaries.get(&index)
+            && let Some(summary) = summary
         {
             facts.iou = summary.iou;
             facts.loss = summary.loss;

@@ -134,8 +134,8 @@ impl Queue {
         self.rule.reads().or(sort.key.reads())
     }
 
-    /// Fills the list again: `frames` facts in the order of the data set.
-    pub(super) fn fill<'a>(&mut self, frames: usize, sort: Sort, facts: impl Fn(usize) -> Facts<'a>) {
+    /// Fills the list again: `frames` facts, asked for in the order of the data set.
+    pub(super) fn fill<'a>(&mut self, frames: usize, sort: Sort, mut facts: impl FnMut(usize) -> Facts<'a>) {
         self.matching.clear();
         self.rows.clear();
         if self.rule.is_empty() && sort == Sort::default() {

@@ -148,14 +148,15 @@ impl Open {
         let judged = |index| commit.judged.get(&index).cloned().unwrap_or_default();
         let changes: Vec<(FrameId, Change, Judged)> =
             commit.asked.each().map(|(index, change)| (id(index), change, judged(index))).collect();
-        let outcomes = self.journal.commit_each(&commit.act, &changes).map_err(|error| error.to_string())?;
+        let mut outcomes = self.journal.commit_each(&commit.act, &changes).map_err(|error| error.to_string())?;
         // Our own records are no news to be told again.
         if let Err(error) = self.store.refresh() {
             tracing::warn!("{error}");
         }
         let (mut changes, mut records) = (Vec::with_capacity(outcomes.len()), Vec::with_capacity(outcomes.len()));
+        let scored = outcomes.iter().filter(|outcome| !outcome.after.judged.machine.is_empty());
+        let scored = scored.map(|outcome| outcome.frame.index).collect();
         // In the order of frames, as `Changes` has them.
-        let mut outcomes = outcomes;
         outcomes.sort_by_key(|outcome| outcome.frame.index);
         for outcome in outcomes {
             changes.push((outcome.frame.index, outcome.before, outcome.after.label.clone()));
@@ -164,7 +165,7 @@ impl Open {
             let known = known.filter(|known| ***known == outcome.after).cloned();
             records.push(known.unwrap_or_else(|| Arc::new(outcome.after)));
         }
-        Ok(Done { changes: Changes::of(changes), records })
+        Ok(Done { changes: Changes::of(changes), records, scored })
     }
 
     /// Everybody's records by the frames of this data set. A record's index is a hint: its name decides.
