@@ -39,8 +39,8 @@ pub fn read_summary(path: &Path) -> Result<Vec<SummaryRow>, StudyError> {
     let mut rows = Vec::new();
     let mut record = csv::ByteRecord::new();
     while reader.read_byte_record(&mut record).map_err(|error| broken(&error, path))? {
-        let line = record.position().map_or(0, csv::Position::line);
-        rows.push(columns.row(&Line { record: &record, line, path })?);
+        let number = record.position().map_or(0, csv::Position::line);
+        rows.push(columns.row(&Line { record: &record, number, path })?);
     }
     Ok(rows)
 }
@@ -104,7 +104,7 @@ impl Columns {
     fn row(&self, line: &Line<'_>) -> Result<SummaryRow, StudyError> {
         let frame = line.text(self.frame, "frame")?.to_owned();
         if frame.is_empty() {
-            return Err(line.wrong("frame", "is empty; expected the name of a frame".into()));
+            return Err(line.wrong("frame", "is empty; expected the name of a frame"));
         }
         let mut known = Vec::with_capacity(self.ious.len());
         for &column in &self.ious {
@@ -127,14 +127,14 @@ impl Columns {
 /// One line of the table.
 struct Line<'a> {
     record: &'a csv::ByteRecord,
-    line: u64,
+    number: u64,
     path: &'a Path,
 }
 
 impl Line<'_> {
     fn text(&self, column: usize, name: &str) -> Result<&str, StudyError> {
         let bytes = self.record.get(column).unwrap_or_default();
-        std::str::from_utf8(bytes).map_err(|_| self.wrong(name, "is not UTF-8 text".into()))
+        std::str::from_utf8(bytes).map_err(|_| self.wrong(name, "is not UTF-8 text"))
     }
 
     fn parsed<T: std::str::FromStr>(
@@ -145,7 +145,7 @@ impl Line<'_> {
     ) -> Result<Option<T>, StudyError> {
         let Some(column) = column else { return Ok(None) };
         let text = self.text(column, name)?;
-        let wrong = |_| self.wrong(name, format!("is `{}`; expected {expected}, or nothing", shortened(text)));
+        let wrong = |_| self.wrong(name, &format!("is `{}`; expected {expected}, or nothing", shortened(text)));
         if text.is_empty() { Ok(None) } else { text.parse().map(Some).map_err(wrong) }
     }
 
@@ -162,14 +162,18 @@ impl Line<'_> {
                 let (lo, hi) = (*range.start(), *range.end());
                 let expected =
                     if hi == f64::MAX { "a finite number".into() } else { format!("a number from {lo} to {hi}") };
-                Err(self.wrong(name, format!("is {value}; expected {expected}, or nothing")))
+                Err(self.wrong(name, &format!("is {value}; expected {expected}, or nothing")))
             }
             None => Ok(value),
         }
     }
 
-    fn wrong(&self, column: &str, message: String) -> StudyError {
-        StudyError::Table { line: self.line, message: format!("column {column} {message}"), path: self.path.to_owned() }
+    fn wrong(&self, column: &str, message: &str) -> StudyError {
+        StudyError::Table {
+            line: self.number,
+            message: format!("column {column} {message}"),
+            path: self.path.to_owned(),
+        }
     }
 }
 

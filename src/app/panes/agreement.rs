@@ -8,6 +8,7 @@ use crate::session::{Command, Labels, Records};
 use egui::{RichText, Role, Ui};
 use std::cmp::Ordering;
 use std::collections::HashMap;
+use std::fmt::Write as _;
 
 /// The machine as one of the two.
 const MACHINE: &str = "machine";
@@ -176,7 +177,8 @@ fn with_machine(a: &Records) -> Found {
 fn summary(ui: &mut Ui, found: &Found, pair: &[String; 2], tokens: &Tokens) {
     let mut text = format!("{} frames judged by both", found.frames);
     if pair[1] != MACHINE {
-        text += &format!(" · {} only by {} · {} only by {}", found.only_in_a, pair[0], found.only_in_b, pair[1]);
+        let [a, b] = pair;
+        let _ = write!(text, " · {} only by {a} · {} only by {b}", found.only_in_a, found.only_in_b);
     }
     ui.label(RichText::new(text).small().color(tokens.dim));
     if let Some(remark) = &found.remark {

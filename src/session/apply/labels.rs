@@ -136,7 +136,7 @@ impl Session {
             return Vec::new();
         }
         let Some(act) = self.labels.undo.pop() else { return Vec::new() };
-        self.again(ActKind::Undo, act.name, Asked::Back(act.changes))
+        self.again(ActKind::Undo, &act.name, Asked::Back(act.changes))
     }
 
     pub(super) fn redo(&mut self) -> Vec<Effect> {
@@ -144,13 +144,13 @@ impl Session {
             return Vec::new();
         }
         let Some(act) = self.labels.redo.pop() else { return Vec::new() };
-        self.again(ActKind::Redo, act.name, Asked::Again(act.changes))
+        self.again(ActKind::Redo, &act.name, Asked::Again(act.changes))
     }
 
-    fn again(&mut self, kind: ActKind, name: String, asked: Asked) -> Vec<Effect> {
-        let effects = self.ask_journal(kind, name.clone(), asked);
+    fn again(&mut self, kind: ActKind, name: &str, asked: Asked) -> Vec<Effect> {
+        let effects = self.ask_journal(kind, name.to_owned(), asked);
         if effects.is_empty() {
-            self.gone(&name);
+            self.gone(name);
         }
         effects
     }

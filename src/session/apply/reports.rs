@@ -58,6 +58,11 @@ impl Session {
         self.stale = true;
     }
 
+    /// What a fit in this session says of the frame on screen; not what a table of results says of it.
+    fn own_summary(&mut self) -> Option<&mut FrameSummary> {
+        self.summaries.get_mut(&self.fit.frame).filter(|summary| summary.hashes.is_some())
+    }
+
     /// Forgets what a fit in this session said of a frame; what a table of results says of it stays.
     pub(super) fn forget_summary(&mut self, frame: usize) {
         if self.summaries.get(&frame).is_some_and(|summary| summary.hashes.is_some()) {
@@ -79,7 +84,7 @@ impl Session {
                     self.fit.status = FitStatus::Paused;
                     self.fit.run_ms = Some(run_ms);
                     self.fit.reason = Some(reason.text());
-                    if let Some(summary) = self.summaries.get_mut(&self.fit.frame) {
+                    if let Some(summary) = self.own_summary() {
                         summary.reason = Some(reason.text().to_owned());
                     }
                     self.stale = true;
@@ -149,7 +154,7 @@ impl Session {
         // Settings may have changed since the newest row was made; the list tells what holds now.
         if snapshot.live
             && snapshot.iteration == self.fit.head()
-            && let Some(summary) = self.summaries.get_mut(&self.fit.frame)
+            && let Some(summary) = self.own_summary()
         {
             summary.loss = Some(snapshot.evaluation.loss);
             summary.iou = mean_known(&snapshot.evaluation.iou);

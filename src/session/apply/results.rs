@@ -3,6 +3,7 @@
 use crate::session::command::{Effect, Trash};
 use crate::session::results::FoundResults;
 use crate::session::state::{LogLevel, Session};
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -55,10 +56,10 @@ impl Session {
         let of = self.data.len();
         let mut text = format!("{path}: results of {matched} of {of} frames");
         if kept > 0 {
-            text += &format!("; {kept} of them were fitted here and keep their own");
+            let _ = write!(text, "; {kept} of them were fitted here and keep their own");
         }
         if let Some(first) = first_unknown {
-            text += &format!("; {unknown} rows are of frames that are not in this data set, for example {first}");
+            let _ = write!(text, "; {unknown} rows are of frames that are not in this data set, for example {first}");
         }
         if matched == 0 { self.note(LogLevel::Error, text) } else { self.hint(text) }
     }
