@@ -346,6 +346,17 @@ fn statistics_of_a_data_set() {
     let journal = desk.journal("bo").display().to_string();
     assert_eq!(desk.json(&["stats", &journal, "--json"])["bo"], found["bo"]);
     assert_eq!(keys(&desk.json(&["stats", "data", "--annotator", "bo", "--by", "sequence", "--json"])), ["bo"]);
+    let by_day = desk.json(&["stats", "data", "--by", "day", "--json"]);
+    let days = keys(&by_day["anna"]["groups"]);
+    assert_eq!(days.len(), 1, "{days:?}");
+    assert_eq!(by_day["anna"]["groups"][&days[0]]["frames"], anna["frames"]);
+    let by_stratum = desk.json(&["stats", "data", "--by", "stratum", "--json"]);
+    let strata = by_stratum["anna"]["groups"].as_object().unwrap();
+    assert!(strata.keys().all(|name| ["easy", "medium", "hard"].contains(&name.as_str())), "{strata:?}");
+    let graded: u64 = strata.values().map(|counts| counts["frames"].as_u64().unwrap()).sum();
+    assert_eq!(graded, anna["frames"].as_u64().unwrap());
+    let message = desk.refused(&["stats", &journal, "--by", "stratum"]);
+    assert!(message.contains("expected a data set, not a file of labels"), "{message}");
     let text = desk.done(&["stats", "data"]);
     assert!(text.contains("frames") && text.contains("7 acts on 1 day") && text.starts_with("anna\n"), "{text}");
 }

@@ -355,7 +355,7 @@ fn a_run_goes_to_the_asked_iterations_and_then_as_many_more() {
     let effects = bench.apply(Command::ToggleRun);
     assert!(matches!(sent(&effects), WorkerCommand::RunTo { target: 200, .. }));
     let summary = &bench.session.summaries[&0];
-    assert_eq!((summary.iterations, summary.iou, summary.converged), (100, Some(0.375), false));
+    assert_eq!((summary.iterations, summary.iou, summary.converged), (Some(100), Some(0.375), Some(false)));
 }
 
 #[test]

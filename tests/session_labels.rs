@@ -8,10 +8,11 @@ use mhp_inspector::body::Pppr;
 use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::{Dataset, Progress};
 use mhp_inspector::diagnose::Evidence;
-use mhp_inspector::labels::{FrameId, Judged, Label, LabelPlace, Record, Tag};
+use mhp_inspector::labels::{Change, FrameId, Judged, Label, LabelPlace, Record, Tag};
 use mhp_inspector::mhp::{Evaluation, Problem, Terms, initialise};
 use mhp_inspector::session::{
-    ActKind, Command, Commit, Effect, LabelStatus, LabelTable, LogLevel, Session, SessionFile, StrataStatus, Written,
+    ActKind, Changes, Command, Commit, Done, Effect, LabelStatus, LabelTable, LogLevel, OpenedLabels, Session,
+    SessionFile, StrataStatus, Written,
 };
 use mhp_inspector::study::complexity::Complexity;
 use mhp_inspector::worker::{Prepared, Snapshot, WorkerCommand, WorkerEvent, WorkerMessage};
@@ -53,7 +54,8 @@ impl Bench {
 
     fn opened(&mut self, id: u64, table: LabelTable) {
         let place = LabelPlace::in_folder(&self.folder.path().join("mhp-labels"));
-        self.session.apply(Command::LabelsOpened(id, Ok((place, table, Vec::new()))));
+        let opened = OpenedLabels { place, table, last_edited: None, warnings: Vec::new() };
+        self.session.apply(Command::LabelsOpened(id, Ok(Box::new(opened))));
     }
 
     /// Applies a command that asks the journal for one act.
@@ -70,13 +72,18 @@ impl Bench {
 
     /// The journal writes an act and says so.
     fn write(&mut self, commit: &Commit) {
-        let outcomes = commit.changes.iter().map(|(frame, change, judged)| {
-            let before = self.journal.get(&frame.index).cloned().unwrap_or_default();
+        let (mut changes, mut records) = (Vec::new(), Vec::new());
+        for (index, change, judged) in asked(commit) {
+            let before = self.journal.get(&index).cloned().unwrap_or_default();
             let after = change.applied(&before);
-            self.journal.insert(frame.index, after.clone());
-            (frame.clone(), before, record("ada", frame.index, after, judged.clone()))
-        });
-        let result = Ok(outcomes.collect());
+            if after == before {
+                continue;
+            }
+            self.journal.insert(index, after.clone());
+            changes.push((index, before, after.clone()));
+            records.push(Arc::new(record("ada", index, after, judged)));
+        }
+        let result = Ok(Done { changes: Changes::of(changes), records, scored: BTreeSet::new() });
         self.answer(commit, result);
     }
 
@@ -84,7 +91,7 @@ impl Bench {
         self.answer(commit, Err("no space left on device".into()));
     }
 
-    fn answer(&mut self, commit: &Commit, result: Result<Vec<(FrameId, Label, Record)>, String>) {
+    fn answer(&mut self, commit: &Commit, result: Result<Done, String>) {
         let Commit { id, kind, act, .. } = commit.clone();
         self.session.apply(Command::LabelsWritten(Written { id, kind, act, result }));
     }
@@ -158,6 +165,12 @@ fn reading(effects: &[Effect]) -> u64 {
     found.unwrap()
 }
 
+/// Frame, change and what is judged, of an act.
+fn asked(commit: &Commit) -> Vec<(usize, Change, Judged)> {
+    let judged = |frame| commit.judged.get(&frame).cloned().unwrap_or_default();
+    commit.asked.each().map(|(frame, change)| (frame, change, judged(frame))).collect()
+}
+
 fn commit_of(effects: Vec<Effect>) -> Option<Commit> {
     effects.into_iter().find_map(|effect| match effect {
         Effect::CommitLabels(commit) => Some(commit),
@@ -178,9 +191,9 @@ fn record(annotator: &str, index: usize, label: Label, judged: Judged) -> Record
     }
 }
 
-fn tagged(annotator: &str, index: usize, tag: Tag) -> (usize, Record) {
+fn tagged(annotator: &str, index: usize, tag: Tag) -> (usize, Arc<Record>) {
     let label = Label { tags: mhp_inspector::labels::Tags::NONE.with(tag), ..Label::default() };
-    (index, record(annotator, index, label, Judged::default()))
+    (index, Arc::new(record(annotator, index, label, Judged::default())))
 }
 
 fn evidence(score: f64) -> Vec<Evidence> {
@@ -254,14 +267,14 @@ fn a_bulk_act_leaves_out_what_is_so_already_and_is_one_undo() {
     bench.session.apply(Command::SelectFrames(BTreeSet::from([0, 2, 3, 99])));
     assert_eq!(bench.session.labels.selection, BTreeSet::from([0, 2, 3]), "frame 99 does not exist");
     let commit = bench.asks(Command::ToggleTag(Tag::F2));
-    let frames: Vec<usize> = commit.changes.iter().map(|(frame, ..)| frame.index).collect();
+    let frames: Vec<usize> = asked(&commit).into_iter().map(|(frame, ..)| frame).collect();
     assert_eq!((commit.act.as_str(), frames), ("tag F2 on 3 frames", vec![2, 3]));
     bench.write(&commit);
     // All have it now: the same key takes it away.
     assert_eq!(bench.asks(Command::ToggleTag(Tag::F2)).act, "untag F2 on 3 frames");
     // A note is for the frames that it was typed for.
-    let note = bench.asks(Command::SetNote(vec![5], "wall".into()));
-    assert_eq!(note.changes.iter().map(|(frame, ..)| frame.index).collect::<Vec<_>>(), [5]);
+    let note = bench.asks(Command::SetNote(Arc::new([5]), "wall".into()));
+    assert_eq!(asked(&note).into_iter().map(|(frame, ..)| frame).collect::<Vec<_>>(), [5]);
 }
 
 #[test]
@@ -281,12 +294,12 @@ fn answers_for_a_data_set_that_was_left_change_nothing() {
 
     bench.write(&late);
     assert_eq!((bench.tags(0).as_str(), bench.names()), ("", (None, None)), "an act for the data set before");
-    let others = || LabelTable::from([("eve".to_owned(), HashMap::from([tagged("eve", 3, Tag::F3)]))]);
+    let others = || LabelTable::from([("eve".to_owned(), [tagged("eve", 3, Tag::F3)].into_iter().collect())]);
     bench.session.apply(Command::LabelsRefreshed(others()));
     bench.opened(old, others());
     assert_eq!(bench.session.labels.status, LabelStatus::Opening);
     assert!(bench.session.labels.table().is_empty(), "labels of the data set before");
-    bench.opened(new, LabelTable::from([("ada".to_owned(), HashMap::from([tagged("ada", 4, Tag::F2)]))]));
+    bench.opened(new, LabelTable::from([("ada".to_owned(), [tagged("ada", 4, Tag::F2)].into_iter().collect())]));
     assert_eq!(bench.session.labels.status, LabelStatus::Ready);
     assert_eq!((bench.tags(4).as_str(), bench.session.labels.last_edited), ("F2", Some(4)));
 }
@@ -298,7 +311,7 @@ fn an_act_of_one_annotator_never_becomes_another_ones() {
     let effects = bench.session.apply(Command::SetAnnotator(" bob ".into()));
     let id = reading(&effects);
     bench.write(&late);
-    bench.opened(id, LabelTable::from([("ada".to_owned(), HashMap::from([tagged("ada", 0, Tag::F1)]))]));
+    bench.opened(id, LabelTable::from([("ada".to_owned(), [tagged("ada", 0, Tag::F1)].into_iter().collect())]));
     assert_eq!((bench.session.labels.annotator.as_str(), bench.tags(0).as_str()), ("bob", ""));
     assert_eq!(bench.session.labels.others(0).map(|record| record.annotator.as_str()).collect::<Vec<_>>(), ["ada"]);
     bench.session.apply(Command::SetAnnotator("  ".into()));
@@ -326,7 +339,7 @@ fn a_list_that_is_filtered_by_tags_follows_them() {
     assert_eq!(bench.session.queue.rows().len(), 6);
     bench.write(&commit);
     assert_eq!(bench.session.queue.rows(), [0, 1, 3, 4, 5]);
-    let table = LabelTable::from([("eve".to_owned(), HashMap::from([tagged("eve", 5, Tag::F3)]))]);
+    let table = LabelTable::from([("eve".to_owned(), [tagged("eve", 5, Tag::F3)].into_iter().collect())]);
     bench.session.apply(Command::LabelsRefreshed(table));
     assert_eq!(bench.session.queue.rows(), [0, 1, 2, 3, 4], "what others wrote counts too");
     // The next one is what took its place.
@@ -340,7 +353,7 @@ fn evidence_of_an_older_fit_is_dropped_and_not_recorded() {
     bench.show(0);
     let first = bench.draw_moved(0.1);
     bench.session.apply(Command::EvidenceFound(0, first.clone(), Ok(evidence(0.9))));
-    let judged = |commit: &Commit| commit.changes[0].2.clone();
+    let judged = |commit: &Commit| asked(commit)[0].2.clone();
     let commit = bench.asks(Command::ToggleTag(Tag::F1));
     assert_eq!(judged(&commit).machine.get(&Tag::F1), Some(&0.9));
     bench.write(&commit);
@@ -370,10 +383,10 @@ fn a_frame_that_is_still_being_read_is_not_judged_on_the_fit_before() {
     let shown = bench.session.shown_hashes().unwrap();
     bench.session.apply(Command::GotoFrame(1));
     let commit = bench.asks(Command::ToggleTag(Tag::F1));
-    assert_eq!((commit.changes[0].0.index, &commit.changes[0].2), (1, &Judged::default()));
+    assert_eq!((asked(&commit)[0].0, asked(&commit)[0].2.clone()), (1, Judged::default()));
     // A note that was typed for the frame that is still on screen is judged on what is on screen.
-    let note = bench.asks(Command::SetNote(vec![0], "wall".into()));
-    let judged = &note.changes[0].2;
+    let note = bench.asks(Command::SetNote(Arc::new([0]), "wall".into()));
+    let judged = &asked(&note)[0].2;
     assert_eq!((judged.fit.as_deref(), judged.machine_shown), (Some(shown.fit.as_str()), true));
 }
 

@@ -39,6 +39,8 @@ pub struct Begin {
     pub paths: Vec<PathBuf>,
     /// Where to begin in it.
     pub aim: Aim,
+    /// A table of results for the frame list.
+    pub results: Option<PathBuf>,
     /// A session file, instead of all that.
     pub session: Option<PathBuf>,
 }
@@ -103,6 +105,9 @@ impl InspectorApp {
                 "the bundled sample was not found; open a data set with File > Open folder".into(),
             )),
         }
+        if let Some(results) = &begin.results {
+            app.apply(Command::LoadResults(results.clone()));
+        }
         for extra in begin.paths.iter().skip(1) {
             app.session.data.recent.push(extra.clone());
         }
@@ -165,6 +170,7 @@ impl InspectorApp {
             AppAct::OpenSession => self.overlay.open_session(),
             AppAct::CopyPicture(pane) => self.copy_picture(ctx, pane),
             AppAct::ShowPane(pane) => self.layout.show_pane(pane),
+            AppAct::LoadResults => self.overlay.load_results(),
             AppAct::CopyPath => self.copy_path(ctx),
             AppAct::FocusFilter => self.panes.frames.focus_filter(),
             AppAct::FocusNote => {
@@ -185,7 +191,7 @@ impl InspectorApp {
         self.apply(Command::SetView(Box::new(view)));
     }
 
-    /// Files dropped on the window.
+    /// Files dropped on the window: a table is results, anything else a data set.
     fn take_drops(&mut self, ctx: &egui::Context) {
         let dropped = ctx.input(|i| {
             i.raw
@@ -196,7 +202,8 @@ impl InspectorApp {
         if dropped != self.dropped
             && let Some(path) = dropped.clone()
         {
-            self.apply(Command::Open(path));
+            let table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
+            self.apply(if table { Command::LoadResults(path) } else { Command::Open(path) });
         }
         self.dropped = dropped;
     }
@@ -284,7 +291,7 @@ impl eframe::App for InspectorApp {
     }
 }
 
-/// Opens the window and returns when it is closed.
+/// Opens the window, with a table of results of the first data set where there is one, and returns when it is closed.
 ///
 /// # Errors
 /// Where there is no display or no graphics adapter.

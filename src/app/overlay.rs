@@ -26,6 +26,7 @@ enum Sheet {
     Goto,
     Path,
     Session,
+    Results,
     Save(SaveKind),
 }
 
@@ -96,6 +97,7 @@ impl Overlay {
             Sheet::Goto => self.goto(ui, shared),
             Sheet::Path => self.path(ui, shared),
             Sheet::Session => self.session_path(ui, shared),
+            Sheet::Results => self.results_path(ui, shared),
             Sheet::Save(kind) => self.save(ui, shared, kind),
         };
         if close {
@@ -347,4 +349,10 @@ fn pick_save(suggested: &std::path::Path) -> Option<PathBuf> {
 fn pick_session() -> Option<PathBuf> {
     let dialog = rfd::FileDialog::new().set_title("Open a session");
     dialog.add_filter("Session", &["mhp-session"]).add_filter("All files", &["*"]).pick_file()
+}
+
+/// Shows the desktop's dialog for a table of results; blocks like [`pick`].
+fn pick_results() -> Option<PathBuf> {
+    let dialog = rfd::FileDialog::new().set_title("Load results");
+    dialog.add_filter("Table", &["csv"]).add_filter("All files", &["*"]).pick_file()
 }

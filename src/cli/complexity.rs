@@ -91,7 +91,10 @@ pub(super) fn run(args: &ComplexityArgs) -> anyhow::Result<ExitCode> {
 }
 
 /// Computes beside this thread, which moves the bar.
-fn compute(
+///
+/// # Errors
+/// As [`crate::study::complexity::compute`].
+pub(super) fn compute(
     dataset: &Arc<Dataset>,
     options: ComplexityOptions,
     cache: Option<PathBuf>,

@@ -57,6 +57,9 @@ pub struct WindowArgs {
     /// Data sets or files to open in the window: an MMVR tree or any folder inside one, a `*_radar.npz`, a folder with
     /// `dataset.toml`, or an `.npy`/`.npz` of maps. Without one, the bundled sample opens.
     pub paths: Vec<PathBuf>,
+    /// Take the results of a batch into the frame list: the `summary.csv` that `fit --out` wrote.
+    #[arg(long, value_name = "FILE")]
+    pub results: Option<PathBuf>,
     /// Show this frame first: a name as in the frame list, or an index from 0.
     #[arg(long, value_name = "FRAME")]
     pub frame: Option<String>,
@@ -64,7 +67,7 @@ pub struct WindowArgs {
     #[arg(long, value_name = "K")]
     pub iteration: Option<usize>,
     /// Open a session file: the same frame, iteration, camera, pins and layout.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["paths", "frame", "iteration"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["paths", "frame", "iteration", "results"])]
     pub session: Option<PathBuf>,
 }
 
@@ -73,7 +76,7 @@ impl WindowArgs {
     /// As the window takes it.
     pub fn begin(self) -> crate::app::Begin {
         let aim = crate::session::Aim { frame: self.frame, iteration: self.iteration };
-        crate::app::Begin { paths: self.paths, aim, session: self.session }
+        crate::app::Begin { paths: self.paths, aim, results: self.results, session: self.session }
     }
 }
 

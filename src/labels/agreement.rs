@@ -81,22 +81,32 @@ pub fn against_machine<'a>(judged: impl IntoIterator<Item = &'a Record>, thresho
     MachineAgreement { agreement, shown, unscored }
 }
 
+/// Each tag of [`Tag::ALL`] and all of them pooled, over frames that both judged: what the first gave, what the second.
+pub fn compare_tags(both: &[(Tags, Tags)]) -> (Vec<(Tag, TagAgreement)>, TagAgreement) {
+    let decide = |tag| both.iter().map(move |&(a, b)| (a.contains(tag), b.contains(tag)));
+    with_sum(Tag::ALL.iter().map(|&tag| (tag, TagAgreement::of(decide(tag)))).collect())
+}
+
+fn with_sum(each: Vec<(Tag, TagAgreement)>) -> (Vec<(Tag, TagAgreement)>, TagAgreement) {
+    let sum = each.iter().fold([0; 4], |[both, only_a, only_b, neither], (_, tag)| {
+        [both + tag.both, only_a + tag.only_a, only_b + tag.only_b, neither + tag.neither]
+    });
+    (each, TagAgreement::of_counts(sum))
+}
+
 type Tables = (Vec<(Tag, TagAgreement)>, TagAgreement, Vec<Dispute>);
 
 /// One table a tag, their sum, and what differs; `decide` gives frame and both answers.
 fn tables<'a, I: Iterator<Item = (&'a str, bool, bool)>>(tags: &[Tag], decide: impl Fn(Tag) -> I) -> Tables {
-    let each: Vec<(Tag, TagAgreement)> =
-        tags.iter().map(|&tag| (tag, TagAgreement::of(decide(tag).map(|(_, a, b)| (a, b))))).collect();
-    let sum = each.iter().fold([0; 4], |[both, only_a, only_b, neither], (_, tag)| {
-        [both + tag.both, only_a + tag.only_a, only_b + tag.only_b, neither + tag.neither]
-    });
+    let each = tags.iter().map(|&tag| (tag, TagAgreement::of(decide(tag).map(|(_, a, b)| (a, b))))).collect();
+    let (each, pooled) = with_sum(each);
     let mut disputes: Vec<Dispute> = Vec::new();
     for &tag in tags {
         let differing = decide(tag).filter(|(_, a, b)| a != b);
         disputes.extend(differing.map(|(frame, a, b)| Dispute { frame: frame.to_owned(), tag, a, b }));
     }
     disputes.sort();
-    (each, TagAgreement::of_counts(sum), disputes)
+    (each, pooled, disputes)
 }
 
 fn tags_by_frame<'a>(records: impl IntoIterator<Item = &'a Record>) -> BTreeMap<&'a str, Tags> {

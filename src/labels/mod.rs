@@ -24,7 +24,7 @@ mod tail;
 
 pub use acts::{place_acts, read_acts, read_labels};
 pub use agreement::{
-    Agreement, Dispute, MachineAgreement, against_machine, agreement, judged, judged_in_acts, standing,
+    Agreement, Dispute, MachineAgreement, against_machine, agreement, compare_tags, judged, judged_in_acts, standing,
 };
 pub use error::LabelError;
 pub use import::{ImportPlan, plan_import};
@@ -32,6 +32,6 @@ pub use journal::{Journal, Outcome, SaidElsewhere};
 pub use kappa::{RELIABLE_FRAMES, TagAgreement};
 pub use place::LabelPlace;
 pub use record::{CellRegion, Change, FrameId, Judged, Label, Record, Tag, Tags, Verdict};
-pub use statistics::{AnnotatorStatistics, LabelCounts, PAUSE_S, Pace, statistics};
+pub use statistics::{AnnotatorStatistics, LabelCounts, PAUSE_S, Pace, day, statistics};
 pub use store::{LabelStore, read_journal};
 pub use table::{COLUMNS, Row, Table, TableError, read_table, write_csv, write_json};

@@ -212,7 +212,7 @@ impl FromStr for Verdict {
 }
 
 /// A box of cells of one view.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct CellRegion {
     /// The view's array.
     pub view: String,
@@ -252,7 +252,7 @@ impl FromStr for CellRegion {
 }
 
 /// All that one annotator says of one frame.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Label {
     /// Failure modes, clean, unsure.
@@ -309,6 +309,18 @@ impl Change {
     /// Removes a tag.
     pub fn removing(tag: Tag) -> Self {
         Self { remove: Tags::NONE.with(tag), ..Self::default() }
+    }
+
+    /// Takes everything back that was said.
+    pub fn clearing() -> Self {
+        Self {
+            remove: Tag::ALL.into_iter().collect(),
+            note: Some(String::new()),
+            person: Some(None),
+            region: Some(None),
+            verdict: Some(None),
+            ..Self::default()
+        }
     }
 
     /// What leads from one label to another: the inverse of an act is the change from its `after` to its `before`.

@@ -67,10 +67,10 @@ pub struct AnnotatorStatistics {
 }
 
 /// Counts by annotator. `records` is every act in order, of any number of annotators; a frame's newest record is what is
-/// said of it, and nothing where that is empty. `group` names the group of a frame.
+/// said of it, and nothing where that is empty. `group` names the group of a frame, by that record.
 pub fn statistics<'a>(
     records: impl IntoIterator<Item = &'a Record>,
-    group: &dyn Fn(&str) -> Option<String>,
+    group: &dyn Fn(&Record) -> Option<String>,
 ) -> BTreeMap<String, AnnotatorStatistics> {
     let mut annotators: BTreeMap<&str, Vec<&Record>> = BTreeMap::new();
     for record in records {
@@ -79,16 +79,22 @@ pub fn statistics<'a>(
     annotators.into_iter().map(|(name, records)| (name.to_owned(), of_one(&records, group))).collect()
 }
 
-fn of_one(records: &[&Record], group: &dyn Fn(&str) -> Option<String>) -> AnnotatorStatistics {
+fn of_one(records: &[&Record], group: &dyn Fn(&Record) -> Option<String>) -> AnnotatorStatistics {
     let newest: BTreeMap<&str, &Record> = records.iter().map(|&record| (record.frame.path.as_str(), record)).collect();
     let mut found = AnnotatorStatistics { pace: pace(records), ..AnnotatorStatistics::default() };
-    for (frame, record) in newest.into_iter().filter(|(_, record)| !record.label.is_empty()) {
+    for record in newest.into_values().filter(|record| !record.label.is_empty()) {
         found.all.add(record);
-        if let Some(group) = group(frame) {
+        if let Some(group) = group(record) {
             found.groups.entry(group).or_default().add(record);
         }
     }
     found
+}
+
+/// The day of a record in UTC, `2025-03-01`; `None` where its time cannot be read.
+pub fn day(record: &Record) -> Option<String> {
+    let time = OffsetDateTime::parse(&record.time, &Rfc3339).ok()?;
+    Some(time.to_offset(UtcOffset::UTC).date().to_string())
 }
 
 /// Over the acts: records with the same time and words are one. A time that cannot be read is an act without one.
@@ -150,7 +156,7 @@ mod tests {
             record("ann", "a/1", "", "10:00:16"),
             record("bo", "a/1", "F4", "23:59:59.5"),
         ];
-        let scene = |frame: &str| frame.split_once('/').map(|(scene, _)| scene.to_owned());
+        let scene = |record: &Record| record.frame.path.split_once('/').map(|(scene, _)| scene.to_owned());
         let found = statistics(&records, &scene);
         assert_eq!(found.keys().collect::<Vec<_>>(), ["ann", "bo"]);
         let ann = &found["ann"];

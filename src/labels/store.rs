@@ -11,6 +11,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::{ErrorKind, Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// How often files that are replaced while they are read are begun anew.
 const TRIES: usize = 100;
@@ -34,8 +35,8 @@ struct LineAt {
 /// The newest record of a frame.
 #[derive(Debug)]
 struct Slot {
-    /// Boxed, because a table of a million frames moves its entries when it grows.
-    record: Box<Record>,
+    /// Shared with whoever shows it.
+    record: Arc<Record>,
     stamp: Stamp,
     last_line: u32,
 }
@@ -127,6 +128,17 @@ impl LabelStore {
         let mut records: Vec<&Record> = frames.map(|slot| &*slot.record).collect();
         records.sort_unstable_by(|a, b| in_frame_order(a, b));
         records.into_iter()
+    }
+
+    /// As [`Self::label`], to be kept.
+    pub fn shared(&self, annotator: &str, frame: &str) -> Option<&Arc<Record>> {
+        Some(&self.people.get(annotator)?.frames.get(frame)?.record)
+    }
+
+    /// The newest record of each frame, to be kept, in no order.
+    pub fn shared_records(&self, annotator: &str) -> impl Iterator<Item = &Arc<Record>> {
+        let person = self.people.get(annotator);
+        person.into_iter().flat_map(|person| person.frames.values()).map(|slot| &slot.record)
     }
 
     /// The record that an annotator wrote last.
@@ -234,13 +246,13 @@ fn fold(people: &mut BTreeMap<String, Person>, lines: &mut Vec<LineAt>, span: Sp
         person.last = Some((stamp, record.frame.path.clone()));
     }
     let Some(slot) = slot else {
-        let path = record.frame.path.clone();
+        let (path, record) = (record.frame.path.clone(), Arc::from(record));
         person.frames.insert(path, Slot { record, stamp, last_line: number });
         return;
     };
     slot.last_line = number;
     if let Some(stamp) = stamp.newer_than(Some(slot.stamp)) {
-        (slot.record, slot.stamp) = (record, stamp);
+        (slot.record, slot.stamp) = (Arc::from(record), stamp);
     }
 }
 
@@ -276,7 +288,7 @@ pub fn read_journal(path: &Path) -> Result<Vec<Record>, LabelError> {
     tail.warnings().for_each(|warning| tracing::warn!("{warning}"));
     let people: BTreeMap<String, Person> = people;
     let slots = people.into_values().flat_map(|person| person.frames.into_values());
-    let mut records: Vec<Record> = slots.map(|slot| *slot.record).collect();
+    let mut records: Vec<Record> = slots.map(|slot| Arc::unwrap_or_clone(slot.record)).collect();
     records.sort_unstable_by(in_frame_order);
     Ok(records)
 }

@@ -13,6 +13,7 @@ mod pins;
 mod queue;
 mod reports;
 mod restore;
+mod results;
 
 pub(super) use reports::mean_known;
 
@@ -79,11 +80,13 @@ impl Session {
                 Vec::new()
             }
             Command::SelectFrames(frames) => {
-                self.labels.selection = frames.into_iter().filter(|&frame| frame < self.data.len()).collect();
+                let mut frames = frames;
+                frames.split_off(&self.data.len());
+                self.labels.select(frames);
                 Vec::new()
             }
             Command::ToggleTag(tag) => self.toggle_tag(tag),
-            Command::SetNote(frames, note) => self.set_note(&frames, note),
+            Command::SetNote(frames, note) => self.set_note(frames, note),
             Command::SetPerson(person) => self.set_person(person),
             Command::SetRegion(region) => self.set_region(region),
             Command::SetVerdict(verdict) => self.set_verdict(verdict),
@@ -157,6 +160,8 @@ impl Session {
             Command::SaveSession(path, window) => self.save_session(path, window),
             Command::OpenSession(path) => vec![Effect::ReadSession(path)],
             Command::SessionRead(path, result) => self.session_read(path, result),
+            Command::LoadResults(path) => self.load_results(path),
+            Command::ResultsRead(path, result) => self.results_read(&path, result),
             Command::TaskDone(result) => self.task_done(result),
             Command::RunTask(task) => vec![Effect::Run(task)],
             Command::Log(level, text) => {

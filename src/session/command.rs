@@ -1,20 +1,22 @@
 //! What can be asked of a session, and what it asks of the outside.
 
+use super::acts::{ActKind, Asked, Done};
 use super::evidence::EvidenceRequest;
 use super::file::SessionFile;
-use super::labels::{ActKind, LabelTable};
+use super::labels::LabelTable;
 use super::pins::Pin;
 use super::queue::Sort;
+use super::results::FoundResults;
 use super::view::ViewState;
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::{BareChoice, Dataset, DatasetError, Frame};
 use crate::diagnose::Evidence;
-use crate::labels::{CellRegion, Change, FrameId, Judged, Label, LabelPlace, Record, Tag, Verdict};
+use crate::labels::{CellRegion, Judged, LabelPlace, Tag, Verdict};
 use crate::mhp::Precision;
 use crate::study::complexity::Complexity;
 use crate::worker::{Snapshot, WorkerCommand, WorkerMessage};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -87,7 +89,7 @@ pub enum Command {
     /// Add the tag to the targets, or remove it where all have it.
     ToggleTag(Tag),
     /// Set the note of these frames: those that it was typed for, wherever the window went meanwhile.
-    SetNote(Vec<usize>, String),
+    SetNote(Arc<[u32]>, String),
     /// Set the person that is meant.
     SetPerson(Option<u32>),
     /// Set the cells that are meant.
@@ -103,7 +105,7 @@ pub enum Command {
     /// Somebody else labels.
     SetAnnotator(String),
     /// Report: the journals were read, as was asked under this number.
-    LabelsOpened(u64, Result<(LabelPlace, LabelTable, Vec<String>), String>),
+    LabelsOpened(u64, Result<Box<OpenedLabels>, String>),
     /// Report: an act was written, or not.
     LabelsWritten(Written),
     /// Report: others wrote.
@@ -179,6 +181,10 @@ pub enum Command {
     OpenSession(PathBuf),
     /// Report: a session file was read.
     SessionRead(PathBuf, Result<Box<SessionFile>, String>),
+    /// Take the results of a batch, a table that `fit --out` wrote, into the frame list.
+    LoadResults(PathBuf),
+    /// Report: such a table was read and its frames were found in the data set, or not.
+    ResultsRead(PathBuf, Result<Box<FoundResults>, String>),
     /// Report: something was written, or not.
     TaskDone(Result<String, String>),
     /// Write a picture that the window drew.
@@ -265,8 +271,46 @@ pub struct Commit {
     pub kind: ActKind,
     /// In words.
     pub act: String,
-    /// The change of each frame, and the fit that was judged.
-    pub changes: Vec<(FrameId, Change, Judged)>,
+    /// To name the frames.
+    pub dataset: Arc<Dataset>,
+    /// What is asked of which frames.
+    pub asked: Asked,
+    /// The fits that were judged, of the frames that have one.
+    pub judged: BTreeMap<usize, Judged>,
+}
+
+/// What was found when the journals were opened.
+#[derive(Debug)]
+pub struct OpenedLabels {
+    /// Where they are.
+    pub place: LabelPlace,
+    /// Everybody's labels.
+    pub table: LabelTable,
+    /// The frame that the annotator labelled last.
+    pub last_edited: Option<usize>,
+    /// What had to be skipped.
+    pub warnings: Vec<String>,
+}
+
+/// Something large that is not needed any more: freeing a hundred thousand records takes longer than a pass may.
+pub struct Trash(Box<dyn std::any::Any + Send>);
+
+impl Trash {
+    /// Of anything.
+    pub(super) fn new(what: impl Send + 'static) -> Self {
+        Self(Box::new(what))
+    }
+
+    /// Frees it, here and now.
+    pub(super) fn free(self) {
+        drop(self.0);
+    }
+}
+
+impl std::fmt::Debug for Trash {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Trash")
+    }
 }
 
 /// The journal's answer to a [`Commit`].
@@ -278,8 +322,8 @@ pub struct Written {
     pub kind: ActKind,
     /// That of the commit.
     pub act: String,
-    /// Frame, label before, record after; or why nothing was written.
-    pub result: Result<Vec<(FrameId, Label, Record)>, String>,
+    /// What was written, or why nothing was.
+    pub result: Result<Done, String>,
 }
 
 /// What the session asks of the outside.
@@ -325,8 +369,12 @@ pub enum Effect {
     Run(Task),
     /// Read a session file on a thread.
     ReadSession(PathBuf),
+    /// Read a table of results on a thread, and find its frames in this data set.
+    ReadResults(PathBuf, Arc<Dataset>),
     /// Compute the maps of a pinned fit on a thread.
     DrawPin(Box<PinRequest>),
     /// Gather evidence.
     Evidence(Box<EvidenceRequest>),
+    /// Free this on a thread.
+    Free(Trash),
 }

@@ -3,12 +3,17 @@
 //! A tag is shown only once its journal has acknowledged it. Acts under way are kept aside, so that a second press of the
 //! same key toggles back and does not ask twice for the same.
 
-use crate::labels::{Change, FrameId, Label, LabelPlace, Record, Tags};
+use super::acts::{Act, ActKind, Asked, Changes, Done};
+use super::records::Records;
+use crate::labels::{Label, LabelPlace, Record, Tag, Tags};
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// Acts that can be undone.
 const UNDO_DEPTH: usize = 500;
+/// Bytes that they may take; the newest is kept whatever it takes. A tag on 100,000 frames takes 0.8 MB.
+const UNDO_BYTES: usize = 64 << 20;
 
 /// What labelling is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -66,37 +71,8 @@ pub enum LabelStatus {
     Failed(String),
 }
 
-/// Why a commit was asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ActKind {
-    /// By a person.
-    Do,
-    /// Takes the last act back.
-    Undo,
-    /// Does it again.
-    Redo,
-}
-
-/// An act that can be undone.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Act {
-    /// In words: `tag F2 on 12 frames`.
-    pub name: String,
-    /// What it changed: frame, label before, label after.
-    pub changes: Vec<(FrameId, Label, Label)>,
-}
-
-/// What may be seen of a frame's labels.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Visible<'a> {
-    /// Everybody's tags.
-    pub tags: Tags,
-    /// Who labelled it.
-    pub annotators: Vec<&'a str>,
-}
-
 /// Everybody's labels: annotator, then frame.
-pub type LabelTable = BTreeMap<String, HashMap<usize, Record>>;
+pub type LabelTable = BTreeMap<String, Records>;
 
 /// The labels of the open data set.
 #[derive(Debug, Default)]
@@ -108,7 +84,7 @@ pub struct Labels {
     /// Whether acts can be written.
     pub status: LabelStatus,
     /// Acts under way.
-    pub(super) pending: Vec<(u64, Vec<(FrameId, Change)>)>,
+    pub(super) pending: Vec<(u64, Asked)>,
     pub(super) next_act: u64,
     /// Number of the reading of the journals that is waited for.
     pub(super) opening: u64,
@@ -119,6 +95,10 @@ pub struct Labels {
     pub last_edited: Option<usize>,
     /// Frames that the next act is for, instead of the one on screen.
     pub selection: BTreeSet<usize>,
+    /// The same in a row, to be shared with acts.
+    pub(super) targets: Arc<[u32]>,
+    /// Counts up with every change of the selection.
+    pub selection_revision: u64,
     /// Counts up with every change of the table.
     pub revision: u64,
 }
@@ -129,9 +109,15 @@ impl Labels {
         &self.table
     }
 
+    /// This annotator's labels.
+    pub fn own(&self) -> Option<&Records> {
+        self.table.get(&self.annotator)
+    }
+
     /// This annotator's record of a frame.
     pub fn mine(&self, frame: usize) -> Option<&Record> {
-        self.table.get(&self.annotator)?.get(&frame).filter(|record| !record.label.is_empty())
+        let own = self.own()?;
+        own.tags(frame).and_then(|_| own.get(frame))
     }
 
     /// This annotator's label of a frame.
@@ -139,42 +125,70 @@ impl Labels {
         self.mine(frame).map_or_else(Label::default, |record| record.label.clone())
     }
 
+    /// This annotator's tags of a frame.
+    pub fn tags(&self, frame: usize) -> Tags {
+        self.own().and_then(|own| own.tags(frame)).unwrap_or_default()
+    }
+
+    /// Tags that this annotator gave to every one of `frames`; none of no frame.
+    pub fn common_tags(&self, frames: &[u32]) -> Tags {
+        let Some(own) = self.own().filter(|_| !frames.is_empty()) else { return Tags::NONE };
+        let all: Tags = Tag::ALL.into_iter().collect();
+        frames.iter().fold(all, |common, &frame| common.minus(all.minus(own.tags(frame as usize).unwrap_or_default())))
+    }
+
     /// True where this annotator said something of a frame's fit or count.
     pub fn is_judged(&self, frame: usize) -> bool {
-        self.mine(frame).is_some_and(|r| !r.label.tags.is_empty() || r.label.verdict.is_some())
+        !self.tags(frame).is_empty() || self.mine(frame).is_some_and(|record| record.label.verdict.is_some())
     }
 
     /// The label as it will be once the acts under way are written.
     pub(super) fn expected(&self, frame: usize) -> Label {
-        let changes = self.pending.iter().flat_map(|(_, changes)| changes);
-        changes.filter(|(id, _)| id.index == frame).fold(self.label(frame), |label, (_, change)| change.applied(&label))
+        let changes = self.pending.iter().filter_map(|(_, asked)| asked.of(frame));
+        changes.fold(self.label(frame), |label, change| change.applied(&label))
+    }
+
+    /// True where each of `frames`, in the order of the data set, will have `tag` once the acts under way are written.
+    pub(super) fn all_will_have(&self, frames: &[u32], tag: Tag) -> bool {
+        let mut tags: Vec<Tags> = frames.iter().map(|&frame| self.tags(frame as usize)).collect();
+        for (_, asked) in &self.pending {
+            asked.change_tags(frames, &mut tags);
+        }
+        tags.iter().all(|tags| tags.contains(tag))
     }
 
     /// Records of a frame by others, in the order of their names.
     pub fn others(&self, frame: usize) -> impl Iterator<Item = &Record> {
         let others = self.table.iter().filter(|(name, _)| **name != self.annotator);
-        others.filter_map(move |(_, records)| records.get(&frame)).filter(|record| !record.label.is_empty())
+        others.filter_map(move |(_, records)| records.tags(frame).and_then(|_| records.get(frame)))
     }
 
-    /// Tags of a frame and who gave them; only one's own in a mode that hides the others'.
-    pub fn visible(&self, frame: usize, mode: LabelMode) -> Visible<'_> {
-        let hide = mode == LabelMode::Agreement;
-        let mut visible = Visible::default();
-        for (name, records) in &self.table {
-            if hide && *name != self.annotator {
-                continue;
-            }
-            if let Some(record) = records.get(&frame).filter(|record| !record.label.is_empty()) {
-                visible.tags = visible.tags.union(record.label.tags);
-                visible.annotators.push(name.as_str());
-            }
-        }
-        visible
+    /// Those whose labels may be seen, in the order of their names; only oneself in a mode that hides the others'.
+    pub fn seen(&self, mode: LabelMode) -> impl Iterator<Item = (&str, &Records)> {
+        let seen = move |name: &str| mode != LabelMode::Agreement || name == self.annotator;
+        self.table.iter().filter(move |(name, _)| seen(name)).map(|(name, records)| (name.as_str(), records))
+    }
+
+    /// Everybody's tags of a frame, as far as they may be seen.
+    pub fn visible_tags(&self, frame: usize, mode: LabelMode) -> Tags {
+        self.seen(mode).filter_map(|(_, records)| records.tags(frame)).fold(Tags::NONE, Tags::union)
+    }
+
+    /// Who labelled a frame, as far as that may be seen.
+    pub fn visible_annotators(&self, frame: usize, mode: LabelMode) -> Vec<&str> {
+        self.seen(mode).filter(|(_, records)| records.tags(frame).is_some()).map(|(name, _)| name).collect()
     }
 
     /// Number of frames that this annotator labelled.
     pub fn count(&self) -> usize {
-        self.table.get(&self.annotator).map_or(0, |r| r.values().filter(|r| !r.label.is_empty()).count())
+        self.own().map_or(0, Records::count)
+    }
+
+    /// Selects these frames.
+    pub(super) fn select(&mut self, frames: BTreeSet<usize>) {
+        self.targets = frames.iter().map(|&frame| frame as u32).collect();
+        self.selection = frames;
+        self.selection_revision += 1;
     }
 
     /// The act that would be undone, in words.
@@ -196,47 +210,55 @@ impl Labels {
         }
     }
 
-    /// Forgets the journals; the annotator stays.
-    pub(super) fn close(&mut self) {
-        let (annotator, revision, next_act) = (std::mem::take(&mut self.annotator), self.revision + 1, self.next_act);
-        *self = Self { annotator, next_act, revision, ..Self::default() };
+    /// Forgets the journals; the annotator stays. Gives what was known, for whoever has time to free it.
+    pub(super) fn close(&mut self) -> Self {
+        let kept = Self {
+            annotator: self.annotator.clone(),
+            revision: self.revision + 1,
+            selection_revision: self.selection_revision + 1,
+            next_act: self.next_act,
+            ..Self::default()
+        };
+        std::mem::replace(self, kept)
     }
 
-    /// Takes in what a commit wrote.
-    pub(super) fn written(&mut self, kind: ActKind, name: String, outcomes: Vec<(FrameId, Label, Record)>) {
-        let mut changes = Vec::with_capacity(outcomes.len());
+    /// Takes in what a commit wrote; gives the records that were replaced.
+    pub(super) fn written(&mut self, kind: ActKind, name: String, done: Done) -> Vec<Arc<Record>> {
+        let Done { changes, records, scored } = done;
         let mine = self.table.entry(self.annotator.clone()).or_default();
-        for (frame, before, record) in outcomes {
-            changes.push((frame.clone(), before, record.label.clone()));
-            self.last_edited = Some(frame.index);
-            mine.insert(frame.index, record);
+        let mut replaced = Vec::new();
+        for ((frame, _, after), record) in changes.iter().zip(records) {
+            self.last_edited = Some(frame);
+            replaced.extend(mine.insert(frame, record, after, scored.contains(&frame)));
         }
         self.revision += 1;
         if changes.is_empty() {
-            return self.forget(kind);
+            self.forget(kind);
+        } else {
+            self.remember(kind, name, changes);
         }
+        replaced
+    }
+
+    fn remember(&mut self, kind: ActKind, name: String, changes: Changes) {
         match kind {
             ActKind::Do => {
                 self.redo.clear();
-                self.undo.push(Act { name, changes });
-                if self.undo.len() > UNDO_DEPTH {
+                self.undo.push(Act { name, changes: Arc::new(changes) });
+                let bytes = |acts: &[Act]| acts.iter().map(|act| act.changes.bytes()).sum::<usize>();
+                while self.undo.len() > UNDO_DEPTH || (self.undo.len() > 1 && bytes(&self.undo) > UNDO_BYTES) {
                     self.undo.remove(0);
                 }
             }
             // The stacks change only now: an act that could not be written is still there to be taken back.
             ActKind::Undo => {
                 self.undo.pop();
-                self.redo.push(Act { name, changes: reversed(changes) });
+                self.redo.push(Act { name, changes: Arc::new(changes.reversed()) });
             }
             ActKind::Redo => {
                 self.redo.pop();
-                self.undo.push(Act { name, changes });
+                self.undo.push(Act { name, changes: Arc::new(changes) });
             }
         }
     }
-}
-
-/// What was done, of what an undo wrote.
-fn reversed(changes: Vec<(FrameId, Label, Label)>) -> Vec<(FrameId, Label, Label)> {
-    changes.into_iter().map(|(frame, before, after)| (frame, after, before)).collect()
 }

@@ -3,7 +3,15 @@
 //! [`Session::apply`] takes a [`Command`] and answers [`Effect`]s, requests to the outside: open, load, run. It needs no
 //! thread, no window and no GPU, so every behaviour of the window can be tested without one. Panes read the session and
 //! send commands; threads report back by commands too.
+//!
+//! **Time.** A pass of the window has 16 ms of its thread, also on 100,000 frames. What takes longer is an [`Effect`]: it
+//! is done by a thread of the [`Runtime`] and comes back as a command. `tests/large.rs` measures it.
+//!
+//! **Memory.** A window on 100,000 frames, all of them labelled, graded and with results, takes less than 1 GiB besides
+//! the pictures: frames that were read up to 512 MiB ([`crate::dataset::DEFAULT_BUDGET`]), the states of one fit up to
+//! 128 MiB, what can be undone up to 64 MiB; a label takes about 1 KiB, a row of results 0.3 KiB, a frame's strata 0.1 KiB.
 
+mod acts;
 mod apply;
 mod command;
 mod evidence;
@@ -13,19 +21,24 @@ mod history;
 mod labels;
 mod pins;
 mod queue;
+mod records;
+mod results;
 mod runtime;
 mod state;
 mod strata;
 mod view;
 
-pub use command::{Aim, Command, Commit, Effect, Export, PickKind, PinRequest, Task, Written};
+pub use acts::{Act, ActKind, Asked, Changes, Done};
+pub use command::{Aim, Command, Commit, Effect, Export, OpenedLabels, PickKind, PinRequest, Task, Trash, Written};
 pub use evidence::EvidenceRequest;
 pub use file::{SavedChange, SavedDataset, SavedFit, SavedFrame, SavedPin, SessionFile, SessionFileError};
 pub use fit::{Fit, FitStatus};
 pub use history::{Branch, Flag, History, Row, difference};
-pub use labels::{Act, ActKind, LabelMode, LabelStatus, LabelTable, Labels, Visible};
+pub use labels::{LabelMode, LabelStatus, LabelTable, Labels};
 pub use pins::{MOST_PINS, Pin, PinRow, Pins, numbers};
-pub use queue::{Facts, Number, Queue, Rule, SYNTAX, SavedView, Sort, SortKey};
+pub use queue::{Facts, Number, Queue, Reads, Rule, SYNTAX, SavedView, Sort, SortKey};
+pub use records::Records;
+pub use results::FoundResults;
 pub use runtime::{Picker, Runtime, Wake};
 pub use state::{Data, FitHashes, FrameSummary, LogLevel, LogLine, Opening, Session};
 pub use strata::{Strata, StrataStatus};

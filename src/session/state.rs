@@ -95,14 +95,14 @@ impl Data {
 /// What is known of a frame's fit, for the list and the timeline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameSummary {
-    /// Iterations done.
-    pub iterations: usize,
+    /// Iterations done; `None` where a batch could not fit the frame.
+    pub iterations: Option<usize>,
     /// L.
-    pub loss: f64,
+    pub loss: Option<f64>,
     /// Mean forward-consistency IoU over the views.
     pub iou: Option<f64>,
     /// The convergence criterion.
-    pub converged: bool,
+    pub converged: Option<bool>,
     /// MAJPE, mm, where there is truth.
     pub majpe_mm: Option<f64>,
     /// Why the last run ended.
@@ -135,6 +135,8 @@ pub struct Session {
     pub(super) left: VecDeque<usize>,
     /// One line a fitted frame.
     pub summaries: BTreeMap<usize, FrameSummary>,
+    /// Counts up with every change of them.
+    pub(super) summarised: u64,
     /// The frame list.
     pub queue: Queue,
     /// The list must be filled again.
@@ -167,7 +169,16 @@ pub struct Session {
     pub(super) aim: Aim,
     /// A session file whose data set is being opened.
     pub(super) restoring: Option<(PathBuf, Box<SessionFile>)>,
+    /// A table of results whose data set is being opened.
+    pub(super) waiting_results: Option<PathBuf>,
     /// What a session file says of the window, for the window to take.
     pub(super) restored_window: Option<serde_json::Value>,
     pub(super) jobs: JobId,
+}
+
+impl Session {
+    /// Counts up with every change of [`Self::summaries`].
+    pub fn summaries_revision(&self) -> u64 {
+        self.summarised
+    }
 }

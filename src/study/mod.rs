@@ -1,6 +1,6 @@
 //! Studies over many frames: batch runs and their tables, the hard subset, and what is taken home of a fit.
 //!
-//! [`run_batch`] fits, [`Summary`] writes the rows to a CSV as they come, [`Means`] sums them up. [`complexity`] says
+//! [`run_batch`] fits, [`Summary`] writes the rows to a CSV as they come and [`read_summary`] reads them back, [`Means`] sums them up. [`complexity`] says
 //! which frames are hard before anything is fitted, [`frame_evidence`] judges a fit; [`write_ply`] and [`write_curves`]
 //! export a state. Nothing here knows a window or a terminal.
 
@@ -8,11 +8,13 @@ mod batch;
 pub mod complexity;
 mod evidence;
 mod export;
+mod results;
 mod row;
 mod summary;
 
 pub use batch::{BatchOptions, fit_frame, run_batch};
 pub use evidence::{FrameEvidence, frame_evidence, frames_before, state_evidence};
 pub use export::{CurveRow, curve_columns, curves_csv, ply, write_curves, write_ply};
+pub use results::{SummaryRow, read_summary};
 pub use row::{FitNumbers, FrameFit, FrameRow, Means};
 pub use summary::{StudyError, Summary, columns};

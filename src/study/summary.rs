@@ -22,6 +22,24 @@ pub enum StudyError {
         /// The file or folder.
         path: PathBuf,
     },
+    /// A table cannot be read.
+    #[error("{path}: cannot be read: {reason}", path = path.display())]
+    Read {
+        /// What the operating system said.
+        reason: std::io::Error,
+        /// The file.
+        path: PathBuf,
+    },
+    /// A table is not what it should be.
+    #[error("{path}: line {line}: {message}", path = path.display())]
+    Table {
+        /// The line, from 1.
+        line: u64,
+        /// What is wrong with it, and what was expected.
+        message: String,
+        /// The file.
+        path: PathBuf,
+    },
     /// The operating system gives no more threads.
     #[error("no thread to work on: {reason}")]
     Thread {

@@ -175,7 +175,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         tooltip: "Say nothing of the frame, or of all selected frames, any more: tags, note, verdict, cells.",
         menu: Menu::Labels,
         keys: &[(NONE, Key::Delete)],
-        enabled: |s| s.label_targets().iter().any(|&frame| s.labels.mine(frame).is_some()),
+        enabled: |s| s.label_targets().iter().any(|&frame| s.labels.mine(frame as usize).is_some()),
         act: |_| Act::Session(Command::ClearLabel),
     },
     UserCommand {

@@ -99,6 +99,8 @@ pub(crate) enum AppAct {
     CopyPicture(Option<PaneKind>),
     /// Bring a pane to the front.
     ShowPane(PaneKind),
+    /// Type the path of a table of results.
+    LoadResults,
     /// Put the frame's path on the clipboard.
     CopyPath,
 }

@@ -15,7 +15,7 @@ fn fitted(s: &Session) -> bool {
 }
 
 fn labelled(s: &Session) -> bool {
-    s.labels.table().values().any(|records| records.values().any(|record| !record.label.is_empty()))
+    s.labels.table().values().any(|records| !records.is_empty())
 }
 
 /// Commands about comparing and sharing, in the order of their menus.
@@ -28,6 +28,15 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         keys: &[],
         enabled: always,
         act: |_| Act::App(AppAct::OpenSession),
+    },
+    UserCommand {
+        label: "Load results…",
+        title: None,
+        tooltip: "Take IoU, convergence, reason and MAJPE of a whole batch into the list: the summary.csv of `fit --out`.",
+        menu: Menu::File,
+        keys: &[],
+        enabled: |s| s.data.dataset.is_some(),
+        act: |_| Act::App(AppAct::LoadResults),
     },
     UserCommand {
         label: "Save session",

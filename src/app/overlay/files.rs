@@ -1,4 +1,4 @@
-//! Sheets that ask for a file: one to write, or a session file to open.
+//! Sheets that ask for a file: one to write, or a session file or a table of results to read.
 
 use super::{Overlay, modal};
 use crate::app::commands::{Act, SaveKind};
@@ -67,6 +67,12 @@ impl Overlay {
         self.files = State::default();
     }
 
+    /// Asks for a table of results.
+    pub(in crate::app) fn load_results(&mut self) {
+        self.toggle(super::Sheet::Results);
+        self.files = State::default();
+    }
+
     pub(super) fn save(&mut self, ui: &mut Ui, shared: &mut Shared<'_>, kind: SaveKind) -> bool {
         let tokens = Tokens::of(ui);
         let (title, how) = what(kind);
@@ -96,6 +102,24 @@ impl Overlay {
             let browse = |_: PathBuf| super::pick_session;
             if let Some(path) = self.path_field(ui, "Session file", "Open", browse) {
                 shared.send(Command::OpenSession(path));
+                done = true;
+            }
+        });
+        done || response.should_close()
+    }
+
+    pub(super) fn results_path(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
+        let tokens = Tokens::of(ui);
+        let mut done = false;
+        let response = modal(ui, "results").show(ui.ctx(), |ui| {
+            ui.set_width(620.0);
+            ui.label(RichText::new("Load results").font(crate::app::theme::strong(16.0)));
+            let how =
+                "The summary.csv of `mhp-inspector fit --out`. Frames that were fitted in this window keep theirs.";
+            ui.label(RichText::new(how).small().color(tokens.dim));
+            let browse = |_: PathBuf| super::pick_results;
+            if let Some(path) = self.path_field(ui, "Table of results", "Load", browse) {
+                shared.send(Command::LoadResults(path));
                 done = true;
             }
         });

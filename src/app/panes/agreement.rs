@@ -3,14 +3,18 @@
 use super::{Shared, empty};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
-use crate::labels::{Agreement, Dispute, Record, Tag, TagAgreement, against_machine, agreement, judged};
-use crate::session::{Command, Labels};
+use crate::labels::{Record, Tag, TagAgreement, Tags, against_machine, compare_tags};
+use crate::session::{Command, Labels, Records};
 use egui::{RichText, Role, Ui};
+use std::cmp::Ordering;
+use std::collections::HashMap;
 
 /// The machine as one of the two.
 const MACHINE: &str = "machine";
 /// The machine says yes from this score on.
 const THRESHOLD: f64 = 0.5;
+/// Disputes that are listed at most.
+const LISTED: usize = 200;
 
 /// Whose labels are compared, what came out, and which disputes are listed.
 #[derive(Default)]
@@ -24,8 +28,21 @@ pub(in crate::app) struct State {
 type Key = (u64, [String; 2]);
 
 struct Found {
-    agreement: Agreement,
+    /// Frames that both judged.
+    frames: usize,
+    only_in_a: usize,
+    only_in_b: usize,
+    tags: Vec<(Tag, TagAgreement)>,
+    pooled: TagAgreement,
+    disputes: Vec<Dispute>,
     remark: Option<String>,
+}
+
+/// A decision that differs: the frame, the tag, and whether it was A who gave it.
+struct Dispute {
+    frame: usize,
+    tag: Tag,
+    a: bool,
 }
 
 /// A cell of a table: the tag, and what A and B said.
@@ -64,8 +81,8 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let mut listed = state.listed;
     egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
         summary(ui, found, &state.pair, &tokens);
-        table(ui, &found.agreement, &mut listed, &tokens);
-        disputes(ui, shared, &found.agreement.disputes, listed, &state.pair, &tokens);
+        table(ui, found, &mut listed, &tokens);
+        disputes(ui, shared, &found.disputes, listed, &state.pair, &tokens);
     });
     state.listed = listed;
 }
@@ -96,35 +113,72 @@ fn choose(ui: &mut Ui, state: &mut State, names: &[&String]) {
 }
 
 fn compute(labels: &Labels, pair: &[String; 2]) -> Found {
-    let records = |name: &String| -> Vec<&Record> {
-        let all = labels.table().get(name).into_iter().flat_map(|records| records.values());
-        judged(all).collect()
+    let records = |name: &String| labels.table().get(name);
+    let Some(a) = records(&pair[0]) else { return between(&Records::default(), &Records::default()) };
+    if pair[1] == MACHINE {
+        with_machine(a)
+    } else {
+        records(&pair[1]).map_or_else(|| between(a, a), |b| between(a, b))
+    }
+}
+
+/// Two people: both lists are in the order of the data set, so that one walk along them finds what both judged.
+fn between(a: &Records, b: &Records) -> Found {
+    let (a, b): (Vec<_>, Vec<_>) = (a.judged().collect(), b.judged().collect());
+    let (mut both, mut disputes): (Vec<(Tags, Tags)>, _) = (Vec::new(), Vec::new());
+    let (mut i, mut j) = (0, 0);
+    while let (Some(&(frame, of_a)), Some(&(other, of_b))) = (a.get(i), b.get(j)) {
+        match frame.cmp(&other) {
+            Ordering::Less => i += 1,
+            Ordering::Greater => j += 1,
+            Ordering::Equal => {
+                both.push((of_a, of_b));
+                let differing = of_a.minus(of_b).union(of_b.minus(of_a));
+                disputes.extend(differing.iter().map(|tag| Dispute { frame, tag, a: of_a.contains(tag) }));
+                (i, j) = (i + 1, j + 1);
+            }
+        }
+    }
+    let (tags, pooled) = compare_tags(&both);
+    let frames = both.len();
+    let (only_in_a, only_in_b) = (a.len() - frames, b.len() - frames);
+    Found { frames, only_in_a, only_in_b, tags, pooled, disputes, remark: None }
+}
+
+/// One person and the machine's scores at that time.
+fn with_machine(a: &Records) -> Found {
+    let (scored, others): (Vec<_>, Vec<_>) = a.judged().map(|(frame, _)| frame).partition(|&frame| a.is_scored(frame));
+    let judged: Vec<(usize, &Record)> = scored.into_iter().filter_map(|frame| Some((frame, a.get(frame)?))).collect();
+    let machine = against_machine(judged.iter().map(|(_, record)| *record), THRESHOLD);
+    let unscored = machine.unscored + others.len();
+    let frames: HashMap<&str, usize> = if machine.agreement.disputes.is_empty() {
+        HashMap::new()
+    } else {
+        judged.iter().map(|(frame, record)| (record.frame.path.as_str(), *frame)).collect()
     };
-    let a = records(&pair[0]);
-    if pair[1] != MACHINE {
-        return Found { agreement: agreement(a, records(&pair[1])), remark: None };
-    }
-    let machine = against_machine(a, THRESHOLD);
     let mut remarks = Vec::new();
+    let counted = machine.agreement.frames;
     if machine.shown > 0 {
-        remarks.push(format!(
-            "{} of {} were judged with the scores on screen: not blind",
-            machine.shown, machine.agreement.frames
-        ));
+        remarks.push(format!("{} of {counted} were judged with the scores on screen: not blind", machine.shown));
     }
-    if machine.unscored > 0 {
-        remarks.push(format!("{} were judged without a score", machine.unscored));
+    if unscored > 0 {
+        remarks.push(format!("{unscored} were judged without a score"));
     }
-    Found { agreement: machine.agreement, remark: (!remarks.is_empty()).then(|| remarks.join("; ")) }
+    let place = |dispute: &crate::labels::Dispute| {
+        Some(Dispute { frame: *frames.get(dispute.frame.as_str())?, tag: dispute.tag, a: dispute.a })
+    };
+    let disputes = machine.agreement.disputes.iter().filter_map(place).collect();
+    let crate::labels::Agreement { only_in_b, tags, pooled, .. } = machine.agreement;
+    let remark = (!remarks.is_empty()).then(|| remarks.join("; "));
+    Found { frames: counted, only_in_a: unscored, only_in_b, tags, pooled, disputes, remark }
 }
 
 fn summary(ui: &mut Ui, found: &Found, pair: &[String; 2], tokens: &Tokens) {
-    let agreement = &found.agreement;
-    let both = format!("{} frames judged by both", agreement.frames);
+    let both = format!("{} frames judged by both", found.frames);
     let text = if pair[1] == MACHINE {
         both
     } else {
-        let (a, b) = (agreement.only_in_a, agreement.only_in_b);
+        let (a, b) = (found.only_in_a, found.only_in_b);
         format!("{both} · {a} only by {} · {b} only by {}", pair[0], pair[1])
     };
     ui.label(RichText::new(text).small().color(tokens.dim));
@@ -133,7 +187,7 @@ fn summary(ui: &mut Ui, found: &Found, pair: &[String; 2], tokens: &Tokens) {
     }
 }
 
-fn table(ui: &mut Ui, agreement: &Agreement, listed: &mut Option<Listed>, tokens: &Tokens) {
+fn table(ui: &mut Ui, found: &Found, listed: &mut Option<Listed>, tokens: &Tokens) {
     egui::Grid::new("agreement").num_columns(9).spacing([12.0, 3.0]).show(ui, |ui| {
         for (title, tip) in [
             ("", ""),
@@ -149,12 +203,12 @@ fn table(ui: &mut Ui, agreement: &Agreement, listed: &mut Option<Listed>, tokens
             ui.label(RichText::new(title).small().color(tokens.dim)).on_hover_text(tip);
         }
         ui.end_row();
-        for (tag, row) in &agreement.tags {
+        for (tag, row) in &found.tags {
             ui.label(RichText::new(tag.code()).font(theme::strong(12.0)).color(tokens.tag(*tag))).on_hover_text(tag.words());
             cells(ui, row, Some(*tag), listed, tokens);
         }
         ui.label(RichText::new("pooled").font(theme::strong(12.0))).on_hover_text("All decisions of all tags in one table.");
-        cells(ui, &agreement.pooled, None, listed, tokens);
+        cells(ui, &found.pooled, None, listed, tokens);
     });
 }
 
@@ -205,35 +259,32 @@ fn disputes(
     pair: &[String; 2],
     tokens: &Tokens,
 ) {
-    let wanted = |d: &&Dispute| listed.is_none_or(|cell| (d.tag, d.a, d.b) == (cell.tag, cell.a, cell.b));
-    let found: Vec<&Dispute> = disputes.iter().filter(wanted).collect();
+    let wanted = |d: &&Dispute| listed.is_none_or(|cell| (d.tag, d.a) == (cell.tag, cell.a));
+    let count = disputes.iter().filter(wanted).count();
     let title = match listed {
         Some(Listed { tag, a, .. }) => {
-            format!("{} frames where only {} gave {tag}", found.len(), pair[usize::from(!a)])
+            format!("{count} frames where only {} gave {tag}", pair[usize::from(!a)])
         }
-        None => format!("{} decisions in dispute", found.len()),
+        None => format!("{count} decisions in dispute"),
     };
     ui.add_space(4.0);
     ui.label(RichText::new(title).small().color(tokens.dim));
-    let labels = &shared.session.labels;
-    let index = |frame: &str| {
-        let records = labels.table().values().flat_map(|records| records.values());
-        records.into_iter().find(|record| record.frame.path == frame).map(|record| record.frame.index)
-    };
+    let Some(dataset) = shared.session.data.dataset.clone() else { return };
     let mut go = None;
-    for dispute in found.iter().take(200) {
+    for dispute in disputes.iter().filter(wanted).take(LISTED) {
+        let name = dataset.frame_name(dispute.frame);
         ui.horizontal(|ui| {
             ui.label(RichText::new(dispute.tag.code()).small().color(tokens.tag(dispute.tag)));
-            let link = ui.link(RichText::new(&dispute.frame).small());
-            if link.named(Role::Link, &format!("Dispute {} {}", dispute.tag, dispute.frame)).clicked() {
-                go = index(&dispute.frame);
+            let link = ui.link(RichText::new(name).small());
+            if link.named(Role::Link, &format!("Dispute {} {name}", dispute.tag)).clicked() {
+                go = Some(dispute.frame);
             }
             let who = if dispute.a { &pair[0] } else { &pair[1] };
             ui.label(RichText::new(format!("by {who} only")).small().color(tokens.dim));
         });
     }
-    if found.len() > 200 {
-        ui.label(RichText::new(format!("and {} more", found.len() - 200)).small().color(tokens.dim));
+    if count > LISTED {
+        ui.label(RichText::new(format!("and {} more", count - LISTED)).small().color(tokens.dim));
     }
     if let Some(frame) = go {
         shared.send(Command::GotoFrame(frame));

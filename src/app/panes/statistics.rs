@@ -3,8 +3,8 @@
 use super::{Shared, empty};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
-use crate::labels::{Record, Tag};
-use crate::session::Session;
+use crate::labels::Tag;
+use crate::session::{Records, Session};
 use egui::{RichText, Role, Sense, Ui, vec2};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -38,7 +38,7 @@ struct Row {
 
 pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let session = shared.session;
-    if session.labels.table().values().all(|records| records.values().all(|r| r.label.is_empty())) {
+    if session.labels.table().values().all(Records::is_empty) {
         let how = "Tag frames with the keys 1 to 5 and 0. Here you then see how often each tag was given, by stratum, by \
                    scene and by day.";
         return empty(ui, "No labels yet", how);
@@ -71,19 +71,20 @@ fn controls(ui: &mut Ui, session: &Session, state: &mut State) {
 }
 
 fn rows(session: &Session, group: Group, annotator: Option<&str>) -> Vec<Row> {
-    let mut groups: BTreeMap<(usize, String), Row> = BTreeMap::new();
+    // By names that are borrowed: 100,000 records make a handful of groups.
+    let mut groups: BTreeMap<(usize, &str), Row> = BTreeMap::new();
     let tables = session.labels.table().iter().filter(|(name, _)| annotator.is_none_or(|wanted| wanted == *name));
-    for (&frame, record) in tables.flat_map(|(_, records)| records).filter(|(_, r)| !r.label.is_empty()) {
-        let name = name_of(session, group, frame, record);
-        let row = groups.entry(name.clone()).or_insert_with(|| Row {
-            frames: frames_of(session, group, &name),
-            name: name.1,
+    for (frame, tags, records) in tables.flat_map(|(_, r)| r.said_tags().map(move |(frame, tags)| (frame, tags, r))) {
+        let (place, name) = name_of(session, group, frame, records);
+        let row = groups.entry((place, name)).or_insert_with(|| Row {
+            frames: frames_of(session, group, name),
+            name: name.to_owned(),
             labelled: BTreeSet::new(),
             tags: [0; Tag::ALL.len()],
         });
         row.labelled.insert(frame);
         for (count, tag) in row.tags.iter_mut().zip(Tag::ALL) {
-            *count += usize::from(record.label.tags.contains(tag));
+            *count += usize::from(tags.contains(tag));
         }
     }
     let mut rows: Vec<Row> = groups.into_values().collect();
@@ -104,21 +105,21 @@ fn rows(session: &Session, group: Group, annotator: Option<&str>) -> Vec<Row> {
 }
 
 /// The group's place in the table, and its name.
-fn name_of(session: &Session, group: Group, frame: usize, record: &Record) -> (usize, String) {
+fn name_of<'a>(session: &'a Session, group: Group, frame: usize, records: &'a Records) -> (usize, &'a str) {
     match group {
         Group::Stratum => match session.strata.of(frame).and_then(|complexity| complexity.stratum) {
-            Some(stratum) => (stratum as usize, stratum.word().into()),
-            None => (9, "not graded".into()),
+            Some(stratum) => (stratum as usize, stratum.word()),
+            None => (9, "not graded"),
         },
-        Group::Scene => (0, session.data.dataset.as_ref().map_or("", |dataset| dataset.sequence(frame)).into()),
-        Group::Day => (0, record.time.get(..10).unwrap_or("unknown").into()),
+        Group::Scene => (0, session.data.dataset.as_ref().map_or("", |dataset| dataset.sequence(frame))),
+        Group::Day => (0, records.get(frame).and_then(|record| record.time.get(..10)).unwrap_or("unknown")),
     }
 }
 
-fn frames_of(session: &Session, group: Group, name: &(usize, String)) -> Option<usize> {
+fn frames_of(session: &Session, group: Group, name: &str) -> Option<usize> {
     use crate::study::complexity::Stratum;
     let counts = &session.strata.result()?.counts;
-    let stratum = Stratum::ALL.into_iter().find(|stratum| group == Group::Stratum && stratum.word() == name.1)?;
+    let stratum = Stratum::ALL.into_iter().find(|stratum| group == Group::Stratum && stratum.word() == name)?;
     Some(counts.in_stratum(stratum))
 }
 

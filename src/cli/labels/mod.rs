@@ -40,7 +40,7 @@ pub enum LabelsCommand {
     /// Bring labels from CSV into the journals of a data set.
     #[command(after_help = import::HELP)]
     Import(import::Args),
-    /// Count labels: by tag, scene, day; and the time that one took.
+    /// Count labels: by tag, by scene, stratum or day; and the time that one took.
     #[command(after_help = stats::HELP)]
     Stats(stats::Args),
 }

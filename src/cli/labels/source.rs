@@ -1,6 +1,7 @@
 //! Where labels come from as typed: a data set, a journal, or a table that was exported.
 
 use crate::cli::common::open;
+use crate::dataset::Dataset;
 use crate::labels::{LabelPlace, Record, place_acts, read_labels};
 use anyhow::{Context as _, bail};
 use std::collections::BTreeSet;
@@ -14,12 +15,24 @@ const DATA: [&str; 3] = ["npz", "npy", "toml"];
 /// # Errors
 /// Where it is none of the three, or cannot be read.
 pub(super) fn acts(path: &Path, manifest: Option<&Path>) -> anyhow::Result<Vec<Record>> {
-    let ending = path.extension().unwrap_or_default();
-    if !path.is_dir() && !DATA.iter().any(|known| ending.eq_ignore_ascii_case(known)) {
+    if is_table(path) {
         return Ok(read_labels(path)?);
     }
     let expected = "expected a data set, a journal (*.labels.jsonl), or labels exported as CSV or JSON";
-    let dataset = open(path, manifest).context(expected)?;
+    acts_of(&open(path, manifest).context(expected)?)
+}
+
+/// True for what is no data set, hence a journal or a table.
+pub(super) fn is_table(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default();
+    !path.is_dir() && !DATA.iter().any(|known| ending.eq_ignore_ascii_case(known))
+}
+
+/// Every record of a data set, in the order of the acts.
+///
+/// # Errors
+/// Where the journals cannot be read.
+pub(super) fn acts_of(dataset: &Dataset) -> anyhow::Result<Vec<Record>> {
     Ok(place_acts(&LabelPlace::of(&dataset.info().root, dataset.fingerprint())?)?)
 }
 

@@ -1,26 +1,34 @@
 //! `labels stats`: how many labels there are, of what, where, when, and how long one took.
 
-use super::source::{acts, counted, only};
-use crate::cli::common::print;
-use crate::labels::{AnnotatorStatistics, LabelCounts, PAUSE_S, Pace, Tag, Verdict, statistics};
-use anyhow::Context as _;
+use super::source::{acts, acts_of, counted, is_table, only};
+use crate::cli::common::{open, print};
+use crate::cli::complexity;
+use crate::labels::{AnnotatorStatistics, LabelCounts, PAUSE_S, Pace, Record, Tag, Verdict, day, statistics};
+use crate::study::complexity::{ComplexityOptions, Stratum, cache_folder};
+use anyhow::{Context as _, bail};
 use clap::ValueEnum;
 use serde_json::{Map, Value, json};
+use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 /// Shown under the options of `labels stats --help`.
 pub(super) const HELP: &str = "\
-JSON: an object an annotator with frames, tags, verdicts, notes, groups (the same counts by scene), acts, first, last, \
+JSON: an object an annotator with frames, tags, verdicts, notes, groups (the same counts by what --by says), acts, first, last, \
 days, hours, median_s. Days and hours are UTC. median_s is the median time from one act to the next, gaps of more than \
 ten minutes left out. Labels that were taken back do not count, the acts do.
+
+--by stratum grades the frames as `complexity` does, which reads all of them the first time; what was measured is kept.
 
 Exit codes: 0 told; 2 bad input.
 
 Examples:
   mhp-inspector labels stats data/mmvr
       Everybody's labels, by scene.
+  mhp-inspector labels stats data/mmvr --by stratum
+      Which tags the hard frames have.
   mhp-inspector labels stats anna.csv --by sequence --json
       One exported table, by folder, for a program to read.";
 
@@ -31,17 +39,21 @@ enum Grouping {
     Scene,
     /// All but the last part: `d1s1/000`.
     Sequence,
+    /// Easy, medium or hard, graded as `complexity` does; PATH must be a data set.
+    Stratum,
+    /// The day in UTC on which the frame was labelled last.
+    Day,
 }
 
-impl Grouping {
-    /// The group of the frame of this name; a name of one part has none.
-    fn of(self, frame: &str) -> Option<String> {
-        let parts = match self {
-            Self::Scene => frame.split_once('/'),
-            Self::Sequence => frame.rsplit_once('/'),
-        };
-        parts.map(|(group, _)| group.to_owned())
-    }
+/// What the frames that no stratum is known of are counted under.
+const NOT_GRADED: &str = "not graded";
+
+/// The group of a frame, by its newest record.
+type Group = Box<dyn Fn(&Record) -> Option<String>>;
+
+/// The scene or sequence of a frame; a name of one part has none.
+fn part(split: for<'a> fn(&'a str) -> Option<(&'a str, &'a str)>) -> Group {
+    Box::new(move |record| split(&record.frame.path).map(|(group, _)| group.to_owned()))
 }
 
 /// What `labels stats` is told.
@@ -68,8 +80,9 @@ pub struct Args {
 /// # Errors
 /// Where PATH cannot be read, or the annotator has no labels there.
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let acts = only(acts(&args.path, args.manifest.as_deref())?, args.annotator.as_deref(), &args.path)?;
-    let found = statistics(&acts, &|frame| args.by.of(frame));
+    let (acts, group) = read(args)?;
+    let acts = only(acts, args.annotator.as_deref(), &args.path)?;
+    let found = statistics(&acts, &group);
     let text = if args.json {
         let object: Map<String, Value> = found.iter().map(|(name, one)| (name.clone(), as_json(one))).collect();
         serde_json::to_string_pretty(&Value::Object(object)).context("writing JSON")? + "\n"
@@ -80,6 +93,37 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     };
     print(&text)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Every act, and what frames are counted together.
+fn read(args: &Args) -> anyhow::Result<(Vec<Record>, Group)> {
+    let manifest = args.manifest.as_deref();
+    let group: Group = match args.by {
+        Grouping::Scene => part(|frame| frame.split_once('/')),
+        Grouping::Sequence => part(|frame| frame.rsplit_once('/')),
+        Grouping::Day => Box::new(day),
+        Grouping::Stratum => return by_stratum(args),
+    };
+    Ok((acts(&args.path, manifest)?, group))
+}
+
+fn by_stratum(args: &Args) -> anyhow::Result<(Vec<Record>, Group)> {
+    if is_table(&args.path) {
+        bail!("{}: --by stratum grades the frames; expected a data set, not a file of labels", args.path.display());
+    }
+    let dataset = Arc::new(open(&args.path, args.manifest.as_deref())?);
+    let acts = acts_of(&dataset)?;
+    let graded = complexity::compute(&dataset, ComplexityOptions::default(), cache_folder())?;
+    let strata: HashMap<String, Stratum> = graded
+        .frames
+        .iter()
+        .enumerate()
+        .filter_map(|(index, frame)| Some((dataset.frame_name(index).to_owned(), frame.as_ref()?.stratum?)))
+        .collect();
+    let group = move |record: &Record| {
+        Some(strata.get(&record.frame.path).map_or(NOT_GRADED, |stratum| stratum.word()).to_owned())
+    };
+    Ok((acts, Box::new(group)))
 }
 
 fn as_json(one: &AnnotatorStatistics) -> Value {
@@ -112,8 +156,10 @@ fn counts_json(counts: &LabelCounts) -> Value {
 
 fn as_text(name: &str, one: &AnnotatorStatistics) -> String {
     let mut text = format!("{name}\n");
-    let groups = one.groups.iter().map(|(name, counts)| (name.as_str(), counts));
-    let rows: Vec<(&str, &LabelCounts)> = groups.chain([("all", &one.all)]).collect();
+    let mut rows: Vec<(&str, &LabelCounts)> = one.groups.iter().map(|(name, counts)| (name.as_str(), counts)).collect();
+    // Strata from easy to hard; any other group stays in the order of names.
+    rows.sort_by_key(|(name, _)| name.parse::<Stratum>().ok().filter(|stratum| stratum.word() == *name));
+    rows.push(("all", &one.all));
     let width = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
     let heads = Tag::ALL.map(|tag| format!("{:>7}", tag.code())).concat();
     let _ = writeln!(text, "  {:<width$} {:>7}{heads} {:>7}", "", "frames", "notes");

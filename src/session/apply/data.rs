@@ -35,11 +35,13 @@ impl Session {
             }
             Err(DatasetError::Cancelled) => {
                 self.restoring = None;
+                self.waiting_results = None;
                 self.note(LogLevel::Info, format!("opening {} was cancelled", path.display()));
                 return Vec::new();
             }
             Err(error) => {
                 self.restoring = None;
+                self.waiting_results = None;
                 self.note(LogLevel::Error, error.to_string());
                 return Vec::new();
             }
@@ -58,6 +60,7 @@ impl Session {
         self.fits.clear();
         self.left.clear();
         self.summaries.clear();
+        self.summarised += 1;
         self.pins = Pins::default();
         self.evidence = EvidenceState::default();
         self.data.frame = None;
@@ -72,6 +75,7 @@ impl Session {
         effects.extend(self.load(start));
         effects.extend(self.open_labels());
         effects.extend(self.begin_strata());
+        effects.extend(self.load_waiting_results());
         effects
     }
 

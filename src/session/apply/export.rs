@@ -64,18 +64,15 @@ impl Session {
     /// Everybody's labels; in agreement mode only one's own, so that nothing hidden leaves through this door.
     fn labels_task(&self, path: PathBuf, json: bool) -> Option<Task> {
         self.labels.place.as_ref()?;
-        let mut records: Vec<Record> = Vec::new();
-        for (annotator, frames) in self.labels.table() {
-            let hidden =
-                self.view.label_mode == crate::session::LabelMode::Agreement && *annotator != self.labels.annotator;
-            if !hidden {
-                records.extend(frames.values().filter(|record| !record.label.is_empty()).cloned());
-            }
+        let mut shared: Vec<Arc<Record>> = Vec::new();
+        for (_, records) in self.labels.seen(self.view.label_mode) {
+            shared.extend(records.said().map(|(_, record)| Arc::clone(record)));
         }
-        records.sort_by(|a, b| {
-            (a.frame.index, &a.frame.path, &a.annotator).cmp(&(b.frame.index, &b.frame.path, &b.annotator))
-        });
         Some(Task::new(move || {
+            let mut records: Vec<Record> = shared.into_iter().map(Arc::unwrap_or_clone).collect();
+            records.sort_by(|a, b| {
+                (a.frame.index, &a.frame.path, &a.annotator).cmp(&(b.frame.index, &b.frame.path, &b.annotator))
+            });
             let count = records.len();
             let fill = if json { write_json } else { write_csv };
             replace_file(&path, |mut out| fill(&mut out, &records))

@@ -80,7 +80,7 @@ impl Session {
     pub(super) fn reset(&mut self) -> Vec<Effect> {
         let Some(frame) = self.data.frame.as_ref().map(|frame| frame.index) else { return Vec::new() };
         self.fits.remove(&frame);
-        self.summaries.remove(&frame);
+        self.forget_summary(frame);
         self.note(LogLevel::Info, "reset: a new start pose with the current settings".into());
         self.begin_fit(frame, None)
     }

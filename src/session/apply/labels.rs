@@ -1,64 +1,69 @@
 //! Acts of labelling: what a key or a field asks for becomes a commit; what the journal acknowledges becomes visible.
 
-use crate::labels::{CellRegion, Change, FrameId, Judged, Label, LabelPlace, Record, Tag, Verdict};
-use crate::session::command::{Commit, Effect, Written};
-use crate::session::labels::{ActKind, LabelMode, LabelStatus, LabelTable};
-use crate::session::queue::SortKey;
+use crate::labels::{CellRegion, Change, Judged, Record, Tag, Verdict};
+use crate::session::acts::{ActKind, Asked};
+use crate::session::command::{Commit, Effect, OpenedLabels, Trash, Written};
+use crate::session::labels::{LabelMode, LabelStatus, LabelTable};
 use crate::session::state::{LogLevel, Session};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Acts on so many frames are looked at before they are sent, to tell whether they would change anything; of larger ones
+/// the journal's thread tells.
+const LOOKED_AT: usize = 64;
+/// So many records take long enough to free that another thread does it.
+const MANY: usize = 1000;
 
 impl Session {
-    /// The frames that the next act is for: the selected ones, else the one on screen.
-    pub fn label_targets(&self) -> Vec<usize> {
+    /// The frames that the next act is for, in the order of the data set: the selected ones, else the one on screen.
+    pub fn label_targets(&self) -> Arc<[u32]> {
         if !self.labels.selection.is_empty() {
-            return self.labels.selection.iter().copied().collect();
+            return Arc::clone(&self.labels.targets);
         }
-        if self.data.is_empty() { Vec::new() } else { vec![self.data.frame_index] }
+        if self.data.is_empty() { Arc::new([]) } else { Arc::new([self.data.frame_index as u32]) }
     }
 
     pub(super) fn toggle_tag(&mut self, tag: Tag) -> Vec<Effect> {
         let frames = self.label_targets();
-        let all_have = frames.iter().all(|&frame| self.labels.expected(frame).tags.contains(tag));
+        let all_have = self.labels.all_will_have(&frames, tag);
         let (verb, change) = if all_have { ("untag", Change::removing(tag)) } else { ("tag", Change::adding(tag)) };
-        self.commit(&format!("{verb} {tag}"), &frames, &change)
+        self.commit(&format!("{verb} {tag}"), frames, change)
     }
 
-    pub(super) fn set_note(&mut self, frames: &[usize], note: String) -> Vec<Effect> {
-        self.commit("note", frames, &Change { note: Some(note), ..Change::default() })
+    pub(super) fn set_note(&mut self, frames: Arc<[u32]>, note: String) -> Vec<Effect> {
+        self.commit("note", frames, Change { note: Some(note), ..Change::default() })
     }
 
     pub(super) fn set_person(&mut self, person: Option<u32>) -> Vec<Effect> {
         let frames = self.label_targets();
-        self.commit("person", &frames, &Change { person: Some(person), ..Change::default() })
+        self.commit("person", frames, Change { person: Some(person), ..Change::default() })
     }
 
     /// A region is of one map: it goes to the frame on screen, whatever is selected.
     pub(super) fn set_region(&mut self, region: Option<CellRegion>) -> Vec<Effect> {
         let name = if region.is_some() { "mark cells" } else { "unmark cells" };
-        self.commit(name, &[self.data.frame_index], &Change { region: Some(region), ..Change::default() })
+        let frames = Arc::new([self.data.frame_index as u32]);
+        self.commit(name, frames, Change { region: Some(region), ..Change::default() })
     }
 
     pub(super) fn set_verdict(&mut self, verdict: Option<Verdict>) -> Vec<Effect> {
         let frames = self.label_targets();
         let name = verdict.map_or_else(|| "no verdict".into(), |verdict| format!("verdict {verdict}"));
-        self.commit(&name, &frames, &Change { verdict: Some(verdict), ..Change::default() })
+        self.commit(&name, frames, Change { verdict: Some(verdict), ..Change::default() })
     }
 
     pub(super) fn clear_label(&mut self) -> Vec<Effect> {
         let frames = self.label_targets();
-        let changes: Vec<(usize, Change)> = frames
-            .iter()
-            .map(|&frame| (frame, Change::between(&self.labels.expected(frame), &Label::default())))
-            .collect();
-        self.commit_each(ActKind::Do, with_count("clear label", frames.len()), changes)
+        self.commit("clear label", frames, Change::clearing())
     }
 
-    fn commit(&mut self, act: &str, frames: &[usize], change: &Change) -> Vec<Effect> {
-        let changes = frames.iter().map(|&frame| (frame, change.clone())).collect();
-        self.commit_each(ActKind::Do, with_count(act, frames.len()), changes)
+    fn commit(&mut self, act: &str, frames: Arc<[u32]>, change: Change) -> Vec<Effect> {
+        let act = with_count(act, frames.len());
+        self.ask_journal(ActKind::Do, act, Asked::Same(frames, change))
     }
 
-    /// Asks the journal for an act. Frames whose label would not change are left out.
-    fn commit_each(&mut self, kind: ActKind, act: String, changes: Vec<(usize, Change)>) -> Vec<Effect> {
+    /// Asks the journal for an act, unless it would change nothing.
+    fn ask_journal(&mut self, kind: ActKind, act: String, asked: Asked) -> Vec<Effect> {
         match &self.labels.status {
             LabelStatus::Ready => {}
             LabelStatus::Failed(why) => {
@@ -72,23 +77,29 @@ impl Session {
             }
         }
         let Some(dataset) = self.data.dataset.clone() else { return Vec::new() };
-        let wanted: Vec<(FrameId, Change)> = changes
-            .into_iter()
-            .filter(|(frame, change)| {
-                let label = self.labels.expected(*frame);
-                change.applied(&label) != label
-            })
-            .map(|(index, change)| (FrameId { path: dataset.frame_name(index).to_owned(), index }, change))
-            .collect();
-        if wanted.is_empty() {
+        if !self.would_change(&asked) {
             return Vec::new();
         }
         self.labels.next_act += 1;
         let id = self.labels.next_act;
-        let changes = wanted.iter().map(|(frame, change)| (frame.clone(), change.clone(), self.judged(frame.index)));
-        let commit = Commit { id, kind, act, changes: changes.collect() };
-        self.labels.pending.push((id, wanted));
-        vec![Effect::CommitLabels(commit)]
+        let judged = self.judged_of(&asked);
+        self.labels.pending.push((id, asked.clone()));
+        vec![Effect::CommitLabels(Commit { id, kind, act, dataset, asked, judged })]
+    }
+
+    fn would_change(&self, asked: &Asked) -> bool {
+        asked.len() > LOOKED_AT
+            || asked.each().any(|(frame, change)| {
+                let label = self.labels.expected(frame);
+                change.applied(&label) != label
+            })
+    }
+
+    /// The fits that an act judges: of the frame on screen, and of those that were fitted before.
+    fn judged_of(&self, asked: &Asked) -> BTreeMap<usize, Judged> {
+        let fitted = self.summaries.iter().filter(|(_, summary)| summary.hashes.is_some()).map(|(&frame, _)| frame);
+        let known = fitted.chain([self.data.frame_index]).filter(|&frame| asked.of(frame).is_some());
+        known.map(|frame| (frame, self.judged(frame))).collect()
     }
 
     /// The fit that is judged when `frame` is labelled now: the one on screen, or the one that was left there.
@@ -129,9 +140,7 @@ impl Session {
             return Vec::new();
         }
         let Some(act) = self.labels.undo.last().cloned() else { return Vec::new() };
-        let changes =
-            act.changes.iter().map(|(id, before, after)| (id.index, Change::between(after, before))).collect();
-        self.again(ActKind::Undo, &act.name, changes)
+        self.again(ActKind::Undo, &act.name, Asked::Back(act.changes))
     }
 
     pub(super) fn redo(&mut self) -> Vec<Effect> {
@@ -139,43 +148,39 @@ impl Session {
             return Vec::new();
         }
         let Some(act) = self.labels.redo.last().cloned() else { return Vec::new() };
-        let changes =
-            act.changes.iter().map(|(id, before, after)| (id.index, Change::between(before, after))).collect();
-        self.again(ActKind::Redo, &act.name, changes)
+        self.again(ActKind::Redo, &act.name, Asked::Again(act.changes))
     }
 
-    fn again(&mut self, kind: ActKind, name: &str, changes: Vec<(usize, Change)>) -> Vec<Effect> {
-        let effects = self.commit_each(kind, name.to_owned(), changes);
+    fn again(&mut self, kind: ActKind, name: &str, asked: Asked) -> Vec<Effect> {
+        let effects = self.ask_journal(kind, name.to_owned(), asked);
         if effects.is_empty() {
             self.labels.forget(kind);
-            self.hint(format!("“{name}” is gone already: another window changed the same labels"));
+            self.gone(name);
         }
         effects
     }
 
+    fn gone(&mut self, name: &str) {
+        self.hint(format!("“{name}” is gone already: another window changed the same labels"));
+    }
+
     /// The journals were read, or could not be.
-    pub(super) fn labels_opened(
-        &mut self,
-        id: u64,
-        result: Result<(LabelPlace, LabelTable, Vec<String>), String>,
-    ) -> Vec<Effect> {
+    pub(super) fn labels_opened(&mut self, id: u64, result: Result<Box<OpenedLabels>, String>) -> Vec<Effect> {
         if id != self.labels.opening {
             return Vec::new();
         }
         match result {
-            Ok((place, table, warnings)) => {
-                for warning in warnings {
+            Ok(opened) => {
+                for warning in opened.warnings {
                     self.note(LogLevel::Warning, warning);
                 }
-                if let Some(reason) = &place.reason {
-                    let text = format!("labels are kept in {}: {reason}", place.folder.display());
+                if let Some(reason) = &opened.place.reason {
+                    let text = format!("labels are kept in {}: {reason}", opened.place.folder.display());
                     self.note(LogLevel::Warning, text);
                 }
-                let mine = table.get(&self.labels.annotator);
-                self.labels.last_edited = mine
-                    .and_then(|records| records.iter().max_by(|a, b| a.1.time.cmp(&b.1.time)).map(|(&frame, _)| frame));
-                self.labels.place = Some(place);
-                self.labels.table = table;
+                self.labels.last_edited = opened.last_edited;
+                self.labels.place = Some(opened.place);
+                self.labels.table = opened.table;
                 self.labels.status = LabelStatus::Ready;
             }
             Err(why) => {
@@ -183,9 +188,14 @@ impl Session {
                 self.labels.status = LabelStatus::Failed(why);
             }
         }
-        self.labels.revision += 1;
-        self.stale = true;
+        self.labels_changed();
         Vec::new()
+    }
+
+    /// A list that asks for labels is filled again.
+    fn labels_changed(&mut self) {
+        self.labels.revision += 1;
+        self.stale |= self.list_reads().labels();
     }
 
     /// The journal acknowledged an act, or could not write it.
@@ -193,33 +203,31 @@ impl Session {
         let Written { id, kind, act, result } = written;
         // An act for a journal that was closed meanwhile is on disk, but no longer of what is on screen.
         let Some(at) = self.labels.pending.iter().position(|(pending, _)| *pending == id) else { return Vec::new() };
-        self.labels.pending.remove(at);
+        let asked = self.labels.pending.remove(at);
         match result {
-            Ok(outcomes) => {
-                self.labels.written(kind, act, outcomes);
+            Ok(done) => {
+                if done.changes.is_empty() && kind != ActKind::Do {
+                    self.gone(&act);
+                }
+                let replaced = self.labels.written(kind, act, done);
                 self.labels_changed();
+                free(replaced.len(), (asked, replaced))
             }
             Err(why) => {
                 self.note(LogLevel::Error, format!("“{act}” was not written and is not done: {why}"));
+                Vec::new()
             }
         }
-        Vec::new()
     }
 
     /// Another window or another annotator wrote.
     pub(super) fn labels_refreshed(&mut self, table: LabelTable) -> Vec<Effect> {
-        if self.labels.status == LabelStatus::Ready {
-            self.labels.table = table;
-            self.labels.revision += 1;
-            self.labels_changed();
+        if self.labels.status != LabelStatus::Ready {
+            return Vec::new();
         }
-        Vec::new()
-    }
-
-    /// Fills the list again where its filter or its order depends on labels.
-    fn labels_changed(&mut self) {
-        let ordered = matches!(self.view.sort.key, SortKey::Tags | SortKey::Annotator);
-        self.stale |= ordered || self.queue.rule.reads_labels();
+        let old = std::mem::replace(&mut self.labels.table, table);
+        self.labels_changed();
+        free(old.values().map(super::super::Records::count).sum(), old)
     }
 
     pub(super) fn set_annotator(&mut self, name: &str) -> Vec<Effect> {
@@ -238,12 +246,14 @@ impl Session {
     /// Reads the journals of the open data set for the annotator.
     pub(super) fn open_labels(&mut self) -> Vec<Effect> {
         let Some(dataset) = self.data.dataset.clone() else { return Vec::new() };
-        self.labels.close();
+        let old = self.labels.close();
         self.labels.status = LabelStatus::Opening;
         self.labels.next_act += 1;
         let id = self.labels.next_act;
         self.labels.opening = id;
-        vec![Effect::OpenLabels { id, dataset, annotator: self.labels.annotator.clone() }]
+        let mut effects = vec![Effect::OpenLabels { id, dataset, annotator: self.labels.annotator.clone() }];
+        effects.extend(free(old.table().values().map(super::super::Records::count).sum(), old));
+        effects
     }
 
     /// What a record says of the fit on screen: `None` where it was judged on the very same, or on none.
@@ -261,6 +271,11 @@ impl Session {
         let close = if at.is_empty() { "" } else { ")" };
         Some(format!("judged on another fit{at}{settings}{close}"))
     }
+}
+
+/// Has something freed elsewhere where it is large.
+fn free(records: usize, what: impl Send + 'static) -> Vec<Effect> {
+    if records > MANY { vec![Effect::Free(Trash::new(what))] } else { Vec::new() }
 }
 
 fn with_count(act: &str, frames: usize) -> String {

@@ -1,8 +1,8 @@
 //! The frame list: filter, order, and what "next" means.
 
 use crate::session::command::Effect;
-use crate::session::queue::{Facts, SavedView, Sort};
-use crate::session::state::{LogLevel, Session};
+use crate::session::queue::{Facts, Reads, SavedView, Sort};
+use crate::session::state::{FrameSummary, LogLevel, Session};
 
 impl Session {
     pub(super) fn set_filter(&mut self, text: String) -> Vec<Effect> {
@@ -99,41 +99,78 @@ impl Session {
             self.queue.last_position = at;
         }
         let mut queue = std::mem::take(&mut self.queue);
-        queue.fill(self.data.len(), self.view.sort, |frame| self.facts(frame));
+        let reads = queue.reads(self.view.sort);
+        // Frames come in order, and so do the summaries: one walk along both, instead of a search for each.
+        let mut summaries = self.summaries.iter().peekable();
+        queue.fill(self.data.len(), self.view.sort, |frame| {
+            while reads.fit && summaries.next_if(|(at, _)| **at < frame).is_some() {}
+            let summary = summaries.peek().filter(|(at, _)| **at == frame).map(|(_, summary)| *summary);
+            self.facts_of(frame, reads, summary)
+        });
         self.queue = queue;
         if let Some(at) = self.queue.position(self.data.frame_index) {
             self.queue.last_position = at;
         }
     }
 
+    /// Which facts the list depends on.
+    pub(super) fn list_reads(&self) -> Reads {
+        self.queue.reads(self.view.sort)
+    }
+
     /// Everything that the list knows of a frame.
     pub fn facts(&self, index: usize) -> Facts<'_> {
-        let Some(dataset) = &self.data.dataset else { return Facts::default() };
-        let complexity = self.strata.of(index);
-        let summary = self.summaries.get(&index);
-        let visible = self.labels.visible(index, self.view.label_mode);
-        let mine = self.labels.mine(index);
-        Facts {
-            index,
-            name: dataset.frame_name(index),
-            scene: dataset.sequence(index),
-            readable: self.strata.is_readable(index),
-            stratum: complexity.and_then(|c| c.stratum),
-            hardness: complexity.and_then(|c| c.hardness),
-            peak_density: complexity.and_then(|c| c.statistics.peak_density),
-            static_dominance: complexity.and_then(|c| c.statistics.static_dominance),
-            human_saliency: complexity.and_then(|c| c.statistics.human_saliency),
-            iou: summary.and_then(|s| s.iou),
-            loss: summary.map(|s| s.loss),
-            iterations: summary.map(|s| s.iterations),
-            converged: summary.map(|s| s.converged),
-            reason: summary.and_then(|s| s.reason.as_deref()),
-            majpe_mm: summary.and_then(|s| s.majpe_mm),
-            tags: visible.tags,
-            own_tags: mine.map(|record| record.label.tags).unwrap_or_default(),
-            note: mine.map_or("", |record| record.label.note.as_str()),
-            verdict: mine.and_then(|record| record.label.verdict),
-            annotators: visible.annotators,
+        self.facts_of(index, Reads::ALL, self.summaries.get(&index))
+    }
+
+    /// What the list knows of a frame, as far as it is asked for.
+    fn facts_of<'a>(&'a self, index: usize, reads: Reads, summary: Option<&'a FrameSummary>) -> Facts<'a> {
+        let mut facts = Facts { index, ..Facts::default() };
+        let Some(dataset) = &self.data.dataset else { return facts };
+        let mode = self.view.label_mode;
+        if reads.name {
+            facts.name = dataset.frame_name(index);
+        }
+        if reads.scene {
+            facts.scene = dataset.sequence(index);
+        }
+        if reads.strata {
+            self.add_strata(&mut facts);
+        }
+        if reads.fit
+            && let Some(summary) = summary
+        {
+            facts.iou = summary.iou;
+            facts.loss = summary.loss;
+            facts.iterations = summary.iterations;
+            facts.converged = summary.converged;
+            facts.reason = summary.reason.as_deref();
+            facts.majpe_mm = summary.majpe_mm;
+        }
+        if reads.tags {
+            facts.tags = self.labels.visible_tags(index, mode);
+            facts.own_tags = self.labels.tags(index);
+        }
+        if reads.said
+            && let Some(record) = self.labels.mine(index)
+        {
+            facts.note = &record.label.note;
+            facts.verdict = record.label.verdict;
+        }
+        if reads.annotators {
+            facts.annotators = self.labels.visible_annotators(index, mode);
+        }
+        facts
+    }
+
+    fn add_strata(&self, facts: &mut Facts<'_>) {
+        facts.readable = self.strata.is_readable(facts.index);
+        if let Some(complexity) = self.strata.of(facts.index) {
+            facts.stratum = complexity.stratum;
+            facts.hardness = complexity.hardness;
+            facts.peak_density = complexity.statistics.peak_density;
+            facts.static_dominance = complexity.statistics.static_dominance;
+            facts.human_saliency = complexity.statistics.human_saliency;
         }
     }
 }

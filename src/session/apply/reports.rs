@@ -36,9 +36,9 @@ impl Session {
 
     pub(super) fn summarise(&mut self) {
         let Some(row) = self.fit.branch().and_then(|branch| branch.rows.last()) else { return };
+        self.summarised += 1;
         if row.report.iteration == 0 {
-            self.summaries.remove(&self.fit.frame);
-            self.stale = true;
+            self.forget_summary(self.fit.frame);
             return;
         }
         let hashes = row.state.as_ref().map(|state| {
@@ -48,13 +48,27 @@ impl Session {
         let summary = FrameSummary {
             reason: self.fit.reason.map(str::to_owned),
             hashes,
-            iterations: row.report.iteration,
-            loss: row.report.loss,
+            iterations: Some(row.report.iteration),
+            loss: Some(row.report.loss),
             iou: mean_known(&row.report.iou),
-            converged: row.report.converged,
+            converged: Some(row.report.converged),
             majpe_mm: row.majpe_mm,
         };
         self.summaries.insert(self.fit.frame, summary);
+        self.stale = true;
+    }
+
+    /// What a fit in this session says of the frame on screen; not what a table of results says of it.
+    fn own_summary(&mut self) -> Option<&mut FrameSummary> {
+        self.summaries.get_mut(&self.fit.frame).filter(|summary| summary.hashes.is_some())
+    }
+
+    /// Forgets what a fit in this session said of a frame; what a table of results says of it stays.
+    pub(super) fn forget_summary(&mut self, frame: usize) {
+        if self.summaries.get(&frame).is_some_and(|summary| summary.hashes.is_some()) {
+            self.summaries.remove(&frame);
+        }
+        self.summarised += 1;
         self.stale = true;
     }
 
@@ -70,7 +84,7 @@ impl Session {
                     self.fit.status = FitStatus::Paused;
                     self.fit.run_ms = Some(run_ms);
                     self.fit.reason = Some(reason.text());
-                    if let Some(summary) = self.summaries.get_mut(&self.fit.frame) {
+                    if let Some(summary) = self.own_summary() {
                         summary.reason = Some(reason.text().to_owned());
                     }
                     self.stale = true;
@@ -143,10 +157,11 @@ impl Session {
         // Settings may have changed since the newest row was made; the list tells what holds now.
         if snapshot.live
             && snapshot.iteration == self.fit.head()
-            && let Some(summary) = self.summaries.get_mut(&self.fit.frame)
+            && let Some(summary) = self.own_summary()
         {
-            summary.loss = snapshot.evaluation.loss;
+            summary.loss = Some(snapshot.evaluation.loss);
             summary.iou = mean_known(&snapshot.evaluation.iou);
+            self.summarised += 1;
         }
         if wanted {
             self.fit.shown = Some(Arc::new(snapshot));

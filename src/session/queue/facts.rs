@@ -75,6 +75,50 @@ impl Default for Facts<'_> {
     }
 }
 
+/// Which facts are asked for. Of 100,000 frames, gathering those that nobody reads costs more than a pass may.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Reads {
+    /// The name.
+    pub name: bool,
+    /// The sequence.
+    pub scene: bool,
+    /// Stratum, hardness and its parts, readable.
+    pub strata: bool,
+    /// What is known of the fit.
+    pub fit: bool,
+    /// Tags.
+    pub tags: bool,
+    /// The annotator's note and verdict.
+    pub said: bool,
+    /// Who labelled it.
+    pub annotators: bool,
+}
+
+impl Reads {
+    /// Everything.
+    pub const ALL: Self =
+        Self { name: true, scene: true, strata: true, fit: true, tags: true, said: true, annotators: true };
+
+    /// What either asks for.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            name: self.name || other.name,
+            scene: self.scene || other.scene,
+            strata: self.strata || other.strata,
+            fit: self.fit || other.fit,
+            tags: self.tags || other.tags,
+            said: self.said || other.said,
+            annotators: self.annotators || other.annotators,
+        }
+    }
+
+    /// True where labels are asked for.
+    pub fn labels(self) -> bool {
+        self.tags || self.said || self.annotators
+    }
+}
+
 /// A number of a frame that can be compared and sorted by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Number {
@@ -130,6 +174,18 @@ impl Number {
     /// The number called `key`.
     pub fn of(key: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|number| number.key() == key)
+    }
+
+    /// What it is read from.
+    pub(super) fn reads(self) -> Reads {
+        let none = Reads::default();
+        match self {
+            Self::Index => none,
+            Self::Hardness | Self::PeakDensity | Self::StaticDominance | Self::HumanSaliency => {
+                Reads { strata: true, ..none }
+            }
+            Self::Iou | Self::Loss | Self::Iterations | Self::Majpe => Reads { fit: true, ..none },
+        }
     }
 
     /// True where it changes while a fit runs.

@@ -6,12 +6,11 @@
 mod facts;
 mod rule;
 
-pub use facts::{Facts, Number};
+pub use facts::{Facts, Number, Reads};
 pub use rule::{Rule, SYNTAX};
 
 use crate::labels::Tags;
 use serde::{Deserialize, Serialize};
-use std::cmp::Ordering;
 
 /// What the list is ordered by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -39,6 +38,22 @@ pub enum SortKey {
     Tags,
     /// Who labelled it.
     Annotator,
+}
+
+impl SortKey {
+    /// Which facts it depends on.
+    pub fn reads(self) -> Reads {
+        let none = Reads::default();
+        match self {
+            Self::Index => none,
+            Self::Stratum | Self::Hardness | Self::PeakDensity | Self::StaticDominance | Self::HumanSaliency => {
+                Reads { strata: true, ..none }
+            }
+            Self::Iou | Self::Converged | Self::Majpe => Reads { fit: true, ..none },
+            Self::Tags => Reads { tags: true, ..none },
+            Self::Annotator => Reads { annotators: true, ..none },
+        }
+    }
 }
 
 /// Order of the list. Frames without a value come last, whichever way it is sorted; equal ones stay in the data set's order.
@@ -114,20 +129,33 @@ impl Queue {
         self.text = text;
     }
 
-    /// Fills the list again: `frames` facts in the order of the data set.
-    pub(super) fn fill<'a>(&mut self, frames: usize, sort: Sort, facts: impl Fn(usize) -> Facts<'a>) {
-        let mut keyed: Vec<(Key, u32)> = Vec::with_capacity(frames);
-        for frame in 0..frames {
-            let row = facts(frame);
-            if self.rule.matches(&row) {
-                keyed.push((key(sort.key, &row), frame as u32));
+    /// Which facts the list depends on.
+    pub fn reads(&self, sort: Sort) -> Reads {
+        self.rule.reads().or(sort.key.reads())
+    }
+
+    /// Fills the list again: `frames` facts, asked for in the order of the data set.
+    pub(super) fn fill<'a>(&mut self, frames: usize, sort: Sort, mut facts: impl FnMut(usize) -> Facts<'a>) {
+        self.matching.clear();
+        self.rows.clear();
+        if self.rule.is_empty() && sort == Sort::default() {
+            self.matching.extend(0..frames as u32);
+            self.rows.extend_from_slice(&self.matching);
+        } else {
+            let mut keyed: Vec<u128> = Vec::with_capacity(frames);
+            for frame in 0..frames {
+                let row = facts(frame);
+                if self.rule.matches(&row) {
+                    // One whole number to compare: the key, then the frame, so that equal ones keep their order.
+                    keyed.push(u128::from(key(sort, &row)) << 32 | frame as u128);
+                    self.matching.push(frame as u32);
+                }
             }
+            if sort != Sort::default() {
+                keyed.sort_unstable();
+            }
+            self.rows.extend(keyed.into_iter().map(|key| key as u32));
         }
-        self.matching = keyed.iter().map(|&(_, frame)| frame).collect();
-        if sort != Sort::default() {
-            keyed.sort_by(|(a, i), (b, j)| a.order(*b, sort.descending).then(i.cmp(j)));
-        }
-        self.rows = keyed.into_iter().map(|(_, frame)| frame).collect();
         self.positions.clear();
         self.positions.resize(frames, ABSENT);
         for (at, &frame) in self.rows.iter().enumerate() {
@@ -175,58 +203,44 @@ impl Queue {
     }
 }
 
-/// A value to sort by; `Nothing` is last.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Key {
-    Nothing,
-    Number(f64),
-    Tags(Tags),
-    /// The first letters of a name, enough to order by.
-    Text([u8; 8]),
+/// Sorts last: what has no value.
+const NOTHING: u64 = u64::MAX;
+
+/// The place in the order as a whole number: smaller comes first, what has no value comes last either way.
+fn key(sort: Sort, facts: &Facts<'_>) -> u64 {
+    let rising = match sort.key {
+        SortKey::Index => Some(facts.index as u64),
+        SortKey::Stratum => facts.stratum.map(|stratum| stratum as u64),
+        SortKey::Hardness => facts.hardness.and_then(ordered),
+        SortKey::PeakDensity => facts.peak_density.and_then(ordered),
+        SortKey::StaticDominance => facts.static_dominance.and_then(ordered),
+        SortKey::HumanSaliency => facts.human_saliency.and_then(ordered),
+        SortKey::Iou => facts.iou.and_then(ordered),
+        SortKey::Converged => facts.converged.map(u64::from),
+        SortKey::Majpe => facts.majpe_mm.and_then(ordered),
+        SortKey::Tags => Some(tag_rank(facts.tags)).filter(|&rank| rank > 0),
+        SortKey::Annotator => facts.annotators.first().map(|name| letters(name)),
+    };
+    // Nothing but NaN, which is left out, comes near the ends of the range.
+    rising.map_or(NOTHING, |rising| if sort.descending { NOTHING - 1 - rising } else { rising })
 }
 
-impl Key {
-    fn order(self, other: Self, descending: bool) -> Ordering {
-        let way = |ordering: Ordering| if descending { ordering.reverse() } else { ordering };
-        match (self, other) {
-            (Self::Nothing, Self::Nothing) => Ordering::Equal,
-            (Self::Nothing, _) => Ordering::Greater,
-            (_, Self::Nothing) => Ordering::Less,
-            (Self::Number(a), Self::Number(b)) => way(a.total_cmp(&b)),
-            (Self::Tags(a), Self::Tags(b)) => way(tag_rank(a).cmp(&tag_rank(b))),
-            (Self::Text(a), Self::Text(b)) => way(a.cmp(&b)),
-            _ => Ordering::Equal,
-        }
-    }
+/// A whole number in the same order: of negative numbers all bits turn round, of others the sign. `None` for NaN.
+fn ordered(x: f64) -> Option<u64> {
+    let bits = x.to_bits();
+    (!x.is_nan()).then_some(if x.is_sign_negative() { !bits } else { bits | 1 << 63 })
 }
 
-/// Sets of tags in the order of their lowest digit.
-fn tag_rank(tags: Tags) -> Vec<u8> {
-    tags.iter().map(|tag| tag as u8).collect()
+/// Sets of tags in the order of their lowest digit, then the next: as words of six letters, of which the missing are least.
+fn tag_rank(tags: Tags) -> u64 {
+    let letters = tags.iter().map(|tag| tag as u64 + 1);
+    letters.chain(std::iter::repeat(0)).take(crate::labels::Tag::ALL.len()).fold(0, |rank, letter| rank * 7 + letter)
 }
 
-fn key(key: SortKey, facts: &Facts<'_>) -> Key {
-    let number = |value: Option<f64>| value.filter(|x| !x.is_nan()).map_or(Key::Nothing, Key::Number);
-    match key {
-        SortKey::Index => Key::Number(facts.index as f64),
-        SortKey::Stratum => number(facts.stratum.map(|stratum| f64::from(stratum as u8))),
-        SortKey::Hardness => number(facts.hardness),
-        SortKey::PeakDensity => number(facts.peak_density),
-        SortKey::StaticDominance => number(facts.static_dominance),
-        SortKey::HumanSaliency => number(facts.human_saliency),
-        SortKey::Iou => number(facts.iou),
-        SortKey::Converged => number(facts.converged.map(|yes| f64::from(u8::from(yes)))),
-        SortKey::Majpe => number(facts.majpe_mm),
-        SortKey::Tags if facts.tags.is_empty() => Key::Nothing,
-        SortKey::Tags => Key::Tags(facts.tags),
-        SortKey::Annotator => facts.annotators.first().map_or(Key::Nothing, |name| {
-            let mut text = [0; 8];
-            for (to, from) in text.iter_mut().zip(name.bytes()) {
-                *to = from.to_ascii_lowercase();
-            }
-            Key::Text(text)
-        }),
-    }
+/// The first eight letters of a name, enough to order by.
+fn letters(name: &str) -> u64 {
+    let letters = name.bytes().map(|byte| byte.to_ascii_lowercase()).chain(std::iter::repeat(0)).take(8);
+    letters.fold(0, |rank, byte| rank << 8 | u64::from(byte))
 }
 
 #[cfg(test)]
@@ -247,6 +261,20 @@ mod tests {
         let by = |descending| queue("", Sort { key: SortKey::Iou, descending }, &IOU).rows().to_vec();
         assert_eq!(by(false), [2, 5, 0, 3, 1, 4]);
         assert_eq!(by(true), [0, 3, 5, 2, 1, 4]);
+    }
+
+    #[test]
+    fn whole_numbers_are_in_the_order_of_what_they_stand_for() {
+        let numbers = [f64::NEG_INFINITY, -2.5, -1e-300, 0.0, 1e-300, 0.5, 2.0, f64::INFINITY];
+        assert!(numbers.windows(2).all(|pair| ordered(pair[0]) < ordered(pair[1])));
+        assert_eq!(ordered(f64::NAN), None);
+        let tags = |text: &str| tag_rank(text.parse().unwrap_or_default());
+        let sets = ["F1", "F1 F2", "F1 F2 F3", "F1 F3", "F2", "F2 unsure", "clean", "unsure"];
+        assert!(sets.windows(2).all(|pair| tags(pair[0]) < tags(pair[1])));
+        assert!(letters("ada") < letters("Adam") && letters("Adam") < letters("bo"));
+        let by = |key, descending, facts: &Facts<'_>| super::key(Sort { key, descending }, facts);
+        let (none, some) = (Facts::default(), Facts { iou: Some(0.3), ..Facts::default() });
+        assert!(by(SortKey::Iou, true, &some) < by(SortKey::Iou, true, &none));
     }
 
     #[test]

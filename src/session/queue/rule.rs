@@ -3,7 +3,7 @@
 //! Terms are separated by spaces and must all hold; a `-` before a term negates it; `a|b` after a colon means either.
 //! A bare word is looked for in the frame's name. What a frame has no value for satisfies no comparison.
 
-use super::facts::{Facts, Number};
+use super::facts::{Facts, Number, Reads};
 use crate::labels::{Tag, Verdict};
 use crate::study::complexity::Stratum;
 
@@ -86,22 +86,9 @@ impl Rule {
         self.terms.is_empty()
     }
 
-    /// True where the answer depends on fits, which change while one runs.
-    pub fn reads_fits(&self) -> bool {
-        self.terms.iter().any(|term| match &term.test {
-            Test::Compare(number, ..) => number.is_of_fit(),
-            Test::Word(word, _) => matches!(word, Word::Reason | Word::Converged | Word::Fitted),
-            Test::Name(_) | Test::Tags { .. } => false,
-        })
-    }
-
-    /// True where the answer depends on labels.
-    pub fn reads_labels(&self) -> bool {
-        self.terms.iter().any(|term| match &term.test {
-            Test::Tags { .. } => true,
-            Test::Word(word, _) => matches!(word, Word::Note | Word::By | Word::Verdict),
-            Test::Name(_) | Test::Compare(..) => false,
-        })
+    /// Which facts the answer depends on.
+    pub fn reads(&self) -> Reads {
+        self.terms.iter().fold(Reads::default(), |reads, term| reads.or(term.test.reads()))
     }
 
     /// True where a frame with these facts matches.
@@ -111,6 +98,22 @@ impl Rule {
 }
 
 impl Test {
+    fn reads(&self) -> Reads {
+        let none = Reads::default();
+        match self {
+            Self::Name(_) => Reads { name: true, ..none },
+            Self::Tags { .. } => Reads { tags: true, ..none },
+            Self::Compare(number, ..) => number.reads(),
+            Self::Word(word, _) => match word {
+                Word::Stratum | Word::Readable => Reads { strata: true, ..none },
+                Word::Scene => Reads { scene: true, ..none },
+                Word::Note | Word::Verdict => Reads { said: true, ..none },
+                Word::By => Reads { annotators: true, ..none },
+                Word::Reason | Word::Converged | Word::Fitted => Reads { fit: true, ..none },
+            },
+        }
+    }
+
     fn holds(&self, facts: &Facts<'_>) -> bool {
         match self {
             Self::Name(part) => contains(facts.name, part),
@@ -340,15 +343,15 @@ mod tests {
 
     #[test]
     fn only_rules_about_fits_follow_a_run() {
-        assert!(Rule::parse("iou<0.5").unwrap().reads_fits());
-        assert!(!Rule::parse("stratum:hard tag:F1 hardness>0.5 00").unwrap().reads_fits());
+        assert!(Rule::parse("iou<0.5").unwrap().reads().fit);
+        assert!(!Rule::parse("stratum:hard tag:F1 hardness>0.5 00").unwrap().reads().fit);
     }
 
     #[test]
     fn only_rules_about_labels_follow_tags() {
         for text in ["-tag:none", "note:wall", "by:ada", "verdict:true-negative"] {
-            assert!(Rule::parse(text).unwrap().reads_labels(), "{text}");
+            assert!(Rule::parse(text).unwrap().reads().labels(), "{text}");
         }
-        assert!(!Rule::parse("stratum:hard iou<0.5 00").unwrap().reads_labels());
+        assert!(!Rule::parse("stratum:hard iou<0.5 00").unwrap().reads().labels());
     }
 }

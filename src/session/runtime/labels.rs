@@ -3,9 +3,11 @@
 
 use super::Wake;
 use crate::dataset::Dataset;
-use crate::labels::{FrameId, Journal, LabelPlace, LabelStore, Record};
-use crate::session::command::{Command, Commit, Written};
+use crate::labels::{Change, FrameId, Journal, Judged, LabelPlace, LabelStore, Record};
+use crate::session::acts::{Changes, Done};
+use crate::session::command::{Command, Commit, OpenedLabels, Written};
 use crate::session::labels::LabelTable;
+use crate::session::records::Records;
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -105,11 +107,12 @@ impl Keeper {
                 self.open = None;
                 Some(Command::LabelsOpened(id, self.begin(dataset, &annotator)))
             }
-            Request::Commit(Commit { id, kind, act, changes }) => {
+            Request::Commit(commit) => {
                 let result = match &mut self.open {
-                    Some(open) => open.commit(&act, &changes),
+                    Some(open) => open.commit(&commit),
                     None => Err("the journal is not open".into()),
                 };
+                let Commit { id, kind, act, .. } = commit;
                 Some(Command::LabelsWritten(Written { id, kind, act, result }))
             }
             Request::Refresh => {
@@ -127,55 +130,65 @@ impl Keeper {
         }
     }
 
-    fn begin(
-        &mut self,
-        dataset: Arc<Dataset>,
-        annotator: &str,
-    ) -> Result<(LabelPlace, LabelTable, Vec<String>), String> {
+    fn begin(&mut self, dataset: Arc<Dataset>, annotator: &str) -> Result<Box<OpenedLabels>, String> {
         let place = LabelPlace::of(&dataset.info().root, dataset.fingerprint()).map_err(|error| error.to_string())?;
         let journal = Journal::open(&place, annotator, dataset.fingerprint()).map_err(|error| error.to_string())?;
         let store = LabelStore::read(&place).map_err(|error| error.to_string())?;
         let mut open = Open { dataset, journal, store, unseen: false, names: None };
         let table = open.table();
+        let last_edited = open.store.last_edited(annotator.trim()).map(|record| record.frame.clone());
+        let last_edited = last_edited.and_then(|frame| open.index(&frame));
         let mut warnings = open.store.warnings().to_vec();
         warnings.extend(open.unknown());
         self.open = Some(open);
-        Ok((place, table, warnings))
+        Ok(Box::new(OpenedLabels { place, table, last_edited, warnings }))
     }
 }
 
 impl Open {
-    fn commit(
-        &mut self,
-        act: &str,
-        changes: &[(FrameId, crate::labels::Change, crate::labels::Judged)],
-    ) -> Result<Vec<(FrameId, crate::labels::Label, Record)>, String> {
-        let outcomes = self.journal.commit_each(act, changes).map_err(|error| error.to_string())?;
+    fn commit(&mut self, commit: &Commit) -> Result<Done, String> {
+        let id = |index| FrameId { path: commit.dataset.frame_name(index).to_owned(), index };
+        let judged = |index| commit.judged.get(&index).cloned().unwrap_or_default();
+        let changes: Vec<(FrameId, Change, Judged)> =
+            commit.asked.each().map(|(index, change)| (id(index), change, judged(index))).collect();
+        let mut outcomes = self.journal.commit_each(&commit.act, &changes).map_err(|error| error.to_string())?;
         // Our own records are no news to be told again; what others wrote meanwhile is.
         let known = self.store.lines();
         match self.store.refresh() {
             Ok(_) => self.unseen |= self.store.lines() != known + outcomes.len(),
             Err(error) => tracing::warn!("{error}"),
         }
-        Ok(outcomes.into_iter().map(|outcome| (outcome.frame, outcome.before, outcome.after)).collect())
+        let (mut changes, mut records) = (Vec::with_capacity(outcomes.len()), Vec::with_capacity(outcomes.len()));
+        let scored = outcomes.iter().filter(|outcome| !outcome.after.judged.machine.is_empty());
+        let scored = scored.map(|outcome| outcome.frame.index).collect();
+        // In the order of frames, as `Changes` has them.
+        outcomes.sort_by_key(|outcome| outcome.frame.index);
+        for outcome in outcomes {
+            changes.push((outcome.frame.index, outcome.before, outcome.after.label.clone()));
+            // What is in memory already is not held twice.
+            let known = self.store.shared(&outcome.after.annotator, &outcome.frame.path);
+            let known = known.filter(|known| ***known == outcome.after).cloned();
+            records.push(known.unwrap_or_else(|| Arc::new(outcome.after)));
+        }
+        Ok(Done { changes: Changes::of(changes), records, scored })
     }
 
     /// Everybody's records by the frames of this data set. A record's index is a hint: its name decides.
     fn table(&mut self) -> LabelTable {
-        let mut table = LabelTable::new();
         let annotators: Vec<String> = self.store.annotators().map(str::to_owned).collect();
-        for annotator in annotators {
-            let records: Vec<Record> = self.store.records(&annotator).cloned().collect();
-            let mut frames = HashMap::with_capacity(records.len());
-            for mut record in records {
-                if let Some(index) = self.index(&record.frame) {
-                    record.frame.index = index;
-                    frames.insert(index, record);
-                }
+        annotators.into_iter().map(|annotator| (annotator.clone(), self.records(&annotator))).collect()
+    }
+
+    fn records(&mut self, annotator: &str) -> Records {
+        let records: Vec<Arc<Record>> = self.store.shared_records(annotator).cloned().collect();
+        let placed = records.into_iter().filter_map(|mut record| {
+            let index = self.index(&record.frame)?;
+            if record.frame.index != index {
+                Arc::make_mut(&mut record).frame.index = index;
             }
-            table.insert(annotator, frames);
-        }
-        table
+            Some((index, record))
+        });
+        placed.collect()
     }
 
     fn index(&mut self, frame: &FrameId) -> Option<usize> {

@@ -3,8 +3,9 @@
 mod evidence;
 mod labels;
 
-use super::command::{Command, Effect, PickKind};
+use super::command::{Command, Effect, PickKind, Trash};
 use super::file::SessionFile;
+use super::results::FoundResults;
 use super::state::{LogLevel, Session};
 use super::strata::StrataStatus;
 use crate::dataset::{Dataset, Loader, OpenJob};
@@ -162,10 +163,15 @@ impl Runtime {
             }
             Effect::Evidence(request) => self.evidence.ask(Ask::Evidence(request)),
             Effect::DrawPin(request) => self.evidence.ask(Ask::Pin(request)),
+            Effect::Free(trash) => Self::free(trash),
             Effect::Run(task) => self.on_thread("export", move || Command::TaskDone((task.0)())),
             Effect::ReadSession(path) => self.on_thread("session-file", move || {
                 let read = SessionFile::read(&path).map(Box::new).map_err(|error| error.to_string());
                 Command::SessionRead(path, read)
+            }),
+            Effect::ReadResults(path, dataset) => self.on_thread("results", move || {
+                let read = FoundResults::read(&path, &dataset).map(Box::new);
+                Command::ResultsRead(path, read)
             }),
             Effect::Send(command) => {
                 if let Some(worker) = &self.worker {
@@ -202,6 +208,13 @@ impl Runtime {
         let StrataStatus::Running { done, total } = session.strata.status else { return None };
         ((done, total) != (state.done, state.total))
             .then_some(Command::StrataProgress { done: state.done, total: state.total })
+    }
+
+    /// Frees something on a thread of its own; here, where there is none.
+    fn free(trash: Trash) {
+        if let Err(error) = std::thread::Builder::new().name("free".into()).spawn(move || trash.free()) {
+            tracing::debug!("no thread to free memory on: {error}");
+        }
     }
 
     /// Does something that may be slow on a thread of its own; its answer comes back as a report.

@@ -4,8 +4,9 @@
 //! hash of its window of files, in two whole numbers below 2⁴⁸; `statistics` (rows, 3) are peak density, static dominance
 //! and human saliency, NaN where undefined; `failures` is a JSON object of row to reason. The archive's checksums tell a
 //! damaged file, which is then ignored. A file is replaced in one step, so that two programs at once leave one of two whole
-//! files; what the other one knew is computed again.
+//! files; what the other one knew is computed again. The folder is kept to 200 files and 256 MiB (`prune.rs`).
 
+use super::prune::{prune, touch};
 use super::stamps::Key;
 use super::{ComplexityOptions, Statistics};
 use crate::dataset::Dataset;
@@ -88,7 +89,10 @@ impl CacheFile {
     /// All that it holds; nothing where it does not exist, or with a warning where it cannot be read.
     pub(super) fn read(&self) -> HashMap<Key, Kept> {
         match self.try_read() {
-            Ok(kept) => kept,
+            Ok(kept) => {
+                touch(&self.path);
+                kept
+            }
             Err(error) if error.is_not_found() => HashMap::new(),
             Err(error) => {
                 tracing::warn!("cached statistics are ignored: {error}");
@@ -149,6 +153,8 @@ impl CacheFile {
             tracing::warn!("{}: cannot be written, statistics are not kept: {error}", self.path.display());
         } else if let Err(error) = write(&self.path, &arrays) {
             tracing::warn!("statistics are not kept: {error}");
+        } else if let Some(folder) = self.path.parent() {
+            prune(folder, &self.path);
         }
     }
 }

@@ -8,7 +8,7 @@
 //!
 //! [`compute`] scans with all cores and keeps what it found on disk, [`ComplexityJob`] does so off the window's thread,
 //! [`rank`] is the pure part. From the inside out: `map.rs` is one map, `history.rs` the last T frames, `scan.rs` the
-//! threads, `plan.rs` who reads what, `cache.rs` the file, `stamps.rs` what makes a cached frame stale.
+//! threads, `plan.rs` who reads what, `cache.rs` the file, `prune.rs` how many there are, `stamps.rs` what makes a cached frame stale.
 
 mod cache;
 mod compute;
@@ -17,6 +17,7 @@ mod job;
 mod map;
 mod options;
 mod plan;
+mod prune;
 mod rank;
 mod scan;
 mod stamps;

@@ -9,11 +9,13 @@ use crate::app::widgets::Named as _;
 use crate::labels::{CellRegion, Tag, Verdict};
 use crate::session::{Command, LabelMode, LabelStatus, Session};
 use egui::{RichText, Role, Ui, vec2};
+use std::sync::Arc;
 
 /// What the pane remembers: fields while they are typed in.
 #[derive(Default)]
 pub(in crate::app) struct State {
-    note: Option<(Vec<usize>, String)>,
+    /// What is being typed, and for which frames: the one on screen, the selection, and how often that changed.
+    note: Option<(Arc<[u32]>, String)>,
     annotator: Option<String>,
     region: Option<String>,
     focus_note: bool,
@@ -81,20 +83,13 @@ fn targets(ui: &mut Ui, shared: &Shared<'_>, tokens: &Tokens) {
     }
 }
 
-/// Tags that every target has.
-fn common(session: &Session) -> impl Fn(Tag) -> bool + '_ {
-    let targets = session.label_targets();
-    move |tag| !targets.is_empty() && targets.iter().all(|&frame| session.labels.label(frame).tags.contains(tag))
-}
-
 fn tags(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
-    let has = common(shared.session);
-    let on: Vec<bool> = Tag::ALL.iter().map(|&tag| has(tag)).collect();
+    let common = shared.session.labels.common_tags(&shared.session.label_targets());
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(3.0, 4.0);
         ui.spacing_mut().button_padding.x = 3.0;
-        for (tag, on) in Tag::ALL.into_iter().zip(on) {
-            tag_chip(ui, shared, tag, on, tokens);
+        for tag in Tag::ALL {
+            tag_chip(ui, shared, tag, common.contains(tag), tokens);
         }
     });
 }
@@ -150,9 +145,9 @@ fn verdicts(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
 
 /// The note is written when the field is left; Escape takes back what was typed.
 fn note(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
-    let targets = shared.session.label_targets();
-    let labels = &shared.session.labels;
-    let note_of = |frames: &[usize]| frames.first().map_or_else(String::new, |&frame| labels.label(frame).note);
+    let session = shared.session;
+    let targets = session.label_targets();
+    let note_of = |frames: &[u32]| frames.first().map_or_else(String::new, |&f| session.labels.label(f as usize).note);
     let stored = note_of(&targets);
     // What was being typed when the frame or the selection changed belongs to the frames that it was typed for.
     if let Some((frames, typed)) = state.note.take_if(|(frames, _)| *frames != targets)

@@ -5,7 +5,7 @@
 use crate::app::theme::Tokens;
 use crate::app::widgets::iou_color;
 use crate::labels::{Tag, Tags};
-use crate::session::{Session, StrataStatus, Strip};
+use crate::session::{LabelMode, Session, StrataStatus, Strip};
 use crate::study::complexity::Stratum;
 use egui::{Align2, Color32, Rect, Ui, pos2, vec2};
 
@@ -19,10 +19,13 @@ struct Sum {
     tags: Tags,
 }
 
+/// What the sums were made from: frames, columns, and the revisions of list, labels, mode, strata and fits.
+type Key = (usize, usize, u64, u64, LabelMode, bool, u64);
+
 /// The sums and what they were made from.
 #[derive(Default)]
 pub(super) struct Strips {
-    key: Option<(usize, usize, u64, u64, bool, usize, f64)>,
+    key: Option<Key>,
     sums: Vec<Sum>,
 }
 
@@ -48,16 +51,14 @@ impl Strips {
     }
 
     fn update(&mut self, session: &Session, frames: usize, columns: usize) {
-        // IoU changes with every step of a run; its sum tells that it did.
-        let fits: f64 = session.summaries.values().filter_map(|s| s.iou).sum();
         let key = (
             frames,
             columns,
             session.queue.revision,
             session.labels.revision,
+            session.view.label_mode,
             session.strata.status == StrataStatus::Ready,
-            session.summaries.len(),
-            fits,
+            session.summaries_revision(),
         );
         if self.key == Some(key) {
             return;
@@ -83,9 +84,9 @@ impl Strips {
                 sum.iou = (sum.iou.0 + iou, sum.iou.1 + 1);
             }
         }
-        for frame in session.labels.table().values().flat_map(|records| records.keys()) {
-            if let Some(sum) = self.sums.get_mut(column(*frame)) {
-                sum.tags = sum.tags.union(session.labels.visible(*frame, session.view.label_mode).tags);
+        for (frame, tags) in session.labels.seen(session.view.label_mode).flat_map(|(_, records)| records.said_tags()) {
+            if let Some(sum) = self.sums.get_mut(column(frame)) {
+                sum.tags = sum.tags.union(tags);
             }
         }
     }
