@@ -70,8 +70,8 @@ impl Bench {
         commit_of(self.session.apply(command)).is_none()
     }
 
-    /// The journal writes an act and says so.
-    fn write(&mut self, commit: &Commit) {
+    /// The journal writes an act and says so; answers the frames that it changed.
+    fn write(&mut self, commit: &Commit) -> Vec<usize> {
         let (mut changes, mut records) = (Vec::new(), Vec::new());
         for (index, change, judged) in asked(commit) {
             let before = self.journal.get(&index).cloned().unwrap_or_default();
@@ -83,8 +83,10 @@ impl Bench {
             changes.push((index, before, after.clone()));
             records.push(Arc::new(record("ada", index, after, judged)));
         }
+        let frames = changes.iter().map(|(frame, ..)| *frame).collect();
         let result = Ok(Done { changes: Changes::of(changes), records, scored: BTreeSet::new() });
         self.answer(commit, result);
+        frames
     }
 
     fn fail(&mut self, commit: &Commit) {
@@ -267,9 +269,8 @@ fn a_bulk_act_leaves_out_what_is_so_already_and_is_one_undo() {
     bench.session.apply(Command::SelectFrames(BTreeSet::from([0, 2, 3, 99])));
     assert_eq!(bench.session.labels.selection, BTreeSet::from([0, 2, 3]), "frame 99 does not exist");
     let commit = bench.asks(Command::ToggleTag(Tag::F2));
-    let frames: Vec<usize> = asked(&commit).into_iter().map(|(frame, ..)| frame).collect();
-    assert_eq!((commit.act.as_str(), frames), ("tag F2 on 3 frames", vec![2, 3]));
-    bench.write(&commit);
+    assert_eq!(commit.act, "tag F2 on 3 frames");
+    assert_eq!(bench.write(&commit), [2, 3], "frame 0 has it already");
     // All have it now: the same key takes it away.
     assert_eq!(bench.asks(Command::ToggleTag(Tag::F2)).act, "untag F2 on 3 frames");
     // A note is for the frames that it was typed for.
@@ -301,7 +302,7 @@ fn answers_for_a_data_set_that_was_left_change_nothing() {
     assert!(bench.session.labels.table().is_empty(), "labels of the data set before");
     bench.opened(new, LabelTable::from([("ada".to_owned(), [tagged("ada", 4, Tag::F2)].into_iter().collect())]));
     assert_eq!(bench.session.labels.status, LabelStatus::Ready);
-    assert_eq!((bench.tags(4).as_str(), bench.session.labels.last_edited), ("F2", Some(4)));
+    assert_eq!(bench.tags(4), "F2");
 }
 
 #[test]

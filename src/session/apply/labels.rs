@@ -95,10 +95,10 @@ impl Session {
             })
     }
 
-    /// The fits that an act judges: of the frame on screen, and of those that were fitted before.
+    /// The fits that an act judges: the one on screen, and those of frames that were fitted before.
     fn judged_of(&self, asked: &Asked) -> BTreeMap<usize, Judged> {
         let fitted = self.summaries.iter().filter(|(_, summary)| summary.hashes.is_some()).map(|(&frame, _)| frame);
-        let known = fitted.chain([self.data.frame_index]).filter(|&frame| asked.of(frame).is_some());
+        let known = fitted.chain([self.fit.frame]).filter(|&frame| asked.of(frame).is_some());
         known.map(|frame| (frame, self.judged(frame))).collect()
     }
 
