@@ -30,14 +30,11 @@ impl FoundResults {
         let names: HashMap<&str, usize> = (0..dataset.len()).map(|index| (dataset.frame_name(index), index)).collect();
         let (mut summaries, mut unknown, mut first_unknown) = (BTreeMap::new(), 0, None);
         for row in rows {
-            match names.get(row.frame.as_str()) {
-                Some(&index) => {
-                    summaries.insert(index, summary(row));
-                }
-                None => {
-                    unknown += 1;
-                    first_unknown.get_or_insert(row.frame);
-                }
+            if let Some(&index) = names.get(row.frame.as_str()) {
+                summaries.insert(index, summary(row));
+            } else {
+                unknown += 1;
+                first_unknown.get_or_insert(row.frame);
             }
         }
         Ok(Self { dataset: Arc::clone(dataset), summaries, unknown, first_unknown })
