@@ -7,6 +7,7 @@ use egui_kittest::kittest::Queryable as _;
 use mhp_inspector::app::InspectorApp;
 use mhp_inspector::labels::Tag;
 use mhp_inspector::session::{Command, LabelStatus, Session, Sort, SortKey, StrataStatus, Strip};
+use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -286,7 +287,8 @@ impl Window {
         for index in 0..dataset.len() {
             let iou = (index % 997) as f64 / 997.0;
             let (name, yes) = (dataset.frame_name(index), index % 3 == 0);
-            text += &format!("{name},40,{yes},iterations,{},{iou},{iou},{}\n", 5.0 - iou, 900.0 - iou * 800.0);
+            let (loss, majpe) = (5.0 - iou, 900.0 - iou * 800.0);
+            writeln!(text, "{name},40,{yes},iterations,{loss},{iou},{iou},{majpe}").unwrap();
         }
         let table = tree.join("../summary.csv");
         std::fs::write(&table, text).unwrap();
