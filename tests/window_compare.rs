@@ -328,7 +328,7 @@ fn captions_say_what_a_figure_shows() {
             assert!(caption.contains(part), "{name}: {part} in {caption:?}");
         }
     }
-    assert!(window.texts_of("3-D scene").starts_with("metres"));
+    assert!(window.texts_of("3-D scene").starts_with("3-D, metres, z up"));
 }
 
 /// False, with the reason printed, where nothing can draw pictures.

@@ -382,7 +382,7 @@ fn a_drag_with_ctrl_marks_cells() {
     window.until("the region", |w| w.session().labels.label(0).region.is_some());
     let region = CellRegion { view: "hori".into(), lo: vec![12, 8], hi: vec![24, 16] };
     assert_eq!(written(&window).label.region, Some(region));
-    assert!(window.named("hori[12..=24, 8..=16]") && window.menu_says("Edit", "Undo: mark cells"));
+    assert!(window.value("Marked cells") == "hori[12..=24, 8..=16]" && window.menu_says("Edit", "Undo: mark cells"));
     window.click("Unmark cells");
     window.until("no region", |w| w.session().labels.label(0).region.is_none());
     // The same by G, and a drag without either pans.
