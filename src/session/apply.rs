@@ -88,7 +88,7 @@ impl Session {
             Command::ToggleTag(tag) => self.toggle_tag(tag),
             Command::SetNote(frames, note) => self.set_note(frames, note),
             Command::SetPerson(person) => self.set_person(person),
-            Command::SetRegion(region) => self.set_region(region),
+            Command::SetRegion(frame, region) => self.set_region(frame, region),
             Command::SetVerdict(verdict) => self.set_verdict(verdict),
             Command::ClearLabel => self.clear_label(),
             Command::Undo => self.undo(),

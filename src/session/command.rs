@@ -92,8 +92,8 @@ pub enum Command {
     SetNote(Arc<[u32]>, String),
     /// Set the person that is meant.
     SetPerson(Option<u32>),
-    /// Set the cells that are meant.
-    SetRegion(Option<CellRegion>),
+    /// Set the cells that are meant on a frame's map.
+    SetRegion(usize, Option<CellRegion>),
     /// Set the verdict.
     SetVerdict(Option<Verdict>),
     /// Say nothing of the targets any more.

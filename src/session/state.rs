@@ -108,7 +108,7 @@ pub struct FrameSummary {
     /// Why the last run ended.
     pub reason: Option<String>,
     /// What identifies the fit; `None` for one that was read from a table.
-    pub hashes: Option<FitHashes>,
+    pub hashes: Option<Box<FitHashes>>,
 }
 
 /// What identifies a fit: a label remembers it.

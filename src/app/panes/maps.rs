@@ -206,7 +206,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     response.widget_info(|| figure::spoken(&name, caption.as_deref()));
     let (marking, marked) = state.mark(ui, &response, plot, index, view);
     if let Some(region) = marked {
-        shared.send(crate::session::Command::SetRegion(Some(region)));
+        shared.send(crate::session::Command::SetRegion(session.data.frame_index, Some(region)));
     }
     if !marking {
         navigate(ui, &response, plot, &mut state.windows[index]);

@@ -39,10 +39,10 @@ impl Session {
         self.commit("person", frames, Change { person: Some(person), ..Change::default() })
     }
 
-    /// A region is of one map: it goes to the frame on screen, whatever is selected.
-    pub(super) fn set_region(&mut self, region: Option<CellRegion>) -> Vec<Effect> {
+    /// A region is of one frame's map, whatever is selected.
+    pub(super) fn set_region(&mut self, frame: usize, region: Option<CellRegion>) -> Vec<Effect> {
         let name = if region.is_some() { "mark cells" } else { "unmark cells" };
-        let frames = Arc::new([self.data.frame_index as u32]);
+        let frames = Arc::new([frame as u32]);
         self.commit(name, frames, Change { region: Some(region), ..Change::default() })
     }
 

@@ -43,7 +43,7 @@ impl Session {
         }
         let hashes = row.state.as_ref().map(|state| {
             let config = self.fit.branch().map_or(self.config, super::super::Branch::newest_config);
-            hashes(&state.params, &config, row.report.iteration)
+            Box::new(hashes(&state.params, &config, row.report.iteration))
         });
         let summary = FrameSummary {
             reason: self.fit.reason.map(str::to_owned),

@@ -7,6 +7,7 @@ use crate::app::commands::{AppAct, command, tooltip};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::labels::{CellRegion, Tag, Verdict};
+use crate::radar::View;
 use crate::session::{Command, LabelMode, LabelStatus, Session};
 use egui::{RichText, Role, Ui, vec2};
 use std::sync::Arc;
@@ -17,7 +18,7 @@ pub(in crate::app) struct State {
     /// What is being typed, and for which frames: the one on screen, the selection, and how often that changed.
     note: Option<(Arc<[u32]>, String)>,
     annotator: Option<String>,
-    region: Option<String>,
+    region: Option<(usize, String)>,
     focus_note: bool,
 }
 
@@ -208,7 +209,7 @@ fn details(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tok
                 shared.show_region(region);
             }
             if ui.small_button("✕").named(Role::Button, "Unmark cells").on_hover_text("Unmark the cells.").clicked() {
-                shared.send(Command::SetRegion(None));
+                shared.send(Command::SetRegion(shared.session.data.frame_index, None));
             }
         }
     });
@@ -217,24 +218,23 @@ fn details(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tok
 
 /// The marked cells as text, which can be typed: without a mouse there is no other way.
 fn region(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, known: Option<&CellRegion>, tokens: &Tokens) {
+    let frame = shared.session.data.frame_index;
     let stored = known.map(ToString::to_string).unwrap_or_default();
-    let mut text = state.region.clone().unwrap_or_else(|| stored.clone());
     let views = shared.session.data.dataset.as_ref().map_or(&[][..], |dataset| &dataset.info().views[..]);
     let hint =
         views.first().map_or_else(String::new, |view| format!("cells, for example {}[10..=20, 30..=42]", view.array));
+    let read = |text: &str| if text.trim().is_empty() { Ok(None) } else { cells(text, views).map(Some) };
+    // What was being typed when the frame changed belongs to the frame that it was typed for.
+    if let Some((typed_for, typed)) = state.region.take_if(|(typed_for, _)| *typed_for != frame)
+        && let Ok(region) = read(&typed)
+    {
+        shared.send(Command::SetRegion(typed_for, region));
+    }
+    let mut text = state.region.as_ref().map_or_else(|| stored.clone(), |(_, typed)| typed.clone());
     let field = egui::TextEdit::singleline(&mut text).hint_text(hint).font(egui::FontId::proportional(theme::CAPTION));
     let response = ui.add(field.desired_width(f32::INFINITY)).named(Role::TextInput, "Marked cells");
-    let wrong = || {
-        let region: CellRegion = text.parse().map_err(|why: String| why)?;
-        let view = views.iter().find(|view| view.array == region.view);
-        let view = view.ok_or_else(|| format!("no view is called {}", region.view))?;
-        let inside = region.lo.len() == view.axes.len()
-            && view.axes.iter().zip(&region.hi).all(|(axis, &hi)| hi < axis.bins)
-            && region.lo.iter().zip(&region.hi).all(|(lo, hi)| lo <= hi);
-        if inside { Ok(region) } else { Err(format!("{} has {:?} cells", view.array, view.shape())) }
-    };
-    let read = if text.trim().is_empty() { Ok(None) } else { wrong().map(Some) };
-    if let Err(why) = &read
+    let region = read(&text);
+    if let Err(why) = &region
         && text != stored
     {
         ui.label(RichText::new(why).small().color(tokens.bad));
@@ -242,17 +242,28 @@ fn region(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, known: Option
     let escape = ui.input(|i| i.key_pressed(egui::Key::Escape));
     if response.lost_focus() {
         state.region = None;
-        if let (Ok(region), false) = (read, escape)
+        if let (Ok(region), false) = (region, escape)
             && text != stored
         {
-            shared.send(Command::SetRegion(region));
+            shared.send(Command::SetRegion(frame, region));
         }
     } else {
-        state.region = response.has_focus().then_some(text);
+        state.region = response.has_focus().then_some((frame, text));
     }
     response.on_hover_text(
         "The cells that your label is about: drag a box on a map (key G), or type them. Empty for none.",
     );
+}
+
+/// The cells that a text names, if one of the views has them.
+fn cells(text: &str, views: &[View]) -> Result<CellRegion, String> {
+    let region: CellRegion = text.parse()?;
+    let view = views.iter().find(|view| view.array == region.view);
+    let view = view.ok_or_else(|| format!("no view is called {}", region.view))?;
+    let inside = region.lo.len() == view.axes.len()
+        && view.axes.iter().zip(&region.hi).all(|(axis, &hi)| hi < axis.bins)
+        && region.lo.iter().zip(&region.hi).all(|(lo, hi)| lo <= hi);
+    if inside { Ok(region) } else { Err(format!("{} has {:?} cells", view.array, view.shape())) }
 }
 
 /// What was judged, and what others say.

@@ -1,6 +1,6 @@
 //! The strip over all frames: one column a pixel, each the sum of the frames that fall on it.
 //!
-//! The sums are made again only when what they show changed, so that 100,000 frames cost as much as a hundred.
+//! The sums are made again only when what they are made from changed, so that 100,000 frames cost as much as a hundred.
 
 use crate::app::theme::Tokens;
 use crate::app::widgets::iou_color;
@@ -9,24 +9,60 @@ use crate::session::{LabelMode, Session, StrataStatus, Strip};
 use crate::study::complexity::Stratum;
 use egui::{Align2, Color32, Rect, Ui, pos2, vec2};
 
-/// What falls on one column.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sum {
-    frames: u32,
-    matching: u32,
-    strata: [u32; 3],
-    iou: (f64, u32),
-    tags: Tags,
+/// Frames and columns.
+type Size = (usize, usize);
+
+/// What falls on each column, and what it was made from.
+struct Lane<K, T> {
+    key: Option<K>,
+    sums: Vec<T>,
 }
 
-/// What the sums were made from: frames, columns, and the revisions of list, labels, mode, strata and fits.
-type Key = (usize, usize, u64, u64, LabelMode, bool, u64);
+impl<K, T> Default for Lane<K, T> {
+    fn default() -> Self {
+        Self { key: None, sums: Vec::new() }
+    }
+}
 
-/// The sums and what they were made from.
+impl<K: PartialEq, T: Clone + Default> Lane<K, T> {
+    /// Makes the sums again where the key changed; `add` is given a column's sum for each of `values`.
+    fn update<V>(
+        &mut self,
+        (frames, columns): Size,
+        key: K,
+        values: impl IntoIterator<Item = (usize, V)>,
+        add: impl Fn(&mut T, V),
+    ) {
+        if self.key.as_ref() == Some(&key) {
+            return;
+        }
+        self.key = Some(key);
+        self.sums.clear();
+        self.sums.resize(columns, T::default());
+        for (frame, value) in values {
+            let column = (frame * columns / frames.max(1)).min(columns.saturating_sub(1));
+            if let Some(sum) = self.sums.get_mut(column) {
+                add(sum, value);
+            }
+        }
+    }
+
+    fn at(&self, column: usize) -> T {
+        self.sums.get(column).cloned().unwrap_or_default()
+    }
+}
+
+/// Sums of what can be shown; each is made again only when its own source changed.
 #[derive(Default)]
 pub(super) struct Strips {
-    key: Option<Key>,
-    sums: Vec<Sum>,
+    /// Frames that match the filter.
+    matching: Lane<(Size, u64), u32>,
+    /// Frames of each stratum, and of none.
+    strata: Lane<(Size, bool), [u32; 4]>,
+    /// Sum of IoU, and of how many.
+    iou: Lane<(Size, u64), (f64, u32)>,
+    /// Every tag that is seen.
+    tags: Lane<(Size, u64, LabelMode), Tags>,
 }
 
 impl Strips {
@@ -34,59 +70,42 @@ impl Strips {
         let frames = session.data.len();
         // A frame that is wider than a pixel has a column of its own.
         let columns = frames.min(rect.width().floor().max(1.0) as usize);
-        self.update(session, frames, columns);
+        self.update(session, (frames, columns));
         let width = rect.width() / columns.max(1) as f32;
         let gap = if width > 4.0 { 1.0 } else { 0.0 };
         let filtered = !session.queue.rule.is_empty();
-        for (i, sum) in self.sums.iter().enumerate() {
+        for i in 0..columns {
             let x = rect.left() + i as f32 * width;
             let column = Rect::from_min_max(pos2(x, rect.top() + 2.0), pos2(x + width - gap, rect.bottom() - 2.0));
-            let faded = if filtered && sum.matching == 0 { 0.25 } else { 1.0 };
+            let faded = if filtered && self.matching.at(i) == 0 { 0.25 } else { 1.0 };
             match session.view.strip {
-                Strip::Stratum => strata(ui, column, sum, faded, tokens),
-                Strip::Iou => iou(ui, column, sum, faded, tokens),
-                Strip::Tags => tags(ui, column, sum, faded, tokens),
+                Strip::Stratum => strata(ui, column, self.strata.at(i), faded, tokens),
+                Strip::Iou => iou(ui, column, self.iou.at(i), faded, tokens),
+                Strip::Tags => tags(ui, column, self.tags.at(i), faded, tokens),
             }
         }
     }
 
-    fn update(&mut self, session: &Session, frames: usize, columns: usize) {
-        let key = (
-            frames,
-            columns,
-            session.queue.revision,
-            session.labels.revision,
-            session.view.label_mode,
-            session.strata.status == StrataStatus::Ready,
-            session.summaries_revision(),
-        );
-        if self.key == Some(key) {
-            return;
-        }
-        self.key = Some(key);
-        self.sums.clear();
-        self.sums.resize(columns, Sum::default());
-        let column = |frame: usize| (frame * columns / frames.max(1)).min(columns.saturating_sub(1));
-        for frame in 0..frames {
-            let Some(sum) = self.sums.get_mut(column(frame)) else { continue };
-            sum.frames += 1;
-            if let Some(stratum) = session.strata.of(frame).and_then(|complexity| complexity.stratum) {
-                sum.strata[stratum as usize] += 1;
+    /// Brings what is shown up to date, and what tells the frames that match.
+    fn update(&mut self, session: &Session, size: Size) {
+        let matching = session.queue.matching().iter().map(|&frame| (frame as usize, ()));
+        self.matching.update(size, (size, session.queue.revision), matching, |sum, ()| *sum += 1);
+        match session.view.strip {
+            Strip::Stratum => {
+                let of = |frame| session.strata.of(frame).and_then(|complexity| complexity.stratum);
+                let strata = (0..size.0).map(|frame| (frame, of(frame).map_or(3, |stratum| stratum as usize)));
+                let key = (size, session.strata.status == StrataStatus::Ready);
+                self.strata.update(size, key, strata, |sum, stratum| sum[stratum] += 1);
             }
-        }
-        for &frame in session.queue.matching() {
-            if let Some(sum) = self.sums.get_mut(column(frame as usize)) {
-                sum.matching += 1;
+            Strip::Iou => {
+                let known = session.summaries.iter().filter_map(|(&frame, summary)| Some((frame, summary.iou?)));
+                let key = (size, session.summaries_revision());
+                self.iou.update(size, key, known, |sum, iou| *sum = (sum.0 + iou, sum.1 + 1));
             }
-        }
-        for (&frame, summary) in &session.summaries {
-            if let (Some(sum), Some(iou)) = (self.sums.get_mut(column(frame)), summary.iou) {
-                sum.iou = (sum.iou.0 + iou, sum.iou.1 + 1);
-            }
-        }
-        for (frame, tags) in session.labels.seen(session.view.label_mode).flat_map(|(_, records)| records.said_tags()) {
-            if let Some(sum) = self.sums.get_mut(column(frame)) {
-                sum.tags = sum.tags.union(tags);
+            Strip::Tags => {
+                let mode = session.view.label_mode;
+                let seen = session.labels.seen(mode).flat_map(|(_, records)| records.said_tags());
+                self.tags.update(size, (size, session.labels.revision, mode), seen, |sum, tags| *sum = sum.union(tags));
             }
         }
     }
@@ -94,11 +113,12 @@ impl Strips {
 
 /// Height and colour say how hard: a third, two thirds, all of the height; where a column has several frames, each stratum
 /// has its share of the height, the hardest below.
-fn strata(ui: &Ui, column: Rect, sum: &Sum, faded: f32, tokens: &Tokens) {
-    let graded: u32 = sum.strata.iter().sum();
+fn strata(ui: &Ui, column: Rect, [easy, medium, hard, none]: [u32; 4], faded: f32, tokens: &Tokens) {
+    let counts = [easy, medium, hard];
+    let graded: u32 = counts.iter().sum();
     let all = [Stratum::Easy, Stratum::Medium, Stratum::Hard];
-    if sum.frames == 1 {
-        let Some(stratum) = all.into_iter().find(|&stratum| sum.strata[stratum as usize] > 0) else { return };
+    if graded + none == 1 {
+        let Some(stratum) = all.into_iter().find(|&stratum| counts[stratum as usize] > 0) else { return };
         let color = tokens.stratum(stratum).gamma_multiply(0.6 * faded);
         bar(ui, column, (stratum as usize + 1) as f32 / 3.0, color);
         if column.width() >= 14.0 {
@@ -109,7 +129,7 @@ fn strata(ui: &Ui, column: Rect, sum: &Sum, faded: f32, tokens: &Tokens) {
     }
     let mut bottom = column.bottom();
     for stratum in all.into_iter().rev() {
-        let height = column.height() * sum.strata[stratum as usize] as f32 / graded.max(1) as f32;
+        let height = column.height() * counts[stratum as usize] as f32 / graded.max(1) as f32;
         let part = Rect::from_min_max(pos2(column.left(), bottom - height), pos2(column.right(), bottom));
         ui.painter().rect_filled(part, 0.0, tokens.stratum(stratum).gamma_multiply(0.75 * faded));
         bottom -= height;
@@ -117,17 +137,17 @@ fn strata(ui: &Ui, column: Rect, sum: &Sum, faded: f32, tokens: &Tokens) {
 }
 
 /// Mean IoU: height and colour say the same.
-fn iou(ui: &Ui, column: Rect, sum: &Sum, faded: f32, tokens: &Tokens) {
-    if sum.iou.1 > 0 {
-        let mean = sum.iou.0 / f64::from(sum.iou.1);
+fn iou(ui: &Ui, column: Rect, (sum, count): (f64, u32), faded: f32, tokens: &Tokens) {
+    if count > 0 {
+        let mean = sum / f64::from(count);
         bar(ui, column, (mean as f32).clamp(0.08, 1.0), iou_color(tokens, mean).gamma_multiply(faded));
     }
 }
 
 /// One row a tag, in the order of the digits from the top.
-fn tags(ui: &Ui, column: Rect, sum: &Sum, faded: f32, tokens: &Tokens) {
+fn tags(ui: &Ui, column: Rect, given: Tags, faded: f32, tokens: &Tokens) {
     let height = column.height() / Tag::ALL.len() as f32;
-    for (i, tag) in Tag::ALL.into_iter().enumerate().filter(|(_, tag)| sum.tags.contains(*tag)) {
+    for (i, tag) in Tag::ALL.into_iter().enumerate().filter(|(_, tag)| given.contains(*tag)) {
         let top = column.top() + i as f32 * height;
         let mark = Rect::from_min_size(pos2(column.left(), top), vec2(column.width().max(2.0), height - 0.5));
         ui.painter().rect_filled(mark, 0.0, tokens.tag(tag).gamma_multiply(faded));
