@@ -122,6 +122,8 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, colu
     }
     state.windows.resize(views.len(), Window::default());
     state.pictures.update(session, views, frame);
+    // A toolbar that is wider than the pane must not push the maps out of it.
+    let pane = ui.max_rect();
     toolbar::show(ui, shared, column);
     if column != Column::Ori
         && session.fit.shown.is_none()
@@ -129,7 +131,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, colu
     {
         return empty(ui, "No fit", why);
     }
-    let area = ui.available_rect_before_wrap();
+    let area = ui.available_rect_before_wrap().intersect(pane);
     let pointer = ui.input(|i| i.pointer.hover_pos().filter(|_| i.modifiers.shift));
     state.flipped = column != Column::Masks && pointer.is_some_and(|p| area.contains(p));
     for (i, rect) in arrange(area, views, session.view.true_proportions).into_iter().enumerate() {

@@ -133,6 +133,8 @@ impl Session {
             self.fit.initialisation = prepared.initialisation;
         }
         self.fit.status = FitStatus::Paused;
+        // A fit that comes back, from this session or from a file, is known to the list again.
+        self.summarise();
         if let Some(cursor) = self.fit.cursor.take() {
             return self.goto_iteration(cursor);
         }
