@@ -6,7 +6,7 @@ use crate::app::widgets::Named as _;
 use crate::labels::Tag;
 use crate::session::{Records, Session};
 use egui::{RichText, Role, Sense, Ui, vec2};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// What the rows are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -32,7 +32,8 @@ struct Row {
     name: String,
     /// Frames of the group, where that is known.
     frames: Option<usize>,
-    labelled: BTreeSet<usize>,
+    /// Frames, sorted, each once: two annotators may have labelled the same one.
+    labelled: Vec<usize>,
     tags: [usize; Tag::ALL.len()],
 }
 
@@ -79,21 +80,17 @@ fn rows(session: &Session, group: Group, annotator: Option<&str>) -> Vec<Row> {
         let row = groups.entry((place, name)).or_insert_with(|| Row {
             frames: frames_of(session, group, name),
             name: name.to_owned(),
-            labelled: BTreeSet::new(),
+            labelled: Vec::new(),
             tags: [0; Tag::ALL.len()],
         });
-        row.labelled.insert(frame);
+        row.labelled.push(frame);
         for (count, tag) in row.tags.iter_mut().zip(Tag::ALL) {
             *count += usize::from(tags.contains(tag));
         }
     }
     let mut rows: Vec<Row> = groups.into_values().collect();
-    let mut all = Row {
-        name: "all".into(),
-        frames: Some(session.data.len()),
-        labelled: BTreeSet::new(),
-        tags: [0; Tag::ALL.len()],
-    };
+    let mut all =
+        Row { name: "all".into(), frames: Some(session.data.len()), labelled: Vec::new(), tags: [0; Tag::ALL.len()] };
     for row in &rows {
         all.labelled.extend(&row.labelled);
         for (sum, count) in all.tags.iter_mut().zip(row.tags) {
@@ -101,6 +98,10 @@ fn rows(session: &Session, group: Group, annotator: Option<&str>) -> Vec<Row> {
         }
     }
     rows.push(all);
+    for row in &mut rows {
+        row.labelled.sort_unstable();
+        row.labelled.dedup();
+    }
     rows
 }
 

@@ -11,6 +11,7 @@ use crate::session::records::Records;
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
 use std::collections::HashMap;
 use std::sync::Arc;
+use std::thread::JoinHandle;
 
 /// Acts that may wait to be written.
 const WAITING: usize = 256;
@@ -23,14 +24,16 @@ enum Request {
 
 /// The window's end.
 pub(super) struct LabelKeeper {
-    requests: Sender<Request>,
+    /// `None` once it is being dropped.
+    requests: Option<Sender<Request>>,
+    thread: Option<JoinHandle<()>>,
     answers: Receiver<Command>,
     told: Sender<Command>,
     wake: Wake,
 }
 
 impl LabelKeeper {
-    /// Starts the thread `labels`; it ends with its keeper, after the acts that wait.
+    /// Starts the thread `labels`. Dropping the keeper waits until the acts that were asked for are written.
     pub(super) fn start(wake: &Wake) -> Self {
         let (requests, inbox) = bounded(WAITING);
         let (told, answers) = unbounded();
@@ -46,23 +49,18 @@ impl LabelKeeper {
                 }
             }
         });
-        if let Err(reason) = spawned {
-            tracing::error!("no thread for labels: {reason}");
-        }
-        Self { requests, answers, told, wake: Arc::clone(wake) }
+        let thread = spawned.inspect_err(|reason| tracing::error!("no thread for labels: {reason}")).ok();
+        Self { requests: Some(requests), thread, answers, told, wake: Arc::clone(wake) }
     }
 
     pub(super) fn open(&self, id: u64, dataset: Arc<Dataset>, annotator: String) {
-        if self.requests.try_send(Request::Open(id, dataset, annotator)).is_err() {
+        if self.ask(Request::Open(id, dataset, annotator)).is_some() {
             self.tell(Command::LabelsOpened(id, Err("the thread that keeps labels does not answer".into())));
         }
     }
 
     pub(super) fn commit(&self, commit: Commit) {
-        if let Err(TrySendError::Full(request) | TrySendError::Disconnected(request)) =
-            self.requests.try_send(Request::Commit(commit))
-            && let Request::Commit(Commit { id, kind, act, .. }) = request
-        {
+        if let Some(Request::Commit(Commit { id, kind, act, .. })) = self.ask(Request::Commit(commit)) {
             let result = Err("the disk does not keep up with the acts before it".into());
             self.tell(Command::LabelsWritten(Written { id, kind, act, result }));
         }
@@ -70,7 +68,16 @@ impl LabelKeeper {
 
     /// What others wrote is looked for when there is time.
     pub(super) fn refresh(&self) {
-        let _ = self.requests.try_send(Request::Refresh);
+        let _ = self.ask(Request::Refresh);
+    }
+
+    /// Gives back what the thread cannot take.
+    fn ask(&self, request: Request) -> Option<Request> {
+        let Some(requests) = &self.requests else { return Some(request) };
+        match requests.try_send(request) {
+            Ok(()) => None,
+            Err(TrySendError::Full(request) | TrySendError::Disconnected(request)) => Some(request),
+        }
     }
 
     pub(super) fn poll(&self) -> Option<Command> {
@@ -81,6 +88,16 @@ impl LabelKeeper {
         // The other end is held by this very keeper.
         let _ = self.told.send(command);
         (self.wake)();
+    }
+}
+
+impl Drop for LabelKeeper {
+    fn drop(&mut self) {
+        self.requests = None;
+        if let Some(thread) = self.thread.take() {
+            // A panic there is not one here.
+            let _ = thread.join();
+        }
     }
 }
 

@@ -171,7 +171,9 @@ fn note(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     if enter {
         response.surrender_focus();
     }
-    if enter || (response.lost_focus() && !escape) {
+    // A window that is closed takes what was typed along.
+    let closing = state.note.is_some() && ui.input(|i| i.viewport().close_requested());
+    if enter || closing || (response.lost_focus() && !escape) {
         if text != stored {
             shared.send(Command::SetNote(targets, text));
         }
