@@ -12,7 +12,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, column: Column) {
         ui.horizontal(|ui| {
             ui.set_height(22.0);
             ui.spacing_mut().item_spacing.x = 4.0;
-            if ui.available_width() < 260.0 {
+            if column == Column::Sim && ui.available_width() < 260.0 {
                 ui.spacing_mut().item_spacing.x = 1.0;
                 ui.spacing_mut().button_padding.x = 5.0;
             }

@@ -48,8 +48,13 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, card: &Evidence, tokens: &Tokens) {
         ui.spacing_mut().item_spacing.y = 3.0;
         ui.horizontal(|ui| {
             ui.label(RichText::new(card.mode.code()).font(theme::strong(12.0)).color(tokens.tag(card.mode)));
-            ui.add(egui::Label::new(RichText::new(card.mode.words()).small()).truncate());
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| score(ui, card, tokens));
+            // The score has its place first; the words take what is left.
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                score(ui, card, tokens);
+                ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                    ui.add(egui::Label::new(RichText::new(card.mode.words()).small()).truncate());
+                });
+            });
         });
         ui.add(egui::Label::new(RichText::new(&card.summary).small()).wrap());
         if !card.findings.is_empty() {
