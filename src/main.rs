@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use mhp_inspector::cli::{Cli, EXIT_BAD_INPUT, WindowArgs, run};
+use std::io::IsTerminal as _;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -11,6 +12,8 @@ fn main() -> ExitCode {
                 .unwrap_or_else(|_| "warn,winit=error,wgpu_hal=error,mhp_inspector=info".into()),
         )
         .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_target(false)
         .init();
     let cli = Cli::parse();
     let done = match cli.command {
@@ -25,7 +28,7 @@ fn main() -> ExitCode {
 
 #[cfg(feature = "viewer")]
 fn open_window(args: WindowArgs) -> anyhow::Result<ExitCode> {
-    mhp_inspector::app::run(args.begin()).map(|()| ExitCode::SUCCESS)
+    mhp_inspector::app::run(args.begin()?).map(|()| ExitCode::SUCCESS)
 }
 
 #[cfg(not(feature = "viewer"))]

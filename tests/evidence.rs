@@ -315,7 +315,7 @@ fn f2_is_one_half_at_the_fraunhofer_distance_of_an_even_array() {
     let found = &at(views, one).judge()[1];
     assert!((found.score.unwrap() - 0.5).abs() < 2e-3, "{found:?}");
     assert_eq!(found.findings[0].place, Some(Place::Joint(0)), "the nearest joint");
-    assert!(found.summary.contains("1.00 of its far field's beginning"), "{}", found.summary);
+    assert!(found.summary.contains("1.00 times the Fraunhofer distance"), "{}", found.summary);
     // 22.5° at the Fraunhofer distance: rounded either way.
     assert!(has(found, "A wave from there is 22° off") || has(found, "A wave from there is 23° off"), "{found:?}");
 }

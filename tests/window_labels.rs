@@ -105,15 +105,21 @@ fn a_bulk_tag_is_one_act() {
     window.ready(1);
     window.click_with(CTRL, "Frame frames/003");
     window.click_with(Modifiers::SHIFT, "Frame frames/005");
-    assert_eq!(window.session().labels.selection.iter().copied().collect::<Vec<_>>(), [3, 4, 5]);
+    assert_eq!(
+        window.session().labels.selection.iter().copied().collect::<Vec<_>>(),
+        [1, 3, 4, 5],
+        "with the frame on screen"
+    );
     assert_eq!(window.frame(), 1, "selecting shows no other frame");
+    window.click_with(CTRL, "Frame frames/001");
     assert!(window.says("Tags go to 3 selected frames"));
     window.key(Key::Num2);
     window.until("three tags", |w| [3, 4, 5].iter().all(|&frame| w.tags(frame) == "F2"));
-    assert_eq!(window.tags(1), "");
+    assert_eq!(window.tags(1), "", "the frame on screen was taken out");
     assert!(window.menu_says("Edit", "Undo: tag F2 on 3 frames"));
     window.key_with(CTRL, Key::Z);
     window.until("none", |w| [3, 4, 5].iter().all(|&frame| w.tags(frame).is_empty()));
+    assert!(window.told("undo: tag F2 on 3 frames"));
     window.key_with(CTRL, Key::Y);
     window.until("three again", |w| [3, 4, 5].iter().all(|&frame| w.tags(frame) == "F2"));
 

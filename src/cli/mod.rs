@@ -74,9 +74,21 @@ pub struct WindowArgs {
 #[cfg(feature = "viewer")]
 impl WindowArgs {
     /// As the window takes it.
-    pub fn begin(self) -> crate::app::Begin {
+    ///
+    /// # Errors
+    /// Where a path is not there, or a session or results file cannot be read: no window is opened for them.
+    pub fn begin(self) -> anyhow::Result<crate::app::Begin> {
+        for path in &self.paths {
+            anyhow::ensure!(path.exists(), "{}: no such file or folder", path.display());
+        }
+        if let Some(session) = &self.session {
+            crate::session::SessionFile::read(session)?.dataset_path(session)?;
+        }
+        if let Some(results) = &self.results {
+            crate::study::read_summary(results)?;
+        }
         let aim = crate::session::Aim { frame: self.frame, iteration: self.iteration };
-        crate::app::Begin { paths: self.paths, aim, results: self.results, session: self.session }
+        Ok(crate::app::Begin { paths: self.paths, aim, results: self.results, session: self.session })
     }
 }
 

@@ -7,13 +7,14 @@
 //! `window` as the window gives it.
 
 use super::pins::PinRow;
-use super::state::Session;
+use super::state::{FrameSummary, Session};
 use super::view::ViewState;
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::npz::replace_file;
 use crate::mhp::{FitState, Precision};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "mhp-session";
@@ -84,6 +85,9 @@ pub struct SessionFile {
     pub joint: Option<usize>,
     /// The fit on screen.
     pub fit: Option<SavedFit>,
+    /// What the frame list knows of frames that were fitted in the session, by index.
+    #[serde(default)]
+    pub summaries: BTreeMap<usize, FrameSummary>,
     /// Pinned fits.
     pub pins: Vec<SavedPin>,
     /// The pin that others are compared with, by its place in the list.
@@ -184,6 +188,13 @@ impl SessionFile {
             filter: session.queue.text.clone(),
             joint: session.joint,
             fit: saved_fit(session),
+            // Rows of a table of results are not the session's own; the table has them.
+            summaries: session
+                .summaries
+                .iter()
+                .filter(|(_, summary)| summary.hashes.is_some())
+                .map(|(&frame, summary)| (frame, summary.clone()))
+                .collect(),
             pins: pins
                 .list()
                 .iter()

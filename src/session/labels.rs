@@ -252,11 +252,11 @@ impl Labels {
             }
             // The stacks change only now: an act that could not be written is still there to be taken back.
             ActKind::Undo => {
-                self.undo.pop();
+                let name = self.undo.pop().map_or(name, |act| act.name);
                 self.redo.push(Act { name, changes: Arc::new(changes.reversed()) });
             }
             ActKind::Redo => {
-                self.redo.pop();
+                let name = self.redo.pop().map_or(name, |act| act.name);
                 self.undo.push(Act { name, changes: Arc::new(changes) });
             }
         }

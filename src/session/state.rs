@@ -13,6 +13,7 @@ use crate::config::FitConfig;
 use crate::dataset::{BareCatalog, Dataset, Frame};
 use crate::mhp::Precision;
 use crate::worker::JobId;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -93,7 +94,7 @@ impl Data {
 }
 
 /// What is known of a frame's fit, for the list and the timeline.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameSummary {
     /// Iterations done; `None` where a batch could not fit the frame.
     pub iterations: Option<usize>,
@@ -112,7 +113,7 @@ pub struct FrameSummary {
 }
 
 /// What identifies a fit: a label remembers it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FitHashes {
     /// Hash of the parameters.
     pub fit: String,

@@ -4,7 +4,7 @@ use super::{Shared, empty};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::labels::{Record, Tag, TagAgreement, Tags, against_machine, compare_tags};
-use crate::session::{Command, Labels, Records};
+use crate::session::{Command, LabelMode, Labels, Records};
 use egui::{RichText, Role, Ui};
 use std::cmp::Ordering;
 use std::collections::HashMap;
@@ -71,6 +71,12 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     {
         let other = names.iter().find(|name| ***name != state.pair[0]);
         state.pair[1] = other.map_or_else(|| MACHINE.to_owned(), |name| (*name).clone());
+    }
+    if shared.session.view.label_mode == LabelMode::Agreement {
+        // Two others' disputes would tell what they said of frames that are still to be judged.
+        state.pair[0].clone_from(&labels.annotator);
+        let text = "A is you while you label for agreement; only frames that you have judged are counted.";
+        ui.label(RichText::new(text).small().color(tokens.dim));
     }
     choose(ui, state, &names);
     let key = (labels.revision, state.pair.clone());
@@ -174,7 +180,10 @@ fn with_machine(a: &Records) -> Found {
 }
 
 fn summary(ui: &mut Ui, found: &Found, pair: &[String; 2], tokens: &Tokens) {
-    let both = format!("{} frames judged by both", found.frames);
+    let both = format!(
+        "{} judged by both",
+        if found.frames == 1 { "1 frame".to_owned() } else { format!("{} frames", found.frames) }
+    );
     let text = if pair[1] == MACHINE {
         both
     } else {

@@ -55,6 +55,7 @@ pub(in crate::app) struct State {
 
 impl State {
     pub(in crate::app) fn reset(&mut self) {
+        self.highlight = None;
         self.windows.clear();
     }
 
@@ -121,6 +122,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, colu
         state.windows.clear();
     }
     state.windows.resize(views.len(), Window::default());
+    state.leave_highlight(Some(session.data.frame_index));
     state.pictures.update(session, views, frame);
     // A toolbar that is wider than the pane must not push the maps out of it.
     let pane = ui.max_rect();

@@ -4,7 +4,7 @@ use super::{Shared, empty};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::labels::Tag;
-use crate::session::{Records, Session};
+use crate::session::{LabelMode, Records, Session};
 use egui::{RichText, Role, Sense, Ui, vec2};
 use std::collections::BTreeMap;
 
@@ -26,7 +26,7 @@ pub(in crate::app) struct State {
     rows: Option<(Key, Vec<Row>)>,
 }
 
-type Key = (u64, Group, Option<String>, bool);
+type Key = (u64, Group, Option<String>, bool, LabelMode);
 
 struct Row {
     name: String,
@@ -47,7 +47,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let tokens = Tokens::of(ui);
     controls(ui, session, state);
     let graded = session.strata.result().is_some();
-    let key = (session.labels.revision, state.group, state.annotator.clone(), graded);
+    let key = (session.labels.revision, state.group, state.annotator.clone(), graded, session.view.label_mode);
     if state.rows.as_ref().is_none_or(|(known, _)| *known != key) {
         state.rows = Some((key, rows(session, state.group, state.annotator.as_deref())));
     }
@@ -63,8 +63,8 @@ fn controls(ui: &mut Ui, session: &Session, state: &mut State) {
         let text = state.annotator.clone().unwrap_or_else(|| "everybody".into());
         let menu = egui::ComboBox::from_id_salt("whose").width(100.0).selected_text(text).show_ui(ui, |ui| {
             ui.selectable_value(&mut state.annotator, None, "everybody");
-            for name in session.labels.table().keys() {
-                ui.selectable_value(&mut state.annotator, Some(name.clone()), name);
+            for (name, _) in session.labels.seen(session.view.label_mode) {
+                ui.selectable_value(&mut state.annotator, Some(name.to_owned()), name);
             }
         });
         menu.response.named(Role::ComboBox, "Whose labels").on_hover_text("Whose labels are counted.");
@@ -74,7 +74,8 @@ fn controls(ui: &mut Ui, session: &Session, state: &mut State) {
 fn rows(session: &Session, group: Group, annotator: Option<&str>) -> Vec<Row> {
     // By names that are borrowed: 100,000 records make a handful of groups.
     let mut groups: BTreeMap<(usize, &str), Row> = BTreeMap::new();
-    let tables = session.labels.table().iter().filter(|(name, _)| annotator.is_none_or(|wanted| wanted == *name));
+    let seen = session.labels.seen(session.view.label_mode);
+    let tables = seen.filter(|(name, _)| annotator.is_none_or(|wanted| wanted == *name));
     for (frame, tags, records) in tables.flat_map(|(_, r)| r.said_tags().map(move |(frame, tags)| (frame, tags, r))) {
         let (place, name) = name_of(session, group, frame, records);
         let row = groups.entry((place, name)).or_insert_with(|| Row {

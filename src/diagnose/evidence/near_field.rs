@@ -51,7 +51,7 @@ pub(super) fn judge(input: &EvidenceInput<'_>) -> Evidence {
         return Evidence { mode: Tag::F2, score: None, summary, findings: Vec::new() };
     };
     let summary = format!(
-        "The nearest joint is {} from the radar of {}, {:.2} of its far field's beginning at {}.",
+        "The nearest joint is {} from the radar of {}, {:.2} times the Fraunhofer distance ({}) where the far field begins.",
         length(worst.range_m),
         worst.view.array,
         worst.range_m / worst.fraunhofer_m,

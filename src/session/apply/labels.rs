@@ -117,12 +117,14 @@ impl Session {
         };
         // Scores of an older fit say nothing of the one that is judged.
         let machine = self.evidence_of(frame).filter(|_| !self.evidence_is_stale()).into_iter().flatten();
+        let machine: BTreeMap<Tag, f64> =
+            machine.filter_map(|evidence| Some((evidence.mode, evidence.score?))).collect();
         Judged {
             fit: Some(hashes.fit),
             config: Some(hashes.config),
             iteration: Some(hashes.iteration),
-            machine: machine.filter_map(|evidence| Some((evidence.mode, evidence.score?))).collect(),
-            machine_shown: !self.evidence_hidden_of(frame),
+            machine_shown: !machine.is_empty() && !self.evidence_hidden_of(frame),
+            machine,
         }
     }
 
@@ -152,7 +154,8 @@ impl Session {
     }
 
     fn again(&mut self, kind: ActKind, name: &str, asked: Asked) -> Vec<Effect> {
-        let effects = self.ask_journal(kind, name.to_owned(), asked);
+        let verb = if kind == ActKind::Undo { "undo" } else { "redo" };
+        let effects = self.ask_journal(kind, format!("{verb}: {name}"), asked);
         if effects.is_empty() {
             self.labels.forget(kind);
             self.gone(name);
@@ -208,6 +211,11 @@ impl Session {
             Ok(done) => {
                 if done.changes.is_empty() && kind != ActKind::Do {
                     self.gone(&act);
+                }
+                if !done.changes.is_empty() && kind != ActKind::Do {
+                    let first = done.records.first().map_or_else(String::new, |record| record.frame.path.clone());
+                    let on = if done.changes.len() == 1 { format!(" ({first})") } else { String::new() };
+                    self.hint(format!("{act}{on}"));
                 }
                 let replaced = self.labels.written(kind, act, done);
                 self.labels_changed();

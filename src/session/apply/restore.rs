@@ -36,7 +36,11 @@ impl Session {
     /// Puts back what a session file says, once its data set is open. Answers the frame to show.
     pub(super) fn restore(&mut self, dataset: &Arc<Dataset>) -> Option<(usize, Vec<Effect>)> {
         let (path, file) = self.restoring.take()?;
-        if dataset.fingerprint() != file.dataset.fingerprint {
+        let same = dataset.fingerprint() == file.dataset.fingerprint;
+        if same {
+            self.summaries = file.summaries;
+            self.summaries.retain(|&frame, _| frame < dataset.len());
+        } else {
             let text = "the data set is not the one that the session was saved with; frames are found by their names";
             self.note(LogLevel::Warning, text.into());
         }

@@ -194,24 +194,20 @@ pub(super) fn cell(painter: &Painter, rect: Rect, column: &Column, facts: &Facts
         }
         "tags" => {
             let mut x = rect.left();
-            for tag in facts.tags.iter() {
-                let font = FontId::proportional(theme::CAPTION);
-                let fade = if facts.own_tags.contains(tag) { 1.0 } else { 0.45 };
-                let color = tokens.tag(tag).gamma_multiply(fade);
-                let text = painter.text(pos2(x, y), Align2::LEFT_CENTER, tag.code(), font, color);
-                x = text.right() + 4.0;
-            }
-            if facts.tags.is_empty()
-                && let Some(verdict) = facts.verdict
-            {
-                let font = FontId::proportional(theme::CAPTION);
+            let font = || FontId::proportional(theme::CAPTION);
+            if let Some(verdict) = facts.verdict {
                 let short = match verdict {
                     Verdict::AnnotationError => "annot. err",
                     Verdict::DetectionError => "detect. err",
                     Verdict::BothIncorrect => "both err",
                     Verdict::TrueNegative => "true neg.",
                 };
-                painter.text(pos2(x, y), Align2::LEFT_CENTER, short, font, tokens.dim);
+                x = painter.text(pos2(x, y), Align2::LEFT_CENTER, short, font(), tokens.text).right() + 4.0;
+            }
+            for tag in facts.tags.iter() {
+                let fade = if facts.own_tags.contains(tag) { 1.0 } else { 0.45 };
+                let color = tokens.tag(tag).gamma_multiply(fade);
+                x = painter.text(pos2(x, y), Align2::LEFT_CENTER, tag.code(), font(), color).right() + 4.0;
             }
         }
         _ => {

@@ -165,10 +165,13 @@ fn found(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
         .position(session.data.frame_index)
         .map_or_else(String::new, |at| format!("{} of {}", at + 1, session.queue.rows().len()));
     ui.horizontal(|ui| {
-        ui.label(RichText::new(words).small().color(tokens.dim))
-            .on_hover_text("N and Shift+N go along this list; the arrow keys go along time, among the same frames.");
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             ui.label(RichText::new(place).font(theme::mono(theme::CAPTION)).color(tokens.dim));
+            ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                let tip = "N and Shift+N go along this list; the arrow keys go along time, among the same frames.";
+                let words = RichText::new(words).small().color(tokens.dim);
+                ui.add(egui::Label::new(words).truncate()).on_hover_text(tip);
+            });
         });
     });
     let selected = session.labels.selection.len();

@@ -107,6 +107,10 @@ fn click(shared: &mut Shared<'_>, state: &mut State, index: usize, ctrl: bool, s
     }
     state.anchor = Some(index);
     if ctrl {
+        if selection.is_empty() {
+            // The frame on screen is marked like a selected one, and is the first of them.
+            selection.insert(session.data.frame_index);
+        }
         if !selection.remove(&index) {
             selection.insert(index);
         }

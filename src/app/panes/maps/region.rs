@@ -1,6 +1,6 @@
 //! Boxes of cells: those that a label marks, drawn with the mouse, and those that a finding points at.
 
-use super::{State, unit_at};
+use super::{State, Window, unit_at};
 use crate::app::map_image::Orientation;
 use crate::app::theme::Tokens;
 use crate::labels::CellRegion;
@@ -15,6 +15,8 @@ pub(super) struct Highlight {
     view: usize,
     lo: Vec<usize>,
     hi: Vec<usize>,
+    /// What was seen of the view before.
+    before: Window,
 }
 
 /// Whether the mouse marks cells.
@@ -48,7 +50,9 @@ impl State {
         let Some(v) = session.data.dataset.as_ref().and_then(|dataset| dataset.info().views.get(view)) else { return };
         let Some([min, max]) = unit_box(v, lo, hi) else { return };
         let frame = session.data.frame_index;
-        self.highlight = Some(Highlight { frame, view, lo: lo.to_vec(), hi: hi.to_vec() });
+        self.leave_highlight(None);
+        let before = self.windows.get(view).copied().unwrap_or_default();
+        self.highlight = Some(Highlight { frame, view, lo: lo.to_vec(), hi: hi.to_vec(), before });
         if let Some(window) = self.windows.get_mut(view) {
             for axis in 0..2 {
                 // The cells take a third of the map, so that what is around them is seen too.
@@ -56,6 +60,15 @@ impl State {
                 let low = (0.5 * (min[axis] + max[axis]) - 0.5 * span).clamp(0.0, 1.0 - span);
                 (window.min[axis], window.max[axis]) = (low, low + span);
             }
+        }
+    }
+
+    /// Takes back the zoom to cells that are pointed at on another frame than `frame`.
+    pub(super) fn leave_highlight(&mut self, frame: Option<usize>) {
+        if let Some(left) = self.highlight.take_if(|highlight| Some(highlight.frame) != frame)
+            && let Some(window) = self.windows.get_mut(left.view)
+        {
+            *window = left.before;
         }
     }
 

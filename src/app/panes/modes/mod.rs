@@ -158,7 +158,7 @@ fn note(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     }
     let mut text = state.note.as_ref().map_or_else(|| stored.clone(), |(_, typed)| typed.clone());
     let field = egui::TextEdit::multiline(&mut text)
-        .hint_text("Note")
+        .hint_text("Note: Enter keeps it, Esc drops it")
         .desired_rows(1)
         .return_key(Some(egui::KeyboardShortcut::new(egui::Modifiers::SHIFT, egui::Key::Enter)))
         .desired_width(f32::INFINITY);
