@@ -198,9 +198,15 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     let rect = figure::print(ui, rect, caption.as_deref());
     // The masks have no colour bar, but keep its place: the three columns must line up.
     let bar_width = 46.0;
-    let inner = Rect::from_min_max(rect.min + vec2(42.0, 20.0), rect.max - vec2(4.0 + bar_width, 30.0));
+    // Where there is hardly room for the map, it goes without axes and colour bar; the probe still tells both.
+    let compact = rect.height() < 112.0 || rect.width() < 150.0;
+    let inner = if compact {
+        Rect::from_min_max(rect.min + vec2(6.0, 18.0), rect.max - vec2(6.0, 4.0))
+    } else {
+        Rect::from_min_max(rect.min + vec2(42.0, 20.0), rect.max - vec2(4.0 + bar_width, 30.0))
+    };
     let plot = if session.view.true_proportions { fit_aspect(inner, view, orientation) } else { inner };
-    if plot.width() < 24.0 || plot.height() < 24.0 {
+    if plot.width() < 12.0 || plot.height() < 12.0 {
         return;
     }
     let tokens = Tokens::of(ui);
@@ -225,7 +231,9 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     let to_screen = |unit: [f64; 2]| screen(plot, window, unit);
     overlay::draw(&painter, session, view, index, orientation, &to_screen, &tokens);
     state.draw_regions(&painter, session, index, view, &to_screen, &tokens);
-    overlay::axes(ui, plot, view, orientation, window, &tokens);
+    if !compact {
+        overlay::axes(ui, plot, view, orientation, window, &tokens);
+    }
     ui.painter().rect_stroke(plot, 0.0, egui::Stroke::new(1.0, tokens.stroke), egui::StrokeKind::Outside);
     if let Some(pointer) = response.hover_pos() {
         let unit = unit_at(plot, window, pointer);
@@ -249,7 +257,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
         debug_assert_eq!(hovered, index);
         overlay::crosshair(&painter, plot, &to_screen, view, orientation, pixel, &tokens);
     }
-    if content != Content::Masks {
+    if content != Content::Masks && !compact {
         let bar = ColorBar {
             rect: Rect::from_min_max(
                 pos2(plot.max.x + 2.0, plot.min.y - 18.0),

@@ -31,11 +31,11 @@ Examples:
 pub struct Args {
     /// A data set, a journal (*.labels.jsonl), or labels exported before.
     path: PathBuf,
-    /// Write CSV.
-    #[arg(long, value_name = "F", group = "out")]
+    /// Write CSV; without F to standard output.
+    #[arg(long, value_name = "F", group = "out", num_args = 0..=1, default_missing_value = "-")]
     csv: Option<PathBuf>,
-    /// Write a JSON array.
-    #[arg(long, value_name = "F", group = "out")]
+    /// Write a JSON array; without F to standard output.
+    #[arg(long, value_name = "F", group = "out", num_args = 0..=1, default_missing_value = "-")]
     json: Option<PathBuf>,
     /// Only this annotator's.
     #[arg(long, value_name = "NAME")]
