@@ -48,6 +48,7 @@ pub mod cli;
 pub mod config;
 pub mod dataset;
 pub mod diagnose;
+mod digest;
 pub mod folders;
 pub mod geometry;
 pub mod labels;

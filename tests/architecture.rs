@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// Each room of `src/` and the rooms that it may use besides itself.
 const MAY_USE: &[(&str, &[&str])] = &[
+    ("digest", &[]),
     ("geometry", &[]),
     ("folders", &[]),
     ("labels", &["folders"]),
@@ -14,27 +15,30 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("body", &["geometry", "radar"]),
     ("mhp", &["geometry", "config", "radar", "body"]),
     ("diagnose", &["geometry", "config", "radar", "body", "mhp", "labels"]),
-    ("dataset", &["geometry", "folders", "config", "radar", "body"]),
+    ("dataset", &["digest", "geometry", "folders", "config", "radar", "body"]),
     ("render", &["geometry"]),
     ("worker", &["geometry", "config", "radar", "body", "mhp", "dataset"]),
-    ("study", &["geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels"]),
+    ("study", &["digest", "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels"]),
     (
         "session",
-        &["geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels", "study", "worker"],
+        &[
+            "digest", "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels",
+            "study", "worker",
+        ],
     ),
     (
         "app",
         &[
-            "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels", "study",
-            "worker", "session", "render",
+            "digest", "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels",
+            "study", "worker", "session", "render",
         ],
     ),
 ];
 
 /// Rooms that know no window and no GPU.
 const WINDOWLESS: &[&str] = &[
-    "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels", "worker", "session",
-    "study",
+    "digest", "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels", "worker",
+    "session", "study",
 ];
 
 fn files(folder: &Path) -> Vec<PathBuf> {

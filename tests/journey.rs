@@ -100,7 +100,7 @@ fn from_the_hard_frames_to_the_labels_at_home() {
     window.until("the findings", |w| w.says("show where F1 is seen"));
     let link = window.names().into_iter().find(|name| name.starts_with("show where F1 is seen")).unwrap();
     window.click(&link);
-    let fit = window.session().shown_hashes().unwrap();
+    let fit = window.session().shown_hashes().cloned().unwrap();
 
     // A tag, a note, undo and redo.
     assert!(!window.is_on("Tag F1") && !journal(&window).is_file());

@@ -11,8 +11,8 @@ use mhp_inspector::diagnose::Evidence;
 use mhp_inspector::labels::{Change, FrameId, Judged, Label, LabelPlace, Record, Tag};
 use mhp_inspector::mhp::{Evaluation, Problem, Terms, initialise};
 use mhp_inspector::session::{
-    ActKind, Changes, Command, Commit, Done, Effect, LabelStatus, LabelTable, LogLevel, OpenedLabels, Session,
-    SessionFile, StrataStatus, Written,
+    ActKind, Changes, Command, Commit, Done, Effect, FitHashes, LabelStatus, LabelTable, LogLevel, OpenedLabels,
+    Session, SessionFile, StrataStatus, Written,
 };
 use mhp_inspector::study::complexity::Complexity;
 use mhp_inspector::worker::{Prepared, Snapshot, WorkerCommand, WorkerEvent, WorkerMessage};
@@ -130,7 +130,7 @@ impl Bench {
     }
 
     /// The worker shows these parameters; answers under which key evidence on them is asked for.
-    fn draw(&mut self, params: Pppr) -> Option<String> {
+    fn draw(&mut self, params: Pppr) -> Option<FitHashes> {
         let zeros = Pppr::zeros(params.shape());
         let evaluation = Evaluation {
             loss: 1.0,
@@ -152,7 +152,7 @@ impl Bench {
     }
 
     /// Draws a pose that differs by `by` metres.
-    fn draw_moved(&mut self, by: f64) -> String {
+    fn draw_moved(&mut self, by: f64) -> FitHashes {
         let mut params = self.session.fit.initial.clone().unwrap();
         params.group_mut(mhp_inspector::body::Group::Position)[0] += by;
         self.draw(params).unwrap()
@@ -363,7 +363,7 @@ fn evidence_of_an_older_fit_is_dropped_and_not_recorded() {
     assert!(bench.session.evidence_is_stale(), "an older answer is shown until the newer one is there");
     let commit = bench.asks(Command::ToggleTag(Tag::F2));
     assert!(judged(&commit).machine.is_empty(), "a score of another fit is no score of this one");
-    assert_eq!(judged(&commit).fit, bench.session.shown_hashes().map(|hashes| hashes.fit));
+    assert_eq!(judged(&commit).fit, bench.session.shown_hashes().map(|hashes| hashes.fit.clone()));
     bench.write(&commit);
     bench.session.apply(Command::EvidenceFound(0, first, Ok(evidence(0.8))));
     assert!(bench.session.evidence_is_stale(), "a late answer on the fit before");
@@ -381,7 +381,7 @@ fn a_frame_that_is_still_being_read_is_not_judged_on_the_fit_before() {
     bench.show(0);
     let key = bench.draw_moved(0.1);
     bench.session.apply(Command::EvidenceFound(0, key, Ok(evidence(0.9))));
-    let shown = bench.session.shown_hashes().unwrap();
+    let shown = bench.session.shown_hashes().cloned().unwrap();
     bench.session.apply(Command::GotoFrame(1));
     let commit = bench.asks(Command::ToggleTag(Tag::F1));
     assert_eq!((asked(&commit)[0].0, asked(&commit)[0].2.clone()), (1, Judged::default()));

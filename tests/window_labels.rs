@@ -356,7 +356,7 @@ fn a_new_fit_leaves_the_tag_and_says_that_it_was_judged_on_another() {
     window.at_rest();
     press(&mut window, Key::Num1, "F1");
     let fit = written(&window).judged.fit;
-    assert_eq!(fit, window.session().shown_hashes().map(|hashes| hashes.fit));
+    assert_eq!(fit, window.session().shown_hashes().map(|hashes| hashes.fit.clone()));
     assert!(!window.says("judged on another fit"));
     window.key(Key::Period);
     window.paused_at(11);

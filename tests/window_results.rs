@@ -4,82 +4,32 @@
 
 #[path = "common/blob.rs"]
 mod blob;
+#[path = "common/window.rs"]
+#[expect(dead_code, reason = "other tests do more with a window")]
+mod window;
 
-use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use mhp_inspector::app::InspectorApp;
 use mhp_inspector::session::{Command, LogLevel, Session};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::path::PathBuf;
+use window::Window;
 
 const HEAD: &str = "frame,iterations,converged,reason,loss,em,iou_hori,iou_vert,majpe_mm";
 
-struct Window {
-    harness: Harness<'static, InspectorApp>,
-    folder: tempfile::TempDir,
+fn until(window: &mut Window, what: &str, done: impl Fn(&Session) -> bool) {
+    window.until(what, |w| done(w.session()));
 }
 
-impl Window {
-    /// Six frames, the first on screen with its fit ready.
-    fn open() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        blob::write_dataset(folder.path(), 6);
-        let paths = [folder.path().to_path_buf()];
-        let harness = Harness::builder().with_size([1440.0, 900.0]).build_eframe(|cc| InspectorApp::new(cc, &paths));
-        let mut window = Self { harness, folder };
-        window.until("a fit", |s| s.fit.is_ready() && s.fit.shown.is_some());
-        window
-    }
-
-    fn session(&self) -> &Session {
-        self.harness.state().session()
-    }
-
-    fn until(&mut self, what: &str, done: impl Fn(&Session) -> bool) {
-        let deadline = Instant::now() + Duration::from_mins(1);
-        while !done(self.session()) {
-            assert!(Instant::now() < deadline, "waited for {what}; the log says {:#?}", self.session().log);
-            self.harness.step();
-        }
-        self.harness.step();
-    }
-
-    fn table(&self, name: &str, rows: &[&str]) -> PathBuf {
-        let path = self.folder.path().join(name);
-        std::fs::write(&path, format!("{HEAD}\n{}\n", rows.join("\n"))).unwrap();
-        path
-    }
-
-    fn drop_file(&mut self, path: &Path) {
-        let file: Arc<dyn egui::DroppedFile + Send + Sync> = Arc::new(Dropped(path.into()));
-        self.harness.input_mut().dropped_files.push(file);
-        self.harness.step();
-    }
-
-    /// What the list shows: frames in its order.
-    fn rows(&self) -> Vec<u32> {
-        self.session().queue.rows().to_vec()
-    }
-
-    fn filter(&mut self, text: &str) -> Vec<u32> {
-        self.harness.state_mut().apply(Command::SetFilter(text.into()));
-        self.harness.step();
-        self.rows()
-    }
+fn write_table(window: &Window, name: &str, rows: &[&str]) -> PathBuf {
+    let path = window.folder.path().join(name);
+    std::fs::write(&path, format!("{HEAD}\n{}\n", rows.join("\n"))).unwrap();
+    path
 }
 
-#[derive(Debug)]
-struct Dropped(PathBuf);
-
-impl egui::DroppedFile for Dropped {
-    fn path(&self) -> &Path {
-        &self.0
-    }
-
-    fn bytes(&self) -> Result<Vec<u8>, String> {
-        std::fs::read(&self.0).map_err(|error| error.to_string())
-    }
+/// What the list shows under a filter: frames in its order.
+fn filter(window: &mut Window, text: &str) -> Vec<u32> {
+    window.apply(Command::SetFilter(text.into()));
+    window.harness.step();
+    window.session().queue.rows().to_vec()
 }
 
 const ROWS: [&str; 4] = [
@@ -91,10 +41,10 @@ const ROWS: [&str; 4] = [
 
 #[test]
 fn a_table_that_is_dropped_fills_the_list() {
-    let mut window = Window::open();
-    let table = window.table("summary.csv", &ROWS);
+    let mut window = Window::open(6);
+    let table = write_table(&window, "summary.csv", &ROWS);
     window.drop_file(&table);
-    window.until("the results", |s| s.summaries.len() == 3);
+    until(&mut window, "the results", |s| s.summaries.len() == 3);
     let told = window.session().log.iter().rev().find(|line| line.text.contains("results of")).unwrap();
     assert!(told.text.contains("results of 3 of 6 frames; 1 rows are of frames that are not"), "{}", told.text);
     assert!(told.text.ends_with("elsewhere/7") && told.level == LogLevel::Info, "{}", told.text);
@@ -102,40 +52,40 @@ fn a_table_that_is_dropped_fills_the_list() {
     assert_eq!((facts.iou, facts.majpe_mm, facts.converged), (Some(0.5), Some(120.5), Some(false)));
     let second = window.session().facts(2);
     assert_eq!((second.iou, second.iterations, second.reason), (Some(0.9), Some(12), Some("converged")));
-    assert_eq!(window.filter("iou<0.6"), [0]);
-    assert_eq!(window.filter("converged:yes"), [2]);
-    assert_eq!(window.filter("reason:error"), [3]);
-    assert_eq!(window.filter("fitted:yes"), [0, 2]);
+    assert_eq!(filter(&mut window, "iou<0.6"), [0]);
+    assert_eq!(filter(&mut window, "converged:yes"), [2]);
+    assert_eq!(filter(&mut window, "reason:error"), [3]);
+    assert_eq!(filter(&mut window, "fitted:yes"), [0, 2]);
     assert!(window.session().summaries[&0].hashes.is_none(), "not fitted here");
 }
 
 #[test]
 fn a_frame_that_was_fitted_here_keeps_its_own() {
-    let mut window = Window::open();
-    window.harness.state_mut().apply(Command::StepFit(3));
-    window.until("three steps", |s| s.fit.head() == 3 && !s.fit.is_running());
+    let mut window = Window::open(6);
+    window.apply(Command::StepFit(3));
+    until(&mut window, "three steps", |s| s.fit.head() == 3 && !s.fit.is_running());
     let own = window.session().summaries[&0].clone();
-    let table = window.table("summary.csv", &ROWS);
-    window.harness.state_mut().apply(Command::LoadResults(table));
-    window.until("the results", |s| s.summaries.len() == 3);
+    let table = write_table(&window, "summary.csv", &ROWS);
+    window.apply(Command::LoadResults(table));
+    until(&mut window, "the results", |s| s.summaries.len() == 3);
     assert_eq!(window.session().summaries[&0], own);
     // To look at a frame of the table is not to fit it: what the table says stays.
-    window.harness.state_mut().apply(Command::GotoFrame(2));
-    window.until("frame 2", |s| s.fit.frame == 2 && s.fit.is_ready() && s.fit.shown.is_some());
+    window.apply(Command::GotoFrame(2));
+    until(&mut window, "frame 2", |s| s.fit.frame == 2 && s.fit.is_ready() && s.fit.shown.is_some());
     assert_eq!(window.session().facts(2).iou, Some(0.9));
-    window.harness.state_mut().apply(Command::StepFit(1));
-    window.until("a step", |s| s.fit.head() == 1 && !s.fit.is_running());
+    window.apply(Command::StepFit(1));
+    until(&mut window, "a step", |s| s.fit.head() == 1 && !s.fit.is_running());
     assert_eq!(window.session().facts(2).iterations, Some(1));
-    let foreign = window.table("summary.csv", &ROWS[3..]);
-    window.harness.state_mut().apply(Command::LoadResults(foreign));
-    window.until("that nothing matches", |s| s.log.iter().any(|line| line.text.contains("results of 0 of 6")));
+    let foreign = write_table(&window, "summary.csv", &ROWS[3..]);
+    window.apply(Command::LoadResults(foreign));
+    until(&mut window, "that nothing matches", |s| s.log.iter().any(|line| line.text.contains("results of 0 of 6")));
     assert_eq!(window.session().facts(2).iterations, Some(1));
 }
 
 #[test]
 fn the_sheet_takes_a_path() {
-    let mut window = Window::open();
-    let table = window.table("summary.csv", &ROWS);
+    let mut window = Window::open(6);
+    let table = write_table(&window, "summary.csv", &ROWS);
     window.harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::K);
     window.harness.run_steps(2);
     window.harness.event(egui::Event::Text("load results".into()));
@@ -146,13 +96,13 @@ fn the_sheet_takes_a_path() {
     window.harness.event(egui::Event::Text(table.display().to_string()));
     window.harness.run_steps(2);
     window.harness.key_press(egui::Key::Enter);
-    window.until("the results", |s| s.summaries.len() == 3);
+    until(&mut window, "the results", |s| s.summaries.len() == 3);
     assert!(window.harness.query_all_by_label("Table of results").next().is_none(), "the sheet is closed");
 }
 
 #[test]
 fn a_wrong_table_is_told_and_nothing_changes() {
-    let mut window = Window::open();
+    let mut window = Window::open(6);
     let wrong =
         |w: &Window| w.session().log.iter().rev().find(|l| l.level == LogLevel::Error).map(|line| line.text.clone());
     let row = |cells: &str| format!("{HEAD}\nframes/000,{cells}\n");
@@ -170,14 +120,15 @@ fn a_wrong_table_is_told_and_nothing_changes() {
     ] {
         let path = window.folder.path().join("wrong.csv");
         std::fs::write(&path, text).unwrap();
-        window.harness.state_mut().apply(Command::LoadResults(path));
+        window.apply(Command::LoadResults(path));
         let before = window.session().log.len();
-        window.until(expected, |s| s.log.len() > before);
+        until(&mut window, expected, |s| s.log.len() > before);
         let told = wrong(&window).unwrap_or_default();
         assert!(told.contains("wrong.csv") && told.contains(expected), "{told}");
         assert!(window.session().summaries.is_empty());
     }
-    window.harness.state_mut().apply(Command::LoadResults("no/such/table.csv".into()));
-    window
-        .until("that it is missing", |s| s.log.iter().any(|l| l.text.starts_with("no/such/table.csv: cannot be read")));
+    window.apply(Command::LoadResults("no/such/table.csv".into()));
+    until(&mut window, "that it is missing", |s| {
+        s.log.iter().any(|l| l.text.starts_with("no/such/table.csv: cannot be read"))
+    });
 }

@@ -104,7 +104,7 @@ pub(super) fn compute(
         // The receiver lives until the answer is here.
         let _ = sender.send(());
     };
-    let mut job = ComplexityJob::start_in(Arc::clone(dataset), options, cache, wake);
+    let mut job = ComplexityJob::start(Arc::clone(dataset), options, cache, wake);
     let bar = progress_bar(dataset.len());
     while let Err(RecvTimeoutError::Timeout) = done.recv_timeout(Duration::from_millis(100)) {
         show(&bar, job.progress());

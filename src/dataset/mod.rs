@@ -21,6 +21,7 @@ mod pppr_io;
 mod progress;
 mod sample;
 mod set;
+mod source;
 mod words;
 
 pub use bare::{BareCatalog, BareChoice, Remembered};
@@ -28,6 +29,7 @@ pub use cache::{DEFAULT_BUDGET, FrameCache};
 pub use error::DatasetError;
 pub(crate) use error::panic_text;
 pub use frame::{Frame, Heatmap, ImageAnnotations, Truth};
+pub(crate) use job::Job;
 pub use job::OpenJob;
 pub use loader::{Loaded, Loader};
 pub use manifest::{Layout, Manifest};

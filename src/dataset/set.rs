@@ -3,12 +3,13 @@
 use super::bare::{BareCatalog, BareChoice, Remembered, assumptions, frames_of};
 use super::files::{RADAR_SUFFIX, Segment, matching, segments};
 use super::manifest::{Layout, Manifest};
+use super::source::{Names, Source};
 use super::words::axes_badge;
 use super::{DatasetError, Frame, Heatmap, Progress, generic, mmvr};
 use crate::body::Skeleton;
+use crate::digest;
 use crate::radar::{RadarConfig, View};
 use sha2::{Digest as _, Sha256};
-use std::fmt::Write as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -43,43 +44,6 @@ pub struct DatasetInfo {
     pub notes: Vec<String>,
 }
 
-#[derive(Debug)]
-enum Source {
-    /// Folders of frames, and the index of the first frame of each.
-    Mmvr { segments: Vec<Segment>, starts: Vec<usize>, frames: usize },
-    /// Files relative to the root.
-    Files(Vec<PathBuf>),
-    /// One file; `stacked` where the arrays' first axis counts frames.
-    Bare { frames: usize, stacked: bool },
-}
-
-impl Source {
-    fn names(&self, dataset: &str) -> Names {
-        let mut names = Names::default();
-        match self {
-            Self::Mmvr { segments, .. } => {
-                for segment in segments {
-                    for k in 0..segment.len() {
-                        names.push(format_args!("{}/{}", segment.sequence, segment.stem(k)));
-                    }
-                }
-            }
-            Self::Files(files) => {
-                for file in files {
-                    names.push(format_args!("{}", file.with_extension("").to_string_lossy()));
-                }
-            }
-            Self::Bare { frames, stacked: true } => {
-                for i in 0..*frames {
-                    names.push(format_args!("{dataset}/{i:06}"));
-                }
-            }
-            Self::Bare { .. } => names.push(format_args!("{dataset}")),
-        }
-        names
-    }
-}
-
 /// An open data set: an index of names. Frames are read by [`Self::load`], from any thread.
 #[derive(Debug)]
 pub struct Dataset {
@@ -88,27 +52,6 @@ pub struct Dataset {
     start: usize,
     names: Names,
     fingerprint: OnceLock<String>,
-}
-
-/// The frames' names, one after the other in one text.
-#[derive(Debug, Default)]
-struct Names {
-    text: String,
-    ends: Vec<u32>,
-}
-
-impl Names {
-    fn push(&mut self, name: std::fmt::Arguments<'_>) {
-        // Writing to a text does not fail.
-        let _ = self.text.write_fmt(name);
-        self.ends.push(self.text.len() as u32);
-    }
-
-    fn get(&self, i: usize) -> &str {
-        let end = self.ends.get(i).copied().unwrap_or_default() as usize;
-        let start = i.checked_sub(1).and_then(|before| self.ends.get(before)).copied().unwrap_or_default() as usize;
-        self.text.get(start..end).unwrap_or_default()
-    }
 }
 
 impl Dataset {
@@ -325,8 +268,7 @@ impl Dataset {
                 hash.update(self.frame_name(frame));
                 hash.update("\n");
             }
-            let first = hash.finalize().iter().take(8).fold(0, |first: u64, &byte| first << 8 | u64::from(byte));
-            format!("{first:016x}")
+            digest::short(hash)
         })
     }
 

@@ -20,6 +20,7 @@ mod stamp;
 mod statistics;
 mod store;
 mod table;
+mod tags;
 mod tail;
 
 pub use acts::{place_acts, read_acts, read_labels};
@@ -31,7 +32,8 @@ pub use import::{ImportPlan, plan_import};
 pub use journal::{Journal, Outcome, SaidElsewhere};
 pub use kappa::{RELIABLE_FRAMES, TagAgreement};
 pub use place::LabelPlace;
-pub use record::{CellRegion, Change, FrameId, Judged, Label, Record, Tag, Tags, Verdict};
+pub use record::{CellRegion, Change, FrameId, Judged, Label, Record};
 pub use statistics::{AnnotatorStatistics, LabelCounts, PAUSE_S, Pace, day, statistics};
 pub use store::{LabelStore, read_journal};
 pub use table::{COLUMNS, Row, Table, TableError, read_table, write_csv, write_json};
+pub use tags::{Tag, Tags, Verdict};

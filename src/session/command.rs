@@ -7,6 +7,7 @@ use super::labels::LabelTable;
 use super::pins::Pin;
 use super::queue::Sort;
 use super::results::FoundResults;
+use super::state::FitHashes;
 use super::view::ViewState;
 use crate::body::Pppr;
 use crate::config::FitConfig;
@@ -136,7 +137,7 @@ pub enum Command {
     /// Report: the maps of a pinned state.
     PinDrawn(u32, Result<Box<Snapshot>, String>),
     /// Report: the evidence of a fit.
-    EvidenceFound(usize, String, Result<Vec<Evidence>, String>),
+    EvidenceFound(usize, FitHashes, Result<Vec<Evidence>, String>),
     /// Report: a frame was read.
     FrameLoaded(usize, Result<Arc<Frame>, DatasetError>),
     /// Play or stop playing frames.

@@ -1,5 +1,6 @@
 //! The machine's evidence on the fit that is on screen: asked for when the fit comes to rest, kept until another one does.
 
+use super::state::FitHashes;
 use crate::dataset::{Dataset, Frame};
 use crate::diagnose::Evidence;
 use crate::mhp::Problem;
@@ -18,8 +19,8 @@ pub struct EvidenceRequest {
     pub problem: Arc<Problem>,
     /// The fit.
     pub snapshot: Arc<Snapshot>,
-    /// Hash of the fit, which comes back with the answer.
-    pub fit: String,
+    /// What identifies the fit, which comes back with the answer.
+    pub fit: FitHashes,
 }
 
 impl EvidenceRequest {
@@ -34,9 +35,9 @@ impl EvidenceRequest {
 #[derive(Debug, Default)]
 pub(super) struct EvidenceState {
     /// Frame and fit that were asked for last.
-    pub(super) asked: Option<(usize, String)>,
+    pub(super) asked: Option<(usize, FitHashes)>,
     /// The newest answer, and the fit that it is on: an older one of the same frame is shown until the newer one is there.
-    pub(super) found: Option<(String, Result<Vec<Evidence>, String>)>,
+    pub(super) found: Option<(FitHashes, Result<Vec<Evidence>, String>)>,
     /// The frame that the answer is on.
     pub(super) frame: usize,
 }

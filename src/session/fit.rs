@@ -1,6 +1,7 @@
 //! The fit of the frame on screen.
 
 use super::history::{Branch, History, Row};
+use super::state::FitHashes;
 use crate::body::Pppr;
 use crate::mhp::{Initialisation, Problem};
 use crate::worker::{JobId, Snapshot};
@@ -53,6 +54,8 @@ pub struct Fit {
     pub cursor: Option<usize>,
     /// What is drawn.
     pub shown: Option<Arc<Snapshot>>,
+    /// What identifies it; made once, for every pass and every command asks.
+    pub(super) shown_hashes: Option<FitHashes>,
 }
 
 impl Fit {

@@ -42,7 +42,7 @@ impl Strata {
 
     /// The statistics of a frame.
     pub fn of(&self, frame: usize) -> Option<&FrameComplexity> {
-        self.result.as_ref()?.frames.get(frame)?.as_ref()
+        self.result.as_ref()?.frame(frame)
     }
 
     /// False where the frame's file could not be read.
@@ -52,7 +52,6 @@ impl Strata {
 
     /// Frames of a stratum.
     pub fn count(&self, stratum: Stratum) -> usize {
-        let frames = self.result.iter().flat_map(|result| result.frames.iter().flatten());
-        frames.filter(|frame| frame.stratum == Some(stratum)).count()
+        self.result.as_ref().map_or(0, |result| result.counts.in_stratum(stratum))
     }
 }

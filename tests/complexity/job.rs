@@ -19,7 +19,7 @@ fn start(dataset: &Arc<Dataset>, cache: Option<&Path>) -> (ComplexityJob, Receiv
         let _ = sender.send(());
     };
     let (dataset, cache) = (Arc::clone(dataset), cache.map(Path::to_owned));
-    (ComplexityJob::start_in(dataset, ComplexityOptions::default(), cache, wake), woken)
+    (ComplexityJob::start(dataset, ComplexityOptions::default(), cache, wake), woken)
 }
 
 fn wait(job: &mut ComplexityJob, woken: &Receiver<()>) -> Result<Complexity, StudyError> {
@@ -35,7 +35,7 @@ fn a_job_answers_once_with_progress_told() {
     let dataset = Arc::new(open(folder.path()));
     let (mut job, woken) = start(&dataset, None);
     let answer = wait(&mut job, &woken).unwrap();
-    assert_eq!(answer, compute(&dataset, job.options(), None, &Progress::new()).unwrap());
+    assert_eq!(answer, compute(&dataset, &ComplexityOptions::default(), None, &Progress::new()).unwrap());
     let state = job.progress().state();
     assert_eq!((state.stage.as_str(), state.done, state.total), ("measuring maps", 27, 27));
 }

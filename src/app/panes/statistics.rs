@@ -120,9 +120,9 @@ fn name_of<'a>(session: &'a Session, group: Group, frame: usize, records: &'a Re
 
 fn frames_of(session: &Session, group: Group, name: &str) -> Option<usize> {
     use crate::study::complexity::Stratum;
-    let counts = &session.strata.result()?.counts;
+    session.strata.result()?;
     let stratum = Stratum::ALL.into_iter().find(|stratum| group == Group::Stratum && stratum.word() == name)?;
-    Some(counts.in_stratum(stratum))
+    Some(session.strata.count(stratum))
 }
 
 fn table(ui: &mut Ui, rows: &[Row], tokens: &Tokens) {

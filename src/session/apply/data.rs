@@ -158,7 +158,7 @@ impl Session {
         if fit.problem.is_none() {
             return Vec::new();
         }
-        fit.shown = None;
+        (fit.shown, fit.shown_hashes) = (None, None);
         fit.status = FitStatus::Paused;
         fit.history.shrink(KEPT_FIT_BYTES);
         self.left.retain(|frame| *frame != fit.frame);

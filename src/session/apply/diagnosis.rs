@@ -3,6 +3,7 @@
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::diagnose::Evidence;
+use crate::digest;
 use crate::session::command::Effect;
 use crate::session::evidence::EvidenceRequest;
 use crate::session::fit::FitStatus;
@@ -59,9 +60,8 @@ impl Session {
     }
 
     /// The hashes of the fit that is on screen.
-    pub fn shown_hashes(&self) -> Option<FitHashes> {
-        let shown = self.fit.shown.as_ref()?;
-        Some(hashes(&shown.params, &shown.config, shown.iteration))
+    pub fn shown_hashes(&self) -> Option<&FitHashes> {
+        self.fit.shown_hashes.as_ref()
     }
 
     /// Asks for the evidence of the fit on screen, once it has come to rest.
@@ -69,14 +69,12 @@ impl Session {
         if self.fit.status != FitStatus::Paused {
             return Vec::new();
         }
-        let (Some(dataset), Some(frame), Some(problem), Some(snapshot)) =
-            (&self.data.dataset, &self.data.frame, &self.fit.problem, &self.fit.shown)
+        let (Some(dataset), Some(frame), Some(problem), Some(snapshot), Some(fit)) =
+            (&self.data.dataset, &self.data.frame, &self.fit.problem, &self.fit.shown, &self.fit.shown_hashes)
         else {
             return Vec::new();
         };
-        let fit = hashes(&snapshot.params, &snapshot.config, snapshot.iteration);
-        let key = (frame.index, format!("{}{}", fit.fit, fit.config));
-        if self.evidence.asked.as_ref() == Some(&key) {
+        if self.evidence.asked.as_ref().is_some_and(|(index, asked)| *index == frame.index && asked == fit) {
             return Vec::new();
         }
         let request = EvidenceRequest {
@@ -84,20 +82,20 @@ impl Session {
             frame: Arc::clone(frame),
             problem: Arc::clone(problem),
             snapshot: Arc::clone(snapshot),
-            fit: key.1.clone(),
+            fit: fit.clone(),
         };
         if self.evidence.frame != frame.index {
             self.evidence.found = None;
         }
         self.evidence.frame = frame.index;
-        self.evidence.asked = Some(key);
+        self.evidence.asked = Some((frame.index, fit.clone()));
         vec![Effect::Evidence(Box::new(request))]
     }
 
     pub(super) fn evidence_found(
         &mut self,
         frame: usize,
-        fit: String,
+        fit: FitHashes,
         result: Result<Vec<Evidence>, String>,
     ) -> Vec<Effect> {
         if self.evidence.asked.as_ref().is_some_and(|asked| (asked.0, &asked.1) == (frame, &fit)) {
@@ -117,23 +115,17 @@ impl Session {
 
     /// True while the evidence on screen is older than the fit on screen.
     pub fn evidence_is_stale(&self) -> bool {
-        let shown = self.shown_hashes().map(|hashes| format!("{}{}", hashes.fit, hashes.config));
         let found = self.evidence.found.as_ref().filter(|_| self.evidence.frame == self.fit.frame);
-        shown.is_none_or(|key| found.is_none_or(|(of, _)| *of != key))
+        self.shown_hashes().is_none_or(|shown| found.is_none_or(|(of, _)| of != shown))
     }
 }
 
 /// Hashes of parameters (little-endian doubles) and settings (their TOML): the first 16 hexadecimal digits of SHA-256.
 pub(super) fn hashes(params: &Pppr, config: &FitConfig, iteration: usize) -> FitHashes {
-    let text = |hash: Sha256| {
-        let digest: [u8; 32] = hash.finalize().into();
-        format!("{:016x}", digest.first_chunk().map_or(0, |first| u64::from_be_bytes(*first)))
-    };
     let mut fit = Sha256::new();
     for x in Group::ALL.iter().flat_map(|&group| params.group(group)) {
         fit.update(x.to_le_bytes());
     }
-    let mut settings = Sha256::new();
-    settings.update(config.to_toml());
-    FitHashes { fit: text(fit), config: text(settings), iteration }
+    let settings = Sha256::new_with_prefix(config.to_toml());
+    FitHashes { fit: digest::short(fit), config: digest::short(settings), iteration }
 }

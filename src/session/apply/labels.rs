@@ -4,7 +4,7 @@ use crate::labels::{CellRegion, Change, Judged, Record, Tag, Verdict};
 use crate::session::acts::{ActKind, Asked};
 use crate::session::command::{Commit, Effect, OpenedLabels, Trash, Written};
 use crate::session::labels::{LabelMode, LabelStatus, LabelTable};
-use crate::session::state::{LogLevel, Session};
+use crate::session::state::{FitHashes, LogLevel, Session};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -104,28 +104,23 @@ impl Session {
 
     /// The fit that is judged when `frame` is labelled now: the one on screen, or the one that was left there.
     fn judged(&self, frame: usize) -> Judged {
+        let fit = |hashes: &FitHashes| Judged {
+            fit: Some(hashes.fit.clone()),
+            config: Some(hashes.config.clone()),
+            iteration: Some(hashes.iteration),
+            ..Judged::default()
+        };
         // While another frame is being read, the fit on screen is still that of the frame before.
-        let shown = self.shown_hashes().filter(|_| self.fit.frame == frame);
-        let Some(hashes) = shown else {
-            let summary = self.summaries.get(&frame).and_then(|summary| summary.hashes.clone());
-            return summary.map_or_else(Judged::default, |hashes| Judged {
-                fit: Some(hashes.fit),
-                config: Some(hashes.config),
-                iteration: Some(hashes.iteration),
-                ..Judged::default()
-            });
+        let Some(shown) = self.shown_hashes().filter(|_| self.fit.frame == frame) else {
+            let left = self.summaries.get(&frame).and_then(|summary| summary.hashes.as_deref());
+            return left.map(fit).unwrap_or_default();
         };
         // Scores of an older fit say nothing of the one that is judged.
         let machine = self.evidence_of(frame).filter(|_| !self.evidence_is_stale()).into_iter().flatten();
         let machine: BTreeMap<Tag, f64> =
             machine.filter_map(|evidence| Some((evidence.mode, evidence.score?))).collect();
-        Judged {
-            fit: Some(hashes.fit),
-            config: Some(hashes.config),
-            iteration: Some(hashes.iteration),
-            machine_shown: !machine.is_empty() && !self.evidence_hidden_of(frame),
-            machine,
-        }
+        let machine_shown = !machine.is_empty() && !self.evidence_hidden_of(frame);
+        Judged { machine, machine_shown, ..fit(shown) }
     }
 
     /// True while the evidence of the frame on screen is hidden: in blind mode, until the annotator has judged it.

@@ -166,6 +166,7 @@ impl Session {
             self.summarised += 1;
         }
         if wanted {
+            self.fit.shown_hashes = Some(hashes(&snapshot.params, &snapshot.config, snapshot.iteration));
             self.fit.shown = Some(Arc::new(snapshot));
         }
     }

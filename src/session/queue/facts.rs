@@ -187,11 +187,6 @@ impl Number {
             Self::Iou | Self::Loss | Self::Iterations | Self::Majpe => Reads { fit: true, ..none },
         }
     }
-
-    /// True where it changes while a fit runs.
-    pub fn is_of_fit(self) -> bool {
-        matches!(self, Self::Iou | Self::Loss | Self::Iterations | Self::Majpe)
-    }
 }
 
 impl Facts<'_> {

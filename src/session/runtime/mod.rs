@@ -191,7 +191,7 @@ impl Runtime {
             return (self.wake)();
         }
         let wake = Arc::clone(&self.wake);
-        self.grading = Some(ComplexityJob::start_in(dataset, options, cache, move || wake()));
+        self.grading = Some(ComplexityJob::start(dataset, options, cache, move || wake()));
     }
 
     fn grading_report(&mut self, session: &Session) -> Option<Command> {

@@ -11,6 +11,7 @@ use super::stamps::Key;
 use super::{ComplexityOptions, Statistics};
 use crate::dataset::Dataset;
 use crate::dataset::npz::{ArrayView, NpzArchive, NpzError, write};
+use crate::digest;
 use crate::folders;
 use serde_json::json;
 use sha2::{Digest as _, Sha256};
@@ -65,9 +66,8 @@ impl CacheFile {
             "tau_pct": options.tau_pct,
         });
         let head = head.to_string();
-        let digest: [u8; 32] = Sha256::digest(&head).into();
-        let name = digest.first_chunk().map_or(0, |first| u64::from_be_bytes(*first));
-        Self { path: folder.join(format!("{name:016x}.npz")), head }
+        let name = digest::short(Sha256::new_with_prefix(&head));
+        Self { path: folder.join(format!("{name}.npz")), head }
     }
 
     /// How many frames it holds, from the headers alone.

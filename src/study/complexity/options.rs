@@ -1,6 +1,7 @@
 //! The three numbers that the statistics depend on.
 
 use super::super::StudyError;
+use crate::diagnose::{STATIC_FRAMES, STATIC_KAPPA_PCT};
 
 /// What counts as a peak, as static and as human.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,8 +15,9 @@ pub struct ComplexityOptions {
 }
 
 impl Default for ComplexityOptions {
+    /// The paper's, section 5.4.1; the evidence for F1 counts cells as static by the same κ and T.
     fn default() -> Self {
-        Self { kappa_pct: 5.0, window: 5, tau_pct: 10.0 }
+        Self { kappa_pct: STATIC_KAPPA_PCT, window: STATIC_FRAMES, tau_pct: 10.0 }
     }
 }
 
