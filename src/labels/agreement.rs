@@ -8,6 +8,9 @@ use super::{Record, Tag, TagAgreement, Tags};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+/// The machine says yes from this evidence score on, where nobody asks for another threshold.
+pub const MACHINE_THRESHOLD: f64 = 0.5;
+
 /// One frame and tag that two annotators see differently.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Dispute {

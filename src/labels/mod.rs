@@ -25,7 +25,8 @@ mod tail;
 
 pub use acts::{place_acts, read_acts, read_labels};
 pub use agreement::{
-    Agreement, Dispute, MachineAgreement, against_machine, agreement, compare_tags, judged, judged_in_acts, standing,
+    Agreement, Dispute, MACHINE_THRESHOLD, MachineAgreement, against_machine, agreement, compare_tags, judged,
+    judged_in_acts, standing,
 };
 pub use error::LabelError;
 pub use import::{ImportPlan, plan_import};

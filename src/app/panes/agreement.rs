@@ -3,7 +3,7 @@
 use super::{Shared, empty};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
-use crate::labels::{Record, Tag, TagAgreement, Tags, against_machine, compare_tags};
+use crate::labels::{MACHINE_THRESHOLD, Record, Tag, TagAgreement, Tags, against_machine, compare_tags};
 use crate::session::{Command, LabelMode, Labels, Records};
 use egui::{RichText, Role, Ui};
 use std::cmp::Ordering;
@@ -11,8 +11,6 @@ use std::collections::HashMap;
 
 /// The machine as one of the two.
 const MACHINE: &str = "machine";
-/// The machine says yes from this score on.
-const THRESHOLD: f64 = 0.5;
 /// Disputes that are listed at most.
 const LISTED: usize = 200;
 
@@ -155,7 +153,7 @@ fn between(a: &Records, b: &Records) -> Found {
 fn with_machine(a: &Records) -> Found {
     let (scored, others): (Vec<_>, Vec<_>) = a.judged().map(|(frame, _)| frame).partition(|&frame| a.is_scored(frame));
     let judged: Vec<(usize, &Record)> = scored.into_iter().filter_map(|frame| Some((frame, a.get(frame)?))).collect();
-    let machine = against_machine(judged.iter().map(|(_, record)| *record), THRESHOLD);
+    let machine = against_machine(judged.iter().map(|(_, record)| *record), MACHINE_THRESHOLD);
     let unscored = machine.unscored + others.len();
     let frames: HashMap<&str, usize> = if machine.agreement.disputes.is_empty() {
         HashMap::new()

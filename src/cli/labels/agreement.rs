@@ -3,7 +3,8 @@
 use super::source::{acts, annotators, counted, listed, only};
 use crate::cli::common::print;
 use crate::labels::{
-    Agreement, MachineAgreement, Record, TagAgreement, against_machine, agreement as compare, judged_in_acts,
+    Agreement, MACHINE_THRESHOLD, MachineAgreement, Record, TagAgreement, against_machine, agreement as compare,
+    judged_in_acts,
 };
 use anyhow::{Context as _, bail};
 use serde_json::{Map, Value, json};
@@ -53,7 +54,7 @@ pub struct Args {
     #[arg(long)]
     machine: bool,
     /// The score from which the machine says yes.
-    #[arg(long, value_name = "S", default_value = "0.5", requires = "machine", value_parser = threshold)]
+    #[arg(long, value_name = "S", default_value_t = MACHINE_THRESHOLD, requires = "machine", value_parser = threshold)]
     threshold: f64,
     /// Also every frame and tag that the two see differently.
     #[arg(long)]
