@@ -230,7 +230,9 @@ fn folders_without_frames_and_paths_that_are_not_there_are_told_apart() {
     for layout in ["hupr", "xrf55"] {
         std::fs::write(folder.path().join("dataset.toml"), MANIFEST.replace("\"npz\"", &format!("\"{layout}\"")))
             .unwrap();
-        assert!(open(folder.path()).contains(&format!("layout `{layout}` is not supported yet; expected npz or mmvr")));
+        let told = open(folder.path());
+        let wanted = if layout == "hupr" { "HuPR's single_<k>/hori/" } else { "XRF55's XX_YY_ZZ.npy" };
+        assert!(told.contains("no frames in it") && told.contains(wanted), "{told}");
     }
 }
 

@@ -1,12 +1,18 @@
-//! The human body: skeleton topologies, the PPPR parameters that are optimised, and a body that walks.
+//! The human body: skeleton topologies, the PPPR parameters that are optimised, and bodies that move.
 
+mod figure;
+mod gait;
+mod motion;
 mod pppr;
+mod segment;
 mod skeleton;
 mod skeletons;
 mod surface;
-mod walker;
 
+pub use figure::{Anchor, Build, Posture};
+pub use gait::{Gait, Path};
+pub use motion::{Motion, Performer};
 pub use pppr::{Group, Pppr, PpprShape};
+pub use segment::{BodyPose, Segment, SegmentFrame};
 pub use skeleton::{Side, Skeleton};
-pub use surface::{BodySurface, SurfacePoint};
-pub use walker::{BodyPose, Path, Segment, SegmentFrame, Walker};
+pub use surface::{BodySurface, Capsule, SurfacePoint};

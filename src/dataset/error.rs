@@ -1,7 +1,7 @@
 //! What can be wrong with a data set; every message names file, key and what was expected.
 
+use super::BareCatalog;
 use super::npz::NpzError;
-use super::{BareCatalog, Layout};
 use std::path::{Path, PathBuf};
 
 /// Why a data set could not be opened or a frame not loaded.
@@ -69,12 +69,12 @@ pub enum DatasetError {
         /// The file.
         path: PathBuf,
     },
-    /// A layout that is recognised but not read.
-    #[error("{path}: layout `{layout}` is not supported yet; expected npz or mmvr", path = path.display())]
-    NotSupported {
-        /// The layout.
-        layout: Layout,
-        /// The manifest or folder.
+    /// A frame of HuPR without one of its cubes.
+    #[error("{path}: no such file; a frame of HuPR has two cubes, and the one in {present}/ is there", path = path.display())]
+    HalfFrame {
+        /// The folder of the cube that exists.
+        present: String,
+        /// The cube that does not.
         path: PathBuf,
     },
     /// MMVR's grouped variant: four frames in one file.

@@ -23,10 +23,15 @@ pub(super) struct Segment {
 }
 
 impl Segment {
-    fn new(path: PathBuf, mut stems: Vec<String>) -> Self {
+    fn new(path: PathBuf, stems: Vec<String>) -> Self {
+        let sequence = sequence_of(&path);
+        Self::named(path, sequence, stems)
+    }
+
+    /// A folder whose frames are called by `sequence`.
+    pub(super) fn named(path: PathBuf, sequence: String, mut stems: Vec<String>) -> Self {
         stems.sort_by(|a, b| natural(a, b));
-        let mut segment =
-            Self { sequence: sequence_of(&path), path, names: String::new(), ends: Vec::with_capacity(stems.len()) };
+        let mut segment = Self { sequence, path, names: String::new(), ends: Vec::with_capacity(stems.len()) };
         for stem in stems {
             segment.names.push_str(&stem);
             segment.ends.push(segment.names.len() as u32);
@@ -115,12 +120,12 @@ fn list(folder: &Path, depth: usize, progress: &Progress) -> Result<(Vec<Segment
 }
 
 /// A folder, or a link to one; the type comes with the name, only links are looked up.
-fn is_folder(entry: &std::fs::DirEntry) -> bool {
+pub(super) fn is_folder(entry: &std::fs::DirEntry) -> bool {
     entry.file_type().is_ok_and(|kind| kind.is_dir() || kind.is_symlink() && entry.path().is_dir())
 }
 
 /// Numbers inside names by value, the rest by character: `d9s1` before `d10s1`.
-fn natural(a: &str, b: &str) -> Ordering {
+pub(super) fn natural(a: &str, b: &str) -> Ordering {
     let (mut left, mut right) = (a.as_bytes(), b.as_bytes());
     while let (Some((&x, rest_x)), Some((&y, rest_y))) = (left.split_first(), right.split_first()) {
         let order = if x.is_ascii_digit() && y.is_ascii_digit() {

@@ -111,7 +111,7 @@ fn heatmap(file: &NpzArchive, key: &str, map: Array, expected: &[usize]) -> Resu
 }
 
 /// A number: 0-d, or one element.
-fn scalar(file: &mut NpzArchive, key: &str) -> Result<Option<f64>, NpzError> {
+pub(super) fn scalar(file: &mut NpzArchive, key: &str) -> Result<Option<f64>, NpzError> {
     if !file.contains(key) {
         return Ok(None);
     }
@@ -122,7 +122,7 @@ fn scalar(file: &mut NpzArchive, key: &str) -> Result<Option<f64>, NpzError> {
     }
 }
 
-fn read_truth(file: &mut NpzArchive, joints: usize) -> Result<Option<Truth>, NpzError> {
+pub(super) fn read_truth(file: &mut NpzArchive, joints: usize) -> Result<Option<Truth>, NpzError> {
     let Some((persons, positions)) = vectors(file, "joints", joints)? else { return Ok(None) };
     let velocities = vectors(file, "velocities", joints)?;
     if let Some((moving, _)) = &velocities

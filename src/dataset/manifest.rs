@@ -27,9 +27,9 @@ pub enum Layout {
     /// A single `.npy` or `.npz` whose axes a person named.
     #[serde(skip_deserializing)]
     Bare,
-    /// HuPR: recognised, not read yet.
+    /// HuPR: folders of complex cubes.
     Hupr,
-    /// XRF55: recognised, not read yet.
+    /// XRF55: stacks of maps.
     Xrf55,
 }
 
@@ -210,6 +210,22 @@ impl Manifest {
             radar: parsed.radar.map(Spanned::into_inner),
             views,
         })
+    }
+
+    /// The built-in description of HuPR, from `assets/hupr.toml`.
+    ///
+    /// # Errors
+    /// As [`Self::mmvr`].
+    pub fn hupr() -> Result<Self, DatasetError> {
+        Self::parse(include_str!("../../assets/hupr.toml"), Path::new("assets/hupr.toml"))
+    }
+
+    /// The built-in description of XRF55, from `assets/xrf55.toml`.
+    ///
+    /// # Errors
+    /// As [`Self::mmvr`].
+    pub fn xrf55() -> Result<Self, DatasetError> {
+        Self::parse(include_str!("../../assets/xrf55.toml"), Path::new("assets/xrf55.toml"))
     }
 
     /// The built-in description of MMVR, from `assets/mmvr.toml`.

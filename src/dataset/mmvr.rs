@@ -5,6 +5,7 @@
 
 use super::files::RADAR_SUFFIX;
 use super::npz::{Array, NpzArchive, NpzError, shape_text};
+use super::truth::truth_beside;
 use super::{DatasetError, DatasetInfo, Frame, Heatmap, ImageAnnotations};
 use crate::radar::View;
 use rayon::prelude::*;
@@ -23,8 +24,13 @@ pub(super) fn load(
 ) -> Result<Frame, DatasetError> {
     let radar = folder.join(format!("{stem}{RADAR_SUFFIX}"));
     let (maps, labels) = rayon::join(|| load_maps(&radar, info), || load_labels(folder, stem, info));
+    let mut labels = labels;
+    let beside = folder.join(format!("{stem}_truth.npz"));
+    let known = truth_beside(&beside, info.skeleton.joints.len(), &mut labels.notes);
     Ok(Frame {
         index,
+        truth: known.truth,
+        person_count: known.person_count.or(labels.person_count),
         name: format!("{sequence}/{stem}"),
         timestamp_s: info
             .frame_rate_hz

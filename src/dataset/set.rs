@@ -5,7 +5,7 @@ use super::files::{RADAR_SUFFIX, Segment, matching, segments};
 use super::manifest::{Layout, Manifest};
 use super::source::{Names, Source};
 use super::words::axes_badge;
-use super::{DatasetError, Frame, Heatmap, Progress, generic, mmvr};
+use super::{DatasetError, Frame, Heatmap, Progress, generic, hupr, mmvr, xrf55};
 use crate::body::Skeleton;
 use crate::digest;
 use crate::radar::{RadarConfig, View};
@@ -55,8 +55,8 @@ pub struct Dataset {
 }
 
 impl Dataset {
-    /// Opens an MMVR tree or any folder inside one, a `*_radar.npz` (its folder, starting at it), a folder with a
-    /// `dataset.toml`, a manifest itself, or an `.npy`/`.npz` of maps whose axes were chosen before.
+    /// Opens an MMVR tree or any folder inside one, a `*_radar.npz` (its folder, starting at it), HuPR's or XRF55's folders, a
+    /// folder with a `dataset.toml`, a manifest itself, or an `.npy`/`.npz` of maps whose axes were chosen before.
     ///
     /// # Errors
     /// One error that names file, key and expectation; [`DatasetError::NeedsAxes`] for a bare file seen the first time.
@@ -65,7 +65,7 @@ impl Dataset {
         if is_folder(path)? {
             return match manifest_in(path)? {
                 Some(manifest) => Self::open_folder(path, &manifest, progress),
-                None => Self::open_mmvr(path, true, None, &Manifest::mmvr()?, progress),
+                None => Self::open_known(path, progress),
             };
         }
         if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
@@ -134,8 +134,63 @@ impl Dataset {
         match manifest.layout {
             Layout::Npz => Self::open_files(root, manifest, progress),
             Layout::Mmvr => Self::open_mmvr(root, true, None, manifest, progress),
-            layout => Err(DatasetError::NotSupported { layout, path: manifest.path.clone() }),
+            Layout::Hupr => Self::open_hupr(root, manifest, progress),
+            Layout::Xrf55 => Self::open_xrf55(root, manifest, progress),
+            Layout::Bare => Err(DatasetError::Manifest {
+                message: "layout \"bare\" is for single files; expected npz, mmvr, hupr or xrf55".into(),
+                line: None,
+                path: manifest.path.clone(),
+            }),
         }
+    }
+
+    /// A folder without a manifest: MMVR's, HuPR's or XRF55's, whichever files are found first.
+    fn open_known(root: &Path, progress: &Progress) -> Result<Self, DatasetError> {
+        let mmvr = Self::open_mmvr(root, true, None, &Manifest::mmvr()?, progress);
+        let Err(DatasetError::NoFrames { expected, .. }) = mmvr else { return mmvr };
+        let hupr = Self::open_hupr(root, &Manifest::hupr()?, progress);
+        if !matches!(hupr, Err(DatasetError::NoFrames { .. })) {
+            return hupr;
+        }
+        let xrf55 = Self::open_xrf55(root, &Manifest::xrf55()?, progress);
+        if !matches!(xrf55, Err(DatasetError::NoFrames { .. })) {
+            return xrf55;
+        }
+        let expected = format!("{expected}, or HuPR's hori/ and vert/, or XRF55's XX_YY_ZZ.npy");
+        Err(DatasetError::NoFrames { expected, path: root.to_owned() })
+    }
+
+    fn open_hupr(root: &Path, manifest: &Manifest, progress: &Progress) -> Result<Self, DatasetError> {
+        progress.begin("listing folders", 0);
+        let (segments, notes) = hupr::sequences(root, progress)?;
+        if segments.is_empty() {
+            let expected = "HuPR's single_<k>/hori/NNNNNNNNN.npy and vert/ in it or in a folder below".into();
+            return Err(DatasetError::NoFrames { expected, path: root.to_owned() });
+        }
+        let (starts, frames) = counted(&segments);
+        let preset = Manifest::hupr()?;
+        let mut info = info_of(root, manifest, &preset, "HuPR".into());
+        info.notes = notes;
+        info.assumptions.extend(hupr::assumptions());
+        let labels = hupr::Annotations::beside(root, &segments);
+        Ok(Self::of(info, Source::Hupr { segments, starts, frames, labels }, 0))
+    }
+
+    fn open_xrf55(root: &Path, manifest: &Manifest, progress: &Progress) -> Result<Self, DatasetError> {
+        progress.begin("listing files", 0);
+        let (files, notes) = xrf55::stacks(root, progress)?;
+        if files.is_empty() {
+            let expected = "XRF55's XX_YY_ZZ.npy in it or in a folder below".into();
+            return Err(DatasetError::NoFrames { expected, path: root.to_owned() });
+        }
+        let preset = Manifest::xrf55()?;
+        let mut info = info_of(root, manifest, &preset, "XRF55".into());
+        info.notes = notes;
+        if info.views == preset.views {
+            info.assumptions.extend(xrf55::assumptions());
+        }
+        let steps = if info.views.iter().all(|view| view.axes.len() == 2) { xrf55::STEPS } else { 1 };
+        Ok(Self::of(info, Source::Stacks { files, steps }, 0))
     }
 
     fn open_files(root: &Path, manifest: &Manifest, progress: &Progress) -> Result<Self, DatasetError> {
@@ -164,9 +219,7 @@ impl Dataset {
             let expected = notes.iter().fold(expected, |text, note| format!("{text}; {note}"));
             return Err(DatasetError::NoFrames { expected, path: root.to_owned() });
         }
-        let starts: Vec<usize> =
-            segments.iter().scan(0, |at, segment| Some(std::mem::replace(at, *at + segment.len()))).collect();
-        let frames = segments.iter().map(Segment::len).sum();
+        let (starts, frames) = counted(&segments);
         let start = stem.and_then(|stem| {
             let segment = segments.first()?;
             (0..segment.len()).find(|&i| segment.stem(i) == stem)
@@ -226,7 +279,8 @@ impl Dataset {
     /// Frames.
     pub fn len(&self) -> usize {
         match &self.source {
-            Source::Mmvr { frames, .. } | Source::Bare { frames, .. } => *frames,
+            Source::Mmvr { frames, .. } | Source::Hupr { frames, .. } | Source::Bare { frames, .. } => *frames,
+            Source::Stacks { files, steps } => files.len() * steps,
             Source::Files(files) => files.len(),
         }
     }
@@ -244,8 +298,10 @@ impl Dataset {
     /// Sequences: consecutive frames with the same [`Self::sequence`].
     pub fn sequences(&self) -> usize {
         match &self.source {
-            Source::Mmvr { segments, .. } => segments.len(),
-            Source::Files(files) => {
+            Source::Mmvr { segments, .. } | Source::Hupr { segments, .. } => segments.len(),
+            // Clips of seventeen maps; files that are a frame each follow one another in their folder.
+            Source::Stacks { files, steps } if *steps > 1 => files.len(),
+            Source::Files(files) | Source::Stacks { files, .. } => {
                 let mut folders: Vec<_> = files.iter().map(|file| file.parent()).collect();
                 folders.dedup();
                 folders.len()
@@ -280,8 +336,9 @@ impl Dataset {
     /// What frame `i` follows the one before in: MMVR's session and segment, a folder, or the data set.
     pub fn sequence(&self, i: usize) -> &str {
         let found = match &self.source {
-            Source::Mmvr { .. } => self.segment(i).map(|(segment, _)| segment.sequence.as_str()),
-            Source::Files(files) => {
+            Source::Mmvr { .. } | Source::Hupr { .. } => self.segment(i).map(|(segment, _)| segment.sequence.as_str()),
+            Source::Stacks { steps, .. } if *steps > 1 => self.frame_name(i).rsplit_once('/').map(|(clip, _)| clip),
+            Source::Files(files) | Source::Stacks { files, .. } => {
                 files.get(i).and_then(|file| file.parent()?.to_str()).filter(|name| !name.is_empty())
             }
             Source::Bare { .. } => None,
@@ -295,6 +352,11 @@ impl Dataset {
             Source::Mmvr { .. } => {
                 self.segment(i).map(|(segment, k)| segment.path.join(format!("{}{RADAR_SUFFIX}", segment.stem(k))))
             }
+            Source::Hupr { .. } => {
+                let array = self.info.views.first().map_or("hori", |view| &view.array);
+                self.segment(i).map(|(segment, k)| segment.path.join(array).join(format!("{}.npy", segment.stem(k))))
+            }
+            Source::Stacks { files, steps } => files.get(i / steps).map(|file| self.info.root.join(file)),
             Source::Files(files) => files.get(i).map(|file| self.info.root.join(file)),
             Source::Bare { .. } => None,
         };
@@ -310,13 +372,19 @@ impl Dataset {
             return Err(DatasetError::NoSuchFrame { index: i, count: self.len(), path: self.info.root.clone() });
         }
         let (name, path) = (self.frame_name(i).to_owned(), self.frame_path(i));
+        let past = || DatasetError::NoSuchFrame { index: i, count: self.len(), path: self.info.root.clone() };
         match &self.source {
+            Source::Stacks { steps, .. } => xrf55::load(i, name, &path, i % steps, &self.info),
+            Source::Hupr { labels, .. } => {
+                let (segment, k) = self.segment(i).ok_or_else(past)?;
+                hupr::load(i, &segment.path, &segment.sequence, segment.stem(k), labels, &self.info)
+            }
             Source::Files(_) => generic::load(i, name, &path, &self.info),
             Source::Bare { stacked, .. } => generic::load_bare(i, name, &path, *stacked, &self.info),
-            Source::Mmvr { .. } => match self.segment(i) {
-                Some((segment, k)) => mmvr::load(i, &segment.path, &segment.sequence, segment.stem(k), &self.info),
-                None => Err(DatasetError::NoSuchFrame { index: i, count: self.len(), path: self.info.root.clone() }),
-            },
+            Source::Mmvr { .. } => {
+                let (segment, k) = self.segment(i).ok_or_else(past)?;
+                mmvr::load(i, &segment.path, &segment.sequence, segment.stem(k), &self.info)
+            }
         }
     }
 
@@ -344,6 +412,13 @@ impl Dataset {
         let one = match &self.source {
             Source::Bare { stacked: true, .. } => return generic::stacked_maps(frames, &self.info.root, &self.info),
             Source::Files(_) | Source::Bare { .. } => generic::maps_only(&self.frame_path(frames.start), &self.info),
+            Source::Stacks { steps, .. } => {
+                xrf55::maps_only(&self.frame_path(frames.start), frames.start % steps, &self.info)
+            }
+            Source::Hupr { .. } => {
+                let (segment, k) = self.segment(frames.start).ok_or_else(past)?;
+                hupr::maps_only(&segment.path, segment.stem(k), &self.info)
+            }
             Source::Mmvr { .. } => {
                 let (segment, k) = self.segment(frames.start).ok_or_else(past)?;
                 mmvr::maps_only(&segment.path, segment.stem(k), &self.info)
@@ -354,10 +429,19 @@ impl Dataset {
 
     /// The segment of frame `i` and the frame's index in it.
     fn segment(&self, i: usize) -> Option<(&Segment, usize)> {
-        let Source::Mmvr { segments, starts, frames } = &self.source else { return None };
+        let (Source::Mmvr { segments, starts, frames } | Source::Hupr { segments, starts, frames, .. }) = &self.source
+        else {
+            return None;
+        };
         let at = starts.partition_point(|&start| start <= i).checked_sub(1).filter(|_| i < *frames)?;
         Some((segments.get(at)?, i - starts.get(at)?))
     }
+}
+
+/// The index of the first frame of each segment, and the frames in all.
+fn counted(segments: &[Segment]) -> (Vec<usize>, usize) {
+    let starts = segments.iter().scan(0, |at, segment| Some(std::mem::replace(at, *at + segment.len()))).collect();
+    (starts, segments.iter().map(Segment::len).sum())
 }
 
 /// What a manifest says, filled up from its layout's preset; what neither says is assumed, and told.

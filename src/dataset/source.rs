@@ -1,6 +1,7 @@
 //! What a data set is made of, and the names of its frames.
 
 use super::files::Segment;
+use super::hupr::Annotations;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -8,6 +9,10 @@ use std::path::PathBuf;
 pub(super) enum Source {
     /// Folders of frames, and the index of the first frame of each.
     Mmvr { segments: Vec<Segment>, starts: Vec<usize>, frames: usize },
+    /// As above, with the label files of all.
+    Hupr { segments: Vec<Segment>, starts: Vec<usize>, frames: usize, labels: Annotations },
+    /// Files relative to the root, each of so many frames.
+    Stacks { files: Vec<PathBuf>, steps: usize },
     /// Files relative to the root.
     Files(Vec<PathBuf>),
     /// One file; `stacked` where the arrays' first axis counts frames.
@@ -18,10 +23,22 @@ impl Source {
     pub(super) fn names(&self, dataset: &str) -> Names {
         let mut names = Names::default();
         match self {
-            Self::Mmvr { segments, .. } => {
+            Self::Mmvr { segments, .. } | Self::Hupr { segments, .. } => {
                 for segment in segments {
                     for k in 0..segment.len() {
                         names.push(format_args!("{}/{}", segment.sequence, segment.stem(k)));
+                    }
+                }
+            }
+            Self::Stacks { files, steps } => {
+                for file in files {
+                    let name = file.with_extension("");
+                    for step in 0..*steps {
+                        if *steps > 1 {
+                            names.push(format_args!("{}/{step:02}", name.to_string_lossy()));
+                        } else {
+                            names.push(format_args!("{}", name.to_string_lossy()));
+                        }
                     }
                 }
             }

@@ -8,8 +8,8 @@
 use super::fmcw::{AdcCube, Fmcw};
 use super::{Axis, Window};
 use num_complex::Complex64;
-use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Windows and FFT lengths (zero-padded to them; at least the number of samples, chirps, elements).
@@ -67,10 +67,33 @@ pub struct PolarMap {
     pub data: Vec<f64>,
 }
 
+/// Range × channel × Doppler of one frame, complex; Doppler from negative to positive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RangeDoppler {
+    /// Range bins; bin i lies at `range_step_m`·i.
+    pub ranges: usize,
+    /// Channels.
+    pub channels: usize,
+    /// Doppler bins; bin i lies at `doppler_step_mps`·(i − ⌊dopplers/2⌋), positive moving away.
+    pub dopplers: usize,
+    /// m a bin.
+    pub range_step_m: f64,
+    /// m/s a bin.
+    pub doppler_step_mps: f64,
+    /// ranges · channels · dopplers numbers, Doppler fastest.
+    pub data: Vec<Complex64>,
+}
+
 /// One windowed, zero-padded FFT.
 struct Stage {
     weights: Vec<f64>,
     plan: Arc<dyn Fft<f64>>,
+}
+
+/// The memory of a transform.
+struct Bench {
+    buffer: Vec<Complex64>,
+    scratch: Vec<Complex64>,
 }
 
 impl Stage {
@@ -81,110 +104,145 @@ impl Stage {
         Self { weights: window.weights(n), plan }
     }
 
-    /// The spectrum of `input`, in the FFT's own order.
-    fn run(&self, input: impl Iterator<Item = Complex64>) -> Vec<Complex64> {
-        let mut buffer = vec![Complex64::ZERO; self.plan.len()];
-        self.run_in(input, &mut buffer);
-        buffer
+    fn bench(&self) -> Bench {
+        let zeros = |n| vec![Complex64::ZERO; n];
+        Bench { buffer: zeros(self.plan.len()), scratch: zeros(self.plan.get_inplace_scratch_len()) }
     }
 
-    /// Likewise into `buffer`, which has the FFT's length.
-    fn run_in(&self, input: impl Iterator<Item = Complex64>, buffer: &mut [Complex64]) {
-        buffer.fill(Complex64::ZERO);
-        for (cell, (x, w)) in buffer.iter_mut().zip(input.zip(&self.weights)) {
+    /// The spectrum of `input`, in the FFT's own order.
+    fn run_in<'a>(&self, input: impl Iterator<Item = Complex64>, bench: &'a mut Bench) -> &'a [Complex64] {
+        bench.buffer.fill(Complex64::ZERO);
+        for (cell, (x, w)) in bench.buffer.iter_mut().zip(input.zip(&self.weights)) {
             *cell = x * w;
         }
-        self.plan.process(buffer);
+        self.plan.process_with_scratch(&mut bench.buffer, &mut bench.scratch);
+        &bench.buffer
     }
 
     /// The spectrum of `input` with frequency 0 at bin ⌊length/2⌋.
     fn run_centred(&self, input: impl Iterator<Item = Complex64>) -> Vec<Complex64> {
-        let mut spectrum = self.run(input);
-        let half = spectrum.len() / 2;
-        spectrum.rotate_right(half);
-        spectrum
+        let mut bench = self.bench();
+        self.run_in(input, &mut bench);
+        let half = bench.buffer.len() / 2;
+        bench.buffer.rotate_right(half);
+        bench.buffer
     }
 }
 
 impl Chain {
-    /// Range, Doppler and angle FFTs of a frame.
+    /// Range, Doppler and angle FFTs of a frame whose channels are an even line.
     ///
     /// The angle transform has the sign that gives a scatterer on the side of the last element a positive sine: its delay
     /// falls along the array, and with it the phase.
-    pub fn cube(&self, fmcw: &Fmcw, adc: &AdcCube) -> RadarCube {
-        let angle = Stage::new(self.angle_window, adc.elements, self.angle_fft, true);
-        let profiles = self.range_doppler(fmcw, adc);
-        let (dopplers, sines) = (self.doppler_fft.max(adc.chirps), angle.plan.len());
-        let ranges = profiles.len();
-        let data = profiles
-            .par_iter()
-            .flat_map_iter(|elements| {
-                (0..dopplers).flat_map(|bin| angle.run_centred(elements.iter().map(move |spectrum| spectrum[bin])))
-            })
-            .collect();
+    pub fn cube(&self, fmcw: &Fmcw, spacing_m: f64, adc: &AdcCube) -> RadarCube {
+        let angle = Stage::new(self.angle_window, adc.channels, self.angle_fft, true);
+        let spectra = self.range_doppler(fmcw, adc);
+        let sines = angle.plan.len();
+        let mut data = Vec::with_capacity(spectra.ranges * spectra.dopplers * sines);
+        for range in 0..spectra.ranges {
+            for doppler in 0..spectra.dopplers {
+                data.extend(angle.run_centred(spectra.channels_at(range, doppler)));
+            }
+        }
         RadarCube {
-            ranges,
-            dopplers,
+            ranges: spectra.ranges,
+            dopplers: spectra.dopplers,
             sines,
-            range_step_m: self.range_step_m(fmcw),
-            doppler_step_mps: fmcw.radar.wavelength_m() / (2.0 * dopplers as f64 * fmcw.chirp_interval_s()),
-            sine_step: fmcw.radar.wavelength_m() / (fmcw.array.spacing_m * sines as f64),
+            range_step_m: spectra.range_step_m,
+            doppler_step_mps: spectra.doppler_step_mps,
+            sine_step: fmcw.radar.wavelength_m() / (spacing_m * sines as f64),
             data,
         }
     }
 
     /// The whole chain to the polar map; the cube is summed as it is made and never held.
-    pub fn polar(&self, fmcw: &Fmcw, adc: &AdcCube) -> PolarMap {
-        let angle = Stage::new(self.angle_window, adc.elements, self.angle_fft, true);
-        let dopplers = self.doppler_fft.max(adc.chirps);
-        let row = |elements: &Vec<Vec<Complex64>>| {
-            let mut power = vec![0.0; angle.plan.len()];
-            let mut buffer = vec![Complex64::ZERO; angle.plan.len()];
-            for bin in 0..dopplers {
-                angle.run_in(elements.iter().map(|spectrum| spectrum[bin]), &mut buffer);
-                for (sum, x) in power.iter_mut().zip(&buffer) {
+    pub fn polar(&self, fmcw: &Fmcw, spacing_m: f64, adc: &AdcCube) -> PolarMap {
+        let angle = Stage::new(self.angle_window, adc.channels, self.angle_fft, true);
+        let spectra = self.range_doppler(fmcw, adc);
+        let sines = angle.plan.len();
+        let mut data = Vec::with_capacity(spectra.ranges * sines);
+        let (mut power, mut bench) = (vec![0.0; sines], angle.bench());
+        for range in 0..spectra.ranges {
+            power.fill(0.0);
+            for doppler in 0..spectra.dopplers {
+                let spectrum = angle.run_in(spectra.channels_at(range, doppler), &mut bench);
+                for (sum, x) in power.iter_mut().zip(spectrum) {
                     *sum += x.norm_sqr();
                 }
             }
-            let half = power.len() / 2;
-            power.rotate_right(half);
-            power.into_iter().map(f64::sqrt).collect::<Vec<f64>>()
-        };
-        let rows: Vec<Vec<f64>> = self.range_doppler(fmcw, adc).par_iter().map(row).collect();
+            power.rotate_right(sines / 2);
+            data.extend(power.iter().map(|p: &f64| p.sqrt()));
+        }
         PolarMap {
-            ranges: rows.len(),
-            sines: angle.plan.len(),
-            range_step_m: self.range_step_m(fmcw),
-            sine_step: fmcw.radar.wavelength_m() / (fmcw.array.spacing_m * angle.plan.len() as f64),
-            data: rows.concat(),
+            ranges: spectra.ranges,
+            sines,
+            range_step_m: spectra.range_step_m,
+            sine_step: fmcw.radar.wavelength_m() / (spacing_m * sines as f64),
+            data,
         }
     }
 
-    fn range_step_m(&self, fmcw: &Fmcw) -> f64 {
-        fmcw.unambiguous_range_m() / self.range_fft.max(fmcw.samples) as f64
-    }
-
-    /// Doppler spectra (centred), ordered [range][element][Doppler].
-    fn range_doppler(&self, fmcw: &Fmcw, adc: &AdcCube) -> Vec<Vec<Vec<Complex64>>> {
+    /// Range and Doppler FFTs of every channel. A transmitter that sends later in its loop sees a moving scatterer with the phase
+    /// that it gained meanwhile; that is turned back, bin by bin, which is right for speeds without ambiguity.
+    pub fn range_doppler(&self, fmcw: &Fmcw, adc: &AdcCube) -> RangeDoppler {
         let range = Stage::new(self.range_window, adc.samples, self.range_fft, false);
-        let doppler = Stage::new(self.doppler_window, adc.chirps, self.doppler_fft, false);
-        let ranges = ((self.max_range_m / self.range_step_m(fmcw)).ceil() as usize + 2).min(range.plan.len());
-        let lines: Vec<Vec<Complex64>> = adc
-            .data
-            .par_chunks_exact(adc.samples)
-            .map(|line| {
-                let mut spectrum = range.run(line.iter().copied());
-                spectrum.truncate(ranges);
-                spectrum
+        let doppler = Stage::new(self.doppler_window, adc.loops, self.doppler_fft, false);
+        let range_step_m = fmcw.unambiguous_range_m() / range.plan.len() as f64;
+        let ranges = ((self.max_range_m / range_step_m).ceil() as usize + 2).min(range.plan.len());
+        let (channels, dopplers) = (adc.channels, doppler.plan.len());
+        let mut lines = Vec::with_capacity(adc.loops * channels * ranges);
+        let mut bench = range.bench();
+        for line in adc.data.chunks_exact(adc.samples) {
+            lines.extend_from_slice(&range.run_in(line.iter().copied(), &mut bench)[..ranges]);
+        }
+        let transmitters = fmcw.array.tx.len();
+        let turns: Vec<Complex64> = (0..transmitters * dopplers)
+            .map(|k| {
+                let (tx, bin) = ((k / dopplers) as f64, k % dopplers);
+                let cycles = (bin as f64 - (dopplers / 2) as f64) / dopplers as f64;
+                Complex64::cis(-TAU * cycles * tx / transmitters as f64)
             })
             .collect();
-        let spectrum = |bin: usize, element: usize| {
-            let slow = (0..adc.chirps).map(|chirp| lines[chirp * adc.elements + element][bin]);
-            let still = slow.clone().sum::<Complex64>() / adc.chirps as f64 * (1.0 - self.still_share);
-            doppler.run_centred(slow.map(|x| x - still))
+        let mut data = Vec::with_capacity(ranges * channels * dopplers);
+        let (mut slow, mut bench) = (vec![Complex64::ZERO; adc.loops], doppler.bench());
+        for bin in 0..ranges {
+            for channel in 0..channels {
+                for (index, x) in slow.iter_mut().enumerate() {
+                    *x = lines[(index * channels + channel) * ranges + bin];
+                }
+                let still = slow.iter().sum::<Complex64>() / adc.loops as f64 * (1.0 - self.still_share);
+                let spectrum = doppler.run_in(slow.iter().map(|x| x - still), &mut bench);
+                let turns = &turns[channel / fmcw.array.rx.len() * dopplers..][..dopplers];
+                let (low, high) = spectrum.split_at(dopplers - dopplers / 2);
+                data.extend(high.iter().chain(low).zip(turns).map(|(x, turn)| x * turn));
+            }
+        }
+        RangeDoppler {
+            ranges,
+            channels,
+            dopplers,
+            range_step_m,
+            doppler_step_mps: fmcw.radar.wavelength_m() / (2.0 * dopplers as f64 * fmcw.loop_s()),
+            data,
+        }
+    }
+}
+
+impl RangeDoppler {
+    /// The channels of one range and Doppler bin.
+    fn channels_at(&self, range: usize, doppler: usize) -> impl Iterator<Item = Complex64> + '_ {
+        let from = range * self.channels * self.dopplers + doppler;
+        (0..self.channels).map(move |channel| self.data[from + channel * self.dopplers])
+    }
+
+    /// Amplitude of each (range, Doppler): the root of the power summed over the channels.
+    pub fn amplitudes(&self) -> Vec<f64> {
+        let row = |range: &[Complex64]| {
+            let power =
+                |bin: usize| range.iter().skip(bin).step_by(self.dopplers).map(Complex64::norm_sqr).sum::<f64>();
+            (0..self.dopplers).map(|bin| power(bin).sqrt()).collect::<Vec<f64>>()
         };
-        let of_range = |bin: usize| (0..adc.elements).map(|element| spectrum(bin, element)).collect();
-        (0..ranges).into_par_iter().map(of_range).collect()
+        self.data.chunks_exact((self.channels * self.dopplers).max(1)).flat_map(row).collect()
     }
 }
 

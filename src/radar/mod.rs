@@ -1,18 +1,21 @@
 //! The radar: its chirp, the axes of its maps, the views that a frame is made of, and the physics that makes such maps:
 //! FMCW synthesis, the FFT chain and the point-spread widths that follow from it.
 
+mod array;
 mod axis;
 mod config;
 mod fft;
 mod fmcw;
 mod psf;
+mod tones;
 mod view;
 mod window;
 
+pub use array::MimoArray;
 pub use axis::{Axis, AxisKind, Spacing};
 pub use config::{RadarConfig, SPEED_OF_LIGHT};
-pub use fft::{Chain, PolarMap, RadarCube};
-pub use fmcw::{AdcCube, Fmcw, LinearArray, Receiver, Scatterer, element_gain, moving_point};
+pub use fft::{Chain, PolarMap, RadarCube, RangeDoppler};
+pub use fmcw::{AdcCube, Echo, Fmcw, Receiver, Track, add_leakage, path_gain};
 pub use psf::{FftSetup, doppler_sigma_mps, first_null_bins, main_lobe_sigma_bins, range_sigma_m, sine_sigma};
 pub use view::{PointSpread, Quantity, View};
 pub use window::Window;

@@ -2,7 +2,7 @@
 
 use super::decode::{Array, flags, numbers, texts};
 use super::header::{Header, Scalar, read_header};
-use super::{NpzError, shape_text, shown};
+use super::{Form, NpzError, shape_text, shown};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::ops::Range;
@@ -14,6 +14,8 @@ pub const NPY_KEY: &str = "array";
 const MAX_ELEMENTS: usize = 1 << 28;
 /// Deflate cannot pack tighter than this, so an entry that claims more lies about its size.
 const MAX_RATIO: u64 = 1032;
+/// Rows of the last axis that are read at a time where an array is read in pieces.
+const PIECE_ROWS: usize = 4096;
 /// What maps and labels may be made of.
 const REAL: &str = "real numbers (float16/32/64, int, uint or bool)";
 
@@ -109,6 +111,14 @@ impl NpzArchive {
         Ok(Entry { key: key.to_owned(), dtype: header.dtype, shape: header.shape, is_real })
     }
 
+    /// How one array lies in the file, without reading data.
+    ///
+    /// # Errors
+    /// Where it is missing or its header is damaged.
+    pub fn form(&mut self, key: &str) -> Result<Form, NpzError> {
+        self.with_entry(key, |source| Ok(Form::new(source.header.clone())))
+    }
+
     /// Reads an array of real numbers to its end, checksum included.
     ///
     /// # Errors
@@ -152,6 +162,25 @@ impl NpzArchive {
         let part = Header { shape: shape.clone(), ..header };
         let data = numbers(&bytes, &part).ok_or_else(|| self.wrong_type(key, &part, REAL))?;
         Ok(Array { shape, data, dtype: part.dtype })
+    }
+
+    /// Reads the amplitudes of an array of complex numbers whose last axis has `every` elements, of its element `first` only: an
+    /// array of one axis less. The file is read in pieces, so that little more than the result is held.
+    ///
+    /// # Errors
+    /// As [`Self::read`], for any dtype but `complex64` and `complex128`, and where the last axis has another length.
+    pub fn read_amplitudes(&mut self, key: &str, every: usize, first: usize) -> Result<Array, NpzError> {
+        let header = self.with_entry(key, |source| Ok(source.header.clone()))?;
+        if header.scalar != Scalar::Complex || !matches!(header.width, 8 | 16) {
+            return Err(self.wrong_type(key, &header, "complex numbers (complex64 or complex128)"));
+        }
+        if header.shape.last() != Some(&every) || header.fortran {
+            let expected = format!("a last axis of {every}, in C order");
+            return Err(self.wrong_shape(key, &header.shape, expected));
+        }
+        let data = self.with_entry(key, |source| source.amplitudes(every, first))?;
+        let shape = header.shape.get(..header.shape.len() - 1).unwrap_or_default().to_vec();
+        Ok(Array { shape, data, dtype: header.dtype })
     }
 
     /// Reads an array of flags: shape and elements in C order.
@@ -234,6 +263,17 @@ pub fn read_array(path: &Path, key: &str) -> Result<Array, NpzError> {
     NpzArchive::open(path)?.read(key)
 }
 
+/// Four or eight bytes as a float; NaN for any other number of them.
+fn real(bytes: &[u8], big_endian: bool) -> f64 {
+    if let Ok(four) = <[u8; 4]>::try_from(bytes) {
+        f64::from(if big_endian { f32::from_be_bytes(four) } else { f32::from_le_bytes(four) })
+    } else if let Ok(eight) = <[u8; 8]>::try_from(bytes) {
+        if big_endian { f64::from_be_bytes(eight) } else { f64::from_le_bytes(eight) }
+    } else {
+        f64::NAN
+    }
+}
+
 fn parse(reader: &mut dyn Read, key: &str, path: &Path) -> Result<Header, NpzError> {
     let bad = |message| NpzError::BadHeader { key: key.to_owned(), message, path: path.to_owned() };
     read_header(reader).map_err(bad)
@@ -289,6 +329,30 @@ impl Source<'_> {
         let bytes = self.take(self.header.data_bytes())?;
         match self.reader.read(&mut [0_u8]) {
             Ok(0) => Ok(bytes),
+            Ok(_) => Err(self.corrupt("it goes on after the declared shape is full".into())),
+            Err(error) => Err(self.corrupt(error.to_string())),
+        }
+    }
+
+    /// |x| of every `every`th complex number from `first` on.
+    fn amplitudes(&mut self, every: usize, first: usize) -> Result<Vec<f64>, NpzError> {
+        self.check()?;
+        let rows = self.header.len() / every.max(1);
+        let row = (every * self.header.width) as u64;
+        let (width, big_endian) = (self.header.width, self.header.big_endian);
+        let mut data = Vec::with_capacity(rows);
+        while data.len() < rows {
+            let count = (rows - data.len()).min(PIECE_ROWS);
+            let bytes = self.take(count as u64 * row)?;
+            let picked = bytes.chunks_exact(every * width).map(|row| {
+                let number = row.get(first * width..(first + 1) * width).unwrap_or_default();
+                let (re, im) = number.split_at(number.len() / 2);
+                real(re, big_endian).hypot(real(im, big_endian))
+            });
+            data.extend(picked);
+        }
+        match self.reader.read(&mut [0_u8]) {
+            Ok(0) => Ok(data),
             Ok(_) => Err(self.corrupt("it goes on after the declared shape is full".into())),
             Err(error) => Err(self.corrupt(error.to_string())),
         }

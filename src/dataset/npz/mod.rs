@@ -8,6 +8,7 @@
 mod archive;
 mod decode;
 mod error;
+mod form;
 mod header;
 mod write;
 
@@ -15,5 +16,6 @@ pub use archive::{Entry, NPY_KEY, NpzArchive, read_array};
 pub use decode::Array;
 pub use error::NpzError;
 pub(crate) use error::{shape_text, shown};
+pub use form::{Form, copy_with};
 pub(crate) use write::replace_file;
 pub use write::{ArrayView, write, write_deflated, write_npy};

@@ -3,6 +3,7 @@
 
 use super::NpzError;
 use npyz::WriterBuilder;
+use num_complex::Complex;
 use std::io::{Seek, Write};
 use std::path::Path;
 use zip::write::FileOptions;
@@ -12,6 +13,9 @@ use zip::write::FileOptions;
 enum Elements<'a> {
     F64(&'a [f64]),
     F32(&'a [f32]),
+    F16(&'a [half::f16]),
+    Complex128(&'a [Complex<f64>]),
+    Complex64(&'a [Complex<f32>]),
     I64(&'a [i64]),
     Flags(&'a [bool]),
     Text(&'a str),
@@ -39,6 +43,21 @@ impl<'a> ArrayView<'a> {
         Self::new(shape, Elements::F32(data))
     }
 
+    /// `float16`.
+    pub fn f16(shape: &[usize], data: &'a [half::f16]) -> Self {
+        Self::new(shape, Elements::F16(data))
+    }
+
+    /// `complex128`.
+    pub fn complex128(shape: &[usize], data: &'a [Complex<f64>]) -> Self {
+        Self::new(shape, Elements::Complex128(data))
+    }
+
+    /// `complex64`.
+    pub fn complex64(shape: &[usize], data: &'a [Complex<f32>]) -> Self {
+        Self::new(shape, Elements::Complex64(data))
+    }
+
     /// `int64`.
     pub fn i64(shape: &[usize], data: &'a [i64]) -> Self {
         Self::new(shape, Elements::I64(data))
@@ -58,6 +77,9 @@ impl<'a> ArrayView<'a> {
         match self.elements {
             Elements::F64(data) => data.len(),
             Elements::F32(data) => data.len(),
+            Elements::F16(data) => data.len(),
+            Elements::Complex128(data) => data.len(),
+            Elements::Complex64(data) => data.len(),
             Elements::I64(data) => data.len(),
             Elements::Flags(data) => data.len(),
             Elements::Text(_) => 1,
@@ -77,6 +99,9 @@ impl<'a> ArrayView<'a> {
         match self.elements {
             Elements::F64(data) => plain(out, &self.shape, data),
             Elements::F32(data) => plain(out, &self.shape, data),
+            Elements::F16(data) => plain(out, &self.shape, data),
+            Elements::Complex128(data) => plain(out, &self.shape, data),
+            Elements::Complex64(data) => plain(out, &self.shape, data),
             Elements::I64(data) => plain(out, &self.shape, data),
             Elements::Flags(data) => plain(out, &self.shape, data),
             Elements::Text(text) => {

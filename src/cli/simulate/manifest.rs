@@ -1,0 +1,94 @@
+//! `dataset.toml` of a simulated data set, SPEC section 6, with how it was made as a comment.
+
+use super::Style;
+use super::npz_frames::MANTISSA_BITS;
+use crate::body::Skeleton;
+use crate::radar::{Axis, PointSpread, Quantity, RadarConfig};
+use crate::simulate::{Layout, Recording};
+use serde::Serialize;
+use std::fmt::Write as _;
+
+#[derive(Serialize)]
+struct Manifest {
+    name: String,
+    layout: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    frames: Option<&'static str>,
+    frame_rate_hz: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    skeleton: Option<Skeleton>,
+    radar: RadarConfig,
+    view: Vec<ManifestView>,
+}
+
+#[derive(Serialize)]
+struct ManifestView {
+    array: String,
+    quantity: Quantity,
+    psf: PointSpread,
+    axes: Vec<Axis>,
+}
+
+/// The name of a recording: its presets.
+fn name(recording: &Recording) -> String {
+    let options = recording.options();
+    let presets: Vec<&str> = options.presets.iter().map(|preset| preset.word()).collect();
+    format!("simulated {} {}", options.layout.word(), presets.join(" "))
+}
+
+/// The whole file.
+pub(super) fn text(recording: &Recording, style: Style<'_>) -> anyhow::Result<String> {
+    let view = |view: &crate::radar::View| ManifestView {
+        array: view.array.clone(),
+        quantity: view.quantity,
+        psf: view.psf,
+        axes: view.axes.clone(),
+    };
+    let layout = recording.options().layout;
+    let own = match layout {
+        Layout::Mmvr | Layout::Xrf55 | Layout::Generic => "npz",
+        Layout::MmvrTree => "mmvr",
+        Layout::Hupr => "hupr",
+        Layout::Xrf55Stack => "xrf55",
+    };
+    // HuPR's files and axes are those of its preset; its bones differ from COCO's.
+    let manifest = Manifest {
+        name: style.name.map_or_else(|| name(recording), str::to_owned),
+        layout: own,
+        frames: (own == "npz").then_some(if recording.sequences() == 1 { "frames/*.npz" } else { "frames/*/*.npz" }),
+        frame_rate_hz: recording.frame_rate_hz(),
+        // Bones of a person of 1.70 m: the people of a recording differ in height.
+        skeleton: (layout != Layout::Hupr).then(|| crate::body::Build::default().skeleton()),
+        radar: recording.radar(),
+        view: recording.device().views.iter().map(view).collect(),
+    };
+    Ok(format!("{}\n{}", comment(recording, style.command), toml::to_string(&manifest)?))
+}
+
+/// How the data set was made, as comment lines.
+pub(super) fn comment(recording: &Recording, command: &str) -> String {
+    let options = recording.options();
+    let device = recording.device();
+    let mut text = format!(
+        "# Simulated people before a simulated radar: made by `{command}`\n# {} frames a sequence, {} in all; truth: joints \
+         and velocities at the middle of each frame, m and m/s.\n",
+        options.sequence_length,
+        recording.len()
+    );
+    for radar in &device.radars {
+        let fmcw = &radar.fmcw;
+        // Writing to a text does not fail.
+        let _ = writeln!(
+            text,
+            "# {}: {} transmitters in turn, {} receivers, {} loops of {} complex {}-bit samples a chirp.",
+            radar.name,
+            fmcw.array.tx.len(),
+            fmcw.array.rx.len(),
+            fmcw.loops,
+            fmcw.samples,
+            options.bits
+        );
+    }
+    let _ = writeln!(text, "# Amplitudes in npz files are float32 rounded to {MANTISSA_BITS} bits of mantissa.");
+    text
+}

@@ -1,0 +1,159 @@
+//! HuPR: `single_<k>/{hori,vert}/NNNNNNNNN.npy`, complex cubes (16, 64, 64, 8) of Doppler, range, angle and "elevation".
+//!
+//! The last axis is no angle: four of the eight antennas of the line skip its FFT, so that a target stays in bin 3 whatever its
+//! height. Bin 3 is also the one at which all twelve antennas are summed in phase; its amplitude is the map, (16, 64, 64).
+//! A cube is 8 MiB; it is read in pieces, and only the map is held.
+
+mod annotations;
+
+pub(super) use annotations::Annotations;
+
+use super::files::{Segment, natural};
+use super::npz::{NPY_KEY, NpzArchive, shape_text};
+use super::truth::truth_beside;
+use super::{DatasetError, DatasetInfo, Frame, Heatmap, Progress};
+use crate::radar::View;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Bins of the last axis, and the one that is taken.
+const LEVELS: usize = 8;
+const LEVEL: usize = 3;
+/// The folders of the two cubes of a frame.
+pub(super) const RADARS: [&str; 2] = ["hori", "vert"];
+/// Folders inside each other that are looked into.
+const MAX_DEPTH: usize = 6;
+
+/// The sequences at or below `root`, in natural order, and notes about frames of which one cube is missing.
+///
+/// # Errors
+/// Where `root` cannot be read, or on cancel.
+pub(super) fn sequences(root: &Path, progress: &Progress) -> Result<(Vec<Segment>, Vec<String>), DatasetError> {
+    let (mut found, mut notes) = (Vec::new(), Vec::new());
+    find(root, 0, progress, &mut found, &mut notes)?;
+    found.sort_by(|a: &Segment, b: &Segment| natural(&a.path.to_string_lossy(), &b.path.to_string_lossy()));
+    notes.sort();
+    Ok((found, notes))
+}
+
+fn find(
+    folder: &Path,
+    depth: usize,
+    progress: &Progress,
+    found: &mut Vec<Segment>,
+    notes: &mut Vec<String>,
+) -> Result<(), DatasetError> {
+    progress.check()?;
+    let below = match folders(folder) {
+        Ok(below) => below,
+        Err(error) if depth == 0 => return Err(error),
+        Err(error) => {
+            notes.push(format!("skipped: {error}"));
+            return Ok(());
+        }
+    };
+    if below.iter().any(|path| RADARS.iter().any(|radar| path.ends_with(radar))) {
+        let [hori, vert] = RADARS.map(|radar| stems(&folder.join(radar)));
+        let missing = hori.symmetric_difference(&vert).count();
+        if missing > 0 {
+            notes.push(format!("{}: {missing} frames have only one of hori and vert", folder.display()));
+        }
+        let all: Vec<String> = hori.union(&vert).cloned().collect();
+        if !all.is_empty() {
+            let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+            found.push(Segment::named(folder.to_owned(), name, all));
+        }
+    } else if depth < MAX_DEPTH {
+        for path in below {
+            find(&path, depth + 1, progress, found, notes)?;
+        }
+    }
+    Ok(())
+}
+
+fn folders(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
+    let failed = |reason| DatasetError::Read { reason, path: folder.to_owned() };
+    let mut below = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        if !entry.file_name().to_string_lossy().starts_with('.') && super::files::is_folder(&entry) {
+            below.push(entry.path());
+        }
+    }
+    Ok(below)
+}
+
+/// Names of the cubes without their ending; a folder that is not there has none.
+fn stems(folder: &Path) -> BTreeSet<String> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return BTreeSet::new() };
+    let name = |entry: std::io::Result<std::fs::DirEntry>| {
+        let name = entry.ok()?.file_name().to_string_lossy().into_owned();
+        name.strip_suffix(".npy").filter(|stem| !stem.is_empty() && !stem.starts_with('.')).map(str::to_owned)
+    };
+    entries.filter_map(name).collect()
+}
+
+/// Loads the frame `stem` of a sequence.
+pub(super) fn load(
+    index: usize,
+    folder: &Path,
+    sequence: &str,
+    stem: &str,
+    labels: &Annotations,
+    info: &DatasetInfo,
+) -> Result<Frame, DatasetError> {
+    let maps = maps_only(folder, stem, info)?;
+    let mut notes = Vec::new();
+    let image = labels.of(sequence, stem, &mut notes);
+    let beside = folder.join("truth").join(format!("{stem}.npz"));
+    let known = truth_beside(&beside, info.skeleton.joints.len(), &mut notes);
+    let number = stem.parse::<u32>().ok();
+    let labelled = image.as_ref().map(|image| image.keypoints.len().max(image.boxes.len()));
+    Ok(Frame {
+        index,
+        name: format!("{sequence}/{stem}"),
+        global_id: None,
+        timestamp_s: known
+            .timestamp_s
+            .or_else(|| info.frame_rate_hz.and_then(|rate| number.map(|number| f64::from(number) / rate))),
+        maps,
+        map_boxes: vec![Vec::new(); info.views.len()],
+        person_count: known.person_count.or(labelled),
+        truth: known.truth,
+        image,
+        notes,
+    })
+}
+
+/// The maps alone, one cube after the other.
+pub(super) fn maps_only(folder: &Path, stem: &str, info: &DatasetInfo) -> Result<Vec<Heatmap>, DatasetError> {
+    info.views.iter().map(|view| read_map(folder, stem, view)).collect()
+}
+
+fn read_map(folder: &Path, stem: &str, view: &View) -> Result<Heatmap, DatasetError> {
+    let path = folder.join(&view.array).join(format!("{stem}.npy"));
+    let other = RADARS.into_iter().find(|radar| *radar != view.array).unwrap_or("hori");
+    if !path.exists() && folder.join(other).join(format!("{stem}.npy")).exists() {
+        return Err(DatasetError::HalfFrame { present: other.to_owned(), path });
+    }
+    let mut file = NpzArchive::open(&path)?;
+    let expected = [view.shape(), vec![LEVELS]].concat();
+    let entry = file.entry(NPY_KEY)?;
+    if entry.shape != expected {
+        let expected = format!("{}, the bins of its axes and {LEVELS} of elevation", shape_text(&expected));
+        return Err(file.wrong_shape(NPY_KEY, &entry.shape, expected).into());
+    }
+    let map = file.read_amplitudes(NPY_KEY, LEVELS, LEVEL)?;
+    Ok(Heatmap { shape: view.shape(), data: map.data, dtype: map.dtype })
+}
+
+/// What was assumed, in words.
+pub(super) fn assumptions() -> [String; 3] {
+    [
+        "chirp: HuPR does not publish it; 77 GHz, 60.012 MHz/µs and 4.4 Msps follow from its range step of 4.3 cm"
+            .into(),
+        "elevation: the cube's last axis is no angle; its bin 3, where all antennas are summed, is the map".into(),
+        "left and right: the antennas are taken to be numbered from left to right (hori), from top to bottom (vert)"
+            .into(),
+    ]
+}

@@ -1,0 +1,185 @@
+//! Writing an array in the form of another: the same dtype, byte order, memory order and shape, in a copy of its archive.
+
+use super::header::{Header, Scalar};
+use super::write::{Sink, replace_file};
+use super::{NPY_KEY, NpzError, shape_text};
+use half::f16;
+use std::io::{Read as _, Write as _};
+use std::path::Path;
+use zip::write::FileOptions;
+
+/// How an array lies in a file.
+#[derive(Debug, Clone)]
+pub struct Form {
+    header: Header,
+}
+
+impl Form {
+    pub(super) fn new(header: Header) -> Self {
+        Self { header }
+    }
+
+    /// Its shape.
+    pub fn shape(&self) -> &[usize] {
+        &self.header.shape
+    }
+
+    /// Its dtype, for example `<f4`.
+    pub fn dtype(&self) -> &str {
+        &self.header.dtype
+    }
+
+    /// The same with another length of the first axis.
+    pub fn with_first_axis(&self, length: usize) -> Self {
+        let mut header = self.header.clone();
+        if let Some(first) = header.shape.first_mut() {
+            *first = length;
+        }
+        Self { header }
+    }
+
+    /// The npy file, header included, of `data` in C order. What is beyond the dtype becomes its nearest finite number; whole
+    /// numbers are rounded; complex numbers get no imaginary part.
+    ///
+    /// # Errors
+    /// In words: where the shape does not hold `data`, or the dtype holds no numbers.
+    pub fn encode(&self, data: &[f64]) -> Result<Vec<u8>, String> {
+        if data.len() != self.header.len() {
+            return Err(format!(
+                "{} cells; the shape {} holds {}",
+                data.len(),
+                shape_text(self.shape()),
+                self.header.len()
+            ));
+        }
+        let mut bytes = self.head();
+        bytes.reserve(data.len() * self.header.width);
+        let in_order = in_file_order(data, &self.header);
+        let data = in_order.as_deref().unwrap_or(data);
+        data.iter().try_for_each(|&x| push(&mut bytes, x, &self.header))?;
+        Ok(bytes)
+    }
+
+    /// Magic, version, length and text, as numpy writes them: a multiple of 64 bytes.
+    fn head(&self) -> Vec<u8> {
+        let Header { dtype, fortran, shape, .. } = &self.header;
+        let order = if *fortran { "True" } else { "False" };
+        let mut text = format!("{{'descr': '{dtype}', 'fortran_order': {order}, 'shape': {}, }}", shape_text(shape));
+        while !(10 + text.len() + 1).is_multiple_of(64) {
+            text.push(' ');
+        }
+        text.push('\n');
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((text.len() as u16).to_le_bytes());
+        bytes.extend(text.into_bytes());
+        bytes
+    }
+}
+
+/// Elements in the order of a Fortran file; `None` where C order will do.
+fn in_file_order(data: &[f64], header: &Header) -> Option<Vec<f64>> {
+    let shape = &header.shape;
+    if !header.fortran || shape.len() < 2 || data.is_empty() {
+        return None;
+    }
+    let mut strides = vec![1_usize; shape.len()];
+    for k in (0..shape.len() - 1).rev() {
+        strides[k] = strides[k + 1] * shape[k + 1];
+    }
+    let mut index = vec![0_usize; shape.len()];
+    let mut turned = Vec::with_capacity(data.len());
+    for _ in 0..data.len() {
+        let at: usize = index.iter().zip(&strides).map(|(i, stride)| i * stride).sum();
+        turned.extend(data.get(at));
+        for (i, &size) in index.iter_mut().zip(shape) {
+            *i += 1;
+            if *i < size {
+                break;
+            }
+            *i = 0;
+        }
+    }
+    Some(turned)
+}
+
+fn push(bytes: &mut Vec<u8>, x: f64, header: &Header) -> Result<(), String> {
+    macro_rules! put {
+        ($value:expr) => {{
+            let value = $value;
+            if header.big_endian { bytes.extend(value.to_be_bytes()) } else { bytes.extend(value.to_le_bytes()) }
+        }};
+    }
+    let finite = |most: f64| if x.is_finite() { x.clamp(-most, most) } else { x };
+    // A cast from float to whole saturates, and a NaN becomes 0.
+    let whole = x.round();
+    match (header.scalar, header.width) {
+        (Scalar::Bool, _) => bytes.push(u8::from(x != 0.0)),
+        (Scalar::Float(2), _) => put!(f16::from_f64(finite(f64::from(f16::MAX)))),
+        (Scalar::Float(4), _) => put!(finite(f64::from(f32::MAX)) as f32),
+        (Scalar::Float(8), _) => put!(x),
+        (Scalar::Int(1), _) => put!(whole as i8),
+        (Scalar::Int(2), _) => put!(whole as i16),
+        (Scalar::Int(4), _) => put!(whole as i32),
+        (Scalar::Int(8), _) => put!(whole as i64),
+        (Scalar::Uint(1), _) => put!(whole as u8),
+        (Scalar::Uint(2), _) => put!(whole as u16),
+        (Scalar::Uint(4), _) => put!(whole as u32),
+        (Scalar::Uint(8), _) => put!(whole as u64),
+        (Scalar::Complex, 8) => {
+            put!(finite(f64::from(f32::MAX)) as f32);
+            put!(0.0_f32);
+        }
+        (Scalar::Complex, 16) => {
+            put!(x);
+            put!(0.0_f64);
+        }
+        _ => return Err(format!("dtype {} holds no numbers that can be written", header.dtype)),
+    }
+    Ok(())
+}
+
+/// Writes a copy of the npz or npy file `from` to `to`, with the arrays of `replaced` (key, npy file) in the place of its
+/// own; every other entry is copied as it is, compressed as it is.
+///
+/// # Errors
+/// Where `from` cannot be read or `to` cannot be written; an existing file is then untouched.
+pub fn copy_with(from: &Path, to: &Path, replaced: &[(String, Vec<u8>)]) -> Result<(), NpzError> {
+    let reading = |reason| NpzError::Read { reason, path: from.to_owned() };
+    let mut file = std::fs::File::open(from).map_err(reading)?;
+    let mut magic = [0_u8; 2];
+    file.read_exact(&mut magic).map_err(reading)?;
+    let written = if &magic == b"PK" {
+        replace_file(to, |out| copy_archive(std::io::BufReader::new(file), out, replaced))
+    } else {
+        let array = replaced.iter().find(|(key, _)| key == NPY_KEY).map(|(_, bytes)| bytes.as_slice());
+        replace_file(to, |out| out.write_all(array.unwrap_or_default()))
+    };
+    written.map_err(|reason| NpzError::Write { reason, path: to.to_owned() })
+}
+
+fn copy_archive(
+    from: std::io::BufReader<std::fs::File>,
+    out: &mut dyn Sink,
+    replaced: &[(String, Vec<u8>)],
+) -> std::io::Result<()> {
+    let mut archive = zip::ZipArchive::new(from)?;
+    let mut copy = zip::ZipWriter::new(out);
+    for k in 0..archive.len() {
+        let entry = archive.by_index_raw(k)?;
+        let key = npyz::npz::array_name_from_file_name(entry.name()).map(str::to_owned);
+        let Some((_, bytes)) = replaced.iter().find(|(name, _)| Some(name) == key.as_ref()) else {
+            copy.raw_copy_file(entry)?;
+            continue;
+        };
+        let options = FileOptions::default()
+            .compression_method(entry.compression())
+            .last_modified_time(entry.last_modified())
+            .large_file(bytes.len() as u64 > u64::from(u32::MAX / 2));
+        let name = entry.name().to_owned();
+        drop(entry);
+        copy.start_file(name, options)?;
+        copy.write_all(bytes)?;
+    }
+    copy.finish()?;
+    Ok(())
+}
