@@ -130,12 +130,12 @@ fn scene(seed: u64, kinds: &[AxisKind], summation: Summation, operators: Operato
 }
 
 /// The kinematic terms see no map, so two cells do: most of the time of the objective goes into maps.
-fn kinematic_objective(config: FitConfig, params: &Pppr) -> Objective {
+fn kinematic_objective(config: &FitConfig, params: &Pppr) -> Objective {
     let radar = RadarConfig { doppler_features: FEATURES, ..RadarConfig::default() };
     let mut view = view("none", &[AxisKind::X], &mut StdRng::seed_from_u64(0));
     view.axes[0].bins = 2;
     let problem = Problem::new(radar, skeleton(), vec![view], &[&[0.0, 1.0]]).unwrap();
-    Objective::new(Arc::new(problem), config, Precision::F64, params).unwrap()
+    Objective::new(Arc::new(problem), *config, Precision::F64, params).unwrap()
 }
 
 /// numpy's percentile, by the textbook.
@@ -189,7 +189,7 @@ impl Scene {
         let base = objective.evaluate(&self.params);
         let thresholds = self.thresholds();
         prop_assert!((base.terms.em - self.em(&self.params, &thresholds)).abs() < 1e-9, "L_EM itself");
-        let mut kinematic_objective = kinematic_objective(self.config, &self.params);
+        let mut kinematic_objective = kinematic_objective(&self.config, &self.params);
         let mut kinematic = |params: &Pppr| {
             let t = kinematic_objective.evaluate(params).terms;
             t.bone + t.rigid + t.joint + t.sep + t.coll

@@ -26,8 +26,8 @@ fn cells(p: [f64; 3]) -> [[f64; 2]; 2] {
     [[row(p[0].hypot(p[2])), column(-p[1], -1.0)], [row(p[0].hypot(p[1])), column(p[2], -2.0)]]
 }
 
-fn run(problem: &Arc<Problem>, config: FitConfig, start: &Pppr) -> StepReport {
-    let mut fitter = Fitter::new(Arc::clone(problem), config, Precision::F64, start.clone()).unwrap();
+fn run(problem: &Arc<Problem>, config: &FitConfig, start: &Pppr) -> StepReport {
+    let mut fitter = Fitter::new(Arc::clone(problem), *config, Precision::F64, start.clone()).unwrap();
     for _ in 0..config.iterations {
         fitter.step().unwrap();
     }
@@ -54,12 +54,12 @@ fn starts_within_the_labelled_boxes_and_reaches_the_asked_iou() {
         }
     }
 
-    let report = run(&problem, config, &params);
+    let report = run(&problem, &config, &params);
     let [hori, vert] = [report.iou[0].unwrap(), report.iou[1].unwrap()];
     println!("defaults: IoU {hori:.3} {vert:.3}, loss {:.4}", report.loss);
     assert!(f64::midpoint(hori, vert) >= 0.52 && report.converged, "{report:?}");
 
-    let report = run(&problem, FitConfig { learning_rate: 3e-3, ..config }, &params);
+    let report = run(&problem, &FitConfig { learning_rate: 3e-3, ..config }, &params);
     let [hori, vert] = [report.iou[0].unwrap(), report.iou[1].unwrap()];
     println!("rate 3e-3: IoU {hori:.3} {vert:.3}, loss {:.4}", report.loss);
     assert!(hori >= 0.60 && vert >= 0.55 && report.converged, "{report:?}");

@@ -25,7 +25,7 @@ const FOREVER: usize = 100_000_000;
 struct Rig {
     worker: Worker,
     wakes: Receiver<PathBuf>,
-    dataset: Dataset,
+    dataset: Arc<Dataset>,
     frame: Arc<Frame>,
     waiting: VecDeque<WorkerMessage>,
     _folder: tempfile::TempDir,
@@ -35,7 +35,7 @@ impl Rig {
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         blob::write_dataset(folder.path(), 1);
-        let dataset = Dataset::open(folder.path(), &Progress::new()).unwrap();
+        let dataset = Arc::new(Dataset::open(folder.path(), &Progress::new()).unwrap());
         let frame = Arc::new(dataset.load(0).unwrap());
         let (wake, wakes) = unbounded();
         // The callback runs on the worker's thread, so the link names that thread.
@@ -49,13 +49,10 @@ impl Rig {
     }
 
     fn prepare_with(&self, job: JobId, config: FitConfig, start: Start) {
-        let info = self.dataset.info();
         self.send(WorkerCommand::Prepare(Box::new(Prepare {
             job,
             branch: 0,
-            radar: info.radar.clone(),
-            skeleton: info.skeleton.clone(),
-            views: info.views.clone(),
+            dataset: Arc::clone(&self.dataset),
             frame: Arc::clone(&self.frame),
             config,
             precision: Precision::F64,
@@ -229,7 +226,7 @@ fn pause_stops_after_the_step_and_nothing_follows() {
     let last = Arc::clone(&rows[at - 1].state);
     // The answer to a later command proves that nothing was on its way.
     let config = FitConfig::default();
-    rig.send(WorkerCommand::Inspect { branch: 0, state: last, config });
+    rig.send(WorkerCommand::Inspect { branch: 0, state: last, config: Box::new(config) });
     let answer = rig.snapshot(|snapshot| !snapshot.live);
     assert_eq!(answer.iteration, at);
     assert!(rig.worker.poll().is_none());
@@ -247,11 +244,11 @@ fn settings_changed_during_a_run_hold_from_the_next_step() {
     let old = FitConfig::default();
     let mut rows = rig.run_forever(4);
     let new = FitConfig { w_em: 2.0, w_kine: 0.125, tau_pct: 20.0, ..old };
-    rig.send(WorkerCommand::Configure(new));
+    rig.send(WorkerCommand::Configure(Box::new(new)));
     let (before, event) = rig.rows_until(1, |event| matches!(event, WorkerEvent::ConfigApplied { .. }));
     rows.extend(before);
     let WorkerEvent::ConfigApplied { branch: 0, iteration: k, config } = event else { panic!("{event:?}") };
-    assert_eq!(config, new);
+    assert_eq!(*config, new);
     assert_eq!(iterations(&rows), (1..=k).collect::<Vec<_>>(), "everything before the event is before the change");
     let mut after = rig.more_rows(4);
     rig.send(WorkerCommand::Pause);
@@ -269,7 +266,7 @@ fn settings_changed_before_the_first_step_give_row_0_anew() {
     let mut rig = Rig::new();
     rig.prepared();
     let new = FitConfig { w_em: 3.0, ..FitConfig::default() };
-    rig.send(WorkerCommand::Configure(new));
+    rig.send(WorkerCommand::Configure(Box::new(new)));
     let (rows, _) = rig.rows_until(1, |event| matches!(event, WorkerEvent::ConfigApplied { iteration: 0, .. }));
     assert_eq!(iterations(&rows), [0]);
     assert_weights(&rows, &new);
@@ -284,19 +281,19 @@ fn a_branch_with_the_same_settings_repeats_the_run_bit_for_bit() {
     rows.insert(0, first);
     // Other settings meanwhile must leave no trace.
     let other = FitConfig { learning_rate: 0.02, tau_pct: 30.0, softness: 0.1, ..FitConfig::default() };
-    rig.send(WorkerCommand::Configure(other));
+    rig.send(WorkerCommand::Configure(Box::new(other)));
     rig.rows_until(1, |event| matches!(event, WorkerEvent::ConfigApplied { iteration: 25, .. }));
     rig.send(WorkerCommand::RunTo { target: 30, run: 1 });
     rig.finish();
     let config = FitConfig::default();
-    rig.send(WorkerCommand::Branch { branch: 1, state: Arc::clone(&rows[7].state), config });
+    rig.send(WorkerCommand::Branch { branch: 1, state: Arc::clone(&rows[7].state), config: Box::new(config) });
     rig.send(WorkerCommand::RunTo { target: 25, run: 1 });
     let (again, at, _) = rig.finish();
     assert_eq!(at, 25);
     assert!(again.iter().all(|row| row.branch == 1));
     same(&again, &rows[7..]);
     // And with other settings it is another run from the first step on.
-    rig.send(WorkerCommand::Branch { branch: 2, state: Arc::clone(&rows[7].state), config: other });
+    rig.send(WorkerCommand::Branch { branch: 2, state: Arc::clone(&rows[7].state), config: Box::new(other) });
     rig.send(WorkerCommand::RunTo { target: 8, run: 1 });
     let (differs, ..) = rig.finish();
     assert_eq!(iterations(&differs), [7, 8]);
@@ -397,7 +394,7 @@ fn looking_back_neither_disturbs_the_run_nor_is_lost() {
     let rows = rig.run_forever(6);
     let state = Arc::clone(&rows[2].state);
     let config = FitConfig { w_em: 7.0, ..FitConfig::default() };
-    rig.send(WorkerCommand::Inspect { branch: 0, state: Arc::clone(&state), config });
+    rig.send(WorkerCommand::Inspect { branch: 0, state: Arc::clone(&state), config: Box::new(config) });
     // A slow window: live pictures are published meanwhile, and none of them may replace the answer.
     let mut later = 0;
     let mut last = rows.last().unwrap().report.iteration;
@@ -469,7 +466,7 @@ fn every_command_in_the_queue_is_obeyed_in_order() {
     let (first, _) = rig.prepared();
     let state: Arc<FitState> = first.state;
     for branch in 1..=200 {
-        rig.send(WorkerCommand::Branch { branch, state: Arc::clone(&state), config: FitConfig::default() });
+        rig.send(WorkerCommand::Branch { branch, state: Arc::clone(&state), config: Box::new(FitConfig::default()) });
         rig.send(WorkerCommand::RunTo { target: 1, run: 1 });
         rig.send(WorkerCommand::Pause);
     }

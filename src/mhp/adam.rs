@@ -1,6 +1,8 @@
 //! Adam with bias correction over the groups of PPPR; SPEC section 4. No renormalisation between steps.
 
+use super::articulation::{Articulation, is_turn};
 use crate::body::{Group, Pppr, PpprShape};
+use crate::config::{FitConfig, Parameterization};
 use serde::{Deserialize, Serialize};
 
 const BETA_1: f64 = 0.9;
@@ -14,50 +16,129 @@ pub struct Adam {
     pub first: Pppr,
     /// Exponential mean of its square.
     pub second: Pppr,
+    /// The same two by the coordinates of root and bones, (persons · coordinates); empty while joints move by themselves.
+    #[serde(default)]
+    pub bones: [Vec<f64>; 2],
     /// Steps since the moments were zero.
     pub steps: u32,
+}
+
+/// One number's update.
+struct Step {
+    unbias: [f64; 2],
+}
+
+impl Step {
+    fn new(steps: u32) -> Self {
+        Self { unbias: [BETA_1, BETA_2].map(|beta| 1.0 / (1.0 - beta.powf(f64::from(steps)))) }
+    }
+
+    /// What is to be added at unit rate; the moments move on.
+    fn of(&self, gradient: f64, first: &mut f64, second: &mut f64) -> f64 {
+        *first = BETA_1 * *first + (1.0 - BETA_1) * gradient;
+        *second = BETA_2 * *second + (1.0 - BETA_2) * gradient * gradient;
+        -(*first * self.unbias[0]) / ((*second * self.unbias[1]).sqrt() + EPSILON)
+    }
 }
 
 impl Adam {
     /// Zero moments.
     pub fn new(shape: PpprShape) -> Self {
-        Self { first: Pppr::zeros(shape), second: Pppr::zeros(shape), steps: 0 }
+        Self { first: Pppr::zeros(shape), second: Pppr::zeros(shape), bones: [const { Vec::new() }; 2], steps: 0 }
     }
 
     /// One update of `params` against `gradient` (same sizes); the moments move on.
-    pub(super) fn update(&mut self, params: &mut Pppr, gradient: &Pppr, learning_rate: f64) {
+    pub(super) fn update(&mut self, params: &mut Pppr, gradient: &Pppr, config: &FitConfig, body: &Articulation) {
         self.steps += 1;
-        let steps = f64::from(self.steps);
-        let (unbias_1, unbias_2) = (1.0 / (1.0 - BETA_1.powf(steps)), 1.0 / (1.0 - BETA_2.powf(steps)));
+        let step = Step::new(self.steps);
+        let turned =
+            (config.parameterization == Parameterization::Bones).then(|| self.turns(params, gradient, config, body));
         for group in Group::ALL {
+            if group == Group::Position && turned.is_some() {
+                continue;
+            }
+            let rate = rate(config, group);
             let moments = self.first.group_mut(group).iter_mut().zip(self.second.group_mut(group));
             for ((x, &g), (m, v)) in params.group_mut(group).iter_mut().zip(gradient.group(group)).zip(moments) {
-                *m = BETA_1 * *m + (1.0 - BETA_1) * g;
-                *v = BETA_2 * *v + (1.0 - BETA_2) * g * g;
-                *x -= learning_rate * (*m * unbias_1) / ((*v * unbias_2).sqrt() + EPSILON);
+                *x += rate * step.of(g, m, v);
             }
         }
+        if let Some(turned) = turned {
+            body.advance(params, &turned);
+        }
     }
+
+    /// The step by the coordinates of root and bones.
+    fn turns(&mut self, params: &Pppr, gradient: &Pppr, config: &FitConfig, body: &Articulation) -> Vec<f64> {
+        let step = Step::new(self.steps);
+        let pulled = body.pull_back(params, gradient);
+        for moment in &mut self.bones {
+            moment.resize(pulled.len(), 0.0);
+        }
+        let [first, second] = &mut self.bones;
+        let rates = [rate(config, Group::Position), config.learning_rates.bone.unwrap_or(config.learning_rate)];
+        let moments = first.iter_mut().zip(second);
+        let steps = pulled
+            .iter()
+            .zip(moments)
+            .enumerate()
+            .map(|(k, (&g, (m, v)))| rates[usize::from(is_turn(k % body.coordinates()))] * step.of(g, m, v));
+        steps.collect()
+    }
+}
+
+fn rate(config: &FitConfig, group: Group) -> f64 {
+    let rates = &config.learning_rates;
+    let own = match group {
+        Group::Position => rates.position,
+        Group::LogScale => rates.log_scale,
+        Group::Rotation => rates.rotation,
+        Group::Velocity => rates.velocity,
+        Group::Beta => rates.beta,
+        Group::Omega => rates.omega,
+    };
+    own.unwrap_or(config.learning_rate)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn lone_joint() -> crate::body::Skeleton {
+        crate::body::Skeleton { joints: vec!["pelvis".into()], bones: vec![], bone_lengths_m: vec![], angles: vec![] }
+    }
+
     /// Two steps by hand on one number: g = 2, then g = −1, rate 0.1.
     #[test]
     fn two_steps_by_hand() {
         let shape = PpprShape { persons: 1, joints: 1, doppler_features: 0 };
         let (mut adam, mut params, mut gradient) = (Adam::new(shape), Pppr::zeros(shape), Pppr::zeros(shape));
+        let config = FitConfig { learning_rate: 0.1, ..FitConfig::default() };
+        let body = Articulation::new(&lone_joint());
         gradient.group_mut(Group::Beta)[0] = 2.0;
-        adam.update(&mut params, &gradient, 0.1);
+        adam.update(&mut params, &gradient, &config, &body);
         // m̂ = 2, v̂ = 4: a full step of the rate.
         assert!((params.group(Group::Beta)[0] + 0.1).abs() < 1e-9);
         gradient.group_mut(Group::Beta)[0] = -1.0;
-        adam.update(&mut params, &gradient, 0.1);
+        adam.update(&mut params, &gradient, &config, &body);
         let (m, v) = (0.9 * 0.2 - 0.1, 0.999 * 0.004 + 0.001);
         let want = -0.1 - 0.1 * (m / 0.19) / (f64::sqrt(v / (1.0 - 0.999 * 0.999)) + 1e-8);
         assert!((params.group(Group::Beta)[0] - want).abs() < 1e-9);
         assert_eq!(params.group(Group::Position), [0.0; 3]);
+    }
+
+    #[test]
+    fn groups_have_their_own_rates_and_bones_leave_positions_to_the_root() {
+        let shape = PpprShape { persons: 1, joints: 1, doppler_features: 0 };
+        let (mut adam, mut params, mut gradient) = (Adam::new(shape), Pppr::zeros(shape), Pppr::zeros(shape));
+        gradient.group_mut(Group::Beta)[0] = 1.0;
+        gradient.group_mut(Group::Position)[1] = -1.0;
+        let mut config = FitConfig { parameterization: Parameterization::Bones, ..FitConfig::default() };
+        config.learning_rates.beta = Some(0.5);
+        config.learning_rates.position = Some(0.25);
+        adam.update(&mut params, &gradient, &config, &Articulation::new(&lone_joint()));
+        assert!((params.group(Group::Beta)[0] + 0.5).abs() < 1e-6);
+        assert!((params.group(Group::Position)[1] - 0.25).abs() < 1e-6);
+        assert_eq!(adam.first.group(Group::Position), [0.0; 3]);
     }
 }

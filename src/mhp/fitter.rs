@@ -1,6 +1,7 @@
 //! The fitter: one `step` is one Adam update and one evaluation. It knows no thread, file or window.
 
 use super::adam::Adam;
+use super::articulation::Articulation;
 use super::convergence::{LOOK_BACK, converged};
 use super::{Evaluation, FitError, Objective, Precision, Problem, StepReport};
 use crate::body::{Group, Pppr};
@@ -24,6 +25,7 @@ pub struct FitState {
 /// Adam on the objective of one frame.
 pub struct Fitter {
     objective: Objective,
+    body: Articulation,
     state: FitState,
     evaluation: Evaluation,
 }
@@ -39,11 +41,12 @@ impl Fitter {
         precision: Precision,
         initial: Pppr,
     ) -> Result<Self, FitError> {
+        let body = Articulation::new(&problem.skeleton);
         let mut objective = Objective::new(problem, config, precision, &initial)?;
         let evaluation = evaluate(&mut objective, &initial, 0)?;
         let adam = Adam::new(initial.shape());
         let losses = vec![evaluation.loss];
-        Ok(Self { objective, state: FitState { iteration: 0, params: initial, adam, losses }, evaluation })
+        Ok(Self { objective, body, state: FitState { iteration: 0, params: initial, adam, losses }, evaluation })
     }
 
     /// One Adam step from the current parameters, then their evaluation.
@@ -53,7 +56,7 @@ impl Fitter {
     pub fn step(&mut self) -> Result<StepReport, FitError> {
         let mut next = self.state.clone();
         next.iteration += 1;
-        next.adam.update(&mut next.params, &self.evaluation.gradient, self.objective.config().learning_rate);
+        next.adam.update(&mut next.params, &self.evaluation.gradient, self.objective.config(), &self.body);
         self.evaluation = evaluate(&mut self.objective, &next.params, next.iteration)?;
         next.losses.push(self.evaluation.loss);
         let surplus = next.losses.len().saturating_sub(LOOK_BACK + 1);
@@ -106,7 +109,7 @@ impl Fitter {
     }
 
     /// Changes the configuration from the next step on; the current parameters are evaluated anew. The EM region stays
-    /// around the initial persons.
+    /// around the initial persons. Another parameterisation starts Adam's moments anew: they are moments of other numbers.
     ///
     /// # Errors
     /// Where the loss is not finite under the new configuration, which is then not taken.
@@ -117,6 +120,9 @@ impl Fitter {
             Ok(evaluation) => {
                 if let Some(last) = self.state.losses.last_mut() {
                     *last = evaluation.loss;
+                }
+                if config.parameterization != before.parameterization {
+                    self.state.adam = Adam::new(self.state.params.shape());
                 }
                 self.evaluation = evaluation;
                 Ok(())
@@ -166,6 +172,8 @@ fn evaluate(objective: &mut Objective, params: &Pppr, iteration: usize) -> Resul
     let t = &evaluation.terms;
     let terms = [
         ("L_EM", t.em),
+        ("L_time", t.time),
+        ("L_floor", t.floor),
         ("L_bone", t.bone),
         ("L_rigid", t.rigid),
         ("L_joint", t.joint),

@@ -6,6 +6,7 @@
 
 mod adam;
 mod adjoint;
+mod articulation;
 mod convergence;
 mod em;
 mod fill;
@@ -26,10 +27,10 @@ pub use adam::Adam;
 pub use fill::fill_missing;
 pub(crate) use fill::for_neighbours;
 pub use fitter::{FitState, Fitter};
-pub use init::{Initialisation, Peak, initialise};
+pub use init::{Initialisation, Peak, initialise, initialise_people, predict};
 pub use objective::{Masks, Objective, masks};
 pub(crate) use percentile::{percentile, percentiles};
-pub use problem::Problem;
+pub use problem::{Neighbour, Problem};
 pub use region::Region;
 pub use simulate::simulate;
 pub use types::{Evaluation, FitError, Precision, StepReport, StopReason, Terms};

@@ -1,13 +1,15 @@
 //! L(Θ) and ∂L/∂Θ; SPEC section 4.
 
 use super::em::{self, ViewAnswer};
+use super::init::anchors;
 use super::percentile::percentile;
 use super::region::{self, Region};
 use super::splat::Scene;
 use super::{Evaluation, FitError, Precision, Problem, kinematic};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::Vec3;
+use crate::geometry::{Vec3, add, add_scaled, dot, scale, sub};
+use crate::radar::View;
 use std::sync::Arc;
 
 /// The objective of one fit: its EM region and the mask of H_ori are fixed by the initial parameters.
@@ -19,6 +21,9 @@ pub struct Objective {
     regions: Vec<Region>,
     /// B_ori over each region's cells.
     targets: Vec<Vec<bool>>,
+    initial: Pppr,
+    /// Where the frames around say that each person's middle is, m; empty where they say nothing.
+    anchors: Vec<Vec3>,
     warnings: Vec<String>,
 }
 
@@ -54,21 +59,42 @@ impl Objective {
         problem.check(initial)?;
         let centres = region::centres(initial);
         let (regions, warnings) = region::regions(&problem, config.em_region, &centres)?;
-        let targets = targets(&problem, &regions, config.tau_pct);
-        Ok(Self { problem, config, precision, centres, regions, targets, warnings })
+        let targets = targets(&problem.views, &regions, config.tau_pct, |view| problem.map(view));
+        let mut objective = Self {
+            problem,
+            config,
+            precision,
+            centres,
+            regions,
+            targets,
+            initial: initial.clone(),
+            anchors: Vec::new(),
+            warnings,
+        };
+        objective.anchor();
+        Ok(objective)
+    }
+
+    /// Looks up where the frames around say that each person is, where that has a weight.
+    fn anchor(&mut self) {
+        if self.config.w_time > 0.0 && self.anchors.is_empty() {
+            self.anchors = anchors(&self.problem, &self.config, &self.initial);
+        }
     }
 
     /// Changes the configuration; the EM region stays around the same initial persons.
     pub fn set_config(&mut self, config: FitConfig) {
-        if config.em_region != self.config.em_region
+        let before = std::mem::replace(&mut self.config, config);
+        if config.em_region != before.em_region
             && let Ok((regions, warnings)) = region::regions(&self.problem, config.em_region, &self.centres)
         {
             (self.regions, self.warnings) = (regions, warnings);
-            self.targets = targets(&self.problem, &self.regions, config.tau_pct);
-        } else if config.tau_pct != self.config.tau_pct {
-            self.targets = targets(&self.problem, &self.regions, config.tau_pct);
         }
-        self.config = config;
+        if config.em_region != before.em_region || config.tau_pct != before.tau_pct {
+            let problem = &self.problem;
+            self.targets = targets(&problem.views, &self.regions, config.tau_pct, |view| problem.map(view));
+        }
+        self.anchor();
     }
 
     /// The configuration in force.
@@ -115,8 +141,18 @@ impl Objective {
                 *total = self.config.w_kine * *total + self.config.w_em * em;
             }
         }
+        if self.config.w_time > 0.0 {
+            terms.time = anchored(&self.anchors, params, self.config.w_time, &mut gradient);
+        }
+        if self.config.w_floor > 0.0 {
+            let (weight, height_m) = (self.config.w_floor, self.config.radar_height_m);
+            terms.floor = on_floor(params, height_m, weight, &mut gradient);
+        }
         let kinematic = terms.bone + terms.rigid + terms.joint + terms.sep + terms.coll;
-        let loss = self.config.w_em * em + self.config.w_kine * kinematic;
+        let loss = self.config.w_em * em
+            + self.config.w_time * terms.time
+            + self.config.w_floor * terms.floor
+            + self.config.w_kine * kinematic;
         Evaluation { loss, terms, iou, gradient, em_gradient }
     }
 
@@ -136,18 +172,51 @@ impl Objective {
     }
 }
 
+/// L_time = Σ ‖c_s − ĉ_s‖² over the persons, m², with c_s the mean of a person's joints; adds `weight` times its gradient.
+fn anchored(anchors: &[Vec3], params: &Pppr, weight: f64, gradient: &mut Pppr) -> f64 {
+    let joints = params.shape().joints;
+    let share = 1.0 / joints.max(1) as f64;
+    let mut sum = 0.0;
+    for (person, anchor) in anchors.iter().enumerate().take(params.shape().persons) {
+        let own = person * joints..(person + 1) * joints;
+        let mean = scale(own.clone().fold([0.0; 3], |sum, joint| add(sum, params.position(joint))), share);
+        let off = sub(mean, *anchor);
+        sum += dot(off, off);
+        for joint in own {
+            let mut slope = gradient.vec3(Group::Position, joint);
+            add_scaled(&mut slope, off, 2.0 * weight * share);
+            gradient.set_vec3(Group::Position, joint, slope);
+        }
+    }
+    sum
+}
+
+/// L_floor = Σ (z_low + h)² over the persons, m², with z_low the height of a person's lowest joint and h that of the radar over
+/// the floor; adds `weight` times its gradient.
+fn on_floor(params: &Pppr, radar_height_m: f64, weight: f64, gradient: &mut Pppr) -> f64 {
+    let joints = params.shape().joints;
+    let height = |joint: usize| params.position(joint)[2];
+    let mut sum = 0.0;
+    for person in 0..params.shape().persons {
+        let own = person * joints..(person + 1) * joints;
+        let Some(lowest) = own.min_by(|&a, &b| height(a).total_cmp(&height(b))) else { continue };
+        let off = height(lowest) + radar_height_m;
+        sum += off * off;
+        let mut slope = gradient.vec3(Group::Position, lowest);
+        slope[2] += 2.0 * weight * off;
+        gradient.set_vec3(Group::Position, lowest, slope);
+    }
+    sum
+}
+
 /// B_ori over each region's cells.
-fn targets(problem: &Problem, regions: &[Region], tau_pct: f64) -> Vec<Vec<bool>> {
-    regions
-        .iter()
-        .enumerate()
-        .map(|(view, region)| {
-            let map = problem.map(view);
-            let cells: Vec<f64> = region.indices(&problem.views[view].shape()).iter().map(|&i| map[i]).collect();
-            let threshold = percentile(&cells, 100.0 - tau_pct);
-            cells.iter().map(|&h| h > threshold).collect()
-        })
-        .collect()
+fn targets<'a>(views: &[View], regions: &[Region], tau_pct: f64, map: impl Fn(usize) -> &'a [f64]) -> Vec<Vec<bool>> {
+    let of_view = |(view, region): (usize, &Region)| {
+        let cells: Vec<f64> = region.indices(&views[view].shape()).iter().map(|&i| map(view)[i]).collect();
+        let threshold = percentile(&cells, 100.0 - tau_pct);
+        cells.iter().map(|&h| h > threshold).collect()
+    };
+    regions.iter().enumerate().map(of_view).collect()
 }
 
 /// The masks of a view for a simulated whole map `sim_map` (from [`super::simulate`]). A map of another size gives an

@@ -4,6 +4,22 @@ use super::{FitError, fill_missing};
 use crate::body::{Pppr, Skeleton};
 use crate::radar::{RadarConfig, View};
 
+/// The maps of a frame shortly before or after.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Neighbour {
+    /// Seconds after the frame that is fitted; negative before it.
+    pub offset_s: f64,
+    /// One map a view, C-ordered, missing cells filled.
+    maps: Vec<Vec<f64>>,
+}
+
+impl Neighbour {
+    /// H_ori of a view at that time; empty where there is no such view.
+    pub fn map(&self, view: usize) -> &[f64] {
+        self.maps.get(view).map_or(&[], Vec::as_slice)
+    }
+}
+
 /// Everything a fit needs besides its configuration and its start. Maps are cast to f64 and their missing cells filled
 /// (SPEC section 4).
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +32,7 @@ pub struct Problem {
     pub views: Vec<View>,
     maps: Vec<Vec<f64>>,
     filled: Vec<usize>,
+    neighbours: Vec<Neighbour>,
 }
 
 impl Problem {
@@ -29,19 +46,29 @@ impl Problem {
             return Err(FitError::WrongParameters { what: "maps", got: maps.len(), expected: views.len().max(1) });
         }
         check_skeleton(&skeleton)?;
-        let mut filled_maps = Vec::with_capacity(maps.len());
-        let mut filled = Vec::with_capacity(maps.len());
-        for (view, map) in views.iter().zip(maps) {
-            check_view(view)?;
-            let array = view.array.clone();
-            if map.len() != view.cells() {
-                return Err(FitError::WrongShape { array, got: map.len(), expected: view.cells() });
-            }
-            let mut map = map.to_vec();
-            filled.push(fill_missing(&mut map, &view.shape()).ok_or(FitError::NoFiniteCell { array })?);
-            filled_maps.push(map);
+        views.iter().try_for_each(check_view)?;
+        let (maps, filled) = fill(&views, maps)?;
+        Ok(Self { radar, skeleton, views, maps, filled, neighbours: Vec::new() })
+    }
+
+    /// Adds the maps of a frame shortly before or after: (seconds after this frame, one map a view). The start reads
+    /// velocity and heading from them, and the temporal term its place.
+    ///
+    /// # Errors
+    /// As [`Self::new`] for a map that does not fit or has no finite cell.
+    pub fn add_neighbour(&mut self, offset_s: f64, maps: &[&[f64]]) -> Result<(), FitError> {
+        if maps.len() != self.views.len() {
+            return Err(FitError::WrongParameters { what: "maps", got: maps.len(), expected: self.views.len() });
         }
-        Ok(Self { radar, skeleton, views, maps: filled_maps, filled })
+        let (maps, _) = fill(&self.views, maps)?;
+        self.neighbours.push(Neighbour { offset_s, maps });
+        self.neighbours.sort_by(|a, b| a.offset_s.total_cmp(&b.offset_s));
+        Ok(())
+    }
+
+    /// The frames shortly before and after, in the order of time.
+    pub fn neighbours(&self) -> &[Neighbour] {
+        &self.neighbours
     }
 
     /// H_ori of a view, missing cells filled, C order; empty where there is no such view.
@@ -74,6 +101,21 @@ impl Problem {
         }
         Ok(())
     }
+}
+
+/// Checks the sizes of `maps` and fills their missing cells; also how many were filled in each.
+fn fill(views: &[View], maps: &[&[f64]]) -> Result<(Vec<Vec<f64>>, Vec<usize>), FitError> {
+    let (mut filled_maps, mut filled) = (Vec::with_capacity(maps.len()), Vec::with_capacity(maps.len()));
+    for (view, map) in views.iter().zip(maps) {
+        let array = view.array.clone();
+        if map.len() != view.cells() {
+            return Err(FitError::WrongShape { array, got: map.len(), expected: view.cells() });
+        }
+        let mut map = map.to_vec();
+        filled.push(fill_missing(&mut map, &view.shape()).ok_or(FitError::NoFiniteCell { array })?);
+        filled_maps.push(map);
+    }
+    Ok((filled_maps, filled))
 }
 
 fn check_skeleton(skeleton: &Skeleton) -> Result<(), FitError> {

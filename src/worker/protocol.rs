@@ -1,10 +1,9 @@
 //! What the window and the worker say to each other.
 
-use crate::body::{Pppr, Skeleton};
+use crate::body::Pppr;
 use crate::config::FitConfig;
-use crate::dataset::Frame;
+use crate::dataset::{Dataset, Frame};
 use crate::mhp::{Evaluation, FitState, Initialisation, Masks, Precision, Problem, StepReport, StopReason};
-use crate::radar::{RadarConfig, View};
 use std::sync::Arc;
 
 /// Identifies one fit of one frame; messages of an older job are dropped.
@@ -33,12 +32,8 @@ pub struct Prepare {
     pub job: JobId,
     /// The branch that its rows belong to.
     pub branch: u32,
-    /// The data set's radar.
-    pub radar: RadarConfig,
-    /// The data set's skeleton.
-    pub skeleton: Skeleton,
-    /// The data set's views.
-    pub views: Vec<View>,
+    /// The data set: its radar, skeleton and views, and the frames around.
+    pub dataset: Arc<Dataset>,
     /// The frame.
     pub frame: Arc<Frame>,
     /// Settings.
@@ -64,7 +59,7 @@ pub enum WorkerCommand {
     /// Stop after the current step; the job stays.
     Pause,
     /// Take effect at the next step.
-    Configure(FitConfig),
+    Configure(Box<FitConfig>),
     /// Continue from an earlier state (and perhaps other settings) as a new branch.
     Branch {
         /// Tag of the rows that follow.
@@ -72,7 +67,7 @@ pub enum WorkerCommand {
         /// Where to continue.
         state: Arc<FitState>,
         /// Settings from there on.
-        config: FitConfig,
+        config: Box<FitConfig>,
     },
     /// Replace the parameters at the current iteration by hand.
     Edit(Box<Pppr>),
@@ -83,7 +78,7 @@ pub enum WorkerCommand {
         /// The state.
         state: Arc<FitState>,
         /// The settings that were in force there.
-        config: FitConfig,
+        config: Box<FitConfig>,
     },
     /// Forget the job.
     Discard,
@@ -157,7 +152,7 @@ pub enum WorkerEvent {
         /// The last iteration with the old settings.
         iteration: usize,
         /// The new settings.
-        config: FitConfig,
+        config: Box<FitConfig>,
     },
     /// A run ended.
     Finished {

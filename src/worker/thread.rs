@@ -5,7 +5,8 @@ use super::protocol::{
     HistoryRow, JobId, Prepare, Prepared, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
 };
 use crate::config::FitConfig;
-use crate::mhp::{FitError, FitState, Fitter, Objective, Precision, Problem, StopReason, initialise, masks, simulate};
+use crate::mhp::{FitError, FitState, Fitter, Objective, Precision, Problem, StopReason, masks, predict, simulate};
+use crate::start::{begin, problem_of};
 use crossbeam_channel::{Receiver, Sender};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -211,17 +212,16 @@ enum Reply {
 
 impl Job {
     fn new(prepare: Prepare) -> Result<(Self, Prepared), FitError> {
-        let Prepare { job, branch, radar, skeleton, views, frame, config, precision, start } = prepare;
-        let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-        let problem = Arc::new(Problem::new(radar, skeleton, views, &maps)?);
+        let Prepare { job, branch, dataset, frame, config, precision, start } = prepare;
+        let problem = Arc::new(problem_of(&dataset, &frame)?);
         let began = Instant::now();
         let (initialisation, initial, state) = match start {
             Start::Initialise => {
-                let found = initialise(&problem, &config)?;
+                let found = begin(&problem, &config)?.initialisation;
                 let initial = found.params.clone();
                 (Some(found), initial, None)
             }
-            Start::Warm(params) => (None, params, None),
+            Start::Warm(params) => (None, predict(&problem, &params), None),
             Start::Resume { initial, state } => (None, initial, Some(state)),
         };
         let init_ms = began.elapsed().as_secs_f64() * 1e3;
@@ -310,7 +310,7 @@ impl Job {
                 }
             }
             WorkerCommand::Configure(config) => {
-                self.fitter.set_config(config)?;
+                self.fitter.set_config(*config)?;
                 self.dirty = true;
                 let (branch, iteration) = (self.branch, self.iteration());
                 if iteration == self.branch_start {
@@ -321,7 +321,7 @@ impl Job {
             }
             WorkerCommand::Branch { branch, state, config } => {
                 self.target = 0;
-                self.fitter.set_config(config)?;
+                self.fitter.set_config(*config)?;
                 self.fitter.restore(FitState::clone(&state))?;
                 self.branch = branch;
                 self.branch_start = self.iteration();
@@ -332,7 +332,7 @@ impl Job {
                 self.push_row();
             }
             WorkerCommand::Inspect { branch, state, config } => {
-                return Ok(Reply::Show(Box::new(self.inspect(branch, &state, config))));
+                return Ok(Reply::Show(Box::new(self.inspect(branch, &state, &config))));
             }
             #[expect(clippy::panic, reason = "the test hook that proves the window survives a panic")]
             WorkerCommand::PanicForTest => panic!("asked to panic"),
@@ -341,17 +341,17 @@ impl Job {
         Ok(Reply::Nothing)
     }
 
-    fn inspect(&mut self, branch: u32, state: &FitState, config: FitConfig) -> Snapshot {
-        self.viewer.set_config(config);
+    fn inspect(&mut self, branch: u32, state: &FitState, config: &FitConfig) -> Snapshot {
+        self.viewer.set_config(*config);
         let evaluation = self.viewer.evaluate(&state.params);
-        let h_sim = simulate(&self.problem, &config, Precision::F32, &state.params);
+        let h_sim = simulate(&self.problem, config, Precision::F32, &state.params);
         let masks = (0..h_sim.len()).map(|view| masks(&self.viewer, view, &h_sim[view])).collect();
         Snapshot {
             job: self.id,
             branch,
             iteration: state.iteration,
             live: false,
-            config,
+            config: *config,
             params: state.params.clone(),
             evaluation,
             h_sim,

@@ -21,6 +21,10 @@ const FULLY_LIT: f64 = 2.0;
 /// Percentiles tried for local maxima, strictest first, until [`ENOUGH_PEAKS`] are found.
 const PERCENTILES: [f64; 6] = [99.5, 99.0, 98.0, 96.0, 92.0, 85.0];
 const ENOUGH_PEAKS: usize = 12;
+/// How far below its strongest cell a body is still lit, ln: 26 dB.
+pub(super) const DEPTH_LN: f64 = 3.0;
+/// A step this short ends the search for the point that peaks agree on, m.
+const LOCATED_M: f64 = 1e-4;
 /// At most this many peaks of a view are kept, strongest first.
 const MOST_PEAKS: usize = 40;
 
@@ -35,6 +39,23 @@ pub struct Peak {
     pub value: f64,
     /// H_ori over the background at the same range, ln.
     pub salience: f64,
+}
+
+/// Where an echo lies in a view, in fractions of bins.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Mark {
+    pub view: usize,
+    /// A bin a spatial axis, in the order of the view's axes without Doppler.
+    pub bin: Vec<f64>,
+}
+
+/// What the change from one map to another tells at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Flow {
+    /// Magnitude of the intensity gradient, of the map's steepest.
+    pub steepness: f64,
+    /// 1 where the echo goes away from the radar, −1 where it comes, 0 where nothing tells.
+    pub sign: f64,
 }
 
 /// A view's map without its Doppler axes (the strongest Doppler bin stands for a cell).
@@ -54,7 +75,9 @@ pub(super) struct Evidence<'a> {
 }
 
 impl<'a> Evidence<'a> {
-    pub(super) fn new(index: usize, view: &'a View, map: &[f64]) -> Self {
+    /// `unrest` is how restless each cell of the map is, 0 to 1, where the frames around tell it ([`unrest`]): what stands
+    /// still is no evidence.
+    pub(super) fn new(index: usize, view: &'a View, map: &[f64], unrest: Option<&[f64]>) -> Self {
         let axes: Vec<(usize, &Axis)> =
             view.axes.iter().enumerate().filter(|(_, axis)| axis.kind != AxisKind::Doppler).collect();
         let shape: Vec<usize> = axes.iter().map(|(_, axis)| axis.bins).collect();
@@ -69,6 +92,12 @@ impl<'a> Evidence<'a> {
         }
         let mut evidence = Self { view, index, axes, shape, value, source, salience: vec![], excess: vec![] };
         evidence.subtract_background();
+        if let Some(unrest) = unrest {
+            for (spatial, &cell) in evidence.source.iter().enumerate() {
+                evidence.salience[spatial] *= unrest[cell];
+                evidence.excess[spatial] *= unrest[cell];
+            }
+        }
         evidence
     }
 
@@ -183,12 +212,117 @@ impl<'a> Evidence<'a> {
         cells.map(|cell| self.salience[cell]).fold(0.0, f64::max)
     }
 
+    /// H over the background at a peak of this view, of the map's largest.
+    pub(super) fn excess_of(&self, peak: &Peak) -> f64 {
+        let spatial =
+            self.axes.iter().fold(0, |flat, &(k, axis)| flat * axis.bins + peak.bin.get(k).copied().unwrap_or(0));
+        self.excess.get(spatial).copied().unwrap_or(0.0)
+    }
+
+    /// How steep the map is at a world point, and which way its echo goes from this map to `then`; `None` outside the map
+    /// or where no axis tells a distance.
+    pub(super) fn flow(&self, then: &Evidence<'_>, p_world: Vec3) -> Option<Flow> {
+        let cell = self.cell(p_world)?;
+        let (k, axis) =
+            self.axes.iter().enumerate().find(|(_, (_, axis))| axis.kind.is_depth()).map(|(k, (_, a))| (k, a))?;
+        let steepest = (0..self.value.len()).map(|cell| self.gradient(cell).1).fold(0.0, f64::max);
+        if steepest <= 0.0 {
+            return None;
+        }
+        // Speckle makes one cell's slope a coin toss: the flow is that of the cells around, weighted by their slopes.
+        let (mut change, mut slopes) = (0.0, 0.0);
+        let mut add = |cell: usize| {
+            let (by_axis, _) = self.gradient(cell);
+            let outwards = by_axis[k] * axis.step().signum();
+            let later = then.value.get(cell).copied().unwrap_or(self.value[cell]);
+            change -= outwards * (later - self.value[cell]);
+            slopes += outwards * outwards;
+        };
+        add(cell);
+        for_neighbours(&self.shape, cell, &mut add);
+        let sign = if slopes > 0.0 { change.signum() } else { 0.0 };
+        Some(Flow { steepness: self.gradient(cell).1 / steepest, sign })
+    }
+
+    /// Central differences of H along each spatial axis a bin, and their magnitude.
+    fn gradient(&self, cell: usize) -> (Vec<f64>, f64) {
+        let bins = unravel(cell, &self.shape);
+        let mut stride = self.value.len();
+        let by_axis: Vec<f64> = bins
+            .iter()
+            .zip(&self.shape)
+            .map(|(&bin, &count)| {
+                stride /= count;
+                let (before, after) = (bin.min(1), (count - 1 - bin).min(1));
+                let span = (before + after).max(1) as f64;
+                (self.value[cell + after * stride] - self.value[cell - before * stride]) / span
+            })
+            .collect();
+        let magnitude = by_axis.iter().map(|g| g * g).sum::<f64>().sqrt();
+        (by_axis, magnitude)
+    }
+
+    /// A peak's place.
+    pub(super) fn mark(&self, peak: &Peak) -> Mark {
+        let bin = self.axes.iter().map(|&(k, _)| peak.bin.get(k).map_or(0.0, |&bin| bin as f64));
+        Mark { view: self.index, bin: bin.collect() }
+    }
+
+    /// The middle of what is lit around a world point, within `reach_m` along directions on the floor and up; weights
+    /// are the salience's excess over [`DEPTH_LN`] below the strongest cell there, so that the whole body counts and not
+    /// its brightest part, and the sidelobes do not. `None` where nothing is lit.
+    pub(super) fn centroid(&self, p_world: Vec3, [floor_m, up_m]: [f64; 2]) -> Option<Mark> {
+        let seen = Seen::new(self.view.pose.view_from_world(p_world));
+        let window: Vec<[usize; 2]> = self
+            .axes
+            .iter()
+            .map(|(_, axis)| {
+                let (direction, arm) = seen.direction_and_arm(axis.kind);
+                let up = mat_t_vec(&self.view.pose.rotation, direction)[2].abs();
+                let reach_m = floor_m + (up_m - floor_m) * up;
+                let half = reach_m * seen.slope(axis) / (arm * axis.step().abs());
+                let middle = axis.bin(seen.coordinate(axis, 0.0));
+                let clamp = |bin: f64| bin.clamp(0.0, axis.bins as f64) as usize;
+                [clamp((middle - half).round()), clamp((middle + half).round() + 1.0)]
+            })
+            .collect();
+        let cells = window.iter().zip(&self.shape).fold(vec![0], |cells: Vec<usize>, (&[lo, hi], &bins)| {
+            cells.iter().flat_map(|&cell| (lo..hi).map(move |bin| cell * bins + bin)).collect()
+        });
+        let strongest = cells.iter().map(|&cell| self.salience[cell]).fold(0.0, f64::max);
+        let floor = (strongest - DEPTH_LN).max(SPECKLE);
+        let (mut sum, mut weights) = (vec![0.0; self.axes.len()], 0.0);
+        for cell in cells {
+            let weight = (self.salience[cell] - floor).max(0.0);
+            weights += weight;
+            for (sum, bin) in sum.iter_mut().zip(unravel(cell, &self.shape)) {
+                *sum += weight * bin as f64;
+            }
+        }
+        (weights > 0.0).then(|| Mark { view: self.index, bin: sum.into_iter().map(|sum| sum / weights).collect() })
+    }
+
     /// Radial velocity (m/s) of the strongest Doppler bin at a world point, where the view has a Doppler axis.
     pub(super) fn radial_mps(&self, p_world: Vec3) -> Option<f64> {
         let (k, axis) = self.view.axes.iter().enumerate().find(|(_, axis)| axis.kind == AxisKind::Doppler)?;
         let bins = unravel(self.source[self.cell(p_world)?], &self.view.shape());
         Some(axis.at(bins[k] as f64))
     }
+}
+
+/// How restless each cell is over `maps` (the same view at several times): 0 where the coefficient of variation is below
+/// `still`, 1 where it is above `restless`; `None` for fewer than three maps. The speckle of a person changes from frame to frame, for a chest that breathes moves by wavelengths; a wall's does not.
+pub(super) fn unrest(maps: &[&[f64]], [still, restless]: [f64; 2]) -> Option<Vec<f64>> {
+    let count = maps.len() as f64;
+    let cells = maps.first().filter(|_| maps.len() >= 3)?.len();
+    let of_cell = |cell: usize| {
+        let values = || maps.iter().filter_map(|map| map.get(cell));
+        let mean = values().sum::<f64>() / count;
+        let spread = (values().map(|h| (h - mean) * (h - mean)).sum::<f64>() / count).sqrt();
+        let variation = if mean > 0.0 { spread / mean } else { 0.0 };
+        ((variation - still) / (restless - still)).clamp(0.0, 1.0)
+    };
+    Some((0..cells).map(of_cell).collect())
 }
 
 fn unravel(mut flat: usize, shape: &[usize]) -> Vec<usize> {
@@ -200,15 +334,15 @@ fn unravel(mut flat: usize, shape: &[usize]) -> Vec<usize> {
     bins
 }
 
-/// The world point that best agrees with all `peaks` at once, and the root mean square disagreement, m. What no axis
+/// The world point that best agrees with all `marks` at once, and the root mean square disagreement, m. What no axis
 /// tells stays at the radar's boresight.
-pub(super) fn locate(views: &[View], peaks: &[&Peak]) -> (Vec3, f64) {
+pub(super) fn locate(views: &[View], marks: &[Mark]) -> (Vec3, f64) {
     let mut p = [2.0, 0.0, 0.0];
     let mut misfit = f64::INFINITY;
     for _ in 0..25 {
         let (mut normal, mut pull) = ([[0.0; 3]; 3], [0.0; 3]);
         let (mut squares, mut count) = (0.0, 0.0);
-        for (direction, gap_m) in peaks.iter().flat_map(|peak| equations(&views[peak.view], peak, p)) {
+        for (direction, gap_m) in marks.iter().flat_map(|mark| equations(&views[mark.view], mark, p)) {
             for i in 0..3 {
                 add_scaled(&mut normal[i], direction, direction[i]);
             }
@@ -224,19 +358,22 @@ pub(super) fn locate(views: &[View], peaks: &[&Peak]) -> (Vec3, f64) {
         // A long step would jump to the other side of the radar.
         let length = dot(step, step).sqrt();
         add_scaled(&mut p, step, if length > 1.0 { 1.0 / length } else { 1.0 });
+        if length < LOCATED_M {
+            break;
+        }
     }
     (p, misfit)
 }
 
-/// For each spatial axis of the peak's view: the unit direction in which the coordinate grows (world) and the gap
-/// between the peak's coordinate and that of `p`, m.
-fn equations(view: &View, peak: &Peak, p: Vec3) -> Vec<(Vec3, f64)> {
+/// For each spatial axis of the mark's view: the unit direction in which the coordinate grows (world) and the gap
+/// between the mark's coordinate and that of `p`, m.
+fn equations(view: &View, mark: &Mark, p: Vec3) -> Vec<(Vec3, f64)> {
     let seen = Seen::new(view.pose.view_from_world(p));
-    let spatial = view.axes.iter().zip(&peak.bin).filter(|(axis, _)| axis.kind != AxisKind::Doppler);
+    let spatial = view.axes.iter().filter(|axis| axis.kind != AxisKind::Doppler).zip(&mark.bin);
     spatial
         .map(|(axis, &bin)| {
             let (direction, arm) = seen.direction_and_arm(axis.kind);
-            let gap = (axis.at(bin as f64) - seen.coordinate(axis, 0.0)) * arm / seen.slope(axis);
+            let gap = (axis.at(bin) - seen.coordinate(axis, 0.0)) * arm / seen.slope(axis);
             (mat_t_vec(&view.pose.rotation, direction), gap)
         })
         .collect()

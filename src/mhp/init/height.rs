@@ -1,6 +1,6 @@
 //! How high a body stands: the extent of what is lit above and below the place where it was found.
 
-use super::evidence::{Evidence, SPECKLE};
+use super::evidence::{DEPTH_LN, Evidence, SPECKLE};
 use crate::geometry::Vec3;
 
 /// Where the middle of a body is expected when nothing tells its height: a radar stands at about chest height, m.
@@ -31,11 +31,16 @@ impl Expectation {
     /// Looks for feet and head of a body found near `at`.
     pub(super) fn new(evidence: &[Evidence<'_>], at: Vec3) -> Self {
         let telling: Vec<&Evidence<'_>> = evidence.iter().filter(|e| e.resolves_height(at)).collect();
-        let lit = |z: f64| {
+        let salience = |z: f64| {
             let sum: f64 = telling.iter().map(|e| e.salience_at_height(at, z, REACH_M)).sum();
-            sum / telling.len().max(1) as f64 > SPECKLE
+            sum / telling.len().max(1) as f64
         };
-        let heights: Vec<f64> = (-50..=50).map(|k| at[2] + STEP_M * f64::from(k)).filter(|&z| lit(z)).collect();
+        let profile: Vec<(f64, f64)> =
+            (-50..=50).map(|k| at[2] + STEP_M * f64::from(k)).map(|z| (z, salience(z))).collect();
+        // Where a body is bright its sidelobes rise over the background too, above its head and below its feet.
+        let strongest = profile.iter().map(|(_, salience)| *salience).fold(0.0, f64::max);
+        let level = SPECKLE.max(strongest - DEPTH_LN);
+        let heights: Vec<f64> = profile.into_iter().filter(|(_, salience)| *salience > level).map(|(z, _)| z).collect();
         let extent_m = extent_around(&heights, at[2])
             .filter(|[low, high]| (PLAUSIBLE_M.0..=PLAUSIBLE_M.1).contains(&(high - low)));
         match extent_m {

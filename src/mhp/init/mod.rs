@@ -1,45 +1,67 @@
-//! Initialisation of one person from the maps alone.
+//! Initialisation from the maps alone; paper section 4.1, and for several people 4.4.
 //!
-//! 1. Background off, local maxima above an adaptive percentile ([`evidence`]).
-//! 2. Peaks of different views are paired where their coordinates agree on one point in space.
-//! 3. A standing body is tried at every such point, at several heights and depths. The place where all views show
+//! 1. Background off, and where frames around are known all that stands still; local maxima above an adaptive percentile ([`evidence`]).
+//! 2. P: peaks of different views are paired where their coordinates agree on one point in space, and the points are
+//!    grouped by hierarchical clustering ([`place`]).
+//! 3. A standing body is tried at every group, at several heights and depths. The place where all views show
 //!    the most echo over their background wins: a wall arc has none, a strong echo in one view only has little.
-//! 4. The body is shifted until it covers what is lit, then until L_EM is smallest.
+//! 4. The body is shifted until it covers what is lit.
+//! 5. V: velocities from the Doppler axis or the intensity gradients ([`velocity`]); heading, where asked for, from the
+//!    places in the frames around ([`motion`]).
+//! 6. Every joint gets its Gaussian ([`scatterers`]), and the start is spoiled where the settings ask for it
+//!    ([`perturb`]).
 //!
 //! Nothing here reads a label.
 
 mod evidence;
 mod height;
+mod motion;
+mod perturb;
+mod place;
+mod pose;
+mod scatterers;
 mod template;
+mod velocity;
 
 pub use evidence::Peak;
 
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
-use crate::config::{FitConfig, Summation};
+use crate::config::{FitConfig, Summation, Yaw};
 use crate::geometry::{Vec3, add, norm, scale, sub};
-use evidence::{Evidence, locate};
+use crate::radar::{AxisKind, View};
+use evidence::{Evidence, Mark, locate};
 use height::Expectation;
+use motion::Track;
+use place::Place;
+use pose::Posture;
 use std::sync::Arc;
 use template::Template;
+use velocity::{Radial, Source};
 
-/// Peaks of two views that disagree by more are not one body, m.
-const LARGEST_MISFIT_M: f64 = 0.35;
 /// Places nearer to each other are one, m.
 const DISTINCT_M: f64 = 0.7;
 /// At most this many places are looked at closely.
 const MOST_PLACES: usize = 8;
 /// A place with less than this share of the strongest place's echo is no rival to it.
 const WEAKEST_RIVAL: f64 = 0.3;
-/// Initial standard deviation of a joint's Gaussian, m.
-const INITIAL_SCALE_M: f64 = 0.08;
-/// Height of the ripples of L_EM along a shift of the body.
-const RIPPLE: f64 = 0.02;
+/// Nobody in a room is faster, m/s: a farther jump is somebody else.
+const FASTEST_MPS: f64 = 4.0;
+/// Steps in which a posture's place is looked for, m.
+const POSTURE_STEP_M: f64 = 0.06;
+/// Reach of the search for a body's middle, on the floor and up and down, m: first that of a start that may be at its
+/// edge, then that of a body.
+const WIDE_REACH_M: [f64; 2] = [0.8, 1.3];
+const NARROW_REACH_M: [f64; 2] = [0.6, 1.1];
+/// Views whose middles disagree by more see different things, m.
+const LARGEST_MISFIT_M: f64 = 0.5;
+/// A person is looked for no farther than this from the place that counting gave it, m.
+const SEED_REACH_M: f64 = 0.3;
 
 /// A start for the fit, and how it came about.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Initialisation {
-    /// One person on the problem's skeleton.
+    /// The persons on the problem's skeleton.
     pub params: Pppr,
     /// Local maxima of every view, strongest over the background first within a view.
     pub peaks: Vec<Peak>,
@@ -47,67 +69,252 @@ pub struct Initialisation {
     pub notes: Vec<String>,
 }
 
+/// A person before it has parameters.
+#[derive(Clone)]
+struct Person {
+    at: Vec3,
+    expected: Option<Expectation>,
+    track: Option<Track>,
+    radial: Option<Radial>,
+    posture: Posture,
+}
+
+impl Person {
+    /// The direction in which it looks, on the floor.
+    fn forward(&self, yaw: Yaw) -> [f64; 2] {
+        let walking = self.track.as_ref().filter(|_| yaw == Yaw::Motion).and_then(Track::heading);
+        walking.unwrap_or_else(|| towards_radar(self.at))
+    }
+
+    fn velocity(&self, config: &FitConfig) -> Vec3 {
+        let tracked = self.track.as_ref().filter(|_| config.yaw == Yaw::Motion).map(|track| track.velocity);
+        match (self.radial, tracked) {
+            _ if !config.init.velocity => [0.0; 3],
+            (Some(radial), _) if radial.source == Source::Doppler => radial.vector,
+            (_, Some(velocity)) => velocity,
+            (Some(radial), None) => radial.vector,
+            (None, None) => [0.0; 3],
+        }
+    }
+}
+
+fn towards_radar(at: Vec3) -> [f64; 2] {
+    let distance = at[0].hypot(at[1]);
+    if distance > 0.0 { [-at[0] / distance, -at[1] / distance] } else { [-1.0, 0.0] }
+}
+
 /// Finds one person; SPEC section 2 says what the parameters are.
 ///
 /// # Errors
 /// [`FitError::NoStart`] where no view shows anything above its background.
 pub fn initialise(problem: &Problem, config: &FitConfig) -> Result<Initialisation, FitError> {
+    initialise_people(problem, config, &[])
+}
+
+/// Finds one person near each of `seeds` (world frame, m), or one anywhere where there are none.
+///
+/// # Errors
+/// [`FitError::NoStart`] where no view shows anything above its background.
+pub fn initialise_people(problem: &Problem, config: &FitConfig, seeds: &[Vec3]) -> Result<Initialisation, FitError> {
+    let unrest = motion::unrest(problem);
+    let views = problem.views.iter().zip(&unrest).enumerate();
     let evidence: Vec<Evidence<'_>> =
-        problem.views.iter().enumerate().map(|(k, view)| Evidence::new(k, view, problem.map(k))).collect();
+        views.map(|(k, (view, unrest))| Evidence::new(k, view, problem.map(k), unrest.as_deref())).collect();
     let peaks: Vec<Peak> = evidence.iter().flat_map(Evidence::peaks).collect();
+    let peaks = perturb::drop_some(problem, &config.init, peaks);
     let template = Template::new(&problem.skeleton);
     let mut notes: Vec<String> = (0..problem.views.len())
         .filter(|&k| problem.filled_cells(k) > 0)
         .map(|k| format!("{}: {} missing cells filled", problem.views[k].array, problem.filled_cells(k)))
         .collect();
-    let candidates = candidates(problem, &peaks);
-    notes.push(format!("{} peaks, {} places tried", peaks.len(), candidates.len()));
-    let ranked = |score: &dyn Fn(&[Vec3]) -> f64| {
-        let scored = candidates.iter().map(|&at| (at, score(&template.facing_origin(at))));
-        let mut scored: Vec<(Vec3, f64)> = scored.filter(|(_, score)| *score > 0.0).collect();
-        scored.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let least = WEAKEST_RIVAL * scored.first().map_or(0.0, |(_, score)| *score);
-        scored.into_iter().filter(|(_, score)| *score >= least).map(|(at, _)| at).collect::<Vec<Vec3>>()
+    let found = match seeds {
+        _ if !config.init.position => vec![(middle_of_views(problem), None)],
+        [] => vec![find_one(problem, &evidence, &template, &peaks, &mut notes)?],
+        seeds => seeds.iter().map(|&seed| near(problem, &evidence, seed)).collect(),
     };
-    let mut places = ranked(&|body| shared_excess(&evidence, body));
-    if places.is_empty() {
-        notes.push("the views agree on no place: the strongest echo of one view was taken".to_owned());
-        places = ranked(&|body| evidence.iter().map(|e| e.mean_excess(body)).sum());
+    let around = motion::around(problem, &unrest);
+    let mut persons = Vec::with_capacity(found.len());
+    for (at, expected) in found {
+        let track = motion::track(problem, &around, at);
+        let radial = velocity::radial(problem, &evidence, &around, at, config.init.velocity_gain_mps);
+        persons.push(Person { at, expected, track, radial, posture: Posture::Standing });
     }
-    let Some((at, expected)) = most_bodily(&evidence, &template, &places) else {
-        return Err(FitError::NoStart { reason: format!("none of {} peaks stands above its background", peaks.len()) });
-    };
-    let at = settle(problem, config, &evidence, &template, expected, at)?;
-    let (params, velocity_note) = standing(problem, &evidence, &template, at);
-    notes.push(format!("standing at x {:.2} m, y {:.2} m, facing the radar", at[0], at[1]));
-    notes.push(match expected.extent_m {
-        Some([low, high]) => format!("feet at z {low:.2} m and head at {high:.2} m seen"),
-        None => format!("no feet and head seen: middle of the body expected at z {:.2} m", expected.middle_m),
-    });
-    notes.push(velocity_note);
+    if config.starts > 1 {
+        choose_postures(problem, config, &template, &mut persons)?;
+    }
+    let mut params = assemble(problem, config, &template, &persons);
+    perturb::spoil(problem, &config.init, &mut params);
+    notes.extend(persons.iter().flat_map(|person| tell(person, config)));
     Ok(Initialisation { params, peaks, notes })
 }
 
-/// Points where peaks of two views may be one body; each peak by itself where no two agree or there is one view.
-fn candidates(problem: &Problem, peaks: &[Peak]) -> Vec<Vec3> {
-    let mut found = Vec::new();
-    for (i, a) in peaks.iter().enumerate() {
-        for b in peaks.iter().skip(i + 1).filter(|b| b.view != a.view) {
-            found.push(locate(&problem.views, &[a, b]));
+/// Gives each person the posture whose L_EM is smallest where it stands best near its place; the place itself is left
+/// to the fit.
+fn choose_postures(
+    problem: &Problem,
+    config: &FitConfig,
+    template: &Template,
+    persons: &mut [Person],
+) -> Result<(), FitError> {
+    let config = FitConfig { summation: Summation::Incoherent, w_time: 0.0, ..*config };
+    let problem = Arc::new(problem.clone());
+    for k in 0..persons.len() {
+        let walks = persons[k].track.as_ref().is_some_and(|track| track.heading().is_some());
+        let mut best: Option<(f64, Posture)> = None;
+        for posture in pose::tried(config.starts, walks) {
+            let own = |at: Vec3| Person { at, posture, ..persons[k].clone() };
+            let body = |at: Vec3| assemble(&problem, &config, template, &[own(at)]);
+            let at = persons[k].at;
+            let objective = Objective::new(Arc::clone(&problem), config, Precision::F32, &body(at))?;
+            let mut lowest = f64::INFINITY;
+            descend(at, POSTURE_STEP_M, 0, |p| {
+                let loss = objective.em_loss(&body(p));
+                lowest = lowest.min(loss);
+                loss
+            });
+            if best.is_none_or(|(loss, _)| lowest < loss) {
+                best = Some((lowest, posture));
+            }
+        }
+        if let Some((_, posture)) = best {
+            persons[k].posture = posture;
         }
     }
-    let sound = |(p, misfit): &(Vec3, f64)| *misfit < LARGEST_MISFIT_M && norm(*p).is_finite();
-    found.retain(sound);
-    if found.is_empty() {
-        found = peaks.iter().map(|peak| locate(&problem.views, &[peak])).filter(sound).collect();
+    Ok(())
+}
+
+/// A warm start: the persons of the frame before, moved as the maps of the two frames say that each of them moved.
+/// Without that frame among those around they stay where they are.
+pub fn predict(problem: &Problem, before: &Pppr) -> Pppr {
+    let mut params = before.clone();
+    let Some(last) = problem.neighbours().iter().rev().find(|neighbour| neighbour.offset_s < 0.0) else {
+        return params;
+    };
+    let unrest = motion::unrest(problem);
+    let views = || problem.views.iter().zip(&unrest).enumerate();
+    let then: Vec<Evidence<'_>> =
+        views().map(|(k, (view, unrest))| Evidence::new(k, view, last.map(k), unrest.as_deref())).collect();
+    let now: Vec<Evidence<'_>> =
+        views().map(|(k, (view, unrest))| Evidence::new(k, view, problem.map(k), unrest.as_deref())).collect();
+    let joints = params.shape().joints;
+    for (person, at) in super::region::centres(before).into_iter().enumerate() {
+        let from = centre(problem, &then, at);
+        let way = sub(centre(problem, &now, from), from);
+        let far = way[0].hypot(way[1]) > FASTEST_MPS * -last.offset_s;
+        if far || !way.iter().all(|x| x.is_finite()) {
+            continue;
+        }
+        for joint in person * joints..(person + 1) * joints {
+            // Heights are read too coarsely to follow them from frame to frame.
+            let moved = add(params.position(joint), [way[0], way[1], 0.0]);
+            params.set_vec3(Group::Position, joint, moved);
+        }
     }
-    // A body stands behind its nearest echo, and its brightest part may be high or low on it.
-    let places = found.iter().flat_map(|(p, _)| {
+    params
+}
+
+/// Where a line through each person's places in this frame and those around says that the mean of its joints is, world
+/// frame, m; a person whom no frame around shows stays where it is. Empty without frames around.
+pub(super) fn anchors(problem: &Problem, config: &FitConfig, params: &Pppr) -> Vec<Vec3> {
+    if problem.neighbours().is_empty() {
+        return Vec::new();
+    }
+    let unrest = motion::unrest(problem);
+    let views = problem.views.iter().zip(&unrest).enumerate();
+    let evidence: Vec<Evidence<'_>> =
+        views.map(|(k, (view, unrest))| Evidence::new(k, view, problem.map(k), unrest.as_deref())).collect();
+    let around = motion::around(problem, &unrest);
+    let (joints, template) = (params.shape().joints.max(1), Template::new(&problem.skeleton));
+    let of_person = |(person, middle): (usize, Vec3)| {
+        let own = person * joints..(person + 1) * joints;
+        let mean = scale(own.fold([0.0; 3], |sum, joint| add(sum, params.position(joint))), 1.0 / joints as f64);
+        let lit = centre(problem, &evidence, middle);
+        let Some(track) = motion::track(problem, &around, lit) else { return mean };
+        // What is lit is skin; the joints lie behind it, and their mean above the middle of their height.
+        let behind = scale(track.at, config.surface_offset_m / norm(track.at).max(0.5));
+        add(add(track.at, behind), [0.0, 0.0, template.mean_over_middle_m()])
+    };
+    super::region::centres(params).into_iter().enumerate().map(of_person).collect()
+}
+
+/// The strongest place where somebody stands.
+fn find_one(
+    problem: &Problem,
+    evidence: &[Evidence<'_>],
+    template: &Template,
+    peaks: &[Peak],
+    notes: &mut Vec<String>,
+) -> Result<(Vec3, Option<Expectation>), FitError> {
+    let places = place::places(problem, evidence, peaks);
+    notes.push(format!("{} peaks, {} places tried", peaks.len(), places.len()));
+    let mut ranked = rank(&places, template, |body| shared_excess(evidence, body));
+    if ranked.is_empty() {
+        notes.push("the views agree on no place: the strongest echo of one view was taken".to_owned());
+        ranked = rank(&places, template, |body| evidence.iter().map(|e| e.mean_excess(body)).sum());
+    }
+    let (at, expected) = most_bodily(evidence, template, &ranked).ok_or_else(|| FitError::NoStart {
+        reason: format!("none of {} peaks stands above its background", peaks.len()),
+    })?;
+    let at = centre(problem, evidence, at);
+    Ok((at, Some(expected)))
+}
+
+/// The body that is lit near `seed`.
+fn near(problem: &Problem, evidence: &[Evidence<'_>], seed: Vec3) -> (Vec3, Option<Expectation>) {
+    let at = centre(problem, evidence, seed);
+    // Somebody else may shine brighter: a person is not looked for beyond arm's reach of the place it was given.
+    let strayed = (at[0] - seed[0]).hypot(at[1] - seed[1]) > SEED_REACH_M;
+    let at = if strayed { [seed[0], seed[1], at[2]] } else { at };
+    (at, Some(Expectation::new(evidence, at)))
+}
+
+/// The middle of what all views show lit around `at`, on the body's axis: the echoes come from the skin before it. Where
+/// height is not seen it stays.
+fn centre(problem: &Problem, evidence: &[Evidence<'_>], mut at: Vec3) -> Vec3 {
+    for reach_m in [WIDE_REACH_M, NARROW_REACH_M, NARROW_REACH_M] {
+        let marks: Vec<Mark> = evidence.iter().filter_map(|e| e.centroid(at, reach_m)).collect();
+        if marks.is_empty() {
+            break;
+        }
+        let (found, misfit) = locate(&problem.views, &marks);
+        if misfit > LARGEST_MISFIT_M || !found.iter().all(|x| x.is_finite()) {
+            break;
+        }
+        let height_seen = evidence.iter().any(|e| e.resolves_height(found));
+        at = if height_seen { found } else { [found[0], found[1], at[2]] };
+    }
+    // The middle of what is lit says little of a body's height: heads outshine feet, or the other way round.
+    [at[0], at[1], Expectation::new(evidence, at).middle_m]
+}
+
+/// The middle of what the first view covers: where a body stands when nothing may be read from the peaks.
+fn middle_of_views(problem: &Problem) -> Vec3 {
+    let middle = |(view, v): (usize, &View)| {
+        let spatial = v.axes.iter().filter(|axis| axis.kind != AxisKind::Doppler);
+        Mark { view, bin: spatial.map(|axis| axis.bins as f64 / 2.0).collect() }
+    };
+    locate(&problem.views, &problem.views.iter().enumerate().map(middle).collect::<Vec<_>>()).0
+}
+
+/// Bodies at `places`, at several heights and depths each, best first: a body stands behind its nearest echo, and its
+/// brightest part may be high or low on it.
+fn rank(places: &[Place], template: &Template, score: impl Fn(&[Vec3]) -> f64) -> Vec<Vec3> {
+    let moved = places.iter().flat_map(|place| {
         [0.0, 0.15].into_iter().flat_map(move |behind| {
-            [-0.6, -0.3, 0.0, 0.3, 0.6].map(|up| add(scale(*p, 1.0 + behind / norm(*p).max(0.5)), [0.0, 0.0, up]))
+            [-0.6, -0.3, 0.0, 0.3, 0.6]
+                .map(|up| add(scale(place.at, 1.0 + behind / norm(place.at).max(0.5)), [0.0, 0.0, up]))
         })
     });
-    places.collect()
+    let scored = moved.map(|at| (at, score(&template.facing(at, towards_radar(at)))));
+    let mut scored: Vec<(Vec3, f64)> = scored.filter(|(_, score)| *score > 0.0).collect();
+    scored.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let least = WEAKEST_RIVAL * scored.first().map_or(0.0, |(_, score)| *score);
+    scored.into_iter().filter(|(_, score)| *score >= least).map(|(at, _)| at).collect()
+}
+
+/// Mean share of the body that lies on what is lit, over the views.
+fn lit(evidence: &[Evidence<'_>], body: &[Vec3]) -> f64 {
+    evidence.iter().map(|e| e.mean_lit(body)).sum::<f64>() / evidence.len().max(1) as f64
 }
 
 /// The first of the strongest distinct `places` where something stands from feet to head, or the strongest: a corner of
@@ -163,74 +370,59 @@ fn descend(start: Vec3, step_m: f64, halvings: usize, mut cost: impl FnMut(Vec3)
 /// Shifts the body until as much of it as possible lies on what is lit in every view.
 fn cover(evidence: &[Evidence<'_>], template: &Template, at: Vec3) -> Vec3 {
     let expected = Expectation::new(evidence, at);
-    descend(at, 0.2, 3, |p| {
-        let body = template.facing_origin(p);
-        let lit: f64 = evidence.iter().map(|e| e.mean_lit(&body)).sum::<f64>() / evidence.len().max(1) as f64;
-        expected.cost(p[2]) - lit
-    })
+    descend(at, 0.2, 3, |p| expected.cost(p[2]) - lit(evidence, &template.facing(p, towards_radar(p))))
 }
 
-/// Shifts the body until L_EM is smallest, in the EM region around where it was found.
-fn settle(
-    problem: &Problem,
-    config: &FitConfig,
-    evidence: &[Evidence<'_>],
-    template: &Template,
-    expected: Expectation,
-    at: Vec3,
-) -> Result<Vec3, FitError> {
-    let start = standing(problem, evidence, template, at).0;
-    // Where the joints are is not known to a wavelength, so their interference says nothing yet.
-    let config = FitConfig { summation: Summation::Incoherent, ..*config };
-    let objective = Objective::new(Arc::new(problem.clone()), config, Precision::F32, &start)?;
-    let mut cost = |p: Vec3| {
-        let loss = objective.em_loss(&standing(problem, evidence, template, p).0);
-        loss + expected.cost(p[2])
-    };
-    let mut at = descend(at, 0.1, 1, &mut cost);
-    for (axis, reach_m) in [(2, 0.6), (0, 0.3), (1, 0.3)] {
-        at[axis] += mean_shift(reach_m, |shift| {
-            let mut moved = at;
-            moved[axis] += shift;
-            cost(moved)
-        });
-    }
-    Ok(at)
-}
-
-/// The mean shift within ± `reach_m` under exp(−cost/T). L_EM along a shift of the body is a wide valley with ripples
-/// where single joints meet single speckles; its deepest ripple says less than its middle.
-fn mean_shift(reach_m: f64, mut cost: impl FnMut(f64) -> f64) -> f64 {
-    let shifts: Vec<f64> = (-6..=6).map(|k| reach_m * f64::from(k) / 6.0).collect();
-    let costs: Vec<f64> = shifts.iter().map(|&shift| cost(shift)).collect();
-    let lowest = costs.iter().copied().fold(f64::INFINITY, f64::min);
-    let (mut sum, mut weights) = (0.0, 0.0);
-    for (shift, cost) in shifts.into_iter().zip(costs).filter(|(_, cost)| cost.is_finite()) {
-        let weight = (-(cost - lowest) / RIPPLE).exp();
-        sum += weight * shift;
-        weights += weight;
-    }
-    if weights > 0.0 { sum / weights } else { 0.0 }
-}
-
-/// The parameters of a body that stands at `at`.
-fn standing(problem: &Problem, evidence: &[Evidence<'_>], template: &Template, at: Vec3) -> (Pppr, String) {
-    let body = template.facing_origin(at);
+/// The parameters of `persons`, standing.
+fn assemble(problem: &Problem, config: &FitConfig, template: &Template, persons: &[Person]) -> Pppr {
+    let joints = problem.skeleton.joints.len();
     let doppler_features = problem.radar.doppler_features;
-    let mut params = Pppr::zeros(PpprShape { persons: 1, joints: body.len(), doppler_features });
-    let radial = evidence.iter().zip(&problem.views).find_map(|(e, view)| {
-        let from_radar = sub(at, view.pose.world_from_view([0.0; 3]));
-        e.radial_mps(at).map(|v| (v, scale(from_radar, v / norm(from_radar).max(1e-6))))
-    });
-    for (joint, &p) in body.iter().enumerate() {
-        params.set_vec3(Group::Position, joint, p);
-        params.set_vec3(Group::LogScale, joint, [INITIAL_SCALE_M.ln(); 3]);
-        params.joint_mut(Group::Rotation, joint).copy_from_slice(&[1.0, 0.0, 0.0, 0.0]);
-        params.set_vec3(Group::Velocity, joint, radial.map_or([0.0; 3], |(_, v)| v));
+    let mut params = Pppr::zeros(PpprShape { persons: persons.len(), joints, doppler_features });
+    for (k, person) in persons.iter().enumerate() {
+        let velocity = person.velocity(config);
+        let body = pose::posed(template, &problem.skeleton, person.posture);
+        let mut at = person.at;
+        if config.w_floor > 0.0 {
+            at[2] = body.middle_m() - config.radar_height_m;
+        }
+        for (joint, p) in body.facing(at, person.forward(config.yaw)).into_iter().enumerate() {
+            params.set_vec3(Group::Position, k * joints + joint, p);
+            params.set_vec3(Group::Velocity, k * joints + joint, velocity);
+        }
     }
-    let note = match radial {
-        Some((v, _)) => format!("radial velocity {v:.2} m/s from the Doppler axis"),
-        None => "velocity 0: no Doppler axis".to_owned(),
-    };
-    (params, note)
+    scatterers::dress(&mut params, &problem.skeleton, config.scatterers);
+    params
+}
+
+/// What was found of a person, in words.
+fn tell(person: &Person, config: &FitConfig) -> Vec<String> {
+    let at = person.at;
+    let walking = person.track.filter(|track| config.yaw == Yaw::Motion && track.heading().is_some());
+    let mut notes = vec![match walking {
+        Some(track) => format!(
+            "standing at x {:.2} m, y {:.2} m, facing where it goes: {:.2} m/s over {} frames",
+            at[0],
+            at[1],
+            track.velocity[0].hypot(track.velocity[1]),
+            track.frames
+        ),
+        None => format!("standing at x {:.2} m, y {:.2} m, facing the radar", at[0], at[1]),
+    }];
+    notes.push(match person.expected.map(|expected| (expected.extent_m, expected.middle_m)) {
+        Some((Some([low, high]), _)) => format!("feet at z {low:.2} m and head at {high:.2} m seen"),
+        Some((None, middle)) => format!("no feet and head seen: middle of the body expected at z {middle:.2} m"),
+        None => "position not read from the peaks: the middle of the views".to_owned(),
+    });
+    notes.push(match person.radial {
+        _ if !config.init.velocity => "velocity 0: not read from the maps".to_owned(),
+        Some(Radial { mps, source: Source::Doppler, .. }) => {
+            format!("radial velocity {mps:.2} m/s from the Doppler axis")
+        }
+        Some(Radial { mps, source: Source::Gradient, .. }) if walking.is_none() => {
+            format!("radial velocity {mps:.2} m/s from the intensity gradient")
+        }
+        _ if walking.is_some() => "velocity from the frames around".to_owned(),
+        _ => "velocity 0: no Doppler axis and no frame around".to_owned(),
+    });
+    notes
 }

@@ -15,6 +15,8 @@ const RELAXATIONS: usize = 400;
 pub(super) struct Template {
     /// One position a joint.
     pub joints: Vec<Vec3>,
+    /// How far the top of the head lies above the highest joint when standing, m.
+    pub crown_m: f64,
 }
 
 impl Template {
@@ -30,15 +32,25 @@ impl Template {
         for joint in &mut joints {
             joint[2] += sunk;
         }
-        Self { joints }
+        let crown_m = (TABLE_HEIGHT_M * size - highest(&joints)).max(0.0);
+        Self { joints, crown_m }
     }
 
-    /// The joints of a person who stands at `at` (middle of the joints' height, m, world) and looks at the origin.
-    pub(super) fn facing_origin(&self, at: Vec3) -> Vec<Vec3> {
-        let (low, high) = (lowest(&self.joints), highest(&self.joints));
-        let middle = f64::midpoint(low, high);
-        let distance = at[0].hypot(at[1]);
-        let forward = if distance > 0.0 { [-at[0] / distance, -at[1] / distance] } else { [-1.0, 0.0] };
+    /// Height of the body's middle above its soles: half way to the top of the head, m.
+    pub(super) fn middle_m(&self) -> f64 {
+        0.5 * (highest(&self.joints) + self.crown_m)
+    }
+
+    /// How far the mean of the joints lies above the body's middle, m.
+    pub(super) fn mean_over_middle_m(&self) -> f64 {
+        let mean = self.joints.iter().map(|j| j[2]).sum::<f64>() / self.joints.len().max(1) as f64;
+        mean - self.middle_m()
+    }
+
+    /// The joints of a person who stands at `at` (the body's middle, half way from soles to crown, m, world) and looks along
+    /// `forward`, a unit vector on the floor.
+    pub(super) fn facing(&self, at: Vec3, forward: [f64; 2]) -> Vec<Vec3> {
+        let middle = self.middle_m();
         let place = |j: &Vec3| {
             [
                 at[0] + forward[0] * j[0] - forward[1] * j[1],
@@ -193,7 +205,7 @@ mod tests {
     #[test]
     fn faces_the_radar() {
         let face = skeleton(&["nose", "left_shoulder", "right_shoulder"], &[[0, 1], [0, 2]], &[0.25, 0.25]);
-        let joints = Template::new(&face).facing_origin([3.0, 1.0, 0.0]);
+        let joints = Template::new(&face).facing([3.0, 1.0, 0.0], [-3.0 / 10f64.sqrt(), -1.0 / 10f64.sqrt()]);
         assert!(joints[0][0].hypot(joints[0][1]) < joints[1][0].hypot(joints[1][1]), "the nose is nearest");
         // Looking back along −x, the person's left is the radar's right: smaller azimuth.
         assert!(joints[1][1].atan2(joints[1][0]) < joints[2][1].atan2(joints[2][0]));

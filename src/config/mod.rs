@@ -1,6 +1,15 @@
 //! `FitConfig`: every number that steers a fit, with its default, range and explanation.
 //!
-//! This is the only source: the command line, the sliders, their tooltips and `FIT.toml` all read [`FIELDS`].
+//! This is the only source: the command line, the sliders, their tooltips and `FIT.toml` all read [`FIELDS`]. The default is the
+//! paper's setting; [`Preset`] names it and the recommended one.
+
+mod fields;
+mod init;
+mod preset;
+
+pub use fields::{FIELDS, Field, FieldGroup};
+pub use init::{InitConfig, LearningRates, Parameterization, Scatterers, Yaw};
+pub use preset::Preset;
 
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -112,8 +121,28 @@ pub struct FitConfig {
     pub learning_rate: f64,
     /// Stop the run as soon as the convergence criterion holds.
     pub stop_when_converged: bool,
+    /// What Adam moves: every joint by itself, or a root and the bones' directions.
+    pub parameterization: Parameterization,
+    /// What the start's Gaussians look like.
+    pub scatterers: Scatterers,
+    /// Where the start looks.
+    pub yaw: Yaw,
+    /// Persons that are fitted; 0: as many as are counted.
+    pub people: usize,
+    /// Start poses that are tried.
+    pub starts: usize,
+    /// Weight of the temporal term.
+    pub w_time: f64,
+    /// Weight of the floor term.
+    pub w_floor: f64,
+    /// How high the radar stands above the floor, m.
+    pub radar_height_m: f64,
     /// The four operators.
     pub operators: Operators,
+    /// Step sizes of single groups.
+    pub learning_rates: LearningRates,
+    /// How a start is found, and spoiled on purpose.
+    pub init: InitConfig,
 }
 
 impl Default for FitConfig {
@@ -132,134 +161,20 @@ impl Default for FitConfig {
             iterations: 100,
             learning_rate: 1e-3,
             stop_when_converged: false,
+            parameterization: Parameterization::default(),
+            scatterers: Scatterers::default(),
+            yaw: Yaw::default(),
+            people: 1,
+            starts: 1,
+            w_time: 0.0,
+            w_floor: 0.0,
+            radar_height_m: 1.0,
             operators: Operators::default(),
+            learning_rates: LearningRates::default(),
+            init: InitConfig::default(),
         }
     }
 }
-
-/// How a number of [`FitConfig`] is edited and explained.
-pub struct Field {
-    /// The key in `FIT.toml`.
-    pub key: &'static str,
-    /// The label on screen, in the paper's notation.
-    pub label: &'static str,
-    /// Meaning and formula.
-    pub help: &'static str,
-    /// Unit, or "".
-    pub unit: &'static str,
-    /// Inclusive range that is accepted.
-    pub range: (f64, f64),
-    /// Whether the slider is logarithmic.
-    pub logarithmic: bool,
-    /// Reads the number.
-    pub get: fn(&FitConfig) -> f64,
-    /// Writes the number.
-    pub set: fn(&mut FitConfig, f64),
-}
-
-/// Every number of [`FitConfig`], in the order it is shown.
-pub const FIELDS: &[Field] = &[
-    Field {
-        key: "w_em",
-        label: "w_EM",
-        help: "Weight of the electromagnetic term: L = w_EM·L_EM + w_kine·L_kine, L_EM = 1 − soft IoU of the masks of H_sim and H_ori.",
-        unit: "",
-        range: (0.0, 1000.0),
-        logarithmic: true,
-        get: |c| c.w_em,
-        set: |c, x| c.w_em = x,
-    },
-    Field {
-        key: "w_kine",
-        label: "w_kine",
-        help: "Weight of the kinematic terms: bone lengths, rigid motion, joint angles, and for several people separation and collision.",
-        unit: "",
-        range: (0.0, 1000.0),
-        logarithmic: true,
-        get: |c| c.w_kine,
-        set: |c, x| c.w_kine = x,
-    },
-    Field {
-        key: "tau_pct",
-        label: "τ_pct",
-        help: "Share of the EM region's cells that a mask holds: B = [H > P_{100−τ}(H)].",
-        unit: "%",
-        range: (0.1, 99.9),
-        logarithmic: true,
-        get: |c| c.tau_pct,
-        set: |c, x| c.tau_pct = x,
-    },
-    Field {
-        key: "softness",
-        label: "T (softness)",
-        help: "Temperature of the soft mask m = σ((ln H_sim − ln P)/T): small is sharp, large spreads the gradient.",
-        unit: "",
-        range: (0.01, 10.0),
-        logarithmic: true,
-        get: |c| c.softness,
-        set: |c, x| c.softness = x,
-    },
-    Field {
-        key: "learning_rate",
-        label: "Learning rate",
-        help: "Adam's step size for every group (m, ln m, m/s, … a step).",
-        unit: "",
-        range: (1e-6, 1.0),
-        logarithmic: true,
-        get: |c| c.learning_rate,
-        set: |c, x| c.learning_rate = x,
-    },
-    Field {
-        key: "iterations",
-        label: "Iterations",
-        help: "Adam steps of a run.",
-        unit: "",
-        range: (1.0, 100_000.0),
-        logarithmic: true,
-        get: |c| c.iterations as f64,
-        set: |c, x| c.iterations = x.round().max(0.0) as usize,
-    },
-    Field {
-        key: "theta_max_deg",
-        label: "θ_max",
-        help: "Largest elbow and knee angle; beyond it L_joint = Σ max(0, θ − θ_max)² grows.",
-        unit: "°",
-        range: (0.0, 180.0),
-        logarithmic: false,
-        get: |c| c.theta_max_deg,
-        set: |c, x| c.theta_max_deg = x,
-    },
-    Field {
-        key: "surface_offset_m",
-        label: "δ (skin)",
-        help: "The echo of a body comes from its skin, not from the joint: p is moved this far towards the radar. 0 is the paper.",
-        unit: "m",
-        range: (0.0, 0.5),
-        logarithmic: false,
-        get: |c| c.surface_offset_m,
-        set: |c, x| c.surface_offset_m = x,
-    },
-    Field {
-        key: "d_sep_m",
-        label: "d_sep",
-        help: "Several people: centroids closer than this are pushed apart, L_sep = Σ max(0, d_sep − ‖c_s − c_t‖)².",
-        unit: "m",
-        range: (0.0, 5.0),
-        logarithmic: false,
-        get: |c| c.d_sep_m,
-        set: |c, x| c.d_sep_m = x,
-    },
-    Field {
-        key: "d_joint_m",
-        label: "d_joint",
-        help: "Several people: joints closer than this are pushed apart, L_coll = Σ max(0, d_joint − ‖p_sm − p_tn‖)².",
-        unit: "m",
-        range: (0.0, 1.0),
-        logarithmic: false,
-        get: |c| c.d_joint_m,
-        set: |c, x| c.d_joint_m = x,
-    },
-];
 
 /// What is wrong with a configuration.
 #[derive(Debug, thiserror::Error)]
@@ -306,6 +221,11 @@ impl FitConfig {
             let (value, (lo, hi)) = ((field.get)(&self), field.range);
             if !(lo..=hi).contains(&value) {
                 return Err(ConfigError::OutOfRange { key: field.key, value, lo, hi });
+            }
+        }
+        for (key, value) in self.learning_rates.given() {
+            if !(0.0..=1.0).contains(&value) {
+                return Err(ConfigError::OutOfRange { key, value, lo: 0.0, hi: 1.0 });
             }
         }
         Ok(self)
@@ -364,7 +284,7 @@ fn offset_of(text: &str, key: &str) -> Option<usize> {
     text.split_inclusive('\n').find_map(|line| {
         let here = at;
         at += line.len();
-        let rest = line.trim_start().strip_prefix(key)?;
+        let rest = line.trim_start().strip_prefix(key.rsplit('.').next().unwrap_or(key))?;
         rest.trim_start().starts_with('=').then_some(here)
     })
 }
@@ -397,7 +317,7 @@ mod tests {
     fn a_wrong_key_or_value_names_file_line_key_and_expectation() {
         let text = refusal("w_em = 1\nw_kin = 2\n");
         assert!(text.starts_with("fit.toml:2: unknown key `w_kin`; expected one of `w_em`, `w_kine`"), "{text}");
-        assert_eq!(refusal("\ntau_pct = 100\n"), "fit.toml:2: tau_pct is 100; expected a number in 0.1 ..= 99.9");
+        assert_eq!(refusal("\ntau_pct = 101\n"), "fit.toml:2: tau_pct is 101; expected a number in 0.1 ..= 100");
         let text = refusal("iterations = -1");
         assert!(text.starts_with("fit.toml:1: ") && !text.contains('\n'), "{text}");
         let text = refusal("em_region = \"half\"");

@@ -1,0 +1,155 @@
+//! Postures that a start may have: standing, walking at several moments of a stride, arms raised, sitting.
+//!
+//! A fit moves limbs by centimetres, a stride moves them by half a metre: what limb is where has to be guessed before. Each
+//! posture is the standing template with its limbs turned about hips, knees, shoulders and elbows, found by their names; a
+//! skeleton without such names only stands. The angles are textbook ones: legs and arms swing as sines, half a stride apart.
+
+use super::template::Template;
+use crate::body::{Side, Skeleton};
+use crate::geometry::{Vec3, add, mat_vec, rotation_from_quaternion, sub};
+use std::f64::consts::TAU;
+
+/// How a body holds its limbs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Posture {
+    Standing,
+    /// Share of a stride since the left leg was farthest ahead.
+    Walking(f64),
+    /// Both arms raised sideways, or to the front.
+    ArmsSideways,
+    ArmsForward,
+    Sitting,
+}
+
+/// Postures in the order in which they are tried; a person who walks is not tried sitting, nor one who stands walking.
+pub(super) fn tried(starts: usize, walks: bool) -> Vec<Posture> {
+    let others = if walks {
+        (0..starts.saturating_sub(1)).map(|k| Posture::Walking(k as f64 / (starts - 1) as f64)).collect()
+    } else {
+        vec![Posture::ArmsForward, Posture::ArmsSideways, Posture::Sitting]
+    };
+    std::iter::once(Posture::Standing).chain(others).take(starts.max(1)).collect()
+}
+
+/// Flexion of a limb forwards at its upper and its lower joint, and its spread sideways, rad.
+struct Limb {
+    upper: f64,
+    lower: f64,
+    spread: f64,
+}
+
+impl Posture {
+    fn leg(self, side: Side) -> Limb {
+        match self {
+            Self::Walking(stride) => {
+                let phase = TAU * (stride + if side == Side::Left { 0.0 } else { 0.5 });
+                // The knee bends while the leg swings forward.
+                let swinging = (-phase.sin()).max(0.0);
+                Limb { upper: 0.17 + 0.38 * phase.cos(), lower: -0.15 - 0.85 * swinging, spread: 0.0 }
+            }
+            Self::Sitting => Limb { upper: 1.4, lower: -1.4, spread: 0.0 },
+            _ => Limb { upper: 0.0, lower: 0.0, spread: 0.0 },
+        }
+    }
+
+    fn arm(self, side: Side) -> Limb {
+        match self {
+            Self::Walking(stride) => {
+                let phase = TAU * (stride + if side == Side::Left { 0.5 } else { 0.0 });
+                Limb { upper: 0.1 + 0.35 * phase.cos(), lower: 0.4 + 0.15 * phase.cos(), spread: 0.0 }
+            }
+            Self::ArmsSideways => Limb { upper: 0.0, lower: 0.0, spread: 1.7 },
+            Self::ArmsForward => Limb { upper: 1.6, lower: 0.1, spread: 0.0 },
+            _ => Limb { upper: 0.0, lower: 0.0, spread: 0.0 },
+        }
+    }
+}
+
+/// The template in `posture`; feet on the height where the template's are.
+pub(super) fn posed(template: &Template, skeleton: &Skeleton, posture: Posture) -> Template {
+    let mut joints = template.joints.clone();
+    let floor = lowest(&joints);
+    for side in [Side::Left, Side::Right] {
+        let named = |words: &[&str]| -> Vec<usize> {
+            let is = |joint: &usize| {
+                let name = skeleton.joints[*joint].to_lowercase();
+                skeleton.side(*joint) == side && name.split(['_', ' ', '-']).any(|word| words.contains(&word))
+            };
+            (0..skeleton.joints.len()).filter(is).collect()
+        };
+        let ends = (named(&["ankle", "heel", "foot", "toe"]), named(&["wrist", "hand"]));
+        bend(&mut joints, &named(&["hip"]), &named(&["knee"]), &ends.0, &posture.leg(side), side);
+        bend(&mut joints, &named(&["shoulder"]), &named(&["elbow"]), &ends.1, &posture.arm(side), side);
+    }
+    let sunk = floor - lowest(&joints);
+    for joint in &mut joints {
+        joint[2] += sunk;
+    }
+    Template { joints, crown_m: template.crown_m }
+}
+
+/// Turns the upper part of a limb and what hangs on it, then the lower part.
+fn bend(joints: &mut [Vec3], top: &[usize], middle: &[usize], ends: &[usize], limb: &Limb, side: Side) {
+    let (&[top], &[middle]) = (top, middle) else { return };
+    // Forwards is a turn about −y of what hangs down; sideways one about x, away from the body.
+    let outwards = if side == Side::Left { limb.spread } else { -limb.spread };
+    let (pivot, knee) = (joints[top], std::iter::once(middle));
+    for joint in knee.chain(ends.iter().copied()) {
+        let flexed = turned(joints[joint], pivot, [0.0, -1.0, 0.0], limb.upper);
+        joints[joint] = turned(flexed, pivot, [1.0, 0.0, 0.0], outwards);
+    }
+    let pivot = joints[middle];
+    // The lower part's axis has turned with the upper part.
+    let axis = sub(turned([0.0, -1.0, 0.0], [0.0; 3], [1.0, 0.0, 0.0], outwards), [0.0; 3]);
+    for &joint in ends {
+        joints[joint] = turned(joints[joint], pivot, axis, limb.lower);
+    }
+}
+
+fn turned(p: Vec3, pivot: Vec3, axis: Vec3, angle: f64) -> Vec3 {
+    let (sin, cos) = (0.5 * angle).sin_cos();
+    let q = [cos, sin * axis[0], sin * axis[1], sin * axis[2]];
+    add(pivot, mat_vec(&rotation_from_quaternion(q), sub(p, pivot)))
+}
+
+fn lowest(joints: &[Vec3]) -> f64 {
+    joints.iter().map(|j| j[2]).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+    use crate::geometry::norm;
+
+    #[test]
+    fn limbs_turn_the_right_way_and_keep_their_lengths() {
+        let skeleton = Skeleton::preset("coco17").unwrap();
+        let template = Template::new(&skeleton);
+        let walking = posed(&template, &skeleton, Posture::Walking(0.0));
+        assert!(walking.joints[15][0] > walking.joints[16][0] + 0.3, "the left foot is ahead");
+        assert!(walking.joints[10][0] > walking.joints[9][0] + 0.2, "and the right hand");
+        let forward = posed(&template, &skeleton, Posture::ArmsForward);
+        assert!(forward.joints[9][0] > 0.4 && forward.joints[10][0] > 0.4);
+        let sideways = posed(&template, &skeleton, Posture::ArmsSideways);
+        assert!(sideways.joints[9][1] > 0.5 && sideways.joints[10][1] < -0.5);
+        let sitting = posed(&template, &skeleton, Posture::Sitting);
+        assert!(sitting.joints[0][2] < template.joints[0][2] - 0.2, "a head is lower");
+        for body in [&walking, &forward, &sideways, &sitting] {
+            for &[m, n] in &skeleton.bones {
+                let length = |t: &Template| norm(sub(t.joints[m], t.joints[n]));
+                assert!((length(&template) - length(body)).abs() < 1e-9, "bone {m}-{n}");
+            }
+            assert!((lowest(&body.joints) - lowest(&template.joints)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn as_many_postures_are_tried_as_asked_for() {
+        assert_eq!(tried(1, true), [Posture::Standing]);
+        assert_eq!(tried(9, true).len(), 9);
+        assert_eq!(tried(9, false).len(), 4);
+        assert_eq!(tried(3, false), [Posture::Standing, Posture::ArmsForward, Posture::ArmsSideways]);
+    }
+}

@@ -1,0 +1,49 @@
+//! V: how fast the echoes at a person move along the line of sight; paper section 4.1 and appendix A.
+//!
+//! With a Doppler axis the strongest bin says it. Without one, γ times the magnitude of the intensity gradient at the place,
+//! in units of the steepest gradient of the map. A magnitude has no sign; the sign is that of the optical flow: where the
+//! map brightens on the far side of the slope, the echo goes away.
+
+use super::evidence::Evidence;
+use crate::geometry::{Vec3, norm, scale, sub};
+use crate::mhp::Problem;
+
+/// Radial velocity of a place and where it comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Radial {
+    /// m/s along the line of sight, positive moving away.
+    pub mps: f64,
+    /// The same as a vector, m/s.
+    pub vector: Vec3,
+    pub source: Source,
+}
+
+/// What a velocity was read from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Source {
+    Doppler,
+    Gradient,
+}
+
+/// The radial velocity at `at` from the first view that tells it; `around` are the frames before and after.
+pub(super) fn radial(
+    problem: &Problem,
+    evidence: &[Evidence<'_>],
+    around: &[(f64, Vec<Evidence<'_>>)],
+    at: Vec3,
+    gain_mps: f64,
+) -> Option<Radial> {
+    let along = |k: usize, mps: f64, source: Source| {
+        let from_radar = sub(at, problem.views[k].pose.world_from_view([0.0; 3]));
+        Radial { mps, vector: scale(from_radar, mps / norm(from_radar).max(1e-6)), source }
+    };
+    let doppler = evidence.iter().enumerate().find_map(|(k, e)| Some(along(k, e.radial_mps(at)?, Source::Doppler)));
+    doppler.or_else(|| {
+        // The nearest frame in time tells the change best.
+        let (offset_s, near) = around.iter().min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))?;
+        evidence.iter().zip(near).enumerate().find_map(|(k, (now, then))| {
+            let flow = now.flow(then, at)?;
+            Some(along(k, gain_mps * flow.steepness * flow.sign * offset_s.signum(), Source::Gradient))
+        })
+    })
+}

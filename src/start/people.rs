@@ -1,0 +1,59 @@
+//! How many persons a fit has: as many as the settings say, or as many as are counted (paper section 4.4).
+
+use crate::config::FitConfig;
+use crate::geometry::Vec3;
+use crate::mhp::{FitError, Initialisation, Problem, initialise, initialise_people};
+use crate::people::{Count, Counter, Scan};
+
+/// A start, and the count that it rests on where people were counted.
+#[derive(Debug, Clone)]
+pub struct Begun {
+    /// The start.
+    pub initialisation: Initialisation,
+    /// How many people were found, with probabilities; `None` for a fit of one person, which needs no count.
+    pub count: Option<Count>,
+}
+
+/// Finds a start for `config.people` persons, or for as many as are counted where that is 0.
+///
+/// # Errors
+/// [`FitError::NoStart`] where nothing stands above the background, nobody was counted, or people cannot be counted in
+/// these views.
+pub fn begin(problem: &Problem, config: &FitConfig) -> Result<Begun, FitError> {
+    // One person is looked for as the paper does, without a count.
+    if config.people == 1 {
+        return Ok(Begun { initialisation: initialise(problem, config)?, count: None });
+    }
+    let count = count(problem)?;
+    let people = if config.people == 0 { count.people() } else { config.people };
+    if people == 0 {
+        let reason = format!("nobody is counted (p = {:.2})", count.probability(0));
+        return Err(FitError::NoStart { reason });
+    }
+    let seeds: Vec<Vec3> = count.seeds(people);
+    let mut initialisation = initialise_people(problem, config, &seeds)?;
+    let counted = count.people();
+    let note = format!("{counted} counted (p = {:.2}), {people} fitted", count.probability(counted));
+    initialisation.notes.insert(0, note);
+    Ok(Begun { initialisation, count: Some(count) })
+}
+
+/// Counts the people of a frame, with the frames before it that the problem knows.
+fn count(problem: &Problem) -> Result<Count, FitError> {
+    let told = |error: crate::people::PeopleError| FitError::NoStart { reason: error.to_string() };
+    let counter = Counter::new(&problem.views).map_err(told)?;
+    let views = 0..problem.views.len();
+    let mut scans: Vec<Scan> = Vec::new();
+    let before = problem.neighbours().iter().filter(|neighbour| neighbour.offset_s < 0.0);
+    let times = before.map(|neighbour| views.clone().map(|k| neighbour.map(k)).collect());
+    for maps in times.chain(std::iter::once(views.clone().map(|k| problem.map(k)).collect::<Vec<&[f64]>>())) {
+        let known: Vec<&Scan> = scans.iter().rev().collect();
+        let scan = counter.scan(&maps, &known).map_err(told)?;
+        scans.push(scan);
+    }
+    let latest: Vec<&Scan> = scans.iter().rev().collect();
+    match latest.split_first() {
+        Some((now, before)) => Ok(counter.count(now, before)),
+        None => Err(FitError::NoStart { reason: "no map".to_owned() }),
+    }
+}
