@@ -1,0 +1,86 @@
+//! `count`: how many people each frame shows, how sure that is, and where they are.
+
+mod report;
+
+use super::common::{open, print, progress_bar};
+use super::frames::{FrameRange, chosen};
+use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
+use crate::study::count::{FrameCount, count_frames};
+use anyhow::Context as _;
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Shown under the options of `count --help`.
+pub(super) const HELP: &str = "\
+What is done: what changed since the frames before (people never stand as still as a room), local maxima above mean + 3
+standard deviations of the cells around, in metres with heights from the other view, DBSCAN (0.3 m, 3 points) over the
+detections of five frames, and a small network that says of each cluster how many people it is. The first frame of a
+sequence has nothing before it and is counted less surely.
+
+Columns of the CSV: frame, people, probability (of that number), p0 p1 p2 p3 p4 (4 and more), annotated (where the data
+set knows), persons: `identity:x:y:z` of each, metres, separated by spaces. The same identity is the same person within a
+sequence. What is unknown is empty (null in JSON).
+
+Exit codes: 0 every frame was counted; 1 some were not; 2 none was, or the input is bad.
+
+Examples:
+  mhp-inspector count data/mmvr
+      A line a frame, and how often the count is that of the labels.
+  mhp-inspector count data/mmvr --frames 0..100 --csv counts.csv
+      The first hundred frames, and a table of them.";
+
+/// What `count` is told.
+#[derive(Debug, Args)]
+pub struct CountArgs {
+    /// An MMVR tree or any folder inside one, a `*_radar.npz`, a folder with `dataset.toml`, or an `.npy`/`.npz` of maps.
+    path: PathBuf,
+    /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
+    #[arg(long, value_name = "FILE")]
+    manifest: Option<PathBuf>,
+    /// Frames to count, counted from 0, the end not included. [default: all; of a `*_radar.npz` that one]
+    #[arg(long, value_name = "A..B")]
+    frames: Option<FrameRange>,
+    /// Write a row a frame.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// One JSON object instead of the table: an array `frames`, and `confusion` where counts are annotated.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs `count`.
+///
+/// # Errors
+/// Where an option or the data set is bad, its views tell no place, or FILE cannot be written.
+pub(super) fn run(args: &CountArgs) -> anyhow::Result<ExitCode> {
+    let dataset = open(&args.path, args.manifest.as_deref())?;
+    let frames = chosen(args.frames, &args.path, &dataset)?;
+    let bar = progress_bar(frames.len());
+    let rows = count_frames(&dataset, frames, || bar.inc(1)).with_context(|| args.path.display().to_string())?;
+    bar.finish_and_clear();
+    if let Some(file) = &args.csv {
+        report::write_csv(file, &dataset, &rows)?;
+    }
+    print(&if args.json { report::json(&dataset, &rows)? } else { report::table(&dataset, &rows) })?;
+    Ok(tell_failures(&rows))
+}
+
+/// Failures that are told one by one.
+const TOLD: usize = 10;
+
+fn tell_failures(rows: &[FrameCount]) -> ExitCode {
+    let failed: Vec<&String> = rows.iter().filter_map(|row| row.count.as_ref().err()).collect();
+    if failed.is_empty() {
+        return ExitCode::SUCCESS;
+    }
+    for why in failed.iter().take(TOLD) {
+        eprintln!("warning: {why}");
+    }
+    if failed.len() == rows.len() {
+        eprintln!("error: none of {} frames could be counted", rows.len());
+        return ExitCode::from(EXIT_BAD_INPUT);
+    }
+    eprintln!("warning: {} of {} frames could not be counted", failed.len(), rows.len());
+    ExitCode::from(EXIT_SOME_FAILED)
+}

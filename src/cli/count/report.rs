@@ -1,0 +1,132 @@
+//! What `count` prints and writes.
+
+use crate::dataset::Dataset;
+use crate::people::{CLASSES, Confusion};
+use crate::study::count::{FrameCount, confusion};
+use anyhow::Context as _;
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// A line a frame, then how often the count is the annotated one.
+pub(super) fn table(dataset: &Dataset, rows: &[FrameCount]) -> String {
+    let name = |row: &FrameCount| dataset.frame_name(row.frame).to_owned();
+    let width = rows.iter().map(|row| name(row).chars().count()).max().unwrap_or(0).max("frame".len());
+    let mut text = format!("{:<width$}  people      p  annotated  places (x y z, m)\n", "frame");
+    for row in rows {
+        let annotated = row.annotated.map_or_else(|| "-".into(), |n| n.to_string());
+        let (people, p) = match &row.count {
+            Ok(count) => (shown(count.people()), format!("{:.3}", count.probability(count.people()))),
+            Err(_) => ("-".into(), "-".into()),
+        };
+        let places: Vec<String> = row.places.iter().map(|[x, y, z]| format!("{x:.2} {y:.2} {z:.2}")).collect();
+        let line = format!("{:<width$}  {people:>6}  {p:>5}  {annotated:>9}  {}", name(row), places.join("; "));
+        let _ = writeln!(text, "{}", line.trim_end());
+    }
+    summary(&confusion(rows), &mut text);
+    text
+}
+
+fn summary(confusion: &Confusion, text: &mut String) {
+    let Some(overall) = confusion.overall() else { return };
+    let _ = writeln!(text, "\nannotated   frames   right");
+    for people in (0..CLASSES).filter(|&people| confusion.of(people) > 0) {
+        let right = confusion.accuracy(people).unwrap_or(0.0);
+        let _ = writeln!(text, "{:>9}  {:>7}  {:>5.1} %", shown(people), confusion.of(people), 100.0 * right);
+    }
+    let _ = writeln!(
+        text,
+        "{:>9}  {:>7}  {:>5.1} %",
+        "all",
+        (0..CLASSES).map(|n| confusion.of(n)).sum::<usize>(),
+        100.0 * overall
+    );
+    if let Some(weighted) = confusion.weighted() {
+        let _ = writeln!(text, "weighted 91/8/1 % over one, two and three people: {:.2} %", 100.0 * weighted);
+    }
+}
+
+/// The class of four and more is shown as that.
+fn shown(people: usize) -> String {
+    if people + 1 == CLASSES { format!("{people}+") } else { people.to_string() }
+}
+
+#[derive(Serialize)]
+struct Row {
+    frame: String,
+    people: Option<usize>,
+    probability: Option<f64>,
+    probabilities: Option<[f64; CLASSES]>,
+    annotated: Option<usize>,
+    persons: Vec<Person>,
+    error: Option<String>,
+}
+
+#[derive(Serialize)]
+struct Person {
+    identity: usize,
+    place_m: [f64; 3],
+}
+
+#[derive(Serialize)]
+struct Document {
+    data_set: String,
+    frames: Vec<Row>,
+    /// `confusion[annotated][people]`, frames; null where nothing is annotated.
+    confusion: Option<[[usize; CLASSES]; CLASSES]>,
+    weighted_accuracy: Option<f64>,
+}
+
+/// One JSON document.
+pub(super) fn json(dataset: &Dataset, rows: &[FrameCount]) -> anyhow::Result<String> {
+    let confusion = confusion(rows);
+    let document = Document {
+        data_set: dataset.info().name.clone(),
+        frames: rows.iter().map(|row| of(dataset, row)).collect(),
+        confusion: confusion.overall().map(|_| confusion.frames),
+        weighted_accuracy: confusion.weighted(),
+    };
+    Ok(serde_json::to_string_pretty(&document)? + "\n")
+}
+
+fn of(dataset: &Dataset, row: &FrameCount) -> Row {
+    let count = row.count.as_ref().ok();
+    let people = count.map(crate::people::Count::people);
+    Row {
+        frame: dataset.frame_name(row.frame).to_owned(),
+        people,
+        probability: count.zip(people).map(|(count, people)| count.probability(people)),
+        probabilities: count.map(|count| count.probabilities),
+        annotated: row.annotated,
+        persons: row
+            .identities
+            .iter()
+            .zip(&row.places)
+            .map(|(&identity, &place_m)| Person { identity, place_m })
+            .collect(),
+        error: row.count.as_ref().err().cloned(),
+    }
+}
+
+/// A row a frame.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub(super) fn write_csv(file: &Path, dataset: &Dataset, rows: &[FrameCount]) -> anyhow::Result<()> {
+    let cannot = || format!("{}: cannot be written", file.display());
+    let mut csv = csv::Writer::from_path(file).with_context(cannot)?;
+    let head = ["frame", "people", "probability", "p0", "p1", "p2", "p3", "p4", "annotated", "persons"];
+    csv.write_record(head).with_context(cannot)?;
+    for row in rows.iter().map(|row| of(dataset, row)) {
+        let number = |n: Option<usize>| n.map_or_else(String::new, |n| n.to_string());
+        let mut record =
+            vec![row.frame, number(row.people), row.probability.map_or_else(String::new, |p| p.to_string())];
+        let each = |k: usize| row.probabilities.map_or_else(String::new, |p| p[k].to_string());
+        record.extend((0..CLASSES).map(each));
+        record.push(number(row.annotated));
+        let person = |p: &Person| format!("{}:{:.3}:{:.3}:{:.3}", p.identity, p.place_m[0], p.place_m[1], p.place_m[2]);
+        record.push(row.persons.iter().map(person).collect::<Vec<String>>().join(" "));
+        csv.write_record(record).with_context(cannot)?;
+    }
+    csv.flush().with_context(cannot)
+}

@@ -1,0 +1,145 @@
+//! `train-counter`: makes the weights of the person counter anew, from synthetic recordings.
+
+use super::common::{print, progress_bar};
+use crate::people::train::{Example, Lesson, SEQUENCE_LENGTH, TrainOptions, examples, recordings, train};
+use crate::people::{CLASSES, Confusion, Counter, CounterOptions, HISTORY, Network};
+use anyhow::Context as _;
+use clap::Args;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Shown under the options of `train-counter --help`.
+pub(super) const HELP: &str = "\
+Simulates MMVR-like sequences with 0 to 4 people 0.6 to 2 m apart (easy, medium and hard in turn), looks at them as `count`
+does, trains the network on the true counts, and tests it on sequences of another seed. The same is done with the network
+alone, on statistics of the maps, for comparison. The same options give the same weights.
+
+Examples:
+  mhp-inspector train-counter --out assets
+      Writes counter.json and counter-alone.json, and prints what they reach.
+  mhp-inspector train-counter --out /tmp --sequences 4 --test-sequences 2 --epochs 5
+      A quick look at whether it works.";
+
+/// What `train-counter` is told.
+#[derive(Debug, Args)]
+pub struct TrainCounterArgs {
+    /// Folder for `counter.json` and `counter-alone.json`.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Sequences of ten frames to learn from, for each number of people.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_one)]
+    sequences: usize,
+    /// Sequences to test on, for each number of people.
+    #[arg(long, value_name = "N", default_value_t = 40, value_parser = at_least_one)]
+    test_sequences: usize,
+    /// Seed of what is learnt from, and of the training itself.
+    #[arg(long, default_value_t = 41)]
+    seed: u64,
+    /// Seed of what is tested on.
+    #[arg(long, default_value_t = 9041)]
+    test_seed: u64,
+    /// Passes over the lessons.
+    #[arg(long, default_value_t = TrainOptions::default().epochs, value_parser = at_least_one)]
+    epochs: usize,
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    text.parse::<usize>().ok().filter(|&n| n > 0).ok_or_else(|| "expected a whole number, 1 or more".to_owned())
+}
+
+/// Runs `train-counter`.
+///
+/// # Errors
+/// Where the seeds are the same, or a file cannot be written.
+pub(super) fn run(args: &TrainCounterArgs) -> anyhow::Result<ExitCode> {
+    anyhow::ensure!(args.seed != args.test_seed, "--test-seed is --seed: a test on what was learnt tells nothing");
+    let (lessons, tests) = (simulate(args.seed, args.sequences)?, simulate(args.test_seed, args.test_sequences)?);
+    let mut report = String::new();
+    for (name, pick) in [("counter", pick_counted as Pick), ("counter-alone", pick_alone as Pick)] {
+        let options = TrainOptions { epochs: args.epochs, seed: args.seed, ..TrainOptions::default() };
+        let chosen: Vec<Lesson> = lessons.iter().map(|example| pick(example).clone()).collect();
+        let bar = progress_bar(args.epochs);
+        let mut network = train(&chosen, &options, |_, _| bar.inc(1))?;
+        bar.finish_and_clear();
+        network.header = header(args, &network, &lessons, &tests, pick);
+        let _ = writeln!(report, "{name}.json\n  {}\n", network.header.join("\n  "));
+        write(&args.out.join(format!("{name}.json")), &network)?;
+    }
+    print(&report)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+type Pick = fn(&Example) -> &Lesson;
+
+fn pick_counted(example: &Example) -> &Lesson {
+    &example.counted
+}
+
+fn pick_alone(example: &Example) -> &Lesson {
+    &example.alone
+}
+
+fn simulate(seed: u64, sequences: usize) -> anyhow::Result<Vec<Example>> {
+    let recordings = recordings(seed, sequences)?;
+    let views = recordings.first().map(crate::simulate::Recording::views).unwrap_or_default();
+    // Only the detections and clusters are wanted: any weights do.
+    let counter = Counter::with(&views, CounterOptions::default(), Network::untrained())?;
+    let bar = progress_bar(recordings.len() * sequences * SEQUENCE_LENGTH);
+    let found = examples(&recordings, &counter, || bar.inc(1))?;
+    bar.finish_and_clear();
+    Ok(found)
+}
+
+/// How the weights came about and what they reach, for people.
+fn header(
+    args: &TrainCounterArgs,
+    network: &Network,
+    lessons: &[Example],
+    tests: &[Example],
+    pick: Pick,
+) -> Vec<String> {
+    let TrainCounterArgs { sequences, test_sequences, seed, test_seed, epochs, .. } = args;
+    let confusion = |examples: &mut dyn Iterator<Item = &Example>| {
+        let mut confusion = Confusion::default();
+        for example in examples {
+            let lesson = pick(example);
+            confusion.add(lesson.people, most_probable(&lesson.answer(network)));
+        }
+        confusion
+    };
+    let full = |example: &&Example| example.history > HISTORY;
+    let mut lines = vec![
+        format!(
+            "cargo run --release --no-default-features --features train -- train-counter --out assets --sequences \
+             {sequences} --test-sequences {test_sequences} --seed {seed} --test-seed {test_seed} --epochs {epochs}"
+        ),
+        format!("learnt from {} frames, tested on {} frames of another seed", lessons.len(), tests.len()),
+    ];
+    lines.extend(told("learnt", &confusion(&mut lessons.iter())));
+    lines.extend(told("test, all frames", &confusion(&mut tests.iter())));
+    lines.extend(told("test, frames with enough frames before them", &confusion(&mut tests.iter().filter(full))));
+    for preset in [crate::simulate::Preset::Easy, crate::simulate::Preset::Medium, crate::simulate::Preset::Hard] {
+        let of = |example: &&Example| full(example) && example.preset == preset;
+        lines.extend(told(&format!("test, {}, likewise", preset.word()), &confusion(&mut tests.iter().filter(of))));
+    }
+    lines
+}
+
+fn most_probable(p: &[f64; CLASSES]) -> usize {
+    (0..CLASSES).fold(0, |best, n| if p[n] > p[best] { n } else { best })
+}
+
+fn told(what: &str, confusion: &Confusion) -> Vec<String> {
+    let share = |x: Option<f64>| x.map_or_else(|| "-".into(), |x| format!("{:.2} %", 100.0 * x));
+    let each: Vec<String> = (0..CLASSES).map(|n| share(confusion.accuracy(n))).collect();
+    vec![
+        format!("{what}: right for 0, 1, 2, 3, 4+ people {}", each.join(", ")),
+        format!("{what}: weighted 91/8/1 % {}, confusion {:?}", share(confusion.weighted()), confusion.frames),
+    ]
+}
+
+fn write(path: &Path, network: &Network) -> anyhow::Result<()> {
+    let text = serde_json::to_string(network)?.replace("],[", "],\n[").replace("\",\"", "\",\n\"") + "\n";
+    std::fs::write(path, text).with_context(|| format!("{}: cannot be written", path.display()))
+}

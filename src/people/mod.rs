@@ -1,0 +1,42 @@
+//! How many people a frame shows, where they are, and who is who from frame to frame (paper 4.4 and appendix B).
+//!
+//! ```text
+//! maps ─ change.rs ─ what changed since the frames before      (a room stands still, people do not)
+//!      ─ cfar.rs ─── local maxima above mean + 3σ around them   (per view)
+//!      ─ scan.rs ─── in metres, heights from the other view
+//!      ─ cluster.rs  DBSCAN over the detections of five frames, twelve features a cluster
+//!      ─ network.rs  12 → 64 → 32 → 5: how many people a cluster is
+//!      ─ counter.rs  the distribution of their sum              → Count: number, probabilities
+//!      ─ seeds.rs ── places for that number, or another         → starts of a fit
+//!      ─ identity.rs assignment to the frame before             → Tracker, match_people
+//! ```
+//!
+//! A [`Counter`] is made once for the views of a data set; [`Counter::scan`] looks at a frame, [`Counter::count`] at a scanned
+//! frame and those before it. All of it is pure. `train/` (feature `train`) makes the weights in `assets/counter.json`;
+//! `alone.rs` is what the counter is compared with.
+
+mod alone;
+mod cfar;
+mod change;
+mod cluster;
+mod confusion;
+mod counter;
+mod error;
+mod identity;
+mod network;
+mod scan;
+mod seeds;
+mod sight;
+
+#[cfg(feature = "train")]
+pub mod train;
+
+pub use alone::map_statistics;
+pub use cfar::{CfarOptions, Detection, detect};
+pub use cluster::{Cluster, ClusterOptions};
+pub use confusion::{Confusion, PREVALENCE};
+pub use counter::{Count, Counted, Counter, CounterOptions};
+pub use error::PeopleError;
+pub use identity::{Track, Tracker, TrackerOptions, match_people};
+pub use network::{CLASSES, FEATURES, LAYERS, Layer, Network};
+pub use scan::{HISTORY, Point, Scan};

@@ -1,0 +1,89 @@
+//! Lessons from the synthetic source: frames with known counts as the counter sees them.
+
+use super::Lesson;
+use crate::people::{Counter, HISTORY, PeopleError, Scan, map_statistics};
+use crate::simulate::{Options, Preset, Recording, SimulateError};
+use rayon::prelude::*;
+
+/// Scenarios of the lessons; the sequences take them in turn.
+const PRESETS: [Preset; 3] = [Preset::Easy, Preset::Medium, Preset::Hard];
+/// Frames a sequence. Short ones: the frames of one teach much the same, and every length of history occurs.
+pub const SEQUENCE_LENGTH: usize = HISTORY + 2;
+/// Numbers of people: 0 to 4, equally often.
+const NUMBERS: usize = 5;
+
+/// One frame, as the counter sees it and as the classifier alone does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Example {
+    /// Its clusters' features.
+    pub counted: Lesson,
+    /// Statistics of its maps.
+    pub alone: Lesson,
+    /// Frames before it in its sequence.
+    pub history: usize,
+    /// Easy, medium, hard.
+    pub preset: Preset,
+}
+
+/// MMVR-like recordings of a seed, one for each number of people, each with `sequences` sequences.
+///
+/// # Errors
+/// Where there are no sequences.
+pub fn recordings(seed: u64, sequences: usize) -> Result<Vec<Recording>, SimulateError> {
+    let recording = |people: usize| {
+        Recording::new(&Options {
+            presets: PRESETS.to_vec(),
+            frames: sequences * SEQUENCE_LENGTH,
+            sequence_length: SEQUENCE_LENGTH,
+            people: Some(people..=people),
+            // A scene of its own for each number.
+            seed: seed.wrapping_mul(NUMBERS as u64).wrapping_add(people as u64),
+            ..Options::default()
+        })
+    };
+    (0..NUMBERS).map(recording).collect()
+}
+
+/// Simulates and scans all frames of the recordings, sequences side by side; `done` hears of every frame.
+///
+/// # Errors
+/// As [`Counter::scan`].
+pub fn examples(
+    recordings: &[Recording],
+    counter: &Counter,
+    done: impl Fn() + Sync,
+) -> Result<Vec<Example>, PeopleError> {
+    let places: Vec<(usize, usize)> =
+        recordings.iter().enumerate().flat_map(|(r, all)| (0..all.sequences()).map(move |k| (r, k))).collect();
+    let of =
+        |&(r, k): &(usize, usize)| recordings.get(r).map_or(Ok(Vec::new()), |all| sequence(all, k, counter, &done));
+    let found: Result<Vec<Vec<Example>>, PeopleError> = places.par_iter().map(of).collect();
+    Ok(found?.concat())
+}
+
+fn sequence(
+    recording: &Recording,
+    number: usize,
+    counter: &Counter,
+    done: &(impl Fn() + Sync),
+) -> Result<Vec<Example>, PeopleError> {
+    let sequence = recording.sequence(number);
+    let (mut scans, mut found): (Vec<Scan>, Vec<Example>) = (Vec::new(), Vec::new());
+    for k in 0..recording.frames_of(number).len() {
+        let frame = sequence.frame(k);
+        let maps: Vec<Vec<f64>> = frame.maps.iter().map(|map| map.iter().map(|&x| f64::from(x)).collect()).collect();
+        let maps: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
+        let before: Vec<&Scan> = scans.iter().rev().take(HISTORY).collect();
+        let now = counter.scan(&maps, &before)?;
+        let people = frame.joints.len();
+        found.push(Example {
+            counted: Lesson::of(counter, &now, &before, people),
+            alone: Lesson { rows: vec![map_statistics(&maps)], people, placed: false },
+            history: k,
+            preset: sequence.preset(),
+        });
+        scans.push(now);
+        done();
+    }
+    Ok(found)
+}

@@ -1,0 +1,212 @@
+//! Training of the classifier, through candle: cross-entropy of the count, Adam 1e-3, 50 epochs, dropout 0.3 (appendix B).
+//!
+//! The truth is the count of a frame, never of a cluster: the distributions of a frame's clusters are convolved, and the
+//! gradient goes through that sum.
+
+mod course;
+
+pub use course::{Example, SEQUENCE_LENGTH, examples, recordings};
+
+use super::counter::{Counter, Described, MOST_CLUSTERS, convolve};
+use super::network::{CLASSES, FEATURES, LAYERS, Layer, Network};
+use super::scan::Scan;
+use candle_core::{D, DType, Device, Result, Tensor, Var};
+use candle_nn::optim::{AdamW, Optimizer as _, ParamsAdamW};
+use rand::{Rng, SeedableRng, rngs::StdRng, seq::SliceRandom as _};
+
+/// Vectors of a frame: its clusters and what belongs to none.
+const ROWS: usize = MOST_CLUSTERS + 1;
+
+/// The feature that changes its sign in a mirror: y of the centroid.
+const LATERAL: usize = 1;
+
+/// How much a lesson with 0, 1, 2, 3, 4 people counts: between all alike and how often they occur (91, 8, 1 % for 1, 2, 3).
+const OCCURRENCE: [f32; CLASSES] = [1.0, 4.0, 2.0, 1.0, 0.5];
+
+/// What a frame teaches.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lesson {
+    /// Features of up to nine vectors, whose counts add up.
+    pub rows: Vec<[f32; FEATURES]>,
+    /// How many people there are.
+    pub people: usize,
+    /// Whether the rows are features of clusters, which a mirror changes.
+    pub placed: bool,
+}
+
+impl Lesson {
+    /// A frame with `people` people, scanned after those `before` it, the latest first.
+    pub fn of(counter: &Counter, now: &Scan, before: &[&Scan], people: usize) -> Self {
+        Self::new(&counter.describe(now, before), people)
+    }
+
+    fn new(described: &Described, people: usize) -> Self {
+        let mut rows = vec![described.rest];
+        rows.extend_from_slice(&described.features);
+        rows.truncate(ROWS);
+        Self { rows, people, placed: true }
+    }
+
+    /// The same scene left and right exchanged: a radar does not care, and what is learnt must not either.
+    fn mirrored(&self) -> Self {
+        let mirror = |row: &[f32; FEATURES]| {
+            let mut row = *row;
+            row[LATERAL] *= if self.placed { -1.0 } else { 1.0 };
+            row
+        };
+        Self { rows: self.rows.iter().map(mirror).collect(), ..*self }
+    }
+
+    /// What a network says of it: the probabilities of the counts.
+    pub fn answer(&self, network: &Network) -> [f64; CLASSES] {
+        let nobody = [1.0, 0.0, 0.0, 0.0, 0.0];
+        self.rows.iter().fold(nobody, |sum, row| convolve(&sum, &network.probabilities(row)))
+    }
+}
+
+/// How to train.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrainOptions {
+    /// Passes over the lessons.
+    pub epochs: usize,
+    /// Lessons a step.
+    pub batch: usize,
+    /// Adam's step.
+    pub learning_rate: f64,
+    /// Share of the first layer's outputs that is dropped.
+    pub dropout: f64,
+    /// How much a lesson with 0, 1, … people counts.
+    pub weights: [f32; CLASSES],
+    /// Seed of the first weights, the order of the lessons and the dropped outputs.
+    pub seed: u64,
+}
+
+impl Default for TrainOptions {
+    fn default() -> Self {
+        Self { epochs: 50, batch: 32, learning_rate: 1e-3, dropout: 0.3, weights: OCCURRENCE, seed: 1 }
+    }
+}
+
+/// Trains a network; `told` hears epoch and mean loss.
+///
+/// # Errors
+/// candle's, which would be a mistake in here.
+pub fn train(lessons: &[Lesson], options: &TrainOptions, mut told: impl FnMut(usize, f32)) -> Result<Network> {
+    let mut rng = StdRng::seed_from_u64(options.seed);
+    let lessons: Vec<Lesson> = lessons.iter().flat_map(|lesson| [lesson.clone(), lesson.mirrored()]).collect();
+    let (mean, scale) = moments(&lessons);
+    let model = Model::new(&mut rng)?;
+    let parameters = ParamsAdamW { lr: options.learning_rate, weight_decay: 0.0, ..ParamsAdamW::default() };
+    let mut adam = AdamW::new(model.vars(), parameters)?;
+    let mut order: Vec<usize> = (0..lessons.len()).collect();
+    for epoch in 0..options.epochs {
+        order.shuffle(&mut rng);
+        let mut sum = 0.0;
+        for chosen in order.chunks(options.batch.max(1)) {
+            let batch: Vec<&Lesson> = chosen.iter().filter_map(|&i| lessons.get(i)).collect();
+            let loss = model.loss(&batch, (&mean, &scale), options, &mut rng)?;
+            adam.backward_step(&loss)?;
+            sum += loss.to_scalar::<f32>()? * batch.len() as f32;
+        }
+        told(epoch + 1, sum / lessons.len().max(1) as f32);
+    }
+    Ok(Network { header: Vec::new(), mean, scale, layers: model.layers()? })
+}
+
+/// Mean and standard deviation of each feature.
+fn moments(lessons: &[Lesson]) -> (Vec<f32>, Vec<f32>) {
+    let rows: Vec<&[f32; FEATURES]> = lessons.iter().flat_map(|lesson| &lesson.rows).collect();
+    let n = rows.len().max(1) as f64;
+    let mean = |k: usize| rows.iter().map(|row| f64::from(row[k])).sum::<f64>() / n;
+    let deviation = |k: usize| (rows.iter().map(|row| (f64::from(row[k]) - mean(k)).powi(2)).sum::<f64>() / n).sqrt();
+    let scale = |k: usize| if deviation(k) > 1e-6 { deviation(k) as f32 } else { 1.0 };
+    ((0..FEATURES).map(|k| mean(k) as f32).collect(), (0..FEATURES).map(scale).collect())
+}
+
+struct Model {
+    /// Weight (outputs, inputs) and bias of each layer.
+    layers: Vec<(Var, Var)>,
+    /// (CLASSES², CLASSES): which sum a pair of counts gives.
+    sums: Tensor,
+}
+
+impl Model {
+    /// Weights uniform in ±√(6/inputs) (He), no bias.
+    fn new(rng: &mut StdRng) -> Result<Self> {
+        let mut layers = Vec::new();
+        for widths in LAYERS.windows(2) {
+            let (inputs, outputs) = (widths[0], widths[1]);
+            let bound = (6.0 / inputs as f32).sqrt();
+            let weights: Vec<f32> = (0..inputs * outputs).map(|_| rng.random_range(-bound..bound)).collect();
+            let weight = Var::from_vec(weights, (outputs, inputs), &Device::Cpu)?;
+            layers.push((weight, Var::zeros(outputs, DType::F32, &Device::Cpu)?));
+        }
+        let pair = |k: usize| (k / CLASSES + k % CLASSES).min(CLASSES - 1);
+        let sums = (0..CLASSES * CLASSES * CLASSES).map(|k| f32::from(u8::from(pair(k / CLASSES) == k % CLASSES)));
+        let sums = Tensor::from_vec(sums.collect::<Vec<f32>>(), (CLASSES * CLASSES, CLASSES), &Device::Cpu)?;
+        Ok(Self { layers, sums })
+    }
+
+    fn vars(&self) -> Vec<Var> {
+        self.layers.iter().flat_map(|(weight, bias)| [weight.clone(), bias.clone()]).collect()
+    }
+
+    /// Cross-entropy of the counts of a batch.
+    fn loss(
+        &self,
+        batch: &[&Lesson],
+        (mean, scale): (&[f32], &[f32]),
+        options: &TrainOptions,
+        rng: &mut StdRng,
+    ) -> Result<Tensor> {
+        let n = batch.len();
+        let (mut inputs, mut there, mut truth) = (Vec::new(), Vec::new(), Vec::new());
+        for lesson in batch {
+            for k in 0..ROWS {
+                let row = lesson.rows.get(k);
+                there.push(f32::from(u8::from(row.is_some())));
+                let row = row.copied().unwrap_or([0.0; FEATURES]);
+                inputs.extend(row.iter().zip(mean).zip(scale).map(|((x, m), s)| (x - m) / s));
+            }
+            let class = lesson.people.min(CLASSES - 1);
+            truth.extend((0..CLASSES).map(|k| if k == class { options.weights[k] } else { 0.0 }));
+        }
+        let inputs = Tensor::from_vec(inputs, (n * ROWS, FEATURES), &Device::Cpu)?;
+        let there = Tensor::from_vec(there, (n, ROWS, 1), &Device::Cpu)?;
+        let truth = Tensor::from_vec(truth, (n, CLASSES), &Device::Cpu)?;
+        let logits = self.forward(&inputs, options.dropout, rng)?;
+        let each = candle_nn::ops::softmax(&logits, D::Minus1)?.reshape((n, ROWS, CLASSES))?;
+        // A row that is not there is nobody for certain.
+        let nobody = Tensor::new(&[1.0f32, 0.0, 0.0, 0.0, 0.0], &Device::Cpu)?.reshape((1, 1, CLASSES))?;
+        let each = (each.broadcast_mul(&there)? + there.affine(-1.0, 1.0)?.broadcast_mul(&nobody)?)?;
+        let mut sum = each.narrow(1, 0, 1)?.squeeze(1)?;
+        for k in 1..ROWS {
+            let next = each.narrow(1, k, 1)?;
+            let pairs = sum.unsqueeze(2)?.broadcast_mul(&next)?.reshape((n, CLASSES * CLASSES))?;
+            sum = pairs.matmul(&self.sums)?;
+        }
+        let likelihood = (sum + 1e-9)?.log()?;
+        (truth.mul(&likelihood)?.sum_all()?.neg()? / n as f64)?.reshape(())
+    }
+
+    fn forward(&self, inputs: &Tensor, dropout: f64, rng: &mut StdRng) -> Result<Tensor> {
+        let mut x = inputs.clone();
+        for (k, (weight, bias)) in self.layers.iter().enumerate() {
+            x = x.matmul(&weight.t()?)?.broadcast_add(bias)?;
+            if k + 1 < self.layers.len() {
+                x = x.relu()?;
+            }
+            if k == 0 && dropout > 0.0 {
+                let kept = (1.0 / (1.0 - dropout)) as f32;
+                let mask = (0..x.elem_count()).map(|_| if rng.random_bool(dropout) { 0.0 } else { kept });
+                x = x.mul(&Tensor::from_vec(mask.collect::<Vec<f32>>(), x.shape().clone(), &Device::Cpu)?)?;
+            }
+        }
+        Ok(x)
+    }
+
+    fn layers(&self) -> Result<Vec<Layer>> {
+        let layer = |(weight, bias): &(Var, Var)| Ok(Layer { weight: weight.to_vec2()?, bias: bias.to_vec1()? });
+        self.layers.iter().map(layer).collect()
+    }
+}

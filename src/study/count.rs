@@ -1,0 +1,147 @@
+//! Counting the people of a data set: every frame with those before it in its sequence, on all cores.
+
+use crate::dataset::{Dataset, DatasetError, Frame, Heatmap};
+use crate::geometry::Vec3;
+use crate::mhp::fill_missing;
+use crate::people::{Confusion, Count, Counter, HISTORY, PeopleError, Scan, Tracker, TrackerOptions};
+use rayon::prelude::*;
+use std::collections::VecDeque;
+use std::ops::Range;
+
+/// Frames that one thread counts at a time.
+const CHUNK: usize = 64;
+/// Frames read before the first one asked for: those whose detections are looked at, and those that these are compared with.
+const LEAD_IN: usize = 2 * HISTORY;
+
+/// One frame of a data set, counted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameCount {
+    /// Index in the data set.
+    pub frame: usize,
+    /// Number and clusters, or why there is none.
+    pub count: Result<Count, String>,
+    /// Annotated number of people, where known.
+    pub annotated: Option<usize>,
+    /// Place of each person, world frame, m.
+    pub places: Vec<Vec3>,
+    /// Who is who: the same number is the same person within a sequence.
+    pub identities: Vec<usize>,
+}
+
+/// Counts `frames`; `done` hears of every frame, in no order. A frame that cannot be read is a row without a count, and
+/// the frames after it begin anew.
+///
+/// # Errors
+/// [`PeopleError::NoPlace`] where the views tell no place, or where the weights are damaged.
+pub fn count_frames(
+    dataset: &Dataset,
+    frames: Range<usize>,
+    done: impl Fn() + Sync,
+) -> Result<Vec<FrameCount>, PeopleError> {
+    let counter = Counter::new(&dataset.info().views)?;
+    let chunks: Vec<Range<usize>> =
+        frames.clone().step_by(CHUNK).map(|start| start..(start + CHUNK).min(frames.end)).collect();
+    let rows: Vec<Vec<FrameCount>> =
+        chunks.into_par_iter().map(|chunk| count_chunk(dataset, &counter, chunk, &done)).collect();
+    let mut rows = rows.concat();
+    identify(dataset, &mut rows);
+    Ok(rows)
+}
+
+fn count_chunk(dataset: &Dataset, counter: &Counter, chunk: Range<usize>, done: &impl Fn()) -> Vec<FrameCount> {
+    let mut window = Window::new(counter);
+    let sequence = dataset.sequence(chunk.start);
+    let earliest = chunk.start.saturating_sub(LEAD_IN);
+    let first = (earliest..chunk.start).find(|&i| dataset.sequence(i) == sequence).unwrap_or(chunk.start);
+    // Frames that fail here are told in their own row, where they were asked for.
+    for maps in dataset.maps(first..chunk.start) {
+        let _ = window.push(maps.map_err(|error| error.to_string()));
+    }
+    let mut rows = Vec::with_capacity(chunk.len());
+    for frame in chunk {
+        if frame > 0 && dataset.sequence(frame) != dataset.sequence(frame - 1) {
+            window.scans.clear();
+        }
+        let (annotated, maps) = labelled(dataset.load(frame));
+        let count = window.push(maps);
+        rows.push(FrameCount { frame, count, annotated, places: Vec::new(), identities: Vec::new() });
+        done();
+    }
+    rows
+}
+
+fn labelled(frame: Result<Frame, DatasetError>) -> (Option<usize>, Result<Vec<Heatmap>, String>) {
+    match frame {
+        Ok(frame) => (frame.person_count, Ok(frame.maps)),
+        Err(error) => (None, Err(error.to_string())),
+    }
+}
+
+/// The scans before the present frame, the latest first.
+pub(super) struct Window<'a> {
+    counter: &'a Counter,
+    scans: VecDeque<Scan>,
+}
+
+impl<'a> Window<'a> {
+    /// Before the first frame.
+    pub(super) fn new(counter: &'a Counter) -> Self {
+        Self { counter, scans: VecDeque::new() }
+    }
+
+    /// Counts the next frame; one that fails ends what is known of the frames before.
+    pub(super) fn push(&mut self, maps: Result<Vec<Heatmap>, String>) -> Result<Count, String> {
+        let counted = maps.and_then(|maps| self.count(maps));
+        match counted {
+            Ok((scan, count)) => {
+                self.scans.push_front(scan);
+                self.scans.truncate(HISTORY);
+                Ok(count)
+            }
+            Err(why) => {
+                self.scans.clear();
+                Err(why)
+            }
+        }
+    }
+
+    fn count(&self, mut maps: Vec<Heatmap>) -> Result<(Scan, Count), String> {
+        for map in &mut maps {
+            // A map without any number is the counter's error: it names the array.
+            let _ = fill_missing(&mut map.data, &map.shape);
+        }
+        let maps: Vec<&[f64]> = maps.iter().map(|map| map.data.as_slice()).collect();
+        let before: Vec<&Scan> = self.scans.iter().collect();
+        let scan = self.counter.scan(&maps, &before).map_err(|error| error.to_string())?;
+        let count = self.counter.count(&scan, &before);
+        Ok((scan, count))
+    }
+}
+
+/// Places, and who is who, in the order of the frames.
+fn identify(dataset: &Dataset, rows: &mut [FrameCount]) {
+    let between_s = dataset.info().frame_rate_hz.filter(|rate| *rate > 0.0).map_or(0.1, f64::recip);
+    let mut tracker = Tracker::new(TrackerOptions::default());
+    let mut last: Option<usize> = None;
+    for row in rows {
+        if last.is_none_or(|last| dataset.sequence(last) != dataset.sequence(row.frame)) {
+            tracker = Tracker::new(TrackerOptions::default());
+        }
+        if let Ok(count) = &row.count {
+            row.places = count.seeds(count.people());
+        }
+        row.identities = tracker.step(&row.places, between_s);
+        last = Some(row.frame);
+    }
+}
+
+/// Annotated against predicted, over the frames that have both.
+pub fn confusion(rows: &[FrameCount]) -> Confusion {
+    let mut confusion = Confusion::default();
+    for row in rows {
+        if let (Some(annotated), Ok(count)) = (row.annotated, &row.count) {
+            confusion.add(annotated, count.people());
+        }
+    }
+    confusion
+}
