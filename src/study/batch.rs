@@ -10,7 +10,8 @@ use crate::config::FitConfig;
 use crate::dataset::{Dataset, Truth, panic_text, write_pppr};
 use crate::diagnose::{JointErrors, joint_errors};
 use crate::geometry::Vec3;
-use crate::mhp::{FitError, Fitter, Precision, Problem, StepReport, StopReason, initialise};
+use crate::mhp::{FitError, Fitter, Precision, StepReport, StopReason, predict};
+use crate::start::{begin, problem_of};
 use crossbeam_channel::Sender;
 use std::collections::{BTreeMap, HashSet};
 use std::ops::Range;
@@ -61,14 +62,12 @@ fn fit_watched(
     let in_file = |error: &dyn std::fmt::Display| format!("{}: {error}", dataset.frame_path(index).display());
     let frame = dataset.load(index).map_err(|error| error.to_string())?;
     let info = dataset.info();
-    let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-    let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps);
-    let problem = Arc::new(problem.map_err(|error| in_file(&error))?);
+    let problem = Arc::new(problem_of(dataset, &frame).map_err(|error| in_file(&error))?);
     let began = Instant::now();
     let (initial, init_ms) = if let Some(params) = start {
-        (params, None)
+        (predict(&problem, &params), None)
     } else {
-        let found = initialise(&problem, &options.config).map_err(|error| in_file(&error))?;
+        let found = begin(&problem, &options.config).map_err(|error| in_file(&error))?.initialisation;
         (found.params, Some(milliseconds(began)))
     };
     let began = Instant::now();

@@ -1,7 +1,17 @@
-//! A state taken home: its Gaussians as PLY, its curves as CSV. (Its parameters as npz: [`crate::dataset::write_pppr`].)
+//! What is taken home: a state's Gaussians as PLY and its curves as CSV, and the simulated maps of whole data sets in the
+//! input's own files. (Parameters as npz: [`crate::dataset::write_pppr`].)
 
+mod cloud;
+mod cloud_files;
 mod curves;
+mod error;
+mod heatmap;
+mod layout;
 mod ply;
 
+pub use cloud::{CloudPoint, point_cloud};
+pub use cloud_files::{write_cloud_npz, write_cloud_pcd, write_cloud_ply};
 pub use curves::{CurveRow, curve_columns, curves_csv, write_curves};
+pub use error::ExportError;
+pub use heatmap::{HeatmapExport, MapScale, scaled_maps};
 pub use ply::{ply, write_ply};

@@ -1,0 +1,217 @@
+//! `export`: what other programs read: parameters, simulated maps in the input's own files, point clouds.
+
+mod frame;
+
+use super::common::{PrecisionArg, open, print, progress_bar};
+use super::frames::{FrameRange, chosen};
+use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
+use crate::config::{FitConfig, Preset};
+use crate::dataset::Dataset;
+use crate::study::{HeatmapExport, MapScale};
+use anyhow::Context as _;
+use clap::{Args, ValueEnum};
+use frame::{Exported, export_frame};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Shown under the options of `export --help`.
+pub(super) const HELP: &str = "\
+pppr     DIR/pppr/NAME.npz: position, log_scale, rotation, velocity, beta, omega, float64; NAME with `_` for `/`.
+heatmap  DIR/heatmap/...: the simulated map in the place of the measured one, in files of the same names, keys, shapes, dtypes,
+         byte and memory order; what else is in a file, and labels beside it, are copied; so is dataset.toml. A model made for
+         the data set reads the folder unchanged. Of a stacked file (frames along the first axis) the chosen frames are written.
+pc       DIR/pc/NAME.npz, .ply, .pcd: points where a detector finds something in the simulated map: x, y, z (m), v_r (m/s,
+         positive moving away), intensity, view.
+
+Scale of maps and intensities: `match` multiplies each view of a frame by one number, so that the mean over the mask of the
+simulated map is that of the measured one over its own, and lets nothing fall below the smallest measured value; `none` writes
+H_sim as the forward model gives it.
+
+Exit codes: 0 every frame was exported; 1 some were not; 2 none was, or the input is bad.
+
+Examples:
+  mhp-inspector export data/mmvr --out enhanced --what heatmap
+      Fits every frame and writes enhanced/heatmap as a tree like data/mmvr.
+  mhp-inspector export data/walk --out take-home --params results/pppr --frames 0..10
+      All three, from the parameters that `fit --out results` wrote.
+  mhp-inspector export data/walk --out clouds --what pc --format pcd,ply --preset recommended
+      Point clouds for two kinds of reader.";
+
+/// What can be exported.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum What {
+    /// Parameters.
+    Pppr,
+    /// Simulated maps in the input's files.
+    Heatmap,
+    /// Point clouds.
+    Pc,
+}
+
+/// Files of point clouds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum CloudFormat {
+    /// numpy.
+    Npz,
+    /// Stanford's polygon format, binary.
+    Ply,
+    /// The Point Cloud Library's format, binary.
+    Pcd,
+}
+
+/// What becomes of the values of a simulated map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ScaleArg {
+    /// In the input's scale.
+    Match,
+    /// As computed.
+    None,
+}
+
+/// What `export` is told.
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// An MMVR tree or any folder inside one, a `*_radar.npz`, a folder with `dataset.toml`, or an `.npy`/`.npz` of maps.
+    path: PathBuf,
+    /// Folder for what is exported.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Frames, counted from 0, as in Rust: 5..12 (12 not included), 5..=11, 5.., ..12, or 7 alone. Default: all.
+    #[arg(long, value_name = "A..B")]
+    frames: Option<FrameRange>,
+    /// What to export.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "pppr,heatmap,pc")]
+    what: Vec<What>,
+    /// The folder of fitted parameters, NAME.npz a frame, as `fit --out` writes it. Without it every frame is fitted here.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["preset", "iterations"])]
+    params: Option<PathBuf>,
+    /// Files of point clouds.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "npz,ply,pcd")]
+    format: Vec<CloudFormat>,
+    /// Scale of maps and intensities.
+    #[arg(long, value_enum, default_value = "match")]
+    scale: ScaleArg,
+    /// The settings of the fits and of the simulation: paper or recommended.
+    #[arg(long, value_name = "NAME", default_value = "paper", value_parser = super::common::preset)]
+    preset: Preset,
+    /// A fit configuration instead of a preset; keys that it lacks are the paper's.
+    #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
+    config: Option<PathBuf>,
+    /// Adam steps of a frame, instead of the configuration's.
+    #[arg(long, value_name = "N")]
+    iterations: Option<usize>,
+    /// Scalar of the per-cell kernel.
+    #[arg(long, value_enum, default_value = "f64")]
+    precision: PrecisionArg,
+    /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
+    #[arg(long, value_name = "FILE")]
+    manifest: Option<PathBuf>,
+}
+
+impl ExportArgs {
+    fn wants(&self, what: What) -> bool {
+        self.what.contains(&what)
+    }
+
+    fn scale(&self) -> MapScale {
+        match self.scale {
+            ScaleArg::Match => MapScale::Match,
+            ScaleArg::None => MapScale::None,
+        }
+    }
+
+    fn config(&self) -> anyhow::Result<FitConfig> {
+        let config = self.config.as_deref().map_or_else(|| Ok(self.preset.config()), FitConfig::from_file)?;
+        let iterations = self.iterations.unwrap_or(config.iterations);
+        Ok(FitConfig { iterations, ..config }.validated()?)
+    }
+}
+
+/// Runs `export`.
+///
+/// # Errors
+/// Where an argument or the data set is bad, DIR cannot be written, or no frame could be exported.
+pub(super) fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
+    let config = args.config()?;
+    let dataset = open(&args.path, args.manifest.as_deref())?;
+    let frames = chosen(args.frames, &args.path, &dataset)?;
+    let wanted = [(What::Pppr, "pppr"), (What::Pc, "pc")].into_iter().filter(|(what, _)| args.wants(*what));
+    for (_, name) in wanted {
+        let folder = args.out.join(name);
+        std::fs::create_dir_all(&folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    }
+    let heatmaps = args
+        .wants(What::Heatmap)
+        .then(|| HeatmapExport::create(&dataset, &args.out.join("heatmap"), args.manifest.as_deref()))
+        .transpose()?;
+    let failures = all(args, &config, &dataset, frames.clone(), heatmaps)?;
+    end(&failures, frames.len(), &args.out)
+}
+
+/// Exports frames side by side; maps are written in the order of the data set. The failures by frame.
+fn all(
+    args: &ExportArgs,
+    config: &FitConfig,
+    dataset: &Dataset,
+    frames: Range<usize>,
+    mut heatmaps: Option<HeatmapExport>,
+) -> anyhow::Result<BTreeMap<usize, String>> {
+    let bar = progress_bar(frames.len());
+    let (next, end) = (AtomicUsize::new(frames.start), frames.end);
+    let threads = std::thread::available_parallelism().map_or(1, usize::from).clamp(1, frames.len().max(1));
+    let (outbox, inbox) = crossbeam_channel::bounded::<(usize, Result<Exported, String>)>(threads);
+    let mut failures = BTreeMap::new();
+    std::thread::scope(|scope| {
+        for k in 0..threads {
+            let (next, outbox) = (&next, outbox.clone());
+            let work = move || {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    if index >= end || outbox.send((index, export_frame(args, config, dataset, index))).is_err() {
+                        return;
+                    }
+                }
+            };
+            std::thread::Builder::new().name(format!("export {k}")).spawn_scoped(scope, work)?;
+        }
+        drop(outbox);
+        for (index, exported) in inbox {
+            bar.inc(1);
+            let written = exported.and_then(|exported| match &mut heatmaps {
+                Some(heatmaps) => {
+                    heatmaps.add(dataset, index, &exported.maps).map(drop).map_err(|error| error.to_string())
+                }
+                None => Ok(()),
+            });
+            if let Err(why) = written {
+                failures.insert(index, why);
+            }
+        }
+        Ok::<(), std::io::Error>(())
+    })
+    .context("no thread to work on")?;
+    bar.finish_and_clear();
+    if failures.len() < frames.len()
+        && let Some(heatmaps) = heatmaps
+    {
+        heatmaps.finish()?;
+    }
+    Ok(failures)
+}
+
+fn end(failures: &BTreeMap<usize, String>, frames: usize, out: &Path) -> anyhow::Result<ExitCode> {
+    let done = frames - failures.len();
+    if done > 0 {
+        print(&format!("{done} of {frames} frames written to {}\n", out.display()))?;
+    }
+    let Some(why) = failures.values().next() else { return Ok(ExitCode::SUCCESS) };
+    match frames {
+        1 => eprintln!("error: {why}"),
+        _ if done == 0 => eprintln!("error: none of {frames} frames could be exported; the first: {why}"),
+        _ => eprintln!("warning: {} of {frames} frames could not be exported; the first: {why}", failures.len()),
+    }
+    Ok(ExitCode::from(if done == 0 { EXIT_BAD_INPUT } else { EXIT_SOME_FAILED }))
+}

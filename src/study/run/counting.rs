@@ -1,0 +1,90 @@
+//! The study `counting`: how often the number of people is right, by a [`Method`].
+
+use super::row::RunNumbers;
+use super::variant::Method;
+use crate::dataset::{Dataset, Heatmap};
+use crate::mhp::fill_missing;
+use crate::people::{CLASSES, Counter, HISTORY, Network, map_statistics};
+use crate::study::count::Window;
+use std::time::Instant;
+
+/// Frames of a unit: short enough for all cores, long against the frames that are read before it.
+pub(super) const CHUNK: usize = 32;
+/// Frames read before the first one, as `count` does: those that are looked at, and those that these are compared with.
+const LEAD_IN: usize = 2 * HISTORY;
+
+/// One frame's count, and the time that it took without reading, ms.
+pub(super) type Counted = (Result<RunNumbers, String>, Option<f64>);
+
+/// Counts consecutive frames of one sequence; those before them in it are looked at where the method asks for them.
+pub(super) fn count(dataset: &Dataset, method: Method, frames: &[usize]) -> Vec<Counted> {
+    let Some(&first) = frames.first() else { return Vec::new() };
+    let made = match method {
+        Method::Counter => Counter::new(&dataset.info().views).map(|counter| Tool::Counter(Box::new(counter))),
+        Method::Alone | Method::Fit => Network::alone().map(Tool::Alone),
+    };
+    let tool = match made {
+        Ok(tool) => tool,
+        Err(error) => return frames.iter().map(|_| (Err(error.to_string()), None)).collect(),
+    };
+    match &tool {
+        Tool::Alone(network) => frames.iter().map(|&frame| alone(dataset, network, frame)).collect(),
+        Tool::Counter(counter) => {
+            let mut window = Window::new(counter);
+            let sequence = dataset.sequence(first);
+            let begin =
+                (first.saturating_sub(LEAD_IN)..first).find(|&i| dataset.sequence(i) == sequence).unwrap_or(first);
+            for before in begin..first {
+                let _ = window.push(maps(dataset, before).map(|(maps, _)| maps));
+            }
+            frames.iter().map(|&frame| with_counter(dataset, &mut window, frame)).collect()
+        }
+    }
+}
+
+enum Tool {
+    Counter(Box<Counter>),
+    Alone(Network),
+}
+
+fn with_counter(dataset: &Dataset, window: &mut Window<'_>, frame: usize) -> Counted {
+    let (maps, annotated) = match maps(dataset, frame) {
+        Ok((maps, annotated)) => (Ok(maps), annotated),
+        Err(why) => (Err(why), None),
+    };
+    let began = Instant::now();
+    let count = window.push(maps);
+    let ms = milliseconds(began);
+    let numbers = count.map(|count| numbers(count.people(), annotated));
+    let ms = numbers.is_ok().then_some(ms);
+    (numbers.map_err(|why| super::fit::portable(dataset, &why)), ms)
+}
+
+fn alone(dataset: &Dataset, network: &Network, frame: usize) -> Counted {
+    let (mut maps, annotated) = match maps(dataset, frame) {
+        Ok(found) => found,
+        Err(why) => return (Err(super::fit::portable(dataset, &why)), None),
+    };
+    let began = Instant::now();
+    for map in &mut maps {
+        let _ = fill_missing(&mut map.data, &map.shape);
+    }
+    let maps: Vec<&[f64]> = maps.iter().map(|map| map.data.as_slice()).collect();
+    let probabilities = network.probabilities(&map_statistics(&maps));
+    let people = (0..CLASSES).fold(0, |best, n| if probabilities[n] > probabilities[best] { n } else { best });
+    (Ok(numbers(people, annotated)), Some(milliseconds(began)))
+}
+
+fn maps(dataset: &Dataset, frame: usize) -> Result<(Vec<Heatmap>, Option<usize>), String> {
+    let frame = dataset.load(frame).map_err(|error| error.to_string())?;
+    let annotated = frame.person_count.or_else(|| frame.truth.as_ref().map(|truth| truth.persons));
+    Ok((frame.maps, annotated))
+}
+
+fn numbers(people: usize, annotated: Option<usize>) -> RunNumbers {
+    RunNumbers { persons: people, annotated, reason: "counted".to_owned(), ..RunNumbers::default() }
+}
+
+fn milliseconds(began: Instant) -> f64 {
+    (began.elapsed().as_secs_f64() * 1e6).round() / 1e3
+}

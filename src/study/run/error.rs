@@ -1,0 +1,94 @@
+//! What can go wrong with a run as a whole. What goes wrong with one frame is a row.
+
+use super::super::StudyError;
+use std::path::PathBuf;
+
+/// Why a run cannot begin, go on, be merged or be read.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// A study underneath.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// A file cannot be written.
+    #[error("{path}: cannot be written: {reason}", path = path.display())]
+    Write {
+        /// What the operating system said.
+        reason: std::io::Error,
+        /// The file or folder.
+        path: PathBuf,
+    },
+    /// A file cannot be read.
+    #[error("{path}: cannot be read: {reason}", path = path.display())]
+    Read {
+        /// What the operating system said.
+        reason: std::io::Error,
+        /// The file or folder.
+        path: PathBuf,
+    },
+    /// A file of a run folder is not what it should be.
+    #[error("{path}: {message}", path = path.display())]
+    Damaged {
+        /// What is wrong, and what was expected.
+        message: String,
+        /// The file.
+        path: PathBuf,
+    },
+    /// The folder holds another run.
+    #[error("{path}: holds a run with another {what}: {there}, not {here}; give another --out, or remove the folder", path = path.display())]
+    OtherRun {
+        /// What differs.
+        what: &'static str,
+        /// What the folder says.
+        there: String,
+        /// What was asked for.
+        here: String,
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Another process writes the folder.
+    #[error("{path}: another process works on this run", path = path.display())]
+    Busy {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Runs that do not make one.
+    #[error("{path}: {message}", path = path.display())]
+    Merge {
+        /// What does not fit.
+        message: String,
+        /// The run folder.
+        path: PathBuf,
+    },
+    /// A parameter grid that makes no sense.
+    #[error("--grid {text}: {message}")]
+    Grid {
+        /// As typed.
+        text: String,
+        /// What is wrong, and what was expected.
+        message: String,
+    },
+    /// No frame to study.
+    #[error("{message}")]
+    NoFrames {
+        /// Which frames were asked for.
+        message: String,
+    },
+    /// The operating system gives no more threads.
+    #[error("no thread to work on: {reason}")]
+    Thread {
+        /// What it said.
+        reason: std::io::Error,
+    },
+}
+
+impl RunError {
+    /// For `map_err`: a file that cannot be written.
+    pub(super) fn writing(path: &std::path::Path) -> impl Fn(std::io::Error) -> Self + '_ {
+        |reason| Self::Write { reason, path: path.to_owned() }
+    }
+
+    /// For `map_err`: a file that cannot be read.
+    pub(super) fn reading(path: &std::path::Path) -> impl Fn(std::io::Error) -> Self + '_ {
+        |reason| Self::Read { reason, path: path.to_owned() }
+    }
+}

@@ -1,0 +1,275 @@
+//! One frame under one or several variants: load once, start once, fit, measure.
+//!
+//! Variants that differ only in what no start depends on share their start ([`start_key`]); those that differ only in the
+//! number of iterations share the fit itself, because k steps of a longer run are the shorter run.
+
+use super::row::RunNumbers;
+use crate::body::Pppr;
+use crate::config::{FitConfig, LearningRates};
+use crate::dataset::{Dataset, Frame, Layout};
+use crate::diagnose::{Camera, Reprojection, joint_errors, map_box_coverage, reprojection};
+use crate::geometry::Vec3;
+use crate::mhp::{Fitter, Precision, Problem, StopReason, predict};
+use crate::start::{begin, problem_of};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// A configuration with everything at its default that a start does not depend on: two variants with the same key start from
+/// the same pose. Where several starts are tried, a short fit decides between them, hence everything counts but its length.
+pub(super) fn start_key(config: &FitConfig) -> FitConfig {
+    let plain = FitConfig::default();
+    let key = FitConfig { iterations: plain.iterations, stop_when_converged: plain.stop_when_converged, ..*config };
+    if config.starts > 1 {
+        return key;
+    }
+    FitConfig {
+        w_em: plain.w_em,
+        w_kine: plain.w_kine,
+        theta_max_deg: plain.theta_max_deg,
+        d_sep_m: plain.d_sep_m,
+        d_joint_m: plain.d_joint_m,
+        learning_rate: plain.learning_rate,
+        learning_rates: LearningRates::default(),
+        w_time: plain.w_time,
+        w_floor: plain.w_floor,
+        ..key
+    }
+}
+
+/// A configuration without its number of iterations: variants with the same key are one fit.
+pub(super) fn fit_key(config: &FitConfig) -> FitConfig {
+    FitConfig { iterations: FitConfig::default().iterations, ..*config }
+}
+
+/// A frame, loaded.
+pub(super) struct Loaded<'a> {
+    dataset: &'a Dataset,
+    frame: Frame,
+    problem: Arc<Problem>,
+}
+
+/// A start, and how long it took to find.
+#[derive(Debug, Clone)]
+pub(super) struct Start {
+    pub(super) params: Pppr,
+    pub(super) init_ms: Option<f64>,
+}
+
+/// One fit at one number of iterations.
+pub(super) struct Stop {
+    pub(super) numbers: RunNumbers,
+    pub(super) fit_ms: f64,
+    pub(super) params: Pppr,
+}
+
+impl<'a> Loaded<'a> {
+    /// Reads frame `index`.
+    ///
+    /// # Errors
+    /// In one line that names the file.
+    pub(super) fn read(dataset: &'a Dataset, index: usize) -> Result<Self, String> {
+        let frame = dataset.load(index).map_err(|error| portable(dataset, &error.to_string()))?;
+        let problem = problem_of(dataset, &frame).map_err(|error| format!("{}: {error}", dataset.frame_name(index)))?;
+        Ok(Self { dataset, frame, problem: Arc::new(problem) })
+    }
+
+    /// A start from the frame's own peaks.
+    ///
+    /// # Errors
+    /// Where nobody is seen.
+    pub(super) fn cold(&self, config: &FitConfig) -> Result<Start, String> {
+        let began = Instant::now();
+        let found = begin(&self.problem, config).map_err(|error| self.told(&error))?.initialisation;
+        Ok(Start { params: found.params, init_ms: Some(milliseconds(began)) })
+    }
+
+    /// A start from what the frame before ended with, moved as its people moved.
+    pub(super) fn warm(&self, before: &Pppr) -> Start {
+        Start { params: predict(&self.problem, before), init_ms: None }
+    }
+
+    /// Fits from `start` and looks at it after each of `stops` steps, ascending. What fails from some step on fails there
+    /// for every later stop.
+    pub(super) fn fit(
+        &self,
+        config: &FitConfig,
+        precision: Precision,
+        start: &Start,
+        stops: &[usize],
+    ) -> Vec<Result<Stop, String>> {
+        let began = Instant::now();
+        let fitter = Fitter::new(Arc::clone(&self.problem), *config, precision, start.params.clone());
+        let mut fitter = fitter.map_err(|error| self.told(&error));
+        let mut ended = false;
+        let mut answers = Vec::with_capacity(stops.len());
+        for &stop in stops {
+            if let Ok(running) = &mut fitter
+                && let Err(why) = advance(running, stop, &mut ended)
+            {
+                fitter = Err(self.told(&why));
+            }
+            let fit_ms = milliseconds(began);
+            answers.push(fitter.as_ref().map_err(Clone::clone).map(|fitter| Stop {
+                numbers: self.numbers(fitter, start, ended),
+                fit_ms,
+                params: fitter.params().clone(),
+            }));
+        }
+        answers
+    }
+
+    fn numbers(&self, fitter: &Fitter, start: &Start, ended: bool) -> RunNumbers {
+        let (report, params) = (fitter.report(), fitter.params());
+        let t = report.terms;
+        let reason = if ended { StopReason::Converged } else { StopReason::Iterations };
+        let now = self.measured(params);
+        let before = self.measured(&start.params);
+        RunNumbers {
+            iterations: report.iteration,
+            converged: report.converged,
+            reason: reason.word().to_owned(),
+            loss: report.loss,
+            terms: [t.em, t.bone, t.rigid, t.joint, t.sep, t.coll],
+            iou: report.iou,
+            init_majpe_mm: before.majpe_mm,
+            init_pa_majpe_mm: before.pa_majpe_mm,
+            ..now
+        }
+    }
+
+    /// What the labels say of `params`.
+    fn measured(&self, params: &Pppr) -> RunNumbers {
+        let (frame, info) = (&self.frame, self.dataset.info());
+        let joints: Vec<Vec3> = (0..params.shape().total_joints()).map(|joint| params.position(joint)).collect();
+        let a_person = info.skeleton.joints.len();
+        let errors = frame.truth.as_ref().and_then(|truth| joint_errors(&joints, &truth.joints, a_person));
+        let image = self.reprojection(&joints, a_person);
+        RunNumbers {
+            majpe_mm: errors.map(|errors| errors.majpe_mm),
+            pa_majpe_mm: errors.map(|errors| errors.pa_majpe_mm),
+            persons: params.shape().persons,
+            annotated: frame.person_count.or_else(|| frame.truth.as_ref().map(|truth| truth.persons)),
+            reprojection_px: image.reprojection_px,
+            box_coverage: image.box_coverage,
+            map_box_coverage: self.map_box_coverage(&joints, a_person),
+            ..RunNumbers::default()
+        }
+    }
+
+    /// Only MMVR publishes a camera; its key points count where the skeleton is theirs.
+    fn reprojection(&self, joints: &[Vec3], a_person: usize) -> Reprojection {
+        let info = self.dataset.info();
+        let Some(image) = self.frame.image.as_ref().filter(|_| info.layout == Layout::Mmvr) else {
+            return Reprojection::default();
+        };
+        let preset = crate::body::Skeleton::preset(&image.keypoint_skeleton);
+        let same = preset.is_some_and(|preset| preset.joints == info.skeleton.joints);
+        let keypoints = if same { image.keypoints.as_slice() } else { &[] };
+        reprojection(&Camera::MMVR, joints, a_person, keypoints, &image.boxes)
+    }
+
+    fn map_box_coverage(&self, joints: &[Vec3], a_person: usize) -> Option<f64> {
+        let views = self.dataset.info().views.iter().zip(&self.frame.map_boxes);
+        let shares: Vec<f64> =
+            views.filter_map(|(view, boxes)| map_box_coverage(view, joints, a_person, boxes)).collect();
+        (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64)
+    }
+
+    /// An error with the frame's name: where the data set lies is no part of a row.
+    fn told(&self, error: &dyn std::fmt::Display) -> String {
+        format!("{}: {error}", self.frame.name)
+    }
+}
+
+/// Steps until `stop` or until the configuration says to end.
+fn advance(fitter: &mut Fitter, stop: usize, ended: &mut bool) -> Result<(), crate::mhp::FitError> {
+    while fitter.iteration() < stop && !*ended {
+        let report = fitter.step()?;
+        *ended = report.converged && fitter.config().stop_when_converged;
+    }
+    Ok(())
+}
+
+/// An error text without the folder of the data set, which may lie elsewhere on another machine.
+pub(super) fn portable(dataset: &Dataset, text: &str) -> String {
+    text.replace(&format!("{}{}", dataset.info().root.display(), std::path::MAIN_SEPARATOR), "")
+}
+
+fn milliseconds(began: Instant) -> f64 {
+    // A microsecond is all that such a time is worth.
+    (began.elapsed().as_secs_f64() * 1e6).round() / 1e3
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+    use super::*;
+    use crate::body::{Group, PpprShape, Skeleton};
+    use crate::geometry::Pose;
+    use crate::mhp::simulate;
+    use crate::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
+
+    fn view(array: &str, depth: AxisKind, across: AxisKind, [first, last]: [f64; 2]) -> View {
+        let axis = |kind, bins, lo, hi| Axis { kind, bins, lo, hi, spacing: Spacing::Linear };
+        View {
+            array: array.into(),
+            quantity: Quantity::Amplitude,
+            psf: PointSpread { range_m: 0.06, azimuth_rad: 0.03, elevation_rad: 0.03, doppler_mps: 0.1 },
+            pose: Pose::default(),
+            axes: vec![axis(depth, 48, 6.0, 0.0), axis(across, 32, first, last)],
+            region: None,
+        }
+    }
+
+    /// A standing column of joints in weak speckle.
+    fn problem() -> Problem {
+        let views = vec![
+            view("hori", AxisKind::DepthH, AxisKind::Y, [2.0, -2.0]),
+            view("vert", AxisKind::DepthV, AxisKind::Z, [-2.0, 2.0]),
+        ];
+        let (radar, skeleton) = (RadarConfig::default(), Skeleton::preset("coco17").unwrap());
+        let doppler_features = radar.doppler_features;
+        let mut body = Pppr::zeros(PpprShape { persons: 1, joints: 17, doppler_features });
+        for joint in 0..17 {
+            body.set_vec3(Group::Position, joint, [3.0, 0.02 * (joint % 5) as f64, 0.6 - 0.1 * joint as f64]);
+            body.set_vec3(Group::LogScale, joint, [0.08_f64.ln(); 3]);
+            body.joint_mut(Group::Rotation, joint)[0] = 1.0;
+        }
+        let blank = vec![1.0; 48 * 32];
+        let empty = Problem::new(radar.clone(), skeleton.clone(), views.clone(), &[&blank, &blank]).unwrap();
+        let mut maps = simulate(&empty, &FitConfig::default(), Precision::F64, &body);
+        for map in &mut maps {
+            let top = map.iter().copied().fold(0.0, f64::max);
+            for (k, cell) in map.iter_mut().enumerate() {
+                *cell += 1e-2 * top * (0.5 + ((k as f64 * 12.9898).sin() * 43_758.545_3).fract().abs());
+            }
+        }
+        let maps: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
+        Problem::new(radar, skeleton, views, &maps).unwrap()
+    }
+
+    /// Every setting that is left out of the key is one that the start does not depend on.
+    #[test]
+    fn variants_with_one_key_have_one_start() {
+        let (problem, base) = (problem(), FitConfig::default());
+        let start = |config: &FitConfig| begin(&problem, config).unwrap().initialisation.params;
+        let same = start(&base);
+        let rates = LearningRates { position: Some(0.01), bone: Some(0.02), ..LearningRates::default() };
+        let variants = [
+            FitConfig { w_em: 0.0, w_kine: 1.0, ..base },
+            FitConfig { theta_max_deg: 90.0, d_sep_m: 1.0, d_joint_m: 0.5, ..base },
+            FitConfig { learning_rate: 0.1, learning_rates: rates, ..base },
+            FitConfig { iterations: 3, stop_when_converged: true, ..base },
+            FitConfig { w_time: 3.0, ..base },
+        ];
+        for variant in variants {
+            assert_eq!(start_key(&variant), start_key(&base));
+            assert_eq!(start(&variant), same, "{variant:?}");
+        }
+        for other in [FitConfig { tau_pct: 40.0, ..base }, FitConfig { surface_offset_m: 0.1, ..base }] {
+            assert_ne!(start_key(&other), start_key(&base));
+        }
+        let several = |w_em| FitConfig { starts: 3, w_em, ..base };
+        assert_ne!(start_key(&several(0.1)), start_key(&several(1.0)), "a short fit decides between several starts");
+    }
+}

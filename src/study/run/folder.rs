@@ -1,0 +1,143 @@
+//! Run folders: begun or gone on with, merged, read back.
+
+use super::engine::execute;
+use super::error::RunError;
+use super::journal::{JOURNAL_FILE, Journal, Rows, read, rewrite};
+use super::markdown;
+use super::output::{self, TABLE_FILE, json_text};
+use super::plan::RunPlan;
+use super::row::RunRow;
+use super::spec::{RUN_FILE, RunSpec};
+use super::table::{TableRow, table};
+use crate::dataset::{Dataset, Progress};
+use std::path::Path;
+
+/// A run as it lies on disk, finished or not.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// What it is.
+    pub spec: RunSpec,
+    /// Rows so far, by variant, then by frame; those fitted only on the way to others included.
+    pub rows: Vec<RunRow>,
+    /// Whether it ended.
+    pub complete: bool,
+    /// The table of these rows.
+    pub table: Vec<TableRow>,
+}
+
+impl Run {
+    fn of(spec: RunSpec, rows: &Rows, complete: bool) -> Self {
+        let table = table(&spec, rows);
+        Self { spec, rows: rows.values().cloned().collect(), complete, table }
+    }
+
+    /// Reads a run folder.
+    ///
+    /// # Errors
+    /// Where it holds no run, or its files cannot be read.
+    pub fn read(folder: &Path) -> Result<Self, RunError> {
+        let spec = RunSpec::read(folder)?;
+        let rows = read(folder, &spec)?;
+        Ok(Self::of(spec, &rows, folder.join(TABLE_FILE).is_file()))
+    }
+
+    /// The table as Markdown.
+    pub fn markdown(&self) -> String {
+        markdown::text(&self.spec, &self.table)
+    }
+
+    /// The table as JSON.
+    pub fn json(&self) -> String {
+        json_text(&self.spec, &self.table)
+    }
+
+    /// The rows of a row of the table, by frame.
+    pub fn rows_of<'a>(&'a self, of: &'a TableRow) -> impl Iterator<Item = &'a RunRow> + 'a {
+        let inside = |row: &&RunRow| of.stratum.is_none_or(|word| row.stratum.is_some_and(|s| s.word() == word));
+        self.rows.iter().filter(|row| !row.passing && row.variant == of.variant).filter(inside)
+    }
+}
+
+/// Whether `folder` holds a run.
+pub fn is_run_folder(folder: &Path) -> bool {
+    folder.join(RUN_FILE).is_file()
+}
+
+/// Does `plan` in `folder`, which is made; where it holds the same run, rows that are done are not done again. Progress
+/// counts rows.
+///
+/// # Errors
+/// Where the folder holds another run or cannot be written, another process works on it, there is no thread, or on cancel.
+pub fn execute_run(
+    dataset: &Dataset,
+    plan: &RunPlan,
+    folder: &Path,
+    threads: usize,
+    progress: &Progress,
+) -> Result<Run, RunError> {
+    std::fs::create_dir_all(folder).map_err(RunError::writing(folder))?;
+    if is_run_folder(folder) {
+        let there = RunSpec::read(folder)?;
+        if let Some((what, there, here)) = there.difference(&plan.spec) {
+            return Err(RunError::OtherRun { what, there, here, path: folder.to_owned() });
+        }
+    } else if folder.join(JOURNAL_FILE).exists() {
+        let message = format!("there is a journal without {RUN_FILE}; give another folder, or remove it");
+        return Err(RunError::Damaged { message, path: folder.to_owned() });
+    } else {
+        plan.spec.write(folder)?;
+    }
+    let rows = execute(dataset, plan, Journal::open(folder, &plan.spec)?, folder, threads, progress)?;
+    output::write(folder, &plan.spec, &rows)?;
+    Ok(Run::of(plan.spec.clone(), &rows, true))
+}
+
+/// Makes one run of its shards, in `out`.
+///
+/// # Errors
+/// Where a folder is no complete shard, they are not of one run, one is missing or comes twice, or `out` cannot be written.
+pub fn merge_runs(folders: &[impl AsRef<Path>], out: &Path) -> Result<Run, RunError> {
+    let mut whole: Option<(RunSpec, usize)> = None;
+    let mut seen = std::collections::BTreeSet::new();
+    let mut rows = Rows::new();
+    for folder in folders.iter().map(AsRef::as_ref) {
+        let wrong = |message: String| RunError::Merge { message, path: folder.to_owned() };
+        let spec = RunSpec::read(folder)?;
+        let shard = spec.shard.ok_or_else(|| wrong("is no shard: it was run without --shard".into()))?;
+        if !folder.join(TABLE_FILE).is_file() {
+            return Err(wrong("is not finished; run its command again, it goes on where it stopped".into()));
+        }
+        match &whole {
+            None => whole = Some((spec.whole(), shard.count)),
+            Some((first, count)) => {
+                if let Some((what, there, here)) = spec.whole().difference(first) {
+                    return Err(wrong(format!("has another {what} than the first: {there}, not {here}")));
+                }
+                if shard.count != *count {
+                    return Err(wrong(format!("is one of {} shards, the first one of {count}", shard.count)));
+                }
+            }
+        }
+        if !seen.insert(shard.index) {
+            return Err(wrong(format!("shard {shard} comes twice")));
+        }
+        rows.extend(read(folder, &spec)?);
+    }
+    let nothing = || RunError::Merge { message: "nothing to merge".into(), path: out.to_owned() };
+    let (spec, count) = whole.ok_or_else(nothing)?;
+    if let Some(missing) = (1..=count).find(|index| !seen.contains(index)) {
+        let message = format!("shard {missing}/{count} is missing");
+        return Err(RunError::Merge { message, path: out.to_owned() });
+    }
+    std::fs::create_dir_all(out).map_err(RunError::writing(out))?;
+    if is_run_folder(out) {
+        let there = RunSpec::read(out)?;
+        if let Some((what, there, here)) = there.difference(&spec) {
+            return Err(RunError::OtherRun { what, there, here, path: out.to_owned() });
+        }
+    }
+    spec.write(out)?;
+    rewrite(&out.join(JOURNAL_FILE), &spec, &rows)?;
+    output::write(out, &spec, &rows)?;
+    Ok(Run::of(spec, &rows, true))
+}

@@ -1,0 +1,130 @@
+//! `journal.jsonl`: a line a finished row, appended as soon as it is known, so that a killed run loses nothing that was done.
+//!
+//! The first line names the run. A torn or damaged line is dropped, its row is done again. The file is locked while a
+//! process writes it.
+
+use super::error::RunError;
+use super::row::RunRow;
+use super::spec::RunSpec;
+use crate::dataset::npz::replace_file;
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// The name of the file in a run folder.
+pub const JOURNAL_FILE: &str = "journal.jsonl";
+
+/// Rows by (variant, frame).
+pub(super) type Rows = BTreeMap<(usize, usize), RunRow>;
+
+/// An open journal.
+#[derive(Debug)]
+pub(super) struct Journal {
+    file: File,
+    path: PathBuf,
+    /// Held until the journal is closed.
+    _lock: File,
+}
+
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Head {
+    run: String,
+}
+
+impl Journal {
+    /// Opens the journal of a run folder, or begins it, and gives the rows that are in it.
+    ///
+    /// # Errors
+    /// Where it cannot be read or written, another process holds it, or it is of another run.
+    pub(super) fn open(folder: &Path, spec: &RunSpec) -> Result<(Self, Rows), RunError> {
+        let path = folder.join(JOURNAL_FILE);
+        let lock = lock(folder)?;
+        let (rows, sound) = if path.exists() { read_lines(&path, spec)? } else { (Rows::new(), false) };
+        if !sound {
+            rewrite(&path, spec, &rows)?;
+        }
+        let file = OpenOptions::new().append(true).open(&path).map_err(RunError::writing(&path))?;
+        Ok((Self { file, path, _lock: lock }, rows))
+    }
+
+    /// Appends a row in one piece.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub(super) fn add(&mut self, row: &RunRow) -> Result<(), RunError> {
+        let line = line(row).map_err(RunError::writing(&self.path))?;
+        self.file.write_all(line.as_bytes()).map_err(RunError::writing(&self.path))
+    }
+}
+
+/// The rows of a run folder, finished or not.
+///
+/// # Errors
+/// Where the journal cannot be read or is of another run.
+pub(super) fn read(folder: &Path, spec: &RunSpec) -> Result<Rows, RunError> {
+    let path = folder.join(JOURNAL_FILE);
+    if path.exists() { read_lines(&path, spec).map(|(rows, _)| rows) } else { Ok(Rows::new()) }
+}
+
+/// Writes a journal of these rows anew, in their order.
+pub(super) fn rewrite(path: &Path, spec: &RunSpec, rows: &Rows) -> Result<(), RunError> {
+    let written = replace_file(path, |out| {
+        let head = serde_json::to_string(&Head { run: spec.id.clone() })?;
+        writeln!(out, "{head}")?;
+        rows.values().try_for_each(|row| out.write_all(line(row)?.as_bytes()))
+    });
+    written.map_err(RunError::writing(path))
+}
+
+fn line(row: &RunRow) -> std::io::Result<String> {
+    Ok(serde_json::to_string(row)? + "\n")
+}
+
+/// The rows, and whether every line was whole.
+fn read_lines(path: &Path, spec: &RunSpec) -> Result<(Rows, bool), RunError> {
+    let bytes = std::fs::read(path).map_err(RunError::reading(path))?;
+    let whole = bytes.is_empty() || bytes.ends_with(b"\n");
+    let mut lines = bytes.split(|&byte| byte == b'\n').filter(|line| !line.is_empty());
+    let Some(head) = lines.next() else { return Ok((Rows::new(), false)) };
+    let Ok(head) = serde_json::from_slice::<Head>(head) else {
+        // Killed while the first line was written: nothing is lost. Anything more is not ours to drop.
+        if whole {
+            let message = "line 1 does not name a run; expected {\"run\": …}".to_owned();
+            return Err(RunError::Damaged { message, path: path.to_owned() });
+        }
+        return Ok((Rows::new(), false));
+    };
+    if head.run != spec.id {
+        let message = format!("is the journal of run {}; run.toml is {}", head.run, spec.id);
+        return Err(RunError::Damaged { message, path: path.to_owned() });
+    }
+    let (mut rows, mut sound) = (Rows::new(), whole);
+    for line in lines {
+        match serde_json::from_slice::<RunRow>(line) {
+            Ok(row) if row.variant < spec.variants.len() => {
+                rows.insert((row.variant, row.frame), row);
+            }
+            _ => sound = false,
+        }
+    }
+    if !sound {
+        tracing::warn!("{}: a torn line is dropped, its row is done again", path.display());
+    }
+    Ok((rows, sound))
+}
+
+/// Holds the folder for this process.
+fn lock(folder: &Path) -> Result<File, RunError> {
+    let path = folder.join(".lock");
+    let file = OpenOptions::new().create(true).append(true).open(&path).map_err(RunError::writing(&path))?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(RunError::Busy { path: folder.to_owned() }),
+        Err(TryLockError::Error(reason)) => {
+            // Some network file systems know no locks; a run there is the user's to keep single.
+            tracing::warn!("{}: cannot be locked: {reason}", path.display());
+            Ok(file)
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! Studies: variants of a configuration over the frames of a data set, as a run folder.
+//!
+//! A [`RunPlan`] says what is compared and in which units it is done; [`execute_run`] does it on all cores and goes on where a
+//! killed run stopped; [`merge_runs`] makes one run of its shards; [`Run`] reads it back. From the inside out: `variant.rs` is one
+//! configuration, `plans.rs` the studies' rows, `grid.rs` and `switches.rs` two ways to make them, `spec.rs` the file that
+//! says what a run is, `plan.rs` its units of work, `fit.rs` one frame, `journal.rs` what is done, `engine.rs` the threads,
+//! `table.rs` the sums, `output.rs`, `markdown.rs` and `parquet_rows.rs` the files.
+//!
+//! A run folder: `run.toml` (the specification), `journal.jsonl` (rows as they were done), `rows.csv` and `rows.parquet` (the same,
+//! sorted), `table.md` and `table.json`; `timing.csv` and `timing.md`, which alone differ from run to run.
+
+mod counting;
+mod engine;
+mod error;
+mod fit;
+mod folder;
+mod grid;
+mod journal;
+mod kind;
+mod markdown;
+mod output;
+mod parquet_rows;
+mod plan;
+mod plans;
+mod row;
+mod spec;
+mod stamp;
+mod switches;
+mod table;
+mod variant;
+
+pub use error::RunError;
+pub use folder::{Run, execute_run, is_run_folder, merge_runs};
+pub use grid::GridAxis;
+pub use journal::JOURNAL_FILE;
+pub use kind::StudyKind;
+pub use output::TABLE_FILE;
+pub use plan::{RunPlan, RunRequest};
+pub use row::{RunNumbers, RunRow};
+pub use spec::{DataSpec, RUN_FILE, RunSpec, Shard, Subset};
+pub use switches::{SWITCHES, Switch};
+pub use table::{CountShares, Spread, TableRow};
+pub use variant::{Method, PaperRow, StartFrom, Variant};

@@ -1,0 +1,226 @@
+//! The table of a run: a row a variant, or a row a stratum and their mean.
+//!
+//! Errors, IoU and convergence are over the frames that could be fitted and whose number of persons is the annotated one
+//! (the paper's count-matched evaluation); the others are counted. Sums go through the frames in their order, so that the
+//! same rows give the same bytes.
+
+use super::journal::Rows;
+use super::plans::paper_of_stratum;
+use super::row::{RunNumbers, RunRow};
+use super::spec::RunSpec;
+use super::variant::{Method, PaperRow};
+use crate::people::{CLASSES, Confusion};
+use crate::study::complexity::Stratum;
+use serde::Serialize;
+
+/// Mean, spread and number of a quantity over frames.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation of the frames (n − 1); 0 for one.
+    pub sd: f64,
+    /// Frames where it is known.
+    pub n: usize,
+}
+
+impl Spread {
+    fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
+        let values: Vec<f64> = values.filter(|x| x.is_finite()).collect();
+        let n = values.len();
+        if n == 0 {
+            return None;
+        }
+        let mean = values.iter().sum::<f64>() / n as f64;
+        let squares: f64 = values.iter().map(|x| (x - mean) * (x - mean)).sum();
+        Some(Self { mean, sd: if n > 1 { (squares / (n - 1) as f64).sqrt() } else { 0.0 }, n })
+    }
+
+    /// Standard error of the mean.
+    pub fn error(&self) -> f64 {
+        self.sd / (self.n.max(1) as f64).sqrt()
+    }
+}
+
+/// How often the number of people is right. Shares, 0..1; `None` without such frames.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CountShares {
+    /// By annotated number: 0, 1, 2, 3, 4 and more.
+    pub by_people: [Option<f64>; CLASSES],
+    /// Frames of each.
+    pub frames: [usize; CLASSES],
+    /// One, two and three people weighted by 91, 8 and 1 %.
+    pub weighted: Option<f64>,
+    /// Of all frames.
+    pub overall: Option<f64>,
+}
+
+/// One row of the table. `None` where nothing is known.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TableRow {
+    /// A cell for each label column.
+    pub labels: Vec<String>,
+    /// Index of the variant.
+    pub variant: usize,
+    /// The stratum, in a table that is cut by it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stratum: Option<&'static str>,
+    /// Frames studied.
+    pub frames: usize,
+    /// Frames without a fit.
+    pub failed: usize,
+    /// Frames left out because another number of persons was fitted than is annotated.
+    pub count_mismatched: usize,
+    /// MAJPE, mm.
+    pub majpe_mm: Option<Spread>,
+    /// PA-MAJPE, mm.
+    pub pa_majpe_mm: Option<Spread>,
+    /// MAJPE of the start, mm.
+    pub init_majpe_mm: Option<Spread>,
+    /// PA-MAJPE of the start, mm.
+    pub init_pa_majpe_mm: Option<Spread>,
+    /// Share of frames whose fit is nearer to truth than its start, 0..1.
+    pub share_improved: Option<f64>,
+    /// Forward-consistency IoU, mean over views, 0..1.
+    pub iou: Option<Spread>,
+    /// Share of frames that met the convergence criterion, 0..1.
+    pub converged_share: Option<f64>,
+    /// L.
+    pub loss: Option<Spread>,
+    /// Adam steps taken.
+    pub iterations: Option<Spread>,
+    /// Joints against key points of an image, px.
+    pub reprojection_px: Option<Spread>,
+    /// Share of projected joints inside the image's boxes.
+    pub box_coverage: Option<Spread>,
+    /// Share of joints inside the boxes on the radar maps.
+    pub map_box_coverage: Option<Spread>,
+    /// Where people were counted and nothing was fitted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub counts: Option<CountShares>,
+    /// The paper's figures for the same.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub paper: Option<PaperRow>,
+}
+
+/// The table of a run.
+pub(super) fn table(spec: &RunSpec, rows: &Rows) -> Vec<TableRow> {
+    let counted = || rows.values().filter(|row| !row.passing);
+    if !spec.study.by_stratum() {
+        let of_variant = |(k, variant): (usize, &super::Variant)| {
+            let rows: Vec<&RunRow> = counted().filter(|row| row.variant == k).collect();
+            let paper = variant.paper;
+            if variant.method == Method::Fit {
+                TableRow { paper, ..summed(variant.labels.clone(), k, &rows) }
+            } else {
+                TableRow { paper, ..counted_right(variant.labels.clone(), k, &rows) }
+            }
+        };
+        return spec.variants.iter().enumerate().map(of_variant).collect();
+    }
+    let cut = Stratum::ALL.map(Some).into_iter().chain([None]);
+    let of_stratum = cut.map(|stratum| {
+        let inside = |row: &&RunRow| stratum.is_none() || row.stratum == stratum;
+        let rows: Vec<&RunRow> = counted().filter(inside).collect();
+        let label = stratum.map_or("mean", Stratum::word).to_owned();
+        TableRow {
+            stratum: stratum.map(Stratum::word),
+            paper: Some(paper_of_stratum(stratum)),
+            ..summed(vec![label], 0, &rows)
+        }
+    });
+    of_stratum.collect()
+}
+
+fn summed(labels: Vec<String>, variant: usize, rows: &[&RunRow]) -> TableRow {
+    let fitted: Vec<&RunNumbers> = rows.iter().filter_map(|row| row.fit.as_ref().ok()).collect();
+    let used: Vec<&RunNumbers> = fitted.iter().copied().filter(|fit| fit.count_matched()).collect();
+    let spread = |get: fn(&RunNumbers) -> Option<f64>| Spread::of(used.iter().filter_map(|fit| get(fit)));
+    let share = |known: Vec<bool>| {
+        (!known.is_empty()).then(|| known.iter().filter(|&&yes| yes).count() as f64 / known.len() as f64)
+    };
+    TableRow {
+        labels,
+        variant,
+        stratum: None,
+        frames: rows.len(),
+        failed: rows.len() - fitted.len(),
+        count_mismatched: fitted.len() - used.len(),
+        majpe_mm: spread(|fit| fit.majpe_mm),
+        pa_majpe_mm: spread(|fit| fit.pa_majpe_mm),
+        init_majpe_mm: spread(|fit| fit.init_majpe_mm),
+        init_pa_majpe_mm: spread(|fit| fit.init_pa_majpe_mm),
+        share_improved: share(used.iter().filter_map(|fit| fit.improved()).collect()),
+        iou: spread(RunNumbers::mean_iou),
+        converged_share: share(used.iter().map(|fit| fit.converged).collect()),
+        loss: spread(|fit| Some(fit.loss)),
+        iterations: spread(|fit| Some(fit.iterations as f64)),
+        reprojection_px: spread(|fit| fit.reprojection_px),
+        box_coverage: spread(|fit| fit.box_coverage),
+        map_box_coverage: spread(|fit| fit.map_box_coverage),
+        counts: None,
+        paper: None,
+    }
+}
+
+/// A row of counts: nothing was fitted, so that nothing else is known.
+fn counted_right(labels: Vec<String>, variant: usize, rows: &[&RunRow]) -> TableRow {
+    let mut confusion = Confusion::default();
+    for numbers in rows.iter().filter_map(|row| row.fit.as_ref().ok()) {
+        if let Some(annotated) = numbers.annotated {
+            confusion.add(annotated, numbers.persons);
+        }
+    }
+    let counts = CountShares {
+        by_people: std::array::from_fn(|people| confusion.accuracy(people)),
+        frames: std::array::from_fn(|people| confusion.of(people)),
+        weighted: confusion.weighted(),
+        overall: confusion.overall(),
+    };
+    let failed = rows.iter().filter(|row| row.fit.is_err()).count();
+    TableRow { frames: rows.len(), failed, counts: Some(counts), ..summed(labels, variant, &[]) }
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+    use super::*;
+
+    fn row(frame: usize, majpe_mm: f64, fitted: usize) -> RunRow {
+        let fit = RunNumbers {
+            majpe_mm: Some(majpe_mm),
+            init_majpe_mm: Some(100.0),
+            iou: vec![Some(0.2), None, Some(0.6)],
+            persons: fitted,
+            annotated: Some(1),
+            converged: majpe_mm < 95.0,
+            ..RunNumbers::default()
+        };
+        RunRow {
+            variant: 0,
+            frame,
+            name: format!("f{frame}"),
+            sequence: "s".into(),
+            stratum: None,
+            passing: false,
+            fit: Ok(fit),
+            init_ms: None,
+            fit_ms: None,
+        }
+    }
+
+    #[test]
+    fn failed_mismatched_and_passing_frames_are_counted_and_left_out() {
+        let failed = RunRow { fit: Err("no".into()), ..row(2, 0.0, 1) };
+        let rows = [row(0, 80.0, 1), row(1, 110.0, 1), failed, row(3, 5000.0, 2)];
+        let rows: Vec<&RunRow> = rows.iter().collect();
+        let summed = summed(vec![], 0, &rows);
+        assert_eq!((summed.frames, summed.failed, summed.count_mismatched), (4, 1, 1));
+        let majpe = summed.majpe_mm.unwrap();
+        assert_eq!((majpe.mean, majpe.n), (95.0, 2));
+        assert!((majpe.sd - 450.0_f64.sqrt()).abs() < 1e-9);
+        assert_eq!((summed.share_improved, summed.converged_share), (Some(0.5), Some(0.5)));
+        assert!((summed.iou.unwrap().mean - 0.4).abs() < 1e-12);
+        assert_eq!(summed.reprojection_px, None);
+    }
+}
