@@ -32,13 +32,16 @@
 //! | [`cli`] | one file a subcommand |
 //! | [`session`] | the state behind the window and the only function that changes it |
 //! | [`worker`] | the thread that runs a fit, and its protocol |
-//! | [`study`] | batch runs and their tables; which frames are hard |
+//! | [`study`] | batch runs; studies, their tables and run folders; exports; which frames are hard |
 //! | [`labels`] | tags, notes, verdicts, the journal that keeps them, agreement |
 //! | [`diagnose`] | metrics: MAJPE, PA-MAJPE; evidence for each failure mode |
+//! | [`start`] | where a frame's fit begins: frames around, count, start poses |
 //! | [`mhp`] | initialisation, forward model, objective, Adam, convergence, the fitter's one `step` |
 //! | [`dataset`] | frames, the generic manifest, MMVR, npz; lazy loading and a cache with a byte budget |
-//! | [`body`] | skeleton topologies, the PPPR parameters, a walking body |
-//! | [`radar`] | chirp, axes, views, point-spread functions, FMCW synthesis and the FFT chain |
+//! | [`simulate`] | the synthetic source: people and rooms before a radar, as frames with truth |
+//! | [`people`] | counting, places and identities of several people |
+//! | [`body`] | skeleton topologies, the PPPR parameters, bodies that move |
+//! | [`radar`] | chirp, axes, views, point-spread functions, FMCW synthesis of a MIMO array and the FFT chain |
 //! | [`config`] | `FitConfig`: defaults, ranges, help text; the only source for files, command line and sliders |
 //! | [`folders`] | where the user's settings, labels and caches lie |
 //! | [`geometry`] | 3-vectors, 3×3 matrices, quaternions, the spherical triad |
@@ -53,6 +56,7 @@ pub mod folders;
 pub mod geometry;
 pub mod labels;
 pub mod mhp;
+pub mod people;
 pub mod radar;
 pub mod study;
 pub mod worker;
@@ -62,3 +66,5 @@ pub mod app;
 #[cfg(feature = "viewer")]
 pub mod render;
 pub mod session;
+pub mod simulate;
+pub mod start;

@@ -515,8 +515,19 @@ fn on_the_bundled_walk_a_fit_on_the_reflector_stands_out() {
         (frames_before(&dataset, 0), frames_before(&dataset, 3), frames_before(&dataset, 9)),
         (0..0, 0..3, 5..9)
     );
-    // Frame 3's own peaks lead to the wall behind the walker; judged on frame 6, where the walker has moved on.
-    let on_wall = fit_frame(&dataset, 3, &options(20), None).unwrap().params;
+    // A fit of frame 6 moved to the strongest echo behind the walker, which is the wall.
+    let view = &dataset.info().views[0];
+    let map = &dataset.load(6).unwrap().maps[0];
+    let behind = |cell: usize| view.axes[0].at((cell / 128) as f64) > 4.0;
+    let strongest = (0..map.data.len()).filter(|&cell| behind(cell));
+    let strongest = strongest.max_by(|&a, &b| map.data[a].total_cmp(&map.data[b])).unwrap();
+    let wall = [view.axes[0].at((strongest / 128) as f64), view.axes[1].at((strongest % 128) as f64)];
+    let mut on_wall = fit_frame(&dataset, 6, &options(20), None).unwrap().params;
+    let from = on_wall.position(11);
+    for joint in 0..17 {
+        let [x, y, z] = on_wall.position(joint);
+        on_wall.set_vec3(Group::Position, joint, [x - from[0] + wall[0], y - from[1] + wall[1], z]);
+    }
     let scores = |params: Option<&Pppr>| {
         let found = frame_evidence(&dataset, 6, &options(20), params).evidence.unwrap();
         check(&found, &dataset.info().views, 17);

@@ -8,8 +8,9 @@ use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::npz::{ArrayView, write};
 use mhp_inspector::dataset::{Dataset, Manifest, Progress, read_pppr};
 use mhp_inspector::diagnose::joint_errors;
-use mhp_inspector::mhp::{Fitter, Precision, Problem, initialise, simulate};
+use mhp_inspector::mhp::{Fitter, Precision, Problem, predict, simulate};
 use mhp_inspector::radar::RadarConfig;
+use mhp_inspector::start::{begin, problem_of};
 use mhp_inspector::study::{BatchOptions, StudyError, run_batch};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -141,13 +142,13 @@ fn column<'a>(rows: &'a [BTreeMap<String, String>], key: &str) -> Vec<&'a str> {
 }
 
 /// What the library makes of a frame, from `start` or its own peaks: loss and parameters.
-fn by_hand(dataset: &Dataset, index: usize, config: FitConfig, start: Option<Pppr>) -> (f64, Pppr) {
-    let (info, frame) = (dataset.info(), dataset.load(index).unwrap());
-    let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-    let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap();
-    let problem = Arc::new(problem);
-    let start = start.unwrap_or_else(|| initialise(&problem, &config).unwrap().params);
-    let mut fitter = Fitter::new(problem, config, Precision::F64, start).unwrap();
+fn by_hand(dataset: &Dataset, index: usize, config: &FitConfig, start: Option<Pppr>) -> (f64, Pppr) {
+    let problem = Arc::new(problem_of(dataset, &dataset.load(index).unwrap()).unwrap());
+    let start = match start {
+        Some(before) => predict(&problem, &before),
+        None => begin(&problem, config).unwrap().initialisation.params,
+    };
+    let mut fitter = Fitter::new(problem, *config, Precision::F64, start).unwrap();
     for _ in 0..config.iterations {
         fitter.step().unwrap();
     }
@@ -185,7 +186,7 @@ fn a_batch_writes_rows_in_order_and_goes_on_after_a_bad_frame() {
     assert_eq!(config, FitConfig { iterations: 6, ..FitConfig::default() });
     let dataset = small.open();
     for (index, row) in rows.iter().enumerate().filter(|(index, _)| *index != 2) {
-        let (loss, params) = by_hand(&dataset, index, config, None);
+        let (loss, params) = by_hand(&dataset, index, &config, None);
         assert_eq!(row["loss"].parse(), Ok(loss), "frame {index}");
         let written = read_pppr(&out.join("pppr").join(row["frame"].replace('/', "_") + ".npz"), None).unwrap();
         assert_eq!(written, params, "frame {index}");
@@ -209,10 +210,10 @@ fn a_warm_start_follows_a_sequence_and_no_further() {
     assert_eq!(fresh, [true, false, false, true, true], "after a bad frame and in a new sequence: from the peaks");
     let config = FitConfig { iterations: 5, ..FitConfig::default() };
     let dataset = small.open();
-    let (_, first) = by_hand(&dataset, 0, config, None);
-    let (loss, _) = by_hand(&dataset, 1, config, Some(first));
+    let (_, first) = by_hand(&dataset, 0, &config, None);
+    let (loss, _) = by_hand(&dataset, 1, &config, Some(first));
     assert_eq!(rows[1]["loss"].parse(), Ok(loss));
-    let (loss, _) = by_hand(&dataset, 4, config, None);
+    let (loss, _) = by_hand(&dataset, 4, &config, None);
     assert_eq!(rows[4]["loss"].parse(), Ok(loss));
 }
 

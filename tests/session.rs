@@ -79,9 +79,11 @@ impl Bench {
 
     /// The worker answers a preparation.
     fn answer(&mut self, prepare: Prepare) {
-        let Prepare { job, branch, radar, skeleton, views, frame, start, .. } = prepare;
+        let Prepare { job, branch, dataset, frame, start, .. } = prepare;
+        let info = dataset.info();
         let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-        let problem = Arc::new(Problem::new(radar, skeleton, views, &maps).unwrap());
+        let problem =
+            Arc::new(Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap());
         let (initial, resumed) = match start {
             Start::Initialise => (self.params.clone(), false),
             Start::Warm(params) => (params, false),
@@ -453,9 +455,9 @@ fn a_setting_changed_at_an_earlier_iteration_starts_a_branch() {
     bench.run_to(10);
     bench.apply(Command::GotoIteration(6));
     let config = FitConfig { w_em: 2.0, ..FitConfig::default() };
-    let effects = bench.apply(Command::SetConfig(config));
+    let effects = bench.apply(Command::SetConfig(Box::new(config)));
     let WorkerCommand::Branch { branch: 1, state, config: told } = sent(&effects) else { panic!("{effects:?}") };
-    assert_eq!((state.iteration, *told), (6, config));
+    assert_eq!((state.iteration, **told), (6, config));
     let history = &bench.session.fit.history;
     let branches: Vec<_> = history.branches().iter().map(|b| (b.id, b.parent, b.config.w_em, b.head())).collect();
     assert_eq!(branches, [(0, None, 0.5, 10), (1, Some((0, 6)), 2.0, 6)]);
@@ -513,20 +515,23 @@ fn a_setting_changed_while_running_is_a_flag() {
     bench.apply(Command::ToggleRun);
     bench.rows(job, 0, 1..=4);
     let mut config = FitConfig { tau_pct: 15.0, ..FitConfig::default() };
-    let effects = bench.apply(Command::SetConfig(config));
-    assert!(matches!(sent(&effects), WorkerCommand::Configure(told) if *told == config));
+    let effects = bench.apply(Command::SetConfig(Box::new(config)));
+    assert!(matches!(sent(&effects), WorkerCommand::Configure(told) if **told == config));
     assert!(bench.session.fit.is_running());
-    bench.event(job, WorkerEvent::ConfigApplied { branch: 0, iteration: 4, config });
+    bench.event(job, WorkerEvent::ConfigApplied { branch: 0, iteration: 4, config: Box::new(config) });
     // A slider sends many values between two steps; what held is one flag.
     config.tau_pct = 20.0;
-    bench.event(job, WorkerEvent::ConfigApplied { branch: 0, iteration: 4, config });
+    bench.event(job, WorkerEvent::ConfigApplied { branch: 0, iteration: 4, config: Box::new(config) });
     bench.rows(job, 0, 5..=6);
     let branch = bench.session.fit.branch().unwrap();
     let flags: Vec<_> = branch.flags.iter().map(|flag| (flag.iteration, flag.text.as_str())).collect();
     assert_eq!(flags, [(4, "τ_pct 10 → 20")]);
     assert_eq!([4, 5].map(|k| branch.config_at(k).tau_pct), [10.0, 20.0]);
-    assert!(bench.apply(Command::SetConfig(FitConfig { tau_pct: 30.0, ..config })).len() == 1);
-    assert!(bench.apply(Command::SetConfig(FitConfig { tau_pct: 30.0, ..config })).is_empty(), "nothing changed");
+    assert!(bench.apply(Command::SetConfig(Box::new(FitConfig { tau_pct: 30.0, ..config }))).len() == 1);
+    assert!(
+        bench.apply(Command::SetConfig(Box::new(FitConfig { tau_pct: 30.0, ..config }))).is_empty(),
+        "nothing changed"
+    );
 }
 
 #[test]
@@ -535,7 +540,7 @@ fn how_long_to_run_is_no_reason_for_a_branch() {
     bench.run_to(10);
     bench.apply(Command::GotoIteration(5));
     let config = FitConfig { iterations: 40, stop_when_converged: true, ..FitConfig::default() };
-    assert!(matches!(sent(&bench.apply(Command::SetConfig(config))), WorkerCommand::Configure(_)));
+    assert!(matches!(sent(&bench.apply(Command::SetConfig(Box::new(config)))), WorkerCommand::Configure(_)));
     assert_eq!((bench.session.fit.cursor, bench.session.fit.history.branches().len()), (Some(5), 1));
 }
 
@@ -543,12 +548,12 @@ fn how_long_to_run_is_no_reason_for_a_branch() {
 fn settings_out_of_range_are_refused_by_name() {
     let mut bench = Bench::new();
     for (config, name) in [
-        (FitConfig { tau_pct: 100.0, ..FitConfig::default() }, "tau_pct is 100"),
+        (FitConfig { tau_pct: 100.5, ..FitConfig::default() }, "tau_pct is 100.5"),
         (FitConfig { w_em: f64::NAN, ..FitConfig::default() }, "w_em is NaN"),
         (FitConfig { iterations: 0, ..FitConfig::default() }, "iterations is 0"),
         (FitConfig { learning_rate: -1.0, ..FitConfig::default() }, "learning_rate is -1"),
     ] {
-        assert!(bench.apply(Command::SetConfig(config)).is_empty());
+        assert!(bench.apply(Command::SetConfig(Box::new(config))).is_empty());
         let text = bench.errors().pop().unwrap().to_owned();
         assert!(text.contains(name) && text.contains("expected"), "{text}");
         assert_eq!(bench.session.config, FitConfig::default());
@@ -598,13 +603,13 @@ fn a_fit_that_was_left_is_found_again() {
     let mut bench = Bench::new();
     bench.run_to(10);
     bench.apply(Command::GotoIteration(6));
-    bench.apply(Command::SetConfig(FitConfig { w_em: 2.0, ..FitConfig::default() }));
+    bench.apply(Command::SetConfig(Box::new(FitConfig { w_em: 2.0, ..FitConfig::default() })));
     bench.rows(bench.job(), 1, 6..=8);
     bench.apply(Command::GotoIteration(7));
     let prepare = bench.goto(1);
     assert_eq!(bench.session.fit.history.branches().len(), 1);
     bench.answer(prepare);
-    bench.apply(Command::SetConfig(FitConfig { w_em: 3.0, ..FitConfig::default() }));
+    bench.apply(Command::SetConfig(Box::new(FitConfig { w_em: 3.0, ..FitConfig::default() })));
 
     let prepare = bench.goto(0);
     let Start::Resume { initial, state } = &prepare.start else { panic!("not resumed") };
@@ -638,7 +643,7 @@ fn another_data_set_begins_anew_and_keeps_how_things_are_shown() {
     bench.apply(Command::SetView(Box::new(view.clone())));
     bench.apply(Command::SelectJoint(Some(3)));
     let config = FitConfig { w_em: 0.75, ..FitConfig::default() };
-    bench.apply(Command::SetConfig(config));
+    bench.apply(Command::SetConfig(Box::new(config)));
     let other = tempfile::tempdir().unwrap();
     let dataset = dataset(other.path(), 2);
     bench.apply(Command::Opened(other.path().into(), Ok(dataset)));
@@ -675,7 +680,7 @@ fn a_job_that_is_lost_can_only_be_reset() {
     assert_eq!(bench.session.fit.status, FitStatus::Failed("a panic".into()));
     assert_eq!(bench.errors(), ["diverged", "a panic"]);
     assert!(bench.apply(Command::ToggleRun).is_empty());
-    assert!(bench.apply(Command::SetConfig(FitConfig { w_em: 1.0, ..FitConfig::default() })).is_empty());
+    assert!(bench.apply(Command::SetConfig(Box::new(FitConfig { w_em: 1.0, ..FitConfig::default() }))).is_empty());
     let prepare = prepare_of(bench.apply(Command::Reset));
     assert_eq!((prepare.config.w_em, bench.session.fit.status.clone()), (1.0, FitStatus::Preparing));
 }
@@ -691,9 +696,9 @@ fn a_run_begins_by_itself_only_where_asked() {
     let prepared = Prepared {
         problem: Arc::new(
             Problem::new(
-                prepare.radar.clone(),
-                prepare.skeleton.clone(),
-                prepare.views.clone(),
+                prepare.dataset.info().radar.clone(),
+                prepare.dataset.info().skeleton.clone(),
+                prepare.dataset.info().views.clone(),
                 &prepare.frame.maps.iter().map(|m| m.data.as_slice()).collect::<Vec<_>>(),
             )
             .unwrap(),

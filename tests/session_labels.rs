@@ -120,7 +120,9 @@ impl Bench {
         });
         let prepare = prepare.unwrap();
         let maps: Vec<&[f64]> = prepare.frame.maps.iter().map(|map| map.data.as_slice()).collect();
-        let problem = Arc::new(Problem::new(prepare.radar, prepare.skeleton, prepare.views, &maps).unwrap());
+        let info = prepare.dataset.info();
+        let (radar, skeleton, views) = (info.radar.clone(), info.skeleton.clone(), info.views.clone());
+        let problem = Arc::new(Problem::new(radar, skeleton, views, &maps).unwrap());
         let params = initialise(&problem, &FitConfig::default()).unwrap().params;
         let initial = params.clone();
         let prepared = Prepared { problem, initialisation: None, initial, warnings: Vec::new(), init_ms: 1.0 };

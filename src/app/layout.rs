@@ -39,11 +39,13 @@ pub enum PaneKind {
     Agreement,
     /// Counts of labels.
     Statistics,
+    /// A study's table and plot.
+    Study,
 }
 
 impl PaneKind {
     /// Every pane.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Frames,
         Self::HOri,
         Self::HSim,
@@ -58,6 +60,7 @@ impl PaneKind {
         Self::Compare,
         Self::Agreement,
         Self::Statistics,
+        Self::Study,
     ];
 
     /// The title on its tab.
@@ -77,6 +80,7 @@ impl PaneKind {
             Self::Compare => "Compare",
             Self::Agreement => "Agreement",
             Self::Statistics => "Statistics",
+            Self::Study => "Study",
         }
     }
 }
@@ -99,9 +103,10 @@ impl Default for Layout {
         let scene = tabs(&mut tiles, vec![scene, image]);
         let curves = tiles.insert_pane(PaneKind::Curves);
         let log = tiles.insert_pane(PaneKind::Log);
-        let [compare, agreement, statistics] =
-            [PaneKind::Compare, PaneKind::Agreement, PaneKind::Statistics].map(|pane| tiles.insert_pane(pane));
-        let curves = tabs(&mut tiles, vec![curves, compare, agreement, statistics, log]);
+        let [study, compare, agreement, statistics] =
+            [PaneKind::Study, PaneKind::Compare, PaneKind::Agreement, PaneKind::Statistics]
+                .map(|pane| tiles.insert_pane(pane));
+        let curves = tabs(&mut tiles, vec![curves, study, compare, agreement, statistics, log]);
         let below = linear(&mut tiles, LinearDir::Horizontal, &[(scene, 1.0), (curves, 1.0)]);
         let middle = linear(&mut tiles, LinearDir::Vertical, &[(maps, 1.12), (below, 1.0)]);
         let frames = tiles.insert_pane(PaneKind::Frames);
@@ -131,9 +136,31 @@ impl Layout {
     /// A stored tree; one without a single pane is replaced by the default.
     pub(crate) fn restored(tree: Tree<PaneKind>) -> Self {
         if tree.root().is_some() && tree.tiles.iter().any(|(_, tile)| matches!(tile, Tile::Pane(_))) {
-            Self { tree, asked: None }
+            let mut restored = Self { tree, asked: None };
+            restored.complete();
+            restored
         } else {
             Self::default()
+        }
+    }
+
+    /// Adds what an older tree does not know yet to the tabs of the curves, or to the first tabs that there are.
+    fn complete(&mut self) {
+        let tiles = &self.tree.tiles;
+        let has = |wanted: PaneKind| tiles.iter().any(|(_, tile)| matches!(tile, Tile::Pane(pane) if *pane == wanted));
+        let missing: Vec<PaneKind> = PaneKind::ALL.into_iter().filter(|&pane| !has(pane)).collect();
+        let of_curves = tiles.iter().find_map(|(id, tile)| {
+            matches!(tile, Tile::Pane(PaneKind::Curves)).then(|| tiles.parent_of(*id)).flatten()
+        });
+        let is_tabs = |id: &TileId| matches!(tiles.get(*id), Some(Tile::Container(Container::Tabs(_))));
+        let mut all: Vec<TileId> = tiles.iter().map(|(id, _)| *id).filter(|id| is_tabs(id)).collect();
+        all.sort_unstable_by_key(|id| id.0);
+        let Some(home) = of_curves.filter(|id| is_tabs(id)).or_else(|| all.first().copied()) else { return };
+        for pane in missing {
+            let id = self.tree.tiles.insert_pane(pane);
+            if let Some(Tile::Container(Container::Tabs(tabs))) = self.tree.tiles.get_mut(home) {
+                tabs.add_child(id);
+            }
         }
     }
 

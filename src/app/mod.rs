@@ -41,6 +41,8 @@ pub struct Begin {
     pub aim: Aim,
     /// A table of results for the frame list.
     pub results: Option<PathBuf>,
+    /// The run folder of a study.
+    pub study: Option<PathBuf>,
     /// A session file, instead of all that.
     pub session: Option<PathBuf>,
 }
@@ -108,6 +110,9 @@ impl InspectorApp {
         if let Some(results) = &begin.results {
             app.apply(Command::LoadResults(results.clone()));
         }
+        if let Some(run) = &begin.study {
+            app.open_run(run.clone());
+        }
         for extra in begin.paths.iter().skip(1) {
             app.session.data.recent.push(extra.clone());
         }
@@ -141,6 +146,7 @@ impl InspectorApp {
 
     fn act(&mut self, ctx: &egui::Context, act: Act) {
         match act {
+            Act::Session(Command::OpenRun(folder)) => self.open_run(folder),
             Act::Session(command) => self.apply(command),
             Act::App(act) => self.app_act(ctx, act),
             Act::Write(kind, path) => self.save(ctx, kind, path),
@@ -171,6 +177,7 @@ impl InspectorApp {
             AppAct::CopyPicture(pane) => self.copy_picture(ctx, pane),
             AppAct::ShowPane(pane) => self.layout.show_pane(pane),
             AppAct::LoadResults => self.overlay.load_results(),
+            AppAct::OpenStudy => self.overlay.open_study(),
             AppAct::CopyPath => self.copy_path(ctx),
             AppAct::FocusFilter => self.panes.frames.focus_filter(),
             AppAct::FocusNote => {
@@ -191,7 +198,13 @@ impl InspectorApp {
         self.apply(Command::SetView(Box::new(view)));
     }
 
-    /// Files dropped on the window: a table is results, anything else a data set.
+    /// Reads a run folder and brings its pane to the front.
+    fn open_run(&mut self, folder: PathBuf) {
+        self.layout.show_pane(PaneKind::Study);
+        self.apply(Command::OpenRun(folder));
+    }
+
+    /// Files dropped on the window: a table is results, a run folder a study, anything else a data set.
     fn take_drops(&mut self, ctx: &egui::Context) {
         let dropped = ctx.input(|i| {
             i.raw
@@ -203,7 +216,11 @@ impl InspectorApp {
             && let Some(path) = dropped.clone()
         {
             let table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
-            self.apply(if table { Command::LoadResults(path) } else { Command::Open(path) });
+            if crate::study::run::is_run_folder(&path) {
+                self.open_run(path);
+            } else {
+                self.apply(if table { Command::LoadResults(path) } else { Command::Open(path) });
+            }
         }
         self.dropped = dropped;
     }

@@ -27,6 +27,7 @@ enum Sheet {
     Path,
     Session,
     Results,
+    Study,
     Save(SaveKind),
 }
 
@@ -98,6 +99,7 @@ impl Overlay {
             Sheet::Path => self.path(ui, shared),
             Sheet::Session => self.session_path(ui, shared),
             Sheet::Results => self.results_path(ui, shared),
+            Sheet::Study => self.study_path(ui, shared),
             Sheet::Save(kind) => self.save(ui, shared, kind),
         };
         if close {
@@ -349,6 +351,11 @@ fn pick_save(suggested: &std::path::Path) -> Option<PathBuf> {
 fn pick_session() -> Option<PathBuf> {
     let dialog = rfd::FileDialog::new().set_title("Open a session");
     dialog.add_filter("Session", &["mhp-session"]).add_filter("All files", &["*"]).pick_file()
+}
+
+/// Shows the desktop's dialog for a run folder; blocks like [`pick`].
+fn pick_run() -> Option<PathBuf> {
+    rfd::FileDialog::new().set_title("Open study").pick_folder()
 }
 
 /// Shows the desktop's dialog for a table of results; blocks like [`pick`].

@@ -111,6 +111,15 @@ impl Tokens {
         }
     }
 
+    /// The colour of a person among several, by identity: six that colour-blind eyes tell apart (Okabe and Ito), then again from
+    /// the first. The number beside the person says the same.
+    pub(crate) fn person(&self, identity: usize) -> Color32 {
+        const ON_DARK: [u32; 6] = [0x56B4E9, 0xE69F00, 0x00B886, 0xD98AB3, 0xF0E442, 0xF0733A];
+        const ON_LIGHT: [u32; 6] = [0x1B75B0, 0xA87400, 0x00785A, 0xA34F7C, 0x8A8000, 0xB94700];
+        let colors = if self.dark { ON_DARK } else { ON_LIGHT };
+        rgb(colors[identity % colors.len()])
+    }
+
     /// The colour of a stratum; a letter or a height says the same.
     pub(crate) fn stratum(&self, stratum: Stratum) -> Color32 {
         match stratum {

@@ -1,6 +1,6 @@
 //! What several subcommands share: opening, settings, precision, printing.
 
-use crate::config::FitConfig;
+use crate::config::{FitConfig, Preset};
 use crate::dataset::{Dataset, Manifest, Progress};
 use crate::mhp::Precision;
 use anyhow::Context as _;
@@ -27,6 +27,15 @@ impl From<PrecisionArg> for Precision {
     }
 }
 
+/// A preset as typed.
+///
+/// # Errors
+/// Names those that there are.
+pub(super) fn preset(name: &str) -> Result<Preset, String> {
+    let known = || Preset::ALL.map(Preset::name).join(", ");
+    Preset::named(name).ok_or_else(|| format!("unknown preset; expected one of {}", known()))
+}
+
 /// Opens `path` as it says itself, or as `manifest` says.
 ///
 /// # Errors
@@ -47,12 +56,12 @@ pub(super) fn config(file: Option<&Path>) -> anyhow::Result<FitConfig> {
     Ok(file.map(FitConfig::from_file).transpose()?.unwrap_or_default())
 }
 
-/// As [`config`], with the number of Adam steps that the command line gives.
+/// The configuration of a file, or the preset's, with the number of Adam steps that the command line gives.
 ///
 /// # Errors
 /// As [`config`], or where the number is out of range.
-pub(super) fn settings(file: Option<&Path>, iterations: Option<usize>) -> anyhow::Result<FitConfig> {
-    let config = config(file)?;
+pub(super) fn settings(file: Option<&Path>, preset: Preset, iterations: Option<usize>) -> anyhow::Result<FitConfig> {
+    let config = file.map(FitConfig::from_file).transpose()?.unwrap_or_else(|| preset.config());
     match iterations {
         Some(iterations) => FitConfig { iterations, ..config }.validated().context("--iterations"),
         None => Ok(config),

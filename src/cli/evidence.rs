@@ -4,6 +4,7 @@ use super::common::{PrecisionArg, open, print, progress_bar, settings};
 use super::frames::{FrameRange, chosen};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::body::Pppr;
+use crate::config::Preset;
 use crate::dataset::npz::replace_file;
 use crate::dataset::{Dataset, read_pppr};
 use crate::diagnose::{Evidence, Finding, Place};
@@ -78,7 +79,7 @@ pub struct EvidenceArgs {
 /// # Errors
 /// Where the configuration, the data set, the range of frames or the parameters are bad, or the table cannot be written.
 pub(super) fn run(args: &EvidenceArgs) -> anyhow::Result<ExitCode> {
-    let config = settings(args.config.as_deref(), args.iterations)?;
+    let config = settings(args.config.as_deref(), Preset::Paper, args.iterations)?;
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
     let params = args.params.as_deref().map(|path| params(path, &dataset, &frames)).transpose()?;

@@ -2,10 +2,10 @@
 
 mod table;
 
-use super::common::{PrecisionArg, open, print, progress_bar, settings};
+use super::common::{PrecisionArg, open, preset, print, progress_bar, settings};
 use super::frames::{FrameRange, chosen};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
-use crate::config::FitConfig;
+use crate::config::{FitConfig, Preset};
 use crate::dataset::Dataset;
 use crate::study::{BatchOptions, FrameRow, Means, Summary, columns, run_batch};
 use anyhow::Context as _;
@@ -40,9 +40,15 @@ pub struct FitArgs {
     /// or the one that PATH names.
     #[arg(long, value_name = "A..B")]
     frames: Option<FrameRange>,
-    /// Fit configuration; without it the defaults.
-    #[arg(long, value_name = "FIT.toml")]
+    /// Fit configuration; without it the preset.
+    #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
     config: Option<PathBuf>,
+    /// Settings with a name: `paper`, or `recommended`, which fits synthetic data with truth best.
+    #[arg(long, value_name = "NAME", default_value = "paper", value_parser = preset)]
+    preset: Preset,
+    /// Persons that are fitted at once, instead of the configuration's; 0 fits as many as are counted.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=8))]
+    people: Option<u8>,
     /// Adam steps of a frame, instead of the configuration's.
     #[arg(long, value_name = "N")]
     iterations: Option<usize>,
@@ -76,7 +82,8 @@ pub struct FitArgs {
 /// Where the configuration, the data set or the range of frames is bad, DIR cannot be written, or no frame at all could
 /// be fitted.
 pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
-    let config = settings(args.config.as_deref(), args.iterations)?;
+    let mut config = settings(args.config.as_deref(), args.preset, args.iterations)?;
+    config.people = args.people.map_or(config.people, usize::from);
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
     let arrays: Vec<String> = dataset.info().views.iter().map(|view| view.array.clone()).collect();

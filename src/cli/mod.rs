@@ -2,15 +2,20 @@
 
 mod common;
 mod complexity;
+mod count;
 mod evidence;
+mod export;
 mod fit;
 mod frames;
 mod info;
 mod labels;
-pub mod sample;
 mod score;
 #[cfg(feature = "viewer")]
 mod screenshot;
+pub mod simulate;
+mod study;
+#[cfg(feature = "train")]
+mod train_counter;
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -36,8 +41,12 @@ Examples:
       What is in it: frames, views, axes, ranges of values.
   mhp-inspector complexity data/mmvr --csv complexity.csv
       Which frames are easy, medium, hard.
+  mhp-inspector count data/mmvr
+      How many people each frame shows, and where.
   mhp-inspector fit data/mmvr --frames 0..10 --out results
-      Ten fits without a window. `mhp-inspector fit --help` tells more.";
+      Ten fits without a window. `mhp-inspector fit --help` tells more.
+  mhp-inspector study operators data/mmvr --out runs/operators
+      A table of the paper, on one's own data. `mhp-inspector study --help` lists them.";
 
 /// Fit parametric human models to mmWave radar heatmaps, frame by frame, and see why a fit fails.
 #[derive(Debug, Parser)]
@@ -60,6 +69,9 @@ pub struct WindowArgs {
     /// Take the results of a batch into the frame list: the `summary.csv` that `fit --out` wrote.
     #[arg(long, value_name = "FILE")]
     pub results: Option<PathBuf>,
+    /// Show the run folder of a study, as `study NAME --out RUN` wrote it.
+    #[arg(long, value_name = "RUN")]
+    pub study: Option<PathBuf>,
     /// Show this frame first: a name as in the frame list, or an index from 0.
     #[arg(long, value_name = "FRAME")]
     pub frame: Option<String>,
@@ -67,7 +79,7 @@ pub struct WindowArgs {
     #[arg(long, value_name = "K")]
     pub iteration: Option<usize>,
     /// Open a session file: the same frame, iteration, camera, pins and layout.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["paths", "frame", "iteration", "results"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["paths", "frame", "iteration", "results", "study"])]
     pub session: Option<PathBuf>,
 }
 
@@ -87,8 +99,17 @@ impl WindowArgs {
         if let Some(results) = &self.results {
             crate::study::read_summary(results)?;
         }
+        if let Some(run) = &self.study {
+            crate::study::run::RunSpec::read(run)?;
+        }
         let aim = crate::session::Aim { frame: self.frame, iteration: self.iteration };
-        Ok(crate::app::Begin { paths: self.paths, aim, results: self.results, session: self.session })
+        Ok(crate::app::Begin {
+            paths: self.paths,
+            aim,
+            results: self.results,
+            study: self.study,
+            session: self.session,
+        })
     }
 }
 
@@ -99,12 +120,20 @@ pub enum Command {
     /// hardness that follows from their ranks, and the stratum.
     #[command(after_help = complexity::HELP)]
     Complexity(complexity::ComplexityArgs),
+    /// Count the people of each frame: the number with its probabilities, and where they are.
+    #[command(after_help = count::HELP)]
+    Count(count::CountArgs),
     /// Tell what speaks for each failure mode of a fit, F1 to F4, in numbers: evidence, not verdicts.
     ///
     /// Each frame is fitted from its own peaks as `fit` does, unless --params says where the joints are. The frames before
     /// it in its sequence are read for what stays and what moves.
     #[command(after_help = evidence::HELP)]
     Evidence(evidence::EvidenceArgs),
+    /// Write what other programs read: parameters, simulated maps in the input's own files, point clouds.
+    ///
+    /// Each frame is fitted from its own peaks as `fit` does, unless --params says where fitted parameters lie.
+    #[command(after_help = export::HELP)]
+    Export(export::ExportArgs),
     /// Fit frames of a data set: a row a frame, a table of all, the parameters as npz.
     ///
     /// Each frame starts from the peaks of its own maps, or with --warm-start from the frame before, and takes the
@@ -128,8 +157,16 @@ pub enum Command {
     #[cfg(feature = "viewer")]
     #[command(after_help = screenshot::HELP)]
     Screenshot(screenshot::ScreenshotArgs),
-    /// Write the bundled sample data set anew: a person who walks before two FMCW arrays, with 3-D truth.
-    Sample(sample::Args),
+    /// Write a synthetic data set with 3-D truth: people and rooms before an FMCW radar, as maps of any supported layout.
+    #[command(after_help = simulate::HELP)]
+    Simulate(simulate::Args),
+    /// Compare variants of a configuration over many frames: the paper's tables, sweeps, shards of them.
+    #[command(subcommand, after_help = study::HELP)]
+    Study(study::StudyCommand),
+    /// Train the person counter on synthetic recordings and write its weights.
+    #[cfg(feature = "train")]
+    #[command(after_help = train_counter::HELP)]
+    TrainCounter(train_counter::TrainCounterArgs),
 }
 
 /// Runs a subcommand.
@@ -139,13 +176,18 @@ pub enum Command {
 pub fn run(command: Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Complexity(args) => complexity::run(&args),
+        Command::Count(args) => count::run(&args),
         Command::Evidence(args) => evidence::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Labels(command) => labels::run(&command),
         Command::Score(args) => score::run(&args),
         #[cfg(feature = "viewer")]
         Command::Screenshot(args) => screenshot::run(&args),
-        Command::Sample(args) => sample::run(&args),
+        Command::Study(command) => study::run(&command),
+        Command::Simulate(args) => simulate::run(&args),
+        #[cfg(feature = "train")]
+        Command::TrainCounter(args) => train_counter::run(&args),
     }
 }

@@ -36,6 +36,9 @@ pub struct ScreenshotArgs {
     /// A session file instead of a data set; frame, iterations, settings and theme are then its own.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["path", "frame", "iterations", "config", "focus", "joint"])]
     session: Option<PathBuf>,
+    /// Show the run folder of a study in its pane.
+    #[arg(long, value_name = "RUN")]
+    study: Option<PathBuf>,
     /// The frame, counted from 0.
     #[arg(long, value_name = "I", default_value_t = 0)]
     frame: usize,
@@ -98,7 +101,12 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
 /// written.
 pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
     let config = config(args.config.as_deref())?;
-    let begin = Begin { paths: args.path.iter().cloned().collect(), session: args.session.clone(), ..Begin::default() };
+    let begin = Begin {
+        paths: args.path.iter().cloned().collect(),
+        study: args.study.clone(),
+        session: args.session.clone(),
+        ..Begin::default()
+    };
     let pane = args.pane.as_deref().map(pane_called).transpose()?;
     let mut harness = Harness::builder()
         .with_size([args.size.0 as f32, args.size.1 as f32])
@@ -108,7 +116,7 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
         .with_render_cursor(false)
         .wgpu()
         .build_eframe(|cc| InspectorApp::begin(cc, &begin));
-    set_up(&mut harness, args, config)?;
+    set_up(&mut harness, args, &config)?;
     if let Some(pane) = pane {
         harness.state_mut().show_pane(pane);
     }
@@ -124,9 +132,9 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn set_up(harness: &mut Harness<'_, InspectorApp>, args: &ScreenshotArgs, config: FitConfig) -> anyhow::Result<()> {
+fn set_up(harness: &mut Harness<'_, InspectorApp>, args: &ScreenshotArgs, config: &FitConfig) -> anyhow::Result<()> {
     if args.session.is_none() {
-        harness.state_mut().apply(Command::SetConfig(config));
+        harness.state_mut().apply(Command::SetConfig(Box::new(*config)));
     }
     until(harness, "the data set", |app| app.session().data.dataset.is_some() && app.session().data.opening.is_none())?;
     let mut view = harness.state().session().view.clone();
@@ -145,8 +153,9 @@ fn set_up(harness: &mut Harness<'_, InspectorApp>, args: &ScreenshotArgs, config
         let graded = !matches!(session.strata.status, StrataStatus::Running { .. });
         let labelled = session.labels.status != LabelStatus::Opening;
         let settled = session.fit.is_ready() && !session.fit.is_running() && !session.evidence_is_stale();
+        let read = session.study.reading.is_none();
         let drawn = session.pins.list().iter().all(|pin| pin.snapshot.is_some());
-        graded && labelled && settled && drawn
+        graded && labelled && settled && drawn && read
     })?;
     if args.focus {
         harness.state_mut().focus();

@@ -3,6 +3,7 @@
 //! The alignment is Horn's: the rotation between two centred point sets is the eigenvector of the largest eigenvalue of
 //! a symmetric 4×4 matrix, found by Jacobi rotations. It cannot reflect, so a mirrored skeleton stays wrong.
 
+use super::assign::assign;
 use crate::geometry::{Vec3, add, dot, mat_vec, norm, rotation_from_quaternion, scale, sub};
 
 const MM_PER_M: f64 = 1000.0;
@@ -31,7 +32,7 @@ pub fn pa_majpe_mm(estimate: &[Vec3], truth: &[Vec3]) -> Option<f64> {
 }
 
 /// Errors of several persons of `joints` joints each (flat lists, person by person). Persons carry no identity: they are
-/// paired closest first, and where the counts differ the smaller number of persons counts.
+/// paired so that the sum of their distances is smallest, and where the counts differ the smaller number of persons counts.
 /// `None` where either list is empty or no whole number of persons.
 pub fn joint_errors(estimate: &[Vec3], truth: &[Vec3], joints: usize) -> Option<JointErrors> {
     if joints == 0 || !estimate.len().is_multiple_of(joints) || !truth.len().is_multiple_of(joints) {
@@ -39,7 +40,9 @@ pub fn joint_errors(estimate: &[Vec3], truth: &[Vec3], joints: usize) -> Option<
     }
     let estimated: Vec<&[Vec3]> = estimate.chunks_exact(joints).collect();
     let true_persons: Vec<&[Vec3]> = truth.chunks_exact(joints).collect();
-    let pairs = pair(&estimated, &true_persons);
+    let pairs = assign(estimated.len(), true_persons.len(), |a, b| {
+        majpe_mm(estimated[a], true_persons[b]).unwrap_or(f64::INFINITY)
+    });
     let count = pairs.len() as f64;
     let mut errors = JointErrors { majpe_mm: 0.0, pa_majpe_mm: 0.0 };
     for &(a, b) in &pairs {
@@ -47,22 +50,6 @@ pub fn joint_errors(estimate: &[Vec3], truth: &[Vec3], joints: usize) -> Option<
         errors.pa_majpe_mm += pa_majpe_mm(estimated[a], true_persons[b])? / count;
     }
     (!pairs.is_empty()).then_some(errors)
-}
-
-/// Pairs persons by repeatedly taking the closest two that are left, in order of distance.
-fn pair(estimated: &[&[Vec3]], truth: &[&[Vec3]]) -> Vec<(usize, usize)> {
-    let mut candidates: Vec<(f64, usize, usize)> = (0..estimated.len())
-        .flat_map(|a| (0..truth.len()).map(move |b| (a, b)))
-        .filter_map(|(a, b)| majpe_mm(estimated[a], truth[b]).map(|distance| (distance, a, b)))
-        .collect();
-    candidates.sort_by(|x, y| x.0.total_cmp(&y.0));
-    let mut pairs: Vec<(usize, usize)> = Vec::new();
-    for (_, a, b) in candidates {
-        if pairs.iter().all(|&(p, q)| p != a && q != b) {
-            pairs.push((a, b));
-        }
-    }
-    pairs
 }
 
 fn centroid(points: &[Vec3]) -> Vec3 {
@@ -186,5 +173,22 @@ mod tests {
         assert!(joint_errors(&swapped, &truth, 5).unwrap().majpe_mm < 1e-9);
         assert!(joint_errors(&BODY, &truth, 5).unwrap().pa_majpe_mm < 1e-9);
         assert_eq!(joint_errors(&BODY, &truth, 4), None);
+    }
+
+    #[test]
+    fn eight_swapped_persons_find_their_own() {
+        let at = |k: usize| BODY.iter().map(move |&p| add(p, [0.4 * k as f64, (k % 3) as f64, 0.0]));
+        let truth: Vec<Vec3> = (0..8).flat_map(at).collect();
+        let estimate: Vec<Vec3> = [3, 7, 0, 5, 1, 6, 2, 4].into_iter().flat_map(at).collect();
+        assert!(joint_errors(&estimate, &truth, 5).unwrap().majpe_mm < 1e-9);
+    }
+
+    #[test]
+    fn the_whole_is_paired_best_and_not_the_closest_two_first() {
+        // On a line: truth at 0 and 1.0, estimates at 0.6 and 2.0. Closest first pairs 0.6 with 1.0 and leaves 2.0 m.
+        let at = |x: f64| BODY.iter().map(move |&p| add(p, [x, 0.0, 0.0]));
+        let truth: Vec<Vec3> = at(0.0).chain(at(1.0)).collect();
+        let estimate: Vec<Vec3> = at(0.6).chain(at(2.0)).collect();
+        assert!((joint_errors(&estimate, &truth, 5).unwrap().majpe_mm - 800.0).abs() < 1e-6);
     }
 }

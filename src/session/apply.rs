@@ -14,6 +14,7 @@ mod queue;
 mod reports;
 mod restore;
 mod results;
+mod study;
 
 pub(super) use reports::mean_known;
 
@@ -129,7 +130,7 @@ impl Session {
             Command::Reset => self.reset(),
             Command::Discard => self.discard(),
             Command::SelectBranch(id) => self.select_branch(id),
-            Command::SetConfig(config) => self.set_config(config),
+            Command::SetConfig(config) => self.set_config(&config),
             Command::SetPrecision(precision) => {
                 if self.precision == precision {
                     return Vec::new();
@@ -162,6 +163,9 @@ impl Session {
             Command::SessionRead(path, result) => self.session_read(path, result),
             Command::LoadResults(path) => self.load_results(path),
             Command::ResultsRead(path, result) => self.results_read(&path, result),
+            Command::OpenRun(folder) => self.open_run(&folder),
+            Command::RunRead(folder, result) => self.run_read(folder, result),
+            Command::ShowStudyRow(row) => self.show_study_row(row),
             Command::TaskDone(result) => self.task_done(result),
             Command::RunTask(task) => vec![Effect::Run(task)],
             Command::Log(level, text) => {

@@ -16,6 +16,7 @@ use crate::diagnose::Evidence;
 use crate::labels::{CellRegion, Judged, LabelPlace, Tag, Verdict};
 use crate::mhp::Precision;
 use crate::study::complexity::Complexity;
+use crate::study::run::Run;
 use crate::worker::{Snapshot, WorkerCommand, WorkerMessage};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -159,7 +160,7 @@ pub enum Command {
     /// Continue on another branch.
     SelectBranch(u32),
     /// New settings; effective from the next step.
-    SetConfig(FitConfig),
+    SetConfig(Box<FitConfig>),
     /// Another scalar for the kernel; prepares the fit again.
     SetPrecision(Precision),
     /// Start the next frame from this one's result.
@@ -186,6 +187,12 @@ pub enum Command {
     LoadResults(PathBuf),
     /// Report: such a table was read and its frames were found in the data set, or not.
     ResultsRead(PathBuf, Result<Box<FoundResults>, String>),
+    /// Show the run of a study.
+    OpenRun(PathBuf),
+    /// Report: a run folder was read, or not.
+    RunRead(PathBuf, Result<Arc<Run>, String>),
+    /// Put the frames of a row of the study's table into the list, with what the study says of them.
+    ShowStudyRow(usize),
     /// Report: something was written, or not.
     TaskDone(Result<String, String>),
     /// Write a picture that the window drew.
@@ -372,6 +379,10 @@ pub enum Effect {
     ReadSession(PathBuf),
     /// Read a table of results on a thread, and find its frames in this data set.
     ReadResults(PathBuf, Arc<Dataset>),
+    /// Read a run folder on a thread.
+    ReadRun(PathBuf),
+    /// Find the frames of a row of a run's table in this data set, on a thread.
+    FindStudyRow(PathBuf, Arc<Run>, usize, Arc<Dataset>),
     /// Compute the maps of a pinned fit on a thread.
     DrawPin(Box<PinRequest>),
     /// Gather evidence.

@@ -48,6 +48,8 @@ pub struct Fit {
     pub run_ms: Option<f64>,
     /// Why the last run ended, in words.
     pub reason: Option<&'static str>,
+    /// Who the persons are: the same number is the same person in the frames around; empty until that is known.
+    pub identities: Vec<usize>,
     /// Every step.
     pub history: History,
     /// An earlier iteration of the active branch that is being looked at; `None` follows the newest.

@@ -103,12 +103,12 @@ impl History {
     /// A history with one branch, as a file kept it: the settings at its beginning, every row, few states, and where the
     /// settings changed.
     pub(super) fn restored(
-        config: FitConfig,
+        config: &FitConfig,
         rows: Vec<super::pins::PinRow>,
         states: Vec<FitState>,
         changes: Vec<(usize, FitConfig)>,
     ) -> Self {
-        let mut history = Self::new(config);
+        let mut history = Self::new(*config);
         let mut states: Vec<Arc<FitState>> = states.into_iter().map(Arc::new).collect();
         for super::pins::PinRow { report, majpe_mm } in rows {
             let at = states.iter().position(|state| state.iteration == report.iteration);

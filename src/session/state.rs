@@ -4,10 +4,12 @@ use super::command::Aim;
 use super::evidence::EvidenceState;
 use super::file::SessionFile;
 use super::fit::Fit;
+use super::identity::Identities;
 use super::labels::Labels;
 use super::pins::Pins;
 use super::queue::Queue;
 use super::strata::Strata;
+use super::study::StudyView;
 use super::view::ViewState;
 use crate::config::FitConfig;
 use crate::dataset::{BareCatalog, Dataset, Frame};
@@ -150,10 +152,14 @@ pub struct Session {
     pub(super) evidence: EvidenceState,
     /// Fits that others are compared with.
     pub pins: Pins,
+    /// The study on screen.
+    pub study: StudyView,
     /// Settings.
     pub config: FitConfig,
     /// Scalar of the kernel.
     pub precision: Precision,
+    /// Who is who from frame to frame.
+    pub(super) identities: Identities,
     /// Start the next frame from this one's result.
     pub warm_start: bool,
     /// The selected joint (flat index).

@@ -101,6 +101,8 @@ pub(crate) enum AppAct {
     ShowPane(PaneKind),
     /// Type the path of a table of results.
     LoadResults,
+    /// Type the path of a run folder.
+    OpenStudy,
     /// Put the frame's path on the clipboard.
     CopyPath,
 }

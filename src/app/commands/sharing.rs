@@ -39,6 +39,15 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         act: |_| Act::App(AppAct::LoadResults),
     },
     UserCommand {
+        label: "Open study…",
+        title: None,
+        tooltip: "Show the table and the plot of a study: the run folder that `study NAME --out` wrote.",
+        menu: Menu::File,
+        keys: &[],
+        enabled: always,
+        act: |_| Act::App(AppAct::OpenStudy),
+    },
+    UserCommand {
         label: "Save session",
         title: None,
         tooltip: "Write frame, iteration, camera, pins and layout to the session file; asks where the first time.",
@@ -199,6 +208,15 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         keys: &[(CTRL, Key::Num4)],
         enabled: always,
         act: |_| Act::App(AppAct::ShowPane(PaneKind::Statistics)),
+    },
+    UserCommand {
+        label: "Show study",
+        title: None,
+        tooltip: "Bring a study's table and plot to the front.",
+        menu: Menu::View,
+        keys: &[],
+        enabled: always,
+        act: |_| Act::App(AppAct::ShowPane(PaneKind::Study)),
     },
     UserCommand {
         label: "Show Log",

@@ -73,6 +73,12 @@ impl Overlay {
         self.files = State::default();
     }
 
+    /// Asks for a run folder.
+    pub(in crate::app) fn open_study(&mut self) {
+        self.toggle(super::Sheet::Study);
+        self.files = State::default();
+    }
+
     pub(super) fn save(&mut self, ui: &mut Ui, shared: &mut Shared<'_>, kind: SaveKind) -> bool {
         let tokens = Tokens::of(ui);
         let (title, how) = what(kind);
@@ -120,6 +126,23 @@ impl Overlay {
             let browse = |_: PathBuf| super::pick_results;
             if let Some(path) = self.path_field(ui, "Table of results", "Load", browse) {
                 shared.send(Command::LoadResults(path));
+                done = true;
+            }
+        });
+        done || response.should_close()
+    }
+
+    pub(super) fn study_path(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
+        let tokens = Tokens::of(ui);
+        let mut done = false;
+        let response = modal(ui, "study").show(ui.ctx(), |ui| {
+            ui.set_width(620.0);
+            ui.label(RichText::new("Open a study").font(crate::app::theme::strong(16.0)));
+            let how = "The run folder of `mhp-inspector study NAME --out RUN`, finished or not.";
+            ui.label(RichText::new(how).small().color(tokens.dim));
+            let browse = |_: PathBuf| super::pick_run;
+            if let Some(path) = self.path_field(ui, "Run folder", "Open", browse) {
+                shared.send(Command::OpenRun(path));
                 done = true;
             }
         });

@@ -3,7 +3,7 @@
 use super::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, chip, icon_button, iou_color, value_row};
-use crate::config::{EmRegion, FIELDS, Field, FitConfig, Summation};
+use crate::config::{EmRegion, Field, FieldGroup, FitConfig, Parameterization, Preset, Scatterers, Summation, Yaw};
 use crate::mhp::Precision;
 use crate::session::{Command, FitStatus};
 use egui::{RichText, Ui};
@@ -16,7 +16,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let old = shared.session.config;
         let mut config = old;
-        for field in FIELDS.iter().take(3) {
+        for field in FieldGroup::Weights.fields() {
             slider(ui, field, &mut config);
         }
         ui.separator();
@@ -24,7 +24,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
         ui.separator();
         settings(ui, shared, &mut config);
         if config != old {
-            shared.send(Command::SetConfig(config));
+            shared.send(Command::SetConfig(Box::new(config)));
         }
     });
 }
@@ -150,6 +150,14 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
         .on_hover_text("Σ ψ of the relative velocity along each bone.");
     value_row(ui, "L_joint", &format!("{:.5}", terms.joint), "")
         .on_hover_text("Σ max(0, θ − θ_max)² over elbows and knees, rad².");
+    for (name, value, help) in [
+        ("L_time", terms.time, "Σ ‖c − ĉ‖² to where the frames around say that each person is, m²."),
+        ("L_floor", terms.floor, "Σ (z_low + h)² of each person's lowest joint over the floor, m²."),
+    ] {
+        if value != 0.0 {
+            value_row(ui, name, &format!("{value:.5}"), "").on_hover_text(help);
+        }
+    }
     if terms.sep != 0.0 || terms.coll != 0.0 {
         value_row(ui, "L_sep", &format!("{:.5}", terms.sep), "");
         value_row(ui, "L_coll", &format!("{:.5}", terms.coll), "");
@@ -176,7 +184,7 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
 
 fn settings(ui: &mut Ui, shared: &mut Shared<'_>, config: &mut FitConfig) {
     egui::CollapsingHeader::new("Optimiser").default_open(true).show(ui, |ui| {
-        for field in FIELDS.iter().skip(3).take(3) {
+        for field in FieldGroup::Optimiser.fields() {
             slider(ui, field, config);
         }
         ui.checkbox(&mut config.stop_when_converged, "Stop when converged")
@@ -219,21 +227,66 @@ fn settings(ui: &mut Ui, shared: &mut Shared<'_>, config: &mut FitConfig) {
                 .on_hover_text("H_sim = √Σ (A K)²: powers add.");
         });
         region(ui, config);
-        slider(ui, &FIELDS[7], config);
+        for field in FieldGroup::Radar.fields() {
+            slider(ui, field, config);
+        }
     });
     egui::CollapsingHeader::new("Kinematic limits").default_open(false).show(ui, |ui| {
-        for field in [&FIELDS[6], &FIELDS[8], &FIELDS[9]] {
+        for field in FieldGroup::Limits.fields() {
+            slider(ui, field, config);
+        }
+    });
+    egui::CollapsingHeader::new("Model").default_open(true).show(ui, |ui| model(ui, config));
+    egui::CollapsingHeader::new("Start").default_open(false).show(ui, |ui| {
+        ui.label(egui::RichText::new("Takes effect when a start is found: Ctrl+R.").small());
+        ui.checkbox(&mut config.init.position, "P: positions from the peaks")
+            .on_hover_text("Off: the body stands in the middle of what the views cover.");
+        ui.checkbox(&mut config.init.velocity, "V: velocities from the maps")
+            .on_hover_text("From the Doppler axis, or from the intensity gradients of consecutive maps. Off: 0.");
+        for field in FieldGroup::Start.fields() {
+            slider(ui, field, config);
+        }
+        ui.label("Spoil the start").on_hover_text("The perturbations of the paper's robustness table.");
+        for field in FieldGroup::Perturbation.fields() {
             slider(ui, field, config);
         }
     });
     ui.add_space(4.0);
-    let changed = *config != FitConfig::default();
-    if ui
-        .add_enabled(changed, egui::Button::new("Reset all to defaults"))
-        .on_hover_text("The paper's settings.")
-        .clicked()
-    {
-        *config = FitConfig::default();
+    ui.horizontal(|ui| {
+        ui.label("Preset").on_hover_text("All settings at once.");
+        for preset in Preset::ALL {
+            let chosen = *config == preset.config();
+            if ui.selectable_label(chosen, preset.name()).on_hover_text(preset.help()).clicked() {
+                *config = preset.config();
+            }
+        }
+    });
+}
+
+/// What is moved, what the Gaussians look like, where the start looks, and the terms that the paper's objective lacks.
+fn model(ui: &mut Ui, config: &mut FitConfig) {
+    ui.horizontal(|ui| {
+        ui.label("Moves");
+        ui.selectable_value(&mut config.parameterization, Parameterization::Joints, "joints")
+            .on_hover_text("Every joint by itself: the paper.");
+        ui.selectable_value(&mut config.parameterization, Parameterization::Bones, "root and bones")
+            .on_hover_text("The root moves and turns, bones turn about their inner joint: lengths stay.");
+    });
+    ui.horizontal(|ui| {
+        ui.label("Gaussians");
+        ui.selectable_value(&mut config.scatterers, Scatterers::Equal, "equal")
+            .on_hover_text("Round, all alike: the paper. Takes effect when a start is found.");
+        ui.selectable_value(&mut config.scatterers, Scatterers::BodyParts, "by body part")
+            .on_hover_text("Along the bones, as wide and bright as the part. Takes effect when a start is found.");
+    });
+    ui.horizontal(|ui| {
+        ui.label("Looks");
+        ui.selectable_value(&mut config.yaw, Yaw::Radar, "at the radar").on_hover_text("The paper.");
+        ui.selectable_value(&mut config.yaw, Yaw::Motion, "where it goes")
+            .on_hover_text("From its places in the frames around. Takes effect when a start is found.");
+    });
+    for field in FieldGroup::Regularisation.fields() {
+        slider(ui, field, config);
     }
 }
 

@@ -12,6 +12,7 @@ mod maps;
 mod modes;
 mod scene;
 mod statistics;
+mod study;
 pub(super) mod timeline;
 
 use super::PaneKind;
@@ -90,6 +91,7 @@ pub(super) struct PaneStates {
     pub(super) curves: curves::State,
     pub(super) agreement: agreement::State,
     pub(super) statistics: statistics::State,
+    pub(super) study: study::State,
     pub(super) compare: compare::State,
     pub(super) frames: frames::State,
     pub(super) modes: modes::State,
@@ -106,6 +108,7 @@ impl PaneStates {
             curves: curves::State::default(),
             agreement: agreement::State::default(),
             statistics: statistics::State::default(),
+            study: study::State::default(),
             compare: compare::State::default(),
             frames: frames::State::default(),
             modes: modes::State::default(),
@@ -144,6 +147,7 @@ pub(super) fn show(pane: PaneKind, ui: &mut egui::Ui, shared: &mut Shared<'_>, s
         PaneKind::Agreement => agreement::show(ui, shared, &mut states.agreement),
         PaneKind::Statistics => statistics::show(ui, shared, &mut states.statistics),
         PaneKind::Modes => modes::show(ui, shared, &mut states.modes),
+        PaneKind::Study => study::show(ui, shared, &mut states.study),
     }
 }
 

@@ -199,13 +199,10 @@ impl Session {
             self.fit.history = History::new(self.config);
             self.fit.cursor = None;
         }
-        let info = dataset.info();
         vec![Effect::Send(WorkerCommand::Prepare(Box::new(Prepare {
             job: self.jobs,
             branch: self.fit.history.active_id(),
-            radar: info.radar.clone(),
-            skeleton: info.skeleton.clone(),
-            views: info.views.clone(),
+            dataset: Arc::clone(dataset),
             frame: Arc::clone(frame),
             config: self.config,
             precision: self.precision,

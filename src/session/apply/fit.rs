@@ -59,7 +59,7 @@ impl Session {
             return Vec::new();
         }
         self.fit.cursor = Some(kept);
-        vec![Effect::Send(WorkerCommand::Inspect { branch: id, state, config })]
+        vec![Effect::Send(WorkerCommand::Inspect { branch: id, state, config: Box::new(config) })]
     }
 
     /// Back to the newest iteration: its state is looked at until the worker publishes a newer one.
@@ -74,7 +74,7 @@ impl Session {
         let Some(branch) = self.fit.branch() else { return Vec::new() };
         let Some((_, state)) = branch.state_at(branch.head()) else { return Vec::new() };
         let (id, config, state) = (branch.id, branch.newest_config(), Arc::clone(state));
-        vec![Effect::Send(WorkerCommand::Inspect { branch: id, state, config })]
+        vec![Effect::Send(WorkerCommand::Inspect { branch: id, state, config: Box::new(config) })]
     }
 
     pub(super) fn reset(&mut self) -> Vec<Effect> {
@@ -118,10 +118,10 @@ impl Session {
         let (id, config, state) = (branch.id, branch.newest_config(), Arc::clone(state));
         self.config = FitConfig { iterations: self.config.iterations, ..config };
         self.summarise();
-        vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: self.config })]
+        vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: Box::new(self.config) })]
     }
 
-    pub(super) fn set_config(&mut self, config: FitConfig) -> Vec<Effect> {
+    pub(super) fn set_config(&mut self, config: &FitConfig) -> Vec<Effect> {
         let config = match config.validated() {
             Ok(config) => config,
             Err(error) => {
@@ -144,7 +144,7 @@ impl Session {
         if !steering_only && let Some(effects) = self.branch_at_cursor() {
             return effects;
         }
-        vec![Effect::Send(WorkerCommand::Configure(config))]
+        vec![Effect::Send(WorkerCommand::Configure(Box::new(config)))]
     }
 
     /// Where an earlier iteration is looked at: starts a branch there with the current settings.
@@ -165,7 +165,7 @@ impl Session {
         let what = difference(&old, &self.config);
         let what = if what.is_empty() { "edited by hand".into() } else { what };
         self.note(LogLevel::Info, format!("branch {id} begins at iteration {kept} of branch {parent}: {what}"));
-        Some(vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: self.config })])
+        Some(vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: Box::new(self.config) })])
     }
 
     pub(super) fn edit(&mut self, params: Pppr) -> Vec<Effect> {

@@ -76,7 +76,7 @@ impl Session {
         match event {
             WorkerEvent::Prepared(prepared) => self.prepared(*prepared),
             WorkerEvent::ConfigApplied { branch, iteration, config } => {
-                self.fit.history.flag(branch, iteration, config);
+                self.fit.history.flag(branch, iteration, *config);
                 Vec::new()
             }
             WorkerEvent::Finished { run, branch, iteration, reason, run_ms } => {
@@ -128,6 +128,7 @@ impl Session {
         }
         self.fit.problem = Some(prepared.problem);
         self.fit.initial = Some(prepared.initial);
+        self.identify();
         self.fit.init_ms = prepared.init_ms;
         if prepared.initialisation.is_some() {
             self.fit.initialisation = prepared.initialisation;

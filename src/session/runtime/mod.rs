@@ -173,6 +173,14 @@ impl Runtime {
                 let read = FoundResults::read(&path, &dataset).map(Box::new);
                 Command::ResultsRead(path, read)
             }),
+            Effect::ReadRun(folder) => self.on_thread("study", move || {
+                let read = crate::study::run::Run::read(&folder).map(Arc::new).map_err(|error| error.to_string());
+                Command::RunRead(folder, read)
+            }),
+            Effect::FindStudyRow(folder, run, row, dataset) => self.on_thread("results", move || {
+                let found = super::study::frames_of_row(&run, row, &dataset);
+                Command::ResultsRead(folder, Ok(Box::new(found)))
+            }),
             Effect::Send(command) => {
                 if let Some(worker) = &self.worker {
                     worker.send(command);

@@ -162,19 +162,25 @@ pub(super) fn draw(
         && let Some(dataset) = &session.data.dataset
     {
         let color = Color32::from_white_alpha(170);
-        bones(painter, &dataset.info().skeleton, &truth.joints, view, o, to_screen, &|_| Stroke::new(1.0, color));
+        bones(painter, &dataset.info().skeleton, &truth.joints, view, o, to_screen, &|_, _| Stroke::new(1.0, color));
     }
     if look.show_skeleton
         && let Some(problem) = &session.fit.problem
     {
         let positions = session.shown_positions();
         let skeleton = &problem.skeleton;
-        // Dark-theme side colours in both themes: the ground is the map.
-        bones(painter, skeleton, &positions, view, o, to_screen, &|side| Stroke::new(1.5, theme::DARK.side(side)));
+        let joints = skeleton.joints.len().max(1);
+        // Dark-theme colours in both themes: the ground is the map. Of several people each has its own.
+        let several = positions.len() > joints;
+        let color = |person: usize, side| {
+            if several { theme::DARK.person(session.identity(person)) } else { theme::DARK.side(side) }
+        };
+        let stroke = |person: usize, side| Stroke::new(1.5, color(person, side));
+        bones(painter, skeleton, &positions, view, o, to_screen, &stroke);
         for (joint, &p) in positions.iter().enumerate() {
             let at = to_screen(o.unit_from_bins(view, &view.bins_of(p)));
             let selected = session.joint == Some(joint);
-            let color = theme::DARK.side(skeleton.side(joint % skeleton.joints.len().max(1)));
+            let color = color(joint / joints, skeleton.side(joint % joints));
             painter.circle(
                 at,
                 if selected { 4.0 } else { 2.2 },
@@ -195,14 +201,14 @@ fn bones(
     view: &View,
     o: Orientation,
     to_screen: &dyn Fn([f64; 2]) -> Pos2,
-    stroke: &dyn Fn(crate::body::Side) -> Stroke,
+    stroke: &dyn Fn(usize, crate::body::Side) -> Stroke,
 ) {
     let joints = skeleton.joints.len().max(1);
-    for person in positions.chunks_exact(joints) {
+    for (number, person) in positions.chunks_exact(joints).enumerate() {
         for &bone in &skeleton.bones {
             let (Some(&a), Some(&b)) = (person.get(bone[0]), person.get(bone[1])) else { continue };
             let ends = [a, b].map(|p| to_screen(o.unit_from_bins(view, &view.bins_of(p))));
-            painter.line_segment(ends, stroke(skeleton.bone_side(bone)));
+            painter.line_segment(ends, stroke(number, skeleton.bone_side(bone)));
         }
     }
 }

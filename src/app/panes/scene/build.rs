@@ -14,6 +14,9 @@ const VELOCITY_S: f32 = 0.3;
 /// Length of the longest gradient arrow, m.
 const GRADIENT_M: f64 = 0.35;
 
+/// A person's number stands this far above the highest joint, m.
+const ABOVE_HEAD_M: f64 = 0.12;
+
 /// A text at a place, m.
 type Label = (Vec3, String, Color32);
 
@@ -59,21 +62,21 @@ pub(super) fn scene(session: &Session, camera: &Camera, tokens: &Tokens, px: f32
     {
         let positions: Vec<_> = (0..initial.shape().total_joints()).map(|j| initial.position(j)).collect();
         let stroke = Stroke { color: rgba(tokens.dim, 0.6), width_px: 1.0 * px };
-        bones(&mut scene.lines, skeleton, &positions, &|_| stroke);
+        bones(&mut scene.lines, skeleton, &positions, &|_, _| stroke);
     }
     if look.show_truth
         && let (Some(truth), Some(dataset)) =
             (session.data.frame.as_ref().and_then(|f| f.truth.as_ref()), &session.data.dataset)
     {
         let stroke = Stroke { color: rgba(tokens.ok, 0.85), width_px: 1.5 * px };
-        bones(&mut scene.lines, &dataset.info().skeleton, &truth.joints, &|_| stroke);
+        bones(&mut scene.lines, &dataset.info().skeleton, &truth.joints, &|_, _| stroke);
     }
     if look.show_baseline
         && let (Some(pin), Some(dataset)) = (session.pins.baseline(), &session.data.dataset)
     {
         let positions: Vec<_> = (0..pin.params.shape().total_joints()).map(|j| pin.params.position(j)).collect();
         let stroke = Stroke { color: rgba(tokens.warn, 0.85), width_px: 1.5 * px };
-        bones(&mut scene.lines, &dataset.info().skeleton, &positions, &|_| stroke);
+        bones(&mut scene.lines, &dataset.info().skeleton, &positions, &|_, _| stroke);
     }
     (scene, labels)
 }
@@ -96,10 +99,17 @@ fn person(
     px: f32,
 ) {
     let joints = skeleton.joints.len().max(1);
+    // Of one person the sides have colours; of several, the persons, and the letters L and R tell the sides.
+    let several = params.shape().persons > 1;
+    let person_color = |person: usize| tokens.person(session.identity(person));
     for joint in 0..params.shape().total_joints() {
         let selected = session.joint == Some(joint);
         let side = skeleton.side(joint % joints);
-        let color = if side == Side::Middle { tokens.text } else { tokens.side(side) };
+        let color = match side {
+            _ if several => person_color(joint / joints),
+            Side::Middle => tokens.text,
+            side => tokens.side(side),
+        };
         let opacity = (0.25 + 0.6 * params.opacity(joint) as f32).min(0.9);
         let alpha = if selected { 0.95 } else { opacity };
         scene.splats.push(SplatInstance {
@@ -116,10 +126,26 @@ fn person(
         }
     }
     let positions: Vec<_> = (0..params.shape().total_joints()).map(|j| params.position(j)).collect();
-    bones(&mut scene.lines, skeleton, &positions, &|side| Stroke {
-        color: rgba(if side == Side::Middle { tokens.dim } else { tokens.side(side) }, 1.0),
-        width_px: 2.0 * px,
+    bones(&mut scene.lines, skeleton, &positions, &|person, side| {
+        let color = match side {
+            _ if several => person_color(person),
+            Side::Middle => tokens.dim,
+            side => tokens.side(side),
+        };
+        Stroke { color: rgba(color, 1.0), width_px: 2.0 * px }
     });
+    if several {
+        for (person, body) in positions.chunks_exact(joints).enumerate() {
+            let highest = body.iter().copied().max_by(|a, b| a[2].total_cmp(&b[2])).unwrap_or_default();
+            let above = geometry::add(highest, [0.0, 0.0, ABOVE_HEAD_M]);
+            labels.push((vec3(above), person_name(session.identity(person)), person_color(person)));
+        }
+    }
+}
+
+/// What a person is called: people count from 1.
+fn person_name(identity: usize) -> String {
+    format!("P{}", identity + 1)
 }
 
 /// L and R are printed at the wrists and ankles: the sides must be readable without colours.
@@ -144,12 +170,12 @@ fn bones(
     lines: &mut Vec<LineInstance>,
     skeleton: &Skeleton,
     positions: &[geometry::Vec3],
-    stroke: &dyn Fn(Side) -> Stroke,
+    stroke: &dyn Fn(usize, Side) -> Stroke,
 ) {
-    for person in positions.chunks_exact(skeleton.joints.len().max(1)) {
+    for (number, person) in positions.chunks_exact(skeleton.joints.len().max(1)).enumerate() {
         for &bone in &skeleton.bones {
             if let (Some(&a), Some(&b)) = (person.get(bone[0]), person.get(bone[1])) {
-                lines.push(stroke(skeleton.bone_side(bone)).line(vec3(a), vec3(b)));
+                lines.push(stroke(number, skeleton.bone_side(bone)).line(vec3(a), vec3(b)));
             }
         }
     }

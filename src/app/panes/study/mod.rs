@@ -1,0 +1,173 @@
+//! A study: its table, a plot of one quantity over its variants, and from each row the way to its frames.
+
+mod bars;
+mod contour;
+mod lines;
+mod measure;
+mod parallel;
+mod table;
+
+use super::{Shared, empty};
+use crate::app::commands::AppAct;
+use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Named as _;
+use crate::session::Command;
+use crate::study::run::{Run, StudyKind, Subset};
+use egui::{RichText, Role, Ui};
+use measure::{Measure, Values};
+
+/// A pane of less than this width, points, has a list of quantities instead of a button for each.
+const NARROW: f32 = 460.0;
+
+/// Which quantity is plotted, and the values that were made from the run.
+#[derive(Default)]
+pub(in crate::app) struct State {
+    measure: Measure,
+    values: Option<(u64, Vec<(Measure, Values)>)>,
+}
+
+/// How a study is plotted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Picture {
+    Bars,
+    Lines,
+    Contour,
+    Parallel,
+}
+
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    let study = &shared.session.study;
+    let Some((folder, run)) = study.run.clone() else {
+        if study.reading.is_some() {
+            return empty(ui, "Reading a run…", "");
+        }
+        let how = "Run one on the command line, for example\n`mhp-inspector study operators DATA --out RUN`,\nand open its \
+                   folder with File > Open study…, or drop the folder on the window.";
+        return empty(ui, "No study yet", how);
+    };
+    let tokens = Tokens::of(ui);
+    head(ui, shared, &run, &folder, &tokens);
+    let revision = study.revision;
+    if state.values.as_ref().is_none_or(|(known, _)| *known != revision) {
+        state.values = Some((revision, measure::of_run(&run)));
+    }
+    let Some((_, values)) = &state.values else { return };
+    if !values.iter().any(|(measure, _)| *measure == state.measure) {
+        state.measure = values.first().map(|(measure, _)| *measure).unwrap_or_default();
+    }
+    choose(ui, &mut state.measure, values);
+    let Some((measure, shown)) = values.iter().find(|(measure, _)| *measure == state.measure) else { return };
+    let row = shared.session.study.row;
+    let mut asked = None;
+    let wide = ui.available_width() > 1000.0;
+    // A picture is seen whole; the table below it is scrolled to.
+    let height = (ui.available_height() - 8.0).clamp(150.0, 280.0);
+    egui::ScrollArea::both().id_salt("study").auto_shrink(false).show(ui, |ui| {
+        let plot = |ui: &mut Ui| match picture(&run) {
+            Picture::Bars => bars::show(ui, &run, *measure, shown, row, &tokens),
+            Picture::Lines => lines::show(ui, &run, *measure, shown, height, &tokens),
+            Picture::Contour => contour::show(ui, &run, *measure, shown, shared.session, height, &tokens),
+            Picture::Parallel => parallel::show(ui, &run, *measure, shown, row, shared.session, height, &tokens),
+        };
+        if wide {
+            ui.horizontal_top(|ui| {
+                let width = (0.5 * ui.available_width()).clamp(320.0, 640.0);
+                let size = egui::vec2(width, ui.available_height());
+                let of_plot = ui.allocate_ui(size, |ui| ui.vertical(plot).inner).inner;
+                ui.add_space(12.0);
+                let of_table = ui.vertical(|ui| table::show(ui, &run, row, &tokens)).inner;
+                asked = of_plot.or(of_table);
+            });
+        } else {
+            let of_plot = plot(ui);
+            ui.add_space(8.0);
+            asked = of_plot.or(table::show(ui, &run, row, &tokens));
+        }
+    });
+    if let Some(row) = asked {
+        shared.send(Command::ShowStudyRow(row));
+    }
+}
+
+/// Numbers along one axis are a curve, along two a map, along more or beside words parallel lines; names are bars.
+fn picture(run: &Run) -> Picture {
+    let numeric = |column: usize| {
+        let label = |row: &crate::study::run::TableRow| row.labels.get(column).and_then(|text| number(text));
+        run.table.iter().all(|row| label(row).is_some())
+    };
+    match (run.spec.study, run.spec.columns.len()) {
+        (StudyKind::Threshold | StudyKind::Budget, _) => Picture::Lines,
+        (StudyKind::Sweep, 1) if numeric(0) => Picture::Lines,
+        (StudyKind::Sweep, 2) if numeric(0) && numeric(1) && grown(run) => Picture::Contour,
+        (StudyKind::Sweep, columns) if columns > 1 => Picture::Parallel,
+        _ => Picture::Bars,
+    }
+}
+
+/// Whether both axes of a map have more than one value: else there is nothing to draw a line through.
+fn grown(run: &Run) -> bool {
+    (0..2).all(|column| measure::levels(run, column).len() > 1)
+}
+
+/// The number that a label begins with: `100 % (no masking)` is 100.
+fn number(label: &str) -> Option<f64> {
+    label.split_whitespace().next()?.parse().ok().filter(|x: &f64| x.is_finite())
+}
+
+fn head(ui: &mut Ui, shared: &mut Shared<'_>, run: &Run, folder: &std::path::Path, tokens: &Tokens) {
+    let (spec, data) = (&run.spec, &run.spec.data);
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new(spec.study.title()).font(theme::strong(theme::TITLE)));
+        if !run.complete {
+            let text = format!("△ not finished: {} fits so far", run.rows.len());
+            ui.label(RichText::new(text).small().color(tokens.warn));
+        }
+        if ui
+            .small_button("Read again")
+            .on_hover_text("Read the run folder again: what a running study has done since.")
+            .clicked()
+        {
+            shared.send(Command::OpenRun(folder.to_owned()));
+        }
+        // Where there is hardly room the menu has it.
+        if ui.available_width() > 120.0
+            && ui.small_button("Open study…").on_hover_text("Show another run folder.").clicked()
+        {
+            shared.app(AppAct::OpenStudy);
+        }
+    });
+    let subset = if data.subset == Subset::Hard { "hard frames" } else { "frames" };
+    let text = format!("{} · {} {subset} · based on {} · seed {}", data.name, data.frames, spec.base, spec.seed);
+    let tip = format!("{}\nmhp-inspector {}", folder.display(), spec.version);
+    ui.add(egui::Label::new(RichText::new(text).small().color(tokens.dim)).truncate()).on_hover_text(tip);
+    let open = shared.session.data.dataset.as_ref();
+    if open.is_none_or(|dataset| !shared.session.study.is_of(dataset)) {
+        ui.horizontal_wrapped(|ui| {
+            let text = "△ Another data set is open: rows cannot show their frames.";
+            ui.label(RichText::new(text).small().color(tokens.warn));
+            let button = ui.small_button("Open its data set").on_hover_text(data.root.display().to_string());
+            if button.clicked() {
+                shared.send(Command::Open(data.root.clone()));
+            }
+        });
+    }
+}
+
+fn choose(ui: &mut Ui, chosen: &mut Measure, values: &[(Measure, Values)]) {
+    if ui.available_width() < NARROW {
+        let menu = egui::ComboBox::from_id_salt("measure").width(130.0).selected_text(chosen.title());
+        let response = menu.show_ui(ui, |ui| {
+            for (measure, _) in values {
+                ui.selectable_value(chosen, *measure, measure.title()).on_hover_text(measure.help());
+            }
+        });
+        response.response.named(Role::ComboBox, "Plotted quantity");
+        return;
+    }
+    ui.horizontal_wrapped(|ui| {
+        for (measure, _) in values {
+            let button = ui.selectable_value(chosen, *measure, RichText::new(measure.short()).small());
+            button.named(Role::Button, &format!("Plot {}", measure.short())).on_hover_text(measure.help());
+        }
+    });
+}

@@ -1,0 +1,72 @@
+//! A study's run on screen: its folder, what was read of it, and which row of its table is in the frame list.
+
+use super::results::FoundResults;
+use super::state::FrameSummary;
+use crate::dataset::Dataset;
+use crate::study::run::{Run, RunRow};
+use std::collections::{BTreeMap, HashMap};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// The run on screen.
+#[derive(Debug, Default)]
+pub struct StudyView {
+    /// What was read, and where.
+    pub run: Option<(PathBuf, Arc<Run>)>,
+    /// A folder that is being read.
+    pub reading: Option<PathBuf>,
+    /// The row of the table whose frames are in the list.
+    pub row: Option<usize>,
+    /// Counts up with every run that was read.
+    pub revision: u64,
+}
+
+impl StudyView {
+    /// The run.
+    pub fn shown(&self) -> Option<&Run> {
+        self.run.as_ref().map(|(_, run)| run.as_ref())
+    }
+
+    /// Whether the open data set may be the run's: the same name and arrays, and frames enough. (Its fingerprint is not for
+    /// the window's thread.)
+    pub fn is_of(&self, dataset: &Dataset) -> bool {
+        let info = dataset.info();
+        self.shown().is_some_and(|run| {
+            let data = &run.spec.data;
+            data.name == info.name
+                && data.end <= dataset.len()
+                && data.arrays.iter().eq(info.views.iter().map(|view| &view.array))
+        })
+    }
+}
+
+/// The filter that shows the frames of a row: all that have a result, also those that could not be fitted.
+pub(super) const ROW_FILTER: &str = "reason:iterations|converged|counted|error";
+
+/// Finds the frames of row `row` of the table in a data set, by their names.
+pub(super) fn frames_of_row(run: &Run, row: usize, dataset: &Arc<Dataset>) -> FoundResults {
+    let names: HashMap<&str, usize> = (0..dataset.len()).map(|index| (dataset.frame_name(index), index)).collect();
+    let (mut summaries, mut unknown, mut first_unknown) = (BTreeMap::new(), 0, None);
+    for of in run.table.get(row).into_iter().flat_map(|of| run.rows_of(of)) {
+        if let Some(&index) = names.get(of.name.as_str()) {
+            summaries.insert(index, summary(of));
+        } else {
+            unknown += 1;
+            first_unknown.get_or_insert_with(|| of.name.clone());
+        }
+    }
+    FoundResults { dataset: Arc::clone(dataset), summaries, unknown, first_unknown }
+}
+
+fn summary(row: &RunRow) -> FrameSummary {
+    let fit = row.fit.as_ref().ok();
+    FrameSummary {
+        iterations: fit.map(|fit| fit.iterations),
+        loss: fit.map(|fit| fit.loss),
+        iou: fit.and_then(crate::study::run::RunNumbers::mean_iou),
+        converged: fit.map(|fit| fit.converged),
+        majpe_mm: fit.and_then(|fit| fit.majpe_mm),
+        reason: Some(row.fit.as_ref().map_or_else(|why| format!("error: {why}"), |fit| fit.reason.clone())),
+        hashes: None,
+    }
+}
