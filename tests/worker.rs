@@ -48,13 +48,13 @@ impl Rig {
         self.worker.send(command);
     }
 
-    fn prepare_with(&self, job: JobId, config: FitConfig, start: Start) {
+    fn prepare_with(&self, job: JobId, config: &FitConfig, start: Start) {
         self.send(WorkerCommand::Prepare(Box::new(Prepare {
             job,
             branch: 0,
             dataset: Arc::clone(&self.dataset),
             frame: Arc::clone(&self.frame),
-            config,
+            config: *config,
             precision: Precision::F64,
             start,
         })));
@@ -62,7 +62,7 @@ impl Rig {
 
     /// Prepares job 1 and answers its row 0 and what was prepared.
     fn prepared(&mut self) -> (HistoryRow, Prepared) {
-        self.prepare_with(1, FitConfig::default(), Start::Initialise);
+        self.prepare_with(1, &FitConfig::default(), Start::Initialise);
         let (mut rows, event) = self.rows_until(1, |event| matches!(event, WorkerEvent::Prepared(_)));
         let WorkerEvent::Prepared(prepared) = event else { panic!("{event:?}") };
         assert_eq!(rows.len(), 1);
@@ -308,7 +308,7 @@ fn a_fit_that_is_resumed_goes_on_bit_for_bit() {
     rig.send(WorkerCommand::RunTo { target: 20, run: 1 });
     let (rows, ..) = rig.finish();
     let start = Start::Resume { initial: prepared.initial, state: Arc::clone(&rows[9].state) };
-    rig.prepare_with(1, FitConfig::default(), start);
+    rig.prepare_with(1, &FitConfig::default(), start);
     let (none, event) = rig.rows_until(1, |event| matches!(event, WorkerEvent::Prepared(_)));
     let WorkerEvent::Prepared(prepared) = event else { panic!("{event:?}") };
     assert!(none.is_empty() && prepared.initialisation.is_none());
@@ -321,7 +321,7 @@ fn a_new_job_ends_the_old_one_and_its_messages() {
     let mut rig = Rig::new();
     rig.prepared();
     rig.run_forever(2);
-    rig.prepare_with(2, FitConfig::default(), Start::Initialise);
+    rig.prepare_with(2, &FitConfig::default(), Start::Initialise);
     // Rows of job 1 may be on their way; after the first word of job 2 there are none.
     let mut message = rig.message();
     while let WorkerMessage::Rows(1, _) = message {
@@ -348,7 +348,7 @@ fn a_panic_is_told_and_the_thread_takes_another_job() {
     // The job is gone: asking it for more is answered, not ignored.
     rig.send(WorkerCommand::RunTo { target: FOREVER, run: 1 });
     rig.rows_until(1, |event| matches!(event, WorkerEvent::Lost(_)));
-    rig.prepare_with(1, FitConfig::default(), Start::Initialise);
+    rig.prepare_with(1, &FitConfig::default(), Start::Initialise);
     rig.rows_until(1, |event| matches!(event, WorkerEvent::Prepared(_)));
     rig.send(WorkerCommand::RunTo { target: 2, run: 1 });
     assert_eq!(iterations(&rig.finish().0), [1, 2]);
@@ -360,7 +360,7 @@ fn a_start_that_is_impossible_is_told() {
     let mut frame = Frame::clone(&rig.frame);
     frame.maps[1].data.fill(f64::NAN);
     rig.frame = Arc::new(frame);
-    rig.prepare_with(1, FitConfig::default(), Start::Initialise);
+    rig.prepare_with(1, &FitConfig::default(), Start::Initialise);
     let (rows, event) = rig.rows_until(1, |event| matches!(event, WorkerEvent::Lost(_)));
     assert!(rows.is_empty());
     let WorkerEvent::Lost(text) = event else { panic!("{event:?}") };
