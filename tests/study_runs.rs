@@ -273,7 +273,7 @@ fn a_run_of_a_program_with_fewer_settings_can_be_read() {
     let wanted = Run::read(&case.run("run")).unwrap();
     let file = case.run("run").join("run.toml");
     let text = std::fs::read_to_string(&file).unwrap();
-    let older: Vec<&str> = text.lines().filter(|line| !line.starts_with("w_floor")).collect();
+    let older: Vec<&str> = text.lines().filter(|line| !line.starts_with("w_time")).collect();
     assert!(older.len() < text.lines().count());
     std::fs::write(&file, older.join("\n")).unwrap();
     assert_eq!(Run::read(&case.run("run")).unwrap(), wanted);

@@ -35,6 +35,17 @@ pub enum Yaw {
     Motion,
 }
 
+/// What tells how high a body stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Height {
+    /// The middle of the echo.
+    #[default]
+    Echo,
+    /// The floor and the top of the echo, where the data set tells the radar's height; else as `echo`.
+    Floor,
+}
+
 /// Adam's step size a group; `None` takes `learning_rate`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

@@ -8,7 +8,7 @@ mod init;
 mod preset;
 
 pub use fields::{FIELDS, Field, FieldGroup};
-pub use init::{InitConfig, LearningRates, Parameterization, Scatterers, Yaw};
+pub use init::{Height, InitConfig, LearningRates, Parameterization, Scatterers, Yaw};
 pub use preset::Preset;
 
 use serde::{Deserialize, Serialize};
@@ -133,10 +133,8 @@ pub struct FitConfig {
     pub starts: usize,
     /// Weight of the temporal term.
     pub w_time: f64,
-    /// Weight of the floor term.
-    pub w_floor: f64,
-    /// How high the radar stands above the floor, m.
-    pub radar_height_m: f64,
+    /// What tells how high a start stands.
+    pub height: Height,
     /// The four operators.
     pub operators: Operators,
     /// Step sizes of single groups.
@@ -167,8 +165,7 @@ impl Default for FitConfig {
             people: 1,
             starts: 1,
             w_time: 0.0,
-            w_floor: 0.0,
-            radar_height_m: 1.0,
+            height: Height::default(),
             operators: Operators::default(),
             learning_rates: LearningRates::default(),
             init: InitConfig::default(),

@@ -1,6 +1,6 @@
 //! Settings with a name.
 
-use super::{EmRegion, FitConfig, LearningRates, Parameterization, Scatterers, Summation, Yaw};
+use super::{EmRegion, FitConfig, Height, LearningRates, Parameterization, Scatterers, Summation, Yaw};
 
 /// A whole [`FitConfig`] with a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,7 +34,7 @@ impl Preset {
             Self::Paper => "The paper's setting: every joint moves by itself, equal round Gaussians, coherent sum.",
             Self::Recommended => {
                 "What fits best on synthetic data with truth: the body moves as one, skin in front of the joints, Gaussians by body \
-                 part, heading and place from the frames around, the posture that fits, powers add."
+                 part, heading and place from the frames around, feet on the floor, the posture that fits, powers add."
             }
         }
     }
@@ -47,11 +47,12 @@ impl Preset {
                 parameterization: Parameterization::Bones,
                 scatterers: Scatterers::BodyParts,
                 yaw: Yaw::Motion,
+                height: Height::Floor,
                 summation: Summation::Incoherent,
                 em_region: EmRegion::HalfWidth(1.0),
-                surface_offset_m: 0.08,
+                surface_offset_m: 0.05,
                 starts: 9,
-                w_time: 2.0,
+                w_time: 8.0,
                 learning_rates: LearningRates {
                     position: Some(2e-3),
                     bone: Some(0.0),

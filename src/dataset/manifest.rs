@@ -267,7 +267,8 @@ fn radar_fault(radar: &RadarConfig) -> Option<String> {
     ];
     let few = radar.doppler_features == 0 || radar.doppler_features > 4096;
     let features = || few.then(|| format!("`doppler_features` is {}; expected 1 to 4096", radar.doppler_features));
-    numbers.into_iter().find_map(|(key, value)| positive(key, value)).or_else(features)
+    let known = radar.height_m.map(|height_m| ("height_m", height_m));
+    numbers.into_iter().chain(known).find_map(|(key, value)| positive(key, value)).or_else(features)
 }
 
 /// What is wrong with a view, in words; `None` if nothing is.

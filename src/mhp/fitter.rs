@@ -173,7 +173,6 @@ fn evaluate(objective: &mut Objective, params: &Pppr, iteration: usize) -> Resul
     let terms = [
         ("L_EM", t.em),
         ("L_time", t.time),
-        ("L_floor", t.floor),
         ("L_bone", t.bone),
         ("L_rigid", t.rigid),
         ("L_joint", t.joint),

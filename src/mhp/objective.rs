@@ -144,15 +144,8 @@ impl Objective {
         if self.config.w_time > 0.0 {
             terms.time = anchored(&self.anchors, params, self.config.w_time, &mut gradient);
         }
-        if self.config.w_floor > 0.0 {
-            let (weight, height_m) = (self.config.w_floor, self.config.radar_height_m);
-            terms.floor = on_floor(params, height_m, weight, &mut gradient);
-        }
         let kinematic = terms.bone + terms.rigid + terms.joint + terms.sep + terms.coll;
-        let loss = self.config.w_em * em
-            + self.config.w_time * terms.time
-            + self.config.w_floor * terms.floor
-            + self.config.w_kine * kinematic;
+        let loss = self.config.w_em * em + self.config.w_time * terms.time + self.config.w_kine * kinematic;
         Evaluation { loss, terms, iou, gradient, em_gradient }
     }
 
@@ -187,24 +180,6 @@ fn anchored(anchors: &[Vec3], params: &Pppr, weight: f64, gradient: &mut Pppr) -
             add_scaled(&mut slope, off, 2.0 * weight * share);
             gradient.set_vec3(Group::Position, joint, slope);
         }
-    }
-    sum
-}
-
-/// L_floor = Σ (z_low + h)² over the persons, m², with z_low the height of a person's lowest joint and h that of the radar over
-/// the floor; adds `weight` times its gradient.
-fn on_floor(params: &Pppr, radar_height_m: f64, weight: f64, gradient: &mut Pppr) -> f64 {
-    let joints = params.shape().joints;
-    let height = |joint: usize| params.position(joint)[2];
-    let mut sum = 0.0;
-    for person in 0..params.shape().persons {
-        let own = person * joints..(person + 1) * joints;
-        let Some(lowest) = own.min_by(|&a, &b| height(a).total_cmp(&height(b))) else { continue };
-        let off = height(lowest) + radar_height_m;
-        sum += off * off;
-        let mut slope = gradient.vec3(Group::Position, lowest);
-        slope[2] += 2.0 * weight * off;
-        gradient.set_vec3(Group::Position, lowest, slope);
     }
     sum
 }

@@ -22,9 +22,6 @@ pub struct Terms {
     /// Σ ‖c − ĉ‖² to where the frames around say that each person is, m²; 0 where they say nothing.
     #[serde(default)]
     pub time: f64,
-    /// Σ (z_low + h)² of each person's lowest joint over the floor, m²; 0 where it has no weight.
-    #[serde(default)]
-    pub floor: f64,
     /// Σ ψ(l − ℓ).
     pub bone: f64,
     /// Σ ψ of the relative velocity along the bone.

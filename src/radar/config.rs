@@ -26,6 +26,10 @@ pub struct RadarConfig {
     /// Length N_d of a joint's Doppler features ω.
     #[serde(default = "default_doppler_features")]
     pub doppler_features: usize,
+    /// Height of the radar above the floor, m, where it is known: only the floor term and the starts of fits that have one
+    /// read it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height_m: Option<f64>,
 }
 
 fn default_doppler_features() -> usize {
@@ -44,6 +48,7 @@ impl Default for RadarConfig {
             l_az_m: 0.0019,
             l_el_m: 0.0019,
             doppler_features: default_doppler_features(),
+            height_m: None,
         }
     }
 }

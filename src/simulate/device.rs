@@ -163,6 +163,7 @@ fn lines(chain: Chain) -> Vec<Radar> {
         l_az_m: spacing_m,
         l_el_m: spacing_m,
         doppler_features: 32,
+        height_m: None,
     };
     let of = |name, direction| Radar {
         name,
@@ -193,6 +194,7 @@ fn xrf55(layout: Layout) -> Radar {
         l_az_m: spacing_m,
         l_el_m: spacing_m,
         doppler_features: 32,
+        height_m: None,
     };
     let stack = layout == Layout::Xrf55Stack;
     let chain = Chain {
@@ -222,6 +224,7 @@ fn hupr() -> Vec<Radar> {
         l_az_m: spacing_m,
         l_el_m: spacing_m,
         doppler_features: 32,
+        height_m: None,
     };
     let at = |along: f64, up: f64| [0.0, -along * spacing_m, up * spacing_m];
     let array = MimoArray {

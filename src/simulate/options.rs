@@ -113,6 +113,8 @@ pub struct Options {
     pub multipath: Option<bool>,
     /// More thermal noise than the preset has, dB.
     pub noise_db: f64,
+    /// Height of the radar above the floor, m; `None` draws one for each sequence, 0.9 to 1.1.
+    pub radar_height_m: Option<f64>,
 }
 
 impl Default for Options {
@@ -130,6 +132,7 @@ impl Default for Options {
             still_share: None,
             multipath: None,
             noise_db: 0.0,
+            radar_height_m: None,
         }
     }
 }
@@ -173,6 +176,9 @@ impl Options {
         }
         if let Some(share) = self.still_share.filter(|share| !(0.0..=1.0).contains(share)) {
             return out("still share", share.to_string(), "0 to 1");
+        }
+        if let Some(height_m) = self.radar_height_m.filter(|height_m| !(0.3..=3.0).contains(height_m)) {
+            return out("radar height", height_m.to_string(), "0.3 to 3 m");
         }
         if !(-40.0..=40.0).contains(&self.noise_db) {
             return out("noise", self.noise_db.to_string(), "-40 to 40 dB");

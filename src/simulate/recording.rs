@@ -43,9 +43,9 @@ impl Recording {
         self.device.views.clone()
     }
 
-    /// Chirp and array.
+    /// Chirp and array, and the height where it is the same for all sequences.
     pub fn radar(&self) -> RadarConfig {
-        self.device.radar()
+        RadarConfig { height_m: self.options.radar_height_m, ..self.device.radar() }
     }
 
     /// Frames a second.

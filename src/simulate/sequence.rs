@@ -79,10 +79,11 @@ impl Sequence {
         let mut draw = rng(Purpose::Cast);
         let people = options.people.clone().unwrap_or_else(|| recipe.people.clone());
         let count = draw.random_range(people);
+        let drawn_height_m = draw.random_range(0.90..1.10);
         let stage = Stage {
             distance_m: reachable(recipe.distance_m, device),
             lateral_m: options.layout.lateral_m(),
-            floor_z_m: -draw.random_range(0.90..1.10),
+            floor_z_m: -options.radar_height_m.unwrap_or(drawn_height_m),
             lasts_s: (options.sequence_length.saturating_sub(1)) as f64 / rate_hz,
         };
         let actions = if options.actions.is_empty() { &recipe.actions } else { &options.actions };

@@ -3,7 +3,9 @@
 use super::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, chip, icon_button, iou_color, value_row};
-use crate::config::{EmRegion, Field, FieldGroup, FitConfig, Parameterization, Preset, Scatterers, Summation, Yaw};
+use crate::config::{
+    EmRegion, Field, FieldGroup, FitConfig, Height, Parameterization, Preset, Scatterers, Summation, Yaw,
+};
 use crate::mhp::Precision;
 use crate::session::{Command, FitStatus};
 use egui::{RichText, Ui};
@@ -150,13 +152,9 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
         .on_hover_text("Σ ψ of the relative velocity along each bone.");
     value_row(ui, "L_joint", &format!("{:.5}", terms.joint), "")
         .on_hover_text("Σ max(0, θ − θ_max)² over elbows and knees, rad².");
-    for (name, value, help) in [
-        ("L_time", terms.time, "Σ ‖c − ĉ‖² to where the frames around say that each person is, m²."),
-        ("L_floor", terms.floor, "Σ (z_low + h)² of each person's lowest joint over the floor, m²."),
-    ] {
-        if value != 0.0 {
-            value_row(ui, name, &format!("{value:.5}"), "").on_hover_text(help);
-        }
+    if terms.time != 0.0 {
+        value_row(ui, "L_time", &format!("{:.5}", terms.time), "")
+            .on_hover_text("Σ ‖c − ĉ‖² to where the frames around say that each person is, m².");
     }
     if terms.sep != 0.0 || terms.coll != 0.0 {
         value_row(ui, "L_sep", &format!("{:.5}", terms.sep), "");
@@ -284,6 +282,13 @@ fn model(ui: &mut Ui, config: &mut FitConfig) {
         ui.selectable_value(&mut config.yaw, Yaw::Radar, "at the radar").on_hover_text("The paper.");
         ui.selectable_value(&mut config.yaw, Yaw::Motion, "where it goes")
             .on_hover_text("From its places in the frames around. Takes effect when a start is found.");
+    });
+    ui.horizontal(|ui| {
+        ui.label("Height");
+        ui.selectable_value(&mut config.height, Height::Echo, "middle of the echo").on_hover_text("The paper.");
+        ui.selectable_value(&mut config.height, Height::Floor, "floor and head").on_hover_text(
+            "Where the data set tells the radar's height (height_m). Takes effect when a start is found.",
+        );
     });
     for field in FieldGroup::Regularisation.fields() {
         slider(ui, field, config);

@@ -68,6 +68,9 @@ pub struct Args {
     /// More (or less) thermal noise than the preset has, dB.
     #[arg(long, value_name = "DB", default_value_t = 0.0, allow_negative_numbers = true)]
     pub noise_db: f64,
+    /// Height of the radar above the floor, m; the manifest tells it.
+    #[arg(long, value_name = "M", default_value_t = 1.0)]
+    pub radar_height: f64,
 }
 
 /// A layout as typed.
@@ -183,6 +186,7 @@ impl Args {
             still_share: self.still_share,
             multipath: self.multipath,
             noise_db: self.noise_db,
+            radar_height_m: Some(self.radar_height),
         };
         options.check().context("simulate")?;
         Ok(options)
@@ -213,6 +217,9 @@ impl Args {
         }
         if self.noise_db != 0.0 {
             let _ = write!(text, " --noise-db {}", self.noise_db);
+        }
+        if (self.radar_height - 1.0).abs() > 0.0 {
+            let _ = write!(text, " --radar-height {}", self.radar_height);
         }
         if let Some(name) = &self.name {
             let _ = write!(text, " --name {name}");

@@ -16,8 +16,6 @@ const NEAREST_M: f64 = 0.5;
 const SMALLEST_RING: usize = 8;
 /// Spread of speckle, ln: a Rayleigh amplitude has 0.64. What rises less over the background is not counted.
 pub(super) const SPECKLE: f64 = 0.64;
-/// The ln-salience above which a cell counts as fully lit.
-const FULLY_LIT: f64 = 2.0;
 /// Percentiles tried for local maxima, strictest first, until [`ENOUGH_PEAKS`] are found.
 const PERCENTILES: [f64; 6] = [99.5, 99.0, 98.0, 96.0, 92.0, 85.0];
 const ENOUGH_PEAKS: usize = 12;
@@ -82,14 +80,19 @@ impl<'a> Evidence<'a> {
             view.axes.iter().enumerate().filter(|(_, axis)| axis.kind != AxisKind::Doppler).collect();
         let shape: Vec<usize> = axes.iter().map(|(_, axis)| axis.bins).collect();
         let cells = shape.iter().product();
-        let (mut value, mut source) = (vec![f64::NEG_INFINITY; cells], vec![0; cells]);
-        for (cell, &h) in map.iter().enumerate() {
-            let bins = unravel(cell, &view.shape());
-            let spatial = axes.iter().fold(0, |flat, &(k, axis)| flat * axis.bins + bins[k]);
-            if h > value[spatial] {
-                (value[spatial], source[spatial]) = (h, cell);
+        let (value, source) = if axes.len() == view.axes.len() {
+            (map.to_vec(), (0..cells).collect())
+        } else {
+            let (mut value, mut source) = (vec![f64::NEG_INFINITY; cells], vec![0; cells]);
+            for (cell, &h) in map.iter().enumerate() {
+                let bins = unravel(cell, &view.shape());
+                let spatial = axes.iter().fold(0, |flat, &(k, axis)| flat * axis.bins + bins[k]);
+                if h > value[spatial] {
+                    (value[spatial], source[spatial]) = (h, cell);
+                }
             }
-        }
+            (value, source)
+        };
         let mut evidence = Self { view, index, axes, shape, value, source, salience: vec![], excess: vec![] };
         evidence.subtract_background();
         if let Some(unrest) = unrest {
@@ -105,50 +108,55 @@ impl<'a> Evidence<'a> {
         let largest = self.value.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
         let tiny = largest * 1e-12;
         let ln: Vec<f64> = self.value.iter().map(|h| h.max(tiny).ln()).collect();
-        let ranges: Vec<Option<f64>> = (0..ln.len()).map(|cell| self.range_m(cell)).collect();
+        let ranges = self.ranges_m();
         let ring_m = self.axes.iter().filter(|(_, a)| !a.kind.is_angular()).map(|(_, a)| a.step().abs());
         let ring_m = ring_m.fold(f64::INFINITY, f64::min);
-        let ring = |cell: usize| ranges[cell].map_or(0, |range| (range / ring_m).round() as usize);
-        let rings = (0..ln.len()).map(ring).max().unwrap_or(0) + 1;
-        let mut members: Vec<Vec<f64>> = vec![Vec::new(); rings];
+        let rings: Option<Vec<usize>> =
+            ranges.as_ref().map(|ranges| ranges.iter().map(|range| (range / ring_m).round() as usize).collect());
+        let ring = |cell: usize| rings.as_ref().map_or(0, |rings| rings[cell]);
+        let count = rings.iter().flatten().copied().max().unwrap_or(0) + 1;
+        let mut members: Vec<Vec<f64>> = vec![Vec::new(); count];
         for (cell, &x) in ln.iter().enumerate() {
             members[ring(cell)].push(x);
         }
         let overall = percentile(&ln, 50.0);
         let background: Vec<f64> =
             members.iter().map(|m| if m.len() < SMALLEST_RING { overall } else { percentile(m, 50.0) }).collect();
-        let far_enough = |cell: usize| ranges[cell].is_none_or(|range| range > NEAREST_M);
+        let far_enough = |cell: usize| ranges.as_ref().is_none_or(|ranges| ranges[cell] > NEAREST_M);
         let above = |cell: usize| if far_enough(cell) { (ln[cell] - background[ring(cell)]).max(0.0) } else { 0.0 };
         self.salience = (0..ln.len()).map(above).collect();
-        let over_speckle = |s: f64| 1.0 - (SPECKLE - s).min(0.0).exp();
+        let over_speckle = |s: f64| if s > SPECKLE { 1.0 - (SPECKLE - s).exp() } else { 0.0 };
         self.excess = self.salience.iter().zip(&self.value).map(|(&s, h)| h / largest * over_speckle(s)).collect();
     }
 
-    /// Distance from the view's origin as far as the axes tell it, m.
-    fn range_m(&self, cell: usize) -> Option<f64> {
-        let bins = unravel(cell, &self.shape);
-        let at = |kind: AxisKind| {
-            self.axes.iter().zip(&bins).find(|((_, a), _)| a.kind == kind).map(|((_, a), &b)| a.value_at(b as f64))
+    /// Distance of each cell from the view's origin as far as the axes tell it, m; `None` where no axis tells any.
+    fn ranges_m(&self) -> Option<Vec<f64>> {
+        let has = |kind: AxisKind| self.axes.iter().any(|(_, axis)| axis.kind == kind);
+        let telling: &[AxisKind] = match () {
+            () if has(AxisKind::Range) => &[AxisKind::Range],
+            () if has(AxisKind::DepthH) => &[AxisKind::DepthH, AxisKind::Y],
+            () if has(AxisKind::DepthV) => &[AxisKind::DepthV, AxisKind::Z],
+            () => &[AxisKind::X, AxisKind::Y, AxisKind::Z],
         };
-        if let Some(range) = at(AxisKind::Range) {
-            return Some(range);
+        if !telling.iter().any(|&kind| has(kind)) {
+            return None;
         }
-        let pieces = match (at(AxisKind::DepthH), at(AxisKind::DepthV)) {
-            (Some(h), _) => vec![Some(h), at(AxisKind::Y)],
-            (None, Some(rho)) => vec![Some(rho), at(AxisKind::Z)],
-            _ => vec![at(AxisKind::X), at(AxisKind::Y), at(AxisKind::Z)],
-        };
-        let known: Vec<f64> = pieces.into_iter().flatten().collect();
-        (!known.is_empty()).then(|| known.iter().map(|x| x * x).sum::<f64>().sqrt())
+        // Squares add up axis by axis: the cells of the axes so far, each with every bin of the next.
+        let squares = self.axes.iter().fold(vec![0.0], |so_far: Vec<f64>, (_, axis)| {
+            let share = f64::from(u8::from(telling.contains(&axis.kind)));
+            let own: Vec<f64> = (0..axis.bins).map(|bin| share * axis.value_at(bin as f64).powi(2)).collect();
+            so_far.iter().flat_map(|before| own.iter().map(move |square| before + square)).collect()
+        });
+        Some(squares.into_iter().map(f64::sqrt).collect())
     }
 
     /// Local maxima above the strictest percentile that leaves enough of them, strongest excess first.
     pub(super) fn peaks(&self) -> Vec<Peak> {
-        let maxima: Vec<usize> = (0..self.value.len()).filter(|&cell| self.is_maximum(cell)).collect();
         let mut kept = Vec::new();
         for q in PERCENTILES {
             let level = percentile(&self.value, q);
-            kept = maxima.iter().copied().filter(|&cell| self.value[cell] >= level).collect();
+            let high = (0..self.value.len()).filter(|&cell| self.value[cell] >= level);
+            kept = high.filter(|&cell| self.is_maximum(cell)).collect();
             if kept.len() >= ENOUGH_PEAKS {
                 break;
             }
@@ -160,6 +168,9 @@ impl<'a> Evidence<'a> {
 
     fn is_maximum(&self, cell: usize) -> bool {
         let mut highest = self.excess[cell] > 0.0;
+        if !highest {
+            return false;
+        }
         for_neighbours(&self.shape, cell, |other| highest &= self.value[other] <= self.value[cell]);
         highest
     }
@@ -186,13 +197,6 @@ impl<'a> Evidence<'a> {
     pub(super) fn mean_excess(&self, points: &[Vec3]) -> f64 {
         let sum: f64 = points.iter().filter_map(|&p| self.cell(p)).map(|cell| self.excess[cell]).sum();
         sum / points.len().max(1) as f64
-    }
-
-    /// Mean over `points` of how lit they are, 0 to 1: strong and stronger echoes count alike, so that the whole body
-    /// has a say and not its brightest part.
-    pub(super) fn mean_lit(&self, points: &[Vec3]) -> f64 {
-        let lit = |cell: usize| (self.salience[cell] / FULLY_LIT).min(1.0);
-        points.iter().filter_map(|&p| self.cell(p)).map(lit).sum::<f64>() / points.len().max(1) as f64
     }
 
     /// Whether some axis of this view tells heights near a world point.
@@ -293,10 +297,14 @@ impl<'a> Evidence<'a> {
         let floor = (strongest - DEPTH_LN).max(SPECKLE);
         let (mut sum, mut weights) = (vec![0.0; self.axes.len()], 0.0);
         for cell in cells {
-            let weight = (self.salience[cell] - floor).max(0.0);
-            weights += weight;
-            for (sum, bin) in sum.iter_mut().zip(unravel(cell, &self.shape)) {
-                *sum += weight * bin as f64;
+            let weight = self.salience[cell] - floor;
+            if weight > 0.0 {
+                weights += weight;
+                let mut rest = cell;
+                for (sum, bins) in sum.iter_mut().zip(&self.shape).rev() {
+                    *sum += weight * (rest % bins) as f64;
+                    rest /= bins;
+                }
             }
         }
         (weights > 0.0).then(|| Mark { view: self.index, bin: sum.into_iter().map(|sum| sum / weights).collect() })

@@ -5,10 +5,6 @@ use crate::geometry::Vec3;
 
 /// Where the middle of a body is expected when nothing tells its height: a radar stands at about chest height, m.
 const UNSEEN_MIDDLE_M: f64 = -0.2;
-/// What one metre off costs then, in units of L_EM.
-const UNSEEN_WEIGHT: f64 = 0.2;
-/// The same where feet and head were seen, to about 5 cm.
-const SEEN_WEIGHT: f64 = 5.0;
 /// A joint's echo may be this far before or behind the body's middle, m.
 const REACH_M: f64 = 0.35;
 const STEP_M: f64 = 0.04;
@@ -17,12 +13,44 @@ const LARGEST_GAP_M: f64 = 0.2;
 /// An extent outside this is no whole standing body, m.
 const PLAUSIBLE_M: (f64, f64) = (1.2, 2.2);
 
-/// Where the middle of the body is expected, and how firmly.
+/// How far above the head its echo still stands out, m: the mean over simulated people.
+const HALO_M: f64 = 0.12;
+/// Stature of adults and its standard deviation, and that of the top of the echo, m.
+const STATURE_M: f64 = 1.70;
+const STATURE_SPREAD_M: f64 = 0.13;
+const TOP_SPREAD_M: f64 = 0.08;
+/// Who does not reach this height sits, m.
+const SITTING_M: f64 = 1.36;
+/// An echo that ends higher above the floor than this misses the feet, and may miss the head as well, m.
+const FEET_M: f64 = 0.15;
+
+/// What the top of an echo says of somebody on the floor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Stature {
+    /// Most likely stature, m.
+    pub height_m: f64,
+    /// Whether the head is lower than that of anybody who stands.
+    pub sits: bool,
+}
+
+impl Stature {
+    /// From the lowest and highest lit height (world frame, m), where they are seen, for a radar `radar_height_m` above the
+    /// floor.
+    pub(super) fn new(extent_m: Option<[f64; 2]>, radar_height_m: f64) -> Self {
+        let whole = extent_m.filter(|[low, _]| low + radar_height_m < FEET_M);
+        let Some(seen_m) = whole.map(|[_, top]| top - HALO_M + radar_height_m) else {
+            return Self { height_m: STATURE_M, sits: false };
+        };
+        let trust = STATURE_SPREAD_M.powi(2) / (STATURE_SPREAD_M.powi(2) + TOP_SPREAD_M.powi(2));
+        Self { height_m: STATURE_M + trust * (seen_m - STATURE_M), sits: seen_m < SITTING_M }
+    }
+}
+
+/// Where the middle of the body is expected.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Expectation {
     /// Height of the middle, world frame, m.
     pub middle_m: f64,
-    weight: f64,
     /// Lowest and highest lit height, m, where they were seen.
     pub extent_m: Option<[f64; 2]>,
 }
@@ -44,14 +72,9 @@ impl Expectation {
         let extent_m = extent_around(&heights, at[2])
             .filter(|[low, high]| (PLAUSIBLE_M.0..=PLAUSIBLE_M.1).contains(&(high - low)));
         match extent_m {
-            Some([low, high]) => Self { middle_m: f64::midpoint(low, high), weight: SEEN_WEIGHT, extent_m },
-            None => Self { middle_m: UNSEEN_MIDDLE_M, weight: UNSEEN_WEIGHT, extent_m },
+            Some([low, high]) => Self { middle_m: f64::midpoint(low, high), extent_m },
+            None => Self { middle_m: UNSEEN_MIDDLE_M, extent_m },
         }
-    }
-
-    /// What a body whose middle is at height `z_m` costs.
-    pub(super) fn cost(&self, z_m: f64) -> f64 {
-        self.weight * (z_m - self.middle_m).powi(2)
     }
 }
 
@@ -67,6 +90,16 @@ fn extent_around(heights: &[f64], z_m: f64) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_head_tells_who_is_tall_and_who_sits() {
+        let stature = |extent_m| Stature::new(extent_m, 1.0);
+        assert_eq!(stature(None), Stature { height_m: STATURE_M, sits: false });
+        let (tall, small) = (stature(Some([-1.0, 1.0])), stature(Some([-1.0, 0.65])));
+        assert!(tall.height_m > 1.8 && tall.height_m < 1.88 && small.height_m < 1.62);
+        assert!(!tall.sits && !small.sits && stature(Some([-1.0, 0.4])).sits);
+        assert!(!stature(Some([-0.5, 0.4])).sits, "without feet the head may be missed too");
+    }
 
     #[test]
     fn an_extent_ends_at_a_gap() {

@@ -5,7 +5,7 @@
 //!    grouped by hierarchical clustering ([`place`]).
 //! 3. A standing body is tried at every group, at several heights and depths. The place where all views show
 //!    the most echo over their background wins: a wall arc has none, a strong echo in one view only has little.
-//! 4. The body is shifted until it covers what is lit.
+//! 4. The body's middle is that of what all views show lit around the place; its height that of feet and head.
 //! 5. V: velocities from the Doppler axis or the intensity gradients ([`velocity`]); heading, where asked for, from the
 //!    places in the frames around ([`motion`]).
 //! 6. Every joint gets its Gaussian ([`scatterers`]), and the start is spoiled where the settings ask for it
@@ -27,11 +27,11 @@ pub use evidence::Peak;
 
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
-use crate::config::{FitConfig, Summation, Yaw};
+use crate::config::{FitConfig, Height, Summation, Yaw};
 use crate::geometry::{Vec3, add, norm, scale, sub};
 use crate::radar::{AxisKind, View};
 use evidence::{Evidence, Mark, locate};
-use height::Expectation;
+use height::{Expectation, Stature};
 use motion::Track;
 use place::Place;
 use pose::Posture;
@@ -55,14 +55,19 @@ const WIDE_REACH_M: [f64; 2] = [0.8, 1.3];
 const NARROW_REACH_M: [f64; 2] = [0.6, 1.1];
 /// Views whose middles disagree by more see different things, m.
 const LARGEST_MISFIT_M: f64 = 0.5;
+/// The L_EM of a posture other than standing, of that of standing, at which it is believed of somebody who does not walk.
+const CLEARLY_BETTER: f64 = 0.9;
 /// A person is looked for no farther than this from the place that counting gave it, m.
 const SEED_REACH_M: f64 = 0.3;
 
 /// A start for the fit, and how it came about.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Initialisation {
-    /// The persons on the problem's skeleton.
+    /// Where the fit begins: the persons on the problem's skeleton.
     pub params: Pppr,
+    /// The same persons as this frame's peaks alone place them: standing, facing the radar, the middle of the body where the
+    /// echo is. The same as `params` where no switch beside the paper's setting refines a start.
+    pub unrefined: Pppr,
     /// Local maxima of every view, strongest over the background first within a view.
     pub peaks: Vec<Peak>,
     /// What was found and assumed, in words.
@@ -80,6 +85,17 @@ struct Person {
 }
 
 impl Person {
+    /// What its head says of it, where the floor is known and asked for.
+    fn stature(&self, problem: &Problem, config: &FitConfig) -> Option<Stature> {
+        let radar_height_m = problem.radar.height_m.filter(|_| config.height == Height::Floor)?;
+        let extent_m = self.expected.and_then(|expected| expected.extent_m);
+        Some(Stature::new(extent_m, radar_height_m))
+    }
+
+    fn walks(&self) -> bool {
+        self.track.as_ref().is_some_and(|track| track.heading().is_some())
+    }
+
     /// The direction in which it looks, on the floor.
     fn forward(&self, yaw: Yaw) -> [f64; 2] {
         let walking = self.track.as_ref().filter(|_| yaw == Yaw::Motion).and_then(Track::heading);
@@ -143,9 +159,13 @@ pub fn initialise_people(problem: &Problem, config: &FitConfig, seeds: &[Vec3]) 
         choose_postures(problem, config, &template, &mut persons)?;
     }
     let mut params = assemble(problem, config, &template, &persons);
-    perturb::spoil(problem, &config.init, &mut params);
+    let plain = persons.iter().map(|person| Person { posture: Posture::Standing, ..person.clone() });
+    let mut unrefined = assemble(problem, &unrefined(config), &template, &plain.collect::<Vec<_>>());
+    for start in [&mut params, &mut unrefined] {
+        perturb::spoil(problem, &config.init, start);
+    }
     notes.extend(persons.iter().flat_map(|person| tell(person, config)));
-    Ok(Initialisation { params, peaks, notes })
+    Ok(Initialisation { params, unrefined, peaks, notes })
 }
 
 /// Gives each person the posture whose L_EM is smallest where it stands best near its place; the place itself is left
@@ -159,7 +179,11 @@ fn choose_postures(
     let config = FitConfig { summation: Summation::Incoherent, w_time: 0.0, ..*config };
     let problem = Arc::new(problem.clone());
     for k in 0..persons.len() {
-        let walks = persons[k].track.as_ref().is_some_and(|track| track.heading().is_some());
+        let walks = persons[k].walks();
+        if !walks && persons[k].stature(&problem, &config).is_some_and(|stature| stature.sits) {
+            persons[k].posture = Posture::Sitting;
+            continue;
+        }
         let mut best: Option<(f64, Posture)> = None;
         for posture in pose::tried(config.starts, walks) {
             let own = |at: Vec3| Person { at, posture, ..persons[k].clone() };
@@ -172,7 +196,9 @@ fn choose_postures(
                 lowest = lowest.min(loss);
                 loss
             });
-            if best.is_none_or(|(loss, _)| lowest < loss) {
+            // Who stands is as likely to stand as all else together: another posture has to be clearly better.
+            let ask = if walks || best.is_none() { lowest } else { lowest / CLEARLY_BETTER };
+            if best.is_none_or(|(loss, _)| ask < loss) {
                 best = Some((lowest, posture));
             }
         }
@@ -230,9 +256,10 @@ pub(super) fn anchors(problem: &Problem, config: &FitConfig, params: &Pppr) -> V
         let mean = scale(own.fold([0.0; 3], |sum, joint| add(sum, params.position(joint))), 1.0 / joints as f64);
         let lit = centre(problem, &evidence, middle);
         let Some(track) = motion::track(problem, &around, lit) else { return mean };
-        // What is lit is skin; the joints lie behind it, and their mean above the middle of their height.
-        let behind = scale(track.at, config.surface_offset_m / norm(track.at).max(0.5));
-        add(add(track.at, behind), [0.0, 0.0, template.mean_over_middle_m()])
+        let at = behind_skin(config, track.at);
+        // Where the floor is known, the start stands as high as it should.
+        let floor = problem.radar.height_m.filter(|_| config.height == Height::Floor);
+        [at[0], at[1], floor.map_or(at[2] + template.mean_over_middle_m(), |_| mean[2])]
     };
     super::region::centres(params).into_iter().enumerate().map(of_person).collect()
 }
@@ -252,10 +279,9 @@ fn find_one(
         notes.push("the views agree on no place: the strongest echo of one view was taken".to_owned());
         ranked = rank(&places, template, |body| evidence.iter().map(|e| e.mean_excess(body)).sum());
     }
-    let (at, expected) = most_bodily(evidence, template, &ranked).ok_or_else(|| FitError::NoStart {
+    let (at, expected) = most_bodily(problem, evidence, &ranked).ok_or_else(|| FitError::NoStart {
         reason: format!("none of {} peaks stands above its background", peaks.len()),
     })?;
-    let at = centre(problem, evidence, at);
     Ok((at, Some(expected)))
 }
 
@@ -312,14 +338,9 @@ fn rank(places: &[Place], template: &Template, score: impl Fn(&[Vec3]) -> f64) -
     scored.into_iter().filter(|(_, score)| *score >= least).map(|(at, _)| at).collect()
 }
 
-/// Mean share of the body that lies on what is lit, over the views.
-fn lit(evidence: &[Evidence<'_>], body: &[Vec3]) -> f64 {
-    evidence.iter().map(|e| e.mean_lit(body)).sum::<f64>() / evidence.len().max(1) as f64
-}
-
 /// The first of the strongest distinct `places` where something stands from feet to head, or the strongest: a corner of
 /// the room may outshine a person in both views, but it is a spot.
-fn most_bodily(evidence: &[Evidence<'_>], template: &Template, places: &[Vec3]) -> Option<(Vec3, Expectation)> {
+fn most_bodily(problem: &Problem, evidence: &[Evidence<'_>], places: &[Vec3]) -> Option<(Vec3, Expectation)> {
     let mut tried: Vec<(Vec3, Expectation)> = Vec::new();
     let mut starts: Vec<Vec3> = Vec::new();
     for &place in places {
@@ -327,7 +348,7 @@ fn most_bodily(evidence: &[Evidence<'_>], template: &Template, places: &[Vec3]) 
             continue;
         }
         starts.push(place);
-        let at = cover(evidence, template, place);
+        let at = centre(problem, evidence, place);
         let expected = Expectation::new(evidence, at);
         if expected.extent_m.is_some() {
             return Some((at, expected));
@@ -367,13 +388,18 @@ fn descend(start: Vec3, step_m: f64, halvings: usize, mut cost: impl FnMut(Vec3)
     at
 }
 
-/// Shifts the body until as much of it as possible lies on what is lit in every view.
-fn cover(evidence: &[Evidence<'_>], template: &Template, at: Vec3) -> Vec3 {
-    let expected = Expectation::new(evidence, at);
-    descend(at, 0.2, 3, |p| expected.cost(p[2]) - lit(evidence, &template.facing(p, towards_radar(p))))
+/// The settings under which a start is what this frame's peaks alone say.
+fn unrefined(config: &FitConfig) -> FitConfig {
+    FitConfig { yaw: Yaw::Radar, height: Height::Echo, w_time: 0.0, surface_offset_m: 0.0, ..*config }
 }
 
-/// The parameters of `persons`, standing.
+/// Where the middle of a body is whose lit middle is `at`: the echoes come from the skin before it.
+fn behind_skin(config: &FitConfig, at: Vec3) -> Vec3 {
+    let behind = 1.0 + config.surface_offset_m / at[0].hypot(at[1]).max(0.5);
+    [at[0] * behind, at[1] * behind, at[2]]
+}
+
+/// The parameters of `persons`.
 fn assemble(problem: &Problem, config: &FitConfig, template: &Template, persons: &[Person]) -> Pppr {
     let joints = problem.skeleton.joints.len();
     let doppler_features = problem.radar.doppler_features;
@@ -381,9 +407,14 @@ fn assemble(problem: &Problem, config: &FitConfig, template: &Template, persons:
     for (k, person) in persons.iter().enumerate() {
         let velocity = person.velocity(config);
         let body = pose::posed(template, &problem.skeleton, person.posture);
-        let mut at = person.at;
-        if config.w_floor > 0.0 {
-            at[2] = body.middle_m() - config.radar_height_m;
+        let at = match person.track {
+            Some(track) if config.w_time > 0.0 => [track.at[0], track.at[1], person.at[2]],
+            _ => person.at,
+        };
+        let mut at = behind_skin(config, at);
+        if let (Some(stature), Some(radar_height_m)) = (person.stature(problem, config), problem.radar.height_m) {
+            let sits = person.posture == Posture::Sitting;
+            at[2] = if sits { body.middle_m() } else { 0.5 * stature.height_m } - radar_height_m;
         }
         for (joint, p) in body.facing(at, person.forward(config.yaw)).into_iter().enumerate() {
             params.set_vec3(Group::Position, k * joints + joint, p);

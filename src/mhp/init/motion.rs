@@ -10,7 +10,7 @@ use crate::mhp::Problem;
 use crate::radar::View;
 
 /// Slower than this, a person stands and the track's direction is its errors', m/s.
-const WALKING_MPS: f64 = 0.25;
+const WALKING_MPS: f64 = 0.5;
 /// Coefficients of variation over time: below the first of a pair a cell stands still, above the second it does not (a
 /// Rayleigh amplitude has 0.52). The second pair is for who only breathes.
 const VARIATIONS: [[f64; 2]; 2] = [[0.05, 0.25], [0.015, 0.075]];

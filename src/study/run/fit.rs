@@ -30,8 +30,6 @@ pub(super) fn start_key(config: &FitConfig) -> FitConfig {
         d_joint_m: plain.d_joint_m,
         learning_rate: plain.learning_rate,
         learning_rates: LearningRates::default(),
-        w_time: plain.w_time,
-        w_floor: plain.w_floor,
         ..key
     }
 }
@@ -51,7 +49,10 @@ pub(super) struct Loaded<'a> {
 /// A start, and how long it took to find.
 #[derive(Debug, Clone)]
 pub(super) struct Start {
+    /// Where the fit begins.
     pub(super) params: Pppr,
+    /// What the frame alone says, without the switches that refine a start.
+    pub(super) unrefined: Pppr,
     pub(super) init_ms: Option<f64>,
 }
 
@@ -80,12 +81,13 @@ impl<'a> Loaded<'a> {
     pub(super) fn cold(&self, config: &FitConfig) -> Result<Start, String> {
         let began = Instant::now();
         let found = begin(&self.problem, config).map_err(|error| self.told(&error))?.initialisation;
-        Ok(Start { params: found.params, init_ms: Some(milliseconds(began)) })
+        Ok(Start { params: found.params, unrefined: found.unrefined, init_ms: Some(milliseconds(began)) })
     }
 
     /// A start from what the frame before ended with, moved as its people moved.
     pub(super) fn warm(&self, before: &Pppr) -> Start {
-        Start { params: predict(&self.problem, before), init_ms: None }
+        let params = predict(&self.problem, before);
+        Start { unrefined: params.clone(), params, init_ms: None }
     }
 
     /// Fits from `start` and looks at it after each of `stops` steps, ascending. What fails from some step on fails there
@@ -123,7 +125,7 @@ impl<'a> Loaded<'a> {
         let t = report.terms;
         let reason = if ended { StopReason::Converged } else { StopReason::Iterations };
         let now = self.measured(params);
-        let before = self.measured(&start.params);
+        let before = self.measured(&start.unrefined);
         RunNumbers {
             iterations: report.iteration,
             converged: report.converged,
@@ -260,13 +262,17 @@ mod tests {
             FitConfig { theta_max_deg: 90.0, d_sep_m: 1.0, d_joint_m: 0.5, ..base },
             FitConfig { learning_rate: 0.1, learning_rates: rates, ..base },
             FitConfig { iterations: 3, stop_when_converged: true, ..base },
-            FitConfig { w_time: 3.0, ..base },
         ];
         for variant in variants {
             assert_eq!(start_key(&variant), start_key(&base));
             assert_eq!(start(&variant), same, "{variant:?}");
         }
-        for other in [FitConfig { tau_pct: 40.0, ..base }, FitConfig { surface_offset_m: 0.1, ..base }] {
+        let others = [
+            FitConfig { tau_pct: 40.0, ..base },
+            FitConfig { surface_offset_m: 0.1, ..base },
+            FitConfig { w_time: 3.0, ..base },
+        ];
+        for other in others {
             assert_ne!(start_key(&other), start_key(&base));
         }
         let several = |w_em| FitConfig { starts: 3, w_em, ..base };

@@ -20,10 +20,7 @@ pub const SWITCHES: &[Switch] = &[
     Switch { name: "heading from motion", take: |to, from| to.yaw = from.yaw },
     Switch { name: "several starts", take: |to, from| to.starts = from.starts },
     Switch { name: "temporal term", take: |to, from| to.w_time = from.w_time },
-    Switch {
-        name: "floor term",
-        take: |to, from| (to.w_floor, to.radar_height_m) = (from.w_floor, from.radar_height_m),
-    },
+    Switch { name: "height from the floor", take: |to, from| to.height = from.height },
     Switch { name: "people", take: |to, from| to.people = from.people },
     Switch { name: "softness", take: |to, from| to.softness = from.softness },
     Switch { name: "threshold", take: |to, from| to.tau_pct = from.tau_pct },
@@ -61,10 +58,7 @@ fn same_spoiling(from: &FitConfig, to: &FitConfig) -> crate::config::InitConfig 
 type Change = fn(&mut FitConfig);
 
 /// What no preset has, but could help: a name and what it sets on top of `recommended`.
-const EXTRAS: &[(&str, Change)] = &[
-    ("limbs that turn", |config| config.learning_rates.bone = Some(1e-3)),
-    ("floor term", |config| config.w_floor = 2.0),
-];
+const EXTRAS: &[(&str, Change)] = &[("limbs that turn", |config| config.learning_rates.bone = Some(1e-3))];
 
 /// `paper`, `paper` with each switch that `recommended` sets, `recommended`, `recommended` without each of them, and with
 /// each of the extras that it lacks. `base` gives what belongs to the study: the seed.
