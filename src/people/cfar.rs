@@ -1,11 +1,12 @@
 //! Detection: constant false alarm rate against the cells around, in the manner of ETCM-CFAR (paper 4.4, appendix B).
 //!
-//! A cell is a detection where it exceeds mean + β·standard deviation of its reference cells: a box
-//! around it, without the guard box in its middle. Both are in metres, so that they fit a body whatever the grid. The
-//! statistics are those of the logarithm: amplitudes of speckle have a heavy tail, and one neighbour at 30 dB would lift
-//! mean and deviation of the amplitudes above a second body beside it.
+//! A cell is a detection where it exceeds mean + β·standard deviation of its reference cells: a box around it, without the
+//! guard box in its middle. Both are in metres, so that they fit a body whatever the grid. The statistics are those of the
+//! logarithm: amplitudes of speckle have a heavy tail, and one neighbour at 30 dB would lift mean and deviation of the
+//! amplitudes above a second body beside it.
 //!
-//! Summed-area tables give every box in four look-ups; only local maxima are asked at all.
+//! Cells are asked on a grid of 0.1 m, so that a cluster has as many points as a body has area. Summed-area tables give
+//! every box in four look-ups.
 
 use super::change::{Cells, amplitudes_of, change, logarithms, smooth};
 use super::sight::Sight;
@@ -45,7 +46,7 @@ impl Default for CfarOptions {
             guard_m: [0.4, 0.5],
             reference_m: [4.0, 5.0],
             smooth_m: 0.04,
-            most: 96,
+            most: 200,
             limb_m: 0.7,
             limb_ln: 0.9,
             sidelobe_m: 0.15,
@@ -173,9 +174,8 @@ impl Planes {
                 let (mean, deviation) = self.reference(row, column, tables);
                 let excess = level - (mean + options.beta * deviation);
                 if excess > 0.0 {
-                    let cell = self.starts.get(k).copied().unwrap_or(0)
-                        + row * self.row_stride
-                        + column * self.column_stride;
+                    let cell =
+                        self.starts.get(k).copied().unwrap_or(0) + row * self.row_stride + column * self.column_stride;
                     found.push(Detection { cell, bin: [row, column], contrast: level - mean, excess, level: 0.0 });
                 }
             }

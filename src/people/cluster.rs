@@ -22,11 +22,15 @@ pub struct ClusterOptions {
     pub wider: f64,
     /// Clusters whose middles are nearer than this are one body, m.
     pub one_body_m: f64,
+    /// So are clusters nearer than this, m,
+    pub limb_m: f64,
+    /// one of which has less than this share of the other's points: an arm or a leg that moves by itself.
+    pub limb_share: f64,
 }
 
 impl Default for ClusterOptions {
     fn default() -> Self {
-        Self { epsilon_m: 0.3, points: 3, apart_m: 0.5, wider: 2.5, one_body_m: 0.4 }
+        Self { epsilon_m: 0.3, points: 3, apart_m: 0.5, wider: 2.5, one_body_m: 0.4, limb_m: 0.75, limb_share: 0.35 }
     }
 }
 
@@ -126,10 +130,15 @@ fn mean(points: &[Point]) -> Vec3 {
 fn joined(mut clusters: Vec<Vec<Point>>, options: &ClusterOptions) -> Vec<Vec<Point>> {
     loop {
         let middles: Vec<Vec3> = clusters.iter().map(|c| mean(c)).collect();
+        let reach = |i: usize, j: usize| {
+            let (few, many) = (clusters[i].len().min(clusters[j].len()), clusters[i].len().max(clusters[j].len()));
+            let limb = (few as f64) < options.limb_share * many as f64;
+            if limb { options.limb_m.max(options.one_body_m) } else { options.one_body_m }
+        };
         let pairs = (0..middles.len()).flat_map(|i| (i + 1..middles.len()).map(move |j| (i, j)));
         let nearest = pairs
             .map(|(i, j)| (flat_distance(middles[i], middles[j]), i, j))
-            .filter(|(apart, _, _)| *apart < options.one_body_m)
+            .filter(|&(apart, i, j)| apart < reach(i, j))
             .min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, i, j)) = nearest else { return clusters };
         let other = clusters.remove(j);
