@@ -126,7 +126,7 @@ fn mean(points: &[Point]) -> Vec3 {
     std::array::from_fn(|k| points.iter().map(|p| weight(p) * p.position[k]).sum::<f64>() / all)
 }
 
-/// Joins the two nearest clusters as long as they are nearer than two bodies can be.
+/// Joins the two nearest clusters as long as they are nearer than two bodies can be, or one is a limb of the other.
 fn joined(mut clusters: Vec<Vec<Point>>, options: &ClusterOptions) -> Vec<Vec<Point>> {
     loop {
         let middles: Vec<Vec3> = clusters.iter().map(|c| mean(c)).collect();
@@ -198,5 +198,28 @@ impl Cluster {
             detections as f64,
         ]
         .map(|value| value as f32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `n` points within some centimetres of a place on the floor.
+    fn body(x: f64, y: f64, n: u32) -> Vec<Point> {
+        let point = |k: u32| {
+            let position = [x, y + 0.02 * f64::from(k % 5), 0.0];
+            Point { position, heights_m: None, contrast: 2.0, level: 0.0, range_m: x.hypot(y), age: 0 }
+        };
+        (0..n).map(point).collect()
+    }
+
+    #[test]
+    fn a_limb_belongs_to_its_body_and_a_second_body_does_not() {
+        let options = ClusterOptions::default();
+        let groups = |second: Vec<Point>| refined(vec![body(3.0, 0.0, 30), second], &options).len();
+        assert_eq!(groups(body(2.45, 0.0, 6)), 1, "an arm in front of the body");
+        assert_eq!(groups(body(2.4, 0.0, 25)), 2, "somebody as large in front of it");
+        assert_eq!(groups(body(2.1, 0.0, 6)), 2, "too far for an arm");
     }
 }
