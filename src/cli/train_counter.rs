@@ -27,11 +27,11 @@ pub struct TrainCounterArgs {
     /// Folder for `counter.json` and `counter-alone.json`.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Sequences of ten frames to learn from, for each number of people.
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_one)]
+    /// Sequences of five frames to learn from, for each number of people.
+    #[arg(long, value_name = "N", default_value_t = 240, value_parser = at_least_one)]
     sequences: usize,
     /// Sequences to test on, for each number of people.
-    #[arg(long, value_name = "N", default_value_t = 40, value_parser = at_least_one)]
+    #[arg(long, value_name = "N", default_value_t = 120, value_parser = at_least_one)]
     test_sequences: usize,
     /// Seed of what is learnt from, and of the training itself.
     #[arg(long, default_value_t = 41)]

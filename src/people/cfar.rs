@@ -1,11 +1,12 @@
 //! Detection: constant false alarm rate against the cells around, in the manner of ETCM-CFAR (paper 4.4, appendix B).
 //!
-//! A cell is a detection where it is a local maximum and exceeds mean + β·standard deviation of its reference cells: a box
-//! around it, without the guard box in its middle. Both are in metres, so that they fit a body whatever the grid. The
-//! statistics are those of the logarithm: amplitudes of speckle have a heavy tail, and one neighbour at 30 dB would lift
-//! mean and deviation of the amplitudes above a second body beside it.
+//! A cell is a detection where it exceeds mean + β·standard deviation of its reference cells: a box around it, without the
+//! guard box in its middle. Both are in metres, so that they fit a body whatever the grid. The statistics are those of the
+//! logarithm: amplitudes of speckle have a heavy tail, and one neighbour at 30 dB would lift mean and deviation of the
+//! amplitudes above a second body beside it.
 //!
-//! Summed-area tables give every box in four look-ups; only local maxima are asked at all.
+//! Cells are asked on a grid of 0.1 m, so that a cluster has as many points as a body has area. Summed-area tables give
+//! every box in four look-ups.
 
 use super::change::{Cells, amplitudes_of, change, logarithms, smooth};
 use super::sight::Sight;
@@ -34,8 +35,8 @@ pub struct CfarOptions {
     pub sidelobe_ln: f32,
     /// Nothing nearer is a detection, m: leakage and sidelobes.
     pub nearest_m: f64,
-    /// Every cell above its threshold is a detection, not the local maxima alone: for point clouds.
-    pub every_cell: bool,
+    /// Cells are asked this far apart, m; 0: every cell.
+    pub spacing_m: f64,
 }
 
 impl Default for CfarOptions {
@@ -45,13 +46,13 @@ impl Default for CfarOptions {
             guard_m: [0.4, 0.5],
             reference_m: [4.0, 5.0],
             smooth_m: 0.04,
-            most: 96,
+            most: 200,
             limb_m: 0.7,
             limb_ln: 0.9,
             sidelobe_m: 0.15,
             sidelobe_ln: 2.3,
             nearest_m: 0.5,
-            every_cell: false,
+            spacing_m: 0.1,
         }
     }
 }
@@ -93,6 +94,8 @@ pub(super) struct Planes {
     across_half: Vec<[usize; 2]>,
     /// Half widths of the box that is averaged, in bins (depth, across).
     smooth_half: [usize; 2],
+    /// From one cell that is asked to the next, bins (depth, across).
+    step: [usize; 2],
     first_row: usize,
     last_row: usize,
 }
@@ -129,6 +132,10 @@ impl Planes {
                 ((options.smooth_m / sight.depth_step_m()).round() as usize).min(8),
                 ((options.smooth_m / sight.across_step_m(rows / 2)).round() as usize).min(8),
             ],
+            step: [
+                bins(options.spacing_m, sight.depth_step_m(), rows),
+                bins(options.spacing_m, sight.across_step_m(rows / 2), columns),
+            ],
             first_row,
             last_row,
         }
@@ -161,22 +168,14 @@ impl Planes {
     }
 
     fn detect_plane(&self, k: usize, options: &CfarOptions, tables: &Tables, found: &mut Vec<Detection>) {
-        for row in self.first_row.max(1)..self.last_row.min(self.rows.saturating_sub(1)) {
-            let Some([above, line, below]) = tables.lines(row, self.columns) else { return };
-            for column in 1..self.columns.saturating_sub(1) {
-                let level = line[column];
-                let near = [column - 1, column, column + 1];
-                let highest = level > line[column - 1]
-                    && level >= line[column + 1]
-                    && near.iter().all(|&c| level >= above[c] && level > below[c]);
-                if !highest && !options.every_cell {
-                    continue;
-                }
-                let offset = row * self.row_stride + column * self.column_stride;
+        for row in (self.first_row..self.last_row).step_by(self.step[0]) {
+            let Some(line) = tables.plane.get(row * self.columns..(row + 1) * self.columns) else { return };
+            for (column, &level) in line.iter().enumerate().step_by(self.step[1]) {
                 let (mean, deviation) = self.reference(row, column, tables);
                 let excess = level - (mean + options.beta * deviation);
                 if excess > 0.0 {
-                    let cell = self.starts.get(k).copied().unwrap_or(0) + offset;
+                    let cell =
+                        self.starts.get(k).copied().unwrap_or(0) + row * self.row_stride + column * self.column_stride;
                     found.push(Detection { cell, bin: [row, column], contrast: level - mean, excess, level: 0.0 });
                 }
             }
@@ -243,12 +242,6 @@ impl Tables {
                 below2[k + 1] = above2[k + 1] + run2;
             }
         }
-    }
-
-    /// The row before, the row, and the row after.
-    fn lines(&self, row: usize, columns: usize) -> Option<[&[f32]; 3]> {
-        let line = |row: usize| self.plane.get(row * columns..(row + 1) * columns);
-        Some([line(row.checked_sub(1)?)?, line(row)?, line(row + 1)?])
     }
 
     /// Cells, sum and sum of squares of a box.

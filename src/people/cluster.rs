@@ -22,11 +22,15 @@ pub struct ClusterOptions {
     pub wider: f64,
     /// Clusters whose middles are nearer than this are one body, m.
     pub one_body_m: f64,
+    /// So are clusters nearer than this, m,
+    pub limb_m: f64,
+    /// one of which has less than this share of the other's points: an arm or a leg that moves by itself.
+    pub limb_share: f64,
 }
 
 impl Default for ClusterOptions {
     fn default() -> Self {
-        Self { epsilon_m: 0.3, points: 3, apart_m: 0.5, wider: 2.5, one_body_m: 0.4 }
+        Self { epsilon_m: 0.3, points: 3, apart_m: 0.5, wider: 2.5, one_body_m: 0.4, limb_m: 0.75, limb_share: 0.35 }
     }
 }
 
@@ -122,14 +126,19 @@ fn mean(points: &[Point]) -> Vec3 {
     std::array::from_fn(|k| points.iter().map(|p| weight(p) * p.position[k]).sum::<f64>() / all)
 }
 
-/// Joins the two nearest clusters as long as they are nearer than two bodies can be.
+/// Joins the two nearest clusters as long as they are nearer than two bodies can be, or one is a limb of the other.
 fn joined(mut clusters: Vec<Vec<Point>>, options: &ClusterOptions) -> Vec<Vec<Point>> {
     loop {
         let middles: Vec<Vec3> = clusters.iter().map(|c| mean(c)).collect();
+        let reach = |i: usize, j: usize| {
+            let (few, many) = (clusters[i].len().min(clusters[j].len()), clusters[i].len().max(clusters[j].len()));
+            let limb = (few as f64) < options.limb_share * many as f64;
+            if limb { options.limb_m.max(options.one_body_m) } else { options.one_body_m }
+        };
         let pairs = (0..middles.len()).flat_map(|i| (i + 1..middles.len()).map(move |j| (i, j)));
         let nearest = pairs
             .map(|(i, j)| (flat_distance(middles[i], middles[j]), i, j))
-            .filter(|(apart, _, _)| *apart < options.one_body_m)
+            .filter(|&(apart, i, j)| apart < reach(i, j))
             .min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, i, j)) = nearest else { return clusters };
         let other = clusters.remove(j);
@@ -189,5 +198,28 @@ impl Cluster {
             detections as f64,
         ]
         .map(|value| value as f32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `n` points within some centimetres of a place on the floor.
+    fn body(x: f64, y: f64, n: u32) -> Vec<Point> {
+        let point = |k: u32| {
+            let position = [x, y + 0.02 * f64::from(k % 5), 0.0];
+            Point { position, heights_m: None, contrast: 2.0, level: 0.0, range_m: x.hypot(y), age: 0 }
+        };
+        (0..n).map(point).collect()
+    }
+
+    #[test]
+    fn a_limb_belongs_to_its_body_and_a_second_body_does_not() {
+        let options = ClusterOptions::default();
+        let groups = |second: Vec<Point>| refined(vec![body(3.0, 0.0, 30), second], &options).len();
+        assert_eq!(groups(body(2.45, 0.0, 6)), 1, "an arm in front of the body");
+        assert_eq!(groups(body(2.4, 0.0, 25)), 2, "somebody as large in front of it");
+        assert_eq!(groups(body(2.1, 0.0, 6)), 2, "too far for an arm");
     }
 }

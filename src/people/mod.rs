@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! maps ─ change.rs ─ what changed since the frames before      (a room stands still, people do not)
-//!      ─ cfar.rs ─── local maxima above mean + 3σ around them   (per view)
+//!      ─ cfar.rs ─── cells of a grid above mean + 3σ around them (per view)
 //!      ─ scan.rs ─── in metres, heights from the other view
 //!      ─ cluster.rs  DBSCAN over the detections of five frames, twelve features a cluster
 //!      ─ network.rs  12 → 64 → 32 → 5: how many people a cluster is

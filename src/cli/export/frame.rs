@@ -59,7 +59,7 @@ pub(super) fn export_frame(
 /// The detector's cells in the map of each view; none where a view tells no place.
 fn detections(problem: &Problem, maps: &[Vec<f64>]) -> Vec<Vec<usize>> {
     let of_view = problem.views.iter().zip(maps);
-    let options = CfarOptions { every_cell: true, most: MOST_POINTS, ..CfarOptions::default() };
+    let options = CfarOptions { spacing_m: 0.0, most: MOST_POINTS, ..CfarOptions::default() };
     let found = of_view.map(|(view, map)| detect(view, map, &options).unwrap_or_default());
     found.map(|found| found.iter().map(|detection| detection.cell).collect()).collect()
 }
