@@ -68,9 +68,21 @@ pub struct Args {
     /// More (or less) thermal noise than the preset has, dB.
     #[arg(long, value_name = "DB", default_value_t = 0.0, allow_negative_numbers = true)]
     pub noise_db: f64,
-    /// Height of the radar above the floor, m; the manifest tells it.
-    #[arg(long, value_name = "M", default_value_t = 1.0)]
-    pub radar_height: f64,
+    /// Height of the radar above the floor, m, which the manifest tells; `any` draws one for each sequence, untold.
+    #[arg(long, value_name = "M", default_value = "1", value_parser = radar_height)]
+    pub radar_height: RadarHeight,
+}
+
+/// Metres; `None` is `any`.
+#[derive(Debug, Clone, Copy)]
+pub struct RadarHeight(pub Option<f64>);
+
+fn radar_height(text: &str) -> Result<RadarHeight, String> {
+    if text == "any" {
+        return Ok(RadarHeight(None));
+    }
+    let height_m = text.parse().map_err(|_| format!("`{text}` is neither a number of metres nor `any`"))?;
+    Ok(RadarHeight(Some(height_m)))
 }
 
 /// A layout as typed.
@@ -186,7 +198,7 @@ impl Args {
             still_share: self.still_share,
             multipath: self.multipath,
             noise_db: self.noise_db,
-            radar_height_m: Some(self.radar_height),
+            radar_height_m: self.radar_height.0,
         };
         options.check().context("simulate")?;
         Ok(options)
@@ -218,8 +230,12 @@ impl Args {
         if self.noise_db != 0.0 {
             let _ = write!(text, " --noise-db {}", self.noise_db);
         }
-        if (self.radar_height - 1.0).abs() > 0.0 {
-            let _ = write!(text, " --radar-height {}", self.radar_height);
+        match self.radar_height.0 {
+            None => text.push_str(" --radar-height any"),
+            Some(1.0) => {}
+            Some(height_m) => {
+                let _ = write!(text, " --radar-height {height_m}");
+            }
         }
         if let Some(name) = &self.name {
             let _ = write!(text, " --name {name}");
