@@ -119,9 +119,9 @@ impl<'a> Evidence<'a> {
         for (cell, &x) in ln.iter().enumerate() {
             members[ring(cell)].push(x);
         }
-        let overall = percentile(&ln, 50.0);
+        let overall = if members.iter().any(|m| m.len() < SMALLEST_RING) { median(&mut ln.clone()) } else { 0.0 };
         let background: Vec<f64> =
-            members.iter().map(|m| if m.len() < SMALLEST_RING { overall } else { percentile(m, 50.0) }).collect();
+            members.iter_mut().map(|m| if m.len() < SMALLEST_RING { overall } else { median(m) }).collect();
         let far_enough = |cell: usize| ranges.as_ref().is_none_or(|ranges| ranges[cell] > NEAREST_M);
         let above = |cell: usize| if far_enough(cell) { (ln[cell] - background[ring(cell)]).max(0.0) } else { 0.0 };
         self.salience = (0..ln.len()).map(above).collect();
@@ -331,6 +331,15 @@ pub(super) fn unrest(maps: &[&[f64]], [still, restless]: [f64; 2]) -> Option<Vec
         ((variation - still) / (restless - still)).clamp(0.0, 1.0)
     };
     Some((0..cells).map(of_cell).collect())
+}
+
+/// The middle value, the upper one of two; the values are reordered. NaN where there are none.
+fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return f64::NAN;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 fn unravel(mut flat: usize, shape: &[usize]) -> Vec<usize> {

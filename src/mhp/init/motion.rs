@@ -49,6 +49,9 @@ pub(super) fn unrest(problem: &Problem) -> Vec<Option<Vec<f64>>> {
         let peaks = Evidence::new(k, view, problem.map(k), unrest.as_deref()).peaks();
         peaks.iter().any(|peak| peak.salience > NOISE)
     };
+    if problem.neighbours().len() < 2 {
+        return vec![None; problem.views.len()];
+    }
     // Every view must show something that moves, and noise always does: a place is where views agree.
     let found = VARIATIONS.iter().find_map(|&limits| {
         let found: Vec<Option<Vec<f64>>> = (0..problem.views.len()).map(|k| of_view(k, limits)).collect();
