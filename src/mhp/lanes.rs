@@ -17,6 +17,12 @@ pub(super) struct Lanes<S: Simd> {
     pub(super) value: S::f32s,
 }
 
+/// `x` in every lane.
+#[inline(always)]
+pub(super) fn splat<S: Simd>(simd: S, x: f32) -> Lanes<S> {
+    Lanes::new(simd, simd.splat_f32s(x))
+}
+
 impl<S: Simd> Clone for Lanes<S> {
     #[inline(always)]
     fn clone(&self) -> Self {
@@ -30,11 +36,6 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub(super) fn new(simd: S, value: S::f32s) -> Self {
         Self { simd, value }
-    }
-
-    #[inline(always)]
-    pub(super) fn splat(simd: S, x: f32) -> Self {
-        Self::new(simd, simd.splat_f32s(x))
     }
 
     /// self · b + c
@@ -83,11 +84,13 @@ impl<S: Simd> Lanes<S> {
     /// 2ˣ for x in −126 ..= 127.
     #[inline(always)]
     pub(super) fn exp2(self) -> Self {
-        let (simd, at) = (self.simd, |x| Self::splat(self.simd, x));
-        let rounded = self + at(ROUND);
-        let f = self - (rounded - at(ROUND));
-        let [c0, c1, c2, c3, c4, c5] = EXP2.map(at);
-        let power = f.mul_add(c5, c4).mul_add(f, c3).mul_add(f, c2).mul_add(f, c1).mul_add(f, c0);
+        let simd = self.simd;
+        let rounded = self + splat(simd, ROUND);
+        let f = self - (rounded - splat(simd, ROUND));
+        let mut power = splat(simd, EXP2[5]);
+        for k in (0..5).rev() {
+            power = power.mul_add(f, splat(simd, EXP2[k]));
+        }
         let bits = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(rounded.value), simd.splat_u32s(23));
         power * Self::new(simd, simd.transmute_f32s_u32s(bits))
     }
@@ -95,19 +98,19 @@ impl<S: Simd> Lanes<S> {
     /// log₂ x of a positive normal x, absolute error 1e-7 or a unit in the last place.
     #[inline(always)]
     pub(super) fn log2(self) -> Self {
-        let (simd, at) = (self.simd, |x| Self::splat(self.simd, x));
+        let simd = self.simd;
         let bits = simd.transmute_u32s_f32s(self.value);
         // The exponent as the low bits of 2²³.
         let shifted = simd.wrapping_dyn_shr_u32s(bits, simd.splat_u32s(23));
         let whole = Self::new(simd, simd.transmute_f32s_u32s(simd.or_u32s(shifted, simd.splat_u32s(0x4B00_0000))));
         let fraction = simd.or_u32s(simd.and_u32s(bits, simd.splat_u32s(0x007F_FFFF)), simd.splat_u32s(0x3F80_0000));
         let m = Self::new(simd, simd.transmute_f32s_u32s(fraction));
-        let root = at(std::f32::consts::SQRT_2);
+        let root = splat(simd, std::f32::consts::SQRT_2);
         let s = (m - root) / (m + root);
         let s2 = s * s;
         // 2/ln 2 · (s + s³/3 + s⁵/5 + s⁷/7)
-        let series = s2.mul_add(at(0.412_198_58), at(0.577_078)).mul_add(s2, at(0.961_796_7)).mul_add(s2, at(2.885_390_1));
-        s.mul_add(series, (whole - at(8_388_735.0)) + at(0.5))
+        let series = s2.mul_add(splat(simd, 0.412_198_58), splat(simd, 0.577_078)).mul_add(s2, splat(simd, 0.961_796_7)).mul_add(s2, splat(simd, 2.885_390_1));
+        s.mul_add(series, (whole - splat(simd, 8_388_735.0)) + splat(simd, 0.5))
     }
 }
 

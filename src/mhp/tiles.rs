@@ -13,7 +13,7 @@
 
 use super::adjoint::Moments;
 use super::em::{SOFT_FLOOR, ViewAnswer, share};
-use super::lanes::Lanes;
+use super::lanes::{Lanes, splat};
 use super::percentile::{between, place};
 use super::simulate::EPSILON;
 use super::splat::Splat;
@@ -440,13 +440,12 @@ impl<S: Simd> Line<S> {
         let [middle_y, middle_x] = grid.middle(row, 0);
         let d0 = (grid.lo[0] + slice) as f64 - joint.bin[0];
         let [top, shift, across] = joint.row(d0, middle_y - joint.bin[1]);
-        let at = |x: f64| Lanes::splat(simd, x as f32);
         Self {
-            top: at(top + f64::from(joint.across.middle(row))),
-            half: at(joint.half[2]),
-            first: at(middle_x - joint.bin[2] + shift),
-            across: at(across),
-            skew: at(joint.skew[2]),
+            top: splat(simd, (top + f64::from(joint.across.middle(row))) as f32),
+            half: splat(simd, joint.half[2] as f32),
+            first: splat(simd, (middle_x - joint.bin[2] + shift) as f32),
+            across: splat(simd, across as f32),
+            skew: splat(simd, joint.skew[2] as f32),
         }
     }
 
@@ -455,8 +454,8 @@ impl<S: Simd> Line<S> {
     fn at(&self, simd: S, bins: Lanes<S>) -> [Lanes<S>; 3] {
         let x = self.first + bins;
         let bent = self.half * x;
-        let along = bent * Lanes::splat(simd, -2.0);
-        let exponent = along.mul_add(x * Lanes::splat(simd, 0.5), self.top);
+        let along = bent * splat(simd, -2.0);
+        let exponent = along.mul_add(x * splat(simd, 0.5), self.top);
         [exponent, along, along.mul_add(self.skew, self.across)]
     }
 }
@@ -486,7 +485,7 @@ impl Tiles {
                     let bins = group_bins(group);
                     for joint in &self.joints {
                         let line = Line::new(simd, joint, grid, [slice, row]);
-                        let slack = Lanes::splat(simd, joint.curvature + joint.across.most(row));
+                        let slack = splat(simd, joint.curvature + joint.across.most(row));
                         for part in 0..Self::parts::<S>() {
                             let [mut exponent, along, across] = line.at(simd, lanes(simd, &bins, part));
                             let mut slack = slack;
@@ -495,14 +494,12 @@ impl Tiles {
                                 slack += lanes(simd, &most, part);
                             }
                             let best = lanes(simd, &crest.exponent, part);
-                            let mut keep = |field: &mut [f32; CELLS], new: Lanes<S>| {
+                            let news = [along, across, slack, exponent];
+                            let Crest { slope: [a, b], slack, exponent: c } = &mut crest;
+                            for (field, new) in [a, b, slack, c].into_iter().zip(news) {
                                 let old = lanes(simd, field, part);
                                 store(field, part, exponent.choose(best, new, old));
-                            };
-                            keep(&mut crest.slope[0], along);
-                            keep(&mut crest.slope[1], across);
-                            keep(&mut crest.slack, slack);
-                            keep(&mut crest.exponent, exponent);
+                            }
                         }
                     }
                     let here = grid.columns.saturating_sub(group * CELLS).min(CELLS);
@@ -530,9 +527,8 @@ impl Tiles {
             pairs.clear();
         }
         lit.clear();
-        let at = |x: f32| Lanes::splat(simd, x);
-        let (reach, cut) = (at(REACH), at(scale.cut + scale.log2 as f32));
-        let relative = at((RELATIVE * LOG2_E) as f32);
+        let (reach, cut) = (splat(simd, REACH), splat(simd, scale.cut + scale.log2 as f32));
+        let relative = splat(simd, (RELATIVE * LOG2_E) as f32);
         let groups = grid.columns.div_ceil(CELLS);
         for (index, crest) in crests.iter().enumerate() {
             let (group, line) = (index % groups, index / groups);
@@ -546,13 +542,14 @@ impl Tiles {
                 let mut any = false;
                 for part in 0..Self::parts::<S>() {
                     let [mut exponent, along, across] = line.at(simd, lanes(simd, &bins, part));
-                    let mut slack = at(joint.across.most(row));
+                    let mut slack = splat(simd, joint.across.most(row));
                     if let Some([middle, most]) = joint.along.group(group) {
                         exponent += lanes(simd, &middle, part);
                         slack += lanes(simd, &most, part);
                     }
                     let highest = (along.abs() + across.abs()).mul_add(reach, exponent + slack);
-                    let [best_along, best_across] = [0, 1].map(|k| lanes(simd, &crest.slope[k], part));
+                    let best_along = lanes(simd, &crest.slope[0], part);
+                    let best_across = lanes(simd, &crest.slope[1], part);
                     let apart = (along - best_along).abs() + (across - best_across).abs();
                     let nearest = exponent - lanes(simd, &crest.exponent, part)
                         + slack
@@ -614,24 +611,23 @@ impl Tiles {
         scale: &Scale,
     ) -> Threshold {
         let grid = question.tiling;
-        let at = |x: f32| Lanes::splat(simd, x);
         let window = self.last.map(|last| [0.8, 1.25].map(|k| (k * (last - scale.log2).exp2()) as f32));
         let [low, high] = window.unwrap_or([f32::MAX, f32::MAX]);
         self.ranked.clear();
-        let mut above = at(0.0);
+        let mut above = splat(simd, 0.0);
         for (slot, &tile) in self.lit.iter().enumerate() {
             let cells = slot * CELLS..(slot + 1) * CELLS;
             let target = &grid.target[tile as usize * CELLS..(tile as usize + 1) * CELLS];
             let (re, im, h) = (&self.re[cells.clone()], &self.im[cells.clone()], &mut self.h[cells]);
-            let mut any = at(0.0);
+            let mut any = splat(simd, 0.0);
             for part in 0..Self::parts::<S>() {
                 let (re, im) = (lanes(simd, re, part), lanes(simd, im, part));
                 let power = if COHERENT { re.mul_add(re, im * im) } else { re };
-                let value = (power + at(scale.epsilon_sq)).sqrt();
+                let value = (power + splat(simd, scale.epsilon_sq)).sqrt();
                 // What lies beyond the box ranks below all.
-                let value = lanes(simd, target, part).choose(at(-0.5), value, at(-1.0));
-                above += value.choose(at(high), at(1.0), at(0.0));
-                any += value.choose(at(low), at(1.0), at(0.0));
+                let value = lanes(simd, target, part).choose(splat(simd, -0.5), value, splat(simd, -1.0));
+                above += value.choose(splat(simd, high), splat(simd, 1.0), splat(simd, 0.0));
+                any += value.choose(splat(simd, low), splat(simd, 1.0), splat(simd, 0.0));
                 store(h, part, value);
             }
             if any.sum() > 0.0 {
@@ -672,11 +668,10 @@ impl Tiles {
         threshold: &Threshold,
     ) -> Mask {
         let grid = question.tiling;
-        let at = |x: f32| Lanes::splat(simd, x);
-        let (zero, one) = (at(0.0), at(1.0));
+        let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
         let soft_floor = scale.soft_floor;
         let centre = (threshold.value + f64::from(soft_floor)).log2();
-        let softness = at((1.0 / question.softness) as f32);
+        let softness = splat(simd, (1.0 / question.softness) as f32);
         self.sloped.clear();
         let mut mask = Mask::default();
         let (mut common, mut soft) = (0.0, 0.0);
@@ -689,10 +684,10 @@ impl Tiles {
             let (mut tile_common, mut tile_soft) = (zero, zero);
             for part in 0..Self::parts::<S>() {
                 let (target, h) = (lanes(simd, target, part), lanes(simd, h, part));
-                let inside = target.choose(at(-0.5), one, zero);
-                let (b, h) = (target.max(zero), h.max(at(f32::MIN_POSITIVE.sqrt())));
-                let raised = h + at(soft_floor);
-                let odds = ((raised.log2() - at(centre as f32)) * softness).min(at(60.0)).max(at(-60.0)).exp2();
+                let inside = target.choose(splat(simd, -0.5), one, zero);
+                let (b, h) = (target.max(zero), h.max(splat(simd, f32::MIN_POSITIVE.sqrt())));
+                let raised = h + splat(simd, soft_floor);
+                let odds = ((raised.log2() - splat(simd, centre as f32)) * softness).min(splat(simd, 60.0)).max(splat(simd, -60.0)).exp2();
                 let share = one / (one + odds);
                 let m = odds * share * inside;
                 tile_common += m * b;
@@ -700,7 +695,7 @@ impl Tiles {
                 let slope = m * share;
                 steepest = steepest.max(slope);
                 store(out, part, slope / (raised * h));
-                let sim = h.choose(at(threshold.lower), inside, zero);
+                let sim = h.choose(splat(simd, threshold.lower), inside, zero);
                 both += sim * b;
                 hard += sim;
                 marked += b;
@@ -711,15 +706,15 @@ impl Tiles {
             self.sloped.push(steepest.largest() > NO_SLOPE);
         }
         // Cells that were not summed are at the floor, and alike.
-        let count = |x: Lanes<S>| x.sum() as usize;
-        let idle_marked = (grid.marked - count(marked).min(grid.marked)) as f64;
-        let idle = (grid.cells - count(lit_cells).min(grid.cells)) as f64;
+        let [both, hard, marked, lit_cells] = [both.sum(), hard.sum(), marked.sum(), lit_cells.sum()];
+        let idle_marked = grid.marked as f64 - f64::from(marked);
+        let idle = grid.cells as f64 - f64::from(lit_cells);
         let floor = f64::from(scale.epsilon_sq.sqrt()) + f64::from(soft_floor);
         let idle_soft = 1.0 / (1.0 + ((centre - floor.log2()) / question.softness).exp2());
         mask.common = common + idle_soft * idle_marked;
         mask.union = soft + idle_soft * idle + grid.marked as f64 - mask.common;
-        mask.both = count(both);
-        mask.either = count(hard) + grid.marked - mask.both;
+        mask.both = both as usize;
+        mask.either = hard as usize + grid.marked - mask.both;
         mask
     }
 
@@ -733,14 +728,14 @@ impl Tiles {
         factor: f64,
     ) {
         let grid = question.tiling;
-        let at = |x: f64| Lanes::splat(simd, x as f32);
-        let (inside, outside) = (at(-factor / mask.union), at(factor * mask.common / (mask.union * mask.union)));
+        let inside = splat(simd, (-factor / mask.union) as f32);
+        let outside = splat(simd, (factor * mask.common / (mask.union * mask.union)) as f32);
         for (slot, &tile) in self.lit.iter().enumerate().filter(|(slot, _)| self.sloped[*slot]) {
             let cells = slot * CELLS..(slot + 1) * CELLS;
             let target = &grid.target[tile as usize * CELLS..(tile as usize + 1) * CELLS];
             let (re, im, soft) = (&mut self.re[cells.clone()], &mut self.im[cells.clone()], &self.soft[cells]);
             for part in 0..Self::parts::<S>() {
-                let by_m = lanes(simd, target, part).choose(at(0.5), inside, outside);
+                let by_m = lanes(simd, target, part).choose(splat(simd, 0.5), inside, outside);
                 let weight = lanes(simd, soft, part) * by_m;
                 if COHERENT {
                     store(re, part, lanes(simd, re, part) * weight);
@@ -777,7 +772,7 @@ impl Tiles {
         pairs: &[Pair],
         moments: &mut Moments,
     ) -> Sums {
-        let zero = Lanes::splat(simd, 0.0);
+        let zero = splat(simd, 0.0);
         let mut total = Sums::default();
         for part in 0..Self::parts::<S>() {
             let (x, y) = (lanes(simd, &ALONG, part), lanes(simd, &ACROSS, part));
@@ -786,8 +781,7 @@ impl Tiles {
                 let cells = pair.slot as usize * CELLS..(pair.slot as usize + 1) * CELLS;
                 let [a, z_re, z_im] = pair.at::<S, COHERENT>(simd, joint, part);
                 let re = lanes(simd, &self.re[cells.clone()], part);
-                let [dy, dx] = pair.delta.map(|d| Lanes::splat(simd, d));
-                let (dx, dy) = (dx + x, dy + y);
+                let (dx, dy) = (splat(simd, pair.delta[1]) + x, splat(simd, pair.delta[0]) + y);
                 let wants = if COHERENT {
                     let im = lanes(simd, &self.im[cells], part);
                     let (a_re, a_im) = (a * re, a * im);
@@ -810,9 +804,8 @@ impl Tiles {
                     by_bin(simd, grid, pair, part, wants, moments);
                 }
             }
-            let sums = [r, rx, ry, rxx, rxy, ryy, q, qx, qy].map(|x| f64::from(x.sum()));
-            for (total, sum) in total.0.iter_mut().zip(sums) {
-                *total += sum;
+            for (total, sums) in total.0.iter_mut().zip([r, rx, ry, rxx, rxy, ryy, q, qx, qy]) {
+                *total += f64::from(sums.sum());
             }
         }
         total
@@ -898,22 +891,21 @@ impl Pair {
     /// A K of some of the tile's cells and its unit phase (Re, Im; nothing where the sum is incoherent).
     #[inline(always)]
     fn at<S: Simd, const COHERENT: bool>(&self, simd: S, joint: &Joint, part: usize) -> [Lanes<S>; 3] {
-        let at = |x: f32| Lanes::splat(simd, x);
         let [across, along] = self.slope;
-        let bent = lanes(simd, &joint.quadratic, part) + at(self.exponent);
-        let mut exponent = lanes(simd, &ALONG, part).mul_add(at(along), bent);
-        exponent = lanes(simd, &ACROSS, part).mul_add(at(across), exponent);
+        let bent = lanes(simd, &joint.quadratic, part) + splat(simd, self.exponent);
+        let mut exponent = lanes(simd, &ALONG, part).mul_add(splat(simd, along), bent);
+        exponent = lanes(simd, &ACROSS, part).mul_add(splat(simd, across), exponent);
         if let Some(spectrum) = joint.along.cells.get(self.column as usize) {
             exponent += lanes(simd, spectrum, part);
         }
         if let Some(spectrum) = joint.across.cells.get(self.row as usize) {
             exponent += lanes(simd, spectrum, part);
         }
-        let a = exponent.max(at(-126.0)).min(at(STRONGEST)).exp2();
+        let a = exponent.max(splat(simd, -126.0)).min(splat(simd, STRONGEST)).exp2();
         if !COHERENT {
-            return [a, at(0.0), at(0.0)];
+            return [a, splat(simd, 0.0), splat(simd, 0.0)];
         }
-        let [c, s] = self.turn.map(at);
+        let (c, s) = (splat(simd, self.turn[0]), splat(simd, self.turn[1]));
         let (re, im) = (lanes(simd, &joint.turn[0], part), lanes(simd, &joint.turn[1], part));
         [a, c * re - s * im, c.mul_add(im, s * re)]
     }
