@@ -72,6 +72,18 @@ impl<S: Simd> Lanes<S> {
     }
 
     #[inline(always)]
+    pub(super) fn any_positive(self) -> bool {
+        let simd = self.simd;
+        simd.first_true_m32s(simd.less_than_f32s(simd.splat_f32s(0.0), self.value)) < S::F32_LANES
+    }
+
+    /// The first lane: a scalar again where all are alike.
+    #[inline(always)]
+    pub(super) fn first(self) -> f32 {
+        bytemuck::cast_slice::<S::f32s, f32>(std::slice::from_ref(&self.value))[0]
+    }
+
+    #[inline(always)]
     pub(super) fn sum(self) -> f32 {
         self.simd.reduce_sum_f32s(self.value)
     }

@@ -32,20 +32,21 @@ const ACROSS: [f32; CELLS] =
     [-1.5, -1.5, -1.5, -1.5, -0.5, -0.5, -0.5, -0.5, 0.5, 0.5, 0.5, 0.5, 1.5, 1.5, 1.5, 1.5];
 /// Softest mask, T, whose reach the powers of two of f32 hold; softer ones take the plain kernel.
 const SOFTEST: f64 = 1.5;
-/// Below e^−18T of the threshold a cell neither counts nor pulls (1.5e-8).
-const MASK_REACH: f64 = 18.0;
-/// A joint this much weaker (in ln) than the weakest cell that counts is dropped.
-const MARGIN: f64 = 12.0;
+/// Below e^−16T of the threshold a cell neither counts nor pulls (1e-7).
+const MASK_REACH: f64 = 16.0;
+/// A joint this much weaker (in ln) than the threshold is dropped, and at least `MARGIN` under the weakest cell that counts.
+const BELOW: f64 = 16.0;
+const MARGIN: f64 = 3.0;
 /// The guess of ln threshold may be this much too high.
 const GUESS: f64 = 3.0;
-/// A joint this much weaker (in ln) than the strongest at its cells is dropped: below half a step of f32.
-const RELATIVE: f64 = 18.0;
+/// A joint this much weaker (in ln) than the strongest at its cells is dropped (8e-7).
+const RELATIVE: f64 = 14.0;
 /// ln of the weakest return relative to the view's scale: its square is still a normal f32.
 const WEAKEST: f64 = -42.0;
 /// log₂ of the strongest return relative to the view's scale; what is stronger is far above any threshold.
 const STRONGEST: f32 = 54.0;
 /// m(1 − m) below which a tile has no slope.
-const NO_SLOPE: f32 = 1e-8;
+const NO_SLOPE: f32 = 1e-7;
 
 /// A box of cells in tiles, and B_ori over it: fixed for a fit.
 #[derive(Debug, Clone)]
@@ -95,6 +96,8 @@ impl Tiling {
 /// distances a cell.
 #[derive(Debug, Default)]
 struct Spectrum {
+    /// Largest of all its bins; 0 where the axis is no Doppler axis.
+    largest: f32,
     middle: Vec<f32>,
     most: Vec<f32>,
     cells: Vec<[f32; CELLS]>,
@@ -106,6 +109,7 @@ impl Spectrum {
         self.middle.clear();
         self.most.clear();
         self.cells.clear();
+        self.largest = if ln.is_empty() { 0.0 } else { (LOG2_E * ln.iter().copied().fold(f64::MIN, f64::max)) as f32 };
         if ln.is_empty() {
             return;
         }
@@ -266,7 +270,7 @@ pub(super) struct Tiles {
     joints: Vec<Joint>,
     /// Sixteen tile columns at a time.
     crests: Vec<Crest>,
-    pairs: Vec<Vec<Pair>>,
+    pairs: Vec<Pairs>,
     /// Tiles that are summed, ascending.
     lit: Vec<u32>,
     /// Re and Im of the sum over joints, 16 a tile that is summed (Σ(AK)² where the sum is incoherent); later times w/|S|².
@@ -383,7 +387,7 @@ struct Scale {
 
 impl Scale {
     fn new(guess: f64, softness: f64) -> Self {
-        let below = (MASK_REACH * softness + MARGIN + GUESS) * LOG2_E;
+        let below = ((MASK_REACH * softness + MARGIN).max(BELOW) + GUESS) * LOG2_E;
         let log2 = guess - below - WEAKEST * LOG2_E;
         let epsilon = (EPSILON.log2() - log2).exp2();
         let soft_floor = (SOFT_FLOOR.log2() - log2).exp2() as f32;
@@ -429,7 +433,9 @@ fn store<S: Simd>(into: &mut [f32], part: usize, x: Lanes<S>) {
 struct Line<S: Simd> {
     top: Lanes<S>,
     half: Lanes<S>,
-    first: Lanes<S>,
+    /// The joint's ridge: the tile nearest to it, in bins, and from there to the tile's middle.
+    nearest: Lanes<S>,
+    rest: Lanes<S>,
     across: Lanes<S>,
     skew: Lanes<S>,
 }
@@ -440,10 +446,13 @@ impl<S: Simd> Line<S> {
         let [middle_y, middle_x] = grid.middle(row, 0);
         let d0 = (grid.lo[0] + slice) as f64 - joint.bin[0];
         let [top, shift, across] = joint.row(d0, middle_y - joint.bin[1]);
+        let first = middle_x - joint.bin[2] + shift;
+        let nearest = (first / SIDE as f64).round() * SIDE as f64;
         Self {
             top: splat(simd, (top + f64::from(joint.across.middle(row))) as f32),
             half: splat(simd, joint.half[2] as f32),
-            first: splat(simd, (middle_x - joint.bin[2] + shift) as f32),
+            nearest: splat(simd, nearest as f32),
+            rest: splat(simd, (first - nearest) as f32),
             across: splat(simd, across as f32),
             skew: splat(simd, joint.skew[2] as f32),
         }
@@ -452,7 +461,8 @@ impl<S: Simd> Line<S> {
     /// (exponent, slope along, slope across) at `bins` from the first tile's middle.
     #[inline(always)]
     fn at(&self, simd: S, bins: Lanes<S>) -> [Lanes<S>; 3] {
-        let x = self.first + bins;
+        // Both terms of the first sum are whole: x keeps its digits near the joint.
+        let x = (bins + self.nearest) + self.rest;
         let bent = self.half * x;
         let along = bent * splat(simd, -2.0);
         let exponent = along.mul_add(x * splat(simd, 0.5), self.top);
@@ -518,14 +528,8 @@ impl Tiles {
     #[inline(always)]
     fn cull<S: Simd>(&mut self, simd: S, grid: &Tiling, scale: &Scale) {
         let Self { joints, crests, pairs, lit, .. } = self;
-        pairs.resize_with(joints.len(), Vec::new);
-        for pairs in pairs.iter_mut() {
-            // Room to grow: the number of pairs drifts while a fit moves.
-            if pairs.capacity() < 2 * pairs.len() {
-                pairs.reserve(2 * pairs.len());
-            }
-            pairs.clear();
-        }
+        pairs.resize_with(joints.len(), Pairs::default);
+        pairs.iter_mut().for_each(Pairs::clear);
         lit.clear();
         let (reach, cut) = (splat(simd, REACH), splat(simd, scale.cut + scale.log2 as f32));
         let relative = splat(simd, (RELATIVE * LOG2_E) as f32);
@@ -538,7 +542,14 @@ impl Tiles {
             let mut slots = [u32::MAX; CELLS];
             for (joint, pairs) in joints.iter().zip(pairs.iter_mut()) {
                 let line = Line::new(simd, joint, grid, [slice, row]);
-                let mut spare = [0.0; CELLS];
+                if line.top.first() + joint.across.most(row) + joint.along.largest < cut.first() {
+                    continue;
+                }
+                let [middle_y, middle_x] = grid.middle(row, 0);
+                let (delta_y, delta_x) = ((middle_y - joint.bin[1]) as f32, (middle_x - joint.bin[2]) as f32);
+                let d0 = (grid.lo[0] + slice) as f64 - joint.bin[0];
+                let turn = times(joint.row_turn[row], [(joint.kappa[0] * d0).cos(), (joint.kappa[0] * d0).sin()]);
+                let (mut spares, mut exponents, mut slopes) = ([0.0; CELLS], [0.0; CELLS], [[0.0; CELLS]; 2]);
                 let mut any = false;
                 for part in 0..Self::parts::<S>() {
                     let [mut exponent, along, across] = line.at(simd, lanes(simd, &bins, part));
@@ -555,20 +566,36 @@ impl Tiles {
                         + slack
                         + lanes(simd, &crest.slack, part)
                         + relative;
-                    let both = (highest - cut).min(apart.mul_add(reach, nearest));
-                    any |= both.largest() > 0.0;
-                    store(&mut spare, part, both);
+                    let spare = (highest - cut).min(apart.mul_add(reach, nearest));
+                    any |= spare.any_positive();
+                    store(&mut spares, part, spare);
+                    store(&mut exponents, part, exponent - splat(simd, scale.log2 as f32));
+                    store(&mut slopes[0], part, across);
+                    store(&mut slopes[1], part, along);
                 }
                 if !any {
                     continue;
                 }
-                for (lane, _) in spare[..here].iter().enumerate().filter(|(_, spare)| **spare > 0.0) {
+                let mut matters = spares[..here]
+                    .iter()
+                    .enumerate()
+                    .fold(0_u32, |bits, (lane, &spare)| bits | u32::from(spare > 0.0) << lane);
+                while matters != 0 {
+                    let lane = matters.trailing_zeros() as usize;
+                    matters &= matters - 1;
                     let column = group * CELLS + lane;
                     if slots[lane] == u32::MAX {
                         slots[lane] = lit.len() as u32;
                         lit.push(((slice * grid.rows + row) * grid.columns + column) as u32);
                     }
-                    pairs.push(pair(joint, grid, [slice, row, column], slots[lane], scale.log2));
+                    let pair = pairs.next();
+                    pair.slot = slots[lane];
+                    (pair.slice, pair.row, pair.column) = (slice as u32, row as u32, column as u32);
+                    pair.exponent = exponents[lane];
+                    pair.slope = [slopes[0][lane], slopes[1][lane]];
+                    let [c, s] = times(joint.column_turn[column], turn);
+                    pair.turn = [c as f32, s as f32];
+                    pair.delta = [delta_y, delta_x + (column * SIDE) as f32];
                 }
             }
         }
@@ -585,7 +612,7 @@ impl Tiles {
     fn sum<S: Simd, const COHERENT: bool>(&mut self, simd: S) {
         let Self { joints, pairs, re, im, .. } = self;
         for (joint, pairs) in joints.iter().zip(pairs.iter()) {
-            for pair in pairs {
+            for pair in pairs.list() {
                 let cells = pair.slot as usize * CELLS..(pair.slot as usize + 1) * CELLS;
                 let (re, im) = (&mut re[cells.clone()], &mut im[cells]);
                 for part in 0..Self::parts::<S>() {
@@ -619,7 +646,7 @@ impl Tiles {
             let cells = slot * CELLS..(slot + 1) * CELLS;
             let target = &grid.target[tile as usize * CELLS..(tile as usize + 1) * CELLS];
             let (re, im, h) = (&self.re[cells.clone()], &self.im[cells.clone()], &mut self.h[cells]);
-            let mut any = splat(simd, 0.0);
+            let mut any = false;
             for part in 0..Self::parts::<S>() {
                 let (re, im) = (lanes(simd, re, part), lanes(simd, im, part));
                 let power = if COHERENT { re.mul_add(re, im * im) } else { re };
@@ -627,10 +654,10 @@ impl Tiles {
                 // What lies beyond the box ranks below all.
                 let value = lanes(simd, target, part).choose(splat(simd, -0.5), value, splat(simd, -1.0));
                 above += value.choose(splat(simd, high), splat(simd, 1.0), splat(simd, 0.0));
-                any += value.choose(splat(simd, low), splat(simd, 1.0), splat(simd, 0.0));
+                any |= (value - splat(simd, low)).min(splat(simd, high) - value).any_positive();
                 store(h, part, value);
             }
-            if any.sum() > 0.0 {
+            if any {
                 self.ranked.extend(h.iter().filter(|&&x| x > low && x <= high).map(|x| x.to_bits()));
             }
         }
@@ -751,7 +778,7 @@ impl Tiles {
     #[inline(always)]
     fn collect<S: Simd, const COHERENT: bool>(&self, simd: S, grid: &Tiling, moments: &mut [Moments]) {
         for ((joint, pairs), moments) in self.joints.iter().zip(&self.pairs).zip(moments) {
-            let mut rest = pairs.as_slice();
+            let mut rest = pairs.list();
             while let Some(first) = rest.first() {
                 let length = rest.partition_point(|pair| pair.slice == first.slice);
                 let (slice, after) = rest.split_at(length);
@@ -801,7 +828,7 @@ impl Tiles {
                 rxy = by_x.mul_add(dy, rxy);
                 ryy = by_y.mul_add(dy, ryy);
                 if !joint.along.middle.is_empty() || !joint.across.middle.is_empty() {
-                    by_bin(simd, grid, pair, part, wants, moments);
+                    by_bin(grid, pair, part, wants, moments);
                 }
             }
             for (total, sums) in total.0.iter_mut().zip([r, rx, ry, rxx, rxy, ryy, q, qx, qy]) {
@@ -814,10 +841,9 @@ impl Tiles {
 
 /// Adds `r` to the bins of the Doppler axes.
 #[inline(always)]
-fn by_bin<S: Simd>(simd: S, grid: &Tiling, pair: &Pair, part: usize, r: Lanes<S>, moments: &mut Moments) {
+fn by_bin<S: Simd>(grid: &Tiling, pair: &Pair, part: usize, r: Lanes<S>, moments: &mut Moments) {
     let mut cells = [0.0; CELLS];
     store(&mut cells, part, r);
-    let _ = simd;
     let axes: [(usize, usize); 2] = [(1, grid.lo[1] + pair.row as usize * SIDE), (2, grid.lo[2] + pair.column as usize * SIDE)];
     let missing = 3 - moments.dims;
     for (axis, first) in axes {
@@ -863,27 +889,33 @@ impl Sums {
     }
 }
 
-fn pair(joint: &Joint, grid: &Tiling, [slice, row, column]: [usize; 3], slot: u32, scale_log2: f64) -> Pair {
-    let [middle_y, middle_x] = grid.middle(row, column);
-    let (d0, d1, d2) = ((grid.lo[0] + slice) as f64 - joint.bin[0], middle_y - joint.bin[1], middle_x - joint.bin[2]);
-    let [top, shift, across] = joint.row(d0, d1);
-    let x = d2 + shift;
-    let along = -2.0 * joint.half[2] * x;
-    let spectrum = f64::from(joint.across.middle(row)) + f64::from(joint.along.middle(column));
-    let mut turn = times(joint.column_turn[column], joint.row_turn[row]);
-    if joint.kappa[0] != 0.0 {
-        let psi = joint.kappa[0] * d0;
-        turn = times(turn, [psi.cos(), psi.sin()]);
+/// The pairs of one joint.
+#[derive(Debug, Default)]
+struct Pairs {
+    /// Those in use, then those of evaluations before: a place that is written to field by field costs no copy.
+    all: Vec<Pair>,
+    used: usize,
+}
+
+impl Pairs {
+    fn clear(&mut self) {
+        // Room to grow: the number drifts while a fit moves.
+        if self.all.capacity() < 2 * self.used {
+            self.all.reserve(2 * self.used);
+        }
+        self.used = 0;
     }
-    Pair {
-        slot,
-        slice: slice as u32,
-        row: row as u32,
-        column: column as u32,
-        exponent: (top + 0.5 * along * x + spectrum - scale_log2) as f32,
-        slope: [(across + joint.skew[2] * along) as f32, along as f32],
-        turn: turn.map(|x| x as f32),
-        delta: [d1 as f32, d2 as f32],
+
+    fn list(&self) -> &[Pair] {
+        &self.all[..self.used]
+    }
+
+    fn next(&mut self) -> &mut Pair {
+        if self.used == self.all.len() {
+            self.all.push(Pair::default());
+        }
+        self.used += 1;
+        &mut self.all[self.used - 1]
     }
 }
 
