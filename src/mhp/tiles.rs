@@ -529,8 +529,11 @@ impl Tiles {
     fn cull<S: Simd>(&mut self, simd: S, grid: &Tiling, scale: &Scale) {
         let Self { joints, crests, pairs, lit, .. } = self;
         pairs.resize_with(joints.len(), Pairs::default);
-        pairs.iter_mut().for_each(Pairs::clear);
+        pairs.iter_mut().for_each(|pairs| pairs.clear(grid.tiles()));
         lit.clear();
+        lit.reserve_exact(grid.tiles());
+        self.sloped.clear();
+        self.sloped.reserve_exact(grid.tiles());
         let (reach, cut) = (splat(simd, REACH), splat(simd, scale.cut + scale.log2 as f32));
         let relative = splat(simd, (RELATIVE * LOG2_E) as f32);
         let groups = grid.columns.div_ceil(CELLS);
@@ -542,7 +545,9 @@ impl Tiles {
             let mut slots = [u32::MAX; CELLS];
             for (joint, pairs) in joints.iter().zip(pairs.iter_mut()) {
                 let line = Line::new(simd, joint, grid, [slice, row]);
-                if line.top.first() + joint.across.most(row) + joint.along.largest < cut.first() {
+                // The ridge's height in the tile row, at most.
+                let ridge = line.top.first() + REACH * line.across.first().abs();
+                if ridge + joint.across.most(row) + joint.along.largest < cut.first() {
                     continue;
                 }
                 let [middle_y, middle_x] = grid.middle(row, 0);
@@ -599,10 +604,14 @@ impl Tiles {
                 }
             }
         }
-        let cells = lit.len() * CELLS;
+        let (cells, most) = (lit.len() * CELLS, grid.tiles() * CELLS);
         for field in [&mut self.re, &mut self.im, &mut self.h, &mut self.soft] {
+            // Memory that is not touched costs nothing; growing later would.
+            field.reserve_exact(most.saturating_sub(field.len()));
             field.resize(cells, 0.0);
         }
+        self.ranked.clear();
+        self.ranked.reserve_exact(most);
         self.re.fill(0.0);
         self.im.fill(0.0);
     }
@@ -898,10 +907,11 @@ struct Pairs {
 }
 
 impl Pairs {
-    fn clear(&mut self) {
-        // Room to grow: the number drifts while a fit moves.
-        if self.all.capacity() < 2 * self.used {
-            self.all.reserve(2 * self.used);
+    /// Forgets them; `most` is the number of tiles that there are.
+    fn clear(&mut self, most: usize) {
+        // Room to grow, for the number drifts while a fit moves. Memory that is not touched costs nothing.
+        if self.all.capacity() < most.min(self.used + self.used / 2 + 16) {
+            self.all.reserve_exact(most.min(4 * self.used + 1024).saturating_sub(self.all.len()));
         }
         self.used = 0;
     }
