@@ -22,10 +22,7 @@ fn main() -> ExitCode {
         .with_ansi(std::io::stderr().is_terminal())
         .with_target(false)
         .init();
-    count_bytes_with(Meter {
-        total_bytes: || ALLOCATOR.total_allocated(),
-        peak_bytes: || ALLOCATOR.max_allocated(),
-    });
+    count_bytes_with(Meter { total_bytes: || ALLOCATOR.total_allocated(), peak_bytes: || ALLOCATOR.max_allocated() });
     let cli = Cli::parse();
     let done = match cli.command {
         Some(command) => run(command),

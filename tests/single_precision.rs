@@ -90,7 +90,8 @@ fn scene(seed: u64) -> Option<[Evaluation; 2]> {
         angles: vec![[0, 1, 2]],
     };
     let views: Vec<View> = (0..rng.random_range(1..3)).map(|k| view(k, rng)).collect();
-    let maps: Vec<Vec<f64>> = views.iter().map(|v| (0..v.cells()).map(|_| rng.random_range(0.0..1.0)).collect()).collect();
+    let maps: Vec<Vec<f64>> =
+        views.iter().map(|v| (0..v.cells()).map(|_| rng.random_range(0.0..1.0)).collect()).collect();
     let maps: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
     let on = |rng: &mut StdRng| rng.random_bool(0.85);
     let config = FitConfig {
@@ -105,14 +106,17 @@ fn scene(seed: u64) -> Option<[Evaluation; 2]> {
     let problem = Arc::new(Problem::new(radar, skeleton, views, &maps).unwrap());
     if config.summation == Summation::Coherent {
         let incoherent = FitConfig { summation: Summation::Incoherent, ..config };
-        let [sum, most] = [config, incoherent].map(|config| simulate(&problem, &config, Precision::F64, &params).concat());
+        let [sum, most] =
+            [config, incoherent].map(|config| simulate(&problem, &config, Precision::F64, &params).concat());
         if sum.iter().zip(&most).any(|(sum, most)| *sum < NULL_DEPTH * most) {
             return None;
         }
     }
-    Some([Precision::F64, Precision::F32].map(|precision| {
-        Objective::new(Arc::clone(&problem), config, precision, &params).unwrap().evaluate(&params)
-    }))
+    Some(
+        [Precision::F64, Precision::F32].map(|precision| {
+            Objective::new(Arc::clone(&problem), config, precision, &params).unwrap().evaluate(&params)
+        }),
+    )
 }
 
 /// What the reference cases ask of single precision, by group.

@@ -121,7 +121,10 @@ impl<S: Simd> Lanes<S> {
         let s = (m - root) / (m + root);
         let s2 = s * s;
         // 2/ln 2 · (s + s³/3 + s⁵/5 + s⁷/7)
-        let series = s2.mul_add(splat(simd, 0.412_198_58), splat(simd, 0.577_078)).mul_add(s2, splat(simd, 0.961_796_7)).mul_add(s2, splat(simd, 2.885_390_1));
+        let series = s2
+            .mul_add(splat(simd, 0.412_198_58), splat(simd, 0.577_078))
+            .mul_add(s2, splat(simd, 0.961_796_7))
+            .mul_add(s2, splat(simd, 2.885_390_1));
         s.mul_add(series, (whole - splat(simd, 8_388_735.0)) + splat(simd, 0.5))
     }
 }

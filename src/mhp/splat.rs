@@ -377,11 +377,11 @@ pub(super) fn feature_at(bin: usize, bins: usize, features: usize) -> (usize, f6
 
 fn spectrum_of(omega: &[f64], mean: f64, bins: usize) -> impl Iterator<Item = f64> {
     (0..bins).map(move |bin| {
-            let (lower, t) = feature_at(bin, bins, omega.len());
-            let at = |i: usize| omega.get(i).copied().unwrap_or(0.0);
-            let upper = if t == 0.0 { 0.0 } else { at(lower + 1) * t };
-            at(lower) * (1.0 - t) + upper - mean
-        })
+        let (lower, t) = feature_at(bin, bins, omega.len());
+        let at = |i: usize| omega.get(i).copied().unwrap_or(0.0);
+        let upper = if t == 0.0 { 0.0 } else { at(lower + 1) * t };
+        at(lower) * (1.0 - t) + upper - mean
+    })
 }
 
 /// ln σ(β), exact for large |β|.

@@ -26,10 +26,8 @@ const CELLS: usize = SIDE * SIDE;
 /// From a tile's middle to its outermost cells.
 const REACH: f32 = 1.5;
 /// Cells of a tile relative to its middle, along the last axis and the one before.
-const ALONG: [f32; CELLS] =
-    [-1.5, -0.5, 0.5, 1.5, -1.5, -0.5, 0.5, 1.5, -1.5, -0.5, 0.5, 1.5, -1.5, -0.5, 0.5, 1.5];
-const ACROSS: [f32; CELLS] =
-    [-1.5, -1.5, -1.5, -1.5, -0.5, -0.5, -0.5, -0.5, 0.5, 0.5, 0.5, 0.5, 1.5, 1.5, 1.5, 1.5];
+const ALONG: [f32; CELLS] = [-1.5, -0.5, 0.5, 1.5, -1.5, -0.5, 0.5, 1.5, -1.5, -0.5, 0.5, 1.5, -1.5, -0.5, 0.5, 1.5];
+const ACROSS: [f32; CELLS] = [-1.5, -1.5, -1.5, -1.5, -0.5, -0.5, -0.5, -0.5, 0.5, 0.5, 0.5, 0.5, 1.5, 1.5, 1.5, 1.5];
 /// Softest mask, T, whose reach the powers of two of f32 hold; softer ones take the plain kernel.
 const SOFTEST: f64 = 1.5;
 /// Below e^−16T of the threshold a cell neither counts nor pulls (1e-7).
@@ -39,6 +37,10 @@ const BELOW: f64 = 16.0;
 const MARGIN: f64 = 3.0;
 /// The guess of ln threshold may be this much too high.
 const GUESS: f64 = 3.0;
+/// And this much too low: beyond it the strongest returns would leave f32's range.
+const HIGH: f64 = 12.0;
+/// Guesses of the threshold at most.
+const TRIES: usize = 40;
 /// A joint this much weaker (in ln) than the strongest at its cells is dropped (8e-7).
 const RELATIVE: f64 = 14.0;
 /// ln of the weakest return relative to the view's scale: its square is still a normal f32.
@@ -161,6 +163,8 @@ struct Joint {
     row_turn: Vec<[f64; 2]>,
     along: Spectrum,
     across: Spectrum,
+    /// The spectrum a slice of the outermost of three axes; empty where that is no Doppler axis.
+    outer: Vec<f64>,
 }
 
 impl Joint {
@@ -203,6 +207,9 @@ impl Joint {
         let spectrum = |k: usize| at(k).map_or(&[] as &[f64], |k| splat.spectrum[k].as_slice());
         self.along.fill(spectrum(2), grid.lo[2], grid.columns, |cell| cell % SIDE);
         self.across.fill(spectrum(1), grid.lo[1], grid.rows, |cell| cell / SIDE);
+        let slices = spectrum(0).iter().skip(grid.lo[0]).take(grid.size[0]);
+        self.outer.clear();
+        self.outer.extend(slices.map(|ln| LOG2_E * ln));
     }
 
     /// log₂ at d₂ + … = 0 in a tile row, the offset of d₂ there, and the slope by d₁ of the rest.
@@ -353,23 +360,27 @@ impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
         let Self { tiles, question, moments } = self;
         let floor = EPSILON.log2();
         let mut guess = tiles.crests(simd, question).max(floor);
+        let mut tries = 0..TRIES;
         loop {
             let scale = Scale::new(guess, question.softness);
             tiles.cull(simd, question.tiling, &scale);
             tiles.sum::<S, COHERENT>(simd);
             let threshold = tiles.threshold::<S, COHERENT>(simd, question, &scale);
-            if guess <= floor || threshold.log2 >= guess - GUESS * LOG2_E {
-                tiles.last = Some(threshold.log2);
-                let mask = tiles.mask::<S, COHERENT>(simd, question, &scale, &threshold);
-                if let Some(factor) = question.scale
-                    && mask.union > 0.0
-                {
-                    tiles.weigh::<S, COHERENT>(simd, question, &mask, factor / question.softness);
-                    tiles.collect::<S, COHERENT>(simd, question.tiling, moments);
-                }
-                return mask.answer();
+            let low = guess > floor && threshold.log2 < guess - GUESS * LOG2_E;
+            let high = threshold.log2 > guess + HIGH * LOG2_E;
+            if (low || high) && tries.next().is_some() {
+                guess = if threshold.among_lit { threshold.log2 } else { guess - 30.0 }.max(floor);
+                continue;
             }
-            guess = if threshold.among_lit { threshold.log2 } else { guess - 30.0 }.max(floor);
+            tiles.last = Some(threshold.log2);
+            let mask = tiles.mask::<S, COHERENT>(simd, question, &scale, &threshold);
+            if let Some(factor) = question.scale
+                && mask.union > 0.0
+            {
+                tiles.weigh::<S, COHERENT>(simd, question, &mask, factor / question.softness);
+                tiles.collect::<S, COHERENT>(simd, question.tiling, moments);
+            }
+            return mask.answer();
         }
     }
 }
@@ -445,7 +456,8 @@ impl<S: Simd> Line<S> {
     fn new(simd: S, joint: &Joint, grid: &Tiling, [slice, row]: [usize; 2]) -> Self {
         let [middle_y, middle_x] = grid.middle(row, 0);
         let d0 = (grid.lo[0] + slice) as f64 - joint.bin[0];
-        let [top, shift, across] = joint.row(d0, middle_y - joint.bin[1]);
+        let [mut top, shift, across] = joint.row(d0, middle_y - joint.bin[1]);
+        top += joint.outer.get(slice).copied().unwrap_or(0.0);
         let first = middle_x - joint.bin[2] + shift;
         let nearest = (first / SIDE as f64).round() * SIDE as f64;
         Self {
@@ -687,6 +699,12 @@ impl Tiles {
             self.ranked.extend(self.h.iter().filter(|&&x| x >= 0.0).map(|x| x.to_bits()));
             order(&mut self.ranked, rank)
         });
+        // Where only the upper neighbour is summed, the lower one is nothing beside it.
+        let split = || {
+            let least = self.ranked.iter().copied().min().filter(|_| self.ranked.len() == rank && weight > 0.0);
+            least.map(|upper| [floor, f32::from_bits(upper)])
+        };
+        let found = found.or_else(split);
         let among_lit = found.is_some();
         let [lower, upper] = found.unwrap_or([floor; 2]);
         let upper = if upper.is_nan() { lower } else { upper };
@@ -723,7 +741,10 @@ impl Tiles {
                 let inside = target.choose(splat(simd, -0.5), one, zero);
                 let (b, h) = (target.max(zero), h.max(splat(simd, f32::MIN_POSITIVE.sqrt())));
                 let raised = h + splat(simd, soft_floor);
-                let odds = ((raised.log2() - splat(simd, centre as f32)) * softness).min(splat(simd, 60.0)).max(splat(simd, -60.0)).exp2();
+                let odds = ((raised.log2() - splat(simd, centre as f32)) * softness)
+                    .min(splat(simd, 60.0))
+                    .max(splat(simd, -60.0))
+                    .exp2();
                 let share = one / (one + odds);
                 let m = odds * share * inside;
                 tile_common += m * b;
@@ -756,13 +777,7 @@ impl Tiles {
 
     /// Turns the sums into w S*/|S|² (or w/Σ(AK)² where the sum is incoherent), w = ∂L/∂ln|S|.
     #[inline(always)]
-    fn weigh<S: Simd, const COHERENT: bool>(
-        &mut self,
-        simd: S,
-        question: &Question<'_>,
-        mask: &Mask,
-        factor: f64,
-    ) {
+    fn weigh<S: Simd, const COHERENT: bool>(&mut self, simd: S, question: &Question<'_>, mask: &Mask, factor: f64) {
         let grid = question.tiling;
         let inside = splat(simd, (-factor / mask.union) as f32);
         let outside = splat(simd, (factor * mask.common / (mask.union * mask.union)) as f32);
@@ -853,7 +868,8 @@ impl Tiles {
 fn by_bin<S: Simd>(grid: &Tiling, pair: &Pair, part: usize, r: Lanes<S>, moments: &mut Moments) {
     let mut cells = [0.0; CELLS];
     store(&mut cells, part, r);
-    let axes: [(usize, usize); 2] = [(1, grid.lo[1] + pair.row as usize * SIDE), (2, grid.lo[2] + pair.column as usize * SIDE)];
+    let axes: [(usize, usize); 2] =
+        [(1, grid.lo[1] + pair.row as usize * SIDE), (2, grid.lo[2] + pair.column as usize * SIDE)];
     let missing = 3 - moments.dims;
     for (axis, first) in axes {
         let Some(bins) = axis.checked_sub(missing).map(|k| &mut moments.r_by_bin[k]) else { continue };
