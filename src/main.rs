@@ -1,9 +1,16 @@
 //! Parse, log, window or headless.
 
+use cap::Cap;
 use clap::Parser;
+use mhp_inspector::cli::bench::{Meter, count_bytes_with};
 use mhp_inspector::cli::{Cli, EXIT_BAD_INPUT, WindowArgs, run};
+use std::alloc::System;
 use std::io::IsTerminal as _;
 use std::process::ExitCode;
+
+/// Counts bytes for `bench`, and limits nothing.
+#[global_allocator]
+static ALLOCATOR: Cap<System> = Cap::new(System, usize::MAX);
 
 fn main() -> ExitCode {
     tracing_subscriber::fmt()
@@ -15,6 +22,7 @@ fn main() -> ExitCode {
         .with_ansi(std::io::stderr().is_terminal())
         .with_target(false)
         .init();
+    count_bytes_with(Meter { total_bytes: || ALLOCATOR.total_allocated(), peak_bytes: || ALLOCATOR.max_allocated() });
     let cli = Cli::parse();
     let done = match cli.command {
         Some(command) => run(command),

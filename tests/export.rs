@@ -129,7 +129,7 @@ fn odd_numbers_and_names_stay_readable() {
 
 fn report(iteration: usize, loss: f64, iou: Vec<Option<f64>>) -> StepReport {
     let terms = Terms { em: 0.1 + 0.2, time: 0.0, bone: 1e-17, rigid: 0.0, joint: 3.0, sep: 4.0, coll: 5.0 };
-    StepReport { iteration, loss, terms, iou, converged: iteration > 0 }
+    StepReport { iteration, loss, terms, iou: iou.into(), converged: iteration > 0 }
 }
 
 #[test]

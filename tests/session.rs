@@ -137,7 +137,7 @@ impl Bench {
         let evaluation = Evaluation {
             loss: loss(iteration),
             terms: Terms::default(),
-            iou: vec![None; 2],
+            iou: vec![None; 2].into(),
             gradient: zeros.clone(),
             em_gradient: zeros,
         };
@@ -163,7 +163,7 @@ fn loss(iteration: usize) -> f64 {
 }
 
 fn report(iteration: usize) -> StepReport {
-    let iou = vec![Some(0.5), Some(0.25)];
+    let iou = vec![Some(0.5), Some(0.25)].into();
     StepReport { iteration, loss: loss(iteration), terms: Terms::default(), iou, converged: false }
 }
 

@@ -137,7 +137,7 @@ impl Bench {
         let evaluation = Evaluation {
             loss: 1.0,
             terms: Terms::default(),
-            iou: vec![None; 2],
+            iou: vec![None; 2].into(),
             gradient: zeros.clone(),
             em_gradient: zeros,
         };

@@ -81,7 +81,7 @@ impl PpprShape {
 
 /// The parameters of all joints of all persons (or their gradients, or Adam's moments): one flat array a group,
 /// ordered (person, joint, component); SPEC section 2.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked")]
 pub struct Pppr {
     shape: PpprShape,
@@ -111,10 +111,33 @@ impl TryFrom<Unchecked> for Pppr {
     }
 }
 
+impl Clone for Pppr {
+    fn clone(&self) -> Self {
+        Self { shape: self.shape, groups: self.groups.clone() }
+    }
+
+    /// Keeps the memory that is there: a fit copies its parameters every iteration.
+    fn clone_from(&mut self, source: &Self) {
+        self.shape = source.shape;
+        for (own, other) in self.groups.iter_mut().zip(&source.groups) {
+            own.clone_from(other);
+        }
+    }
+}
+
 impl Pppr {
     /// All zeros (the zero quaternion included): a gradient to be accumulated.
     pub fn zeros(shape: PpprShape) -> Self {
         Self { shape, groups: Group::ALL.map(|g| vec![0.0; shape.width(g) * shape.total_joints()]) }
+    }
+
+    /// All zeros again, in the memory that is there.
+    pub fn reset(&mut self, shape: PpprShape) {
+        self.shape = shape;
+        for (group, numbers) in Group::ALL.into_iter().zip(&mut self.groups) {
+            numbers.clear();
+            numbers.resize(shape.width(group) * shape.total_joints(), 0.0);
+        }
     }
 
     /// The sizes.

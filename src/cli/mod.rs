@@ -1,5 +1,6 @@
 //! The command line: one file a subcommand. Arguments as typed become a validated configuration and one library call.
 
+pub mod bench;
 mod common;
 mod complexity;
 mod count;
@@ -116,6 +117,9 @@ impl WindowArgs {
 /// The subcommands; everything the window does, one of them can do headless.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Measure what an iteration, a simulation and a whole frame cost on this machine.
+    #[command(after_help = bench::HELP)]
+    Bench(bench::BenchArgs),
     /// Tell which frames of a data set are hard, before anything is fitted: three statistics of each frame's maps, the
     /// hardness that follows from their ranks, and the stratum.
     #[command(after_help = complexity::HELP)]
@@ -175,6 +179,7 @@ pub enum Command {
 /// Whatever the subcommand could not do, naming file, key and what was expected.
 pub fn run(command: Command) -> anyhow::Result<ExitCode> {
     match command {
+        Command::Bench(args) => bench::run(&args),
         Command::Complexity(args) => complexity::run(&args),
         Command::Count(args) => count::run(&args),
         Command::Evidence(args) => evidence::run(&args),

@@ -10,7 +10,7 @@ const BETA_2: f64 = 0.999;
 const EPSILON: f64 = 1e-8;
 
 /// The two moments, and how many steps they have seen.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct Adam {
     /// Exponential mean of the gradient.
     pub first: Pppr,
@@ -21,6 +21,23 @@ pub struct Adam {
     pub bones: [Vec<f64>; 2],
     /// Steps since the moments were zero.
     pub steps: u32,
+}
+
+impl Clone for Adam {
+    fn clone(&self) -> Self {
+        let Self { first, second, bones, steps } = self;
+        Self { first: first.clone(), second: second.clone(), bones: bones.clone(), steps: *steps }
+    }
+
+    /// Keeps the memory that is there.
+    fn clone_from(&mut self, source: &Self) {
+        self.first.clone_from(&source.first);
+        self.second.clone_from(&source.second);
+        for (own, other) in self.bones.iter_mut().zip(&source.bones) {
+            own.clone_from(other);
+        }
+        self.steps = source.steps;
+    }
 }
 
 /// One number's update.
@@ -47,14 +64,24 @@ impl Adam {
         Self { first: Pppr::zeros(shape), second: Pppr::zeros(shape), bones: [const { Vec::new() }; 2], steps: 0 }
     }
 
-    /// One update of `params` against `gradient` (same sizes); the moments move on.
-    pub(super) fn update(&mut self, params: &mut Pppr, gradient: &Pppr, config: &FitConfig, body: &Articulation) {
+    /// One update of `params` against `gradient` (same sizes); the moments move on. `turns` is overwritten.
+    pub(super) fn update(
+        &mut self,
+        params: &mut Pppr,
+        gradient: &Pppr,
+        config: &FitConfig,
+        body: &Articulation,
+        turns: &mut Vec<f64>,
+    ) {
         self.steps += 1;
         let step = Step::new(self.steps);
-        let turned =
-            (config.parameterization == Parameterization::Bones).then(|| self.turns(params, gradient, config, body));
+        let turned = config.parameterization == Parameterization::Bones;
+        if turned {
+            body.pull_back(params, gradient, turns);
+            self.turn(turns, config, body);
+        }
         for group in Group::ALL {
-            if group == Group::Position && turned.is_some() {
+            if group == Group::Position && turned {
                 continue;
             }
             let rate = rate(config, group);
@@ -63,27 +90,22 @@ impl Adam {
                 *x += rate * step.of(g, m, v);
             }
         }
-        if let Some(turned) = turned {
-            body.advance(params, &turned);
+        if turned {
+            body.advance(params, turns);
         }
     }
 
-    /// The step by the coordinates of root and bones.
-    fn turns(&mut self, params: &Pppr, gradient: &Pppr, config: &FitConfig, body: &Articulation) -> Vec<f64> {
+    /// From the gradient by the coordinates of root and bones to the step by them.
+    fn turn(&mut self, turns: &mut [f64], config: &FitConfig, body: &Articulation) {
         let step = Step::new(self.steps);
-        let pulled = body.pull_back(params, gradient);
         for moment in &mut self.bones {
-            moment.resize(pulled.len(), 0.0);
+            moment.resize(turns.len(), 0.0);
         }
         let [first, second] = &mut self.bones;
         let rates = [rate(config, Group::Position), config.learning_rates.bone.unwrap_or(config.learning_rate)];
-        let moments = first.iter_mut().zip(second);
-        let steps = pulled
-            .iter()
-            .zip(moments)
-            .enumerate()
-            .map(|(k, (&g, (m, v)))| rates[usize::from(is_turn(k % body.coordinates()))] * step.of(g, m, v));
-        steps.collect()
+        for (k, (x, (m, v))) in turns.iter_mut().zip(first.iter_mut().zip(second)).enumerate() {
+            *x = rates[usize::from(is_turn(k % body.coordinates()))] * step.of(*x, m, v);
+        }
     }
 }
 
@@ -116,11 +138,11 @@ mod tests {
         let config = FitConfig { learning_rate: 0.1, ..FitConfig::default() };
         let body = Articulation::new(&lone_joint());
         gradient.group_mut(Group::Beta)[0] = 2.0;
-        adam.update(&mut params, &gradient, &config, &body);
+        adam.update(&mut params, &gradient, &config, &body, &mut Vec::new());
         // m̂ = 2, v̂ = 4: a full step of the rate.
         assert!((params.group(Group::Beta)[0] + 0.1).abs() < 1e-9);
         gradient.group_mut(Group::Beta)[0] = -1.0;
-        adam.update(&mut params, &gradient, &config, &body);
+        adam.update(&mut params, &gradient, &config, &body, &mut Vec::new());
         let (m, v) = (0.9 * 0.2 - 0.1, 0.999 * 0.004 + 0.001);
         let want = -0.1 - 0.1 * (m / 0.19) / (f64::sqrt(v / (1.0 - 0.999 * 0.999)) + 1e-8);
         assert!((params.group(Group::Beta)[0] - want).abs() < 1e-9);
@@ -136,7 +158,7 @@ mod tests {
         let mut config = FitConfig { parameterization: Parameterization::Bones, ..FitConfig::default() };
         config.learning_rates.beta = Some(0.5);
         config.learning_rates.position = Some(0.25);
-        adam.update(&mut params, &gradient, &config, &Articulation::new(&lone_joint()));
+        adam.update(&mut params, &gradient, &config, &Articulation::new(&lone_joint()), &mut Vec::new());
         assert!((params.group(Group::Beta)[0] + 0.5).abs() < 1e-6);
         assert!((params.group(Group::Position)[1] - 0.25).abs() < 1e-6);
         assert_eq!(adam.first.group(Group::Position), [0.0; 3]);

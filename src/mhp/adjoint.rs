@@ -12,6 +12,8 @@ use crate::radar::{Axis, AxisKind, Spacing};
 /// Sums over the cells of a view for one joint; r = ∂L/∂ln A_jK_j, q = ∂L/∂ψ_j.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Moments {
+    /// Number of axes, 1 to 3.
+    pub dims: usize,
     /// Σ r
     pub r: f64,
     /// Σ r Δ
@@ -24,6 +26,18 @@ pub(super) struct Moments {
     pub q_delta: [f64; 3],
     /// Σ r of each bin of a Doppler axis; empty on other axes.
     pub r_by_bin: [Vec<f64>; 3],
+}
+
+impl Moments {
+    /// All zeros for a view with these axes; keeps the memory of what was there.
+    pub(super) fn clear(&mut self, axes: &[Axis]) {
+        let mut r_by_bin = std::mem::take(&mut self.r_by_bin);
+        for (by_bin, axis) in r_by_bin.iter_mut().zip(axes) {
+            by_bin.clear();
+            by_bin.resize(if axis.kind == AxisKind::Doppler { axis.bins } else { 0 }, 0.0);
+        }
+        *self = Self { dims: axes.len().min(3), r_by_bin, ..Self::default() };
+    }
 }
 
 /// Adjoints of the geometry at a joint.

@@ -71,9 +71,9 @@ impl Articulation {
         ROOT + 3 * self.hinges.len()
     }
 
-    /// The gradient by coordinate, (persons · coordinates), of one by position and orientation.
-    pub(super) fn pull_back(&self, params: &Pppr, gradient: &Pppr) -> Vec<f64> {
-        let mut pulled = Vec::with_capacity(params.shape().persons * self.coordinates());
+    /// Writes the gradient by coordinate, (persons · coordinates), of one by position and orientation.
+    pub(super) fn pull_back(&self, params: &Pppr, gradient: &Pppr, pulled: &mut Vec<f64>) {
+        pulled.clear();
         for first in self.persons(params) {
             let mut push = |v: Vec3| pulled.extend(v);
             let all = 0..self.joints;
@@ -84,7 +84,6 @@ impl Articulation {
                 push(torque(params, gradient, params.position(first + hinge.inner), carried));
             }
         }
-        pulled
     }
 
     /// Moves and turns `params` by `step`, (persons · coordinates).
@@ -253,7 +252,8 @@ mod tests {
                 .map(|&group| p.group(group).iter().zip(gradient.group(group)).map(|(x, g)| x * g).sum::<f64>())
                 .sum()
         };
-        let pulled = body.pull_back(&params, &gradient);
+        let mut pulled = Vec::new();
+        body.pull_back(&params, &gradient, &mut pulled);
         for k in 0..pulled.len() {
             let slope = [1e-6, -1e-6].map(|h| {
                 let (mut moved, mut step) = (params.clone(), vec![0.0; pulled.len()]);

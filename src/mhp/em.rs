@@ -1,5 +1,6 @@
 //! L_EM on one view: soft mask of H_sim against the hard mask of H_ori; SPEC section 4.
 
+use super::Precision;
 use super::adjoint::{Moments, pull_back};
 use super::kernel::Kernel;
 use super::percentile::percentile;
@@ -7,11 +8,12 @@ use super::region::Region;
 use super::scalar::Real;
 use super::simulate::{EPSILON, floored, ln_floored};
 use super::splat::{Scene, Splat, Trace};
+use super::tiles::{self, Question, Tiles, Tiling};
 use crate::body::Pppr;
-use crate::radar::AxisKind;
+use crate::config::FitConfig;
 
 /// h of SPEC section 4: the floor in the logarithms of the soft mask.
-const SOFT_FLOOR: f64 = 1e-30;
+pub(super) const SOFT_FLOOR: f64 = 1e-30;
 
 /// What one view says.
 pub(super) struct ViewAnswer {
@@ -28,43 +30,88 @@ pub(super) fn hard_iou(masks: impl Iterator<Item = (bool, bool)>) -> Option<f64>
         both += usize::from(a && b);
         either += usize::from(a || b);
     }
+    share(both, either)
+}
+
+/// `both` of `either`; `None` of nothing.
+pub(super) fn share(both: usize, either: usize) -> Option<f64> {
     (either > 0).then(|| both as f64 / either as f64)
 }
 
-/// Evaluates L_view over `region`, and adds its gradient times `scale` to `gradient` where one is given: (`scale`,
-/// `gradient`). `target` is B_ori over the region's cells in C order.
-pub(super) fn evaluate<T: Real>(
+/// What one evaluation of a view needs besides its answer; kept, so that the next one allocates nothing.
+#[derive(Default)]
+pub(super) struct Workspace {
+    splats: Vec<Splat>,
+    traces: Vec<Trace>,
+    moments: Vec<Moments>,
+    tiles: Tiles,
+}
+
+/// Where L_view is evaluated, and B_ori there.
+pub(super) struct Aim {
+    pub region: Region,
+    /// B_ori over the region's cells in C order.
+    pub target: Vec<bool>,
+    /// The same in tiles.
+    pub tiling: Tiling,
+}
+
+/// Evaluates L_view at `aim`, and adds its gradient times `scale` to `gradient` where one is given: (`scale`, `gradient`).
+pub(super) fn evaluate(
     scene: &Scene<'_>,
+    precision: Precision,
     params: &Pppr,
-    region: &Region,
-    target: &[bool],
+    aim: &Aim,
     gradient: Option<(f64, &mut Pppr)>,
+    workspace: &mut Workspace,
 ) -> ViewAnswer {
     let joints = params.shape().total_joints();
-    let (splats, traces): (Vec<Splat>, Vec<Trace>) = (0..joints).map(|j| scene.splat(params, j)).unzip();
-    let mut kernel = Kernel::<T>::new(&splats, &region.bins, scene.config.summation);
-    let mut ln_s = vec![f64::NEG_INFINITY; region.cells()];
-    kernel.forward(&mut ln_s);
-
-    let mask = SoftMask::new(&ln_s, target, scene.config.tau_pct, scene.config.softness);
-    if let Some((scale, gradient)) = gradient {
-        let mut moments = vec![empty_moments(scene); joints];
-        kernel.backward(&mask.weight(&ln_s, target, scale), &mut moments);
+    let Workspace { splats, traces, moments, tiles } = workspace;
+    splats.resize_with(joints, Splat::default);
+    traces.clear();
+    for (joint, slot) in splats.iter_mut().enumerate() {
+        let (splat, trace) = scene.splat(params, joint, std::mem::take(&mut slot.spectrum));
+        *slot = splat;
+        traces.push(trace);
+    }
+    moments.resize_with(joints, Moments::default);
+    for moments in moments.iter_mut() {
+        moments.clear(&scene.view.axes);
+    }
+    let scale = gradient.as_ref().map(|(scale, _)| *scale);
+    let answer = match precision {
+        Precision::F64 => plain::<f64>(scene, splats, aim, scale, moments),
+        Precision::F32 if tiles::reaches(scene.config.softness) => {
+            let FitConfig { summation, tau_pct, softness, .. } = *scene.config;
+            let question = Question { splats, tiling: &aim.tiling, summation, tau_pct, softness, scale };
+            tiles.evaluate(&question, moments)
+        }
+        Precision::F32 => plain::<f32>(scene, splats, aim, scale, moments),
+    };
+    if let Some((_, gradient)) = gradient {
         for (joint, moments) in moments.iter().enumerate() {
             pull_back(scene, &splats[joint], &traces[joint], moments, joint, gradient);
         }
     }
-    ViewAnswer { loss: mask.loss(), iou: mask.iou }
+    answer
 }
 
-fn empty_moments(scene: &Scene<'_>) -> Moments {
-    let mut moments = Moments::default();
-    for (axis, by_bin) in scene.view.axes.iter().zip(&mut moments.r_by_bin) {
-        if axis.kind == AxisKind::Doppler {
-            *by_bin = vec![0.0; axis.bins];
-        }
+/// Every cell by itself, as SPEC reads: the oracle, and the way out for masks softer than f32's range.
+fn plain<T: Real>(
+    scene: &Scene<'_>,
+    splats: &[Splat],
+    aim: &Aim,
+    scale: Option<f64>,
+    moments: &mut [Moments],
+) -> ViewAnswer {
+    let mut kernel = Kernel::<T>::new(splats, &aim.region.bins, scene.config.summation);
+    let mut ln_s = vec![f64::NEG_INFINITY; aim.region.cells()];
+    kernel.forward(&mut ln_s);
+    let mask = SoftMask::new(&ln_s, &aim.target, scene.config.tau_pct, scene.config.softness);
+    if let Some(scale) = scale {
+        kernel.backward(&mask.weight(&ln_s, &aim.target, scale), moments);
     }
-    moments
+    ViewAnswer { loss: mask.loss(), iou: mask.iou }
 }
 
 /// The soft mask of H_sim and what it has in common with the hard mask of H_ori.

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Everything that another step needs: restoring it continues the run bit for bit under the same configuration.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct FitState {
     /// Adam steps taken.
     pub iteration: usize,
@@ -22,12 +22,32 @@ pub struct FitState {
     pub losses: Vec<f64>,
 }
 
+impl Clone for FitState {
+    fn clone(&self) -> Self {
+        let Self { iteration, params, adam, losses } = self;
+        Self { iteration: *iteration, params: params.clone(), adam: adam.clone(), losses: losses.clone() }
+    }
+
+    /// Keeps the memory that is there.
+    fn clone_from(&mut self, source: &Self) {
+        self.iteration = source.iteration;
+        self.params.clone_from(&source.params);
+        self.adam.clone_from(&source.adam);
+        self.losses.clone_from(&source.losses);
+    }
+}
+
 /// Adam on the objective of one frame.
 pub struct Fitter {
     objective: Objective,
     body: Articulation,
     state: FitState,
     evaluation: Evaluation,
+    // Of the next step, until it is known to be finite; then they change places with those above.
+    next: FitState,
+    next_evaluation: Evaluation,
+    /// The step by the coordinates of root and bones.
+    turns: Vec<f64>,
 }
 
 impl Fitter {
@@ -46,7 +66,9 @@ impl Fitter {
         let evaluation = evaluate(&mut objective, &initial, 0)?;
         let adam = Adam::new(initial.shape());
         let losses = vec![evaluation.loss];
-        Ok(Self { objective, body, state: FitState { iteration: 0, params: initial, adam, losses }, evaluation })
+        let state = FitState { iteration: 0, params: initial, adam, losses };
+        let (next, next_evaluation) = (state.clone(), evaluation.clone());
+        Ok(Self { objective, body, state, evaluation, next, next_evaluation, turns: Vec::new() })
     }
 
     /// One Adam step from the current parameters, then their evaluation.
@@ -54,14 +76,16 @@ impl Fitter {
     /// # Errors
     /// [`FitError::Diverged`] where the new parameters or their loss are not finite; the fitter then stays where it was.
     pub fn step(&mut self) -> Result<StepReport, FitError> {
-        let mut next = self.state.clone();
+        let Self { objective, body, state, evaluation, next, next_evaluation, turns } = self;
+        next.clone_from(state);
         next.iteration += 1;
-        next.adam.update(&mut next.params, &self.evaluation.gradient, self.objective.config(), &self.body);
-        self.evaluation = evaluate(&mut self.objective, &next.params, next.iteration)?;
-        next.losses.push(self.evaluation.loss);
+        next.adam.update(&mut next.params, &evaluation.gradient, objective.config(), body, turns);
+        evaluate_into(objective, &next.params, next.iteration, next_evaluation)?;
+        next.losses.push(next_evaluation.loss);
         let surplus = next.losses.len().saturating_sub(LOOK_BACK + 1);
         next.losses.drain(..surplus);
-        self.state = next;
+        std::mem::swap(state, next);
+        std::mem::swap(evaluation, next_evaluation);
         Ok(self.report())
     }
 
@@ -160,11 +184,22 @@ impl Fitter {
 
 /// Evaluates, and refuses what is not finite.
 fn evaluate(objective: &mut Objective, params: &Pppr, iteration: usize) -> Result<Evaluation, FitError> {
+    let mut evaluation = Evaluation::zeros(params.shape());
+    evaluate_into(objective, params, iteration, &mut evaluation)?;
+    Ok(evaluation)
+}
+
+fn evaluate_into(
+    objective: &mut Objective,
+    params: &Pppr,
+    iteration: usize,
+    evaluation: &mut Evaluation,
+) -> Result<(), FitError> {
     let names = |joint: usize| joint_name(objective, params, joint);
     if let Some((joint, group)) = first_non_finite(params) {
         return Err(FitError::Diverged { iteration, joint: names(joint), term: group.key().to_owned() });
     }
-    let evaluation = objective.evaluate(params);
+    objective.evaluate_into(params, evaluation);
     if let Some((joint, group)) = first_non_finite(&evaluation.gradient) {
         let term = format!("the gradient of {}", group.key());
         return Err(FitError::Diverged { iteration, joint: joint_name(objective, params, joint), term });
@@ -184,7 +219,7 @@ fn evaluate(objective: &mut Objective, params: &Pppr, iteration: usize) -> Resul
         Some((term, _)) => {
             Err(FitError::Diverged { iteration, joint: "all joints".to_owned(), term: (*term).to_owned() })
         }
-        None => Ok(evaluation),
+        None => Ok(()),
     }
 }
 

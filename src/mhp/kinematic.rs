@@ -99,11 +99,10 @@ fn separation(params: &Pppr, limit: f64, gradient: &mut Pppr) -> f64 {
         let sum = (0..joints).fold([0.0; 3], |sum, j| add(sum, params.position(person * joints + j)));
         scale(sum, 1.0 / joints as f64)
     };
-    let centroids: Vec<Vec3> = (0..persons).map(centroid).collect();
     let mut total = 0.0;
     for s in 0..persons {
         for t in 0..s {
-            let Some((term, e_bar)) = repulsion(sub(centroids[s], centroids[t]), limit) else { continue };
+            let Some((term, e_bar)) = repulsion(sub(centroid(s), centroid(t)), limit) else { continue };
             total += term;
             for j in 0..joints {
                 add_to(gradient, Group::Position, s * joints + j, e_bar, 1.0 / joints as f64);

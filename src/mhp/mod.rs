@@ -2,7 +2,7 @@
 //!
 //! [`Problem`] is one frame; [`Objective`] answers loss and gradient for parameters; [`Fitter`] takes Adam steps. The
 //! forward model goes from joints to cells in two files, `splat.rs` (a joint in a view, f64) and `kernel.rs` (cells,
-//! f64 or f32), and back in `kernel.rs` (moments) and `adjoint.rs`.
+//! plainly) or `tiles.rs` (cells, f32, fast), and back in the same (moments) and `adjoint.rs`.
 
 mod adam;
 mod adjoint;
@@ -14,6 +14,7 @@ mod fitter;
 mod init;
 mod kernel;
 mod kinematic;
+mod lanes;
 mod objective;
 mod percentile;
 mod problem;
@@ -21,6 +22,7 @@ mod region;
 mod scalar;
 mod simulate;
 mod splat;
+mod tiles;
 mod types;
 
 pub use adam::Adam;
@@ -33,4 +35,5 @@ pub(crate) use percentile::{percentile, percentiles};
 pub use problem::{Neighbour, Problem};
 pub use region::Region;
 pub use simulate::simulate;
-pub use types::{Evaluation, FitError, Precision, StepReport, StopReason, Terms};
+pub use tiles::simd_path;
+pub use types::{Evaluation, FitError, Ious, Precision, StepReport, StopReason, Terms};

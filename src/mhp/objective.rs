@@ -1,15 +1,15 @@
 //! L(Θ) and ∂L/∂Θ; SPEC section 4.
 
-use super::em::{self, ViewAnswer};
+use super::em::{self, Aim, ViewAnswer, Workspace};
 use super::init::anchors;
 use super::percentile::percentile;
 use super::region::{self, Region};
 use super::splat::Scene;
+use super::tiles::Tiling;
 use super::{Evaluation, FitError, Precision, Problem, kinematic};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::geometry::{Vec3, add, add_scaled, dot, scale, sub};
-use crate::radar::View;
 use std::sync::Arc;
 
 /// The objective of one fit: its EM region and the mask of H_ori are fixed by the initial parameters.
@@ -19,8 +19,9 @@ pub struct Objective {
     precision: Precision,
     centres: Vec<Vec3>,
     regions: Vec<Region>,
-    /// B_ori over each region's cells.
-    targets: Vec<Vec<bool>>,
+    /// Each view's region with B_ori over its cells.
+    aims: Vec<Aim>,
+    workspaces: Vec<Workspace>,
     initial: Pppr,
     /// Where the frames around say that each person's middle is, m; empty where they say nothing.
     anchors: Vec<Vec3>,
@@ -59,14 +60,16 @@ impl Objective {
         problem.check(initial)?;
         let centres = region::centres(initial);
         let (regions, warnings) = region::regions(&problem, config.em_region, &centres)?;
-        let targets = targets(&problem.views, &regions, config.tau_pct, |view| problem.map(view));
+        let aims = aims(&problem, &regions, config.tau_pct);
+        let workspaces = regions.iter().map(|_| Workspace::default()).collect();
         let mut objective = Self {
             problem,
             config,
             precision,
             centres,
             regions,
-            targets,
+            aims,
+            workspaces,
             initial: initial.clone(),
             anchors: Vec::new(),
             warnings,
@@ -91,8 +94,7 @@ impl Objective {
             (self.regions, self.warnings) = (regions, warnings);
         }
         if config.em_region != before.em_region || config.tau_pct != before.tau_pct {
-            let problem = &self.problem;
-            self.targets = targets(&problem.views, &self.regions, config.tau_pct, |view| problem.map(view));
+            self.aims = aims(&self.problem, &self.regions, config.tau_pct);
         }
         self.anchor();
     }
@@ -125,16 +127,27 @@ impl Objective {
     /// L, its terms and its gradients at `params`, which must have the sizes of the initial parameters (those of another
     /// number of persons are accepted).
     pub fn evaluate(&mut self, params: &Pppr) -> Evaluation {
-        let mut em_gradient = Pppr::zeros(params.shape());
+        let mut evaluation = Evaluation::zeros(params.shape());
+        self.evaluate_into(params, &mut evaluation);
+        evaluation
+    }
+
+    /// As [`Self::evaluate`], into an evaluation of before: in single precision nothing is allocated from the second time on.
+    pub fn evaluate_into(&mut self, params: &Pppr, evaluation: &mut Evaluation) {
+        let Evaluation { loss, terms, iou, gradient, em_gradient } = evaluation;
+        em_gradient.reset(params.shape());
+        gradient.reset(params.shape());
+        iou.clear();
         let views = self.problem.views.len() as f64;
-        let (mut em, mut iou) = (0.0, Vec::with_capacity(self.regions.len()));
-        for index in 0..self.regions.len() {
-            let answer = self.view(index, params, Some((1.0 / views, &mut em_gradient)));
+        let mut em = 0.0;
+        let mut workspaces = std::mem::take(&mut self.workspaces);
+        for (index, workspace) in workspaces.iter_mut().enumerate() {
+            let answer = self.view(index, params, Some((1.0 / views, &mut *em_gradient)), workspace);
             em += answer.loss / views;
             iou.push(answer.iou);
         }
-        let mut gradient = Pppr::zeros(params.shape());
-        let mut terms = kinematic::evaluate(&self.problem.skeleton, &self.config, params, &mut gradient);
+        self.workspaces = workspaces;
+        *terms = kinematic::evaluate(&self.problem.skeleton, &self.config, params, gradient);
         terms.em = em;
         for group in Group::ALL {
             for (total, em) in gradient.group_mut(group).iter_mut().zip(em_gradient.group(group)) {
@@ -142,26 +155,28 @@ impl Objective {
             }
         }
         if self.config.w_time > 0.0 {
-            terms.time = anchored(&self.anchors, params, self.config.w_time, &mut gradient);
+            terms.time = anchored(&self.anchors, params, self.config.w_time, gradient);
         }
         let kinematic = terms.bone + terms.rigid + terms.joint + terms.sep + terms.coll;
-        let loss = self.config.w_em * em + self.config.w_time * terms.time + self.config.w_kine * kinematic;
-        Evaluation { loss, terms, iou, gradient, em_gradient }
+        *loss = self.config.w_em * em + self.config.w_time * terms.time + self.config.w_kine * kinematic;
     }
 
     /// L_EM alone, without its gradient.
     pub fn em_loss(&self, params: &Pppr) -> f64 {
-        let losses = (0..self.regions.len()).map(|index| self.view(index, params, None).loss);
+        let mut workspace = Workspace::default();
+        let losses = (0..self.aims.len()).map(|index| self.view(index, params, None, &mut workspace).loss);
         losses.sum::<f64>() / self.problem.views.len() as f64
     }
 
-    fn view(&self, index: usize, params: &Pppr, gradient: Option<(f64, &mut Pppr)>) -> ViewAnswer {
+    fn view(
+        &self,
+        index: usize,
+        params: &Pppr,
+        gradient: Option<(f64, &mut Pppr)>,
+        workspace: &mut Workspace,
+    ) -> ViewAnswer {
         let scene = Scene { radar: &self.problem.radar, view: &self.problem.views[index], config: &self.config };
-        let (region, target) = (&self.regions[index], &self.targets[index]);
-        match self.precision {
-            Precision::F64 => em::evaluate::<f64>(&scene, params, region, target, gradient),
-            Precision::F32 => em::evaluate::<f32>(&scene, params, region, target, gradient),
-        }
+        em::evaluate(&scene, self.precision, params, &self.aims[index], gradient, workspace)
     }
 }
 
@@ -185,11 +200,13 @@ fn anchored(anchors: &[Vec3], params: &Pppr, weight: f64, gradient: &mut Pppr) -
 }
 
 /// B_ori over each region's cells.
-fn targets<'a>(views: &[View], regions: &[Region], tau_pct: f64, map: impl Fn(usize) -> &'a [f64]) -> Vec<Vec<bool>> {
+fn aims(problem: &Problem, regions: &[Region], tau_pct: f64) -> Vec<Aim> {
     let of_view = |(view, region): (usize, &Region)| {
-        let cells: Vec<f64> = region.indices(&views[view].shape()).iter().map(|&i| map(view)[i]).collect();
+        let map = problem.map(view);
+        let cells: Vec<f64> = region.indices(&problem.views[view].shape()).iter().map(|&i| map[i]).collect();
         let threshold = percentile(&cells, 100.0 - tau_pct);
-        cells.iter().map(|&h| h > threshold).collect()
+        let target: Vec<bool> = cells.iter().map(|&h| h > threshold).collect();
+        Aim { tiling: Tiling::new(&region.bins, &target), target, region: region.clone() }
     };
     regions.iter().enumerate().map(of_view).collect()
 }
@@ -207,7 +224,7 @@ pub fn masks(objective: &Objective, view: usize, sim_map: &[f64]) -> Masks {
     let simulated: Vec<f64> = indices.iter().filter_map(|&i| sim_map.get(i).copied()).collect();
     let threshold = percentile(&simulated, 100.0 - objective.config.tau_pct);
     let mut masks = Masks { ori: vec![false; cells], sim: vec![false; cells], inside: vec![false; cells] };
-    for (&cell, &ori) in indices.iter().zip(&objective.targets[view]) {
+    for (&cell, &ori) in indices.iter().zip(&objective.aims[view].target) {
         masks.inside[cell] = true;
         masks.ori[cell] = ori;
         masks.sim[cell] = sim_map.get(cell).is_some_and(|&h| h > threshold);

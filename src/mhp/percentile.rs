@@ -1,7 +1,7 @@
 //! numpy's default percentile (linear interpolation), bit for bit, so that a strict comparison with it decides as numpy's.
 
 /// Where a percentile lies among `last + 1` sorted values: the order statistic at or below it, and the weight of the next.
-fn place(last: usize, q_pct: f64) -> (usize, f64) {
+pub(super) fn place(last: usize, q_pct: f64) -> (usize, f64) {
     let at = last as f64 * (q_pct / 100.0);
     let lower = (at.floor() as usize).min(last);
     (lower, at - lower as f64)
@@ -21,7 +21,8 @@ fn lerp(a: f64, b: f64, t: f64) -> f64 {
     if t >= 0.5 { b - (b - a) * (1.0 - t) } else { a + (b - a) * t }
 }
 
-fn between(a: f64, b: f64, t: f64) -> f64 {
+/// The percentile between two neighbouring order statistics, `t` the weight of the upper one.
+pub(super) fn between(a: f64, b: f64, t: f64) -> f64 {
     if a == b { a } else { lerp(a, b, t) }
 }
 

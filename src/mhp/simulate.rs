@@ -3,7 +3,7 @@
 use super::kernel::Kernel;
 use super::region::Region;
 use super::scalar::Real;
-use super::splat::{Scene, Splat};
+use super::splat::{Scene, Spectra, Splat};
 use super::{Precision, Problem};
 use crate::body::Pppr;
 use crate::config::{FitConfig, Summation};
@@ -24,7 +24,7 @@ fn ln_hypot(a: f64, b: f64) -> f64 {
 
 /// Every joint of `params` in one view.
 pub(super) fn splats(scene: &Scene<'_>, params: &Pppr) -> Vec<Splat> {
-    (0..params.shape().total_joints()).map(|joint| scene.splat(params, joint).0).collect()
+    (0..params.shape().total_joints()).map(|joint| scene.splat(params, joint, Spectra::default()).0).collect()
 }
 
 /// √(S² + ε²) from ln S, in linear f64: values that differ by less than a step of ln H near the floor stay apart, and the

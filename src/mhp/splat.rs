@@ -162,8 +162,11 @@ pub(super) struct Row {
     pub displacement: Vec3,
 }
 
+/// ln of the spectrum's factor a bin of each Doppler axis; empty on other axes.
+pub(super) type Spectra = [Vec<f64>; 3];
+
 /// What the per-cell kernel needs of one joint in one view.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Splat {
     /// Number of axes, 1 to 3.
     pub dims: usize,
@@ -177,8 +180,7 @@ pub(super) struct Splat {
     pub phase: f64,
     /// Phase ramp κ, rad per bin.
     pub kappa: [f64; 3],
-    /// ln of the spectrum's factor a bin of each Doppler axis; empty on other axes.
-    pub spectrum: [Vec<f64>; 3],
+    pub spectrum: Spectra,
 }
 
 /// What the derivative needs besides.
@@ -244,8 +246,8 @@ impl Scene<'_> {
         (skin.value / d.value, d, skin)
     }
 
-    /// Projects flat joint `joint` of `params` into this view.
-    pub(super) fn splat(&self, params: &Pppr, joint: usize) -> (Splat, Trace) {
+    /// Projects flat joint `joint` of `params` into this view; `spectrum` is overwritten and becomes the splat's.
+    pub(super) fn splat(&self, params: &Pppr, joint: usize, mut spectrum: Spectra) -> (Splat, Trace) {
         let pose = &self.view.pose;
         let unmoved = pose.view_from_world(params.position(joint));
         let seen = Seen::new(scale(unmoved, self.surface_factor(unmoved).0));
@@ -264,7 +266,7 @@ impl Scene<'_> {
 
         let dims = self.view.axes.len().min(3);
         let (mut rows, mut bin, mut kappa) = ([Row::default(); 3], [0.0; 3], [0.0; 3]);
-        let mut spectrum: [Vec<f64>; 3] = Default::default();
+        spectrum.iter_mut().for_each(Vec::clear);
         let mut covariance = [[0.0; 3]; 3];
         for (k, axis) in self.view.axes.iter().take(dims).enumerate() {
             rows[k] = self.row(&seen, axis);
@@ -273,7 +275,7 @@ impl Scene<'_> {
                 kappa[k] = omega_mean * dot(velocity, rows[k].displacement);
             }
             if axis.kind == AxisKind::Doppler {
-                spectrum[k] = spectrum_of(omega, omega_mean, axis.bins);
+                spectrum[k].extend(spectrum_of(omega, omega_mean, axis.bins));
             }
             covariance[k][k] = self.own_variance(axis) + 1.0 / 12.0;
         }
@@ -373,15 +375,13 @@ pub(super) fn feature_at(bin: usize, bins: usize, features: usize) -> (usize, f6
     (lower, t - lower as f64)
 }
 
-fn spectrum_of(omega: &[f64], mean: f64, bins: usize) -> Vec<f64> {
-    (0..bins)
-        .map(|bin| {
-            let (lower, t) = feature_at(bin, bins, omega.len());
-            let at = |i: usize| omega.get(i).copied().unwrap_or(0.0);
-            let upper = if t == 0.0 { 0.0 } else { at(lower + 1) * t };
-            at(lower) * (1.0 - t) + upper - mean
-        })
-        .collect()
+fn spectrum_of(omega: &[f64], mean: f64, bins: usize) -> impl Iterator<Item = f64> {
+    (0..bins).map(move |bin| {
+        let (lower, t) = feature_at(bin, bins, omega.len());
+        let at = |i: usize| omega.get(i).copied().unwrap_or(0.0);
+        let upper = if t == 0.0 { 0.0 } else { at(lower + 1) * t };
+        at(lower) * (1.0 - t) + upper - mean
+    })
 }
 
 /// ln σ(β), exact for large |β|.

@@ -1,7 +1,11 @@
 //! What an evaluation of the objective and a step of the fit answer.
 
-use crate::body::Pppr;
+use crate::body::{Pppr, PpprShape};
 use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
+
+/// One IoU a view; `None` where both masks are empty. Up to four views take no heap, so that a report allocates nothing.
+pub type Ious = SmallVec<[Option<f64>; 4]>;
 
 /// Which scalar the per-cell kernel of the forward model computes in. Per-joint quantities are always f64.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -42,11 +46,24 @@ pub struct Evaluation {
     /// The unweighted terms.
     pub terms: Terms,
     /// Forward-consistency IoU of each view over its EM region; `None` where both masks are empty.
-    pub iou: Vec<Option<f64>>,
+    pub iou: Ious,
     /// ∂L/∂Θ, the total.
     pub gradient: Pppr,
     /// ∂L_EM/∂Θ, unweighted.
     pub em_gradient: Pppr,
+}
+
+impl Evaluation {
+    /// All zeros, to be filled by [`super::Objective::evaluate_into`].
+    pub fn zeros(shape: PpprShape) -> Self {
+        Self {
+            loss: 0.0,
+            terms: Terms::default(),
+            iou: Ious::new(),
+            gradient: Pppr::zeros(shape),
+            em_gradient: Pppr::zeros(shape),
+        }
+    }
 }
 
 /// What is known of the fit after `iteration` Adam steps (0: the initial pose).
@@ -59,7 +76,7 @@ pub struct StepReport {
     /// Unweighted terms of the same.
     pub terms: Terms,
     /// Forward-consistency IoU of each view.
-    pub iou: Vec<Option<f64>>,
+    pub iou: Ious,
     /// The convergence criterion of SPEC section 4 at this iteration.
     pub converged: bool,
 }

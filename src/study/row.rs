@@ -173,7 +173,7 @@ mod tests {
 
     fn row(loss: f64, iou: Option<f64>, converged: bool) -> FrameRow {
         let terms = Terms { em: 0.5, time: 0.0, bone: 0.1, rigid: 0.2, joint: 0.3, sep: 0.0, coll: 0.0 };
-        let report = StepReport { iteration: 10, loss, terms, iou: vec![iou], converged };
+        let report = StepReport { iteration: 10, loss, terms, iou: vec![iou].into(), converged };
         let fit = FitNumbers {
             report,
             reason: StopReason::Iterations,

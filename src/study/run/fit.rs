@@ -132,7 +132,7 @@ impl<'a> Loaded<'a> {
             reason: reason.word().to_owned(),
             loss: report.loss,
             terms: [t.em, t.bone, t.rigid, t.joint, t.sep, t.coll],
-            iou: report.iou,
+            iou: report.iou.into_vec(),
             init_majpe_mm: before.majpe_mm,
             init_pa_majpe_mm: before.pa_majpe_mm,
             ..now

@@ -1,0 +1,212 @@
+//! `bench`: what an iteration, a simulation and a whole frame cost here.
+
+use super::common::{PrecisionArg, open, print};
+use crate::body::Pppr;
+use crate::config::{EmRegion, FitConfig};
+use crate::dataset::{Dataset, read_pppr};
+use crate::mhp::{Fitter, Precision, Problem, simd_path, simulate};
+use crate::start::{begin, problem_of};
+use anyhow::Context as _;
+use clap::{Args, ValueEnum};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+/// Iterations of a whole frame, as in the paper's timing.
+const FRAME_ITERATIONS: usize = 80;
+/// Iterations that are not timed: buffers grow, caches warm.
+const WARM_UP: usize = 20;
+/// How often initialisation, simulation and a whole frame are repeated; the fastest counts.
+const REPEATS: usize = 5;
+/// How long the batch runs at least.
+const BATCH: Duration = Duration::from_secs(1);
+
+/// Shown under the options of `bench --help`.
+pub(super) const HELP: &str = "\
+Exit codes: 0 measured; 2 bad input.
+
+The fit starts from --params, or from the data set's own params.npz beside its manifest, or from the frame's peaks. A
+fit.toml beside the manifest is the configuration. Times are of one thread, except frames_per_s.
+
+Examples:
+  mhp-inspector bench --dataset case
+      An iteration in the EM region, in single precision.
+  mhp-inspector bench --dataset case --region full --iterations 500 --json
+      On whole maps; one JSON object.";
+
+/// Where the objective is evaluated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum RegionArg {
+    /// As the configuration says.
+    Region,
+    /// Whole maps.
+    Full,
+}
+
+/// What `bench` is told.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// An MMVR tree or any folder inside one, a folder with `dataset.toml`, or an `.npy`/`.npz` of maps.
+    #[arg(long, value_name = "DIR")]
+    dataset: PathBuf,
+    /// PPPR npz to start from.
+    #[arg(long, value_name = "P.npz")]
+    params: Option<PathBuf>,
+    /// Iterations that are timed.
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+    iterations: u32,
+    /// Scalar of the per-cell kernel.
+    #[arg(long, value_enum, default_value = "f32")]
+    precision: PrecisionArg,
+    /// Cells that are compared.
+    #[arg(long, value_enum, default_value = "region")]
+    region: RegionArg,
+    /// Threads of the batch.
+    #[arg(long, value_name = "T", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    threads: u16,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What the program's allocator knows; the binary has one that counts.
+#[derive(Debug, Clone, Copy)]
+pub struct Meter {
+    /// Bytes allocated since the start, whatever became of them.
+    pub total_bytes: fn() -> usize,
+    /// The most that was held at one time.
+    pub peak_bytes: fn() -> usize,
+}
+
+static METER: OnceLock<Meter> = OnceLock::new();
+
+/// Tells `bench` where bytes are counted; only the first call counts.
+pub fn count_bytes_with(meter: Meter) {
+    METER.get_or_init(|| meter);
+}
+
+#[derive(Serialize)]
+struct Figures {
+    us_per_iteration_min: f64,
+    us_per_iteration_median: f64,
+    init_ms: Option<f64>,
+    simulate_ms: f64,
+    frame_ms: Option<f64>,
+    frames_per_s: Option<f64>,
+    bytes_per_iteration: Option<f64>,
+    peak_bytes: Option<usize>,
+    simd: &'static str,
+    precision: Precision,
+    cells: Vec<usize>,
+    joints: usize,
+    threads: u16,
+}
+
+/// Runs `bench`.
+///
+/// # Errors
+/// Where the data set, parameters or configuration cannot be read or do not fit each other, or the fit diverges.
+pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
+    let figures = measure(args)?;
+    if args.json {
+        print(&format!("{}\n", serde_json::to_string(&figures)?))?;
+    } else {
+        let table = serde_json::to_value(&figures)?;
+        let rows = table.as_object().into_iter().flatten().map(|(key, value)| format!("{key:<24} {value}\n"));
+        print(&rows.collect::<String>())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn measure(args: &BenchArgs) -> anyhow::Result<Figures> {
+    let dataset = open(&args.dataset, None)?;
+    let beside = |name: &str| Some(args.dataset.join(name)).filter(|path| path.is_file());
+    let mut config = beside("fit.toml").map_or_else(|| Ok(FitConfig::default()), |path| FitConfig::from_file(&path))?;
+    if args.region == RegionArg::Full {
+        config.em_region = EmRegion::Full;
+    }
+    let precision = Precision::from(args.precision);
+    let problem = problem(&dataset, 0)?;
+    // A start that cannot be found from the maps leaves its figures empty.
+    let init_ms = fastest_ms(|| begin(&problem, &config).is_ok());
+    let initial = match args.params.clone().or_else(|| beside("params.npz")) {
+        Some(path) => read_pppr(&path, None)?,
+        None => begin(&problem, &config)?.initialisation.params,
+    };
+    let mut fitter = Fitter::new(Arc::clone(&problem), config, precision, initial.clone())?;
+    for _ in 0..WARM_UP {
+        fitter.step()?;
+    }
+    let mut times_us = Vec::with_capacity(args.iterations as usize);
+    let before = METER.get().map(|meter| (meter.total_bytes)());
+    for _ in 0..args.iterations {
+        let began = Instant::now();
+        fitter.step()?;
+        times_us.push(began.elapsed().as_secs_f64() * 1e6);
+    }
+    let after = METER.get().map(|meter| (meter.total_bytes)());
+    times_us.sort_by(f64::total_cmp);
+    let bytes = before.zip(after).map(|(before, after)| (after - before) as f64 / f64::from(args.iterations));
+    let simulate_ms = fastest_ms(|| !simulate(&problem, &config, precision, &initial).is_empty());
+    let frame_ms = fastest_ms(|| whole_frame(&problem, &config, precision).is_some());
+    let frames_per_s = frame_ms.map(|_| batch(args, &dataset, &config, precision)).transpose()?;
+    Ok(Figures {
+        us_per_iteration_min: tenths(times_us[0]),
+        us_per_iteration_median: tenths(times_us[times_us.len() / 2]),
+        init_ms,
+        simulate_ms: simulate_ms.unwrap_or(f64::NAN),
+        frame_ms,
+        frames_per_s,
+        bytes_per_iteration: bytes,
+        peak_bytes: METER.get().map(|meter| (meter.peak_bytes)()),
+        simd: simd_path(),
+        precision,
+        cells: fitter.objective().regions().iter().map(crate::mhp::Region::cells).collect(),
+        joints: initial.shape().total_joints(),
+        threads: args.threads,
+    })
+}
+
+fn problem(dataset: &Dataset, index: usize) -> anyhow::Result<Arc<Problem>> {
+    let frame = dataset.load(index)?;
+    let problem = problem_of(dataset, &frame).with_context(|| dataset.frame_path(index).display().to_string())?;
+    Ok(Arc::new(problem))
+}
+
+/// Start and 80 iterations; `None` where there is no start or it diverges.
+fn whole_frame(problem: &Arc<Problem>, config: &FitConfig, precision: Precision) -> Option<Pppr> {
+    let initial = begin(problem, config).ok()?.initialisation.params;
+    let mut fitter = Fitter::new(Arc::clone(problem), *config, precision, initial).ok()?;
+    (0..FRAME_ITERATIONS).try_for_each(|_| fitter.step().map(drop)).ok()?;
+    Some(fitter.params().clone())
+}
+
+/// Frames a second with loading, start and 80 iterations, all threads busy.
+fn batch(args: &BenchArgs, dataset: &Dataset, config: &FitConfig, precision: Precision) -> anyhow::Result<f64> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(args.threads)).build()?;
+    let round = usize::from(args.threads) * 16;
+    let (began, mut done) = (Instant::now(), 0);
+    while began.elapsed() < BATCH {
+        let frames = done..done + round;
+        let one = |index: usize| problem(dataset, index % dataset.len()).map(|p| whole_frame(&p, config, precision));
+        pool.install(|| frames.into_par_iter().try_for_each(|index| one(index).map(drop)))?;
+        done += round;
+    }
+    Ok(tenths(done as f64 / began.elapsed().as_secs_f64()))
+}
+
+/// The fastest of some repetitions, ms; `None` where `work` says that it failed.
+fn fastest_ms(work: impl Fn() -> bool) -> Option<f64> {
+    let times = (0..REPEATS).map(|_| {
+        let began = Instant::now();
+        work().then(|| began.elapsed().as_secs_f64() * 1e3)
+    });
+    times.collect::<Option<Vec<f64>>>()?.into_iter().min_by(f64::total_cmp).map(|ms| (ms * 1e3).round() / 1e3)
+}
+
+fn tenths(x: f64) -> f64 {
+    (x * 10.0).round() / 10.0
+}

@@ -1,0 +1,165 @@
+//! As many f32 as the machine computes at once, with the few functions that the tiles need.
+//!
+//! The instruction set is chosen at run time by `pulp` (AVX-512, AVX2 with FMA, NEON or plain), which keeps this crate
+//! free of `unsafe`. Everything here is inlined into the function that `pulp` compiles for the chosen set.
+#![expect(
+    clippy::inline_always,
+    reason = "all of it belongs into the one function that is compiled for an instruction set"
+)]
+
+use pulp::Simd;
+use std::ops::{Add, AddAssign, Div, Mul, Sub};
+
+/// 1.5 · 2²³ + 127: adding it rounds to a whole number and leaves that number, biased as an exponent, in the low bits.
+const ROUND: f32 = 12_583_039.0;
+/// 2ᶠ on |f| ≤ ½, relative error 1e-7 (least squares at Chebyshev points).
+const EXP2: [f32; 6] = [1.000_000_1, 0.693_146_94, 0.240_221_22, 0.055_507_425, 0.009_675_46, 0.001_326_697];
+
+/// A register of f32.
+#[derive(Clone, Copy)]
+pub(super) struct Lanes<S: Simd> {
+    simd: S,
+    pub(super) value: S::f32s,
+}
+
+/// `x` in every lane.
+#[inline(always)]
+pub(super) fn splat<S: Simd>(simd: S, x: f32) -> Lanes<S> {
+    Lanes::new(simd, simd.splat_f32s(x))
+}
+
+impl<S: Simd> Lanes<S> {
+    #[inline(always)]
+    pub(super) fn new(simd: S, value: S::f32s) -> Self {
+        Self { simd, value }
+    }
+
+    /// self · b + c
+    #[inline(always)]
+    pub(super) fn mul_add(self, b: Self, c: Self) -> Self {
+        Self::new(self.simd, self.simd.mul_add_f32s(self.value, b.value, c.value))
+    }
+
+    #[inline(always)]
+    pub(super) fn min(self, b: Self) -> Self {
+        Self::new(self.simd, self.simd.min_f32s(self.value, b.value))
+    }
+
+    #[inline(always)]
+    pub(super) fn max(self, b: Self) -> Self {
+        Self::new(self.simd, self.simd.max_f32s(self.value, b.value))
+    }
+
+    #[inline(always)]
+    pub(super) fn abs(self) -> Self {
+        Self::new(self.simd, self.simd.abs_f32s(self.value))
+    }
+
+    #[inline(always)]
+    pub(super) fn sqrt(self) -> Self {
+        Self::new(self.simd, self.simd.sqrt_f32s(self.value))
+    }
+
+    /// `yes` where self > b, else `no`.
+    #[inline(always)]
+    pub(super) fn choose(self, b: Self, yes: Self, no: Self) -> Self {
+        let mask = self.simd.less_than_f32s(b.value, self.value);
+        Self::new(self.simd, self.simd.select_f32s(mask, yes.value, no.value))
+    }
+
+    #[inline(always)]
+    pub(super) fn any_positive(self) -> bool {
+        let simd = self.simd;
+        simd.first_true_m32s(simd.less_than_f32s(simd.splat_f32s(0.0), self.value)) < S::F32_LANES
+    }
+
+    /// The first lane: a scalar again where all are alike.
+    #[inline(always)]
+    pub(super) fn first(self) -> f32 {
+        bytemuck::cast_slice::<S::f32s, f32>(std::slice::from_ref(&self.value))[0]
+    }
+
+    #[inline(always)]
+    pub(super) fn sum(self) -> f32 {
+        self.simd.reduce_sum_f32s(self.value)
+    }
+
+    #[inline(always)]
+    pub(super) fn largest(self) -> f32 {
+        self.simd.reduce_max_f32s(self.value)
+    }
+
+    /// 2ˣ for x in −126 ..= 127.
+    #[inline(always)]
+    pub(super) fn exp2(self) -> Self {
+        let simd = self.simd;
+        let rounded = self + splat(simd, ROUND);
+        let f = self - (rounded - splat(simd, ROUND));
+        let mut power = splat(simd, EXP2[5]);
+        for k in (0..5).rev() {
+            power = power.mul_add(f, splat(simd, EXP2[k]));
+        }
+        let bits = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(rounded.value), simd.splat_u32s(23));
+        power * Self::new(simd, simd.transmute_f32s_u32s(bits))
+    }
+
+    /// log₂ x of a positive normal x, absolute error 1e-7 or a unit in the last place.
+    #[inline(always)]
+    pub(super) fn log2(self) -> Self {
+        let simd = self.simd;
+        let bits = simd.transmute_u32s_f32s(self.value);
+        // The exponent as the low bits of 2²³.
+        let shifted = simd.wrapping_dyn_shr_u32s(bits, simd.splat_u32s(23));
+        let whole = Self::new(simd, simd.transmute_f32s_u32s(simd.or_u32s(shifted, simd.splat_u32s(0x4B00_0000))));
+        let fraction = simd.or_u32s(simd.and_u32s(bits, simd.splat_u32s(0x007F_FFFF)), simd.splat_u32s(0x3F80_0000));
+        let m = Self::new(simd, simd.transmute_f32s_u32s(fraction));
+        let root = splat(simd, std::f32::consts::SQRT_2);
+        let s = (m - root) / (m + root);
+        let s2 = s * s;
+        // 2/ln 2 · (s + s³/3 + s⁵/5 + s⁷/7)
+        let series = s2
+            .mul_add(splat(simd, 0.412_198_58), splat(simd, 0.577_078))
+            .mul_add(s2, splat(simd, 0.961_796_7))
+            .mul_add(s2, splat(simd, 2.885_39));
+        s.mul_add(series, (whole - splat(simd, 8_388_735.0)) + splat(simd, 0.5))
+    }
+}
+
+impl<S: Simd> Add for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        Self::new(self.simd, self.simd.add_f32s(self.value, b.value))
+    }
+}
+
+impl<S: Simd> AddAssign for Lanes<S> {
+    #[inline(always)]
+    fn add_assign(&mut self, b: Self) {
+        *self = *self + b;
+    }
+}
+
+impl<S: Simd> Sub for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, b: Self) -> Self {
+        Self::new(self.simd, self.simd.sub_f32s(self.value, b.value))
+    }
+}
+
+impl<S: Simd> Mul for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, b: Self) -> Self {
+        Self::new(self.simd, self.simd.mul_f32s(self.value, b.value))
+    }
+}
+
+impl<S: Simd> Div for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, b: Self) -> Self {
+        Self::new(self.simd, self.simd.div_f32s(self.value, b.value))
+    }
+}
