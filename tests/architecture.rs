@@ -32,8 +32,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "session",
         &[
-            "digest", "geometry", "folders", "config", "radar", "body", "mhp", "people", "dataset", "diagnose",
-            "labels", "study", "worker",
+            "digest", "geometry", "folders", "config", "radar", "body", "mhp", "people", "dataset", "start",
+            "diagnose", "labels", "study", "worker",
         ],
     ),
     (
@@ -48,7 +48,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
 /// Rooms that know no window and no GPU.
 const WINDOWLESS: &[&str] = &[
     "digest", "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels", "worker",
-    "session", "study", "simulate", "people",
+    "session", "study", "simulate", "people", "start",
 ];
 
 fn files(folder: &Path) -> Vec<PathBuf> {

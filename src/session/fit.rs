@@ -3,7 +3,8 @@
 use super::history::{Branch, History, Row};
 use super::state::FitHashes;
 use crate::body::Pppr;
-use crate::mhp::{Initialisation, Problem};
+use crate::mhp::Problem;
+use crate::start::Begun;
 use crate::worker::{JobId, Snapshot};
 use std::sync::Arc;
 
@@ -36,8 +37,8 @@ pub struct Fit {
     pub problem: Option<Arc<Problem>>,
     /// The pose that fixes the EM region.
     pub initial: Option<Pppr>,
-    /// How the start pose was found.
-    pub initialisation: Option<Initialisation>,
+    /// How the start pose was found, and how many people were counted.
+    pub begun: Option<Begun>,
     /// Milliseconds that took.
     pub init_ms: f64,
     /// Parameters were edited by hand.

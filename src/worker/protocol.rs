@@ -3,7 +3,8 @@
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::{Dataset, Frame};
-use crate::mhp::{Evaluation, FitState, Initialisation, Masks, Precision, Problem, StepReport, StopReason};
+use crate::mhp::{Evaluation, FitState, Masks, Precision, Problem, StepReport, StopReason};
+use crate::start::Begun;
 use std::sync::Arc;
 
 /// Identifies one fit of one frame; messages of an older job are dropped.
@@ -130,8 +131,8 @@ pub struct HistoryRow {
 pub struct Prepared {
     /// Maps filled, shapes checked.
     pub problem: Arc<Problem>,
-    /// How the start pose was found; `None` when warm or resumed.
-    pub initialisation: Option<Initialisation>,
+    /// How the start pose was found, and how many people were counted; `None` when warm or resumed.
+    pub begun: Option<Begun>,
     /// The pose that fixes the EM region.
     pub initial: Pppr,
     /// Warnings of the objective (an EM region without cells, …).

@@ -215,11 +215,11 @@ impl Job {
         let Prepare { job, branch, dataset, frame, config, precision, start } = prepare;
         let problem = Arc::new(problem_of(&dataset, &frame)?);
         let began = Instant::now();
-        let (initialisation, initial, state) = match start {
+        let (begun, initial, state) = match start {
             Start::Initialise => {
-                let found = begin(&problem, &config)?.initialisation;
-                let initial = found.params.clone();
-                (Some(found), initial, None)
+                let begun = begin(&problem, &config)?;
+                let initial = begun.initialisation.params.clone();
+                (Some(begun), initial, None)
             }
             Start::Warm(params) => (None, predict(&problem, &params), None),
             Start::Resume { initial, state } => (None, initial, Some(state)),
@@ -253,7 +253,7 @@ impl Job {
         if !resumed {
             new.push_row();
         }
-        Ok((new, Prepared { problem, initialisation, initial, warnings, init_ms }))
+        Ok((new, Prepared { problem, begun, initial, warnings, init_ms }))
     }
 
     fn iteration(&self) -> usize {

@@ -142,6 +142,15 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
     let (loss, terms, iou) =
         evaluation.map_or((report.loss, report.terms, report.iou.clone()), |e| (e.loss, e.terms, e.iou.clone()));
     value_row(ui, "Iteration", &format!("{} / {}", report.iteration, fit.head()), "");
+    if let Some(count) = fit.begun.as_ref().and_then(|begun| begun.count.as_ref()) {
+        let (people, chances) = (count.people(), count.probabilities.map(|p| format!("{:.0} %", 100.0 * p)));
+        let chance = chances.get(people).cloned().unwrap_or_default();
+        value_row(ui, "People counted", &format!("{people} ({chance})"), "").on_hover_text(format!(
+            "0 to 4 and more: {}. Fitted: {}; “people” under Start overrides the count.",
+            chances.join(", "),
+            fit.initial.as_ref().map_or(0, |initial| initial.shape().persons)
+        ));
+    }
     value_row(ui, "L total", &format!("{loss:.5}"), "")
         .on_hover_text("L = w_EM·L_EM + w_kine·(L_bone + L_rigid + L_joint + L_sep + L_coll)");
     value_row(ui, "L_EM", &format!("{:.5}", terms.em), "")

@@ -117,8 +117,8 @@ impl Session {
         for warning in &prepared.warnings {
             self.note(LogLevel::Warning, warning.clone());
         }
-        if let Some(found) = &prepared.initialisation {
-            for note in &found.notes {
+        if let Some(begun) = &prepared.begun {
+            for note in &begun.initialisation.notes {
                 self.note(LogLevel::Info, note.clone());
             }
         }
@@ -130,8 +130,8 @@ impl Session {
         self.fit.initial = Some(prepared.initial);
         self.identify();
         self.fit.init_ms = prepared.init_ms;
-        if prepared.initialisation.is_some() {
-            self.fit.initialisation = prepared.initialisation;
+        if prepared.begun.is_some() {
+            self.fit.begun = prepared.begun;
         }
         self.fit.status = FitStatus::Paused;
         // A fit that comes back, from this session or from a file, is known to the list again.
