@@ -11,6 +11,9 @@
 //! 6. Every joint gets its Gaussian ([`scatterers`]), and the start is spoiled where the settings ask for it
 //!    ([`perturb`]).
 //!
+//! Switches beside the paper's setting refine the start: behind the skin, on the line through the frames around, as high as
+//! floor and head say ([`height`]), in the posture that fits ([`pose`]). What it is without them is kept beside it.
+//!
 //! Nothing here reads a label.
 
 mod evidence;
