@@ -1,5 +1,6 @@
 //! One frame's worth of optimisation problem: radar, skeleton, views and their maps, checked and filled.
 
+use super::init::{Cached, Surroundings};
 use super::{FitError, fill_missing};
 use crate::body::{Pppr, Skeleton};
 use crate::radar::{RadarConfig, View};
@@ -33,6 +34,7 @@ pub struct Problem {
     maps: Vec<Vec<f64>>,
     filled: Vec<usize>,
     neighbours: Vec<Neighbour>,
+    surroundings: Cached,
 }
 
 impl Problem {
@@ -48,7 +50,7 @@ impl Problem {
         check_skeleton(&skeleton)?;
         views.iter().try_for_each(check_view)?;
         let (maps, filled) = fill(&views, maps)?;
-        Ok(Self { radar, skeleton, views, maps, filled, neighbours: Vec::new() })
+        Ok(Self { radar, skeleton, views, maps, filled, neighbours: Vec::new(), surroundings: Cached::default() })
     }
 
     /// Adds the maps of a frame shortly before or after: (seconds after this frame, one map a view). The start reads
@@ -62,8 +64,14 @@ impl Problem {
         }
         let (maps, _) = fill(&self.views, maps)?;
         self.neighbours.push(Neighbour { offset_s, maps });
+        self.surroundings = Cached::default();
         self.neighbours.sort_by(|a, b| a.offset_s.total_cmp(&b.offset_s));
         Ok(())
+    }
+
+    /// What the maps show, worked out when first asked for; views must not be changed afterwards.
+    pub(super) fn surroundings(&self) -> &Surroundings {
+        self.surroundings.of(self)
     }
 
     /// The frames shortly before and after, in the order of time.

@@ -4,6 +4,7 @@ use crate::config::FitConfig;
 use crate::geometry::Vec3;
 use crate::mhp::{FitError, Initialisation, Problem, initialise, initialise_people};
 use crate::people::{Count, Counter, Scan};
+use std::sync::Arc;
 
 /// A start, and the count that it rests on where people were counted.
 #[derive(Debug, Clone)]
@@ -19,7 +20,7 @@ pub struct Begun {
 /// # Errors
 /// [`FitError::NoStart`] where nothing stands above the background, nobody was counted, or people cannot be counted in
 /// these views.
-pub fn begin(problem: &Problem, config: &FitConfig) -> Result<Begun, FitError> {
+pub fn begin(problem: &Arc<Problem>, config: &FitConfig) -> Result<Begun, FitError> {
     // One person is looked for as the paper does, without a count.
     if config.people == 1 {
         return Ok(Begun { initialisation: initialise(problem, config)?, count: None });

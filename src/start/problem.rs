@@ -7,7 +7,7 @@ use crate::dataset::{Dataset, Frame};
 use crate::mhp::{FitError, Problem};
 
 /// Frames looked at on each side.
-const REACH: usize = 2;
+const REACH: usize = 4;
 /// Frames a second where a data set does not say.
 const USUAL_RATE_HZ: f64 = 10.0;
 

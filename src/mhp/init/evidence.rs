@@ -3,12 +3,15 @@
 //! A strong echo smears along its own range (sidelobes of the angular transform), and so do walls that surround the
 //! radar: both are arcs about the radar. A person is compact. So each cell is compared with the median of the cells at
 //! the same range; where a view does not resolve range, with the median of the map.
+//!
+//! What the axes alone decide ([`Layout`]) is worked out once for all maps of a view. Cells are f32 of the map's largest.
 
 use super::super::fill::for_neighbours;
-use super::super::percentile::percentile;
 use super::super::splat::Seen;
 use crate::geometry::{Vec3, add_scaled, dot, mat_t_vec, scale};
 use crate::radar::{Axis, AxisKind, View};
+use smallvec::SmallVec;
+use std::sync::Arc;
 
 /// Echoes nearer than this are leakage from the radar itself, m.
 const NEAREST_M: f64 = 0.5;
@@ -21,8 +24,12 @@ const PERCENTILES: [f64; 6] = [99.5, 99.0, 98.0, 96.0, 92.0, 85.0];
 const ENOUGH_PEAKS: usize = 12;
 /// How far below its strongest cell a body is still lit, ln: 26 dB.
 pub(super) const DEPTH_LN: f64 = 3.0;
+/// Cells are held above this share of the map's largest.
+const FAINTEST: f32 = 1e-12;
 /// A step this short ends the search for the point that peaks agree on, m.
 const LOCATED_M: f64 = 1e-4;
+/// Where the search begins when nothing is known of the point: before the radar, m.
+const BEFORE_RADAR: Vec3 = [2.0, 0.0, 0.0];
 /// At most this many peaks of a view are kept, strongest first.
 const MOST_PEAKS: usize = 40;
 
@@ -33,7 +40,7 @@ pub struct Peak {
     pub view: usize,
     /// Bin on each axis of the view.
     pub bin: Vec<usize>,
-    /// H_ori there.
+    /// H_ori there, to single precision.
     pub value: f64,
     /// H_ori over the background at the same range, ln.
     pub salience: f64,
@@ -44,7 +51,7 @@ pub struct Peak {
 pub(super) struct Mark {
     pub view: usize,
     /// A bin a spatial axis, in the order of the view's axes without Doppler.
-    pub bin: Vec<f64>,
+    pub bin: SmallVec<[f64; 3]>,
 }
 
 /// What the change from one map to another tells at a point.
@@ -56,77 +63,52 @@ pub(super) struct Flow {
     pub sign: f64,
 }
 
-/// A view's map without its Doppler axes (the strongest Doppler bin stands for a cell).
-pub(super) struct Evidence<'a> {
-    view: &'a View,
+/// A view as evidence sees it: its axes without Doppler, and the rings of cells at the same range.
+#[derive(Debug)]
+pub(super) struct Layout {
+    view: View,
     index: usize,
     /// Spatial axes and their places among the view's axes.
-    axes: Vec<(usize, &'a Axis)>,
+    axes: Vec<(usize, Axis)>,
     shape: Vec<usize>,
-    /// H of each spatial cell, and the full cell it was taken from.
-    value: Vec<f64>,
-    source: Vec<usize>,
-    /// ln H over the background, ≥ 0.
-    salience: Vec<f64>,
-    /// H over the background, of the map's largest.
-    excess: Vec<f64>,
+    /// Spatial cells ring by ring, and where each ring begins.
+    cells: Vec<u32>,
+    rings: Vec<usize>,
+    /// Cells too near to the radar to tell anything.
+    deaf: Vec<u32>,
 }
 
-impl<'a> Evidence<'a> {
-    /// `unrest` is how restless each cell of the map is, 0 to 1, where the frames around tell it ([`unrest`]): what stands
-    /// still is no evidence.
-    pub(super) fn new(index: usize, view: &'a View, map: &[f64], unrest: Option<&[f64]>) -> Self {
-        let axes: Vec<(usize, &Axis)> =
-            view.axes.iter().enumerate().filter(|(_, axis)| axis.kind != AxisKind::Doppler).collect();
+impl Layout {
+    pub(super) fn new(index: usize, view: &View) -> Self {
+        let spatial = view.axes.iter().enumerate().filter(|(_, axis)| axis.kind != AxisKind::Doppler);
+        let axes: Vec<(usize, Axis)> = spatial.map(|(k, axis)| (k, axis.clone())).collect();
         let shape: Vec<usize> = axes.iter().map(|(_, axis)| axis.bins).collect();
-        let cells = shape.iter().product();
-        let (value, source) = if axes.len() == view.axes.len() {
-            (map.to_vec(), (0..cells).collect())
-        } else {
-            let (mut value, mut source) = (vec![f64::NEG_INFINITY; cells], vec![0; cells]);
-            for (cell, &h) in map.iter().enumerate() {
-                let bins = unravel(cell, &view.shape());
-                let spatial = axes.iter().fold(0, |flat, &(k, axis)| flat * axis.bins + bins[k]);
-                if h > value[spatial] {
-                    (value[spatial], source[spatial]) = (h, cell);
-                }
-            }
-            (value, source)
+        let count: usize = shape.iter().product();
+        let mut layout = Self { view: view.clone(), index, axes, shape, cells: vec![], rings: vec![], deaf: vec![] };
+        let ranges = layout.ranges_m();
+        let widths = layout.axes.iter().filter(|(_, a)| !a.kind.is_angular()).map(|(_, a)| a.step().abs());
+        let width_m = widths.fold(f64::INFINITY, f64::min);
+        let ring_of: Vec<usize> = match &ranges {
+            Some(ranges) => ranges.iter().map(|range| (range / width_m).round() as usize).collect(),
+            None => vec![0; count],
         };
-        let mut evidence = Self { view, index, axes, shape, value, source, salience: vec![], excess: vec![] };
-        evidence.subtract_background();
-        if let Some(unrest) = unrest {
-            for (spatial, &cell) in evidence.source.iter().enumerate() {
-                evidence.salience[spatial] *= unrest[cell];
-                evidence.excess[spatial] *= unrest[cell];
-            }
+        // Counting sort: how many cells each ring has, where it begins, and each cell to its place.
+        layout.rings = vec![0; ring_of.iter().max().map_or(1, |last| last + 2)];
+        for &ring in &ring_of {
+            layout.rings[ring + 1] += 1;
         }
-        evidence
-    }
-
-    fn subtract_background(&mut self) {
-        let largest = self.value.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-        let tiny = largest * 1e-12;
-        let ln: Vec<f64> = self.value.iter().map(|h| h.max(tiny).ln()).collect();
-        let ranges = self.ranges_m();
-        let ring_m = self.axes.iter().filter(|(_, a)| !a.kind.is_angular()).map(|(_, a)| a.step().abs());
-        let ring_m = ring_m.fold(f64::INFINITY, f64::min);
-        let rings: Option<Vec<usize>> =
-            ranges.as_ref().map(|ranges| ranges.iter().map(|range| (range / ring_m).round() as usize).collect());
-        let ring = |cell: usize| rings.as_ref().map_or(0, |rings| rings[cell]);
-        let count = rings.iter().flatten().copied().max().unwrap_or(0) + 1;
-        let mut members: Vec<Vec<f64>> = vec![Vec::new(); count];
-        for (cell, &x) in ln.iter().enumerate() {
-            members[ring(cell)].push(x);
+        for ring in 1..layout.rings.len() {
+            layout.rings[ring] += layout.rings[ring - 1];
         }
-        let overall = if members.iter().any(|m| m.len() < SMALLEST_RING) { median(&mut ln.clone()) } else { 0.0 };
-        let background: Vec<f64> =
-            members.iter_mut().map(|m| if m.len() < SMALLEST_RING { overall } else { median(m) }).collect();
-        let far_enough = |cell: usize| ranges.as_ref().is_none_or(|ranges| ranges[cell] > NEAREST_M);
-        let above = |cell: usize| if far_enough(cell) { (ln[cell] - background[ring(cell)]).max(0.0) } else { 0.0 };
-        self.salience = (0..ln.len()).map(above).collect();
-        let over_speckle = |s: f64| if s > SPECKLE { 1.0 - (SPECKLE - s).exp() } else { 0.0 };
-        self.excess = self.salience.iter().zip(&self.value).map(|(&s, h)| h / largest * over_speckle(s)).collect();
+        let mut next = layout.rings.clone();
+        layout.cells = vec![0; count];
+        for (cell, &ring) in ring_of.iter().enumerate() {
+            layout.cells[next[ring]] = cell as u32;
+            next[ring] += 1;
+        }
+        let deaf = ranges.iter().flatten().enumerate().filter(|(_, range)| **range <= NEAREST_M);
+        layout.deaf = deaf.map(|(cell, _)| cell as u32).collect();
+        layout
     }
 
     /// Distance of each cell from the view's origin as far as the axes tell it, m; `None` where no axis tells any.
@@ -150,60 +132,159 @@ impl<'a> Evidence<'a> {
         Some(squares.into_iter().map(f64::sqrt).collect())
     }
 
+    /// ln of `value` over the median of its ring, ≥ 0. `value` must be positive.
+    fn salience(&self, value: &[f32]) -> Vec<f32> {
+        // Positive floats sort as their bits do, and integers are partitioned several times as fast.
+        let mut bits: Vec<u32> = self.cells.iter().map(|&cell| value[cell as usize].to_bits()).collect();
+        let small = self.rings.windows(2).any(|ends| ends[1] - ends[0] < SMALLEST_RING);
+        let overall = if small { median(&mut bits.clone()) } else { 1.0 };
+        let mut salience = vec![0.0; value.len()];
+        for ends in self.rings.windows(2) {
+            let ring = ends[0]..ends[1];
+            let background = if ring.len() < SMALLEST_RING { overall } else { median(&mut bits[ring.clone()]) };
+            for &cell in &self.cells[ring] {
+                let ratio = value[cell as usize] / background;
+                salience[cell as usize] = if ratio > 1.0 { ratio.ln() } else { 0.0 };
+            }
+        }
+        for &cell in &self.deaf {
+            salience[cell as usize] = 0.0;
+        }
+        salience
+    }
+}
+
+/// A view's map without its Doppler axes (the strongest Doppler bin stands for a cell).
+#[derive(Debug, Clone)]
+pub(super) struct Evidence {
+    layout: Arc<Layout>,
+    /// H of each spatial cell, of the map's largest, and the full cell it was taken from where that is another.
+    value: Vec<f32>,
+    source: Vec<u32>,
+    largest: f64,
+    /// ln H over the background, ≥ 0.
+    salience: Vec<f32>,
+    /// How restless each spatial cell is, 0 to 1: what stands still is no evidence. `None` where nothing tells.
+    unrest: Option<Arc<Vec<f32>>>,
+}
+
+impl Evidence {
+    pub(super) fn new(layout: &Arc<Layout>, map: &[f64]) -> Self {
+        let largest = map.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        let relative = |h: f64| ((h / largest) as f32).max(FAINTEST);
+        let (mut value, mut source) = (Vec::new(), Vec::new());
+        if layout.axes.len() == layout.view.axes.len() {
+            value.extend(map.iter().map(|&h| relative(h)));
+        } else {
+            let cells = layout.cells.len();
+            (value, source) = (vec![0.0; cells], vec![0; cells]);
+            for (cell, &h) in map.iter().enumerate() {
+                let bins = unravel(cell, &layout.view.shape());
+                let spatial = layout.axes.iter().fold(0, |flat, (k, axis)| flat * axis.bins + bins[*k]);
+                if relative(h) > value[spatial] {
+                    (value[spatial], source[spatial]) = (relative(h), cell as u32);
+                }
+            }
+        }
+        let salience = layout.salience(&value);
+        Self { layout: Arc::clone(layout), value, source, largest, salience, unrest: None }
+    }
+
+    /// The same map where what stands still is no evidence; `unrest` is how restless each cell of the map is, 0 to 1.
+    pub(super) fn where_restless(self, unrest: &[f32]) -> Self {
+        let of_spatial = (0..self.value.len()).map(|cell| unrest[self.source(cell)]).collect();
+        Self { unrest: Some(Arc::new(of_spatial)), ..self }
+    }
+
+    /// The same map, with the stillness of another map of the view.
+    pub(super) fn as_restless_as(self, other: &Self) -> Self {
+        Self { unrest: other.unrest.clone(), ..self }
+    }
+
+    /// The cell of the whole map that a spatial cell was taken from.
+    fn source(&self, spatial: usize) -> usize {
+        self.source.get(spatial).map_or(spatial, |&cell| cell as usize)
+    }
+
+    fn unrest(&self, cell: usize) -> f64 {
+        self.unrest.as_ref().map_or(1.0, |unrest| f64::from(unrest[cell]))
+    }
+
+    /// ln H over the background of what moves, ≥ 0.
+    fn salience(&self, cell: usize) -> f64 {
+        f64::from(self.salience[cell]) * self.unrest(cell)
+    }
+
+    /// H over the background of what moves, of the map's largest.
+    fn excess(&self, cell: usize) -> f64 {
+        let salience = f64::from(self.salience[cell]);
+        let over_speckle = if salience > SPECKLE { 1.0 - (SPECKLE - salience).exp() } else { 0.0 };
+        f64::from(self.value[cell]) * over_speckle * self.unrest(cell)
+    }
+
     /// Local maxima above the strictest percentile that leaves enough of them, strongest excess first.
     pub(super) fn peaks(&self) -> Vec<Peak> {
-        let mut kept = Vec::new();
+        let mut bits: Vec<u32> = self.value.iter().map(|x| x.to_bits()).collect();
+        let last = bits.len().saturating_sub(1);
+        // From the strictest down: everything above the last level is already in the upper part.
+        let mut rest = bits.as_mut_slice();
+        let mut kept: Vec<(f64, usize)> = Vec::new();
         for q in PERCENTILES {
-            let level = percentile(&self.value, q);
-            let high = (0..self.value.len()).filter(|&cell| self.value[cell] >= level);
-            kept = high.filter(|&cell| self.is_maximum(cell)).collect();
+            let at = (last as f64 * q / 100.0).ceil() as usize;
+            if at >= rest.len() {
+                continue;
+            }
+            let (below, &mut level, _) = rest.select_nth_unstable(at);
+            rest = below;
+            let high = (0..self.value.len()).filter(|&cell| self.value[cell].to_bits() >= level);
+            kept = high.filter(|&cell| self.is_maximum(cell)).map(|cell| (self.excess(cell), cell)).collect();
             if kept.len() >= ENOUGH_PEAKS {
                 break;
             }
         }
-        kept.sort_by(|&a, &b| self.excess[b].total_cmp(&self.excess[a]).then(a.cmp(&b)));
+        kept.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         kept.truncate(MOST_PEAKS);
-        kept.into_iter().map(|cell| self.peak(cell)).collect()
+        kept.into_iter().map(|(_, cell)| self.peak(cell)).collect()
     }
 
     fn is_maximum(&self, cell: usize) -> bool {
-        let mut highest = self.excess[cell] > 0.0;
+        let mut highest = self.excess(cell) > 0.0;
         if !highest {
             return false;
         }
-        for_neighbours(&self.shape, cell, |other| highest &= self.value[other] <= self.value[cell]);
+        for_neighbours(&self.layout.shape, cell, |other| highest &= self.value[other] <= self.value[cell]);
         highest
     }
 
     fn peak(&self, cell: usize) -> Peak {
         Peak {
-            view: self.index,
-            bin: unravel(self.source[cell], &self.view.shape()),
-            value: self.value[cell],
-            salience: self.salience[cell],
+            view: self.layout.index,
+            bin: unravel(self.source(cell), &self.layout.view.shape()).to_vec(),
+            value: self.largest * f64::from(self.value[cell]),
+            salience: self.salience(cell),
         }
     }
 
     /// The spatial cell at a world point; `None` outside the map.
     fn cell(&self, p_world: Vec3) -> Option<usize> {
-        let seen = Seen::new(self.view.pose.view_from_world(p_world));
-        self.axes.iter().try_fold(0, |flat, (_, axis)| {
-            let bin = axis.bin(seen.coordinate(axis, 0.0)).round();
+        let p = self.layout.view.pose.view_from_world(p_world);
+        self.layout.axes.iter().try_fold(0, |flat, (_, axis)| {
+            let bin = axis.bin(axis.coordinate(p)).round();
             (bin >= 0.0 && bin < axis.bins as f64).then_some(flat * axis.bins + bin as usize)
         })
     }
 
     /// Mean over `points` of the amplitude over the background, of the map's largest.
     pub(super) fn mean_excess(&self, points: &[Vec3]) -> f64 {
-        let sum: f64 = points.iter().filter_map(|&p| self.cell(p)).map(|cell| self.excess[cell]).sum();
+        let sum: f64 = points.iter().filter_map(|&p| self.cell(p)).map(|cell| self.excess(cell)).sum();
         sum / points.len().max(1) as f64
     }
 
     /// Whether some axis of this view tells heights near a world point.
     pub(super) fn resolves_height(&self, p_world: Vec3) -> bool {
-        let seen = Seen::new(self.view.pose.view_from_world(p_world));
-        self.axes.iter().any(|(_, axis)| {
-            let up = mat_t_vec(&self.view.pose.rotation, seen.direction_and_arm(axis.kind).0)[2];
+        let seen = Seen::new(self.layout.view.pose.view_from_world(p_world));
+        self.layout.axes.iter().any(|(_, axis)| {
+            let up = mat_t_vec(&self.layout.view.pose.rotation, seen.direction_and_arm(axis.kind).0)[2];
             up.abs() > 0.7
         })
     }
@@ -213,76 +294,105 @@ impl<'a> Evidence<'a> {
         let distance = p_world[0].hypot(p_world[1]).max(NEAREST_M);
         let along = (-8..=8).map(|k| 1.0 + reach_m * f64::from(k) / (8.0 * distance));
         let cells = along.filter_map(|k| self.cell([p_world[0] * k, p_world[1] * k, z_m]));
-        cells.map(|cell| self.salience[cell]).fold(0.0, f64::max)
+        cells.map(|cell| self.salience(cell)).fold(0.0, f64::max)
     }
 
     /// H over the background at a peak of this view, of the map's largest.
     pub(super) fn excess_of(&self, peak: &Peak) -> f64 {
-        let spatial =
-            self.axes.iter().fold(0, |flat, &(k, axis)| flat * axis.bins + peak.bin.get(k).copied().unwrap_or(0));
-        self.excess.get(spatial).copied().unwrap_or(0.0)
+        let spatial = self
+            .layout
+            .axes
+            .iter()
+            .fold(0, |flat, (k, axis)| flat * axis.bins + peak.bin.get(*k).copied().unwrap_or(0));
+        if spatial < self.value.len() { self.excess(spatial) } else { 0.0 }
     }
 
     /// How steep the map is at a world point, and which way its echo goes from this map to `then`; `None` outside the map
     /// or where no axis tells a distance.
-    pub(super) fn flow(&self, then: &Evidence<'_>, p_world: Vec3) -> Option<Flow> {
+    pub(super) fn flow(&self, then: &Self, p_world: Vec3) -> Option<Flow> {
         let cell = self.cell(p_world)?;
-        let (k, axis) =
-            self.axes.iter().enumerate().find(|(_, (_, axis))| axis.kind.is_depth()).map(|(k, (_, a))| (k, a))?;
-        let steepest = (0..self.value.len()).map(|cell| self.gradient(cell).1).fold(0.0, f64::max);
+        let (k, axis) = self
+            .layout
+            .axes
+            .iter()
+            .enumerate()
+            .find(|(_, (_, axis))| axis.kind.is_depth())
+            .map(|(k, (_, a))| (k, a))?;
+        let steepest = self.steepest();
         if steepest <= 0.0 {
             return None;
         }
         // Speckle makes one cell's slope a coin toss: the flow is that of the cells around, weighted by their slopes.
         let (mut change, mut slopes) = (0.0, 0.0);
+        let brighter = (then.largest / self.largest) as f32;
         let mut add = |cell: usize| {
             let (by_axis, _) = self.gradient(cell);
             let outwards = by_axis[k] * axis.step().signum();
-            let later = then.value.get(cell).copied().unwrap_or(self.value[cell]);
-            change -= outwards * (later - self.value[cell]);
+            let later = then.value.get(cell).map_or(self.value[cell], |&later| later * brighter);
+            change -= outwards * f64::from(later - self.value[cell]);
             slopes += outwards * outwards;
         };
         add(cell);
-        for_neighbours(&self.shape, cell, &mut add);
+        for_neighbours(&self.layout.shape, cell, &mut add);
         let sign = if slopes > 0.0 { change.signum() } else { 0.0 };
         Some(Flow { steepness: self.gradient(cell).1 / steepest, sign })
     }
 
     /// Central differences of H along each spatial axis a bin, and their magnitude.
-    fn gradient(&self, cell: usize) -> (Vec<f64>, f64) {
-        let bins = unravel(cell, &self.shape);
+    fn gradient(&self, cell: usize) -> (SmallVec<[f64; 3]>, f64) {
+        let shape = &self.layout.shape;
         let mut stride = self.value.len();
-        let by_axis: Vec<f64> = bins
-            .iter()
-            .zip(&self.shape)
-            .map(|(&bin, &count)| {
-                stride /= count;
-                let (before, after) = (bin.min(1), (count - 1 - bin).min(1));
-                let span = (before + after).max(1) as f64;
-                (self.value[cell + after * stride] - self.value[cell - before * stride]) / span
-            })
-            .collect();
+        let along = |(bin, &count): (usize, &usize)| {
+            stride /= count;
+            let (before, after) = (bin.min(1), (count - 1 - bin).min(1));
+            let span = (before + after).max(1) as f64;
+            f64::from(self.value[cell + after * stride] - self.value[cell - before * stride]) / span
+        };
+        let by_axis: SmallVec<[f64; 3]> = unravel(cell, shape).into_iter().zip(shape).map(along).collect();
         let magnitude = by_axis.iter().map(|g| g * g).sum::<f64>().sqrt();
         (by_axis, magnitude)
     }
 
+    /// The largest magnitude of a gradient in the map.
+    fn steepest(&self) -> f64 {
+        let mut squares = vec![0.0_f32; self.value.len()];
+        let mut stride = self.value.len();
+        for &count in &self.layout.shape {
+            let block = stride;
+            stride /= count;
+            for (squares, value) in squares.chunks_exact_mut(block).zip(self.value.chunks_exact(block)) {
+                for bin in 0..count {
+                    let (before, after) = (bin.min(1), (count - 1 - bin).min(1));
+                    let (low, high) = ((bin - before) * stride, (bin + after) * stride);
+                    let scale = 1.0 / (before + after).max(1) as f32;
+                    for k in 0..stride {
+                        let slope = scale * (value[high + k] - value[low + k]);
+                        squares[bin * stride + k] += slope * slope;
+                    }
+                }
+            }
+        }
+        f64::from(squares.into_iter().fold(0.0, f32::max).sqrt())
+    }
+
     /// A peak's place.
     pub(super) fn mark(&self, peak: &Peak) -> Mark {
-        let bin = self.axes.iter().map(|&(k, _)| peak.bin.get(k).map_or(0.0, |&bin| bin as f64));
-        Mark { view: self.index, bin: bin.collect() }
+        let bin = self.layout.axes.iter().map(|&(k, _)| peak.bin.get(k).map_or(0.0, |&bin| bin as f64));
+        Mark { view: self.layout.index, bin: bin.collect() }
     }
 
     /// The middle of what is lit around a world point, within `reach_m` along directions on the floor and up; weights
     /// are the salience's excess over [`DEPTH_LN`] below the strongest cell there, so that the whole body counts and not
     /// its brightest part, and the sidelobes do not. `None` where nothing is lit.
     pub(super) fn centroid(&self, p_world: Vec3, [floor_m, up_m]: [f64; 2]) -> Option<Mark> {
-        let seen = Seen::new(self.view.pose.view_from_world(p_world));
+        let seen = Seen::new(self.layout.view.pose.view_from_world(p_world));
         let window: Vec<[usize; 2]> = self
+            .layout
             .axes
             .iter()
             .map(|(_, axis)| {
                 let (direction, arm) = seen.direction_and_arm(axis.kind);
-                let up = mat_t_vec(&self.view.pose.rotation, direction)[2].abs();
+                let up = mat_t_vec(&self.layout.view.pose.rotation, direction)[2].abs();
                 let reach_m = floor_m + (up_m - floor_m) * up;
                 let half = reach_m * seen.slope(axis) / (arm * axis.step().abs());
                 let middle = axis.bin(seen.coordinate(axis, 0.0));
@@ -290,60 +400,62 @@ impl<'a> Evidence<'a> {
                 [clamp((middle - half).round()), clamp((middle + half).round() + 1.0)]
             })
             .collect();
-        let cells = window.iter().zip(&self.shape).fold(vec![0], |cells: Vec<usize>, (&[lo, hi], &bins)| {
+        let cells = window.iter().zip(&self.layout.shape).fold(vec![0], |cells: Vec<usize>, (&[lo, hi], &bins)| {
             cells.iter().flat_map(|&cell| (lo..hi).map(move |bin| cell * bins + bin)).collect()
         });
-        let strongest = cells.iter().map(|&cell| self.salience[cell]).fold(0.0, f64::max);
+        let strongest = cells.iter().map(|&cell| self.salience(cell)).fold(0.0, f64::max);
         let floor = (strongest - DEPTH_LN).max(SPECKLE);
-        let (mut sum, mut weights) = (vec![0.0; self.axes.len()], 0.0);
+        let (mut sum, mut weights): (SmallVec<[f64; 3]>, f64) = (SmallVec::from_elem(0.0, self.layout.axes.len()), 0.0);
         for cell in cells {
-            let weight = self.salience[cell] - floor;
+            let weight = self.salience(cell) - floor;
             if weight > 0.0 {
                 weights += weight;
                 let mut rest = cell;
-                for (sum, bins) in sum.iter_mut().zip(&self.shape).rev() {
+                for (sum, bins) in sum.iter_mut().zip(&self.layout.shape).rev() {
                     *sum += weight * (rest % bins) as f64;
                     rest /= bins;
                 }
             }
         }
-        (weights > 0.0).then(|| Mark { view: self.index, bin: sum.into_iter().map(|sum| sum / weights).collect() })
+        (weights > 0.0)
+            .then(|| Mark { view: self.layout.index, bin: sum.into_iter().map(|sum| sum / weights).collect() })
     }
 
     /// Radial velocity (m/s) of the strongest Doppler bin at a world point, where the view has a Doppler axis.
     pub(super) fn radial_mps(&self, p_world: Vec3) -> Option<f64> {
-        let (k, axis) = self.view.axes.iter().enumerate().find(|(_, axis)| axis.kind == AxisKind::Doppler)?;
-        let bins = unravel(self.source[self.cell(p_world)?], &self.view.shape());
+        let (k, axis) = self.layout.view.axes.iter().enumerate().find(|(_, axis)| axis.kind == AxisKind::Doppler)?;
+        let bins = unravel(self.source(self.cell(p_world)?), &self.layout.view.shape());
         Some(axis.at(bins[k] as f64))
     }
 }
 
 /// How restless each cell is over `maps` (the same view at several times): 0 where the coefficient of variation is below
-/// `still`, 1 where it is above `restless`; `None` for fewer than three maps. The speckle of a person changes from frame to frame, for a chest that breathes moves by wavelengths; a wall's does not.
-pub(super) fn unrest(maps: &[&[f64]], [still, restless]: [f64; 2]) -> Option<Vec<f64>> {
+/// `still`, 1 where it is above `restless`. The speckle of a person changes from frame to frame, for a chest that breathes
+/// moves by wavelengths; a wall's does not.
+pub(super) fn unrest(maps: &[&[f64]], [still, restless]: [f64; 2]) -> Vec<f32> {
     let count = maps.len() as f64;
-    let cells = maps.first().filter(|_| maps.len() >= 3)?.len();
     let of_cell = |cell: usize| {
         let values = || maps.iter().filter_map(|map| map.get(cell));
         let mean = values().sum::<f64>() / count;
         let spread = (values().map(|h| (h - mean) * (h - mean)).sum::<f64>() / count).sqrt();
         let variation = if mean > 0.0 { spread / mean } else { 0.0 };
-        ((variation - still) / (restless - still)).clamp(0.0, 1.0)
+        ((variation - still) / (restless - still)).clamp(0.0, 1.0) as f32
     };
-    Some((0..cells).map(of_cell).collect())
+    (0..maps.first().map_or(0, |map| map.len())).map(of_cell).collect()
 }
 
-/// The middle value, the upper one of two; the values are reordered. NaN where there are none.
-fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return f64::NAN;
+/// The middle value of positive floats given as their bits, the upper one of two; they are reordered. 1 where there are
+/// none.
+fn median(bits: &mut [u32]) -> f32 {
+    if bits.is_empty() {
+        return 1.0;
     }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    let middle = bits.len() / 2;
+    f32::from_bits(*bits.select_nth_unstable(middle).1)
 }
 
-fn unravel(mut flat: usize, shape: &[usize]) -> Vec<usize> {
-    let mut bins = vec![0; shape.len()];
+fn unravel(mut flat: usize, shape: &[usize]) -> SmallVec<[usize; 3]> {
+    let mut bins = SmallVec::from_elem(0, shape.len());
     for k in (0..shape.len()).rev() {
         bins[k] = flat % shape[k];
         flat /= shape[k];
@@ -353,8 +465,12 @@ fn unravel(mut flat: usize, shape: &[usize]) -> Vec<usize> {
 
 /// The world point that best agrees with all `marks` at once, and the root mean square disagreement, m. What no axis
 /// tells stays at the radar's boresight.
-pub(super) fn locate(views: &[View], marks: &[Mark]) -> (Vec3, f64) {
-    let mut p = [2.0, 0.0, 0.0];
+pub(super) fn locate(views: &[View], marks: &[&Mark]) -> (Vec3, f64) {
+    locate_from(BEFORE_RADAR, views, marks)
+}
+
+/// As [`locate`], looking first at `p`: what no axis tells stays there.
+pub(super) fn locate_from(mut p: Vec3, views: &[View], marks: &[&Mark]) -> (Vec3, f64) {
     let mut misfit = f64::INFINITY;
     for _ in 0..25 {
         let (mut normal, mut pull) = ([[0.0; 3]; 3], [0.0; 3]);

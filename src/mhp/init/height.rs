@@ -13,12 +13,15 @@ const LARGEST_GAP_M: f64 = 0.2;
 /// An extent outside this is no whole standing body, m.
 const PLAUSIBLE_M: (f64, f64) = (1.2, 2.2);
 
-/// How far above the head its echo still stands out, m: the mean over simulated people.
-const HALO_M: f64 = 0.12;
+/// How far above the head its echo still stands out beyond [`SHARED_HALO`] of what it does below the feet, m; that share;
+/// and how far it is believed to below the feet, m. Least squares over simulated people.
+const HALO_M: f64 = 0.05;
+const SHARED_HALO: f64 = 0.58;
+const FARTHEST_BELOW_M: f64 = -0.25;
 /// Stature of adults and its standard deviation, and that of the top of the echo, m.
-const STATURE_M: f64 = 1.70;
+const STATURE_M: f64 = 1.72;
 const STATURE_SPREAD_M: f64 = 0.13;
-const TOP_SPREAD_M: f64 = 0.08;
+const TOP_SPREAD_M: f64 = 0.09;
 /// Who does not reach this height sits, m.
 const SITTING_M: f64 = 1.36;
 /// An echo that ends higher above the floor than this misses the feet, and may miss the head as well, m.
@@ -27,23 +30,36 @@ const FEET_M: f64 = 0.15;
 /// What the top of an echo says of somebody on the floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stature {
-    /// Most likely stature, m.
-    pub height_m: f64,
-    /// Whether the head is lower than that of anybody who stands.
-    pub sits: bool,
+    /// Most likely stature of somebody who stands, m.
+    pub standing_m: f64,
+    /// Height of the head's top where it is lower than that of anybody who stands, m.
+    pub bent_m: Option<f64>,
 }
 
 impl Stature {
-    /// From the lowest and highest lit height (world frame, m), where they are seen, for a radar `radar_height_m` above the
-    /// floor.
-    pub(super) fn new(extent_m: Option<[f64; 2]>, radar_height_m: f64) -> Self {
-        let whole = extent_m.filter(|[low, _]| low + radar_height_m < FEET_M);
-        let Some(seen_m) = whole.map(|[_, top]| top - HALO_M + radar_height_m) else {
-            return Self { height_m: STATURE_M, sits: false };
+    /// From the lowest and highest lit heights (world frame, m) in the frames that show any, for a radar `radar_height_m`
+    /// above the floor.
+    pub(super) fn new(lit_m: impl Iterator<Item = [f64; 2]>, radar_height_m: f64) -> Self {
+        let (mut low, mut top): (Vec<f64>, Vec<f64>) = lit_m.map(|[low, top]| (low, top)).unzip();
+        let (Some(low), Some(top)) = (median(&mut low), median(&mut top)) else {
+            return Self { standing_m: STATURE_M, bent_m: None };
         };
+        let (low, top) = (low + radar_height_m, top + radar_height_m);
+        if low > FEET_M {
+            return Self { standing_m: STATURE_M, bent_m: None };
+        }
+        // What shines beyond the feet shines beyond the head.
+        let seen_m = top + SHARED_HALO * low.clamp(FARTHEST_BELOW_M, 0.0) - HALO_M;
         let trust = STATURE_SPREAD_M.powi(2) / (STATURE_SPREAD_M.powi(2) + TOP_SPREAD_M.powi(2));
-        Self { height_m: STATURE_M + trust * (seen_m - STATURE_M), sits: seen_m < SITTING_M }
+        Self { standing_m: STATURE_M + trust * (seen_m - STATURE_M), bent_m: (seen_m < SITTING_M).then_some(seen_m) }
     }
+}
+
+/// The middle value, the mean of two; `None` where there are none.
+fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    Some(f64::midpoint(values[last / 2], values[last.div_ceil(2)]))
 }
 
 /// Where the middle of the body is expected.
@@ -51,14 +67,16 @@ impl Stature {
 pub(super) struct Expectation {
     /// Height of the middle, world frame, m.
     pub middle_m: f64,
-    /// Lowest and highest lit height, m, where they were seen.
+    /// Lowest and highest lit height around the place, m.
+    pub lit_m: Option<[f64; 2]>,
+    /// The same where they may be feet and head of somebody who stands or sits.
     pub extent_m: Option<[f64; 2]>,
 }
 
 impl Expectation {
     /// Looks for feet and head of a body found near `at`.
-    pub(super) fn new(evidence: &[Evidence<'_>], at: Vec3) -> Self {
-        let telling: Vec<&Evidence<'_>> = evidence.iter().filter(|e| e.resolves_height(at)).collect();
+    pub(super) fn new(evidence: &[Evidence], at: Vec3) -> Self {
+        let telling: Vec<&Evidence> = evidence.iter().filter(|e| e.resolves_height(at)).collect();
         let salience = |z: f64| {
             let sum: f64 = telling.iter().map(|e| e.salience_at_height(at, z, REACH_M)).sum();
             sum / telling.len().max(1) as f64
@@ -69,12 +87,10 @@ impl Expectation {
         let strongest = profile.iter().map(|(_, salience)| *salience).fold(0.0, f64::max);
         let level = SPECKLE.max(strongest - DEPTH_LN);
         let heights: Vec<f64> = profile.into_iter().filter(|(_, salience)| *salience > level).map(|(z, _)| z).collect();
-        let extent_m = extent_around(&heights, at[2])
-            .filter(|[low, high]| (PLAUSIBLE_M.0..=PLAUSIBLE_M.1).contains(&(high - low)));
-        match extent_m {
-            Some([low, high]) => Self { middle_m: f64::midpoint(low, high), extent_m },
-            None => Self { middle_m: UNSEEN_MIDDLE_M, extent_m },
-        }
+        let lit_m = extent_around(&heights, at[2]);
+        let extent_m = lit_m.filter(|[low, high]| (PLAUSIBLE_M.0..=PLAUSIBLE_M.1).contains(&(high - low)));
+        let middle_m = extent_m.map_or(UNSEEN_MIDDLE_M, |[low, high]| f64::midpoint(low, high));
+        Self { middle_m, lit_m, extent_m }
     }
 }
 
@@ -93,12 +109,21 @@ mod tests {
 
     #[test]
     fn a_head_tells_who_is_tall_and_who_sits() {
-        let stature = |extent_m| Stature::new(extent_m, 1.0);
-        assert_eq!(stature(None), Stature { height_m: STATURE_M, sits: false });
-        let (tall, small) = (stature(Some([-1.0, 1.0])), stature(Some([-1.0, 0.65])));
-        assert!(tall.height_m > 1.8 && tall.height_m < 1.88 && small.height_m < 1.62);
-        assert!(!tall.sits && !small.sits && stature(Some([-1.0, 0.4])).sits);
-        assert!(!stature(Some([-0.5, 0.4])).sits, "without feet the head may be missed too");
+        let stature = |lit_m: &[[f64; 2]]| Stature::new(lit_m.iter().copied(), 1.0);
+        let unknown = Stature { standing_m: STATURE_M, bent_m: None };
+        assert_eq!(stature(&[]), unknown);
+        let (tall, small) = (stature(&[[-1.1, 1.0]]), stature(&[[-1.1, 0.65]]));
+        assert!(tall.standing_m > 1.8 && tall.standing_m < 1.9 && small.standing_m < 1.65);
+        assert!(tall.bent_m.is_none() && small.bent_m.is_none());
+        let sits = stature(&[[-1.1, 0.4], [-1.1, 0.8], [-1.1, 0.38]]).bent_m;
+        assert!(sits.is_some_and(|top| (1.2..1.3).contains(&top)), "one frame of three is not believed");
+        assert_eq!(stature(&[[-0.5, 0.4]]), unknown, "without feet the head may be missed too");
+    }
+
+    #[test]
+    fn what_shines_below_the_feet_is_taken_off_the_head() {
+        let stature = |low: f64| Stature::new([[low, 0.8]].into_iter(), 1.0).standing_m;
+        assert!(stature(-1.2) < stature(-1.0) && stature(-1.9) == stature(-1.3) && stature(-0.9) == stature(-1.0));
     }
 
     #[test]

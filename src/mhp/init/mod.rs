@@ -23,10 +23,12 @@ mod perturb;
 mod place;
 mod pose;
 mod scatterers;
+mod surroundings;
 mod template;
 mod velocity;
 
 pub use evidence::Peak;
+pub(super) use surroundings::{Cached, Surroundings};
 
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
@@ -35,7 +37,7 @@ use crate::geometry::{Vec3, add, norm, scale, sub};
 use crate::radar::{AxisKind, View};
 use evidence::{Evidence, Mark, locate};
 use height::{Expectation, Stature};
-use motion::Track;
+use motion::{Sighting, Track};
 use place::Place;
 use pose::Posture;
 use std::sync::Arc;
@@ -91,8 +93,10 @@ impl Person {
     /// What its head says of it, where the floor is known and asked for.
     fn stature(&self, problem: &Problem, config: &FitConfig) -> Option<Stature> {
         let radar_height_m = problem.radar.height_m.filter(|_| config.height == Height::Floor)?;
-        let extent_m = self.expected.and_then(|expected| expected.extent_m);
-        Some(Stature::new(extent_m, radar_height_m))
+        let own = self.expected.and_then(|expected| expected.lit_m);
+        let in_track = self.track.iter().flat_map(|track| track.sightings.iter().filter_map(|seen| seen.lit_m));
+        let lit_m: Vec<[f64; 2]> = if self.track.is_some() { in_track.collect() } else { own.into_iter().collect() };
+        Some(Stature::new(lit_m.into_iter(), radar_height_m))
     }
 
     fn walks(&self) -> bool {
@@ -126,7 +130,7 @@ fn towards_radar(at: Vec3) -> [f64; 2] {
 ///
 /// # Errors
 /// [`FitError::NoStart`] where no view shows anything above its background.
-pub fn initialise(problem: &Problem, config: &FitConfig) -> Result<Initialisation, FitError> {
+pub fn initialise(problem: &Arc<Problem>, config: &FitConfig) -> Result<Initialisation, FitError> {
     initialise_people(problem, config, &[])
 }
 
@@ -134,11 +138,12 @@ pub fn initialise(problem: &Problem, config: &FitConfig) -> Result<Initialisatio
 ///
 /// # Errors
 /// [`FitError::NoStart`] where no view shows anything above its background.
-pub fn initialise_people(problem: &Problem, config: &FitConfig, seeds: &[Vec3]) -> Result<Initialisation, FitError> {
-    let unrest = motion::unrest(problem);
-    let views = problem.views.iter().zip(&unrest).enumerate();
-    let evidence: Vec<Evidence<'_>> =
-        views.map(|(k, (view, unrest))| Evidence::new(k, view, problem.map(k), unrest.as_deref())).collect();
+pub fn initialise_people(
+    problem: &Arc<Problem>,
+    config: &FitConfig,
+    seeds: &[Vec3],
+) -> Result<Initialisation, FitError> {
+    let evidence = &problem.surroundings().now;
     let peaks: Vec<Peak> = evidence.iter().flat_map(Evidence::peaks).collect();
     let peaks = perturb::drop_some(problem, &config.init, peaks);
     let template = Template::new(&problem.skeleton);
@@ -148,14 +153,14 @@ pub fn initialise_people(problem: &Problem, config: &FitConfig, seeds: &[Vec3]) 
         .collect();
     let found = match seeds {
         _ if !config.init.position => vec![(middle_of_views(problem), None)],
-        [] => vec![find_one(problem, &evidence, &template, &peaks, &mut notes)?],
-        seeds => seeds.iter().map(|&seed| near(problem, &evidence, seed)).collect(),
+        [] => vec![find_one(problem, evidence, &template, &peaks, &mut notes)?],
+        seeds => seeds.iter().map(|&seed| near(problem, evidence, seed)).collect(),
     };
-    let around = motion::around(problem, &unrest);
     let mut persons = Vec::with_capacity(found.len());
     for (at, expected) in found {
-        let track = motion::track(problem, &around, at);
-        let radial = velocity::radial(problem, &evidence, &around, at, config.init.velocity_gain_mps);
+        let lit_m = expected.and_then(|expected| expected.lit_m);
+        let track = motion::track(problem, Sighting { t_s: 0.0, at, lit_m });
+        let radial = velocity::radial(problem, at, config.init.velocity_gain_mps);
         persons.push(Person { at, expected, track, radial, posture: Posture::Standing });
     }
     if config.starts > 1 {
@@ -174,25 +179,25 @@ pub fn initialise_people(problem: &Problem, config: &FitConfig, seeds: &[Vec3]) 
 /// Gives each person the posture whose L_EM is smallest where it stands best near its place; the place itself is left
 /// to the fit.
 fn choose_postures(
-    problem: &Problem,
+    problem: &Arc<Problem>,
     config: &FitConfig,
     template: &Template,
     persons: &mut [Person],
 ) -> Result<(), FitError> {
     let config = FitConfig { summation: Summation::Incoherent, w_time: 0.0, ..*config };
-    let problem = Arc::new(problem.clone());
     for k in 0..persons.len() {
         let walks = persons[k].walks();
-        if !walks && persons[k].stature(&problem, &config).is_some_and(|stature| stature.sits) {
-            persons[k].posture = Posture::Sitting;
+        let stature = persons[k].stature(problem, &config).filter(|_| !walks);
+        if let Some(top_m) = stature.and_then(|stature| stature.bent_m) {
+            persons[k].posture = pose::bent(template, &problem.skeleton, top_m);
             continue;
         }
         let mut best: Option<(f64, Posture)> = None;
         for posture in pose::tried(config.starts, walks) {
             let own = |at: Vec3| Person { at, posture, ..persons[k].clone() };
-            let body = |at: Vec3| assemble(&problem, &config, template, &[own(at)]);
+            let body = |at: Vec3| assemble(problem, &config, template, &[own(at)]);
             let at = persons[k].at;
-            let objective = Objective::new(Arc::clone(&problem), config, Precision::F32, &body(at))?;
+            let objective = Objective::new(Arc::clone(problem), config, Precision::F32, &body(at))?;
             let mut lowest = f64::INFINITY;
             descend(at, POSTURE_STEP_M, 0, |p| {
                 let loss = objective.em_loss(&body(p));
@@ -216,20 +221,13 @@ fn choose_postures(
 /// Without that frame among those around they stay where they are.
 pub fn predict(problem: &Problem, before: &Pppr) -> Pppr {
     let mut params = before.clone();
-    let Some(last) = problem.neighbours().iter().rev().find(|neighbour| neighbour.offset_s < 0.0) else {
-        return params;
-    };
-    let unrest = motion::unrest(problem);
-    let views = || problem.views.iter().zip(&unrest).enumerate();
-    let then: Vec<Evidence<'_>> =
-        views().map(|(k, (view, unrest))| Evidence::new(k, view, last.map(k), unrest.as_deref())).collect();
-    let now: Vec<Evidence<'_>> =
-        views().map(|(k, (view, unrest))| Evidence::new(k, view, problem.map(k), unrest.as_deref())).collect();
+    let Surroundings { now, around } = problem.surroundings();
+    let Some((t_s, then)) = around.iter().rev().find(|(t_s, _)| *t_s < 0.0) else { return params };
     let joints = params.shape().joints;
     for (person, at) in super::region::centres(before).into_iter().enumerate() {
-        let from = centre(problem, &then, at);
-        let way = sub(centre(problem, &now, from), from);
-        let far = way[0].hypot(way[1]) > FASTEST_MPS * -last.offset_s;
+        let (from, _) = centre(problem, then, at);
+        let way = sub(centre(problem, now, from).0, from);
+        let far = way[0].hypot(way[1]) > FASTEST_MPS * -t_s;
         if far || !way.iter().all(|x| x.is_finite()) {
             continue;
         }
@@ -248,17 +246,13 @@ pub(super) fn anchors(problem: &Problem, config: &FitConfig, params: &Pppr) -> V
     if problem.neighbours().is_empty() {
         return Vec::new();
     }
-    let unrest = motion::unrest(problem);
-    let views = problem.views.iter().zip(&unrest).enumerate();
-    let evidence: Vec<Evidence<'_>> =
-        views.map(|(k, (view, unrest))| Evidence::new(k, view, problem.map(k), unrest.as_deref())).collect();
-    let around = motion::around(problem, &unrest);
     let (joints, template) = (params.shape().joints.max(1), Template::new(&problem.skeleton));
     let of_person = |(person, middle): (usize, Vec3)| {
         let own = person * joints..(person + 1) * joints;
         let mean = scale(own.fold([0.0; 3], |sum, joint| add(sum, params.position(joint))), 1.0 / joints as f64);
-        let lit = centre(problem, &evidence, middle);
-        let Some(track) = motion::track(problem, &around, lit) else { return mean };
+        let (lit, expectation) = centre(problem, &problem.surroundings().now, middle);
+        let here = Sighting { t_s: 0.0, at: lit, lit_m: expectation.lit_m };
+        let Some(track) = motion::track(problem, here) else { return mean };
         let at = behind_skin(config, track.at);
         // Where the floor is known, the start stands as high as it should.
         let floor = problem.radar.height_m.filter(|_| config.height == Height::Floor);
@@ -270,7 +264,7 @@ pub(super) fn anchors(problem: &Problem, config: &FitConfig, params: &Pppr) -> V
 /// The strongest place where somebody stands.
 fn find_one(
     problem: &Problem,
-    evidence: &[Evidence<'_>],
+    evidence: &[Evidence],
     template: &Template,
     peaks: &[Peak],
     notes: &mut Vec<String>,
@@ -289,23 +283,25 @@ fn find_one(
 }
 
 /// The body that is lit near `seed`.
-fn near(problem: &Problem, evidence: &[Evidence<'_>], seed: Vec3) -> (Vec3, Option<Expectation>) {
-    let at = centre(problem, evidence, seed);
+fn near(problem: &Problem, evidence: &[Evidence], seed: Vec3) -> (Vec3, Option<Expectation>) {
+    let (at, expectation) = centre(problem, evidence, seed);
     // Somebody else may shine brighter: a person is not looked for beyond arm's reach of the place it was given.
-    let strayed = (at[0] - seed[0]).hypot(at[1] - seed[1]) > SEED_REACH_M;
-    let at = if strayed { [seed[0], seed[1], at[2]] } else { at };
-    (at, Some(Expectation::new(evidence, at)))
+    if (at[0] - seed[0]).hypot(at[1] - seed[1]) > SEED_REACH_M {
+        let at = [seed[0], seed[1], at[2]];
+        return (at, Some(Expectation::new(evidence, at)));
+    }
+    (at, Some(expectation))
 }
 
 /// The middle of what all views show lit around `at`, on the body's axis: the echoes come from the skin before it. Where
 /// height is not seen it stays.
-fn centre(problem: &Problem, evidence: &[Evidence<'_>], mut at: Vec3) -> Vec3 {
+fn centre(problem: &Problem, evidence: &[Evidence], mut at: Vec3) -> (Vec3, Expectation) {
     for reach_m in [WIDE_REACH_M, NARROW_REACH_M, NARROW_REACH_M] {
         let marks: Vec<Mark> = evidence.iter().filter_map(|e| e.centroid(at, reach_m)).collect();
         if marks.is_empty() {
             break;
         }
-        let (found, misfit) = locate(&problem.views, &marks);
+        let (found, misfit) = locate(&problem.views, &marks.iter().collect::<Vec<_>>());
         if misfit > LARGEST_MISFIT_M || !found.iter().all(|x| x.is_finite()) {
             break;
         }
@@ -313,7 +309,8 @@ fn centre(problem: &Problem, evidence: &[Evidence<'_>], mut at: Vec3) -> Vec3 {
         at = if height_seen { found } else { [found[0], found[1], at[2]] };
     }
     // The middle of what is lit says little of a body's height: heads outshine feet, or the other way round.
-    [at[0], at[1], Expectation::new(evidence, at).middle_m]
+    let expectation = Expectation::new(evidence, at);
+    ([at[0], at[1], expectation.middle_m], expectation)
 }
 
 /// The middle of what the first view covers: where a body stands when nothing may be read from the peaks.
@@ -322,7 +319,8 @@ fn middle_of_views(problem: &Problem) -> Vec3 {
         let spatial = v.axes.iter().filter(|axis| axis.kind != AxisKind::Doppler);
         Mark { view, bin: spatial.map(|axis| axis.bins as f64 / 2.0).collect() }
     };
-    locate(&problem.views, &problem.views.iter().enumerate().map(middle).collect::<Vec<_>>()).0
+    let marks: Vec<Mark> = problem.views.iter().enumerate().map(middle).collect();
+    locate(&problem.views, &marks.iter().collect::<Vec<_>>()).0
 }
 
 /// Bodies at `places`, at several heights and depths each, best first: a body stands behind its nearest echo, and its
@@ -343,7 +341,7 @@ fn rank(places: &[Place], template: &Template, score: impl Fn(&[Vec3]) -> f64) -
 
 /// The first of the strongest distinct `places` where something stands from feet to head, or the strongest: a corner of
 /// the room may outshine a person in both views, but it is a spot.
-fn most_bodily(problem: &Problem, evidence: &[Evidence<'_>], places: &[Vec3]) -> Option<(Vec3, Expectation)> {
+fn most_bodily(problem: &Problem, evidence: &[Evidence], places: &[Vec3]) -> Option<(Vec3, Expectation)> {
     let mut tried: Vec<(Vec3, Expectation)> = Vec::new();
     let mut starts: Vec<Vec3> = Vec::new();
     for &place in places {
@@ -351,8 +349,7 @@ fn most_bodily(problem: &Problem, evidence: &[Evidence<'_>], places: &[Vec3]) ->
             continue;
         }
         starts.push(place);
-        let at = centre(problem, evidence, place);
-        let expected = Expectation::new(evidence, at);
+        let (at, expected) = centre(problem, evidence, place);
         if expected.extent_m.is_some() {
             return Some((at, expected));
         }
@@ -365,7 +362,7 @@ fn most_bodily(problem: &Problem, evidence: &[Evidence<'_>], places: &[Vec3]) ->
 }
 
 /// How much echo over the background all views show at a body: the geometric mean over views, so that each must agree.
-fn shared_excess(evidence: &[Evidence<'_>], body: &[Vec3]) -> f64 {
+fn shared_excess(evidence: &[Evidence], body: &[Vec3]) -> f64 {
     let logs: f64 = evidence.iter().map(|e| e.mean_excess(body).ln()).sum();
     (logs / evidence.len().max(1) as f64).exp()
 }
@@ -410,14 +407,15 @@ fn assemble(problem: &Problem, config: &FitConfig, template: &Template, persons:
     for (k, person) in persons.iter().enumerate() {
         let velocity = person.velocity(config);
         let body = pose::posed(template, &problem.skeleton, person.posture);
-        let at = match person.track {
+        let at = match &person.track {
             Some(track) if config.w_time > 0.0 => [track.at[0], track.at[1], person.at[2]],
             _ => person.at,
         };
         let mut at = behind_skin(config, at);
         if let (Some(stature), Some(radar_height_m)) = (person.stature(problem, config), problem.radar.height_m) {
-            let sits = person.posture == Posture::Sitting;
-            at[2] = if sits { body.middle_m() } else { 0.5 * stature.height_m } - radar_height_m;
+            let bent = matches!(person.posture, Posture::Bent(_));
+            let middle_m = if bent { body.middle_m() } else { body.middle_as_tall_as_m(stature.standing_m) };
+            at[2] = middle_m - radar_height_m;
         }
         for (joint, p) in body.facing(at, person.forward(config.yaw)).into_iter().enumerate() {
             params.set_vec3(Group::Position, k * joints + joint, p);
@@ -431,14 +429,14 @@ fn assemble(problem: &Problem, config: &FitConfig, template: &Template, persons:
 /// What was found of a person, in words.
 fn tell(person: &Person, config: &FitConfig) -> Vec<String> {
     let at = person.at;
-    let walking = person.track.filter(|track| config.yaw == Yaw::Motion && track.heading().is_some());
+    let walking = person.track.as_ref().filter(|track| config.yaw == Yaw::Motion && track.heading().is_some());
     let mut notes = vec![match walking {
         Some(track) => format!(
             "standing at x {:.2} m, y {:.2} m, facing where it goes: {:.2} m/s over {} frames",
             at[0],
             at[1],
             track.velocity[0].hypot(track.velocity[1]),
-            track.frames
+            track.sightings.len()
         ),
         None => format!("standing at x {:.2} m, y {:.2} m, facing the radar", at[0], at[1]),
     }];
@@ -447,6 +445,14 @@ fn tell(person: &Person, config: &FitConfig) -> Vec<String> {
         Some((None, middle)) => format!("no feet and head seen: middle of the body expected at z {middle:.2} m"),
         None => "position not read from the peaks: the middle of the views".to_owned(),
     });
+    notes.push(format!(
+        "LIT {:.2?}",
+        person
+            .track
+            .iter()
+            .flat_map(|t| t.sightings.iter().map(|s| (s.t_s, s.at[0], s.at[1], s.lit_m.unwrap_or([9.0, 9.0]))))
+            .collect::<Vec<_>>()
+    ));
     notes.push(match person.radial {
         _ if !config.init.velocity => "velocity 0: not read from the maps".to_owned(),
         Some(Radial { mps, source: Source::Doppler, .. }) => {

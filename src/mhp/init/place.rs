@@ -3,7 +3,7 @@
 //! Echoes of one body scatter over half a metre and over its whole height, so points are joined by their distance on the
 //! floor alone (average linkage, cut at the width of a body). A cluster is a place where somebody may stand.
 
-use super::evidence::{Evidence, Peak, locate};
+use super::evidence::{Evidence, Mark, Peak, locate, locate_from};
 use crate::geometry::{Vec3, add_scaled, norm, scale};
 use crate::mhp::Problem;
 use kodama::{Method, linkage};
@@ -30,12 +30,12 @@ pub(super) struct Place {
 }
 
 /// Places where somebody may stand, strongest first.
-pub(super) fn places(problem: &Problem, evidence: &[Evidence<'_>], peaks: &[Peak]) -> Vec<Place> {
+pub(super) fn places(problem: &Problem, evidence: &[Evidence], peaks: &[Peak]) -> Vec<Place> {
     let mut points = pairs(problem, evidence, peaks);
     if points.is_empty() {
         let alone = peaks.iter().filter_map(|peak| {
             let e = evidence.get(peak.view)?;
-            Some((locate(&problem.views, &[e.mark(peak)]), e.excess_of(peak)))
+            Some((locate(&problem.views, &[&e.mark(peak)]), e.excess_of(peak)))
         });
         points =
             alone.filter(|((p, _), _)| norm(*p).is_finite()).map(|((at, _), weight)| Point { at, weight }).collect();
@@ -48,14 +48,16 @@ pub(super) fn places(problem: &Problem, evidence: &[Evidence<'_>], peaks: &[Peak
 }
 
 /// Points where peaks of two views may be one body.
-fn pairs(problem: &Problem, evidence: &[Evidence<'_>], peaks: &[Peak]) -> Vec<Point> {
+fn pairs(problem: &Problem, evidence: &[Evidence], peaks: &[Peak]) -> Vec<Point> {
+    let marks: Vec<(Mark, f64)> =
+        peaks.iter().filter_map(|peak| evidence.get(peak.view).map(|e| (e.mark(peak), e.excess_of(peak)))).collect();
     let mut points = Vec::new();
-    for (i, a) in peaks.iter().enumerate() {
-        for b in peaks.iter().skip(i + 1).filter(|b| b.view != a.view) {
-            let (Some(e), Some(f)) = (evidence.get(a.view), evidence.get(b.view)) else { continue };
-            let (at, misfit) = locate(&problem.views, &[e.mark(a), f.mark(b)]);
+    for (i, (a, excess_a)) in marks.iter().enumerate() {
+        let (near, _) = locate(&problem.views, &[a]);
+        for (b, excess_b) in marks[i + 1..].iter().filter(|(b, _)| b.view != a.view) {
+            let (at, misfit) = locate_from(near, &problem.views, &[a, b]);
             if misfit < LARGEST_MISFIT_M && norm(at).is_finite() {
-                let weight = (e.excess_of(a) * f.excess_of(b)).sqrt();
+                let weight = (excess_a * excess_b).sqrt();
                 points.push(Point { at, weight: weight * (1.0 - misfit / LARGEST_MISFIT_M) });
             }
         }

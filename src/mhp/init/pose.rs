@@ -9,6 +9,10 @@ use crate::body::{Side, Skeleton};
 use crate::geometry::{Vec3, add, mat_vec, rotation_from_quaternion, sub};
 use std::f64::consts::TAU;
 
+/// How far hips and knees are bent on a chair, and at most: on the floor, knees up, rad.
+const ON_A_CHAIR: f64 = 1.4;
+const ON_THE_FLOOR: f64 = 2.4;
+
 /// How a body holds its limbs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Posture {
@@ -18,7 +22,8 @@ pub(super) enum Posture {
     /// Both arms raised sideways, or to the front.
     ArmsSideways,
     ArmsForward,
-    Sitting,
+    /// Hips and knees bent by this much, rad: a right angle sits on a chair, more on the floor.
+    Bent(f64),
 }
 
 /// Postures in the order in which they are tried; a person who walks is not tried sitting, nor one who stands walking.
@@ -26,7 +31,7 @@ pub(super) fn tried(starts: usize, walks: bool) -> Vec<Posture> {
     let others = if walks {
         (0..starts.saturating_sub(1)).map(|k| Posture::Walking(k as f64 / (starts - 1) as f64)).collect()
     } else {
-        vec![Posture::ArmsForward, Posture::ArmsSideways, Posture::Sitting]
+        vec![Posture::ArmsForward, Posture::ArmsSideways, Posture::Bent(ON_A_CHAIR)]
     };
     std::iter::once(Posture::Standing).chain(others).take(starts.max(1)).collect()
 }
@@ -47,7 +52,7 @@ impl Posture {
                 let swinging = (-phase.sin()).max(0.0);
                 Limb { upper: 0.17 + 0.38 * phase.cos(), lower: -0.15 - 0.85 * swinging, spread: 0.0 }
             }
-            Self::Sitting => Limb { upper: 1.4, lower: -1.4, spread: 0.0 },
+            Self::Bent(angle) => Limb { upper: angle, lower: -angle, spread: 0.0 },
             _ => Limb { upper: 0.0, lower: 0.0, spread: 0.0 },
         }
     }
@@ -63,6 +68,17 @@ impl Posture {
             _ => Limb { upper: 0.0, lower: 0.0, spread: 0.0 },
         }
     }
+}
+
+/// Hips and knees bent so far that the top of the head comes down to `top_m` above the floor, at least as on a chair.
+pub(super) fn bent(template: &Template, skeleton: &Skeleton, top_m: f64) -> Posture {
+    let top_of = |angle: f64| posed(template, skeleton, Posture::Bent(angle)).top_m();
+    let (mut high, mut low) = (ON_A_CHAIR, ON_THE_FLOOR);
+    for _ in 0..12 {
+        let angle = f64::midpoint(high, low);
+        if top_of(angle) > top_m { high = angle } else { low = angle }
+    }
+    Posture::Bent(high)
 }
 
 /// The template in `posture`; feet on the height where the template's are.
@@ -134,7 +150,7 @@ mod tests {
         assert!(forward.joints[9][0] > 0.4 && forward.joints[10][0] > 0.4);
         let sideways = posed(&template, &skeleton, Posture::ArmsSideways);
         assert!(sideways.joints[9][1] > 0.5 && sideways.joints[10][1] < -0.5);
-        let sitting = posed(&template, &skeleton, Posture::Sitting);
+        let sitting = posed(&template, &skeleton, Posture::Bent(ON_A_CHAIR));
         assert!(sitting.joints[0][2] < template.joints[0][2] - 0.2, "a head is lower");
         for body in [&walking, &forward, &sideways, &sitting] {
             for &[m, n] in &skeleton.bones {

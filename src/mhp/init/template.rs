@@ -36,15 +36,27 @@ impl Template {
         Self { joints, crown_m }
     }
 
+    /// Height of the top of the head above the soles, m.
+    pub(super) fn top_m(&self) -> f64 {
+        highest(&self.joints) + self.crown_m
+    }
+
     /// Height of the body's middle above its soles: half way to the top of the head, m.
     pub(super) fn middle_m(&self) -> f64 {
-        0.5 * (highest(&self.joints) + self.crown_m)
+        0.5 * self.top_m()
     }
 
     /// How far the mean of the joints lies above the body's middle, m.
     pub(super) fn mean_over_middle_m(&self) -> f64 {
         let mean = self.joints.iter().map(|j| j[2]).sum::<f64>() / self.joints.len().max(1) as f64;
         mean - self.middle_m()
+    }
+
+    /// Where the middle of this body is above the floor when the mean of its joints is where it would be if the body were
+    /// `stature_m` tall, m: bones have their own lengths, whoever stands there.
+    pub(super) fn middle_as_tall_as_m(&self, stature_m: f64) -> f64 {
+        let mean = self.middle_m() + self.mean_over_middle_m();
+        mean * stature_m / self.top_m() - self.mean_over_middle_m()
     }
 
     /// The joints of a person who stands at `at` (the body's middle, half way from soles to crown, m, world) and looks along

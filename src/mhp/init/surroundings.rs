@@ -1,0 +1,73 @@
+//! The evidence of a frame and of those around it, worked out once for a problem.
+
+use super::evidence::{self, Evidence, Layout};
+use crate::mhp::Problem;
+use std::sync::{Arc, OnceLock};
+
+/// Coefficients of variation over time: below the first of a pair a cell stands still, above the second it does not (a
+/// Rayleigh amplitude has 0.52). The second pair is for who only breathes.
+const VARIATIONS: [[f64; 2]; 2] = [[0.05, 0.25], [0.015, 0.075]];
+/// The largest of 30,000 Rayleigh amplitudes over their median, ln: a peak above it is no noise.
+const NOISE: f64 = 1.4;
+
+/// One view's evidence each.
+type Views = Vec<Evidence>;
+
+/// What the maps of a frame and of those around it show.
+#[derive(Debug)]
+pub(in crate::mhp) struct Surroundings {
+    /// The frame itself.
+    pub(super) now: Views,
+    /// Frames around with their times after this one, s, in the order of time.
+    pub(super) around: Vec<(f64, Views)>,
+}
+
+impl Surroundings {
+    fn new(problem: &Problem) -> Self {
+        let layouts: Vec<Arc<Layout>> =
+            problem.views.iter().enumerate().map(|(k, view)| Arc::new(Layout::new(k, view))).collect();
+        let seen = |maps: &dyn Fn(usize) -> Evidence| (0..layouts.len()).map(maps).collect::<Views>();
+        let plain = seen(&|k| Evidence::new(&layouts[k], problem.map(k)));
+        let now = moving(problem, &plain).unwrap_or(plain);
+        let of_neighbour = |neighbour: &crate::mhp::Neighbour| {
+            let view = |k: usize| Evidence::new(&layouts[k], neighbour.map(k)).as_restless_as(&now[k]);
+            (neighbour.offset_s, seen(&view))
+        };
+        let around = problem.neighbours().iter().map(of_neighbour).collect();
+        Self { now, around }
+    }
+}
+
+/// The evidence of what moves; `None` where nothing does, for then stillness tells nobody from the room.
+fn moving(problem: &Problem, plain: &[Evidence]) -> Option<Views> {
+    if problem.neighbours().len() < 2 {
+        return None;
+    }
+    let at_level = |limits: [f64; 2]| -> Option<Views> {
+        let of_view = |(k, evidence): (usize, &Evidence)| {
+            let others = problem.neighbours().iter().map(|neighbour| neighbour.map(k));
+            let maps: Vec<&[f64]> = std::iter::once(problem.map(k)).chain(others).collect();
+            let moving = evidence.clone().where_restless(&evidence::unrest(&maps, limits));
+            // Every view must show something that moves, and noise always does: a place is where views agree.
+            moving.peaks().iter().any(|peak| peak.salience > NOISE).then_some(moving)
+        };
+        plain.iter().enumerate().map(of_view).collect()
+    };
+    VARIATIONS.into_iter().find_map(at_level)
+}
+
+/// A problem's surroundings, worked out when first asked for. Equal to any other: it follows from the problem.
+#[derive(Debug, Clone, Default)]
+pub(in crate::mhp) struct Cached(OnceLock<Arc<Surroundings>>);
+
+impl PartialEq for Cached {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl Cached {
+    pub(in crate::mhp) fn of<'a>(&'a self, problem: &Problem) -> &'a Surroundings {
+        self.0.get_or_init(|| Arc::new(Surroundings::new(problem)))
+    }
+}
