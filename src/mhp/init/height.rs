@@ -13,19 +13,20 @@ const LARGEST_GAP_M: f64 = 0.2;
 /// An extent outside this is no whole standing body, m.
 const PLAUSIBLE_M: (f64, f64) = (1.2, 2.2);
 
-/// How far above the head its echo still stands out beyond [`SHARED_HALO`] of what it does below the feet, m; that share;
-/// and how far it is believed to below the feet, m. Least squares over simulated people.
+/// How far above the head its echo still stands out beyond [`SHARED_HALO`] of what it does below the feet, m, and that
+/// share: least squares over simulated people.
 const HALO_M: f64 = 0.05;
 const SHARED_HALO: f64 = 0.58;
-const FARTHEST_BELOW_M: f64 = -0.25;
+/// What is lit lower than this below the floor is no foot; then feet are taken to shine as far below it as they usually do, m.
+const LOWEST_FOOT_M: f64 = -0.35;
+const USUAL_FOOT_M: f64 = -0.12;
 /// Stature of adults and its standard deviation, and that of the top of the echo, m.
 const STATURE_M: f64 = 1.72;
 const STATURE_SPREAD_M: f64 = 0.13;
 const TOP_SPREAD_M: f64 = 0.09;
-/// Who does not reach this height sits, m.
+/// Who does not reach the first height sits; what exceeds the second is nobody, m.
 const SITTING_M: f64 = 1.36;
-/// An echo that ends higher above the floor than this misses the feet, and may miss the head as well, m.
-const FEET_M: f64 = 0.15;
+const TALLEST_M: f64 = 2.1;
 
 /// What the top of an echo says of somebody on the floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,15 +42,15 @@ impl Stature {
     /// above the floor.
     pub(super) fn new(lit_m: impl Iterator<Item = [f64; 2]>, radar_height_m: f64) -> Self {
         let (mut low, mut top): (Vec<f64>, Vec<f64>) = lit_m.map(|[low, top]| (low, top)).unzip();
-        let (Some(low), Some(top)) = (median(&mut low), median(&mut top)) else {
-            return Self { standing_m: STATURE_M, bent_m: None };
-        };
+        let unknown = Self { standing_m: STATURE_M, bent_m: None };
+        let (Some(low), Some(top)) = (median(&mut low), median(&mut top)) else { return unknown };
         let (low, top) = (low + radar_height_m, top + radar_height_m);
-        if low > FEET_M {
-            return Self { standing_m: STATURE_M, bent_m: None };
+        // What shines beyond the feet shines beyond the head; feet are often dark, heads are not.
+        let foot = if low < LOWEST_FOOT_M { USUAL_FOOT_M } else { low.min(0.0) };
+        let seen_m = top + SHARED_HALO * foot - HALO_M;
+        if seen_m > TALLEST_M {
+            return unknown;
         }
-        // What shines beyond the feet shines beyond the head.
-        let seen_m = top + SHARED_HALO * low.clamp(FARTHEST_BELOW_M, 0.0) - HALO_M;
         let trust = STATURE_SPREAD_M.powi(2) / (STATURE_SPREAD_M.powi(2) + TOP_SPREAD_M.powi(2));
         Self { standing_m: STATURE_M + trust * (seen_m - STATURE_M), bent_m: (seen_m < SITTING_M).then_some(seen_m) }
     }
@@ -117,13 +118,15 @@ mod tests {
         assert!(tall.bent_m.is_none() && small.bent_m.is_none());
         let sits = stature(&[[-1.1, 0.4], [-1.1, 0.8], [-1.1, 0.38]]).bent_m;
         assert!(sits.is_some_and(|top| (1.2..1.3).contains(&top)), "one frame of three is not believed");
-        assert_eq!(stature(&[[-0.5, 0.4]]), unknown, "without feet the head may be missed too");
+        assert!(stature(&[[-0.5, 0.3]]).bent_m.is_none(), "without feet it may be a piece");
+        assert_eq!(stature(&[[-1.1, 1.6]]), unknown, "nobody is that tall");
     }
 
     #[test]
     fn what_shines_below_the_feet_is_taken_off_the_head() {
         let stature = |low: f64| Stature::new([[low, 0.8]].into_iter(), 1.0).standing_m;
-        assert!(stature(-1.2) < stature(-1.0) && stature(-1.9) == stature(-1.3) && stature(-0.9) == stature(-1.0));
+        assert!(stature(-1.2) < stature(-1.0) && stature(-0.5) == stature(-1.0), "dark feet say nothing");
+        assert!((stature(-1.9) - stature(-1.0 + USUAL_FOOT_M)).abs() < 1e-12, "a ghost below the floor neither");
     }
 
     #[test]

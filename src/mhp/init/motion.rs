@@ -11,7 +11,7 @@ use crate::mhp::Problem;
 /// Slower than this, a person stands and the track's direction is its errors', m/s.
 const WALKING_MPS: f64 = 0.5;
 /// A head that comes down faster than this falls or sits down, m/s.
-const FALLING_MPS: f64 = -0.4;
+const FALLING_MPS: f64 = -0.6;
 /// Farther from the place that the frame before leads to, the track is somebody else, m.
 const LEASH_M: f64 = 0.35;
 
@@ -71,7 +71,7 @@ pub(super) fn track(problem: &Problem, here: Sighting) -> Option<Track> {
         for (t_s, evidence) in ordered {
             let mut expected = last.at;
             add_scaled(&mut expected, velocity, t_s - last.t_s);
-            let found = follow(problem, evidence, *t_s, expected);
+            let Some(found) = follow(problem, evidence, *t_s, expected) else { break };
             velocity = scale(sub(found.at, last.at), 1.0 / (t_s - last.t_s));
             last = found;
             sightings.push(found);
@@ -80,15 +80,11 @@ pub(super) fn track(problem: &Problem, here: Sighting) -> Option<Track> {
     (sightings.len() > 1).then(|| line(sightings))
 }
 
-/// The middle of what is lit near `expected`; `expected` itself where that is somebody else.
-fn follow(problem: &Problem, evidence: &[Evidence], t_s: f64, expected: Vec3) -> Sighting {
+/// The middle of what is lit near `expected`; `None` where that is somebody else.
+fn follow(problem: &Problem, evidence: &[Evidence], t_s: f64, expected: Vec3) -> Option<Sighting> {
     let (at, expectation) = centre(problem, evidence, expected);
     let off = sub(at, expected);
-    if off[0].hypot(off[1]) < LEASH_M {
-        Sighting { t_s, at, lit_m: expectation.lit_m }
-    } else {
-        Sighting { t_s, at: expected, lit_m: None }
-    }
+    (off[0].hypot(off[1]) < LEASH_M).then_some(Sighting { t_s, at, lit_m: expectation.lit_m })
 }
 
 /// Least squares through the places.
