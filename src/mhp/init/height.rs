@@ -24,8 +24,11 @@ const USUAL_FOOT_M: f64 = -0.12;
 const STATURE_M: f64 = 1.72;
 const STATURE_SPREAD_M: f64 = 0.13;
 const TOP_SPREAD_M: f64 = 0.09;
-/// Who does not reach the first height sits; what exceeds the second is nobody, m.
-const SITTING_M: f64 = 1.36;
+/// An echo that ends higher above the floor than this misses the feet: it may be a piece of a body, m.
+const FEET_M: f64 = 0.15;
+/// Who does not reach the first height sits, who reaches the second stands; what exceeds the third is nobody, m.
+pub(super) const SITTING_M: f64 = 1.36;
+pub(super) const STANDING_M: f64 = 1.60;
 const TALLEST_M: f64 = 2.1;
 
 /// What the top of an echo says of somebody on the floor.
@@ -33,8 +36,8 @@ const TALLEST_M: f64 = 2.1;
 pub(super) struct Stature {
     /// Most likely stature of somebody who stands, m.
     pub standing_m: f64,
-    /// Height of the head's top where it is lower than that of anybody who stands, m.
-    pub bent_m: Option<f64>,
+    /// Height of the head's top where feet and head are seen, m.
+    pub top_m: Option<f64>,
 }
 
 impl Stature {
@@ -42,7 +45,7 @@ impl Stature {
     /// above the floor.
     pub(super) fn new(lit_m: impl Iterator<Item = [f64; 2]>, radar_height_m: f64) -> Self {
         let (mut low, mut top): (Vec<f64>, Vec<f64>) = lit_m.map(|[low, top]| (low, top)).unzip();
-        let unknown = Self { standing_m: STATURE_M, bent_m: None };
+        let unknown = Self { standing_m: STATURE_M, top_m: None };
         let (Some(low), Some(top)) = (median(&mut low), median(&mut top)) else { return unknown };
         let (low, top) = (low + radar_height_m, top + radar_height_m);
         // What shines beyond the feet shines beyond the head; feet are often dark, heads are not.
@@ -52,7 +55,7 @@ impl Stature {
             return unknown;
         }
         let trust = STATURE_SPREAD_M.powi(2) / (STATURE_SPREAD_M.powi(2) + TOP_SPREAD_M.powi(2));
-        Self { standing_m: STATURE_M + trust * (seen_m - STATURE_M), bent_m: (seen_m < SITTING_M).then_some(seen_m) }
+        Self { standing_m: STATURE_M + trust * (seen_m - STATURE_M), top_m: (low < FEET_M).then_some(seen_m) }
     }
 }
 
@@ -111,14 +114,13 @@ mod tests {
     #[test]
     fn a_head_tells_who_is_tall_and_who_sits() {
         let stature = |lit_m: &[[f64; 2]]| Stature::new(lit_m.iter().copied(), 1.0);
-        let unknown = Stature { standing_m: STATURE_M, bent_m: None };
+        let unknown = Stature { standing_m: STATURE_M, top_m: None };
         assert_eq!(stature(&[]), unknown);
         let (tall, small) = (stature(&[[-1.1, 1.0]]), stature(&[[-1.1, 0.65]]));
         assert!(tall.standing_m > 1.8 && tall.standing_m < 1.9 && small.standing_m < 1.65);
-        assert!(tall.bent_m.is_none() && small.bent_m.is_none());
-        let sits = stature(&[[-1.1, 0.4], [-1.1, 0.8], [-1.1, 0.38]]).bent_m;
-        assert!(sits.is_some_and(|top| (1.2..1.3).contains(&top)), "one frame of three is not believed");
-        assert!(stature(&[[-0.5, 0.3]]).bent_m.is_none(), "without feet it may be a piece");
+        let sits = stature(&[[-1.1, 0.4], [-1.1, 0.8], [-1.1, 0.38]]).top_m;
+        assert!(sits.is_some_and(|top| top < SITTING_M), "one frame of three is not believed");
+        assert!(stature(&[[-0.5, 0.3]]).top_m.is_none(), "without feet it may be a piece");
         assert_eq!(stature(&[[-1.1, 1.6]]), unknown, "nobody is that tall");
     }
 

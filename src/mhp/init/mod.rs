@@ -188,12 +188,9 @@ fn choose_postures(
     for k in 0..persons.len() {
         let walks = persons[k].walks();
         let stature = persons[k].stature(problem, &config).filter(|_| !walks);
-        if let Some(top_m) = stature.and_then(|stature| stature.bent_m) {
-            persons[k].posture = pose::bent(template, &problem.skeleton, top_m);
-            continue;
-        }
+        let tried = postures(template, problem, config.starts, walks, stature);
         let mut best: Option<(f64, Posture)> = None;
-        for posture in pose::tried(config.starts, walks) {
+        for (posture, better) in tried {
             let own = |at: Vec3| Person { at, posture, ..persons[k].clone() };
             let body = |at: Vec3| assemble(problem, &config, template, &[own(at)]);
             let at = persons[k].at;
@@ -204,9 +201,7 @@ fn choose_postures(
                 lowest = lowest.min(loss);
                 loss
             });
-            // Who stands is as likely to stand as all else together: another posture has to be clearly better.
-            let ask = if walks || best.is_none() { lowest } else { lowest / CLEARLY_BETTER };
-            if best.is_none_or(|(loss, _)| ask < loss) {
+            if best.is_none_or(|(loss, _)| lowest < better * loss) {
                 best = Some((lowest, posture));
             }
         }
@@ -215,6 +210,27 @@ fn choose_postures(
         }
     }
     Ok(())
+}
+
+/// Postures to try, and the share of the best L_EM so far below which each is believed: who stands is as likely to stand as
+/// all else together, and who hardly reaches an adult's height to sit.
+fn postures(
+    template: &Template,
+    problem: &Problem,
+    starts: usize,
+    walks: bool,
+    stature: Option<Stature>,
+) -> Vec<(Posture, f64)> {
+    let believed = |posture: Posture| (posture, if walks { 1.0 } else { CLEARLY_BETTER });
+    let tried = pose::tried(starts, walks).into_iter().map(believed);
+    let Some(top_m) = stature.and_then(|stature| stature.top_m) else { return tried.collect() };
+    // Where the head's height is known, it says how far a body is bent.
+    let upright = tried.filter(|(posture, _)| !matches!(posture, Posture::Bent(_)));
+    match pose::bent(template, &problem.skeleton, top_m) {
+        bent if top_m < height::SITTING_M => vec![(bent, 1.0)],
+        bent if top_m < height::STANDING_M => upright.chain([(bent, 1.0)]).collect(),
+        _ => upright.collect(),
+    }
 }
 
 /// A warm start: the persons of the frame before, moved as the maps of the two frames say that each of them moved.

@@ -70,10 +70,10 @@ impl Posture {
     }
 }
 
-/// Hips and knees bent so far that the top of the head comes down to `top_m` above the floor, at least as on a chair.
+/// Hips and knees bent so far that the top of the head comes down to `top_m` above the floor.
 pub(super) fn bent(template: &Template, skeleton: &Skeleton, top_m: f64) -> Posture {
     let top_of = |angle: f64| posed(template, skeleton, Posture::Bent(angle)).top_m();
-    let (mut high, mut low) = (ON_A_CHAIR, ON_THE_FLOOR);
+    let (mut high, mut low) = (0.0, ON_THE_FLOOR);
     for _ in 0..12 {
         let angle = f64::midpoint(high, low);
         if top_of(angle) > top_m { high = angle } else { low = angle }
@@ -98,7 +98,11 @@ pub(super) fn posed(template: &Template, skeleton: &Skeleton, posture: Posture) 
         bend(&mut joints, &named(&["shoulder"]), &named(&["elbow"]), &ends.1, &posture.arm(side), side);
     }
     let sunk = floor - lowest(&joints);
+    // Knees and shins shine as the trunk does: bent forwards they take the middle of what is lit with them.
+    let bent = matches!(posture, Posture::Bent(_));
+    let ahead = if bent { mean_ahead(&joints) - mean_ahead(&template.joints) } else { 0.0 };
     for joint in &mut joints {
+        joint[0] -= ahead;
         joint[2] += sunk;
     }
     Template { joints, crown_m: template.crown_m }
@@ -126,6 +130,10 @@ fn turned(p: Vec3, pivot: Vec3, axis: Vec3, angle: f64) -> Vec3 {
     let (sin, cos) = (0.5 * angle).sin_cos();
     let q = [cos, sin * axis[0], sin * axis[1], sin * axis[2]];
     add(pivot, mat_vec(&rotation_from_quaternion(q), sub(p, pivot)))
+}
+
+fn mean_ahead(joints: &[Vec3]) -> f64 {
+    joints.iter().map(|j| j[0]).sum::<f64>() / joints.len().max(1) as f64
 }
 
 fn lowest(joints: &[Vec3]) -> f64 {
