@@ -12,6 +12,7 @@ use mhp_inspector::body::{Group, PpprShape};
 use mhp_inspector::geometry::{norm, sub};
 use mhp_inspector::mhp::{FitError, Problem, initialise};
 use reading::{case_folders, read};
+use std::sync::Arc;
 
 fn centroid(flat: &[f64]) -> [f64; 3] {
     std::array::from_fn(|k| flat.iter().skip(k).step_by(3).sum::<f64>() / (flat.len() / 3) as f64)
@@ -28,7 +29,7 @@ fn finds_the_person_of_the_reference_cases() {
         let name = folder.file_name().unwrap().to_string_lossy().into_owned();
         let case = Case::open(&folder);
         let truth = read(&folder.join("frames/000000.npz"), "joints");
-        let start = initialise(&case.problem, &case.config).unwrap();
+        let start = initialise(&Arc::new(case.problem.clone()), &case.config).unwrap();
         let expected = PpprShape { persons: 1, ..case.params.shape() };
         assert_eq!(start.params.shape(), expected);
         assert!(start.params.is_finite());
@@ -58,7 +59,7 @@ fn is_not_drawn_to_a_wall() {
         *value += 0.3 * largest * (-((range - 2.4) / 0.15).powi(2)).exp();
     }
     let slices: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
-    let problem = Problem::new(case.problem.radar, case.problem.skeleton, views, &slices).unwrap();
+    let problem = Arc::new(Problem::new(case.problem.radar, case.problem.skeleton, views, &slices).unwrap());
     let start = initialise(&problem, &case.config).unwrap();
     let [across, up] = miss(centroid(start.params.group(Group::Position)), truth);
     assert!(across < 0.35 && up < 0.3, "{across:.2} m across, {up:.2} m up");
@@ -69,7 +70,8 @@ fn a_constant_map_has_no_start() {
     let folder = case_folders().into_iter().find(|f| f.ends_with("mmvr-size")).unwrap();
     let case = Case::open(&folder);
     let flat = vec![1.0; 256 * 128];
-    let problem = Problem::new(case.problem.radar, case.problem.skeleton, case.problem.views, &[&flat, &flat]).unwrap();
+    let problem =
+        Arc::new(Problem::new(case.problem.radar, case.problem.skeleton, case.problem.views, &[&flat, &flat]).unwrap());
     assert!(matches!(initialise(&problem, &case.config), Err(FitError::NoStart { .. })));
 }
 
@@ -77,7 +79,7 @@ fn a_constant_map_has_no_start() {
 fn starts_with_bones_of_reference_length_and_the_stated_values() {
     let folder = case_folders().into_iter().find(|f| f.ends_with("mmvr-size")).unwrap();
     let case = Case::open(&folder);
-    let params = initialise(&case.problem, &case.config).unwrap().params;
+    let params = initialise(&Arc::new(case.problem.clone()), &case.config).unwrap().params;
     let skeleton = &case.problem.skeleton;
     for (&[m, n], want) in skeleton.bones.iter().zip(&skeleton.bone_lengths_m) {
         let length = norm(sub(params.position(m), params.position(n)));

@@ -15,8 +15,8 @@ fn frame() -> Option<(Arc<Problem>, Frame)> {
     let frame = dataset.load(dataset.start_index()).unwrap();
     let info = dataset.info();
     let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-    let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap();
-    Some((Arc::new(problem), frame))
+    let problem = Arc::new(Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap());
+    Some((problem, frame))
 }
 
 /// (row, column) of a joint on each of MMVR's two maps; the axes are as the notes on data sets measured them.

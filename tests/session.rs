@@ -38,7 +38,8 @@ impl Bench {
         let frame = dataset.load(0).unwrap();
         let info = dataset.info();
         let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-        let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap();
+        let problem =
+            Arc::new(Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap());
         let params = initialise(&problem, &FitConfig::default()).unwrap().params;
         let mut bench = Self { session: Session::default(), dataset, params, folder };
         let effects = bench.apply(Command::Opened(bench.folder.path().into(), Ok(Arc::clone(&bench.dataset))));

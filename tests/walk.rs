@@ -9,6 +9,7 @@ use mhp_inspector::diagnose::joint_errors;
 use mhp_inspector::geometry::{Vec3, add, scale, sub};
 use mhp_inspector::mhp::{Problem, initialise};
 use std::path::Path;
+use std::sync::Arc;
 
 fn centroid(joints: &[Vec3]) -> Vec3 {
     scale(joints.iter().fold([0.0; 3], |sum, &p| add(sum, p)), 1.0 / joints.len() as f64)
@@ -23,7 +24,8 @@ fn starts_near_the_walker() {
     for index in 0..dataset.len() {
         let frame = dataset.load(index).unwrap();
         let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-        let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap();
+        let problem =
+            Arc::new(Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap());
         let start = initialise(&problem, &FitConfig::default()).unwrap();
         let found: Vec<Vec3> =
             start.params.group(Group::Position).chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();

@@ -50,7 +50,7 @@ impl Preset {
                 height: Height::Floor,
                 summation: Summation::Incoherent,
                 em_region: EmRegion::HalfWidth(1.0),
-                surface_offset_m: 0.05,
+                surface_offset_m: 0.04,
                 starts: 9,
                 w_time: 8.0,
                 learning_rates: LearningRates {

@@ -2,8 +2,8 @@
 
 use crate::config::FitConfig;
 use crate::geometry::Vec3;
-use crate::mhp::{FitError, Initialisation, Problem, initialise, initialise_people};
-use crate::people::{Count, Counter, Scan};
+use crate::mhp::{FitError, Initialisation, Neighbour, Problem, initialise, initialise_people};
+use crate::people::{Count, Counter, HISTORY, Scan};
 use std::sync::Arc;
 
 /// A start, and the count that it rests on where people were counted.
@@ -45,8 +45,9 @@ fn count(problem: &Problem) -> Result<Count, FitError> {
     let counter = Counter::new(&problem.views).map_err(told)?;
     let views = 0..problem.views.len();
     let mut scans: Vec<Scan> = Vec::new();
-    let before = problem.neighbours().iter().filter(|neighbour| neighbour.offset_s < 0.0);
-    let times = before.map(|neighbour| views.clone().map(|k| neighbour.map(k)).collect());
+    let earlier: Vec<&Neighbour> = problem.neighbours().iter().filter(|neighbour| neighbour.offset_s < 0.0).collect();
+    let latest = &earlier[earlier.len().saturating_sub(HISTORY - 1)..];
+    let times = latest.iter().map(|neighbour| views.clone().map(|k| neighbour.map(k)).collect());
     for maps in times.chain(std::iter::once(views.clone().map(|k| problem.map(k)).collect::<Vec<&[f64]>>())) {
         let known: Vec<&Scan> = scans.iter().rev().collect();
         let scan = counter.scan(&maps, &known).map_err(told)?;

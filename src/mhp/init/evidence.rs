@@ -71,11 +71,13 @@ pub(super) struct Layout {
     /// Spatial axes and their places among the view's axes.
     axes: Vec<(usize, Axis)>,
     shape: Vec<usize>,
+    /// The ring of each spatial cell.
+    ring_of: Vec<u32>,
     /// Spatial cells ring by ring, and where each ring begins.
     cells: Vec<u32>,
     rings: Vec<usize>,
-    /// Cells too near to the radar to tell anything.
-    deaf: Vec<u32>,
+    /// Rings before this are too near to the radar to tell anything.
+    deaf: usize,
 }
 
 impl Layout {
@@ -84,30 +86,27 @@ impl Layout {
         let axes: Vec<(usize, Axis)> = spatial.map(|(k, axis)| (k, axis.clone())).collect();
         let shape: Vec<usize> = axes.iter().map(|(_, axis)| axis.bins).collect();
         let count: usize = shape.iter().product();
-        let mut layout = Self { view: view.clone(), index, axes, shape, cells: vec![], rings: vec![], deaf: vec![] };
-        let ranges = layout.ranges_m();
-        let widths = layout.axes.iter().filter(|(_, a)| !a.kind.is_angular()).map(|(_, a)| a.step().abs());
-        let width_m = widths.fold(f64::INFINITY, f64::min);
-        let ring_of: Vec<usize> = match &ranges {
-            Some(ranges) => ranges.iter().map(|range| (range / width_m).round() as usize).collect(),
-            None => vec![0; count],
-        };
+        let (ring_of, rings, cells) = (vec![0; count], vec![], vec![0; count]);
+        let mut layout = Self { view: view.clone(), index, axes, shape, ring_of, cells, rings, deaf: 0 };
+        if let Some(ranges) = layout.ranges_m() {
+            let widths = layout.axes.iter().filter(|(_, a)| !a.kind.is_angular()).map(|(_, a)| a.step().abs());
+            let width_m = widths.fold(f64::INFINITY, f64::min);
+            layout.ring_of = ranges.iter().map(|range| (range / width_m).round() as u32).collect();
+            layout.deaf = (NEAREST_M / width_m).round() as usize;
+        }
         // Counting sort: how many cells each ring has, where it begins, and each cell to its place.
-        layout.rings = vec![0; ring_of.iter().max().map_or(1, |last| last + 2)];
-        for &ring in &ring_of {
-            layout.rings[ring + 1] += 1;
+        layout.rings = vec![0; layout.ring_of.iter().max().map_or(1, |&last| last as usize + 2)];
+        for &ring in &layout.ring_of {
+            layout.rings[ring as usize + 1] += 1;
         }
         for ring in 1..layout.rings.len() {
             layout.rings[ring] += layout.rings[ring - 1];
         }
         let mut next = layout.rings.clone();
-        layout.cells = vec![0; count];
-        for (cell, &ring) in ring_of.iter().enumerate() {
-            layout.cells[next[ring]] = cell as u32;
-            next[ring] += 1;
+        for (cell, &ring) in layout.ring_of.iter().enumerate() {
+            layout.cells[next[ring as usize]] = cell as u32;
+            next[ring as usize] += 1;
         }
-        let deaf = ranges.iter().flatten().enumerate().filter(|(_, range)| **range <= NEAREST_M);
-        layout.deaf = deaf.map(|(cell, _)| cell as u32).collect();
         layout
     }
 
@@ -132,25 +131,35 @@ impl Layout {
         Some(squares.into_iter().map(f64::sqrt).collect())
     }
 
-    /// ln of `value` over the median of its ring, ≥ 0. `value` must be positive.
-    fn salience(&self, value: &[f32]) -> Vec<f32> {
+    /// One over the median of each ring; 0 where nothing is told. `value` must be positive.
+    fn background(&self, value: &[f32]) -> Vec<f32> {
         // Positive floats sort as their bits do, and integers are partitioned several times as fast.
         let mut bits: Vec<u32> = self.cells.iter().map(|&cell| value[cell as usize].to_bits()).collect();
         let small = self.rings.windows(2).any(|ends| ends[1] - ends[0] < SMALLEST_RING);
         let overall = if small { median(&mut bits.clone()) } else { 1.0 };
-        let mut salience = vec![0.0; value.len()];
-        for ends in self.rings.windows(2) {
-            let ring = ends[0]..ends[1];
-            let background = if ring.len() < SMALLEST_RING { overall } else { median(&mut bits[ring.clone()]) };
-            for &cell in &self.cells[ring] {
-                let ratio = value[cell as usize] / background;
-                salience[cell as usize] = if ratio > 1.0 { ratio.ln() } else { 0.0 };
+        let of_ring = |(ring, ends): (usize, &[usize])| match &mut bits[ends[0]..ends[1]] {
+            _ if ring < self.deaf => 0.0,
+            few if few.len() < SMALLEST_RING => 1.0 / overall,
+            members => 1.0 / median(members),
+        };
+        self.rings.windows(2).enumerate().map(of_ring).collect()
+    }
+
+    /// H of each spatial cell in shares of `largest`, and the full cell each was taken from where that is another.
+    fn spatial(&self, map: &[f64], largest: f64) -> (Vec<f32>, Vec<u32>) {
+        let relative = |h: f64| ((h / largest) as f32).max(FAINTEST);
+        if self.axes.len() == self.view.axes.len() {
+            return (map.iter().map(|&h| relative(h)).collect(), Vec::new());
+        }
+        let (mut value, mut source) = (vec![0.0; self.cells.len()], vec![0; self.cells.len()]);
+        for (cell, &h) in map.iter().enumerate() {
+            let bins = unravel(cell, &self.view.shape());
+            let spatial = self.axes.iter().fold(0, |flat, (k, axis)| flat * axis.bins + bins[*k]);
+            if relative(h) > value[spatial] {
+                (value[spatial], source[spatial]) = (relative(h), cell as u32);
             }
         }
-        for &cell in &self.deaf {
-            salience[cell as usize] = 0.0;
-        }
-        salience
+        (value, source)
     }
 }
 
@@ -158,12 +167,12 @@ impl Layout {
 #[derive(Debug, Clone)]
 pub(super) struct Evidence {
     layout: Arc<Layout>,
-    /// H of each spatial cell, of the map's largest, and the full cell it was taken from where that is another.
+    /// H of each spatial cell in shares of `largest`, and the full cell it was taken from where that is another.
     value: Vec<f32>,
     source: Vec<u32>,
     largest: f64,
-    /// ln H over the background, ≥ 0.
-    salience: Vec<f32>,
+    /// One over the background of each ring.
+    background: Arc<Vec<f32>>,
     /// How restless each spatial cell is, 0 to 1: what stands still is no evidence. `None` where nothing tells.
     unrest: Option<Arc<Vec<f32>>>,
 }
@@ -171,34 +180,24 @@ pub(super) struct Evidence {
 impl Evidence {
     pub(super) fn new(layout: &Arc<Layout>, map: &[f64]) -> Self {
         let largest = map.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-        let relative = |h: f64| ((h / largest) as f32).max(FAINTEST);
-        let (mut value, mut source) = (Vec::new(), Vec::new());
-        if layout.axes.len() == layout.view.axes.len() {
-            value.extend(map.iter().map(|&h| relative(h)));
-        } else {
-            let cells = layout.cells.len();
-            (value, source) = (vec![0.0; cells], vec![0; cells]);
-            for (cell, &h) in map.iter().enumerate() {
-                let bins = unravel(cell, &layout.view.shape());
-                let spatial = layout.axes.iter().fold(0, |flat, (k, axis)| flat * axis.bins + bins[*k]);
-                if relative(h) > value[spatial] {
-                    (value[spatial], source[spatial]) = (relative(h), cell as u32);
-                }
-            }
-        }
-        let salience = layout.salience(&value);
-        Self { layout: Arc::clone(layout), value, source, largest, salience, unrest: None }
+        let (value, source) = layout.spatial(map, largest);
+        let background = Arc::new(layout.background(&value));
+        Self { layout: Arc::clone(layout), value, source, largest, background, unrest: None }
     }
 
-    /// The same map where what stands still is no evidence; `unrest` is how restless each cell of the map is, 0 to 1.
-    pub(super) fn where_restless(self, unrest: &[f32]) -> Self {
-        let of_spatial = (0..self.value.len()).map(|cell| unrest[self.source(cell)]).collect();
+    /// Another map of the same view, a short time before or after, over the background and with the stillness of this one.
+    pub(super) fn at_another_time(&self, map: &[f64]) -> Self {
+        let (value, source) = self.layout.spatial(map, self.largest);
+        let (background, unrest) = (Arc::clone(&self.background), self.unrest.clone());
+        Self { layout: Arc::clone(&self.layout), value, source, largest: self.largest, background, unrest }
+    }
+
+    /// The same map where what stands still is no evidence: cells whose coefficient of variation is below `still` do not
+    /// count, those above `restless` do.
+    pub(super) fn where_restless(self, variation: &[f32], [still, restless]: [f32; 2]) -> Self {
+        let unrest = |cell: usize| ((variation[self.source(cell)] - still) / (restless - still)).clamp(0.0, 1.0);
+        let of_spatial = (0..self.value.len()).map(unrest).collect();
         Self { unrest: Some(Arc::new(of_spatial)), ..self }
-    }
-
-    /// The same map, with the stillness of another map of the view.
-    pub(super) fn as_restless_as(self, other: &Self) -> Self {
-        Self { unrest: other.unrest.clone(), ..self }
     }
 
     /// The cell of the whole map that a spatial cell was taken from.
@@ -210,14 +209,20 @@ impl Evidence {
         self.unrest.as_ref().map_or(1.0, |unrest| f64::from(unrest[cell]))
     }
 
+    /// ln H over the background, ≥ 0.
+    fn over_background(&self, cell: usize) -> f64 {
+        let ratio = self.value[cell] * self.background[self.layout.ring_of[cell] as usize];
+        if ratio > 1.0 { f64::from(ratio.ln()) } else { 0.0 }
+    }
+
     /// ln H over the background of what moves, ≥ 0.
     fn salience(&self, cell: usize) -> f64 {
-        f64::from(self.salience[cell]) * self.unrest(cell)
+        self.over_background(cell) * self.unrest(cell)
     }
 
     /// H over the background of what moves, of the map's largest.
     fn excess(&self, cell: usize) -> f64 {
-        let salience = f64::from(self.salience[cell]);
+        let salience = self.over_background(cell);
         let over_speckle = if salience > SPECKLE { 1.0 - (SPECKLE - salience).exp() } else { 0.0 };
         f64::from(self.value[cell]) * over_speckle * self.unrest(cell)
     }
@@ -324,11 +329,10 @@ impl Evidence {
         }
         // Speckle makes one cell's slope a coin toss: the flow is that of the cells around, weighted by their slopes.
         let (mut change, mut slopes) = (0.0, 0.0);
-        let brighter = (then.largest / self.largest) as f32;
         let mut add = |cell: usize| {
             let (by_axis, _) = self.gradient(cell);
             let outwards = by_axis[k] * axis.step().signum();
-            let later = then.value.get(cell).map_or(self.value[cell], |&later| later * brighter);
+            let later = then.value.get(cell).copied().unwrap_or(self.value[cell]);
             change -= outwards * f64::from(later - self.value[cell]);
             slopes += outwards * outwards;
         };
@@ -429,19 +433,26 @@ impl Evidence {
     }
 }
 
-/// How restless each cell is over `maps` (the same view at several times): 0 where the coefficient of variation is below
-/// `still`, 1 where it is above `restless`. The speckle of a person changes from frame to frame, for a chest that breathes
-/// moves by wavelengths; a wall's does not.
-pub(super) fn unrest(maps: &[&[f64]], [still, restless]: [f64; 2]) -> Vec<f32> {
+/// The coefficient of variation of each cell over `maps`, the same view at several times. The speckle of a person changes
+/// from frame to frame, for a chest that breathes moves by wavelengths; a wall's does not.
+pub(super) fn variation(maps: &[&[f64]]) -> Vec<f32> {
+    let Some((first, others)) = maps.split_first() else { return Vec::new() };
+    // Sums of differences to the first map: what stands still adds up to nothing, to the last digit.
+    let (mut sums, mut squares) = (vec![0.0; first.len()], vec![0.0; first.len()]);
+    for map in others {
+        for ((sum, square), (then, now)) in sums.iter_mut().zip(&mut squares).zip(map.iter().zip(*first)) {
+            let difference = then - now;
+            *sum += difference;
+            *square += difference * difference;
+        }
+    }
     let count = maps.len() as f64;
-    let of_cell = |cell: usize| {
-        let values = || maps.iter().filter_map(|map| map.get(cell));
-        let mean = values().sum::<f64>() / count;
-        let spread = (values().map(|h| (h - mean) * (h - mean)).sum::<f64>() / count).sqrt();
-        let variation = if mean > 0.0 { spread / mean } else { 0.0 };
-        ((variation - still) / (restless - still)).clamp(0.0, 1.0) as f32
+    let of_cell = |((&sum, square), now): ((&f64, f64), &f64)| {
+        let (mean, shift) = (now + sum / count, sum / count);
+        let spread = (square / count - shift * shift).max(0.0).sqrt();
+        if mean > 0.0 { (spread / mean) as f32 } else { 0.0 }
     };
-    (0..maps.first().map_or(0, |map| map.len())).map(of_cell).collect()
+    sums.iter().zip(squares).zip(*first).map(of_cell).collect()
 }
 
 /// The middle value of positive floats given as their bits, the upper one of two; they are reordered. 1 where there are

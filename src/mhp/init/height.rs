@@ -72,7 +72,7 @@ pub(super) struct Expectation {
     /// Height of the middle, world frame, m.
     pub middle_m: f64,
     /// Lowest and highest lit height around the place, m.
-    pub lit_m: Option<[f64; 2]>,
+    pub lit: Option<[f64; 2]>,
     /// The same where they may be feet and head of somebody who stands or sits.
     pub extent_m: Option<[f64; 2]>,
 }
@@ -91,10 +91,10 @@ impl Expectation {
         let strongest = profile.iter().map(|(_, salience)| *salience).fold(0.0, f64::max);
         let level = SPECKLE.max(strongest - DEPTH_LN);
         let heights: Vec<f64> = profile.into_iter().filter(|(_, salience)| *salience > level).map(|(z, _)| z).collect();
-        let lit_m = extent_around(&heights, at[2]);
-        let extent_m = lit_m.filter(|[low, high]| (PLAUSIBLE_M.0..=PLAUSIBLE_M.1).contains(&(high - low)));
+        let lit = extent_around(&heights, at[2]);
+        let extent_m = lit.filter(|[low, high]| (PLAUSIBLE_M.0..=PLAUSIBLE_M.1).contains(&(high - low)));
         let middle_m = extent_m.map_or(UNSEEN_MIDDLE_M, |[low, high]| f64::midpoint(low, high));
-        Self { middle_m, lit_m, extent_m }
+        Self { middle_m, lit, extent_m }
     }
 }
 

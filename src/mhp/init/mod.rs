@@ -12,7 +12,8 @@
 //!    ([`perturb`]).
 //!
 //! Switches beside the paper's setting refine the start: behind the skin, on the line through the frames around, as high as
-//! floor and head say ([`height`]), in the posture that fits ([`pose`]). What it is without them is kept beside it.
+//! floor and head say in all of them ([`height`]), in the posture that fits ([`pose`]). What it is without them is kept
+//! beside it. The evidence is worked out once for a problem ([`surroundings`]).
 //!
 //! Nothing here reads a label.
 
@@ -93,7 +94,7 @@ impl Person {
     /// What its head says of it, where the floor is known and asked for.
     fn stature(&self, problem: &Problem, config: &FitConfig) -> Option<Stature> {
         let radar_height_m = problem.radar.height_m.filter(|_| config.height == Height::Floor)?;
-        let own = self.expected.and_then(|expected| expected.lit_m);
+        let own = self.expected.and_then(|expected| expected.lit);
         let in_track = self.track.iter().flat_map(|track| track.sightings.iter().filter_map(|seen| seen.lit_m));
         let lit_m: Vec<[f64; 2]> = if self.track.is_some() { in_track.collect() } else { own.into_iter().collect() };
         Some(Stature::new(lit_m.into_iter(), radar_height_m))
@@ -158,7 +159,7 @@ pub fn initialise_people(
     };
     let mut persons = Vec::with_capacity(found.len());
     for (at, expected) in found {
-        let lit_m = expected.and_then(|expected| expected.lit_m);
+        let lit_m = expected.and_then(|expected| expected.lit);
         let track = motion::track(problem, Sighting { t_s: 0.0, at, lit_m });
         let radial = velocity::radial(problem, at, config.init.velocity_gain_mps);
         persons.push(Person { at, expected, track, radial, posture: Posture::Standing });
@@ -267,7 +268,7 @@ pub(super) fn anchors(problem: &Problem, config: &FitConfig, params: &Pppr) -> V
         let own = person * joints..(person + 1) * joints;
         let mean = scale(own.fold([0.0; 3], |sum, joint| add(sum, params.position(joint))), 1.0 / joints as f64);
         let (lit, expectation) = centre(problem, &problem.surroundings().now, middle);
-        let here = Sighting { t_s: 0.0, at: lit, lit_m: expectation.lit_m };
+        let here = Sighting { t_s: 0.0, at: lit, lit_m: expectation.lit };
         let Some(track) = motion::track(problem, here) else { return mean };
         let at = behind_skin(config, track.at);
         // Where the floor is known, the start stands as high as it should.
@@ -448,27 +449,20 @@ fn tell(person: &Person, config: &FitConfig) -> Vec<String> {
     let walking = person.track.as_ref().filter(|track| config.yaw == Yaw::Motion && track.heading().is_some());
     let mut notes = vec![match walking {
         Some(track) => format!(
-            "standing at x {:.2} m, y {:.2} m, facing where it goes: {:.2} m/s over {} frames",
+            "{} at x {:.2} m, y {:.2} m, facing where it goes: {:.2} m/s over {} frames",
+            person.posture.words(),
             at[0],
             at[1],
             track.velocity[0].hypot(track.velocity[1]),
             track.sightings.len()
         ),
-        None => format!("standing at x {:.2} m, y {:.2} m, facing the radar", at[0], at[1]),
+        None => format!("{} at x {:.2} m, y {:.2} m, facing the radar", person.posture.words(), at[0], at[1]),
     }];
     notes.push(match person.expected.map(|expected| (expected.extent_m, expected.middle_m)) {
         Some((Some([low, high]), _)) => format!("feet at z {low:.2} m and head at {high:.2} m seen"),
         Some((None, middle)) => format!("no feet and head seen: middle of the body expected at z {middle:.2} m"),
         None => "position not read from the peaks: the middle of the views".to_owned(),
     });
-    notes.push(format!(
-        "LIT {:.2?}",
-        person
-            .track
-            .iter()
-            .flat_map(|t| t.sightings.iter().map(|s| (s.t_s, s.at[0], s.at[1], s.lit_m.unwrap_or([9.0, 9.0]))))
-            .collect::<Vec<_>>()
-    ));
     notes.push(match person.radial {
         _ if !config.init.velocity => "velocity 0: not read from the maps".to_owned(),
         Some(Radial { mps, source: Source::Doppler, .. }) => {

@@ -63,16 +63,16 @@ pub(super) fn track(problem: &Problem, here: Sighting) -> Option<Track> {
     let surroundings = problem.surroundings();
     let mut sightings = vec![here];
     for forwards in [true, false] {
-        let side = surroundings.around.iter().filter(|(t, _)| (*t > 0.0) == forwards && *t != 0.0);
+        let side = surroundings.around.iter().filter(|(t_s, _)| (*t_s > 0.0) == forwards && *t_s != 0.0);
         let mut ordered: Vec<&(f64, Vec<Evidence>)> = side.collect();
         ordered.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
-        let mut last = here;
-        let mut velocity = [0.0; 3];
+        let (mut last, mut velocity) = (here, [0.0; 3]);
         for (t_s, evidence) in ordered {
+            let step_s = t_s - last.t_s;
             let mut expected = last.at;
-            add_scaled(&mut expected, velocity, t_s - last.t_s);
+            add_scaled(&mut expected, velocity, step_s);
             let Some(found) = follow(problem, evidence, *t_s, expected) else { break };
-            velocity = scale(sub(found.at, last.at), 1.0 / (t_s - last.t_s));
+            velocity = scale(sub(found.at, last.at), 1.0 / step_s);
             last = found;
             sightings.push(found);
         }
@@ -84,7 +84,7 @@ pub(super) fn track(problem: &Problem, here: Sighting) -> Option<Track> {
 fn follow(problem: &Problem, evidence: &[Evidence], t_s: f64, expected: Vec3) -> Option<Sighting> {
     let (at, expectation) = centre(problem, evidence, expected);
     let off = sub(at, expected);
-    (off[0].hypot(off[1]) < LEASH_M).then_some(Sighting { t_s, at, lit_m: expectation.lit_m })
+    (off[0].hypot(off[1]) < LEASH_M).then_some(Sighting { t_s, at, lit_m: expectation.lit })
 }
 
 /// Least squares through the places.

@@ -44,6 +44,17 @@ struct Limb {
 }
 
 impl Posture {
+    /// What somebody in this posture does.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Self::Standing => "standing",
+            Self::Walking(_) => "walking",
+            Self::ArmsSideways => "standing with arms raised sideways",
+            Self::ArmsForward => "standing with arms raised forwards",
+            Self::Bent(_) => "sitting or crouching",
+        }
+    }
+
     fn leg(self, side: Side) -> Limb {
         match self {
             Self::Walking(stride) => {

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 /// Coefficients of variation over time: below the first of a pair a cell stands still, above the second it does not (a
 /// Rayleigh amplitude has 0.52). The second pair is for who only breathes.
-const VARIATIONS: [[f64; 2]; 2] = [[0.05, 0.25], [0.015, 0.075]];
+const VARIATIONS: [[f32; 2]; 2] = [[0.05, 0.25], [0.015, 0.075]];
 /// The largest of 30,000 Rayleigh amplitudes over their median, ln: a peak above it is no noise.
 const NOISE: f64 = 1.4;
 
@@ -26,12 +26,12 @@ impl Surroundings {
     fn new(problem: &Problem) -> Self {
         let layouts: Vec<Arc<Layout>> =
             problem.views.iter().enumerate().map(|(k, view)| Arc::new(Layout::new(k, view))).collect();
-        let seen = |maps: &dyn Fn(usize) -> Evidence| (0..layouts.len()).map(maps).collect::<Views>();
-        let plain = seen(&|k| Evidence::new(&layouts[k], problem.map(k)));
+        let plain: Views =
+            layouts.iter().enumerate().map(|(k, layout)| Evidence::new(layout, problem.map(k))).collect();
         let now = moving(problem, &plain).unwrap_or(plain);
         let of_neighbour = |neighbour: &crate::mhp::Neighbour| {
-            let view = |k: usize| Evidence::new(&layouts[k], neighbour.map(k)).as_restless_as(&now[k]);
-            (neighbour.offset_s, seen(&view))
+            let views = now.iter().enumerate().map(|(k, now)| now.at_another_time(neighbour.map(k)));
+            (neighbour.offset_s, views.collect())
         };
         let around = problem.neighbours().iter().map(of_neighbour).collect();
         Self { now, around }
@@ -43,17 +43,19 @@ fn moving(problem: &Problem, plain: &[Evidence]) -> Option<Views> {
     if problem.neighbours().len() < 2 {
         return None;
     }
-    let at_level = |limits: [f64; 2]| -> Option<Views> {
-        let of_view = |(k, evidence): (usize, &Evidence)| {
-            let others = problem.neighbours().iter().map(|neighbour| neighbour.map(k));
-            let maps: Vec<&[f64]> = std::iter::once(problem.map(k)).chain(others).collect();
-            let moving = evidence.clone().where_restless(&evidence::unrest(&maps, limits));
+    let of_view = |k: usize| {
+        let others = problem.neighbours().iter().map(|neighbour| neighbour.map(k));
+        evidence::variation(&std::iter::once(problem.map(k)).chain(others).collect::<Vec<_>>())
+    };
+    let variations: Vec<Vec<f32>> = (0..plain.len()).map(of_view).collect();
+    VARIATIONS.into_iter().find_map(|limits| {
+        let moving = |(evidence, variation): (&Evidence, &Vec<f32>)| {
+            let moving = evidence.clone().where_restless(variation, limits);
             // Every view must show something that moves, and noise always does: a place is where views agree.
             moving.peaks().iter().any(|peak| peak.salience > NOISE).then_some(moving)
         };
-        plain.iter().enumerate().map(of_view).collect()
-    };
-    VARIATIONS.into_iter().find_map(at_level)
+        plain.iter().zip(&variations).map(moving).collect()
+    })
 }
 
 /// A problem's surroundings, worked out when first asked for. Equal to any other: it follows from the problem.

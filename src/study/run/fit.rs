@@ -253,7 +253,7 @@ mod tests {
     /// Every setting that is left out of the key is one that the start does not depend on.
     #[test]
     fn variants_with_one_key_have_one_start() {
-        let (problem, base) = (problem(), FitConfig::default());
+        let (problem, base) = (Arc::new(problem()), FitConfig::default());
         let start = |config: &FitConfig| begin(&problem, config).unwrap().initialisation.params;
         let same = start(&base);
         let rates = LearningRates { position: Some(0.01), bone: Some(0.02), ..LearningRates::default() };
