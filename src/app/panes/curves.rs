@@ -1,11 +1,14 @@
 //! Loss, terms, IoU and MAJPE over the iterations, with flags where settings changed and a cursor that can be dragged.
 
+mod thin;
+
 use super::{Shared, empty};
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
 use crate::session::{Branch, Command, FitStatus, PinRow, Row, numbers};
 use egui::{Color32, Ui};
 use egui_plot::{GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, VLine};
+use thin::Window;
 
 /// What the plot remembers.
 #[derive(Default)]
@@ -14,6 +17,8 @@ pub(in crate::app) struct State {
     tab: Tab,
     /// The shown iteration before the last click.
     before_click: usize,
+    /// What was on screen in the pass before.
+    window: Option<Window>,
 }
 
 impl State {
@@ -88,17 +93,23 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     }
     if std::mem::take(&mut state.reset) {
         plot = plot.reset();
+        state.window = None;
     }
+    let drawn = |pieces: Vec<Vec<PlotPoint>>| match &state.window {
+        Some(window) => pieces.into_iter().map(|piece| window.thinned(piece)).collect(),
+        None => pieces,
+    };
     let lines: Vec<(Vec<Vec<PlotPoint>>, &Curve)> =
-        curves.iter().filter(|c| !hidden.contains(&c.key)).map(|c| (points(&rows, c, log), c)).collect();
+        curves.iter().filter(|c| !hidden.contains(&c.key)).map(|c| (drawn(points(&rows, c, log)), c)).collect();
     let others: Vec<(u32, Vec<Vec<PlotPoint>>)> = fit
         .history
         .branches()
         .iter()
         .filter(|b| b.id != branch.id)
-        .filter_map(|b| Some((b.id, points(&b.rows.iter().collect::<Vec<_>>(), curves.first()?, log))))
+        .filter_map(|b| Some((b.id, drawn(points(&b.rows.iter().collect::<Vec<_>>(), curves.first()?, log)))))
         .collect();
-    let pinned = pinned(shared, state.tab, log);
+    let pinned: Vec<(String, Vec<Vec<PlotPoint>>)> =
+        pinned(shared, state.tab, log).into_iter().map(|(name, pieces)| (name, drawn(pieces))).collect();
     let shown = fit.shown_iteration();
     let response = plot.show(ui, |plot| {
         for (id, pieces) in &others {
@@ -130,6 +141,8 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         (plot.pointer_coordinate(), plot.response().clone())
     });
     flag_texts(ui, &response, branch, &tokens);
+    let [lo, hi] = response.transform.bounds().range_x().into_inner().into();
+    state.window = (hi > lo).then(|| Window::new(lo, hi, response.transform.frame().width() * ui.pixels_per_point()));
     let (pointer, inner) = response.inner;
     inner.widget_info(|| figure::spoken("Curves", caption.as_deref()));
     if inner.double_clicked() {
