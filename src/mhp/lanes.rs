@@ -20,10 +20,6 @@ const WHOLE: f32 = 12_582_912.0;
 /// Series of cos πt and sin(πt)/t by t².
 const COS_PI: [f32; 7] = [1.0, -4.934_802_2, 4.058_712, -1.335_262_8, 0.235_330_63, -0.025_806_89, 0.001_929_574];
 const SIN_PI: [f32; 6] = [3.141_592_7, -5.167_712_8, 2.550_164, -0.599_264_53, 0.082_145_887, -0.007_370_431];
-/// A bit a lane.
-const BITS: [f32; 16] =
-    [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 512.0, 1024.0, 2048.0, 4096.0, 8192.0, 16384.0, 32768.0];
-
 /// A register of f32.
 #[derive(Clone, Copy)]
 pub(super) struct Lanes<S: Simd> {
@@ -86,9 +82,17 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub(super) fn positive(self) -> u32 {
         let simd = self.simd;
-        let [zero, bits] = [simd.splat_f32s(0.0), S::as_simd_f32s(&BITS).0[0]];
-        // Up to 2¹⁶ − 1: a whole number of f32.
-        simd.reduce_sum_f32s(simd.select_f32s(simd.less_than_f32s(zero, self.value), bits, zero)) as u32
+        let mask = simd.less_than_f32s(simd.splat_f32s(0.0), self.value);
+        let bytes = bytemuck::bytes_of(&mask);
+        if let (&[low, high], 16) = (bytes, S::F32_LANES) {
+            // AVX-512 has them as such.
+            return u32::from(u16::from_le_bytes([low, high]));
+        }
+        let mut bits = 0;
+        for (lane, bytes) in bytes.chunks_exact(bytes.len() / S::F32_LANES).enumerate() {
+            bits |= u32::from(bytes[0] != 0) << lane;
+        }
+        bits
     }
 
     /// The first lane: a scalar again where all are alike.

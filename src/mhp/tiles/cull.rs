@@ -3,9 +3,13 @@
 use super::joint::Line;
 use super::strip::bits;
 use super::{
-    CELLS, Crest, Joint, LOG2_E, Lanes, Question, REACH, RELATIVE, SIDE, STEPS, Scale, Simd, Strip, Tiles, Tiling,
-    lanes, ordered, place, splat, store, unordered,
+    Block, CELLS, Crest, Joint, LOG2_E, Lanes, Question, REACH, RELATIVE, SIDE, STEPS, Scale, Simd, Strip, Tiles,
+    Tiling, lanes, ordered, place, splat, store, unordered,
 };
+
+/// The threshold is guessed from at least this many rows of tiles, and from one in so many.
+const ROWS: usize = 10;
+const STRIDE: usize = 4;
 
 /// (exponent, slope across, slope along) of a joint in some of a block's tile middles, from tile column `column` on.
 #[inline(always)]
@@ -23,41 +27,30 @@ fn middles<S: Simd>(simd: S, joint: &Joint, line: &Line, column: usize, part: us
 
 /// How far a joint's spectrum may lie above its middles, in some of a block's tiles.
 #[inline(always)]
-fn slack<S: Simd>(simd: S, joint: &Joint, row: usize, column: usize, part: usize) -> Lanes<S> {
-    let across = splat(simd, joint.across.most(row));
-    joint.along.blocks.get(column / CELLS).map_or(across, |[_, most]| across + lanes(simd, most, part))
+fn slack<S: Simd>(simd: S, joint: &Joint, block: &Block, part: usize) -> Lanes<S> {
+    let across = splat(simd, joint.across.most(block.row));
+    joint.along.blocks.get(block.column / CELLS).map_or(across, |[_, most]| across + lanes(simd, most, part))
 }
 
 impl Tiles {
-    /// The strongest joint in every tile's middle; returns a guess of log₂ of the threshold.
+    /// A guess of log₂ of the threshold: the percentile of the strongest joints in the middles of tiles.
     #[inline(always)]
-    pub(super) fn crests<S: Simd>(&mut self, simd: S, question: &Question<'_>) -> f64 {
+    pub(super) fn guess<S: Simd>(&mut self, simd: S, question: &Question<'_>) -> f64 {
         let grid = question.tiling;
-        self.crests.clear();
         self.ranked.clear();
-        for (slice, row, column) in grid.blocks() {
-            let mut crest = Crest { exponent: [f32::MIN; CELLS], slope: [[0.0; CELLS]; 2], slack: [0.0; CELLS] };
+        let stride = (grid.size[0] * grid.rows / ROWS).clamp(1, STRIDE);
+        for block in grid.blocks.iter().filter(|block| (block.slice * grid.rows + block.row) % stride == 0) {
+            let mut highest = [f32::MIN; CELLS];
             for part in 0..Self::parts::<S>() {
-                let zero = splat(simd, 0.0);
-                let mut best = [splat(simd, f32::MIN), zero, zero, zero];
+                let mut best = splat(simd, f32::MIN);
                 for joint in &self.joints {
-                    let line = joint.line(grid, [slice, row]);
-                    let [exponent, across, along] = middles(simd, joint, &line, column, part);
-                    let slack = slack(simd, joint, row, column, part) + splat(simd, joint.curvature);
-                    let highest = best[0];
-                    for (best, new) in best.iter_mut().zip([exponent, across, along, slack]) {
-                        *best = exponent.choose(highest, new, *best);
-                    }
+                    let [exponent, ..] = middles(simd, joint, &joint.line(grid, block), block.column, part);
+                    best = best.max(exponent);
                 }
-                let [exponent, across, along, slack] = best;
-                store(&mut crest.exponent, part, exponent);
-                store(&mut crest.slope[0], part, across);
-                store(&mut crest.slope[1], part, along);
-                store(&mut crest.slack, part, slack);
+                store(&mut highest, part, best);
             }
-            let here = (grid.columns - column).min(CELLS);
-            self.ranked.extend(crest.exponent[..here].iter().map(|&x| ordered(x)));
-            self.crests.push(crest);
+            let here = (grid.columns - block.column).min(CELLS);
+            self.ranked.extend(highest[..here].iter().map(|&x| ordered(x)));
         }
         let Some(last) = self.ranked.len().checked_sub(1) else { return 0.0 };
         let (lower, _) = place(last, 100.0 - question.tau_pct);
@@ -65,9 +58,37 @@ impl Tiles {
         f64::from(unordered(key))
     }
 
+    /// The strongest joint in every tile's middle, among those that reach `cut` (log₂) in its row.
+    #[inline(always)]
+    fn crests<S: Simd>(&mut self, simd: S, grid: &Tiling, cut: f32) {
+        self.crests.clear();
+        for block in &grid.blocks {
+            let mut crest = Crest { exponent: [f32::MIN; CELLS], slope: [[0.0; CELLS]; 2], slack: [0.0; CELLS] };
+            for joint in &self.joints {
+                let line = joint.line(grid, block);
+                if line.highest + joint.along.largest < cut {
+                    continue;
+                }
+                for part in 0..Self::parts::<S>() {
+                    let [exponent, across, along] = middles(simd, joint, &line, block.column, part);
+                    let slack = slack(simd, joint, block, part) + splat(simd, joint.curvature);
+                    let highest = lanes(simd, &crest.exponent, part);
+                    let Crest { exponent: e, slope: [a, b], slack: s } = &mut crest;
+                    for (best, new) in [(e, exponent), (a, across), (b, along), (s, slack)] {
+                        let old = lanes(simd, best, part);
+                        store(best, part, exponent.choose(highest, new, old));
+                    }
+                }
+            }
+            self.crests.push(crest);
+        }
+    }
+
     /// Lists for every joint the tiles that it matters to.
     #[inline(always)]
     pub(super) fn cull<S: Simd>(&mut self, simd: S, grid: &Tiling, scale: &Scale) {
+        let cut = scale.cut + scale.log2 as f32;
+        self.crests(simd, grid, cut);
         let Self { joints, crests, strips, ends, lit_bits, .. } = self;
         // Room to grow, for the number drifts while a fit moves. Memory that is not touched costs nothing.
         let (used, most) = (strips.len(), joints.len() * crests.len());
@@ -78,19 +99,19 @@ impl Tiles {
         ends.clear();
         lit_bits.clear();
         lit_bits.resize(crests.len(), 0);
-        let (reach, cut) = (splat(simd, REACH), splat(simd, scale.cut + scale.log2 as f32));
+        let reach = splat(simd, REACH);
         let (relative, log2) = (splat(simd, (RELATIVE * LOG2_E) as f32), splat(simd, scale.log2 as f32));
         for joint in joints.iter() {
-            for (block, (slice, row, column)) in grid.blocks().enumerate() {
-                let line = joint.line(grid, [slice, row]);
-                if line.highest + joint.along.largest < cut.first() {
+            for (index, block) in grid.blocks.iter().enumerate() {
+                let line = joint.line(grid, block);
+                if line.highest + joint.along.largest < cut {
                     continue;
                 }
-                let crest = &crests[block];
+                let crest = &crests[index];
                 let mut strip = Strip::default();
                 for part in 0..Self::parts::<S>() {
-                    let [exponent, across, along] = middles(simd, joint, &line, column, part);
-                    let slack = slack(simd, joint, row, column, part);
+                    let [exponent, across, along] = middles(simd, joint, &line, block.column, part);
+                    let slack = slack(simd, joint, block, part);
                     let highest = (along.abs() + across.abs()).mul_add(reach, exponent + slack);
                     let best_across = lanes(simd, &crest.slope[0], part);
                     let best_along = lanes(simd, &crest.slope[1], part);
@@ -99,22 +120,22 @@ impl Tiles {
                         + slack
                         + lanes(simd, &crest.slack, part)
                         + relative;
-                    let spare = (highest - cut).min(apart.mul_add(reach, nearest));
+                    let spare = (highest - splat(simd, cut)).min(apart.mul_add(reach, nearest));
                     strip.tiles |= spare.positive() << (part * S::F32_LANES);
                     store(&mut strip.exponent, part, exponent - log2);
                     store(&mut strip.slope[0], part, across);
                     store(&mut strip.slope[1], part, along);
                 }
-                strip.tiles &= u32::MAX >> (32 - (grid.columns - column).min(CELLS));
+                strip.tiles &= u32::MAX >> (32 - (grid.columns - block.column).min(CELLS));
                 if strip.tiles == 0 {
                     continue;
                 }
-                lit_bits[block] |= strip.tiles;
-                (strip.block, strip.slice, strip.row, strip.column) =
-                    (block as u32, slice as u32, row as u32, column as u32);
+                lit_bits[index] |= strip.tiles;
+                (strip.block, strip.slice) = (index as u32, block.slice as u32);
+                (strip.row, strip.column) = (block.row as u32, block.column as u32);
                 strip.across = line.delta;
                 for part in 0..Self::parts::<S>() {
-                    let whole = lanes(simd, &STEPS, part) + splat(simd, joint.first[0] + (column * SIDE) as f32);
+                    let whole = lanes(simd, &STEPS, part) + splat(simd, joint.first[0] + (block.column * SIDE) as f32);
                     let along = whole + splat(simd, joint.first[1]);
                     let turns = along.mul_add(splat(simd, joint.along_turns), splat(simd, line.turn));
                     store(&mut strip.along, part, along);

@@ -1,6 +1,6 @@
 //! A splat in powers of two, and as every row of tiles sees it.
 
-use super::{ACROSS, ALONG, CELLS, REACH, SIDE, STEPS, Simd, Tiling, lanes, splat, store};
+use super::{ACROSS, ALONG, Block, CELLS, REACH, SIDE, STEPS, Simd, Tiling, lanes, splat, store};
 use crate::mhp::splat::Splat;
 use std::f64::consts::{LOG2_E, TAU};
 
@@ -173,9 +173,9 @@ impl Joint {
     }
 
     #[inline(always)]
-    pub(super) fn line(&self, grid: &Tiling, [slice, row]: [usize; 2]) -> Line {
-        let lines = &self.lines[slice * grid.rows.div_ceil(CELLS) + row / CELLS];
-        let i = row % CELLS;
+    pub(super) fn line(&self, grid: &Tiling, block: &Block) -> Line {
+        let lines = &self.lines[block.slice * grid.rows.div_ceil(CELLS) + block.row / CELLS];
+        let i = block.row % CELLS;
         Line {
             top: lines.top[i],
             highest: lines.highest[i],

@@ -50,18 +50,20 @@ const SOFTEST: f64 = 1.5;
 /// Below e^−16T of the threshold a cell neither counts nor pulls (1e-7).
 const MASK_REACH: f64 = 16.0;
 /// A joint this much weaker (in ln) than the threshold is dropped, and at least `MARGIN` under the weakest cell that counts.
-const BELOW: f64 = 16.0;
+const BELOW: f64 = 11.0;
 const MARGIN: f64 = 3.0;
 /// The guess of ln threshold may be this much too high.
-const GUESS: f64 = 3.0;
+const GUESS: f64 = 2.0;
 /// And this much too low: beyond it the strongest returns would leave f32's range.
 const HIGH: f64 = 12.0;
 /// Guesses of the threshold at most.
 const TRIES: usize = 40;
 /// A joint this much weaker (in ln) than the strongest at its cells is dropped (8e-7).
-const RELATIVE: f64 = 14.0;
-/// ln of the weakest return relative to the view's scale: its square is still a normal f32.
-const WEAKEST: f64 = -42.0;
+const RELATIVE: f64 = 12.0;
+/// ln of the weakest return that counts relative to the view's scale.
+const WEAKEST: f64 = -36.0;
+/// log₂ below which no return is taken: squares of its parts are normal f32, for others cost a hundred cycles.
+const FAINTEST: f32 = -54.0;
 /// log₂ of the strongest return relative to the view's scale; what is stronger is far above any threshold.
 const STRONGEST: f32 = 54.0;
 /// m(1 − m) below which a tile has no slope.
@@ -77,10 +79,19 @@ pub(super) struct Tiling {
     /// Tiles across and along.
     rows: usize,
     columns: usize,
+    blocks: Vec<Block>,
     /// 16 numbers a tile, 16 tiles a block: B_ori as 0 or 1, −1 beyond the box.
     target: Vec<f32>,
     cells: usize,
     marked: usize,
+}
+
+/// Sixteen tiles beside each other: its slice, its row, and its first column of tiles.
+#[derive(Debug, Clone, Copy)]
+struct Block {
+    slice: usize,
+    row: usize,
+    column: usize,
 }
 
 impl Tiling {
@@ -92,7 +103,12 @@ impl Tiling {
         }
         let (rows, columns) = (size[1].div_ceil(SIDE), size[2].div_ceil(SIDE));
         let marked = ori.iter().filter(|&&b| b).count();
-        let mut tiling = Self { lo, size, rows, columns, target: Vec::new(), cells: ori.len(), marked };
+        let of_line = |line| {
+            let (slice, row) = (line / rows, line % rows);
+            (0..columns).step_by(CELLS).map(move |column| Block { slice, row, column })
+        };
+        let blocks = (0..size[0] * rows).flat_map(of_line).collect();
+        let mut tiling = Self { lo, size, rows, columns, blocks, target: Vec::new(), cells: ori.len(), marked };
         let mut target = vec![-1.0; size[0] * rows * columns.div_ceil(CELLS) * CELLS * CELLS];
         for (place, &ori) in tiling.places().zip(ori) {
             target[place] = f32::from(u8::from(ori));
@@ -110,13 +126,6 @@ impl Tiling {
             let first = (slice * rows + y / SIDE) * row_tiles * CELLS + y % SIDE * SIDE;
             (0..width).map(move |x| first + x / SIDE * CELLS + x % SIDE)
         })
-    }
-
-    /// (slice, row, first column of tiles) of every block.
-    fn blocks(&self) -> impl Iterator<Item = (usize, usize, usize)> {
-        let (rows, columns) = (self.rows, self.columns);
-        (0..self.size[0] * rows)
-            .flat_map(move |line| (0..columns).step_by(CELLS).map(move |column| (line / rows, line % rows, column)))
     }
 
     /// Bins of the first tile's middle, across and along.
@@ -222,7 +231,7 @@ impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
             return ViewAnswer { loss: f64::NAN, iou: None };
         }
         let floor = EPSILON.log2();
-        let mut guess = tiles.crests(simd, question).max(floor);
+        let mut guess = tiles.guess(simd, question).max(floor);
         let mut tries = 0..TRIES;
         loop {
             let scale = Scale::new(guess, question.softness);

@@ -1,6 +1,6 @@
 //! A joint in sixteen tiles beside each other.
 
-use super::{ACROSS, ALONG, CELLS, Joint, Lanes, STRONGEST, Simd, lanes, splat};
+use super::{ACROSS, ALONG, CELLS, FAINTEST, Joint, Lanes, STRONGEST, Simd, lanes, splat};
 
 /// A joint in those of a block's tiles that it matters to.
 #[derive(Debug, Clone, Copy, Default)]
@@ -52,7 +52,7 @@ impl Strip {
         if let Some(spectrum) = joint.across.cells.get(self.row as usize) {
             exponent += lanes(simd, spectrum, part);
         }
-        let a = exponent.max(splat(simd, -126.0)).min(splat(simd, STRONGEST)).exp2();
+        let a = exponent.max(splat(simd, FAINTEST)).min(splat(simd, STRONGEST)).exp2();
         if !COHERENT {
             return [a, splat(simd, 0.0), splat(simd, 0.0)];
         }

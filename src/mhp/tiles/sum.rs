@@ -1,11 +1,17 @@
 //! H in the tiles, its percentile, the mask and its slope.
 
 use super::strip::bits;
-use super::{CELLS, Mask, NO_SLOPE, Question, Scale, Simd, Threshold, Tiles, between, lanes, place, splat, store};
+use super::{
+    CELLS, Lanes, Mask, NO_SLOPE, Question, Scale, Simd, Threshold, Tiles, between, lanes, place, splat, store,
+};
 use std::ops::Range;
 
-/// How far from the last threshold the next is looked for first.
-const NEAR: f64 = 1.04;
+/// The square of the threshold is looked for between these multiples of the last one.
+const LEVELS: [f64; 6] = [0.06, 0.5, 0.93, 1.07, 2.0, 16.0];
+/// log₂ of m/(1 − m) is cut off here, both ways.
+const ODDS: f32 = 60.0;
+/// Largest m/(1 − m) where it takes no powers: so far up the slope is 0 in single precision.
+const FINITE: f32 = 1e30;
 /// Tiles whose soft masks are added up in single precision.
 const FEW: usize = 64;
 
@@ -50,6 +56,10 @@ impl Tiles {
         scale: &Scale,
     ) -> Threshold {
         let grid = question.tiling;
+        let square = self.last.map_or(f64::NAN, |last| (2.0 * (last - scale.log2)).exp2());
+        let levels = LEVELS.map(|level| (level * square) as f32);
+        let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
+        let mut above = [zero; LEVELS.len()];
         for &tile in &self.lit {
             let cells = cells(tile);
             let target = &grid.target[cells.clone()];
@@ -59,22 +69,27 @@ impl Tiles {
                 let square = if COHERENT { re.mul_add(re, im * im) } else { re };
                 let value = square + splat(simd, scale.epsilon_sq);
                 // What lies beyond the box ranks below all.
-                store(power, part, lanes(simd, target, part).choose(splat(simd, -0.5), value, splat(simd, -1.0)));
+                let value = lanes(simd, target, part).choose(splat(simd, -0.5), value, splat(simd, -1.0));
+                store(power, part, value);
+                for (above, level) in above.iter_mut().zip(levels) {
+                    *above += value.choose(splat(simd, level), one, zero);
+                }
             }
         }
         let last = grid.cells.saturating_sub(1);
         let (lower_index, weight) = place(last, 100.0 - question.tau_pct);
         // Counted from the strongest.
         let rank = last - lower_index;
-        let near = self.last.and_then(|last| {
-            let square = (2.0 * (last - scale.log2)).exp2();
-            let above = self.between(simd, [square / NEAR, square * NEAR].map(|x| x as f32));
-            order(&mut self.ranked, rank.checked_sub(above).filter(|&rank| rank > 0)?)
-        });
-        let found = near.or_else(|| {
-            self.between(simd, [-0.5, f32::MAX]);
-            order(&mut self.ranked, rank)
-        });
+        let mut counted = [0; LEVELS.len()];
+        for (count, above) in counted.iter_mut().zip(above) {
+            *count = above.sum() as usize;
+        }
+        let counted = || levels.into_iter().zip(counted);
+        // With its upper neighbour.
+        let low = counted().rev().find(|&(_, above)| above > rank).map_or(-0.5, |(level, _)| level);
+        let (high, above) = counted().find(|&(level, above)| level > low && above < rank).unwrap_or((f32::MAX, 0));
+        self.between(simd, [low, high]);
+        let found = order(&mut self.ranked, rank - above);
         // Where only the upper neighbour is summed, the lower one is nothing beside it.
         let split = || {
             let least = self.ranked.iter().copied().min().filter(|_| self.ranked.len() == rank && weight > 0.0);
@@ -88,25 +103,21 @@ impl Tiles {
         Threshold { lower, value, log2: value.log2() + scale.log2, among_lit }
     }
 
-    /// Lists the squares in (low, high] as what is ranked, and returns how many lie above.
+    /// Lists the squares in (low, high] as what is ranked.
     #[inline(always)]
-    fn between<S: Simd>(&mut self, simd: S, [low, high]: [f32; 2]) -> usize {
+    fn between<S: Simd>(&mut self, simd: S, [low, high]: [f32; 2]) {
         self.ranked.clear();
-        let mut above = splat(simd, 0.0);
         for &tile in &self.lit {
             let power = &self.power[cells(tile)];
-            let mut inside = 0;
+            let mut any = false;
             for part in 0..Self::parts::<S>() {
                 let value = lanes(simd, power, part);
-                above += value.choose(splat(simd, high), splat(simd, 1.0), splat(simd, 0.0));
-                let margin = (value - splat(simd, low)).min(splat(simd, high) - value);
-                inside |= u32::from(margin.any_positive());
+                any |= (value - splat(simd, low)).min(splat(simd, high) - value).any_positive();
             }
-            if inside != 0 {
+            if any {
                 self.ranked.extend(power.iter().filter(|&&x| x > low && x <= high).map(|x| x.to_bits()));
             }
         }
-        above.sum() as usize
     }
 
     /// The soft mask: its sums, and a cell's m(1 − m)/|S|² · d ln(H + h)/d ln|S|.
@@ -120,9 +131,8 @@ impl Tiles {
     ) -> Mask {
         let grid = question.tiling;
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
-        let soft_floor = scale.soft_floor;
-        let centre = (threshold.value + f64::from(soft_floor)).log2();
-        let softness = splat(simd, (1.0 / question.softness) as f32);
+        let centre = (threshold.value + f64::from(scale.soft_floor)).log2();
+        let odds = Odds::new(question.softness, scale.soft_floor, threshold.value);
         self.sloped.clear();
         self.sloped.resize(self.lit_bits.len(), 0);
         let mut mask = Mask::default();
@@ -139,19 +149,13 @@ impl Tiles {
                     let (target, power) = (lanes(simd, target, part), lanes(simd, power, part));
                     let inside = target.choose(splat(simd, -0.5), one, zero);
                     let b = target.max(zero);
-                    let h = power.max(splat(simd, f32::MIN_POSITIVE)).sqrt();
-                    let raised = h + splat(simd, soft_floor);
-                    let odds = ((raised.log2() - splat(simd, centre as f32)) * softness)
-                        .min(splat(simd, 60.0))
-                        .max(splat(simd, -60.0))
-                        .exp2();
+                    let [odds, by_power] = odds.at(simd, power.max(splat(simd, f32::MIN_POSITIVE)));
                     let share = one / (one + odds);
                     let m = odds * share * inside;
                     few_common += m * b;
                     few_soft += m;
-                    let slope = m * share;
-                    steep |= (slope - splat(simd, NO_SLOPE)).any_positive();
-                    store(out, part, slope / (raised * h));
+                    steep |= (m * share - splat(simd, NO_SLOPE)).any_positive();
+                    store(out, part, by_power * share * share * inside);
                     let sim = power.choose(splat(simd, threshold.lower), inside, zero);
                     both += sim * b;
                     hard += sim;
@@ -167,7 +171,7 @@ impl Tiles {
         let [both, hard, marked, lit_cells] = [both.sum(), hard.sum(), marked.sum(), lit_cells.sum()];
         let idle_marked = grid.marked as f64 - f64::from(marked);
         let idle = grid.cells as f64 - f64::from(lit_cells);
-        let floor = f64::from(scale.epsilon_sq.sqrt()) + f64::from(soft_floor);
+        let floor = f64::from(scale.epsilon_sq.sqrt()) + f64::from(scale.soft_floor);
         let idle_soft = 1.0 / (1.0 + ((centre - floor.log2()) / question.softness).exp2());
         mask.common = common + idle_soft * idle_marked;
         mask.union = soft + idle_soft * idle + grid.marked as f64 - mask.common;
@@ -205,6 +209,44 @@ impl Tiles {
                 }
             }
         }
+    }
+}
+
+/// m/(1 − m) of the soft mask, (H + h)^(1/T) by that of the threshold.
+struct Odds {
+    /// 1/T
+    sharpness: f32,
+    /// 0 where it is nothing beside the threshold.
+    soft_floor: f32,
+    /// log₂ of the threshold, and 1 by its square.
+    centre: f32,
+    square: f32,
+}
+
+impl Odds {
+    fn new(softness: f64, soft_floor: f32, threshold: f64) -> Self {
+        let soft_floor = if f64::from(soft_floor) < 1e-8 * threshold { 0.0 } else { soft_floor };
+        let raised = threshold + f64::from(soft_floor);
+        Self {
+            sharpness: (1.0 / softness) as f32,
+            soft_floor,
+            centre: raised.log2() as f32,
+            square: (1.0 / (raised * raised)) as f32,
+        }
+    }
+
+    /// The odds where H² is `power`, and these times d ln(H + h)/d ln H by H².
+    #[inline(always)]
+    fn at<S: Simd>(&self, simd: S, power: Lanes<S>) -> [Lanes<S>; 2] {
+        let of = |x: f32| splat(simd, x);
+        if self.soft_floor == 0.0 && self.sharpness == 2.0 {
+            // T = ½ takes no powers.
+            return [(power * of(self.square)).min(of(FINITE)), of(self.square)];
+        }
+        let h = power.sqrt();
+        let raised = h + of(self.soft_floor);
+        let odds = ((raised.log2() - of(self.centre)) * of(self.sharpness)).min(of(ODDS)).max(of(-ODDS)).exp2();
+        [odds, odds / (raised * h)]
     }
 }
 
