@@ -63,7 +63,12 @@ impl Tiles {
     fn crests<S: Simd>(&mut self, simd: S, grid: &Tiling, cut: f32) {
         self.crests.clear();
         for block in &grid.blocks {
-            let mut crest = Crest { exponent: [f32::MIN; CELLS], slope: [[0.0; CELLS]; 2], slack: [0.0; CELLS] };
+            let mut crest = Crest {
+                exponent: [f32::MIN; CELLS],
+                slope: [[0.0; CELLS]; 2],
+                slack: [0.0; CELLS],
+                highest: [f32::MIN; CELLS],
+            };
             for joint in &self.joints {
                 let line = joint.line(grid, block);
                 if line.highest + joint.along.largest < cut {
@@ -71,9 +76,13 @@ impl Tiles {
                 }
                 for part in 0..Self::parts::<S>() {
                     let [exponent, across, along] = middles(simd, joint, &line, block.column, part);
-                    let slack = slack(simd, joint, block, part) + splat(simd, joint.curvature);
+                    let slack = slack(simd, joint, block, part);
+                    let highest = (along.abs() + across.abs()).mul_add(splat(simd, REACH), exponent + slack);
+                    let highest = highest.max(lanes(simd, &crest.highest, part));
+                    store(&mut crest.highest, part, highest);
+                    let slack = slack + splat(simd, joint.curvature);
                     let highest = lanes(simd, &crest.exponent, part);
-                    let Crest { exponent: e, slope: [a, b], slack: s } = &mut crest;
+                    let Crest { exponent: e, slope: [a, b], slack: s, .. } = &mut crest;
                     for (best, new) in [(e, exponent), (a, across), (b, along), (s, slack)] {
                         let old = lanes(simd, best, part);
                         store(best, part, exponent.choose(highest, new, old));
@@ -100,6 +109,8 @@ impl Tiles {
         lit_bits.clear();
         lit_bits.resize(crests.len(), 0);
         let reach = splat(simd, REACH);
+        // Σ of all joints by the strongest, at most.
+        let low = splat(simd, scale.low - (joints.len().max(1) as f32).log2());
         let (relative, log2) = (splat(simd, (RELATIVE * LOG2_E) as f32), splat(simd, scale.log2 as f32));
         for joint in joints.iter() {
             for (index, block) in grid.blocks.iter().enumerate() {
@@ -120,7 +131,9 @@ impl Tiles {
                         + slack
                         + lanes(simd, &crest.slack, part)
                         + relative;
-                    let spare = (highest - splat(simd, cut)).min(apart.mul_add(reach, nearest));
+                    let faded = (low - lanes(simd, &crest.highest, part)).max(splat(simd, 0.0));
+                    let cut = faded.mul_add(splat(simd, scale.fading), splat(simd, cut));
+                    let spare = (highest - cut).min(apart.mul_add(reach, nearest));
                     strip.tiles |= spare.positive() << (part * S::F32_LANES);
                     store(&mut strip.exponent, part, exponent - log2);
                     store(&mut strip.slope[0], part, across);

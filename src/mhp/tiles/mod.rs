@@ -50,7 +50,7 @@ const SOFTEST: f64 = 1.5;
 /// Below e^−16T of the threshold a cell neither counts nor pulls (1e-7).
 const MASK_REACH: f64 = 16.0;
 /// A joint this much weaker (in ln) than the threshold is dropped, and at least `MARGIN` under the weakest cell that counts.
-const BELOW: f64 = 11.0;
+const BELOW: f64 = 16.0;
 const MARGIN: f64 = 3.0;
 /// The guess of ln threshold may be this much too high.
 const GUESS: f64 = 2.0;
@@ -59,7 +59,7 @@ const HIGH: f64 = 12.0;
 /// Guesses of the threshold at most.
 const TRIES: usize = 40;
 /// A joint this much weaker (in ln) than the strongest at its cells is dropped (8e-7).
-const RELATIVE: f64 = 12.0;
+const RELATIVE: f64 = 13.0;
 /// ln of the weakest return that counts relative to the view's scale.
 const WEAKEST: f64 = -36.0;
 /// log₂ below which no return is taken: squares of its parts are normal f32, for others cost a hundred cycles.
@@ -141,6 +141,8 @@ struct Crest {
     exponent: [f32; CELLS],
     slope: [[f32; CELLS]; 2],
     slack: [f32; CELLS],
+    /// log₂ of any joint in the tile, at most.
+    highest: [f32; CELLS],
 }
 
 /// Buffers of one view.
@@ -266,6 +268,10 @@ struct Scale {
     /// ε and h of SPEC section 3 and 4 relative to it.
     epsilon_sq: f32,
     soft_floor: f32,
+    /// log₂ of the lowest threshold that the guess allows, and by how many powers a cell below it pulls less than a joint
+    /// that is as strong as the threshold: 1/T − 1.
+    low: f32,
+    fading: f32,
 }
 
 impl Scale {
@@ -274,7 +280,14 @@ impl Scale {
         let log2 = guess - below - WEAKEST * LOG2_E;
         let epsilon = (EPSILON.log2() - log2).exp2();
         let soft_floor = (SOFT_FLOOR.log2() - log2).exp2() as f32;
-        Self { log2, cut: (WEAKEST * LOG2_E) as f32, epsilon_sq: (epsilon * epsilon) as f32, soft_floor }
+        Self {
+            log2,
+            cut: (WEAKEST * LOG2_E) as f32,
+            epsilon_sq: (epsilon * epsilon) as f32,
+            soft_floor,
+            low: (guess - GUESS * LOG2_E) as f32,
+            fading: (1.0 / softness - 1.0).max(0.0) as f32,
+        }
     }
 }
 
