@@ -187,6 +187,11 @@ impl Joint {
         }
     }
 
+    /// The most that spectra within tiles add, log₂.
+    pub(super) fn spectrum(&self) -> f32 {
+        self.along.largest + self.across.largest
+    }
+
     pub(super) fn is_finite(&self) -> bool {
         let own = [self.top, self.phase];
         own.iter().chain(&self.half).chain(&self.skew).chain(&self.bin).chain(&self.kappa).all(|x| x.is_finite())

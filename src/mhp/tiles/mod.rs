@@ -66,6 +66,10 @@ const WEAKEST: f64 = -36.0;
 const FAINTEST: f32 = -54.0;
 /// log₂ of the strongest return relative to the view's scale; what is stronger is far above any threshold.
 const STRONGEST: f32 = 54.0;
+/// log₂ of how far the strongest joint of a map stays under what is strongest in f32, for the sum of all.
+const ROOM: f64 = 8.0;
+/// log₂ of how far a map may stay under its strongest joint.
+const OUTSIDE: f64 = 30.0;
 /// m(1 − m) below which a tile has no slope.
 const NO_SLOPE: f32 = 1e-7;
 
@@ -217,6 +221,29 @@ impl Tiles {
     }
 }
 
+impl Tiles {
+    /// H_sim of every cell in C order, f64; `None` where f32's range does not hold it.
+    pub(super) fn map(&mut self, splats: &[Splat], tiling: &Tiling, summation: Summation) -> Option<Vec<f64>> {
+        match summation {
+            Summation::Coherent => Arch::new().dispatch(Whole::<true> { tiles: self, splats, tiling }),
+            Summation::Incoherent => Arch::new().dispatch(Whole::<false> { tiles: self, splats, tiling }),
+        }
+    }
+
+    fn values<const COHERENT: bool>(&self, tiling: &Tiling, log2: f64) -> Vec<f64> {
+        let (unit, floor) = ((2.0 * log2).exp2(), EPSILON * EPSILON);
+        let of = |place: usize| {
+            let tile = place / CELLS;
+            if self.lit_bits[tile / CELLS] >> (tile % CELLS) & 1 == 0 {
+                return EPSILON;
+            }
+            let (re, im) = (f64::from(self.re[place]), f64::from(self.im[place]));
+            (unit * if COHERENT { re * re + im * im } else { re } + floor).sqrt()
+        };
+        tiling.places().map(of).collect()
+    }
+}
+
 struct Run<'a, const COHERENT: bool> {
     tiles: &'a mut Tiles,
     question: &'a Question<'a>,
@@ -259,6 +286,35 @@ impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
     }
 }
 
+/// H_sim over a box.
+struct Whole<'a, const COHERENT: bool> {
+    tiles: &'a mut Tiles,
+    splats: &'a [Splat],
+    tiling: &'a Tiling,
+}
+
+impl<const COHERENT: bool> WithSimd for Whole<'_, COHERENT> {
+    type Output = Option<Vec<f64>>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Option<Vec<f64>> {
+        let Self { tiles, splats, tiling } = self;
+        if !tiles.fill(simd, splats, tiling) {
+            return None;
+        }
+        let loudest = tiles.joints.iter().map(|joint| joint.top + f64::from(joint.spectrum())).fold(f64::MIN, f64::max);
+        let scale = Scale::below(loudest);
+        tiles.cull(simd, tiling, &scale);
+        // A map that none of the joints reaches in its own cells has its largest values elsewhere in f32's range.
+        let highest = tiles.crests.iter().flat_map(|crest| crest.exponent).fold(f32::MIN, f32::max);
+        if f64::from(highest) < loudest - OUTSIDE {
+            return None;
+        }
+        tiles.sum::<S, COHERENT>(simd);
+        Some(tiles.values::<COHERENT>(tiling, scale.log2))
+    }
+}
+
 /// Where f32's range lies in this view.
 struct Scale {
     /// log₂ of what 1 stands for.
@@ -275,6 +331,11 @@ struct Scale {
 }
 
 impl Scale {
+    /// For a whole map whose strongest joint has `log2` at its middle: all that f32's range holds below it.
+    fn below(log2: f64) -> Self {
+        Self { log2: log2 - f64::from(STRONGEST) + ROOM, fading: 0.0, ..Self::new(0.0, 1.0) }
+    }
+
     fn new(guess: f64, softness: f64) -> Self {
         let below = ((MASK_REACH * softness + MARGIN).max(BELOW) + GUESS) * LOG2_E;
         let log2 = guess - below - WEAKEST * LOG2_E;
