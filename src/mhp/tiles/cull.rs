@@ -58,22 +58,16 @@ impl Tiles {
         f64::from(unordered(key))
     }
 
-    /// The strongest joint in every tile's middle, among those that reach `cut` (log₂) in its row.
+    /// The strongest joint in every tile's middle, among those that reach its row.
     #[inline(always)]
-    fn crests<S: Simd>(&mut self, simd: S, grid: &Tiling, cut: f32) {
-        self.crests.clear();
-        for block in &grid.blocks {
-            let mut crest = Crest {
-                exponent: [f32::MIN; CELLS],
-                slope: [[0.0; CELLS]; 2],
-                slack: [0.0; CELLS],
-                highest: [f32::MIN; CELLS],
-            };
-            for joint in &self.joints {
+    fn crests<S: Simd>(&mut self, simd: S, grid: &Tiling) {
+        let Self { joints, crests, .. } = self;
+        crests.clear();
+        crests.resize(grid.blocks.len(), Crest::NOTHING);
+        for joint in joints.iter() {
+            for &index in &joint.reached {
+                let (block, crest) = (&grid.blocks[index as usize], &mut crests[index as usize]);
                 let line = joint.line(grid, block);
-                if line.highest + joint.along.largest < cut {
-                    continue;
-                }
                 for part in 0..Self::parts::<S>() {
                     let [exponent, across, along] = middles(simd, joint, &line, block.column, part);
                     let slack = slack(simd, joint, block, part);
@@ -82,14 +76,13 @@ impl Tiles {
                     store(&mut crest.highest, part, highest);
                     let slack = slack + splat(simd, joint.curvature);
                     let highest = lanes(simd, &crest.exponent, part);
-                    let Crest { exponent: e, slope: [a, b], slack: s, .. } = &mut crest;
+                    let Crest { exponent: e, slope: [a, b], slack: s, .. } = crest;
                     for (best, new) in [(e, exponent), (a, across), (b, along), (s, slack)] {
                         let old = lanes(simd, best, part);
                         store(best, part, exponent.choose(highest, new, old));
                     }
                 }
             }
-            self.crests.push(crest);
         }
     }
 
@@ -97,7 +90,10 @@ impl Tiles {
     #[inline(always)]
     pub(super) fn cull<S: Simd>(&mut self, simd: S, grid: &Tiling, scale: &Scale) {
         let cut = scale.cut + scale.log2 as f32;
-        self.crests(simd, grid, cut);
+        for joint in &mut self.joints {
+            joint.reach(simd, grid, cut);
+        }
+        self.crests(simd, grid);
         let Self { joints, crests, strips, ends, lit_bits, .. } = self;
         // Room to grow, for the number drifts while a fit moves. Memory that is not touched costs nothing.
         let (used, most) = (strips.len(), joints.len() * crests.len());
@@ -113,12 +109,9 @@ impl Tiles {
         let low = splat(simd, scale.low - (joints.len().max(1) as f32).log2());
         let (relative, log2) = (splat(simd, (RELATIVE * LOG2_E) as f32), splat(simd, scale.log2 as f32));
         for joint in joints.iter() {
-            for (index, block) in grid.blocks.iter().enumerate() {
+            for &index in &joint.reached {
+                let (block, crest) = (&grid.blocks[index as usize], &crests[index as usize]);
                 let line = joint.line(grid, block);
-                if line.highest + joint.along.largest < cut {
-                    continue;
-                }
-                let crest = &crests[index];
                 let mut strip = Strip::default();
                 for part in 0..Self::parts::<S>() {
                     let [exponent, across, along] = middles(simd, joint, &line, block.column, part);
@@ -143,8 +136,8 @@ impl Tiles {
                 if strip.tiles == 0 {
                     continue;
                 }
-                lit_bits[index] |= strip.tiles;
-                (strip.block, strip.slice) = (index as u32, block.slice as u32);
+                lit_bits[index as usize] |= strip.tiles;
+                (strip.block, strip.slice) = (index, block.slice as u32);
                 (strip.row, strip.column) = (block.row as u32, block.column as u32);
                 strip.across = line.delta;
                 for part in 0..Self::parts::<S>() {

@@ -1,5 +1,6 @@
 //! A splat in powers of two, and as every row of tiles sees it.
 
+use super::strip::bits;
 use super::{ACROSS, ALONG, Block, CELLS, REACH, SIDE, STEPS, Simd, Tiling, lanes, splat, store};
 use crate::mhp::splat::Splat;
 use std::f64::consts::{LOG2_E, TAU};
@@ -46,6 +47,7 @@ impl Spectrum {
 #[derive(Debug, Clone, Copy, Default)]
 struct Lines {
     top: [f32; CELLS],
+    /// log₂ in the row, at most, but for a spectrum along it.
     highest: [f32; CELLS],
     slope: [f32; CELLS],
     nearest: [f32; CELLS],
@@ -58,8 +60,6 @@ struct Lines {
 pub(super) struct Line {
     /// log₂ where the joint's ridge crosses the row's middle.
     pub top: f32,
-    /// At most that in the row, but for a spectrum along it.
-    pub highest: f32,
     /// Slope across the row at the ridge.
     pub slope: f32,
     /// From the ridge to the middle of the first tile, bins: a multiple of a tile, and the rest.
@@ -96,6 +96,8 @@ pub(super) struct Joint {
     pub quadratic: [f32; CELLS],
     pub turn: [[f32; CELLS]; 2],
     lines: Vec<Lines>,
+    /// Blocks whose rows the joint reaches.
+    pub reached: Vec<u32>,
     pub along: Spectrum,
     pub across: Spectrum,
 }
@@ -178,12 +180,31 @@ impl Joint {
         let i = block.row % CELLS;
         Line {
             top: lines.top[i],
-            highest: lines.highest[i],
             slope: lines.slope[i],
             nearest: lines.nearest[i],
             rest: lines.rest[i],
             turn: lines.turn[i],
             delta: lines.delta[i],
+        }
+    }
+
+    /// Lists the blocks in whose rows the joint is stronger than `cut`, log₂, or may be.
+    #[inline(always)]
+    pub(super) fn reach<S: Simd>(&mut self, simd: S, grid: &Tiling, cut: f32) {
+        let (row_blocks, along) = (grid.rows.div_ceil(CELLS), grid.columns.div_ceil(CELLS));
+        self.reached.clear();
+        self.reached.reserve(grid.blocks.len());
+        for (index, lines) in self.lines.iter().enumerate() {
+            let (slice, first) = (index / row_blocks, index % row_blocks * CELLS);
+            let mut rows = 0;
+            for part in 0..CELLS / S::F32_LANES {
+                let spare = lanes(simd, &lines.highest, part) - splat(simd, cut - self.along.largest);
+                rows |= spare.positive() << (part * S::F32_LANES);
+            }
+            for row in bits(rows & (u32::MAX >> (32 - (grid.rows - first).min(CELLS)))) {
+                let block = (slice * grid.rows + first + row) * along;
+                self.reached.extend((block..block + along).map(|block| block as u32));
+            }
         }
     }
 

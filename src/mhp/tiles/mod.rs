@@ -71,7 +71,7 @@ const ROOM: f64 = 8.0;
 /// log₂ of how far a map may stay under its strongest joint.
 const OUTSIDE: f64 = 30.0;
 /// m(1 − m) below which a tile has no slope.
-const NO_SLOPE: f32 = 1e-7;
+const NO_SLOPE: f32 = 1e-6;
 
 /// A box of cells in tiles, and B_ori over it: fixed for a fit. Sixteen tiles beside each other are a block; the last
 /// block of a row may reach beyond the box, as may the last row and column of tiles.
@@ -147,6 +147,11 @@ struct Crest {
     slack: [f32; CELLS],
     /// log₂ of any joint in the tile, at most.
     highest: [f32; CELLS],
+}
+
+impl Crest {
+    const NOTHING: Self =
+        Self { exponent: [f32::MIN; CELLS], slope: [[0.0; CELLS]; 2], slack: [0.0; CELLS], highest: [f32::MIN; CELLS] };
 }
 
 /// Buffers of one view.

@@ -8,10 +8,8 @@ use std::ops::Range;
 
 /// The square of the threshold is looked for between these multiples of the last one.
 const LEVELS: [f64; 6] = [0.06, 0.5, 0.93, 1.07, 2.0, 16.0];
-/// log₂ of m/(1 − m) is cut off here, both ways.
+/// log₂ of m/(1 − m) is cut off here, both ways; there is no slope so far up.
 const ODDS: f32 = 60.0;
-/// Largest m/(1 − m) where it takes no powers: so far up the slope is 0 in single precision.
-const FINITE: f32 = 1e30;
 /// Tiles whose soft masks are added up in single precision.
 const FEW: usize = 64;
 
@@ -241,7 +239,8 @@ impl Odds {
         let of = |x: f32| splat(simd, x);
         if self.soft_floor == 0.0 && self.sharpness == 2.0 {
             // T = ½ takes no powers.
-            return [(power * of(self.square)).min(of(FINITE)), of(self.square)];
+            let (odds, most) = (power * of(self.square), of(ODDS.exp2()));
+            return [odds.min(most), odds.choose(most, of(0.0), of(self.square))];
         }
         let h = power.sqrt();
         let raised = h + of(self.soft_floor);
