@@ -59,7 +59,7 @@ const HIGH: f64 = 12.0;
 /// Guesses of the threshold at most.
 const TRIES: usize = 40;
 /// A joint this much weaker (in ln) than the strongest at its cells is dropped (8e-7).
-const RELATIVE: f64 = 13.0;
+const RELATIVE: f64 = 14.0;
 /// ln of the weakest return that counts relative to the view's scale.
 const WEAKEST: f64 = -36.0;
 /// log₂ below which no return is taken: squares of its parts are normal f32, for others cost a hundred cycles.
@@ -71,7 +71,7 @@ const ROOM: f64 = 8.0;
 /// log₂ of how far a map may stay under its strongest joint.
 const OUTSIDE: f64 = 30.0;
 /// m(1 − m) below which a tile has no slope.
-const NO_SLOPE: f32 = 1e-6;
+const NO_SLOPE: f32 = 1e-7;
 
 /// A box of cells in tiles, and B_ori over it: fixed for a fit. Sixteen tiles beside each other are a block; the last
 /// block of a row may reach beyond the box, as may the last row and column of tiles.
