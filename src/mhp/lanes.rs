@@ -18,8 +18,9 @@ const EXP2: [f32; 6] = [1.000_000_1, 0.693_146_94, 0.240_221_22, 0.055_507_425, 
 /// 1.5 · 2²³: adding it rounds to a whole number.
 const WHOLE: f32 = 12_582_912.0;
 /// Series of cos πt and sin(πt)/t by t².
-const COS_PI: [f32; 7] = [1.0, -4.934_802_2, 4.058_712, -1.335_262_8, 0.235_330_63, -0.025_806_89, 0.001_929_574];
-const SIN_PI: [f32; 6] = [3.141_592_7, -5.167_712_8, 2.550_164, -0.599_264_53, 0.082_145_887, -0.007_370_431];
+const COS_PI: [f32; 7] = [1.0, -4.934_802, 4.058_712, -1.335_262_8, 0.235_330_63, -0.025_806_89, 0.001_929_6];
+const SIN_PI: [f32; 6] = [std::f32::consts::PI, -5.167_712_8, 2.550_164, -0.599_264_53, 0.082_145_89, -0.007_370_43];
+
 /// A register of f32.
 #[derive(Clone, Copy)]
 pub(super) struct Lanes<S: Simd> {
@@ -93,12 +94,6 @@ impl<S: Simd> Lanes<S> {
             bits |= u32::from(bytes[0] != 0) << lane;
         }
         bits
-    }
-
-    /// The first lane: a scalar again where all are alike.
-    #[inline(always)]
-    pub(super) fn first(self) -> f32 {
-        bytemuck::cast_slice::<S::f32s, f32>(std::slice::from_ref(&self.value))[0]
     }
 
     #[inline(always)]

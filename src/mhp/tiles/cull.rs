@@ -39,7 +39,7 @@ impl Tiles {
         let grid = question.tiling;
         self.ranked.clear();
         let stride = (grid.size[0] * grid.rows / ROWS).clamp(1, STRIDE);
-        for block in grid.blocks.iter().filter(|block| (block.slice * grid.rows + block.row) % stride == 0) {
+        for block in grid.blocks.iter().filter(|block| (block.slice * grid.rows + block.row).is_multiple_of(stride)) {
             let mut highest = [f32::MIN; CELLS];
             for part in 0..Self::parts::<S>() {
                 let mut best = splat(simd, f32::MIN);

@@ -70,7 +70,7 @@ const STRONGEST: f32 = 54.0;
 const ROOM: f64 = 8.0;
 /// log₂ of how far a map may stay under its strongest joint.
 const OUTSIDE: f64 = 30.0;
-/// m(1 − m) below which a tile has no slope.
+/// m(1 − m)/T below which a tile has no slope.
 const NO_SLOPE: f32 = 1e-7;
 
 /// A box of cells in tiles, and B_ori over it: fixed for a fit. Sixteen tiles beside each other are a block; the last

@@ -129,6 +129,7 @@ impl Tiles {
     ) -> Mask {
         let grid = question.tiling;
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
+        let flat = splat(simd, (f64::from(NO_SLOPE) * question.softness) as f32);
         let centre = (threshold.value + f64::from(scale.soft_floor)).log2();
         let odds = Odds::new(question.softness, scale.soft_floor, threshold.value);
         self.sloped.clear();
@@ -152,7 +153,7 @@ impl Tiles {
                     let m = odds * share * inside;
                     few_common += m * b;
                     few_soft += m;
-                    steep |= (m * share - splat(simd, NO_SLOPE)).any_positive();
+                    steep |= (m * share - flat).any_positive();
                     store(out, part, by_power * share * share * inside);
                     let sim = power.choose(splat(simd, threshold.lower), inside, zero);
                     both += sim * b;
