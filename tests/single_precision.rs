@@ -3,23 +3,36 @@
 //! `PROPTEST_CASES=20000 PROPTEST_RNG_SEED=7 cargo test --release --test single_precision`.
 #![expect(clippy::unwrap_used, reason = "a test stops where its material is missing")]
 
+mod common;
+
 use mhp_inspector::body::{Group, Pppr, PpprShape, Skeleton};
 use mhp_inspector::config::{EmRegion, FitConfig, Operators, Summation};
-use mhp_inspector::geometry::{Pose, rotation_from_quaternion};
-use mhp_inspector::mhp::{Evaluation, Objective, Precision, Problem, simulate};
+use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::geometry::{Pose, norm, rotation_from_quaternion, sub};
+use mhp_inspector::mhp::{Evaluation, Fitter, Objective, Precision, Problem, initialise, simulate};
 use mhp_inspector::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
+use std::ops::Range;
+use std::path::Path;
 use std::sync::Arc;
 
 const JOINTS: usize = 5;
 const FEATURES: usize = 6;
 /// Beside a coherent null ln|S| has no digits in single precision: scenes keep |S| above this part of the incoherent sum.
 const NULL_DEPTH: f64 = 0.02;
+/// Frames of a sample that are fitted.
+const FRAMES: usize = 2;
 /// Scenes in every run.
 const SCENES: u64 = 2000;
 
-fn axis(kind: AxisKind, rng: &mut StdRng) -> Axis {
+/// Bins of an axis that are drawn from, and those of the largest maps.
+const BINS: Range<usize> = 5..40;
+const MANY_BINS: Range<usize> = 1024..1025;
+/// Scenes of the largest maps.
+const LARGE_SCENES: u64 = 12;
+
+fn axis(kind: AxisKind, bins: Range<usize>, rng: &mut StdRng) -> Axis {
     let (lo, hi) = match kind {
         AxisKind::Range | AxisKind::DepthH | AxisKind::DepthV | AxisKind::X => (0.0, 6.0),
         AxisKind::Doppler => (-2.0, 2.0),
@@ -29,11 +42,11 @@ fn axis(kind: AxisKind, rng: &mut StdRng) -> Axis {
     let sine = kind.is_angular() && rng.random_bool(0.5);
     let spacing = if sine { Spacing::Sine } else { Spacing::Linear };
     let (lo, hi) = if rng.random_bool(0.3) { (hi, lo) } else { (lo, hi) };
-    Axis { kind, bins: rng.random_range(5..40), lo, hi, spacing }
+    Axis { kind, bins: rng.random_range(bins), lo, hi, spacing }
 }
 
-fn view(index: usize, rng: &mut StdRng) -> View {
-    let dims = *[1, 2, 2, 2, 3].get(rng.random_range(0..5_usize)).unwrap();
+fn view(index: usize, bins: &Range<usize>, rng: &mut StdRng) -> View {
+    let dims = if *bins == BINS { *[1, 2, 2, 2, 3].get(rng.random_range(0..5_usize)).unwrap() } else { 2 };
     let mut kinds = AxisKind::ALL.to_vec();
     let axes = (0..dims).map(|_| kinds.swap_remove(rng.random_range(0..kinds.len()))).collect::<Vec<_>>();
     let turned = rng.random_bool(0.3);
@@ -43,7 +56,7 @@ fn view(index: usize, rng: &mut StdRng) -> View {
         quantity: Quantity::default(),
         psf: PointSpread { range_m: 0.06, azimuth_rad: 0.04, elevation_rad: 0.05, doppler_mps: 0.15 },
         pose: Pose { rotation: rotation_from_quaternion(q), translation: [0.0, 0.05, -0.1] },
-        axes: axes.into_iter().map(|kind| axis(kind, rng)).collect(),
+        axes: axes.into_iter().map(|kind| axis(kind, bins.clone(), rng)).collect(),
         region: None,
     }
 }
@@ -71,7 +84,7 @@ fn params(persons: usize, rng: &mut StdRng) -> Pppr {
 }
 
 /// Loss and gradients of one scene in both precisions; `None` beside a coherent null.
-fn scene(seed: u64) -> Option<[Evaluation; 2]> {
+fn scene(seed: u64, bins: &Range<usize>) -> Option<[Evaluation; 2]> {
     let rng = &mut StdRng::seed_from_u64(seed);
     let radar = RadarConfig {
         start_hz: 77e9,
@@ -90,7 +103,7 @@ fn scene(seed: u64) -> Option<[Evaluation; 2]> {
         bone_lengths_m: vec![0.3; JOINTS - 1],
         angles: vec![[0, 1, 2]],
     };
-    let views: Vec<View> = (0..rng.random_range(1..3)).map(|k| view(k, rng)).collect();
+    let views: Vec<View> = (0..rng.random_range(1..3)).map(|k| view(k, bins, rng)).collect();
     let maps: Vec<Vec<f64>> =
         views.iter().map(|v| (0..v.cells()).map(|_| rng.random_range(0.0..1.0)).collect()).collect();
     let maps: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
@@ -138,15 +151,65 @@ fn misses([want, got]: &[Evaluation; 2]) -> Vec<String> {
     misses
 }
 
-#[test]
-fn single_precision_agrees_on_random_scenes() {
-    let number = |key: &str| std::env::var(key).ok().and_then(|text| text.parse::<u64>().ok());
-    let (first, scenes) = (number("PROPTEST_RNG_SEED").unwrap_or(0) << 32, number("PROPTEST_CASES").unwrap_or(SCENES));
-    let wrong: Vec<String> = (first..first + scenes)
+fn check(seeds: Range<u64>, bins: &Range<usize>) {
+    let scenes = seeds.end - seeds.start;
+    let wrong: Vec<String> = seeds
         .filter_map(|seed| {
-            let misses = misses(&scene(seed)?);
+            let misses = misses(&scene(seed, bins)?);
             (!misses.is_empty()).then(|| format!("scene {seed}: {}", misses.join("; ")))
         })
         .collect();
     assert!(wrong.is_empty(), "{} of {scenes}:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+fn single_precision_agrees_on_random_scenes() {
+    let number = |key: &str| std::env::var(key).ok().and_then(|text| text.parse::<u64>().ok());
+    let (first, scenes) = (number("PROPTEST_RNG_SEED").unwrap_or(0) << 32, number("PROPTEST_CASES").unwrap_or(SCENES));
+    check(first..first + scenes, &BINS);
+}
+
+#[test]
+fn single_precision_agrees_on_the_largest_maps() {
+    check(0..LARGE_SCENES, &MANY_BINS);
+}
+
+/// A hundred iterations of a data set's first frames, from their own start; mean distance of the joints between precisions.
+fn fits_end_together(folder: &Path) {
+    let dataset = Dataset::open(folder, &Progress::new()).unwrap();
+    let info = dataset.info();
+    for index in 0..dataset.len().min(FRAMES) {
+        let frame = dataset.load(index).unwrap();
+        let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
+        let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap();
+        let problem = Arc::new(problem);
+        let config = FitConfig::default();
+        let start = initialise(&problem, &config).unwrap().params;
+        let [a, b] = [Precision::F64, Precision::F32].map(|precision| {
+            let mut fitter = Fitter::new(Arc::clone(&problem), config, precision, start.clone()).unwrap();
+            for _ in 0..100 {
+                fitter.step().unwrap();
+            }
+            fitter.params().clone()
+        });
+        let joints = a.shape().total_joints();
+        let apart = (0..joints).map(|joint| norm(sub(a.position(joint), b.position(joint)))).sum::<f64>();
+        let mean_mm = 1e3 * apart / joints as f64;
+        println!("{} frame {index}: {mean_mm:.4} mm", folder.display());
+        assert!(mean_mm < 2.0, "{} frame {index}: {mean_mm} mm", folder.display());
+    }
+}
+
+#[test]
+fn fits_of_the_samples_end_within_two_millimetres_of_double_precision() {
+    let samples = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/samples"));
+    for sample in ["generic", "mmvr-tree", "walk"] {
+        fits_end_together(&samples.join(sample));
+    }
+}
+
+#[test]
+fn a_fit_of_the_real_frame_ends_within_two_millimetres_of_double_precision() {
+    let Some(shared) = common::shared() else { return };
+    fits_end_together(&shared.join("data/mmvr/00383_radar.npz"));
 }

@@ -266,10 +266,10 @@ impl Geometry {
         add_scaled(&mut p, seen.e_rho, self.rho * seen.rho.pass);
         add_scaled(&mut p, seen.e_h, self.h);
         // Angles and unit directions come from the point itself, not from the floored lengths: so do their slopes.
-        let [x, y, z] = seen.p;
-        add_scaled(&mut p, seen.e_az, self.azimuth * inverse(x.hypot(y)));
+        let [x, y, _] = seen.p;
+        add_scaled(&mut p, seen.e_az, self.azimuth * inverse((x * x + y * y).sqrt()));
         add_scaled(&mut p, seen.e_el, self.elevation * inverse(norm(seen.p)));
-        add_scaled(&mut p, across_h, dot(self.e_h, across_h) * inverse(x.hypot(z)));
+        add_scaled(&mut p, across_h, dot(self.e_h, across_h) * inverse(seen.h));
         (unmove(scene, trace.unmoved, p), self.v)
     }
 }

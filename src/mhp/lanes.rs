@@ -15,6 +15,12 @@ const ROUND: f32 = 12_583_039.0;
 /// 2ᶠ on |f| ≤ ½, relative error 1e-7 (least squares at Chebyshev points).
 const EXP2: [f32; 6] = [1.000_000_1, 0.693_146_94, 0.240_221_22, 0.055_507_425, 0.009_675_46, 0.001_326_697];
 
+/// 1.5 · 2²³: adding it rounds to a whole number.
+const WHOLE: f32 = 12_582_912.0;
+/// Series of cos πt and sin(πt)/t by t².
+const COS_PI: [f32; 7] = [1.0, -4.934_802, 4.058_712, -1.335_262_8, 0.235_330_63, -0.025_806_89, 0.001_929_6];
+const SIN_PI: [f32; 6] = [std::f32::consts::PI, -5.167_712_8, 2.550_164, -0.599_264_5, 0.082_145_89, -0.007_370_43];
+
 /// A register of f32.
 #[derive(Clone, Copy)]
 pub(super) struct Lanes<S: Simd> {
@@ -73,10 +79,21 @@ impl<S: Simd> Lanes<S> {
         simd.first_true_m32s(simd.less_than_f32s(simd.splat_f32s(0.0), self.value)) < S::F32_LANES
     }
 
-    /// The first lane: a scalar again where all are alike.
+    /// A bit a lane that is positive, the first lane's the lowest.
     #[inline(always)]
-    pub(super) fn first(self) -> f32 {
-        bytemuck::cast_slice::<S::f32s, f32>(std::slice::from_ref(&self.value))[0]
+    pub(super) fn positive(self) -> u32 {
+        let simd = self.simd;
+        let mask = simd.less_than_f32s(simd.splat_f32s(0.0), self.value);
+        let bytes = bytemuck::bytes_of(&mask);
+        if let (&[low, high], 16) = (bytes, S::F32_LANES) {
+            // AVX-512 has them as such.
+            return u32::from(u16::from_le_bytes([low, high]));
+        }
+        let mut bits = 0;
+        for (lane, bytes) in bytes.chunks_exact(bytes.len() / S::F32_LANES).enumerate() {
+            bits |= u32::from(bytes[0] != 0) << lane;
+        }
+        bits
     }
 
     #[inline(always)]
@@ -84,9 +101,17 @@ impl<S: Simd> Lanes<S> {
         self.simd.reduce_sum_f32s(self.value)
     }
 
+    /// cos and sin of a number of turns, absolute error 3e-7 and what rounding leaves of whole turns.
     #[inline(always)]
-    pub(super) fn largest(self) -> f32 {
-        self.simd.reduce_max_f32s(self.value)
+    pub(super) fn turn(self) -> [Self; 2] {
+        let of = |x: f32| splat(self.simd, x);
+        let t = self - ((self + of(WHOLE)) - of(WHOLE));
+        let t2 = t * t;
+        let polynomial = |of_t2: &[f32]| of_t2.iter().rev().fold(of(0.0), |sum, &c| sum.mul_add(t2, of(c)));
+        // Of half the angle, −π/2 to π/2.
+        let (c, s) = (polynomial(&COS_PI), t * polynomial(&SIN_PI));
+        let twice = s + s;
+        [of(1.0) - twice * s, twice * c]
     }
 
     /// 2ˣ for x in −126 ..= 127.

@@ -4,6 +4,7 @@ use super::kernel::Kernel;
 use super::region::Region;
 use super::scalar::Real;
 use super::splat::{Scene, Spectra, Splat};
+use super::tiles::{Tiles, Tiling};
 use super::{Precision, Problem};
 use crate::body::Pppr;
 use crate::config::{FitConfig, Summation};
@@ -45,7 +46,11 @@ pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, par
             let region = Region::whole(view);
             match precision {
                 Precision::F64 => map::<f64>(&splats, &region, config.summation),
-                Precision::F32 => map::<f32>(&splats, &region, config.summation),
+                Precision::F32 => {
+                    let tiling = Tiling::new(&region.bins, &vec![false; region.cells()]);
+                    let tiled = Tiles::default().map(&splats, &tiling, config.summation);
+                    tiled.unwrap_or_else(|| map::<f32>(&splats, &region, config.summation))
+                }
             }
         })
         .collect()

@@ -41,8 +41,6 @@ pub(super) struct Seen {
     pub rho: Floored,
     /// √(x² + z²), m.
     pub h: f64,
-    pub azimuth: f64,
-    pub elevation: f64,
     pub sin_az: f64,
     pub cos_az: f64,
     pub sin_el: f64,
@@ -69,20 +67,20 @@ pub(super) struct Seen {
 
 impl Seen {
     pub(super) fn new(p: Vec3) -> Self {
-        let (rho, h) = (p[0].hypot(p[1]), p[0].hypot(p[2]));
-        let (azimuth, elevation) = (p[1].atan2(p[0]), p[2].atan2(rho));
-        let ((sin_az, cos_az), (sin_el, cos_el)) = (azimuth.sin_cos(), elevation.sin_cos());
+        let [x, y, z] = p;
+        let (rho, h, d) = ((x * x + y * y).sqrt(), (x * x + z * z).sqrt(), norm(p));
+        // At the origin and above it, angles are 0.
+        let unit = |a: f64, b: f64, length: f64| if length == 0.0 { [1.0, 0.0] } else { [a / length, b / length] };
+        let ([cos_az, sin_az], [cos_el, sin_el]) = (unit(x, y, rho), unit(rho, z, d));
         let u = [cos_el * cos_az, cos_el * sin_az, sin_el];
         let sin_cone = u[1];
         let cos_cone = Floored::new((1.0 - sin_cone * sin_cone).max(0.0).sqrt(), COSINE_FLOOR);
         let e_cone = scale([-sin_cone * u[0], 1.0 - sin_cone * u[1], -sin_cone * u[2]], 1.0 / cos_cone.value);
         Self {
             p,
-            d: Floored::new(norm(p), DISTANCE_FLOOR_M),
+            d: Floored::new(d, DISTANCE_FLOOR_M),
             rho: Floored::new(rho, DISTANCE_FLOOR_M),
             h,
-            azimuth,
-            elevation,
             sin_az,
             cos_az,
             sin_el,
@@ -96,7 +94,7 @@ impl Seen {
             e_el: [-sin_el * cos_az, -sin_el * sin_az, cos_el],
             e_cone,
             e_rho: [cos_az, sin_az, 0.0],
-            e_h: if h > 0.0 { [p[0] / h, 0.0, p[2] / h] } else { [1.0, 0.0, 0.0] },
+            e_h: if h > 0.0 { [x / h, 0.0, z / h] } else { [1.0, 0.0, 0.0] },
         }
     }
 
@@ -106,9 +104,9 @@ impl Seen {
         match axis.kind {
             AxisKind::Range => self.d.value,
             AxisKind::Azimuth if sine => self.sin_az,
-            AxisKind::Azimuth => self.azimuth,
+            AxisKind::Azimuth => self.sin_az.atan2(self.cos_az),
             AxisKind::Elevation if sine => self.sin_el,
-            AxisKind::Elevation => self.elevation,
+            AxisKind::Elevation => self.sin_el.atan2(self.cos_el),
             AxisKind::Cone if sine => self.sin_cone,
             AxisKind::Cone => self.sin_cone.clamp(-1.0, 1.0).asin(),
             AxisKind::Doppler => radial_mps,

@@ -1,21 +1,20 @@
 //! What the cells want of each joint.
 
-use super::{ACROSS, ALONG, CELLS, Joint, Lanes, Moments, Pair, SIDE, Simd, Tiles, Tiling, lanes, splat, store};
+use super::strip::bits;
+use super::{ACROSS, ALONG, CELLS, Joint, Lanes, Moments, SIDE, Simd, Strip, Tiles, Tiling, lanes, splat, store};
 
 impl Tiles {
     /// Adds to each joint's moments what the cells want.
     #[inline(always)]
     pub(super) fn collect<S: Simd, const COHERENT: bool>(&self, simd: S, grid: &Tiling, moments: &mut [Moments]) {
-        for ((joint, pairs), moments) in self.joints.iter().zip(&self.pairs).zip(moments) {
-            let mut rest = pairs.list();
-            while let Some(first) = rest.first() {
-                let length = rest.partition_point(|pair| pair.slice == first.slice);
-                let (slice, after) = rest.split_at(length);
-                let delta = (grid.lo[0] + first.slice as usize) as f64 - joint.bin[0];
-                let sums = self.collect_slice::<S, COHERENT>(simd, grid, joint, slice, moments);
-                sums.add_to(moments, grid.lo[0] + first.slice as usize, delta);
-                rest = after;
+        let mut from = 0;
+        for ((joint, &to), moments) in self.joints.iter().zip(&self.ends).zip(moments) {
+            for strips in self.strips[from..to].chunk_by(|a, b| a.slice == b.slice) {
+                let slice = grid.lo[0] + strips[0].slice as usize;
+                let sums = self.collect_slice::<S, COHERENT>(simd, grid, joint, strips, moments);
+                sums.add_to(moments, slice, slice as f64 - joint.bin[0]);
             }
+            from = to;
         }
     }
 
@@ -25,42 +24,51 @@ impl Tiles {
         simd: S,
         grid: &Tiling,
         joint: &Joint,
-        pairs: &[Pair],
+        strips: &[Strip],
         moments: &mut Moments,
     ) -> Sums {
         let zero = splat(simd, 0.0);
+        let spectral = !joint.along.cells.is_empty() || !joint.across.cells.is_empty();
         let mut total = Sums::default();
         for part in 0..Self::parts::<S>() {
             let (x, y) = (lanes(simd, &ALONG, part), lanes(simd, &ACROSS, part));
-            let [mut r, mut rx, mut ry, mut rxx, mut rxy, mut ryy, mut q, mut qx, mut qy] = [zero; 9];
-            for pair in pairs.iter().filter(|pair| self.sloped[pair.slot as usize]) {
-                let cells = pair.slot as usize * CELLS..(pair.slot as usize + 1) * CELLS;
-                let [a, z_re, z_im] = pair.at::<S, COHERENT>(simd, joint, part);
-                let re = lanes(simd, &self.re[cells.clone()], part);
-                let (dx, dy) = (splat(simd, pair.delta[1]) + x, splat(simd, pair.delta[0]) + y);
-                let wants = if COHERENT {
-                    let im = lanes(simd, &self.im[cells], part);
-                    let (a_re, a_im) = (a * re, a * im);
-                    let turn = a_im * z_re - a_re * z_im;
-                    q += turn;
-                    qx = turn.mul_add(dx, qx);
-                    qy = turn.mul_add(dy, qy);
-                    a_re.mul_add(z_re, a_im * z_im)
-                } else {
-                    a * a * re
-                };
-                let (by_x, by_y) = (wants * dx, wants * dy);
-                r += wants;
-                rx += by_x;
-                ry += by_y;
-                rxx = by_x.mul_add(dx, rxx);
-                rxy = by_x.mul_add(dy, rxy);
-                ryy = by_y.mul_add(dy, ryy);
-                if !joint.along.middle.is_empty() || !joint.across.middle.is_empty() {
-                    by_bin(grid, pair, part, wants, moments);
+            let mut sums = [zero; 9];
+            for strip in strips {
+                // By the distance of the tiles' middles first: that of the cells is the same in all of them.
+                let [mut r, mut rx, mut rxx, mut q, mut qx] = [zero; 5];
+                for tile in bits(strip.tiles & self.sloped[strip.block as usize]) {
+                    let cell = (strip.block as usize * CELLS + tile) * CELLS;
+                    let [a, a_re, a_im] = strip.at::<S, COHERENT>(simd, joint, tile, part);
+                    let re = lanes(simd, &self.re[cell..cell + CELLS], part);
+                    let dx = splat(simd, strip.along[tile]);
+                    let wants = if COHERENT {
+                        let im = lanes(simd, &self.im[cell..cell + CELLS], part);
+                        let turn = a_re * im - a_im * re;
+                        q += turn;
+                        qx = turn.mul_add(dx, qx);
+                        a_re.mul_add(re, a_im * im)
+                    } else {
+                        a * a * re
+                    };
+                    let by_x = wants * dx;
+                    r += wants;
+                    rx += by_x;
+                    rxx = by_x.mul_add(dx, rxx);
+                    if spectral {
+                        by_bin(grid, strip, tile, part, wants, moments);
+                    }
+                }
+                let y = y + splat(simd, strip.across);
+                let cell_rx = x.mul_add(r, rx);
+                let cell_rxx = x.mul_add(rx + cell_rx, rxx);
+                let cell_qx = x.mul_add(q, qx);
+                let ry = r * y;
+                let news = [r, cell_rx, ry, cell_rxx, cell_rx * y, ry * y, q, cell_qx, q * y];
+                for (sum, new) in sums.iter_mut().zip(news) {
+                    *sum += new;
                 }
             }
-            for (total, sums) in total.0.iter_mut().zip([r, rx, ry, rxx, rxy, ryy, q, qx, qy]) {
+            for (total, sums) in total.0.iter_mut().zip(sums) {
                 *total += f64::from(sums.sum());
             }
         }
@@ -70,11 +78,11 @@ impl Tiles {
 
 /// Adds `r` to the bins of the Doppler axes.
 #[inline(always)]
-fn by_bin<S: Simd>(grid: &Tiling, pair: &Pair, part: usize, r: Lanes<S>, moments: &mut Moments) {
+fn by_bin<S: Simd>(grid: &Tiling, strip: &Strip, tile: usize, part: usize, r: Lanes<S>, moments: &mut Moments) {
     let mut cells = [0.0; CELLS];
     store(&mut cells, part, r);
     let axes: [(usize, usize); 2] =
-        [(1, grid.lo[1] + pair.row as usize * SIDE), (2, grid.lo[2] + pair.column as usize * SIDE)];
+        [(1, grid.lo[1] + strip.row as usize * SIDE), (2, grid.lo[2] + (strip.column as usize + tile) * SIDE)];
     let missing = 3 - moments.dims;
     for (axis, first) in axes {
         let Some(bins) = axis.checked_sub(missing).map(|k| &mut moments.r_by_bin[k]) else { continue };

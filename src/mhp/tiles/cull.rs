@@ -1,94 +1,56 @@
 //! Which joints matter to which tiles, and a guess of the threshold.
 
+use super::joint::Line;
+use super::strip::bits;
 use super::{
-    CELLS, Crest, Joint, LOG2_E, Lanes, Pairs, Question, REACH, RELATIVE, SIDE, Scale, Simd, Tiles, Tiling, lanes,
-    ordered, place, splat, store, times, unordered,
+    Block, CELLS, Crest, Joint, LOG2_E, Lanes, Question, REACH, RELATIVE, SIDE, STEPS, Scale, Simd, Strip, Tiles,
+    Tiling, lanes, ordered, place, splat, store, unordered,
 };
 
-/// A joint in a row of tile middles: exponent, slopes along and across.
-struct Line<S: Simd> {
-    top: Lanes<S>,
-    half: Lanes<S>,
-    /// The joint's ridge: the tile nearest to it, in bins, and from there to the tile's middle.
-    nearest: Lanes<S>,
-    rest: Lanes<S>,
-    across: Lanes<S>,
-    skew: Lanes<S>,
+/// The threshold is guessed from at least this many rows of tiles, and from one in so many.
+const ROWS: usize = 10;
+const STRIDE: usize = 4;
+
+/// (exponent, slope across, slope along) of a joint in some of a block's tile middles, from tile column `column` on.
+#[inline(always)]
+fn middles<S: Simd>(simd: S, joint: &Joint, line: &Line, column: usize, part: usize) -> [Lanes<S>; 3] {
+    // All but the rest is whole: x keeps its digits near the ridge.
+    let whole = lanes(simd, &STEPS, part) + splat(simd, line.nearest + (column * SIDE) as f32);
+    let x = whole + splat(simd, line.rest);
+    let along = x * splat(simd, joint.bend);
+    let mut exponent = along.mul_add(x * splat(simd, 0.5), splat(simd, line.top));
+    if let Some([middle, _]) = joint.along.blocks.get(column / CELLS) {
+        exponent += lanes(simd, middle, part);
+    }
+    [exponent, along.mul_add(splat(simd, joint.shear), splat(simd, line.slope)), along]
 }
 
-impl<S: Simd> Line<S> {
-    #[inline(always)]
-    fn new(simd: S, joint: &Joint, grid: &Tiling, [slice, row]: [usize; 2]) -> Self {
-        let [middle_y, middle_x] = grid.middle(row, 0);
-        let d0 = (grid.lo[0] + slice) as f64 - joint.bin[0];
-        let [mut top, shift, across] = joint.row(d0, middle_y - joint.bin[1]);
-        top += joint.outer.get(slice).copied().unwrap_or(0.0);
-        let first = middle_x - joint.bin[2] + shift;
-        let nearest = (first / SIDE as f64).round() * SIDE as f64;
-        Self {
-            top: splat(simd, (top + f64::from(joint.across.middle(row))) as f32),
-            half: splat(simd, joint.half[2] as f32),
-            nearest: splat(simd, nearest as f32),
-            rest: splat(simd, (first - nearest) as f32),
-            across: splat(simd, across as f32),
-            skew: splat(simd, joint.skew[2] as f32),
-        }
-    }
-
-    /// (exponent, slope along, slope across) at `bins` from the first tile's middle.
-    #[inline(always)]
-    fn at(&self, simd: S, bins: Lanes<S>) -> [Lanes<S>; 3] {
-        // Both terms of the first sum are whole: x keeps its digits near the joint.
-        let x = (bins + self.nearest) + self.rest;
-        let bent = self.half * x;
-        let along = bent * splat(simd, -2.0);
-        let exponent = along.mul_add(x * splat(simd, 0.5), self.top);
-        [exponent, along, along.mul_add(self.skew, self.across)]
-    }
-}
-
-/// Bins from the first tile's middle to those of a group of 16.
-fn group_bins(group: usize) -> [f32; CELLS] {
-    std::array::from_fn(|i| ((group * CELLS + i) * SIDE) as f32)
+/// How far a joint's spectrum may lie above its middles, in some of a block's tiles.
+#[inline(always)]
+fn slack<S: Simd>(simd: S, joint: &Joint, block: &Block, part: usize) -> Lanes<S> {
+    let across = splat(simd, joint.across.most(block.row));
+    joint.along.blocks.get(block.column / CELLS).map_or(across, |[_, most]| across + lanes(simd, most, part))
 }
 
 impl Tiles {
-    /// The strongest joint in every tile's middle; returns a guess of log₂ of the threshold.
+    /// A guess of log₂ of the threshold: the percentile of the strongest joints in the middles of tiles.
     #[inline(always)]
-    pub(super) fn crests<S: Simd>(&mut self, simd: S, question: &Question<'_>) -> f64 {
+    pub(super) fn guess<S: Simd>(&mut self, simd: S, question: &Question<'_>) -> f64 {
         let grid = question.tiling;
-        self.crests.clear();
         self.ranked.clear();
-        for slice in 0..grid.size[0] {
-            for row in 0..grid.rows {
-                for group in 0..grid.columns.div_ceil(CELLS) {
-                    let mut crest =
-                        Crest { exponent: [f32::MIN; CELLS], slope: [[0.0; CELLS]; 2], slack: [0.0; CELLS] };
-                    let bins = group_bins(group);
-                    for joint in &self.joints {
-                        let line = Line::new(simd, joint, grid, [slice, row]);
-                        let slack = splat(simd, joint.curvature + joint.across.most(row));
-                        for part in 0..Self::parts::<S>() {
-                            let [mut exponent, along, across] = line.at(simd, lanes(simd, &bins, part));
-                            let mut slack = slack;
-                            if let Some([middle, most]) = joint.along.group(group) {
-                                exponent += lanes(simd, &middle, part);
-                                slack += lanes(simd, &most, part);
-                            }
-                            let best = lanes(simd, &crest.exponent, part);
-                            let news = [along, across, slack, exponent];
-                            let Crest { slope: [a, b], slack, exponent: c } = &mut crest;
-                            for (field, new) in [a, b, slack, c].into_iter().zip(news) {
-                                let old = lanes(simd, field, part);
-                                store(field, part, exponent.choose(best, new, old));
-                            }
-                        }
-                    }
-                    let here = grid.columns.saturating_sub(group * CELLS).min(CELLS);
-                    self.ranked.extend(crest.exponent[..here].iter().map(|&x| ordered(x)));
-                    self.crests.push(crest);
+        let stride = (grid.size[0] * grid.rows / ROWS).clamp(1, STRIDE);
+        for block in grid.blocks.iter().filter(|block| (block.slice * grid.rows + block.row).is_multiple_of(stride)) {
+            let mut highest = [f32::MIN; CELLS];
+            for part in 0..Self::parts::<S>() {
+                let mut best = splat(simd, f32::MIN);
+                for joint in &self.joints {
+                    let [exponent, ..] = middles(simd, joint, &joint.line(grid, block), block.column, part);
+                    best = best.max(exponent);
                 }
+                store(&mut highest, part, best);
             }
+            let here = (grid.columns - block.column).min(CELLS);
+            self.ranked.extend(highest[..here].iter().map(|&x| ordered(x)));
         }
         let Some(last) = self.ranked.len().checked_sub(1) else { return 0.0 };
         let (lower, _) = place(last, 100.0 - question.tau_pct);
@@ -96,97 +58,115 @@ impl Tiles {
         f64::from(unordered(key))
     }
 
-    /// Lists the pairs of joints and tiles that matter.
+    /// The strongest joint in every tile's middle, among those that reach its row.
+    #[inline(always)]
+    fn crests<S: Simd>(&mut self, simd: S, grid: &Tiling) {
+        let Self { joints, crests, .. } = self;
+        crests.clear();
+        crests.resize(grid.blocks.len(), Crest::NOTHING);
+        for joint in joints.iter() {
+            for &index in &joint.reached {
+                let (block, crest) = (&grid.blocks[index as usize], &mut crests[index as usize]);
+                let line = joint.line(grid, block);
+                for part in 0..Self::parts::<S>() {
+                    let [exponent, across, along] = middles(simd, joint, &line, block.column, part);
+                    let slack = slack(simd, joint, block, part);
+                    let highest = (along.abs() + across.abs()).mul_add(splat(simd, REACH), exponent + slack);
+                    let highest = highest.max(lanes(simd, &crest.highest, part));
+                    store(&mut crest.highest, part, highest);
+                    let slack = slack + splat(simd, joint.curvature);
+                    let highest = lanes(simd, &crest.exponent, part);
+                    let Crest { exponent: e, slope: [a, b], slack: s, .. } = crest;
+                    for (best, new) in [(e, exponent), (a, across), (b, along), (s, slack)] {
+                        let old = lanes(simd, best, part);
+                        store(best, part, exponent.choose(highest, new, old));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Lists for every joint the tiles that it matters to.
     #[inline(always)]
     pub(super) fn cull<S: Simd>(&mut self, simd: S, grid: &Tiling, scale: &Scale) {
-        let Self { joints, crests, pairs, lit, .. } = self;
-        pairs.resize_with(joints.len(), Pairs::default);
-        for pairs in pairs.iter_mut() {
-            pairs.clear(grid.tiles());
+        let cut = scale.cut + scale.log2 as f32;
+        for joint in &mut self.joints {
+            joint.reach(simd, grid, cut);
         }
-        lit.clear();
-        lit.reserve_exact(grid.tiles());
-        self.sloped.clear();
-        self.sloped.reserve_exact(grid.tiles());
-        let (reach, cut) = (splat(simd, REACH), splat(simd, scale.cut + scale.log2 as f32));
-        let relative = splat(simd, (RELATIVE * LOG2_E) as f32);
-        let groups = grid.columns.div_ceil(CELLS);
-        for (index, crest) in crests.iter().enumerate() {
-            let (group, line) = (index % groups, index / groups);
-            let (slice, row) = (line / grid.rows, line % grid.rows);
-            let here = grid.columns.saturating_sub(group * CELLS).min(CELLS);
-            let bins = group_bins(group);
-            let mut slots = [u32::MAX; CELLS];
-            for (joint, pairs) in joints.iter().zip(pairs.iter_mut()) {
-                let line = Line::new(simd, joint, grid, [slice, row]);
-                // The ridge's height in the tile row, at most.
-                let ridge = line.top.first() + REACH * line.across.first().abs();
-                if ridge + joint.across.most(row) + joint.along.largest < cut.first() {
-                    continue;
-                }
-                let [middle_y, middle_x] = grid.middle(row, 0);
-                let (delta_y, delta_x) = ((middle_y - joint.bin[1]) as f32, (middle_x - joint.bin[2]) as f32);
-                let d0 = (grid.lo[0] + slice) as f64 - joint.bin[0];
-                let turn = times(joint.row_turn[row], [(joint.kappa[0] * d0).cos(), (joint.kappa[0] * d0).sin()]);
-                let (mut spares, mut exponents, mut slopes) = ([0.0; CELLS], [0.0; CELLS], [[0.0; CELLS]; 2]);
-                let mut any = false;
+        self.crests(simd, grid);
+        let Self { joints, crests, strips, ends, lit_bits, .. } = self;
+        // Room to grow, for the number drifts while a fit moves. Memory that is not touched costs nothing.
+        let (used, most) = (strips.len(), joints.len() * crests.len());
+        if strips.capacity() < most.min(used + used / 2 + 16) {
+            strips.reserve_exact(most.min(4 * used + 1024) - used);
+        }
+        strips.clear();
+        ends.clear();
+        lit_bits.clear();
+        lit_bits.resize(crests.len(), 0);
+        let reach = splat(simd, REACH);
+        // Σ of all joints by the strongest, at most.
+        let low = splat(simd, scale.low - (joints.len().max(1) as f32).log2());
+        let (relative, log2) = (splat(simd, (RELATIVE * LOG2_E) as f32), splat(simd, scale.log2 as f32));
+        for joint in joints.iter() {
+            for &index in &joint.reached {
+                let (block, crest) = (&grid.blocks[index as usize], &crests[index as usize]);
+                let line = joint.line(grid, block);
+                let mut strip = Strip::default();
                 for part in 0..Self::parts::<S>() {
-                    let [mut exponent, along, across] = line.at(simd, lanes(simd, &bins, part));
-                    let mut slack = splat(simd, joint.across.most(row));
-                    if let Some([middle, most]) = joint.along.group(group) {
-                        exponent += lanes(simd, &middle, part);
-                        slack += lanes(simd, &most, part);
-                    }
+                    let [exponent, across, along] = middles(simd, joint, &line, block.column, part);
+                    let slack = slack(simd, joint, block, part);
                     let highest = (along.abs() + across.abs()).mul_add(reach, exponent + slack);
-                    let best_along = lanes(simd, &crest.slope[0], part);
-                    let best_across = lanes(simd, &crest.slope[1], part);
+                    let best_across = lanes(simd, &crest.slope[0], part);
+                    let best_along = lanes(simd, &crest.slope[1], part);
                     let apart = (along - best_along).abs() + (across - best_across).abs();
                     let nearest = exponent - lanes(simd, &crest.exponent, part)
                         + slack
                         + lanes(simd, &crest.slack, part)
                         + relative;
+                    let faded = (low - lanes(simd, &crest.highest, part)).max(splat(simd, 0.0));
+                    let cut = faded.mul_add(splat(simd, scale.fading), splat(simd, cut));
                     let spare = (highest - cut).min(apart.mul_add(reach, nearest));
-                    any |= spare.any_positive();
-                    store(&mut spares, part, spare);
-                    store(&mut exponents, part, exponent - splat(simd, scale.log2 as f32));
-                    store(&mut slopes[0], part, across);
-                    store(&mut slopes[1], part, along);
+                    strip.tiles |= spare.positive() << (part * S::F32_LANES);
+                    store(&mut strip.exponent, part, exponent - log2);
+                    store(&mut strip.slope[0], part, across);
+                    store(&mut strip.slope[1], part, along);
                 }
-                if !any {
+                strip.tiles &= u32::MAX >> (32 - (grid.columns - block.column).min(CELLS));
+                if strip.tiles == 0 {
                     continue;
                 }
-                let mut matters = spares[..here]
-                    .iter()
-                    .enumerate()
-                    .fold(0_u32, |bits, (lane, &spare)| bits | u32::from(spare > 0.0) << lane);
-                while matters != 0 {
-                    let lane = matters.trailing_zeros() as usize;
-                    matters &= matters - 1;
-                    let column = group * CELLS + lane;
-                    if slots[lane] == u32::MAX {
-                        slots[lane] = lit.len() as u32;
-                        lit.push(((slice * grid.rows + row) * grid.columns + column) as u32);
+                lit_bits[index as usize] |= strip.tiles;
+                (strip.block, strip.slice) = (index, block.slice as u32);
+                (strip.row, strip.column) = (block.row as u32, block.column as u32);
+                strip.across = line.delta;
+                for part in 0..Self::parts::<S>() {
+                    let whole = lanes(simd, &STEPS, part) + splat(simd, joint.first[0] + (block.column * SIDE) as f32);
+                    let along = whole + splat(simd, joint.first[1]);
+                    let turns = along.mul_add(splat(simd, joint.along_turns), splat(simd, line.turn));
+                    store(&mut strip.along, part, along);
+                    for (table, values) in strip.turn.iter_mut().zip(turns.turn()) {
+                        store(table, part, values);
                     }
-                    let pair = pairs.next();
-                    pair.slot = slots[lane];
-                    (pair.slice, pair.row, pair.column) = (slice as u32, row as u32, column as u32);
-                    pair.exponent = exponents[lane];
-                    pair.slope = [slopes[0][lane], slopes[1][lane]];
-                    let [c, s] = times(joint.column_turn[column], turn);
-                    pair.turn = [c as f32, s as f32];
-                    pair.delta = [delta_y, delta_x + (column * SIDE) as f32];
                 }
+                strips.push(strip);
             }
+            ends.push(strips.len());
         }
-        let (cells, most) = (lit.len() * CELLS, grid.tiles() * CELLS);
-        for field in [&mut self.re, &mut self.im, &mut self.h, &mut self.soft] {
-            // Memory that is not touched costs nothing; growing later would.
-            field.reserve_exact(most.saturating_sub(field.len()));
+        let cells = crests.len() * CELLS * CELLS;
+        for field in [&mut self.re, &mut self.im, &mut self.power, &mut self.soft] {
             field.resize(cells, 0.0);
         }
-        self.ranked.clear();
-        self.ranked.reserve_exact(most);
-        self.re.fill(0.0);
-        self.im.fill(0.0);
+        self.ranked.reserve(cells.saturating_sub(self.ranked.len()));
+        self.lit.clear();
+        self.lit.reserve(crests.len() * CELLS);
+        for (block, &tiles) in self.lit_bits.iter().enumerate() {
+            self.lit.extend(bits(tiles).map(|tile| (block * CELLS + tile) as u32));
+        }
+        for &tile in &self.lit {
+            let cells = tile as usize * CELLS..(tile as usize + 1) * CELLS;
+            self.re[cells.clone()].fill(0.0);
+            self.im[cells].fill(0.0);
+        }
     }
 }

@@ -1,13 +1,15 @@
 //! The fast path of L_EM: f32, in tiles of 4 × 4 cells, each summed over the joints that matter there.
 //!
 //! One view goes through five stages, none of which allocates once its buffers have grown:
-//! 1. [`Joint`]: a splat in powers of two, its quadratic form and phase within a tile as tables.
+//! 1. [`Joint`]: a splat in powers of two, its quadratic form and phase within a tile as tables, and what is the same
+//!    along a row of tiles.
 //! 2. Cull: in the middle of every tile all joints' exponents; the strongest ones' percentile is a guess of the
 //!    threshold. A joint is dropped where it is far below the soft mask's reach under that threshold, or far below the
-//!    tile's strongest joint; bounds over the tile make this safe. What is left is a list of [`Pair`]s a joint.
-//! 3. Sum: a pair costs one exponential and one complex product for 16 cells, relative to a scale of the whole view.
+//!    tile's strongest joint; bounds over the tile make this safe. What is left is a list of [`Strip`]s a joint.
+//! 3. Sum: a joint in a tile costs one exponential and one complex product for 16 cells, relative to a scale of the
+//!    whole view.
 //! 4. Mask: percentile, soft mask, its slope. Where the threshold was guessed too high, back to 2 with a lower guess.
-//! 5. Collect: the pairs once more, in the tiles where the mask has a slope, into each joint's moments.
+//! 5. Collect: the strips once more, in the tiles where the mask has a slope, into each joint's moments.
 //!
 //! The answer depends on the parameters alone: what is kept from the last evaluation only speeds the percentile up.
 #![expect(
@@ -17,7 +19,8 @@
 
 mod collect;
 mod cull;
-mod pairs;
+mod joint;
+mod strip;
 mod sum;
 
 use super::adjoint::Moments;
@@ -27,9 +30,10 @@ use super::percentile::{between, place};
 use super::simulate::EPSILON;
 use super::splat::Splat;
 use crate::config::Summation;
-use pairs::{Pair, Pairs};
+use joint::Joint;
 use pulp::{Arch, Simd, WithSimd};
 use std::f64::consts::LOG2_E;
+use strip::Strip;
 
 const SIDE: usize = 4;
 const CELLS: usize = SIDE * SIDE;
@@ -38,6 +42,9 @@ const REACH: f32 = 1.5;
 /// Cells of a tile relative to its middle, along the last axis and the one before.
 const ALONG: [f32; CELLS] = [-1.5, -0.5, 0.5, 1.5, -1.5, -0.5, 0.5, 1.5, -1.5, -0.5, 0.5, 1.5, -1.5, -0.5, 0.5, 1.5];
 const ACROSS: [f32; CELLS] = [-1.5, -1.5, -1.5, -1.5, -0.5, -0.5, -0.5, -0.5, 0.5, 0.5, 0.5, 0.5, 1.5, 1.5, 1.5, 1.5];
+/// From the first tile of a block to each of its sixteen, bins.
+const STEPS: [f32; CELLS] =
+    [0.0, 4.0, 8.0, 12.0, 16.0, 20.0, 24.0, 28.0, 32.0, 36.0, 40.0, 44.0, 48.0, 52.0, 56.0, 60.0];
 /// Softest mask, T, whose reach the powers of two of f32 hold; softer ones take the plain kernel.
 const SOFTEST: f64 = 1.5;
 /// Below e^−16T of the threshold a cell neither counts nor pulls (1e-7).
@@ -46,21 +53,28 @@ const MASK_REACH: f64 = 16.0;
 const BELOW: f64 = 16.0;
 const MARGIN: f64 = 3.0;
 /// The guess of ln threshold may be this much too high.
-const GUESS: f64 = 3.0;
+const GUESS: f64 = 2.0;
 /// And this much too low: beyond it the strongest returns would leave f32's range.
 const HIGH: f64 = 12.0;
 /// Guesses of the threshold at most.
 const TRIES: usize = 40;
 /// A joint this much weaker (in ln) than the strongest at its cells is dropped (8e-7).
 const RELATIVE: f64 = 14.0;
-/// ln of the weakest return relative to the view's scale: its square is still a normal f32.
-const WEAKEST: f64 = -42.0;
+/// ln of the weakest return that counts relative to the view's scale.
+const WEAKEST: f64 = -36.0;
+/// log₂ below which no return is taken: squares of its parts are normal f32, for others cost a hundred cycles.
+const FAINTEST: f32 = -54.0;
 /// log₂ of the strongest return relative to the view's scale; what is stronger is far above any threshold.
 const STRONGEST: f32 = 54.0;
-/// m(1 − m) below which a tile has no slope.
+/// log₂ of how far the strongest joint of a map stays under what is strongest in f32, for the sum of all.
+const ROOM: f64 = 8.0;
+/// log₂ of how far a map may stay under its strongest joint.
+const OUTSIDE: f64 = 30.0;
+/// m(1 − m)/T below which a tile has no slope.
 const NO_SLOPE: f32 = 1e-7;
 
-/// A box of cells in tiles, and B_ori over it: fixed for a fit.
+/// A box of cells in tiles, and B_ori over it: fixed for a fit. Sixteen tiles beside each other are a block; the last
+/// block of a row may reach beyond the box, as may the last row and column of tiles.
 #[derive(Debug, Clone)]
 pub(super) struct Tiling {
     /// First bin of the last three axes (outermost first; missing axes have one bin, 0).
@@ -69,10 +83,19 @@ pub(super) struct Tiling {
     /// Tiles across and along.
     rows: usize,
     columns: usize,
-    /// 16 numbers a tile: B_ori as 0 or 1, −1 where the tile reaches beyond the box.
+    blocks: Vec<Block>,
+    /// 16 numbers a tile, 16 tiles a block: B_ori as 0 or 1, −1 beyond the box.
     target: Vec<f32>,
     cells: usize,
     marked: usize,
+}
+
+/// Sixteen tiles beside each other: its slice, its row, and its first column of tiles.
+#[derive(Debug, Clone, Copy)]
+struct Block {
+    slice: usize,
+    row: usize,
+    column: usize,
 }
 
 impl Tiling {
@@ -83,176 +106,36 @@ impl Tiling {
             (lo[2 - k], size[2 - k]) = (from, to.saturating_sub(from));
         }
         let (rows, columns) = (size[1].div_ceil(SIDE), size[2].div_ceil(SIDE));
-        let mut target = vec![-1.0; size[0] * rows * columns * CELLS];
-        for (cell, &ori) in ori.iter().enumerate() {
-            let (x, y, z) = (cell % size[2], cell / size[2] % size[1], cell / (size[2] * size[1]));
-            let tile = (z * rows + y / SIDE) * columns + x / SIDE;
-            target[tile * CELLS + y % SIDE * SIDE + x % SIDE] = f32::from(u8::from(ori));
-        }
         let marked = ori.iter().filter(|&&b| b).count();
-        Self { lo, size, rows, columns, target, cells: ori.len(), marked }
+        let of_line = |line| {
+            let (slice, row) = (line / rows, line % rows);
+            (0..columns).step_by(CELLS).map(move |column| Block { slice, row, column })
+        };
+        let blocks = (0..size[0] * rows).flat_map(of_line).collect();
+        let mut tiling = Self { lo, size, rows, columns, blocks, target: Vec::new(), cells: ori.len(), marked };
+        let mut target = vec![-1.0; size[0] * rows * columns.div_ceil(CELLS) * CELLS * CELLS];
+        for (place, &ori) in tiling.places().zip(ori) {
+            target[place] = f32::from(u8::from(ori));
+        }
+        tiling.target = target;
+        tiling
     }
 
-    fn tiles(&self) -> usize {
-        self.size[0] * self.rows * self.columns
+    /// Where each cell of the box lies among the tiles' numbers, in C order.
+    fn places(&self) -> impl Iterator<Item = usize> {
+        let [slices, height, width] = self.size;
+        let (rows, row_tiles) = (self.rows, self.columns.div_ceil(CELLS) * CELLS);
+        (0..slices * height).flat_map(move |line| {
+            let (slice, y) = (line / height, line % height);
+            let first = (slice * rows + y / SIDE) * row_tiles * CELLS + y % SIDE * SIDE;
+            (0..width).map(move |x| first + x / SIDE * CELLS + x % SIDE)
+        })
     }
 
-    /// Bin of a tile's middle.
-    fn middle(&self, row: usize, column: usize) -> [f64; 2] {
+    /// Bins of the first tile's middle, across and along.
+    fn middle(&self) -> [f64; 2] {
         let half = (SIDE - 1) as f64 * 0.5;
-        [(self.lo[1] + SIDE * row) as f64 + half, (self.lo[2] + SIDE * column) as f64 + half]
-    }
-}
-
-/// The spectrum of ω along a Doppler axis, a tile: what it is in the middle, how far its bins lie from that, and those
-/// distances a cell.
-#[derive(Debug, Default)]
-struct Spectrum {
-    /// Largest of all its bins; 0 where the axis is no Doppler axis.
-    largest: f32,
-    middle: Vec<f32>,
-    most: Vec<f32>,
-    cells: Vec<[f32; CELLS]>,
-}
-
-impl Spectrum {
-    /// `ln` is the spectrum of the whole axis; `lane` picks the bin of a tile that a cell lies in.
-    fn fill(&mut self, ln: &[f64], lo: usize, tiles: usize, lane: impl Fn(usize) -> usize) {
-        self.middle.clear();
-        self.most.clear();
-        self.cells.clear();
-        self.largest = if ln.is_empty() { 0.0 } else { (LOG2_E * ln.iter().copied().fold(f64::MIN, f64::max)) as f32 };
-        if ln.is_empty() {
-            return;
-        }
-        for tile in 0..tiles {
-            let bins: [f64; SIDE] =
-                std::array::from_fn(|i| LOG2_E * ln.get(lo + tile * SIDE + i).copied().unwrap_or(0.0));
-            let (low, high) = bins.iter().fold((f64::MAX, f64::MIN), |(a, b), &x| (a.min(x), b.max(x)));
-            let middle = f64::midpoint(low, high);
-            self.middle.push(middle as f32);
-            self.most.push((0.5 * (high - low)) as f32);
-            self.cells.push(std::array::from_fn(|cell| (bins[lane(cell)] - middle) as f32));
-        }
-    }
-
-    fn middle(&self, tile: usize) -> f32 {
-        self.middle.get(tile).copied().unwrap_or(0.0)
-    }
-
-    fn most(&self, tile: usize) -> f32 {
-        self.most.get(tile).copied().unwrap_or(0.0)
-    }
-
-    /// Middles and distances of 16 tiles; `None` where the axis is no Doppler axis.
-    fn group(&self, group: usize) -> Option<[[f32; CELLS]; 2]> {
-        let of = |f: fn(&Self, usize) -> f32| std::array::from_fn(|i| f(self, group * CELLS + i));
-        (!self.middle.is_empty()).then(|| [of(Self::middle), of(Self::most)])
-    }
-}
-
-/// A splat in powers of two. Its exponent is −(h₀ d₀² + h₁ (d₁ + k₁₀ d₀)² + h₂ (d₂ + k₂₁ d₁ + k₂₀ d₀)²), the squares
-/// completed from the last axis on, so that elongated Gaussians keep their digits.
-#[derive(Debug, Default)]
-struct Joint {
-    bin: [f64; 3],
-    /// log₂ of amplitude times norm.
-    top: f64,
-    half: [f64; 3],
-    /// k₁₀, k₂₀, k₂₁
-    skew: [f64; 3],
-    /// Largest fall of the exponent from the middle of a tile to its corner by curvature alone.
-    curvature: f32,
-    phase: f64,
-    kappa: [f64; 3],
-    /// Within a tile: the quadratic form, and e^{iκΔ}.
-    quadratic: [f32; CELLS],
-    turn: [[f32; CELLS]; 2],
-    /// e^{iκΔ} a tile column from the joint on; e^{i(φ + κΔ)} a tile row.
-    column_turn: Vec<[f64; 2]>,
-    row_turn: Vec<[f64; 2]>,
-    along: Spectrum,
-    across: Spectrum,
-    /// The spectrum a slice of the outermost of three axes; empty where that is no Doppler axis.
-    outer: Vec<f64>,
-}
-
-impl Joint {
-    fn fill(&mut self, splat: &Splat, grid: &Tiling) {
-        let missing = 3 - splat.dims;
-        let at = |k: usize| k.checked_sub(missing);
-        let p = |k: usize, l: usize| match (at(k), at(l)) {
-            (Some(k), Some(l)) => splat.precision[k][l],
-            _ => f64::from(u8::from(k == l)),
-        };
-        self.bin = std::array::from_fn(|k| at(k).map_or(0.0, |k| splat.bin[k]));
-        self.kappa = std::array::from_fn(|k| at(k).map_or(0.0, |k| splat.kappa[k]));
-        (self.phase, self.top) = (splat.phase, splat.ln_weight * LOG2_E);
-        let (k20, k21) = (p(2, 0) / p(2, 2), p(2, 1) / p(2, 2));
-        let s = |k: usize, l: usize| p(k, l) - p(k, 2) * p(2, l) / p(2, 2);
-        let k10 = s(1, 0) / s(1, 1);
-        self.half = [s(0, 0) - s(0, 1) * s(1, 0) / s(1, 1), s(1, 1), p(2, 2)].map(|h| 0.5 * LOG2_E * h);
-        self.skew = [k10, k20, k21];
-        let reach = f64::from(REACH);
-        self.curvature = (self.half[1] * reach.powi(2) + self.half[2] * (reach * (1.0 + k21.abs())).powi(2)) as f32;
-        for (cell, (&x, &y)) in ALONG.iter().zip(&ACROSS).enumerate() {
-            let (x, y) = (f64::from(x), f64::from(y));
-            self.quadratic[cell] = -(self.half[1] * y * y + self.half[2] * (x + k21 * y).powi(2)) as f32;
-        }
-        let step = |kappa: f64| [(0.5 * kappa).cos(), (0.5 * kappa).sin()];
-        let (x, y) = (step(self.kappa[2]), step(self.kappa[1]));
-        let odd = |[c, s]: [f64; 2]| {
-            let half = [c, s];
-            let three = times(times(half, half), half);
-            [conjugate(three), conjugate(half), half, three]
-        };
-        let (x, y) = (odd(x), odd(y));
-        for cell in 0..CELLS {
-            let [c, s] = times(x[cell % SIDE], y[cell / SIDE]);
-            (self.turn[0][cell], self.turn[1][cell]) = (c as f32, s as f32);
-        }
-        let [middle_y, middle_x] = grid.middle(0, 0);
-        turns(&mut self.column_turn, 0.0, self.kappa[2], middle_x - self.bin[2], grid.columns);
-        turns(&mut self.row_turn, self.phase, self.kappa[1], middle_y - self.bin[1], grid.rows);
-        let spectrum = |k: usize| at(k).map_or(&[] as &[f64], |k| splat.spectrum[k].as_slice());
-        self.along.fill(spectrum(2), grid.lo[2], grid.columns, |cell| cell % SIDE);
-        self.across.fill(spectrum(1), grid.lo[1], grid.rows, |cell| cell / SIDE);
-        let slices = spectrum(0).iter().skip(grid.lo[0]).take(grid.size[0]);
-        self.outer.clear();
-        self.outer.extend(slices.map(|ln| LOG2_E * ln));
-    }
-
-    /// log₂ at d₂ + … = 0 in a tile row, the offset of d₂ there, and the slope by d₁ of the rest.
-    fn row(&self, d0: f64, d1: f64) -> [f64; 3] {
-        let [k10, k20, k21] = self.skew;
-        let y = d1 + k10 * d0;
-        let top = self.top - self.half[0] * d0 * d0 - self.half[1] * y * y;
-        [top, k21 * d1 + k20 * d0, -2.0 * self.half[1] * y]
-    }
-
-    fn is_finite(&self) -> bool {
-        let own = [self.top, self.phase];
-        own.iter().chain(&self.half).chain(&self.skew).chain(&self.bin).chain(&self.kappa).all(|x| x.is_finite())
-    }
-}
-
-fn times([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
-    [a * c - b * d, a * d + b * c]
-}
-
-fn conjugate([a, b]: [f64; 2]) -> [f64; 2] {
-    [a, -b]
-}
-
-/// e^{i(φ + κ(Δ + 4k))} for k tiles.
-fn turns(out: &mut Vec<[f64; 2]>, phase: f64, kappa: f64, delta: f64, tiles: usize) {
-    let start = phase + kappa * delta;
-    let (mut now, step) = ([start.cos(), start.sin()], kappa * SIDE as f64);
-    let step = [step.cos(), step.sin()];
-    out.clear();
-    for _ in 0..tiles {
-        out.push(now);
-        now = times(now, step);
+        [self.lo[1] as f64 + half, self.lo[2] as f64 + half]
     }
 }
 
@@ -262,26 +145,37 @@ struct Crest {
     exponent: [f32; CELLS],
     slope: [[f32; CELLS]; 2],
     slack: [f32; CELLS],
+    /// log₂ of any joint in the tile, at most.
+    highest: [f32; CELLS],
+}
+
+impl Crest {
+    const NOTHING: Self =
+        Self { exponent: [f32::MIN; CELLS], slope: [[0.0; CELLS]; 2], slack: [0.0; CELLS], highest: [f32::MIN; CELLS] };
 }
 
 /// Buffers of one view.
 #[derive(Debug, Default)]
 pub(super) struct Tiles {
     joints: Vec<Joint>,
-    /// Sixteen tile columns at a time.
+    /// A block each.
     crests: Vec<Crest>,
-    pairs: Vec<Pairs>,
-    /// Tiles that are summed, ascending.
+    /// Joint by joint; `ends` tells where each joint's strips end.
+    strips: Vec<Strip>,
+    ends: Vec<usize>,
+    /// Tiles that are summed: a bit each, a block's in one number; and their places, ascending.
+    lit_bits: Vec<u32>,
     lit: Vec<u32>,
-    /// Re and Im of the sum over joints, 16 a tile that is summed (Σ(AK)² where the sum is incoherent); later times w/|S|².
+    /// Re and Im of the sum over joints, 16 a tile (Σ(AK)² where the sum is incoherent); later times w/|S|². This and
+    /// what follows holds where tiles are lit.
     re: Vec<f32>,
     im: Vec<f32>,
-    /// H relative to the scale; −1 beyond the box.
-    h: Vec<f32>,
+    /// H² relative to the scale; −1 beyond the box.
+    power: Vec<f32>,
     /// m(1 − m)/|S|² · d ln(H + h)/d ln|S|.
     soft: Vec<f32>,
-    /// Whether the mask has a slope in a tile.
-    sloped: Vec<bool>,
+    /// Tiles where the mask has a slope: a bit each, a block's in one number.
+    sloped: Vec<u32>,
     /// Scratch of percentiles.
     ranked: Vec<u32>,
     /// log₂ of the last threshold: where the percentile is looked for first.
@@ -325,17 +219,33 @@ pub fn simd_path() -> &'static str {
 impl Tiles {
     /// Answers `question`, and fills `moments` (one a joint, zeroed) where a gradient is wanted.
     pub(super) fn evaluate(&mut self, question: &Question<'_>, moments: &mut [Moments]) -> ViewAnswer {
-        self.joints.resize_with(question.splats.len(), Joint::default);
-        for (joint, splat) in self.joints.iter_mut().zip(question.splats) {
-            joint.fill(splat, question.tiling);
-        }
-        if !self.joints.iter().all(Joint::is_finite) {
-            return ViewAnswer { loss: f64::NAN, iou: None };
-        }
         match question.summation {
             Summation::Coherent => Arch::new().dispatch(Run::<true> { tiles: self, question, moments }),
             Summation::Incoherent => Arch::new().dispatch(Run::<false> { tiles: self, question, moments }),
         }
+    }
+}
+
+impl Tiles {
+    /// H_sim of every cell in C order, f64; `None` where f32's range does not hold it.
+    pub(super) fn map(&mut self, splats: &[Splat], tiling: &Tiling, summation: Summation) -> Option<Vec<f64>> {
+        match summation {
+            Summation::Coherent => Arch::new().dispatch(Whole::<true> { tiles: self, splats, tiling }),
+            Summation::Incoherent => Arch::new().dispatch(Whole::<false> { tiles: self, splats, tiling }),
+        }
+    }
+
+    fn values<const COHERENT: bool>(&self, tiling: &Tiling, log2: f64) -> Vec<f64> {
+        let (unit, floor) = ((2.0 * log2).exp2(), EPSILON * EPSILON);
+        let of = |place: usize| {
+            let tile = place / CELLS;
+            if self.lit_bits[tile / CELLS] >> (tile % CELLS) & 1 == 0 {
+                return EPSILON;
+            }
+            let (re, im) = (f64::from(self.re[place]), f64::from(self.im[place]));
+            (unit * if COHERENT { re * re + im * im } else { re } + floor).sqrt()
+        };
+        tiling.places().map(of).collect()
     }
 }
 
@@ -351,8 +261,11 @@ impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> ViewAnswer {
         let Self { tiles, question, moments } = self;
+        if !tiles.fill(simd, question.splats, question.tiling) {
+            return ViewAnswer { loss: f64::NAN, iou: None };
+        }
         let floor = EPSILON.log2();
-        let mut guess = tiles.crests(simd, question).max(floor);
+        let mut guess = tiles.guess(simd, question).max(floor);
         let mut tries = 0..TRIES;
         loop {
             let scale = Scale::new(guess, question.softness);
@@ -378,6 +291,35 @@ impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
     }
 }
 
+/// H_sim over a box.
+struct Whole<'a, const COHERENT: bool> {
+    tiles: &'a mut Tiles,
+    splats: &'a [Splat],
+    tiling: &'a Tiling,
+}
+
+impl<const COHERENT: bool> WithSimd for Whole<'_, COHERENT> {
+    type Output = Option<Vec<f64>>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Option<Vec<f64>> {
+        let Self { tiles, splats, tiling } = self;
+        if !tiles.fill(simd, splats, tiling) {
+            return None;
+        }
+        let loudest = tiles.joints.iter().map(|joint| joint.top + f64::from(joint.spectrum())).fold(f64::MIN, f64::max);
+        let scale = Scale::below(loudest);
+        tiles.cull(simd, tiling, &scale);
+        // A map that none of the joints reaches in its own cells has its largest values elsewhere in f32's range.
+        let highest = tiles.crests.iter().flat_map(|crest| crest.exponent).fold(f32::MIN, f32::max);
+        if f64::from(highest) < loudest - OUTSIDE {
+            return None;
+        }
+        tiles.sum::<S, COHERENT>(simd);
+        Some(tiles.values::<COHERENT>(tiling, scale.log2))
+    }
+}
+
 /// Where f32's range lies in this view.
 struct Scale {
     /// log₂ of what 1 stands for.
@@ -387,20 +329,36 @@ struct Scale {
     /// ε and h of SPEC section 3 and 4 relative to it.
     epsilon_sq: f32,
     soft_floor: f32,
+    /// log₂ of the lowest threshold that the guess allows, and by how many powers a cell below it pulls less than a joint
+    /// that is as strong as the threshold: 1/T − 1.
+    low: f32,
+    fading: f32,
 }
 
 impl Scale {
+    /// For a whole map whose strongest joint has `log2` at its middle: all that f32's range holds below it.
+    fn below(log2: f64) -> Self {
+        Self { log2: log2 - f64::from(STRONGEST) + ROOM, fading: 0.0, ..Self::new(0.0, 1.0) }
+    }
+
     fn new(guess: f64, softness: f64) -> Self {
         let below = ((MASK_REACH * softness + MARGIN).max(BELOW) + GUESS) * LOG2_E;
         let log2 = guess - below - WEAKEST * LOG2_E;
         let epsilon = (EPSILON.log2() - log2).exp2();
         let soft_floor = (SOFT_FLOOR.log2() - log2).exp2() as f32;
-        Self { log2, cut: (WEAKEST * LOG2_E) as f32, epsilon_sq: (epsilon * epsilon) as f32, soft_floor }
+        Self {
+            log2,
+            cut: (WEAKEST * LOG2_E) as f32,
+            epsilon_sq: (epsilon * epsilon) as f32,
+            soft_floor,
+            low: (guess - GUESS * LOG2_E) as f32,
+            fading: (1.0 / softness - 1.0).max(0.0) as f32,
+        }
     }
 }
 
 struct Threshold {
-    /// The order statistic at or below it, relative to the scale: H > threshold means H > this.
+    /// Square of the order statistic at or below it, relative to the scale: H > threshold means H² > this.
     lower: f32,
     /// Relative to the scale.
     value: f64,
@@ -444,6 +402,16 @@ fn unordered(key: u32) -> f32 {
 }
 
 impl Tiles {
+    /// Takes the splats in; false where one is not finite.
+    #[inline(always)]
+    fn fill<S: Simd>(&mut self, simd: S, splats: &[Splat], grid: &Tiling) -> bool {
+        self.joints.resize_with(splats.len(), Joint::default);
+        for (joint, splat) in self.joints.iter_mut().zip(splats) {
+            joint.fill(simd, splat, grid);
+        }
+        self.joints.iter().all(Joint::is_finite)
+    }
+
     /// Parts of 16 numbers.
     const fn parts<S: Simd>() -> usize {
         CELLS / S::F32_LANES

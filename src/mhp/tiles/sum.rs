@@ -1,31 +1,51 @@
 //! H in the tiles, its percentile, the mask and its slope.
 
-use super::{CELLS, Mask, NO_SLOPE, Question, Scale, Simd, Threshold, Tiles, between, lanes, place, splat, store};
+use super::strip::bits;
+use super::{
+    CELLS, Lanes, Mask, NO_SLOPE, Question, Scale, Simd, Threshold, Tiles, between, lanes, place, splat, store,
+};
+use std::ops::Range;
+
+/// The square of the threshold is looked for between these multiples of the last one.
+const LEVELS: [f64; 6] = [0.06, 0.5, 0.93, 1.07, 2.0, 16.0];
+/// log₂ of m/(1 − m) is cut off here, both ways; there is no slope so far up.
+const ODDS: f32 = 60.0;
+/// Tiles whose soft masks are added up in single precision.
+const FEW: usize = 64;
+
+/// A tile's cells among those of all.
+fn cells(tile: u32) -> Range<usize> {
+    tile as usize * CELLS..(tile as usize + 1) * CELLS
+}
 
 impl Tiles {
-    /// Adds every pair's return to its tile.
+    /// Adds every joint's return to its tiles.
     #[inline(always)]
     pub(super) fn sum<S: Simd, const COHERENT: bool>(&mut self, simd: S) {
-        let Self { joints, pairs, re, im, .. } = self;
-        for (joint, pairs) in joints.iter().zip(pairs.iter()) {
-            for pair in pairs.list() {
-                let cells = pair.slot as usize * CELLS..(pair.slot as usize + 1) * CELLS;
-                let (re, im) = (&mut re[cells.clone()], &mut im[cells]);
-                for part in 0..Self::parts::<S>() {
-                    let [a, z_re, z_im] = pair.at::<S, COHERENT>(simd, joint, part);
-                    let old = lanes(simd, re, part);
-                    if COHERENT {
-                        store(re, part, a.mul_add(z_re, old));
-                        store(im, part, a.mul_add(z_im, lanes(simd, im, part)));
-                    } else {
-                        store(re, part, a.mul_add(a, old));
+        let Self { joints, strips, ends, re, im, .. } = self;
+        let mut from = 0;
+        for (joint, &to) in joints.iter().zip(ends.iter()) {
+            for strip in &strips[from..to] {
+                for tile in bits(strip.tiles) {
+                    let cells = cells(strip.block * CELLS as u32 + tile as u32);
+                    let (re, im) = (&mut re[cells.clone()], &mut im[cells]);
+                    for part in 0..Self::parts::<S>() {
+                        let [a, a_re, a_im] = strip.at::<S, COHERENT>(simd, joint, tile, part);
+                        let old = lanes(simd, re, part);
+                        if COHERENT {
+                            store(re, part, a_re + old);
+                            store(im, part, a_im + lanes(simd, im, part));
+                        } else {
+                            store(re, part, a.mul_add(a, old));
+                        }
                     }
                 }
             }
+            from = to;
         }
     }
 
-    /// H of every cell that is summed, and its percentile over all cells.
+    /// H² of every cell that is summed, and the percentile of H over all cells.
     #[inline(always)]
     pub(super) fn threshold<S: Simd, const COHERENT: bool>(
         &mut self,
@@ -34,57 +54,68 @@ impl Tiles {
         scale: &Scale,
     ) -> Threshold {
         let grid = question.tiling;
-        let window = self.last.map(|last| [0.8, 1.25].map(|k| (k * (last - scale.log2).exp2()) as f32));
-        let [low, high] = window.unwrap_or([f32::MAX, f32::MAX]);
-        self.ranked.clear();
-        let mut above = splat(simd, 0.0);
-        for (slot, &tile) in self.lit.iter().enumerate() {
-            let cells = slot * CELLS..(slot + 1) * CELLS;
-            let target = &grid.target[tile as usize * CELLS..(tile as usize + 1) * CELLS];
-            let (re, im, h) = (&self.re[cells.clone()], &self.im[cells.clone()], &mut self.h[cells]);
-            let mut any = false;
+        let square = self.last.map_or(f64::NAN, |last| (2.0 * (last - scale.log2)).exp2());
+        let levels = LEVELS.map(|level| (level * square) as f32);
+        let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
+        let mut above = [zero; LEVELS.len()];
+        for &tile in &self.lit {
+            let cells = cells(tile);
+            let target = &grid.target[cells.clone()];
+            let (re, im, power) = (&self.re[cells.clone()], &self.im[cells.clone()], &mut self.power[cells]);
             for part in 0..Self::parts::<S>() {
                 let (re, im) = (lanes(simd, re, part), lanes(simd, im, part));
-                let power = if COHERENT { re.mul_add(re, im * im) } else { re };
-                let value = (power + splat(simd, scale.epsilon_sq)).sqrt();
+                let square = if COHERENT { re.mul_add(re, im * im) } else { re };
+                let value = square + splat(simd, scale.epsilon_sq);
                 // What lies beyond the box ranks below all.
                 let value = lanes(simd, target, part).choose(splat(simd, -0.5), value, splat(simd, -1.0));
-                above += value.choose(splat(simd, high), splat(simd, 1.0), splat(simd, 0.0));
-                any |= (value - splat(simd, low)).min(splat(simd, high) - value).any_positive();
-                store(h, part, value);
-            }
-            if any {
-                self.ranked.extend(h.iter().filter(|&&x| x > low && x <= high).map(|x| x.to_bits()));
+                store(power, part, value);
+                for (above, level) in above.iter_mut().zip(levels) {
+                    *above += value.choose(splat(simd, level), one, zero);
+                }
             }
         }
         let last = grid.cells.saturating_sub(1);
         let (lower_index, weight) = place(last, 100.0 - question.tau_pct);
         // Counted from the strongest.
-        let (rank, above) = (last - lower_index, above.sum() as usize);
-        let floor = scale.epsilon_sq.sqrt();
-        let order = |ranked: &mut [u32], rank: usize| -> Option<[f32; 2]> {
-            let from_below = ranked.len().checked_sub(rank + 1)?;
-            let (_, &mut lower, stronger) = ranked.select_nth_unstable(from_below);
-            let upper = stronger.iter().copied().min();
-            Some([f32::from_bits(lower), upper.map_or(f32::NAN, f32::from_bits)])
-        };
-        let near = rank.checked_sub(above).filter(|&rank| rank > 0);
-        let found = near.and_then(|rank| order(&mut self.ranked, rank)).or_else(|| {
-            self.ranked.clear();
-            self.ranked.extend(self.h.iter().filter(|&&x| x >= 0.0).map(|x| x.to_bits()));
-            order(&mut self.ranked, rank)
-        });
+        let rank = last - lower_index;
+        let mut counted = [0; LEVELS.len()];
+        for (count, above) in counted.iter_mut().zip(above) {
+            *count = above.sum() as usize;
+        }
+        let counted = || levels.into_iter().zip(counted);
+        // With its upper neighbour.
+        let low = counted().rev().find(|&(_, above)| above > rank).map_or(-0.5, |(level, _)| level);
+        let (high, above) = counted().find(|&(level, above)| level > low && above < rank).unwrap_or((f32::MAX, 0));
+        self.between(simd, [low, high]);
+        let found = order(&mut self.ranked, rank - above);
         // Where only the upper neighbour is summed, the lower one is nothing beside it.
         let split = || {
             let least = self.ranked.iter().copied().min().filter(|_| self.ranked.len() == rank && weight > 0.0);
-            least.map(|upper| [floor, f32::from_bits(upper)])
+            least.map(|upper| [scale.epsilon_sq, f32::from_bits(upper)])
         };
         let found = found.or_else(split);
         let among_lit = found.is_some();
-        let [lower, upper] = found.unwrap_or([floor; 2]);
+        let [lower, upper] = found.unwrap_or([scale.epsilon_sq; 2]);
         let upper = if upper.is_nan() { lower } else { upper };
-        let value = between(f64::from(lower), f64::from(upper), weight);
+        let value = between(f64::from(lower).sqrt(), f64::from(upper).sqrt(), weight);
         Threshold { lower, value, log2: value.log2() + scale.log2, among_lit }
+    }
+
+    /// Lists the squares in (low, high] as what is ranked.
+    #[inline(always)]
+    fn between<S: Simd>(&mut self, simd: S, [low, high]: [f32; 2]) {
+        self.ranked.clear();
+        for &tile in &self.lit {
+            let power = &self.power[cells(tile)];
+            let mut any = false;
+            for part in 0..Self::parts::<S>() {
+                let value = lanes(simd, power, part);
+                any |= (value - splat(simd, low)).min(splat(simd, high) - value).any_positive();
+            }
+            if any {
+                self.ranked.extend(power.iter().filter(|&&x| x > low && x <= high).map(|x| x.to_bits()));
+            }
+        }
     }
 
     /// The soft mask: its sums, and a cell's m(1 − m)/|S|² · d ln(H + h)/d ln|S|.
@@ -98,50 +129,48 @@ impl Tiles {
     ) -> Mask {
         let grid = question.tiling;
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
-        let soft_floor = scale.soft_floor;
-        let centre = (threshold.value + f64::from(soft_floor)).log2();
-        let softness = splat(simd, (1.0 / question.softness) as f32);
+        let flat = splat(simd, (f64::from(NO_SLOPE) * question.softness) as f32);
+        let centre = (threshold.value + f64::from(scale.soft_floor)).log2();
+        let odds = Odds::new(question.softness, scale.soft_floor, threshold.value);
         self.sloped.clear();
+        self.sloped.resize(self.lit_bits.len(), 0);
         let mut mask = Mask::default();
         let (mut common, mut soft) = (0.0, 0.0);
         let (mut both, mut hard, mut marked, mut lit_cells) = (zero, zero, zero, zero);
-        for (slot, &tile) in self.lit.iter().enumerate() {
-            let cells = slot * CELLS..(slot + 1) * CELLS;
-            let target = &grid.target[tile as usize * CELLS..(tile as usize + 1) * CELLS];
-            let (h, out) = (&self.h[cells.clone()], &mut self.soft[cells]);
-            let mut steepest = zero;
-            let (mut tile_common, mut tile_soft) = (zero, zero);
-            for part in 0..Self::parts::<S>() {
-                let (target, h) = (lanes(simd, target, part), lanes(simd, h, part));
-                let inside = target.choose(splat(simd, -0.5), one, zero);
-                let (b, h) = (target.max(zero), h.max(splat(simd, f32::MIN_POSITIVE.sqrt())));
-                let raised = h + splat(simd, soft_floor);
-                let odds = ((raised.log2() - splat(simd, centre as f32)) * softness)
-                    .min(splat(simd, 60.0))
-                    .max(splat(simd, -60.0))
-                    .exp2();
-                let share = one / (one + odds);
-                let m = odds * share * inside;
-                tile_common += m * b;
-                tile_soft += m;
-                let slope = m * share;
-                steepest = steepest.max(slope);
-                store(out, part, slope / (raised * h));
-                let sim = h.choose(splat(simd, threshold.lower), inside, zero);
-                both += sim * b;
-                hard += sim;
-                marked += b;
-                lit_cells += inside;
+        for tiles in self.lit.chunks(FEW) {
+            let (mut few_common, mut few_soft) = (zero, zero);
+            for &tile in tiles {
+                let cells = cells(tile);
+                let target = &grid.target[cells.clone()];
+                let (power, out) = (&self.power[cells.clone()], &mut self.soft[cells]);
+                let mut steep = false;
+                for part in 0..Self::parts::<S>() {
+                    let (target, power) = (lanes(simd, target, part), lanes(simd, power, part));
+                    let inside = target.choose(splat(simd, -0.5), one, zero);
+                    let b = target.max(zero);
+                    let [odds, by_power] = odds.at(simd, power.max(splat(simd, f32::MIN_POSITIVE)));
+                    let share = one / (one + odds);
+                    let m = odds * share * inside;
+                    few_common += m * b;
+                    few_soft += m;
+                    steep |= (m * share - flat).any_positive();
+                    store(out, part, by_power * share * share * inside);
+                    let sim = power.choose(splat(simd, threshold.lower), inside, zero);
+                    both += sim * b;
+                    hard += sim;
+                    marked += b;
+                    lit_cells += inside;
+                }
+                self.sloped[tile as usize / CELLS] |= u32::from(steep) << (tile as usize % CELLS);
             }
-            common += f64::from(tile_common.sum());
-            soft += f64::from(tile_soft.sum());
-            self.sloped.push(steepest.largest() > NO_SLOPE);
+            common += f64::from(few_common.sum());
+            soft += f64::from(few_soft.sum());
         }
         // Cells that were not summed are at the floor, and alike.
         let [both, hard, marked, lit_cells] = [both.sum(), hard.sum(), marked.sum(), lit_cells.sum()];
         let idle_marked = grid.marked as f64 - f64::from(marked);
         let idle = grid.cells as f64 - f64::from(lit_cells);
-        let floor = f64::from(scale.epsilon_sq.sqrt()) + f64::from(soft_floor);
+        let floor = f64::from(scale.epsilon_sq.sqrt()) + f64::from(scale.soft_floor);
         let idle_soft = 1.0 / (1.0 + ((centre - floor.log2()) / question.softness).exp2());
         mask.common = common + idle_soft * idle_marked;
         mask.union = soft + idle_soft * idle + grid.marked as f64 - mask.common;
@@ -162,20 +191,69 @@ impl Tiles {
         let grid = question.tiling;
         let inside = splat(simd, (-factor / mask.union) as f32);
         let outside = splat(simd, (factor * mask.common / (mask.union * mask.union)) as f32);
-        for (slot, &tile) in self.lit.iter().enumerate().filter(|(slot, _)| self.sloped[*slot]) {
-            let cells = slot * CELLS..(slot + 1) * CELLS;
-            let target = &grid.target[tile as usize * CELLS..(tile as usize + 1) * CELLS];
-            let (re, im, soft) = (&mut self.re[cells.clone()], &mut self.im[cells.clone()], &self.soft[cells]);
-            for part in 0..Self::parts::<S>() {
-                let by_m = lanes(simd, target, part).choose(splat(simd, 0.5), inside, outside);
-                let weight = lanes(simd, soft, part) * by_m;
-                if COHERENT {
-                    store(re, part, lanes(simd, re, part) * weight);
-                    store(im, part, lanes(simd, im, part) * weight);
-                } else {
-                    store(re, part, weight);
+        for (block, &tiles) in self.sloped.iter().enumerate() {
+            for tile in bits(tiles) {
+                let cells = cells((block * CELLS + tile) as u32);
+                let target = &grid.target[cells.clone()];
+                let (re, im, soft) = (&mut self.re[cells.clone()], &mut self.im[cells.clone()], &self.soft[cells]);
+                for part in 0..Self::parts::<S>() {
+                    let by_m = lanes(simd, target, part).choose(splat(simd, 0.5), inside, outside);
+                    let weight = lanes(simd, soft, part) * by_m;
+                    if COHERENT {
+                        store(re, part, lanes(simd, re, part) * weight);
+                        store(im, part, lanes(simd, im, part) * weight);
+                    } else {
+                        store(re, part, weight);
+                    }
                 }
             }
         }
     }
+}
+
+/// m/(1 − m) of the soft mask, (H + h)^(1/T) by that of the threshold.
+struct Odds {
+    /// 1/T
+    sharpness: f32,
+    /// 0 where it is nothing beside the threshold.
+    soft_floor: f32,
+    /// log₂ of the threshold, and 1 by its square.
+    centre: f32,
+    square: f32,
+}
+
+impl Odds {
+    fn new(softness: f64, soft_floor: f32, threshold: f64) -> Self {
+        let soft_floor = if f64::from(soft_floor) < 1e-8 * threshold { 0.0 } else { soft_floor };
+        let raised = threshold + f64::from(soft_floor);
+        Self {
+            sharpness: (1.0 / softness) as f32,
+            soft_floor,
+            centre: raised.log2() as f32,
+            square: (1.0 / (raised * raised)) as f32,
+        }
+    }
+
+    /// The odds where H² is `power`, and these times d ln(H + h)/d ln H by H².
+    #[inline(always)]
+    fn at<S: Simd>(&self, simd: S, power: Lanes<S>) -> [Lanes<S>; 2] {
+        let of = |x: f32| splat(simd, x);
+        if self.soft_floor == 0.0 && self.sharpness == 2.0 {
+            // T = ½ takes no powers.
+            let (odds, most) = (power * of(self.square), of(ODDS.exp2()));
+            return [odds.min(most), odds.choose(most, of(0.0), of(self.square))];
+        }
+        let h = power.sqrt();
+        let raised = h + of(self.soft_floor);
+        let odds = ((raised.log2() - of(self.centre)) * of(self.sharpness)).min(of(ODDS)).max(of(-ODDS)).exp2();
+        [odds, odds / (raised * h)]
+    }
+}
+
+/// The value of a rank, counted from the strongest, among floats as bits, and the next above it (NaN where there is none).
+fn order(ranked: &mut [u32], rank: usize) -> Option<[f32; 2]> {
+    let from_below = ranked.len().checked_sub(rank + 1)?;
+    let (_, &mut lower, stronger) = ranked.select_nth_unstable(from_below);
+    let upper = stronger.iter().copied().min();
+    Some([f32::from_bits(lower), upper.map_or(f32::NAN, f32::from_bits)])
 }
