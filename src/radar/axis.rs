@@ -109,18 +109,17 @@ impl Axis {
     /// Axis coordinate ξ of a point at rest in the view frame, m (0 on a Doppler axis); SPEC section 1.
     pub fn coordinate(&self, p_view: Vec3) -> f64 {
         let [x, y, z] = p_view;
-        let (rho, d) = (x.hypot(y), norm(p_view).max(1e-9));
         let angle = match self.kind {
-            AxisKind::Range => return d,
+            AxisKind::Range => return norm(p_view),
             AxisKind::Doppler => return 0.0,
             AxisKind::X => return x,
             AxisKind::Y => return y,
             AxisKind::Z => return z,
             AxisKind::DepthH => return x.hypot(z),
-            AxisKind::DepthV => return rho,
+            AxisKind::DepthV => return x.hypot(y),
             AxisKind::Azimuth => y.atan2(x),
-            AxisKind::Elevation => z.atan2(rho),
-            AxisKind::Cone => (y / d).clamp(-1.0, 1.0).asin(),
+            AxisKind::Elevation => z.atan2(x.hypot(y)),
+            AxisKind::Cone => (y / norm(p_view).max(1e-9)).clamp(-1.0, 1.0).asin(),
         };
         match self.spacing {
             Spacing::Linear => angle,
