@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot make its input has failed")]
 
 use mhp_inspector::geometry::{Pose, Vec3};
-use mhp_inspector::people::{CLASSES, Counter, Network, PeopleError, Scan, map_statistics};
+use mhp_inspector::people::{CLASSES, Counter, FEATURES, Network, PeopleError, Scan, map_statistics};
 use mhp_inspector::radar::{Axis, AxisKind, PointSpread, Quantity, Spacing, View};
 use mhp_inspector::simulate::{Options, Preset, Recording};
 
@@ -216,10 +216,10 @@ fn strange_maps_do_not_stop_the_counter() {
 #[test]
 fn damaged_weights_are_told() {
     let good = serde_json::to_string(&Network::bundled().unwrap()).unwrap();
-    assert!(Network::from_json(&good).is_ok());
+    assert!(Network::from_json(&good, FEATURES).is_ok());
     let mut network = Network::bundled().unwrap();
     network.layers[1].weight.pop();
-    let told = |text: &str| Network::from_json(text).unwrap_err().to_string();
+    let told = |text: &str| Network::from_json(text, FEATURES).unwrap_err().to_string();
     assert!(told(&serde_json::to_string(&network).unwrap()).contains("expected a layer of 32 by 64"));
     assert!(told(&good[..good.len() / 2]).starts_with("weights of the counter"));
     let mut network = Network::bundled().unwrap();

@@ -1,8 +1,9 @@
 //! `train-counter`: makes the weights of the person counter anew, from synthetic recordings.
 
 use super::common::{print, progress_bar};
-use crate::people::train::{Example, Lesson, SEQUENCE_LENGTH, TrainOptions, examples, recordings, train};
-use crate::people::{CLASSES, Confusion, Counter, CounterOptions, HISTORY, Network};
+use crate::people::train::{Example, Lesson, TrainOptions, examples, pooled, recordings, train};
+use crate::people::{CLASSES, COMPARED, Confusion, Counter, CounterOptions, FEATURES, HISTORY, Network};
+use crate::simulate::{Preset, Recording};
 use anyhow::Context as _;
 use clap::Args;
 use std::fmt::Write as _;
@@ -21,17 +22,24 @@ Examples:
   mhp-inspector train-counter --out /tmp --sequences 4 --test-sequences 2 --epochs 5
       A quick look at whether it works.";
 
+/// Frames of a sequence that is learnt from. Few: the frames of one teach much the same, and every number of frames to
+/// compare with occurs.
+const LESSONS: usize = COMPARED + 2;
+/// Frames of a sequence that is tested on: the last five have as many frames before them as are looked at.
+const TESTS: usize = HISTORY + 5;
+
 /// What `train-counter` is told.
 #[derive(Debug, Args)]
 pub struct TrainCounterArgs {
     /// Folder for `counter.json` and `counter-alone.json`.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Sequences of five frames to learn from, for each number of people.
-    #[arg(long, value_name = "N", default_value_t = 240, value_parser = at_least_one)]
+    /// Sequences with one person to learn from, five frames each; half as many with two, a quarter with three, an eighth
+    /// with nobody and with four.
+    #[arg(long, value_name = "N", default_value_t = 800, value_parser = at_least_one)]
     sequences: usize,
-    /// Sequences to test on, for each number of people.
-    #[arg(long, value_name = "N", default_value_t = 120, value_parser = at_least_one)]
+    /// Sequences to test on, likewise, fourteen frames each.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_one)]
     test_sequences: usize,
     /// Seed of what is learnt from, and of the training itself.
     #[arg(long, default_value_t = 41)]
@@ -54,7 +62,8 @@ fn at_least_one(text: &str) -> Result<usize, String> {
 /// Where the seeds are the same, or a file cannot be written.
 pub(super) fn run(args: &TrainCounterArgs) -> anyhow::Result<ExitCode> {
     anyhow::ensure!(args.seed != args.test_seed, "--test-seed is --seed: a test on what was learnt tells nothing");
-    let (lessons, tests) = (simulate(args.seed, args.sequences)?, simulate(args.test_seed, args.test_sequences)?);
+    let lessons = simulate(args.seed, args.sequences, LESSONS)?;
+    let tests = simulate(args.test_seed, args.test_sequences, TESTS)?;
     let mut report = String::new();
     for (name, pick) in [("counter", pick_counted as Pick), ("counter-alone", pick_alone as Pick)] {
         let options = TrainOptions { epochs: args.epochs, seed: args.seed, ..TrainOptions::default() };
@@ -80,12 +89,12 @@ fn pick_alone(example: &Example) -> &Lesson {
     &example.alone
 }
 
-fn simulate(seed: u64, sequences: usize) -> anyhow::Result<Vec<Example>> {
-    let recordings = recordings(seed, sequences)?;
-    let views = recordings.first().map(crate::simulate::Recording::views).unwrap_or_default();
+fn simulate(seed: u64, sequences: usize, length: usize) -> anyhow::Result<Vec<Example>> {
+    let recordings = recordings(seed, sequences, length)?;
+    let views = recordings.first().map(Recording::views).unwrap_or_default();
     // Only the detections and clusters are wanted: any weights do.
-    let counter = Counter::with(&views, CounterOptions::default(), Network::untrained())?;
-    let bar = progress_bar(recordings.len() * sequences * SEQUENCE_LENGTH);
+    let counter = Counter::with(&views, CounterOptions::default(), Network::untrained(FEATURES))?;
+    let bar = progress_bar(recordings.iter().map(Recording::len).sum());
     let found = examples(&recordings, &counter, || bar.inc(1))?;
     bar.finish_and_clear();
     Ok(found)
@@ -100,15 +109,13 @@ fn header(
     pick: Pick,
 ) -> Vec<String> {
     let TrainCounterArgs { sequences, test_sequences, seed, test_seed, epochs, .. } = args;
-    let confusion = |examples: &mut dyn Iterator<Item = &Example>| {
+    let (learnt, answers) = (answers(lessons, network, pick), answers(tests, network, pick));
+    let confusion = |of: &[Answer], taken: &dyn Fn(&Answer) -> bool| {
         let mut confusion = Confusion::default();
-        for example in examples {
-            let lesson = pick(example);
-            confusion.add(lesson.people, most_probable(&lesson.answer(network)));
-        }
+        of.iter().filter(|answer| taken(answer)).for_each(|answer| confusion.add(answer.people, answer.said));
         confusion
     };
-    let full = |example: &&Example| example.history > HISTORY;
+    let full = |answer: &Answer| answer.history >= HISTORY;
     let mut lines = vec![
         format!(
             "cargo run --release --no-default-features --features train -- train-counter --out assets --sequences \
@@ -116,14 +123,41 @@ fn header(
         ),
         format!("learnt from {} frames, tested on {} frames of another seed", lessons.len(), tests.len()),
     ];
-    lines.extend(told("learnt", &confusion(&mut lessons.iter())));
-    lines.extend(told("test, all frames", &confusion(&mut tests.iter())));
-    lines.extend(told("test, frames with enough frames before them", &confusion(&mut tests.iter().filter(full))));
-    for preset in [crate::simulate::Preset::Easy, crate::simulate::Preset::Medium, crate::simulate::Preset::Hard] {
-        let of = |example: &&Example| full(example) && example.preset == preset;
-        lines.extend(told(&format!("test, {}, likewise", preset.word()), &confusion(&mut tests.iter().filter(of))));
+    lines.extend(told("learnt", &confusion(&learnt, &|_| true)));
+    lines.extend(told("test, all frames", &confusion(&answers, &|_| true)));
+    for first in [0, 1, COMPARED] {
+        let name = format!("test, frame {} of a sequence", first + 1);
+        lines.extend(told(&name, &confusion(&answers, &|answer| answer.history == first)));
+    }
+    lines.extend(told("test, frames with enough frames before them", &confusion(&answers, &full)));
+    for preset in [Preset::Easy, Preset::Medium, Preset::Hard] {
+        let of = confusion(&answers, &|answer| full(answer) && answer.preset == preset);
+        lines.extend(told(&format!("test, {}, likewise", preset.word()), &of));
     }
     lines
+}
+
+/// What is said of a frame.
+struct Answer {
+    people: usize,
+    said: usize,
+    history: usize,
+    preset: Preset,
+}
+
+/// What is said of every frame: of the counter's lessons what the frames agree on, of the classifier alone each by itself.
+fn answers(examples: &[Example], network: &Network, pick: Pick) -> Vec<Answer> {
+    let mut said: Vec<[f64; CLASSES]> = Vec::new();
+    let of = |example: &Example| {
+        let lesson = pick(example);
+        if example.history == 0 || !lesson.placed {
+            said.clear();
+        }
+        said.push(lesson.answer(network));
+        let Example { history, preset, .. } = *example;
+        Answer { people: lesson.people, said: most_probable(&pooled(&said)), history, preset }
+    };
+    examples.iter().map(of).collect()
 }
 
 fn most_probable(p: &[f64; CLASSES]) -> usize {

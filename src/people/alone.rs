@@ -3,15 +3,15 @@
 //! It sees six statistics of each of the first two maps. That is what a small network can be given without looking where
 //! the echoes are; it shows what detection and clustering are worth.
 
-use super::network::FEATURES;
-
+/// Numbers of a frame.
+pub const STATISTICS: usize = 12;
 /// Statistics of a map: mean, standard deviation and skewness of ln H; how far the largest lies above the mean; the
 /// shares of the cells that are 2 and 3 standard deviations above it.
-const OF_A_MAP: usize = FEATURES / 2;
+const OF_A_MAP: usize = STATISTICS / 2;
 
 /// Twelve numbers of a frame: six of each of the first two maps, zeros for a map that is not there.
-pub fn map_statistics(maps: &[&[f64]]) -> [f32; FEATURES] {
-    let mut all = [0.0; FEATURES];
+pub fn map_statistics(maps: &[&[f64]]) -> [f32; STATISTICS] {
+    let mut all = [0.0; STATISTICS];
     for (map, out) in maps.iter().zip(all.chunks_exact_mut(OF_A_MAP)) {
         out.copy_from_slice(&statistics(map));
     }

@@ -48,7 +48,7 @@ impl Default for CfarOptions {
             smooth_m: 0.04,
             most: 200,
             limb_m: 0.7,
-            limb_ln: 0.9,
+            limb_ln: 1.4,
             sidelobe_m: 0.15,
             sidelobe_ln: 2.3,
             nearest_m: 0.5,

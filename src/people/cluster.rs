@@ -30,7 +30,7 @@ pub struct ClusterOptions {
 
 impl Default for ClusterOptions {
     fn default() -> Self {
-        Self { epsilon_m: 0.3, points: 3, apart_m: 0.5, wider: 2.5, one_body_m: 0.4, limb_m: 0.75, limb_share: 0.35 }
+        Self { epsilon_m: 0.3, points: 3, apart_m: 0.5, wider: 2.5, one_body_m: 0.3, limb_m: 0.75, limb_share: 0.2 }
     }
 }
 
@@ -109,15 +109,19 @@ pub(super) fn refined(clusters: Vec<Vec<Point>>, options: &ClusterOptions) -> Ve
 
 /// Whether two groups of points are two bodies: far enough apart, each of enough points, and wider apart than wide.
 fn are_two(halves: &[Vec<Point>; 2], options: &ClusterOptions) -> bool {
-    let [a, b] = halves.each_ref().map(|half| mean(half));
-    let spread =
-        |half: &[Point], middle: Vec3| half.iter().map(|p| flat_distance(p.position, middle).powi(2)).sum::<f64>();
-    let within =
-        ((spread(&halves[0], a) + spread(&halves[1], b)) / (halves[0].len() + halves[1].len()).max(1) as f64).sqrt();
-    let apart = flat_distance(a, b);
+    let [apart, within] = apart(halves);
     halves.iter().all(|half| half.len() >= options.points)
         && apart >= options.apart_m
         && apart >= options.wider * within
+}
+
+/// The distance of the middles of two groups of points, and the standard deviation of the points about them, m.
+pub(super) fn apart(halves: &[Vec<Point>; 2]) -> [f64; 2] {
+    let [a, b] = halves.each_ref().map(|half| mean(half));
+    let spread =
+        |half: &[Point], middle: Vec3| half.iter().map(|p| flat_distance(p.position, middle).powi(2)).sum::<f64>();
+    let points = halves[0].len() + halves[1].len();
+    [flat_distance(a, b), ((spread(&halves[0], a) + spread(&halves[1], b)) / points.max(1) as f64).sqrt()]
 }
 
 fn mean(points: &[Point]) -> Vec3 {
@@ -178,26 +182,19 @@ impl Cluster {
         Self { points, centroid, extent, intensity, variance, consistency }
     }
 
-    /// The twelve features of the paper's classifier: centroid (m), extent (m), mean and variance of intensity, points,
-    /// temporal consistency, and of the whole frame the clusters and the detections.
-    pub(super) fn features(&self, clusters: usize, detections: usize) -> [f32; 12] {
-        let ([x, y, z], [dx, dy, dz]) = (self.centroid, self.extent);
-        let points = self.points.len() as f64;
-        [
-            x,
-            y,
-            z,
-            dx,
-            dy,
-            dz,
-            self.intensity,
-            self.variance,
-            points,
-            self.consistency,
-            clusters as f64,
-            detections as f64,
-        ]
-        .map(|value| value as f32)
+    /// ln of the largest amplitude, as it would be at 1 m: echoes fall with the square of the distance.
+    pub(super) fn strength(&self) -> f64 {
+        let strength = |p: &Point| f64::from(p.level) + 2.0 * p.range_m.max(0.1).ln();
+        self.points.iter().map(strength).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// How far the middle of the detections moved from the older frames to the latest two, m.
+    pub(super) fn moved(&self) -> f64 {
+        let middle = |new: bool| {
+            let some: Vec<Point> = self.points.iter().filter(|p| (p.age < 2) == new).copied().collect();
+            (!some.is_empty()).then(|| mean(&some))
+        };
+        middle(true).zip(middle(false)).map_or(0.0, |(a, b)| flat_distance(a, b))
     }
 }
 
@@ -218,7 +215,7 @@ mod tests {
     fn a_limb_belongs_to_its_body_and_a_second_body_does_not() {
         let options = ClusterOptions::default();
         let groups = |second: Vec<Point>| refined(vec![body(3.0, 0.0, 30), second], &options).len();
-        assert_eq!(groups(body(2.45, 0.0, 6)), 1, "an arm in front of the body");
+        assert_eq!(groups(body(2.45, 0.0, 5)), 1, "an arm in front of the body");
         assert_eq!(groups(body(2.4, 0.0, 25)), 2, "somebody as large in front of it");
         assert_eq!(groups(body(2.1, 0.0, 6)), 2, "too far for an arm");
     }

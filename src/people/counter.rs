@@ -1,30 +1,40 @@
-//! Counting: detections of a few frames → clusters → the classifier's word on each → the count.
+//! Counting: detections of a few frames → clusters → the classifier's word on each → the sum → what ten frames agree on.
 //!
 //! The paper feeds "cluster statistics" to a classifier of the count and leaves open how the statistics of several clusters
-//! become one vector of twelve. Here every cluster is asked by itself how many people it holds (0: clutter, 1, or several
-//! who stand too close), and so is what belongs to no cluster; the distribution of the sum is the convolution of theirs. The
-//! classifier is trained through that sum, on nothing but the true count of a frame.
+//! become one vector of twelve. Here every cluster is asked by itself how many people it holds (0: clutter or a limb, 1, or
+//! several who stand too close); the distribution of the sum is the convolution of theirs. The classifier is trained
+//! through that sum, on nothing but the true count of a frame. The frames of the last second are then pooled: an arm that
+//! looks like a second person does so for some frames, the number of people stays.
 
 use super::cfar::CfarOptions;
 use super::cluster::{Cluster, ClusterOptions, cluster, refined};
 use super::error::PeopleError;
-use super::network::{CLASSES, FEATURES, Network};
-use super::scan::{HISTORY, Point, Scan, Scanner};
+use super::features::{FEATURES, features};
+use super::network::{CLASSES, Network};
+use super::scan::{COMPARED, HISTORY, Point, Scan, Scanner};
 use crate::radar::View;
 
 /// Clusters that are asked, those of most points first; more are not people.
 pub(super) const MOST_CLUSTERS: usize = 8;
 
-/// Share of the frames in which a cluster must be detected: what comes and goes is noise.
-const PERSISTENT: f64 = 0.5;
+/// A number that one frame excludes still has this probability.
+const DOUBT: f64 = 0.01;
 
 /// What the counter is told.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CounterOptions {
     /// Detection.
     pub cfar: CfarOptions,
     /// Clustering.
     pub cluster: ClusterOptions,
+}
+
+impl Default for CounterOptions {
+    /// The paper's, but β is 2: logarithms have no heavy tail, the fainter of two people is found more often, and what
+    /// noise comes with it the classifier knows.
+    fn default() -> Self {
+        Self { cfar: CfarOptions { beta: 2.0, ..CfarOptions::default() }, cluster: ClusterOptions::default() }
+    }
 }
 
 /// Counts the people of frames with the same views.
@@ -72,29 +82,33 @@ impl Counter {
         Ok(Self { scanner: Scanner::new(views, options.cfar)?, options, network })
     }
 
-    /// Detections of a frame. `maps`: one a view, C order, missing cells filled; `before`: the frames before it in its
-    /// sequence, the latest first, at most [`HISTORY`] are looked at.
+    /// Detections and clusters of a frame. `maps`: one a view, C order, missing cells filled; `before`: the frames before it
+    /// in its sequence, the latest first, at most [`HISTORY`] are looked at.
     ///
     /// # Errors
     /// Where the maps are not those of the views, or hold no number.
     pub fn scan(&self, maps: &[&[f64]], before: &[&Scan]) -> Result<Scan, PeopleError> {
-        self.scanner.scan(maps, before)
+        let mut scan = self.scanner.scan(maps, before)?;
+        let Described { clusters, loose, features } = self.describe(&scan, before);
+        let asked: Vec<[f64; CLASSES]> = features.iter().map(|x| self.network.probabilities(x)).collect();
+        scan.said = asked.iter().fold(NOBODY, |sum, p| convolve(&sum, p));
+        let counted = clusters.into_iter().zip(asked);
+        scan.clusters = counted.map(|(cluster, probabilities)| Counted { cluster, probabilities }).collect();
+        scan.loose = loose;
+        Ok(scan)
     }
 
-    /// The count of a scanned frame, given those before it, the latest first.
+    /// The count of a scanned frame, given those before it, the latest first: what they agree on.
     pub fn count(&self, now: &Scan, before: &[&Scan]) -> Count {
-        let Described { clusters, loose, features, rest } = self.describe(now, before);
-        let asked: Vec<[f64; CLASSES]> = features.iter().map(|x| self.network.probabilities(x)).collect();
-        let sum = asked.iter().fold(self.network.probabilities(&rest), |sum, p| convolve(&sum, p));
-        let clusters =
-            clusters.into_iter().zip(asked).map(|(cluster, probabilities)| Counted { cluster, probabilities });
-        Count { probabilities: sum, clusters: clusters.collect(), loose }
+        let alike = before.iter().take(HISTORY).filter(|scan| scan.moving == now.moving);
+        let said: Vec<[f64; CLASSES]> = std::iter::once(now.said).chain(alike.map(|scan| scan.said)).collect();
+        Count { probabilities: agreed(&said), clusters: now.clusters.clone(), loose: now.loose.clone() }
     }
 
     /// Clusters and what the classifier sees of them.
     pub(super) fn describe(&self, now: &Scan, before: &[&Scan]) -> Described {
         // What stands still in a sequence's first frame would be clutter among what moves.
-        let before: Vec<&&Scan> = before.iter().take(HISTORY).filter(|scan| scan.moving == now.moving).collect();
+        let before: Vec<&&Scan> = before.iter().take(COMPARED).filter(|scan| scan.moving == now.moving).collect();
         let aged = |(age, scan): (usize, &&&Scan)| {
             let age = age as u8 + 1;
             scan.points.iter().map(move |point| Point { age, ..*point }).collect::<Vec<Point>>()
@@ -104,26 +118,23 @@ impl Counter {
         let frames = before.len() + 1;
         let (found, rest) = cluster(&points, &self.options.cluster);
         let found = refined(found, &self.options.cluster);
-        let described = found.into_iter().map(|points| Cluster::new(points, frames));
-        let (mut clusters, passing): (Vec<Cluster>, Vec<Cluster>) =
-            described.partition(|cluster| cluster.consistency >= PERSISTENT);
-        let rest = passing.into_iter().flat_map(|cluster| cluster.points).chain(rest).collect::<Vec<Point>>();
+        let mut clusters: Vec<Cluster> = found.into_iter().map(|points| Cluster::new(points, frames)).collect();
         clusters.sort_by(|a, b| b.points.len().cmp(&a.points.len()).then(b.intensity.total_cmp(&a.intensity)));
         clusters.truncate(MOST_CLUSTERS);
-        let features = clusters.iter().map(|c| c.features(clusters.len(), points.len())).collect();
-        let loose = rest.clone();
-        let rest = Cluster::new(rest, frames).features(clusters.len(), points.len());
-        Described { clusters, loose, features, rest }
+        let features = features(&clusters, points.len(), frames);
+        Described { clusters, loose: rest, features }
     }
 }
 
-/// Clusters, the features of each, and those of what belongs to none.
+/// Clusters, the features of each, and the detections that belong to none.
 pub(super) struct Described {
     pub(super) clusters: Vec<Cluster>,
     pub(super) loose: Vec<Point>,
     pub(super) features: Vec<[f32; FEATURES]>,
-    pub(super) rest: [f32; FEATURES],
 }
+
+/// The distribution of a count where there is nobody.
+pub(super) const NOBODY: [f64; CLASSES] = [1.0, 0.0, 0.0, 0.0, 0.0];
 
 /// The distribution of the sum of two counts; the last class takes all that is above.
 pub(super) fn convolve(a: &[f64; CLASSES], b: &[f64; CLASSES]) -> [f64; CLASSES] {
@@ -134,6 +145,15 @@ pub(super) fn convolve(a: &[f64; CLASSES], b: &[f64; CLASSES]) -> [f64; CLASSES]
         }
     }
     sum
+}
+
+/// What several frames agree on: the geometric mean of their distributions. None of them is sure beyond [`DOUBT`], because
+/// frames that follow each other err alike.
+pub(super) fn agreed(said: &[[f64; CLASSES]]) -> [f64; CLASSES] {
+    let mean = |k: usize| said.iter().map(|p| (p[k] + DOUBT).ln()).sum::<f64>() / said.len().max(1) as f64;
+    let shares: [f64; CLASSES] = std::array::from_fn(|k| mean(k).exp());
+    let sum: f64 = shares.iter().sum();
+    shares.map(|share| share / sum)
 }
 
 impl Count {
@@ -157,5 +177,13 @@ mod tests {
         let (coin, two) = ([0.5, 0.5, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0]);
         assert_eq!(convolve(&coin, &coin), [0.25, 0.5, 0.25, 0.0, 0.0]);
         assert_eq!(convolve(&convolve(&two, &two), &two), [0.0, 0.0, 0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn one_frame_does_not_outvote_the_second_before_it() {
+        let (one, two) = ([0.0, 0.9, 0.1, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0]);
+        let p = agreed(&[two, one, one, one, one]);
+        assert!(p[1] > p[2] && (p.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{p:?}");
+        assert!(agreed(&[one])[1] > 0.8);
     }
 }

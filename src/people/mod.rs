@@ -4,9 +4,10 @@
 //! maps ─ change.rs ─ what changed since the frames before      (a room stands still, people do not)
 //!      ─ cfar.rs ─── cells of a grid above mean + 3σ around them (per view)
 //!      ─ scan.rs ─── in metres, heights from the other view
-//!      ─ cluster.rs  DBSCAN over the detections of five frames, twelve features a cluster
-//!      ─ network.rs  12 → 64 → 32 → 5: how many people a cluster is
-//!      ─ counter.rs  the distribution of their sum              → Count: number, probabilities
+//!      ─ cluster.rs  DBSCAN over the detections of four frames
+//!      ─ features.rs the paper's twelve numbers a cluster, and how it stands to the stronger ones
+//!      ─ network.rs  31 → 64 → 32 → 5: how many people a cluster is
+//!      ─ counter.rs  the distribution of their sum, over ten frames → Count: number, probabilities
 //!      ─ seeds.rs ── places for that number, or another         → starts of a fit
 //!      ─ identity.rs assignment to the frame before             → Tracker, match_people
 //! ```
@@ -22,6 +23,7 @@ mod cluster;
 mod confusion;
 mod counter;
 mod error;
+mod features;
 mod identity;
 mod network;
 mod scan;
@@ -31,12 +33,13 @@ mod sight;
 #[cfg(feature = "train")]
 pub mod train;
 
-pub use alone::map_statistics;
+pub use alone::{STATISTICS, map_statistics};
 pub use cfar::{CfarOptions, Detection, detect};
 pub use cluster::{Cluster, ClusterOptions};
 pub use confusion::{Confusion, PREVALENCE};
 pub use counter::{Count, Counted, Counter, CounterOptions};
 pub use error::PeopleError;
+pub use features::FEATURES;
 pub use identity::{Track, Tracker, TrackerOptions, match_people};
-pub use network::{CLASSES, FEATURES, LAYERS, Layer, Network};
-pub use scan::{HISTORY, Point, Scan};
+pub use network::{CLASSES, LAYERS, Layer, Network};
+pub use scan::{COMPARED, HISTORY, Point, Scan};

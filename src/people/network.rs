@@ -1,14 +1,14 @@
-//! The classifier: 12 → 64 → 32 → 5 with ReLU, read from its committed weights; f32.
+//! The classifier: features → 64 → 32 → 5 with ReLU, read from its committed weights; f32.
 
+use super::alone::STATISTICS;
 use super::error::PeopleError;
+use super::features::FEATURES;
 use serde::{Deserialize, Serialize};
 
-/// Features of a vector.
-pub const FEATURES: usize = 12;
 /// Classes: 0, 1, 2, 3, 4 and more.
 pub const CLASSES: usize = 5;
-/// Widths of the layers.
-pub const LAYERS: [usize; 4] = [FEATURES, 64, 32, CLASSES];
+/// Widths of the layers after the inputs.
+pub const LAYERS: [usize; 3] = [64, 32, CLASSES];
 
 /// A fully connected layer: y = W x + b.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,22 +33,21 @@ pub struct Network {
 }
 
 impl Network {
-    /// Zeros of the right shape: says that every count is as probable as every other.
-    pub fn untrained() -> Self {
-        let layer =
-            |widths: &[usize]| Layer { weight: vec![vec![0.0; widths[0]]; widths[1]], bias: vec![0.0; widths[1]] };
-        let layers = LAYERS.windows(2).map(layer).collect();
-        Self { header: Vec::new(), mean: vec![0.0; FEATURES], scale: vec![1.0; FEATURES], layers }
+    /// Zeros for so many inputs: says that every count is as probable as every other.
+    pub fn untrained(inputs: usize) -> Self {
+        let layer = |(from, to): (usize, usize)| Layer { weight: vec![vec![0.0; from]; to], bias: vec![0.0; to] };
+        let layers = widths(inputs).map(layer).collect();
+        Self { header: Vec::new(), mean: vec![0.0; inputs], scale: vec![1.0; inputs], layers }
     }
 
-    /// Reads a network.
+    /// Reads a network of so many inputs.
     ///
     /// # Errors
-    /// Where the text is no network of [`LAYERS`] with finite weights.
-    pub fn from_json(text: &str) -> Result<Self, PeopleError> {
+    /// Where the text is no such network of [`LAYERS`] with finite weights.
+    pub fn from_json(text: &str, inputs: usize) -> Result<Self, PeopleError> {
         let network: Self =
             serde_json::from_str(text).map_err(|error| PeopleError::Weights { message: error.to_string() })?;
-        network.check()?;
+        network.check(inputs)?;
         Ok(network)
     }
 
@@ -57,7 +56,7 @@ impl Network {
     /// # Errors
     /// Where they are damaged.
     pub fn bundled() -> Result<Self, PeopleError> {
-        Self::from_json(include_str!("../../assets/counter.json"))
+        Self::from_json(include_str!("../../assets/counter.json"), FEATURES)
     }
 
     /// Those of the classifier alone ([`super::map_statistics`]), which the counter is compared with.
@@ -65,18 +64,18 @@ impl Network {
     /// # Errors
     /// Where they are damaged.
     pub fn alone() -> Result<Self, PeopleError> {
-        Self::from_json(include_str!("../../assets/counter-alone.json"))
+        Self::from_json(include_str!("../../assets/counter-alone.json"), STATISTICS)
     }
 
-    fn check(&self) -> Result<(), PeopleError> {
+    fn check(&self, inputs: usize) -> Result<(), PeopleError> {
         let wrong = |message: String| Err(PeopleError::Weights { message });
-        if self.mean.len() != FEATURES || self.scale.len() != FEATURES || self.layers.len() + 1 != LAYERS.len() {
-            return wrong(format!("expected {FEATURES} means and scales and {} layers", LAYERS.len() - 1));
+        if self.mean.len() != inputs || self.scale.len() != inputs || self.layers.len() != LAYERS.len() {
+            return wrong(format!("expected {inputs} means and scales and {} layers", LAYERS.len()));
         }
-        for (layer, widths) in self.layers.iter().zip(LAYERS.windows(2)) {
-            let rows = layer.weight.len() == widths[1] && layer.weight.iter().all(|row| row.len() == widths[0]);
-            if !rows || layer.bias.len() != widths[1] {
-                return wrong(format!("expected a layer of {} by {}", widths[1], widths[0]));
+        for (layer, (from, to)) in self.layers.iter().zip(widths(inputs)) {
+            let rows = layer.weight.len() == to && layer.weight.iter().all(|row| row.len() == from);
+            if !rows || layer.bias.len() != to {
+                return wrong(format!("expected a layer of {from} by {to}"));
             }
         }
         let numbers = self.layers.iter().flat_map(|l| l.weight.iter().flatten().chain(&l.bias));
@@ -87,7 +86,7 @@ impl Network {
     }
 
     /// Softmax probabilities of the classes.
-    pub fn probabilities(&self, features: &[f32; FEATURES]) -> [f64; CLASSES] {
+    pub fn probabilities(&self, features: &[f32]) -> [f64; CLASSES] {
         let mut x: Vec<f32> =
             features.iter().zip(&self.mean).zip(&self.scale).map(|((x, mean), scale)| (x - mean) / scale).collect();
         for (k, layer) in self.layers.iter().enumerate() {
@@ -97,6 +96,11 @@ impl Network {
         }
         softmax(&x)
     }
+}
+
+/// Inputs and outputs of each layer.
+pub(super) fn widths(inputs: usize) -> impl Iterator<Item = (usize, usize)> {
+    std::iter::once(inputs).chain(LAYERS).zip(LAYERS)
 }
 
 fn softmax(logits: &[f32]) -> [f64; CLASSES] {

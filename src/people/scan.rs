@@ -2,15 +2,19 @@
 
 use super::cfar::{CfarOptions, Detection, Planes, Tables};
 use super::change::amplitudes_of;
+use super::counter::{Counted, NOBODY};
 use super::error::PeopleError;
+use super::network::CLASSES;
 use super::sight::{Role, Sight, baseline_m};
 use crate::geometry::{Vec3, norm, sub};
 use crate::radar::View;
 
 /// Echoes of two views are one body's where their ranges differ by no more, m.
 const SAME_RANGE_M: f64 = 0.12;
-/// Frames before the present one that are looked at.
-pub const HISTORY: usize = 3;
+/// Frames before the present one that are looked at: people stay as many for a second, one frame's confusion does not.
+pub const HISTORY: usize = 9;
+/// Of these, so many show what changed and what persists.
+pub const COMPARED: usize = 3;
 
 /// A detection in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,6 +40,12 @@ pub struct Scan {
     pub points: Vec<Point>,
     /// Whether they are of what changed, not of the map itself: false for the first frame of a sequence.
     pub moving: bool,
+    /// The clusters of its points and of those of the frames before, and how many people each is.
+    pub(super) clusters: Vec<Counted>,
+    /// Points that belong to no cluster.
+    pub(super) loose: Vec<Point>,
+    /// What the clusters say together of the number of people.
+    pub(super) said: [f64; CLASSES],
     /// The amplitudes of every view that tells places.
     amplitudes: Vec<Vec<f32>>,
 }
@@ -65,7 +75,7 @@ impl Scanner {
         Ok(Self { sights, views: views.to_vec(), options })
     }
 
-    /// The detections of a frame; `maps` one a view, missing cells filled; `before` the frames before, the last first.
+    /// The detections of a frame, not yet clustered; `maps` one a view, missing cells filled; `before` the frames before, the last first.
     pub(super) fn scan(&self, maps: &[&[f64]], before: &[&Scan]) -> Result<Scan, PeopleError> {
         if maps.len() != self.views.len() {
             return Err(PeopleError::WrongMaps { got: maps.len(), expected: self.views.len() });
@@ -83,11 +93,13 @@ impl Scanner {
             }
             let now = amplitudes_of(map, sight.view.quantity);
             let earlier: Vec<&[f32]> =
-                before.iter().take(HISTORY).filter_map(|scan| scan.amplitudes.get(s)).map(Vec::as_slice).collect();
+                before.iter().take(COMPARED).filter_map(|scan| scan.amplitudes.get(s)).map(Vec::as_slice).collect();
             detections.push(planes.detect(&now, &earlier, &self.options, &mut tables));
             amplitudes.push(now);
         }
-        Ok(Scan { points: thinned(self.points(&detections), &self.options), moving: !before.is_empty(), amplitudes })
+        let points = thinned(self.points(&detections), &self.options);
+        let (clusters, loose) = (Vec::new(), Vec::new());
+        Ok(Scan { points, moving: !before.is_empty(), clusters, loose, said: NOBODY, amplitudes })
     }
 
     /// Places of the detections of views that tell where, with heights from those that tell how high. Without a view

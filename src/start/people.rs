@@ -3,7 +3,7 @@
 use crate::config::FitConfig;
 use crate::geometry::Vec3;
 use crate::mhp::{FitError, Initialisation, Neighbour, Problem, initialise, initialise_people};
-use crate::people::{Count, Counter, HISTORY, Scan};
+use crate::people::{Count, Counter, Scan};
 use std::sync::Arc;
 
 /// A start, and the count that it rests on where people were counted.
@@ -39,23 +39,24 @@ pub fn begin(problem: &Arc<Problem>, config: &FitConfig) -> Result<Begun, FitErr
     Ok(Begun { initialisation, count: Some(count) })
 }
 
-/// Counts the people of a frame, with the frames before it that the problem knows.
+/// Counts the people of a frame, with the frames around it that the problem knows: those after it tell as much as those
+/// before. The nearest in time are scanned last.
 fn count(problem: &Problem) -> Result<Count, FitError> {
     let told = |error: crate::people::PeopleError| FitError::NoStart { reason: error.to_string() };
     let counter = Counter::new(&problem.views).map_err(told)?;
+    let mut around: Vec<&Neighbour> = problem.neighbours().iter().collect();
+    around.sort_by(|a, b| b.offset_s.abs().total_cmp(&a.offset_s.abs()));
     let views = 0..problem.views.len();
+    let others = around.into_iter().map(|neighbour| views.clone().map(|k| neighbour.map(k)).collect());
     let mut scans: Vec<Scan> = Vec::new();
-    let earlier: Vec<&Neighbour> = problem.neighbours().iter().filter(|neighbour| neighbour.offset_s < 0.0).collect();
-    let latest = &earlier[earlier.len().saturating_sub(HISTORY - 1)..];
-    let times = latest.iter().map(|neighbour| views.clone().map(|k| neighbour.map(k)).collect());
-    for maps in times.chain(std::iter::once(views.clone().map(|k| problem.map(k)).collect::<Vec<&[f64]>>())) {
+    for maps in others.chain(std::iter::once(views.clone().map(|k| problem.map(k)).collect::<Vec<&[f64]>>())) {
         let known: Vec<&Scan> = scans.iter().rev().collect();
         let scan = counter.scan(&maps, &known).map_err(told)?;
         scans.push(scan);
     }
     let latest: Vec<&Scan> = scans.iter().rev().collect();
     match latest.split_first() {
-        Some((now, before)) => Ok(counter.count(now, before)),
+        Some((now, known)) => Ok(counter.count(now, known)),
         None => Err(FitError::NoStart { reason: "no map".to_owned() }),
     }
 }

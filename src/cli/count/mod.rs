@@ -13,10 +13,10 @@ use std::process::ExitCode;
 
 /// Shown under the options of `count --help`.
 pub(super) const HELP: &str = "\
-What is done: what changed since the frames before (people never stand as still as a room), local maxima above mean + 3
-standard deviations of the cells around, in metres with heights from the other view, DBSCAN (0.3 m, 3 points) over the
-detections of five frames, and a small network that says of each cluster how many people it is. The first frame of a
-sequence has nothing before it and is counted less surely.
+What is done: what changed since the frames before (people never stand as still as a room), cells above mean + 2 standard
+deviations of the logarithms around, in metres with heights from the other view, DBSCAN (0.3 m, 3 points) over the
+detections of four frames, and a small network that says of each cluster how many people it is. What the last ten frames
+agree on is the count. The first frames of a sequence have few or none before them and are counted less surely.
 
 Columns of the CSV: frame, people, probability (of that number), p0 p1 p2 p3 p4 (4 and more), annotated (where the data
 set knows), persons: `identity:x:y:z` of each, metres, separated by spaces. The same identity is the same person within a

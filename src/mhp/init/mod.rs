@@ -63,8 +63,10 @@ const NARROW_REACH_M: [f64; 2] = [0.6, 1.1];
 const LARGEST_MISFIT_M: f64 = 0.5;
 /// The L_EM of a posture other than standing, of that of standing, at which it is believed of somebody who does not walk.
 const CLEARLY_BETTER: f64 = 0.9;
-/// A person is looked for no farther than this from the place that counting gave it, m.
+/// A person is looked for no farther than this from the place that counting gave it, m, and no farther than this share of
+/// the way to the nearest other person: two would find the same echo.
 const SEED_REACH_M: f64 = 0.3;
+const SEED_SHARE: f64 = 0.25;
 
 /// A start for the fit, and how it came about.
 #[derive(Debug, Clone, PartialEq)]
@@ -155,7 +157,7 @@ pub fn initialise_people(
     let found = match seeds {
         _ if !config.init.position => vec![(middle_of_views(problem), None)],
         [] => vec![find_one(problem, evidence, &template, &peaks, &mut notes)?],
-        seeds => seeds.iter().map(|&seed| near(problem, evidence, seed)).collect(),
+        seeds => (0..seeds.len()).map(|k| near(problem, evidence, seeds, k)).collect(),
     };
     let mut persons = Vec::with_capacity(found.len());
     for (at, expected) in found {
@@ -299,11 +301,15 @@ fn find_one(
     Ok((at, Some(expected)))
 }
 
-/// The body that is lit near `seed`.
-fn near(problem: &Problem, evidence: &[Evidence], seed: Vec3) -> (Vec3, Option<Expectation>) {
+/// The body that is lit near the `k`-th of `seeds`.
+fn near(problem: &Problem, evidence: &[Evidence], seeds: &[Vec3], k: usize) -> (Vec3, Option<Expectation>) {
+    let seed = seeds[k];
+    let apart = |other: &Vec3| (other[0] - seed[0]).hypot(other[1] - seed[1]);
+    let others = seeds.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, other)| apart(other));
+    let reach_m = others.fold(SEED_REACH_M, |reach_m, apart_m| reach_m.min(SEED_SHARE * apart_m));
     let (at, expectation) = centre(problem, evidence, seed);
     // Somebody else may shine brighter: a person is not looked for beyond arm's reach of the place it was given.
-    if (at[0] - seed[0]).hypot(at[1] - seed[1]) > SEED_REACH_M {
+    if apart(&at) > reach_m {
         let at = [seed[0], seed[1], at[2]];
         return (at, Some(Expectation::new(evidence, at)));
     }

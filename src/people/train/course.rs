@@ -7,10 +7,8 @@ use rayon::prelude::*;
 
 /// Scenarios of the lessons; the sequences take them in turn.
 const PRESETS: [Preset; 3] = [Preset::Easy, Preset::Medium, Preset::Hard];
-/// Frames a sequence. Short ones: the frames of one teach much the same, and every length of history occurs.
-pub const SEQUENCE_LENGTH: usize = HISTORY + 2;
-/// Numbers of people: 0 to 4, equally often.
-const NUMBERS: usize = 5;
+/// Of every so many sequences with one person there is one with 0, 1, 2, 3, 4: one person is what is seen most.
+const ONE_OF: [usize; 5] = [8, 1, 2, 4, 8];
 
 /// One frame, as the counter sees it and as the classifier alone does.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,23 +23,24 @@ pub struct Example {
     pub preset: Preset,
 }
 
-/// MMVR-like recordings of a seed, one for each number of people, each with `sequences` sequences.
+/// MMVR-like recordings of a seed, one for each number of people: `sequences` sequences of `length` frames with one person,
+/// half as many with two, a quarter with three, an eighth with four and with nobody.
 ///
 /// # Errors
 /// Where there are no sequences.
-pub fn recordings(seed: u64, sequences: usize) -> Result<Vec<Recording>, SimulateError> {
-    let recording = |people: usize| {
+pub fn recordings(seed: u64, sequences: usize, length: usize) -> Result<Vec<Recording>, SimulateError> {
+    let recording = |(people, one_of): (usize, &usize)| {
         Recording::new(&Options {
             presets: PRESETS.to_vec(),
-            frames: sequences * SEQUENCE_LENGTH,
-            sequence_length: SEQUENCE_LENGTH,
+            frames: sequences.div_ceil(*one_of) * length,
+            sequence_length: length,
             people: Some(people..=people),
             // A scene of its own for each number.
-            seed: seed.wrapping_mul(NUMBERS as u64).wrapping_add(people as u64),
+            seed: seed.wrapping_mul(ONE_OF.len() as u64).wrapping_add(people as u64),
             ..Options::default()
         })
     };
-    (0..NUMBERS).map(recording).collect()
+    ONE_OF.iter().enumerate().map(recording).collect()
 }
 
 /// Simulates and scans all frames of the recordings, sequences side by side; `done` hears of every frame.
@@ -78,7 +77,7 @@ fn sequence(
         let people = frame.joints.len();
         found.push(Example {
             counted: Lesson::of(counter, &now, &before, people),
-            alone: Lesson { rows: vec![map_statistics(&maps)], people, placed: false },
+            alone: Lesson { rows: vec![map_statistics(&maps).to_vec()], people, placed: false },
             history: k,
             preset: sequence.preset(),
         });
