@@ -172,7 +172,7 @@ pub(super) struct Evidence {
     source: Vec<u32>,
     largest: f64,
     /// One over the background of each ring.
-    background: Arc<Vec<f32>>,
+    background: Vec<f32>,
     /// How restless each spatial cell is, 0 to 1: what stands still is no evidence. `None` where nothing tells.
     unrest: Option<Arc<Vec<f32>>>,
 }
@@ -181,15 +181,16 @@ impl Evidence {
     pub(super) fn new(layout: &Arc<Layout>, map: &[f64]) -> Self {
         let largest = map.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
         let (value, source) = layout.spatial(map, largest);
-        let background = Arc::new(layout.background(&value));
+        let background = layout.background(&value);
         Self { layout: Arc::clone(layout), value, source, largest, background, unrest: None }
     }
 
-    /// Another map of the same view, a short time before or after, over the background and with the stillness of this one.
+    /// Another map of the same view, a short time before or after, on the scale and with the stillness of this one. The
+    /// background is its own: that of a ring rises with the sidelobes of whoever stands in it.
     pub(super) fn at_another_time(&self, map: &[f64]) -> Self {
         let (value, source) = self.layout.spatial(map, self.largest);
-        let (background, unrest) = (Arc::clone(&self.background), self.unrest.clone());
-        Self { layout: Arc::clone(&self.layout), value, source, largest: self.largest, background, unrest }
+        let background = self.layout.background(&value);
+        Self { value, source, background, layout: Arc::clone(&self.layout), unrest: self.unrest.clone(), ..*self }
     }
 
     /// The same map where what stands still is no evidence: cells whose coefficient of variation is below `still` do not
