@@ -67,6 +67,8 @@ const CLEARLY_BETTER: f64 = 0.9;
 /// the way to the nearest other person: two would find the same echo.
 const SEED_REACH_M: f64 = 0.3;
 const SEED_SHARE: f64 = 0.25;
+/// Share of the way to the nearest other person within which what is lit belongs to this one.
+const OWN_SHARE: f64 = 0.6;
 
 /// A start for the fit, and how it came about.
 #[derive(Debug, Clone, PartialEq)]
@@ -157,12 +159,16 @@ pub fn initialise_people(
     let found = match seeds {
         _ if !config.init.position => vec![(middle_of_views(problem), None)],
         [] => vec![find_one(problem, evidence, &template, &peaks, &mut notes)?],
-        seeds => (0..seeds.len()).map(|k| near(problem, evidence, seeds, k)).collect(),
+        seeds => {
+            let body = |k: usize| near(problem, evidence, seeds, k);
+            (0..seeds.len()).map(body).map(|(at, expected)| (at, Some(expected))).collect()
+        }
     };
     let mut persons = Vec::with_capacity(found.len());
-    for (at, expected) in found {
+    let places: Vec<Vec3> = found.iter().map(|(at, _)| *at).collect();
+    for (k, (at, expected)) in found.into_iter().enumerate() {
         let lit_m = expected.and_then(|expected| expected.lit);
-        let track = motion::track(problem, Sighting { t_s: 0.0, at, lit_m });
+        let track = motion::track(problem, Sighting { t_s: 0.0, at, lit_m }, apart_m(&places, k));
         let radial = velocity::radial(problem, at, config.init.velocity_gain_mps);
         persons.push(Person { at, expected, track, radial, posture: Posture::Standing });
     }
@@ -243,9 +249,11 @@ pub fn predict(problem: &Problem, before: &Pppr) -> Pppr {
     let Surroundings { now, around } = problem.surroundings();
     let Some((t_s, then)) = around.iter().rev().find(|(t_s, _)| *t_s < 0.0) else { return params };
     let joints = params.shape().joints;
-    for (person, at) in super::region::centres(before).into_iter().enumerate() {
-        let (from, _) = centre(problem, then, at);
-        let way = sub(centre(problem, now, from).0, from);
+    let places = super::region::centres(before);
+    for (person, &at) in places.iter().enumerate() {
+        let apart_m = apart_m(&places, person);
+        let (from, _) = centre(problem, then, at, apart_m);
+        let way = sub(centre(problem, now, from, apart_m).0, from);
         let far = way[0].hypot(way[1]) > FASTEST_MPS * -t_s;
         if far || !way.iter().all(|x| x.is_finite()) {
             continue;
@@ -266,18 +274,19 @@ pub(super) fn anchors(problem: &Problem, config: &FitConfig, params: &Pppr) -> V
         return Vec::new();
     }
     let (joints, template) = (params.shape().joints.max(1), Template::new(&problem.skeleton));
-    let of_person = |(person, middle): (usize, Vec3)| {
+    let middles = super::region::centres(params);
+    let of_person = |person: usize| {
         let own = person * joints..(person + 1) * joints;
         let mean = scale(own.fold([0.0; 3], |sum, joint| add(sum, params.position(joint))), 1.0 / joints as f64);
-        let (lit, expectation) = centre(problem, &problem.surroundings().now, middle);
-        let here = Sighting { t_s: 0.0, at: lit, lit_m: expectation.lit };
-        let Some(track) = motion::track(problem, here) else { return mean };
+        let (lit, expected) = near(problem, &problem.surroundings().now, &middles, person);
+        let here = Sighting { t_s: 0.0, at: lit, lit_m: expected.lit };
+        let Some(track) = motion::track(problem, here, apart_m(&middles, person)) else { return mean };
         let at = behind_skin(config, track.at);
         // Where the floor is known, the start stands as high as it should.
         let floor = problem.radar.height_m.filter(|_| config.height == Height::Floor);
         [at[0], at[1], floor.map_or(at[2] + template.mean_over_middle_m(), |_| mean[2])]
     };
-    super::region::centres(params).into_iter().enumerate().map(of_person).collect()
+    (0..middles.len()).map(of_person).collect()
 }
 
 /// The strongest place where somebody stands.
@@ -301,25 +310,31 @@ fn find_one(
     Ok((at, Some(expected)))
 }
 
+/// How far the nearest of the other `places` is from the `k`-th on the floor, m; infinite where there is no other.
+fn apart_m(places: &[Vec3], k: usize) -> f64 {
+    let apart = |other: &Vec3| (other[0] - places[k][0]).hypot(other[1] - places[k][1]);
+    let others = places.iter().enumerate().filter(|(other, _)| *other != k);
+    others.map(|(_, other)| apart(other)).fold(f64::INFINITY, f64::min)
+}
+
 /// The body that is lit near the `k`-th of `seeds`.
-fn near(problem: &Problem, evidence: &[Evidence], seeds: &[Vec3], k: usize) -> (Vec3, Option<Expectation>) {
+fn near(problem: &Problem, evidence: &[Evidence], seeds: &[Vec3], k: usize) -> (Vec3, Expectation) {
     let seed = seeds[k];
-    let apart = |other: &Vec3| (other[0] - seed[0]).hypot(other[1] - seed[1]);
-    let others = seeds.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, other)| apart(other));
-    let reach_m = others.fold(SEED_REACH_M, |reach_m, apart_m| reach_m.min(SEED_SHARE * apart_m));
-    let (at, expectation) = centre(problem, evidence, seed);
+    let apart_m = apart_m(seeds, k);
+    let (at, expectation) = centre(problem, evidence, seed, apart_m);
     // Somebody else may shine brighter: a person is not looked for beyond arm's reach of the place it was given.
-    if apart(&at) > reach_m {
+    if (at[0] - seed[0]).hypot(at[1] - seed[1]) > SEED_REACH_M.min(SEED_SHARE * apart_m) {
         let at = [seed[0], seed[1], at[2]];
-        return (at, Some(Expectation::new(evidence, at)));
+        return (at, Expectation::new(evidence, at));
     }
-    (at, Some(expectation))
+    (at, expectation)
 }
 
 /// The middle of what all views show lit around `at`, on the body's axis: the echoes come from the skin before it. Where
-/// height is not seen it stays.
-fn centre(problem: &Problem, evidence: &[Evidence], mut at: Vec3) -> (Vec3, Expectation) {
-    for reach_m in [WIDE_REACH_M, NARROW_REACH_M, NARROW_REACH_M] {
+/// height is not seen it stays. What is nearer to the nearest other person, `apart_m` away, is theirs.
+fn centre(problem: &Problem, evidence: &[Evidence], mut at: Vec3, apart_m: f64) -> (Vec3, Expectation) {
+    for [floor_m, up_m] in [WIDE_REACH_M, NARROW_REACH_M, NARROW_REACH_M] {
+        let reach_m = [floor_m.min(OWN_SHARE * apart_m), up_m];
         let marks: Vec<Mark> = evidence.iter().filter_map(|e| e.centroid(at, reach_m)).collect();
         if marks.is_empty() {
             break;
@@ -372,7 +387,7 @@ fn most_bodily(problem: &Problem, evidence: &[Evidence], places: &[Vec3]) -> Opt
             continue;
         }
         starts.push(place);
-        let (at, expected) = centre(problem, evidence, place);
+        let (at, expected) = centre(problem, evidence, place, f64::INFINITY);
         if expected.extent_m.is_some() {
             return Some((at, expected));
         }

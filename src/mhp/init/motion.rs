@@ -58,8 +58,9 @@ impl Track {
     }
 }
 
-/// Follows the person who was found at `here` through the frames around; `None` where there are none.
-pub(super) fn track(problem: &Problem, here: Sighting) -> Option<Track> {
+/// Follows the person who was found at `here`, `apart_m` from the nearest other, through the frames around; `None` where
+/// there are none.
+pub(super) fn track(problem: &Problem, here: Sighting, apart_m: f64) -> Option<Track> {
     let surroundings = problem.surroundings();
     let mut sightings = vec![here];
     for forwards in [true, false] {
@@ -71,7 +72,7 @@ pub(super) fn track(problem: &Problem, here: Sighting) -> Option<Track> {
             let step_s = t_s - last.t_s;
             let mut expected = last.at;
             add_scaled(&mut expected, velocity, step_s);
-            let Some(found) = follow(problem, evidence, *t_s, expected) else { break };
+            let Some(found) = follow(problem, evidence, *t_s, expected, apart_m) else { break };
             velocity = scale(sub(found.at, last.at), 1.0 / step_s);
             last = found;
             sightings.push(found);
@@ -81,8 +82,8 @@ pub(super) fn track(problem: &Problem, here: Sighting) -> Option<Track> {
 }
 
 /// The middle of what is lit near `expected`; `None` where that is somebody else.
-fn follow(problem: &Problem, evidence: &[Evidence], t_s: f64, expected: Vec3) -> Option<Sighting> {
-    let (at, expectation) = centre(problem, evidence, expected);
+fn follow(problem: &Problem, evidence: &[Evidence], t_s: f64, expected: Vec3, apart_m: f64) -> Option<Sighting> {
+    let (at, expectation) = centre(problem, evidence, expected, apart_m);
     let off = sub(at, expected);
     (off[0].hypot(off[1]) < LEASH_M).then_some(Sighting { t_s, at, lit_m: expectation.lit })
 }
