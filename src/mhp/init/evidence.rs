@@ -6,17 +6,15 @@
 //!
 //! What the axes alone decide ([`Layout`]) is worked out once for all maps of a view. Cells are f32 of the map's largest.
 
-use super::super::fill::for_neighbours;
-use super::super::splat::Seen;
-use crate::geometry::{Vec3, add_scaled, dot, mat_t_vec, scale};
-use crate::radar::{Axis, AxisKind, View};
+use super::layout::{Layout, NEAREST_M, unravel};
+use super::locate::Mark;
+use crate::geometry::{Vec3, mat_t_vec};
+use crate::mhp::for_neighbours;
+use crate::mhp::splat::Seen;
+use crate::radar::AxisKind;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-/// Echoes nearer than this are leakage from the radar itself, m.
-const NEAREST_M: f64 = 0.5;
-/// A ring with fewer cells says nothing of the background.
-const SMALLEST_RING: usize = 8;
 /// Spread of speckle, ln: a Rayleigh amplitude has 0.64. What rises less over the background is not counted.
 pub(super) const SPECKLE: f64 = 0.64;
 /// Percentiles tried for local maxima, strictest first, until [`ENOUGH_PEAKS`] are found.
@@ -24,12 +22,6 @@ const PERCENTILES: [f64; 6] = [99.5, 99.0, 98.0, 96.0, 92.0, 85.0];
 const ENOUGH_PEAKS: usize = 12;
 /// How far below its strongest cell a body is still lit, ln: 26 dB.
 pub(super) const DEPTH_LN: f64 = 3.0;
-/// Cells are held above this share of the map's largest.
-const FAINTEST: f32 = 1e-12;
-/// A step this short ends the search for the point that peaks agree on, m.
-const LOCATED_M: f64 = 1e-4;
-/// Where the search begins when nothing is known of the point: before the radar, m.
-const BEFORE_RADAR: Vec3 = [2.0, 0.0, 0.0];
 /// At most this many peaks of a view are kept, strongest first.
 const MOST_PEAKS: usize = 40;
 
@@ -46,14 +38,6 @@ pub struct Peak {
     pub salience: f64,
 }
 
-/// Where an echo lies in a view, in fractions of bins.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Mark {
-    pub view: usize,
-    /// A bin a spatial axis, in the order of the view's axes without Doppler.
-    pub bin: SmallVec<[f64; 3]>,
-}
-
 /// What the change from one map to another tells at a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Flow {
@@ -61,106 +45,6 @@ pub(super) struct Flow {
     pub steepness: f64,
     /// 1 where the echo goes away from the radar, −1 where it comes, 0 where nothing tells.
     pub sign: f64,
-}
-
-/// A view as evidence sees it: its axes without Doppler, and the rings of cells at the same range.
-#[derive(Debug)]
-pub(super) struct Layout {
-    view: View,
-    index: usize,
-    /// Spatial axes and their places among the view's axes.
-    axes: Vec<(usize, Axis)>,
-    shape: Vec<usize>,
-    /// The ring of each spatial cell.
-    ring_of: Vec<u32>,
-    /// Spatial cells ring by ring, and where each ring begins.
-    cells: Vec<u32>,
-    rings: Vec<usize>,
-    /// Rings before this are too near to the radar to tell anything.
-    deaf: usize,
-}
-
-impl Layout {
-    pub(super) fn new(index: usize, view: &View) -> Self {
-        let spatial = view.axes.iter().enumerate().filter(|(_, axis)| axis.kind != AxisKind::Doppler);
-        let axes: Vec<(usize, Axis)> = spatial.map(|(k, axis)| (k, axis.clone())).collect();
-        let shape: Vec<usize> = axes.iter().map(|(_, axis)| axis.bins).collect();
-        let count: usize = shape.iter().product();
-        let (ring_of, rings, cells) = (vec![0; count], vec![], vec![0; count]);
-        let mut layout = Self { view: view.clone(), index, axes, shape, ring_of, cells, rings, deaf: 0 };
-        if let Some(ranges) = layout.ranges_m() {
-            let widths = layout.axes.iter().filter(|(_, a)| !a.kind.is_angular()).map(|(_, a)| a.step().abs());
-            let width_m = widths.fold(f64::INFINITY, f64::min);
-            layout.ring_of = ranges.iter().map(|range| (range / width_m).round() as u32).collect();
-            layout.deaf = (NEAREST_M / width_m).round() as usize;
-        }
-        // Counting sort: how many cells each ring has, where it begins, and each cell to its place.
-        layout.rings = vec![0; layout.ring_of.iter().max().map_or(1, |&last| last as usize + 2)];
-        for &ring in &layout.ring_of {
-            layout.rings[ring as usize + 1] += 1;
-        }
-        for ring in 1..layout.rings.len() {
-            layout.rings[ring] += layout.rings[ring - 1];
-        }
-        let mut next = layout.rings.clone();
-        for (cell, &ring) in layout.ring_of.iter().enumerate() {
-            layout.cells[next[ring as usize]] = cell as u32;
-            next[ring as usize] += 1;
-        }
-        layout
-    }
-
-    /// Distance of each cell from the view's origin as far as the axes tell it, m; `None` where no axis tells any.
-    fn ranges_m(&self) -> Option<Vec<f64>> {
-        let has = |kind: AxisKind| self.axes.iter().any(|(_, axis)| axis.kind == kind);
-        let telling: &[AxisKind] = match () {
-            () if has(AxisKind::Range) => &[AxisKind::Range],
-            () if has(AxisKind::DepthH) => &[AxisKind::DepthH, AxisKind::Y],
-            () if has(AxisKind::DepthV) => &[AxisKind::DepthV, AxisKind::Z],
-            () => &[AxisKind::X, AxisKind::Y, AxisKind::Z],
-        };
-        if !telling.iter().any(|&kind| has(kind)) {
-            return None;
-        }
-        // Squares add up axis by axis: the cells of the axes so far, each with every bin of the next.
-        let squares = self.axes.iter().fold(vec![0.0], |so_far: Vec<f64>, (_, axis)| {
-            let share = f64::from(u8::from(telling.contains(&axis.kind)));
-            let own: Vec<f64> = (0..axis.bins).map(|bin| share * axis.value_at(bin as f64).powi(2)).collect();
-            so_far.iter().flat_map(|before| own.iter().map(move |square| before + square)).collect()
-        });
-        Some(squares.into_iter().map(f64::sqrt).collect())
-    }
-
-    /// One over the median of each ring; 0 where nothing is told. `value` must be positive.
-    fn background(&self, value: &[f32]) -> Vec<f32> {
-        // Positive floats sort as their bits do, and integers are partitioned several times as fast.
-        let mut bits: Vec<u32> = self.cells.iter().map(|&cell| value[cell as usize].to_bits()).collect();
-        let small = self.rings.windows(2).any(|ends| ends[1] - ends[0] < SMALLEST_RING);
-        let overall = if small { median(&mut bits.clone()) } else { 1.0 };
-        let of_ring = |(ring, ends): (usize, &[usize])| match &mut bits[ends[0]..ends[1]] {
-            _ if ring < self.deaf => 0.0,
-            few if few.len() < SMALLEST_RING => 1.0 / overall,
-            members => 1.0 / median(members),
-        };
-        self.rings.windows(2).enumerate().map(of_ring).collect()
-    }
-
-    /// H of each spatial cell in shares of `largest`, and the full cell each was taken from where that is another.
-    fn spatial(&self, map: &[f64], largest: f64) -> (Vec<f32>, Vec<u32>) {
-        let relative = |h: f64| ((h / largest) as f32).max(FAINTEST);
-        if self.axes.len() == self.view.axes.len() {
-            return (map.iter().map(|&h| relative(h)).collect(), Vec::new());
-        }
-        let (mut value, mut source) = (vec![0.0; self.cells.len()], vec![0; self.cells.len()]);
-        for (cell, &h) in map.iter().enumerate() {
-            let bins = unravel(cell, &self.view.shape());
-            let spatial = self.axes.iter().fold(0, |flat, (k, axis)| flat * axis.bins + bins[*k]);
-            if relative(h) > value[spatial] {
-                (value[spatial], source[spatial]) = (relative(h), cell as u32);
-            }
-        }
-        (value, source)
-    }
 }
 
 /// A view's map without its Doppler axes (the strongest Doppler bin stands for a cell).
@@ -454,82 +338,4 @@ pub(super) fn variation(maps: &[&[f64]]) -> Vec<f32> {
         if mean > 0.0 { (spread / mean) as f32 } else { 0.0 }
     };
     sums.iter().zip(squares).zip(*first).map(of_cell).collect()
-}
-
-/// The middle value of positive floats given as their bits, the upper one of two; they are reordered. 1 where there are
-/// none.
-fn median(bits: &mut [u32]) -> f32 {
-    if bits.is_empty() {
-        return 1.0;
-    }
-    let middle = bits.len() / 2;
-    f32::from_bits(*bits.select_nth_unstable(middle).1)
-}
-
-fn unravel(mut flat: usize, shape: &[usize]) -> SmallVec<[usize; 3]> {
-    let mut bins = SmallVec::from_elem(0, shape.len());
-    for k in (0..shape.len()).rev() {
-        bins[k] = flat % shape[k];
-        flat /= shape[k];
-    }
-    bins
-}
-
-/// The world point that best agrees with all `marks` at once, and the root mean square disagreement, m. What no axis
-/// tells stays at the radar's boresight.
-pub(super) fn locate(views: &[View], marks: &[&Mark]) -> (Vec3, f64) {
-    locate_from(BEFORE_RADAR, views, marks)
-}
-
-/// As [`locate`], looking first at `p`: what no axis tells stays there.
-pub(super) fn locate_from(mut p: Vec3, views: &[View], marks: &[&Mark]) -> (Vec3, f64) {
-    let mut misfit = f64::INFINITY;
-    for _ in 0..25 {
-        let (mut normal, mut pull) = ([[0.0; 3]; 3], [0.0; 3]);
-        let (mut squares, mut count) = (0.0, 0.0);
-        for (direction, gap_m) in marks.iter().flat_map(|mark| equations(&views[mark.view], mark, p)) {
-            for i in 0..3 {
-                add_scaled(&mut normal[i], direction, direction[i]);
-            }
-            add_scaled(&mut pull, direction, gap_m);
-            squares += gap_m * gap_m;
-            count += 1.0;
-        }
-        misfit = (squares / f64::max(count, 1.0)).sqrt();
-        for (i, row) in normal.iter_mut().enumerate() {
-            row[i] += 1e-3;
-        }
-        let step = solve(&normal, pull);
-        // A long step would jump to the other side of the radar.
-        let length = dot(step, step).sqrt();
-        add_scaled(&mut p, step, if length > 1.0 { 1.0 / length } else { 1.0 });
-        if length < LOCATED_M {
-            break;
-        }
-    }
-    (p, misfit)
-}
-
-/// For each spatial axis of the mark's view: the unit direction in which the coordinate grows (world) and the gap
-/// between the mark's coordinate and that of `p`, m.
-fn equations(view: &View, mark: &Mark, p: Vec3) -> Vec<(Vec3, f64)> {
-    let seen = Seen::new(view.pose.view_from_world(p));
-    let spatial = view.axes.iter().filter(|axis| axis.kind != AxisKind::Doppler).zip(&mark.bin);
-    spatial
-        .map(|(axis, &bin)| {
-            let (direction, arm) = seen.direction_and_arm(axis.kind);
-            let gap = (axis.at(bin) - seen.coordinate(axis, 0.0)) * arm / seen.slope(axis);
-            (mat_t_vec(&view.pose.rotation, direction), gap)
-        })
-        .collect()
-}
-
-/// Solves the 3×3 system by Cramer's rule; the matrix is positive definite.
-fn solve(m: &[Vec3; 3], b: Vec3) -> Vec3 {
-    use crate::geometry::cross;
-    let (c12, c20, c01) = (cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1]));
-    let mut x = scale(c12, b[0]);
-    add_scaled(&mut x, c20, b[1]);
-    add_scaled(&mut x, c01, b[2]);
-    scale(x, 1.0 / dot(m[0], c12))
 }

@@ -18,7 +18,10 @@
 //! Nothing here reads a label.
 
 mod evidence;
+mod find;
 mod height;
+mod layout;
+mod locate;
 mod motion;
 mod perturb;
 mod place;
@@ -34,41 +37,21 @@ pub(super) use surroundings::{Cached, Surroundings};
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
 use crate::config::{FitConfig, Height, Summation, Yaw};
-use crate::geometry::{Vec3, add, norm, scale, sub};
-use crate::radar::{AxisKind, View};
-use evidence::{Evidence, Mark, locate};
+use crate::geometry::{Vec3, add, scale, sub};
+use find::{apart_m, centre, find_one, middle_of_views, near};
 use height::{Expectation, Stature};
 use motion::{Sighting, Track};
-use place::Place;
 use pose::Posture;
 use std::sync::Arc;
 use template::Template;
 use velocity::{Radial, Source};
 
-/// Places nearer to each other are one, m.
-const DISTINCT_M: f64 = 0.7;
-/// At most this many places are looked at closely.
-const MOST_PLACES: usize = 8;
-/// A place with less than this share of the strongest place's echo is no rival to it.
-const WEAKEST_RIVAL: f64 = 0.3;
 /// Nobody in a room is faster, m/s: a farther jump is somebody else.
 const FASTEST_MPS: f64 = 4.0;
 /// Steps in which a posture's place is looked for, m.
 const POSTURE_STEP_M: f64 = 0.06;
-/// Reach of the search for a body's middle, on the floor and up and down, m: first that of a start that may be at its
-/// edge, then that of a body.
-const WIDE_REACH_M: [f64; 2] = [0.8, 1.3];
-const NARROW_REACH_M: [f64; 2] = [0.6, 1.1];
-/// Views whose middles disagree by more see different things, m.
-const LARGEST_MISFIT_M: f64 = 0.5;
 /// The L_EM of a posture other than standing, of that of standing, at which it is believed of somebody who does not walk.
 const CLEARLY_BETTER: f64 = 0.9;
-/// A person is looked for no farther than this from the place that counting gave it, m, and no farther than this share of
-/// the way to the nearest other person: two would find the same echo.
-const SEED_REACH_M: f64 = 0.3;
-const SEED_SHARE: f64 = 0.25;
-/// Share of the way to the nearest other person within which what is lit belongs to this one.
-const OWN_SHARE: f64 = 0.6;
 
 /// A start for the fit, and how it came about.
 #[derive(Debug, Clone, PartialEq)]
@@ -149,7 +132,7 @@ pub fn initialise_people(
     seeds: &[Vec3],
 ) -> Result<Initialisation, FitError> {
     let evidence = &problem.surroundings().now;
-    let peaks: Vec<Peak> = evidence.iter().flat_map(Evidence::peaks).collect();
+    let peaks: Vec<Peak> = evidence.iter().flat_map(evidence::Evidence::peaks).collect();
     let peaks = perturb::drop_some(problem, &config.init, peaks);
     let template = Template::new(&problem.skeleton);
     let mut notes: Vec<String> = (0..problem.views.len())
@@ -287,122 +270,6 @@ pub(super) fn anchors(problem: &Problem, config: &FitConfig, params: &Pppr) -> V
         [at[0], at[1], floor.map_or(at[2] + template.mean_over_middle_m(), |_| mean[2])]
     };
     (0..middles.len()).map(of_person).collect()
-}
-
-/// The strongest place where somebody stands.
-fn find_one(
-    problem: &Problem,
-    evidence: &[Evidence],
-    template: &Template,
-    peaks: &[Peak],
-    notes: &mut Vec<String>,
-) -> Result<(Vec3, Option<Expectation>), FitError> {
-    let places = place::places(problem, evidence, peaks);
-    notes.push(format!("{} peaks, {} places tried", peaks.len(), places.len()));
-    let mut ranked = rank(&places, template, |body| shared_excess(evidence, body));
-    if ranked.is_empty() {
-        notes.push("the views agree on no place: the strongest echo of one view was taken".to_owned());
-        ranked = rank(&places, template, |body| evidence.iter().map(|e| e.mean_excess(body)).sum());
-    }
-    let (at, expected) = most_bodily(problem, evidence, &ranked).ok_or_else(|| FitError::NoStart {
-        reason: format!("none of {} peaks stands above its background", peaks.len()),
-    })?;
-    Ok((at, Some(expected)))
-}
-
-/// How far the nearest of the other `places` is from the `k`-th on the floor, m; infinite where there is no other.
-fn apart_m(places: &[Vec3], k: usize) -> f64 {
-    let apart = |other: &Vec3| (other[0] - places[k][0]).hypot(other[1] - places[k][1]);
-    let others = places.iter().enumerate().filter(|(other, _)| *other != k);
-    others.map(|(_, other)| apart(other)).fold(f64::INFINITY, f64::min)
-}
-
-/// The body that is lit near the `k`-th of `seeds`.
-fn near(problem: &Problem, evidence: &[Evidence], seeds: &[Vec3], k: usize) -> (Vec3, Expectation) {
-    let seed = seeds[k];
-    let apart_m = apart_m(seeds, k);
-    let (at, expectation) = centre(problem, evidence, seed, apart_m);
-    // Somebody else may shine brighter: a person is not looked for beyond arm's reach of the place it was given.
-    if (at[0] - seed[0]).hypot(at[1] - seed[1]) > SEED_REACH_M.min(SEED_SHARE * apart_m) {
-        let at = [seed[0], seed[1], at[2]];
-        return (at, Expectation::new(evidence, at));
-    }
-    (at, expectation)
-}
-
-/// The middle of what all views show lit around `at`, on the body's axis: the echoes come from the skin before it. Where
-/// height is not seen it stays. What is nearer to the nearest other person, `apart_m` away, is theirs.
-fn centre(problem: &Problem, evidence: &[Evidence], mut at: Vec3, apart_m: f64) -> (Vec3, Expectation) {
-    for [floor_m, up_m] in [WIDE_REACH_M, NARROW_REACH_M, NARROW_REACH_M] {
-        let reach_m = [floor_m.min(OWN_SHARE * apart_m), up_m];
-        let marks: Vec<Mark> = evidence.iter().filter_map(|e| e.centroid(at, reach_m)).collect();
-        if marks.is_empty() {
-            break;
-        }
-        let (found, misfit) = locate(&problem.views, &marks.iter().collect::<Vec<_>>());
-        if misfit > LARGEST_MISFIT_M || !found.iter().all(|x| x.is_finite()) {
-            break;
-        }
-        let height_seen = evidence.iter().any(|e| e.resolves_height(found));
-        at = if height_seen { found } else { [found[0], found[1], at[2]] };
-    }
-    // The middle of what is lit says little of a body's height: heads outshine feet, or the other way round.
-    let expectation = Expectation::new(evidence, at);
-    ([at[0], at[1], expectation.middle_m], expectation)
-}
-
-/// The middle of what the first view covers: where a body stands when nothing may be read from the peaks.
-fn middle_of_views(problem: &Problem) -> Vec3 {
-    let middle = |(view, v): (usize, &View)| {
-        let spatial = v.axes.iter().filter(|axis| axis.kind != AxisKind::Doppler);
-        Mark { view, bin: spatial.map(|axis| axis.bins as f64 / 2.0).collect() }
-    };
-    let marks: Vec<Mark> = problem.views.iter().enumerate().map(middle).collect();
-    locate(&problem.views, &marks.iter().collect::<Vec<_>>()).0
-}
-
-/// Bodies at `places`, at several heights and depths each, best first: a body stands behind its nearest echo, and its
-/// brightest part may be high or low on it.
-fn rank(places: &[Place], template: &Template, score: impl Fn(&[Vec3]) -> f64) -> Vec<Vec3> {
-    let moved = places.iter().flat_map(|place| {
-        [0.0, 0.15].into_iter().flat_map(move |behind| {
-            [-0.6, -0.3, 0.0, 0.3, 0.6]
-                .map(|up| add(scale(place.at, 1.0 + behind / norm(place.at).max(0.5)), [0.0, 0.0, up]))
-        })
-    });
-    let scored = moved.map(|at| (at, score(&template.facing(at, towards_radar(at)))));
-    let mut scored: Vec<(Vec3, f64)> = scored.filter(|(_, score)| *score > 0.0).collect();
-    scored.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let least = WEAKEST_RIVAL * scored.first().map_or(0.0, |(_, score)| *score);
-    scored.into_iter().filter(|(_, score)| *score >= least).map(|(at, _)| at).collect()
-}
-
-/// The first of the strongest distinct `places` where something stands from feet to head, or the strongest: a corner of
-/// the room may outshine a person in both views, but it is a spot.
-fn most_bodily(problem: &Problem, evidence: &[Evidence], places: &[Vec3]) -> Option<(Vec3, Expectation)> {
-    let mut tried: Vec<(Vec3, Expectation)> = Vec::new();
-    let mut starts: Vec<Vec3> = Vec::new();
-    for &place in places {
-        if starts.iter().any(|start| (start[0] - place[0]).hypot(start[1] - place[1]) < DISTINCT_M) {
-            continue;
-        }
-        starts.push(place);
-        let (at, expected) = centre(problem, evidence, place, f64::INFINITY);
-        if expected.extent_m.is_some() {
-            return Some((at, expected));
-        }
-        tried.push((at, expected));
-        if tried.len() == MOST_PLACES {
-            break;
-        }
-    }
-    tried.first().copied()
-}
-
-/// How much echo over the background all views show at a body: the geometric mean over views, so that each must agree.
-fn shared_excess(evidence: &[Evidence], body: &[Vec3]) -> f64 {
-    let logs: f64 = evidence.iter().map(|e| e.mean_excess(body).ln()).sum();
-    (logs / evidence.len().max(1) as f64).exp()
 }
 
 /// Walks downhill on a grid that is halved `halvings` times: to the best of the six neighbours until none is better.

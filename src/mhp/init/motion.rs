@@ -3,8 +3,8 @@
 //! Left and right, front and back can hardly be told in one frame, but people walk forwards. Each neighbour's map is
 //! searched around the place of the frame before it on the way out, so that the track does not jump to somebody else.
 
-use super::centre;
 use super::evidence::Evidence;
+use super::find::centre;
 use crate::geometry::{Vec3, add_scaled, scale, sub};
 use crate::mhp::Problem;
 
@@ -123,5 +123,14 @@ mod tests {
         let heading = track.heading().unwrap();
         assert!((heading[0] + 1.2 / 1.2f64.hypot(0.4)).abs() < 1e-12);
         assert_eq!(line(vec![seen(0.0, [1.0; 3]), seen(0.1, [1.01, 1.0, 1.0])]).heading(), None);
+    }
+
+    #[test]
+    fn who_falls_has_no_heading() {
+        let seen = |t_s: f64, top: f64| Sighting { t_s, at: [3.0 + 1.2 * t_s, 0.0, 0.0], lit_m: Some([-1.0, top]) };
+        let walks = line(vec![seen(0.0, 0.8), seen(0.1, 0.84), seen(-0.1, 0.78)]);
+        assert!(walks.heading().is_some_and(|heading| (heading[0] - 1.0).abs() < 1e-12));
+        let falls = line(vec![seen(0.0, 0.6), seen(0.1, 0.4), seen(-0.1, 0.8)]);
+        assert!((falls.rises_mps() + 2.0).abs() < 1e-9 && falls.heading().is_none());
     }
 }

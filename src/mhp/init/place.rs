@@ -3,7 +3,8 @@
 //! Echoes of one body scatter over half a metre and over its whole height, so points are joined by their distance on the
 //! floor alone (average linkage, cut at the width of a body). A cluster is a place where somebody may stand.
 
-use super::evidence::{Evidence, Mark, Peak, locate, locate_from};
+use super::evidence::{Evidence, Peak};
+use super::locate::{Mark, locate, locate_from};
 use crate::geometry::{Vec3, add_scaled, norm, scale};
 use crate::mhp::Problem;
 use kodama::{Method, linkage};

@@ -181,6 +181,19 @@ mod tests {
     }
 
     #[test]
+    fn a_bent_body_comes_down_to_the_height_of_its_head_and_stays_where_it_was() {
+        let skeleton = Skeleton::preset("coco17").unwrap();
+        let template = Template::new(&skeleton);
+        for top_m in [1.05, 1.2, 1.45] {
+            let body = posed(&template, &skeleton, bent(&template, &skeleton, top_m));
+            assert!((body.top_m() - top_m).abs() < 0.01, "{top_m} m: {} m", body.top_m());
+            assert!((mean_ahead(&body.joints) - mean_ahead(&template.joints)).abs() < 1e-12);
+        }
+        let upright = posed(&template, &skeleton, bent(&template, &skeleton, 2.0));
+        assert!((upright.top_m() - template.top_m()).abs() < 0.01, "nobody grows");
+    }
+
+    #[test]
     fn as_many_postures_are_tried_as_asked_for() {
         assert_eq!(tried(1, true), [Posture::Standing]);
         assert_eq!(tried(9, true).len(), 9);

@@ -1,6 +1,7 @@
 //! The evidence of a frame and of those around it, worked out once for a problem.
 
-use super::evidence::{self, Evidence, Layout};
+use super::evidence::{self, Evidence};
+use super::layout::Layout;
 use crate::mhp::Problem;
 use std::sync::{Arc, OnceLock};
 

@@ -1,0 +1,132 @@
+//! What the axes of a view alone decide for its evidence, worked out once for all its maps: which cells lie at the same
+//! range, and how a map with a Doppler axis becomes one without.
+
+use crate::radar::{Axis, AxisKind, View};
+use smallvec::SmallVec;
+
+/// Echoes nearer than this are leakage from the radar itself, m.
+pub(super) const NEAREST_M: f64 = 0.5;
+/// A ring with fewer cells says nothing of the background.
+const SMALLEST_RING: usize = 8;
+/// Cells are held above this share of the map's largest.
+const FAINTEST: f32 = 1e-12;
+
+/// A view as evidence sees it: its axes without Doppler, and the rings of cells at the same range.
+#[derive(Debug)]
+pub(super) struct Layout {
+    pub(super) view: View,
+    pub(super) index: usize,
+    /// Spatial axes and their places among the view's axes.
+    pub(super) axes: Vec<(usize, Axis)>,
+    pub(super) shape: Vec<usize>,
+    /// The ring of each spatial cell.
+    pub(super) ring_of: Vec<u32>,
+    /// Spatial cells ring by ring, and where each ring begins.
+    cells: Vec<u32>,
+    rings: Vec<usize>,
+    /// Rings before this are too near to the radar to tell anything.
+    deaf: usize,
+}
+
+impl Layout {
+    pub(super) fn new(index: usize, view: &View) -> Self {
+        let spatial = view.axes.iter().enumerate().filter(|(_, axis)| axis.kind != AxisKind::Doppler);
+        let axes: Vec<(usize, Axis)> = spatial.map(|(k, axis)| (k, axis.clone())).collect();
+        let shape: Vec<usize> = axes.iter().map(|(_, axis)| axis.bins).collect();
+        let count: usize = shape.iter().product();
+        let (ring_of, rings, cells) = (vec![0; count], vec![], vec![0; count]);
+        let mut layout = Self { view: view.clone(), index, axes, shape, ring_of, cells, rings, deaf: 0 };
+        if let Some(ranges) = layout.ranges_m() {
+            let widths = layout.axes.iter().filter(|(_, a)| !a.kind.is_angular()).map(|(_, a)| a.step().abs());
+            let width_m = widths.fold(f64::INFINITY, f64::min);
+            layout.ring_of = ranges.iter().map(|range| (range / width_m).round() as u32).collect();
+            layout.deaf = (NEAREST_M / width_m).round() as usize;
+        }
+        // Counting sort: how many cells each ring has, where it begins, and each cell to its place.
+        layout.rings = vec![0; layout.ring_of.iter().max().map_or(1, |&last| last as usize + 2)];
+        for &ring in &layout.ring_of {
+            layout.rings[ring as usize + 1] += 1;
+        }
+        for ring in 1..layout.rings.len() {
+            layout.rings[ring] += layout.rings[ring - 1];
+        }
+        let mut next = layout.rings.clone();
+        for (cell, &ring) in layout.ring_of.iter().enumerate() {
+            layout.cells[next[ring as usize]] = cell as u32;
+            next[ring as usize] += 1;
+        }
+        layout
+    }
+
+    /// Distance of each cell from the view's origin as far as the axes tell it, m; `None` where no axis tells any.
+    fn ranges_m(&self) -> Option<Vec<f64>> {
+        let has = |kind: AxisKind| self.axes.iter().any(|(_, axis)| axis.kind == kind);
+        let telling: &[AxisKind] = match () {
+            () if has(AxisKind::Range) => &[AxisKind::Range],
+            () if has(AxisKind::DepthH) => &[AxisKind::DepthH, AxisKind::Y],
+            () if has(AxisKind::DepthV) => &[AxisKind::DepthV, AxisKind::Z],
+            () => &[AxisKind::X, AxisKind::Y, AxisKind::Z],
+        };
+        if !telling.iter().any(|&kind| has(kind)) {
+            return None;
+        }
+        // Squares add up axis by axis: the cells of the axes so far, each with every bin of the next.
+        let squares = self.axes.iter().fold(vec![0.0], |so_far: Vec<f64>, (_, axis)| {
+            let share = f64::from(u8::from(telling.contains(&axis.kind)));
+            let own: Vec<f64> = (0..axis.bins).map(|bin| share * axis.value_at(bin as f64).powi(2)).collect();
+            so_far.iter().flat_map(|before| own.iter().map(move |square| before + square)).collect()
+        });
+        Some(squares.into_iter().map(f64::sqrt).collect())
+    }
+
+    /// One over the median of each ring; 0 where nothing is told. `value` must be positive.
+    pub(super) fn background(&self, value: &[f32]) -> Vec<f32> {
+        // Positive floats sort as their bits do, and integers are partitioned several times as fast.
+        let mut bits: Vec<u32> = self.cells.iter().map(|&cell| value[cell as usize].to_bits()).collect();
+        let small = self.rings.windows(2).any(|ends| ends[1] - ends[0] < SMALLEST_RING);
+        let overall = if small { median(&mut bits.clone()) } else { 1.0 };
+        let of_ring = |(ring, ends): (usize, &[usize])| match &mut bits[ends[0]..ends[1]] {
+            _ if ring < self.deaf => 0.0,
+            few if few.len() < SMALLEST_RING => 1.0 / overall,
+            members => 1.0 / median(members),
+        };
+        self.rings.windows(2).enumerate().map(of_ring).collect()
+    }
+
+    /// H of each spatial cell in shares of `largest`, and the full cell each was taken from where that is another.
+    pub(super) fn spatial(&self, map: &[f64], largest: f64) -> (Vec<f32>, Vec<u32>) {
+        let relative = |h: f64| ((h / largest) as f32).max(FAINTEST);
+        if self.axes.len() == self.view.axes.len() {
+            return (map.iter().map(|&h| relative(h)).collect(), Vec::new());
+        }
+        let (mut value, mut source) = (vec![0.0; self.cells.len()], vec![0; self.cells.len()]);
+        for (cell, &h) in map.iter().enumerate() {
+            let bins = unravel(cell, &self.view.shape());
+            let spatial = self.axes.iter().fold(0, |flat, (k, axis)| flat * axis.bins + bins[*k]);
+            if relative(h) > value[spatial] {
+                (value[spatial], source[spatial]) = (relative(h), cell as u32);
+            }
+        }
+        (value, source)
+    }
+}
+
+/// The middle value of positive floats given as their bits, the upper one of two; they are reordered. 1 where there are
+/// none.
+fn median(bits: &mut [u32]) -> f32 {
+    if bits.is_empty() {
+        return 1.0;
+    }
+    let middle = bits.len() / 2;
+    f32::from_bits(*bits.select_nth_unstable(middle).1)
+}
+
+/// The index on each axis of a flat index in C order.
+pub(super) fn unravel(mut flat: usize, shape: &[usize]) -> SmallVec<[usize; 3]> {
+    let mut bins = SmallVec::from_elem(0, shape.len());
+    for k in (0..shape.len()).rev() {
+        bins[k] = flat % shape[k];
+        flat /= shape[k];
+    }
+    bins
+}
