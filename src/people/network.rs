@@ -75,7 +75,7 @@ impl Network {
         for (layer, (from, to)) in self.layers.iter().zip(widths(inputs)) {
             let rows = layer.weight.len() == to && layer.weight.iter().all(|row| row.len() == from);
             if !rows || layer.bias.len() != to {
-                return wrong(format!("expected a layer of {from} by {to}"));
+                return wrong(format!("expected a layer of {to} by {from}"));
             }
         }
         let numbers = self.layers.iter().flat_map(|l| l.weight.iter().flatten().chain(&l.bias));
