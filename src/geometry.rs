@@ -48,6 +48,11 @@ pub fn norm(a: Vec3) -> f64 {
     dot(a, a).sqrt()
 }
 
+/// Distance of two points on the floor, whatever their heights.
+pub fn flat_distance(a: Vec3, b: Vec3) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
 /// M a
 pub fn mat_vec(m: &Mat3, a: Vec3) -> Vec3 {
     [dot(m[0], a), dot(m[1], a), dot(m[2], a)]

@@ -2,8 +2,8 @@
 //!
 //! Distance is taken on the floor: the echoes of one body stand above each other, so that head and feet are one cluster.
 
-use super::scan::{Point, flat_distance};
-use crate::geometry::Vec3;
+use super::scan::Point;
+use crate::geometry::{Vec3, flat_distance};
 use kodama::{Method, linkage};
 use ndarray::Array2;
 use petal_clustering::{Dbscan, Fit as _};

@@ -6,8 +6,7 @@
 //! best cut of itself into two.
 
 use super::cluster::{Cluster, apart, split};
-use super::scan::flat_distance;
-use crate::geometry::Vec3;
+use crate::geometry::{Vec3, flat_distance};
 
 /// Features of a cluster.
 pub const FEATURES: usize = 31;

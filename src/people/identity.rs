@@ -1,7 +1,6 @@
 //! Who is who: one-to-one assignment of people (Hungarian method), and tracks that carry an identity from frame to frame.
 
-use super::scan::flat_distance;
-use crate::geometry::{Vec3, add, scale, sub};
+use crate::geometry::{Vec3, add, flat_distance, scale, sub};
 use pathfinding::kuhn_munkres::kuhn_munkres_min;
 use pathfinding::matrix::Matrix;
 

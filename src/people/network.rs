@@ -4,6 +4,7 @@ use super::alone::STATISTICS;
 use super::error::PeopleError;
 use super::features::FEATURES;
 use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
 
 /// Classes: 0, 1, 2, 3, 4 and more.
 pub const CLASSES: usize = 5;
@@ -56,7 +57,13 @@ impl Network {
     /// # Errors
     /// Where they are damaged.
     pub fn bundled() -> Result<Self, PeopleError> {
-        Self::from_json(include_str!("../../assets/counter.json"), FEATURES)
+        // A counter is made for every frame of a batch; its weights are read once.
+        static READ: OnceLock<Network> = OnceLock::new();
+        if let Some(network) = READ.get() {
+            return Ok(network.clone());
+        }
+        let network = Self::from_json(include_str!("../../assets/counter.json"), FEATURES)?;
+        Ok(READ.get_or_init(|| network).clone())
     }
 
     /// Those of the classifier alone ([`super::map_statistics`]), which the counter is compared with.

@@ -6,8 +6,8 @@ use super::counter::{Counted, NOBODY};
 use super::error::PeopleError;
 use super::network::CLASSES;
 use super::sight::{Role, Sight, baseline_m};
-use crate::geometry::{Vec3, norm, sub};
-use crate::radar::View;
+use crate::geometry::{Vec3, flat_distance};
+use crate::radar::{View, unravel};
 
 /// Echoes of two views are one body's where their ranges differ by no more, m.
 const SAME_RANGE_M: f64 = 0.12;
@@ -181,19 +181,4 @@ fn thinned(mut points: Vec<Point>, options: &CfarOptions) -> Vec<Point> {
         }
     }
     kept
-}
-
-/// Distance on the floor, m: a body's echoes stand above each other.
-pub(super) fn flat_distance(a: Vec3, b: Vec3) -> f64 {
-    let d = sub(a, b);
-    norm([d[0], d[1], 0.0])
-}
-
-fn unravel(mut flat: usize, shape: &[usize]) -> Vec<usize> {
-    let mut bins = vec![0; shape.len()];
-    for (bin, &size) in bins.iter_mut().zip(shape).rev() {
-        *bin = flat % size.max(1);
-        flat /= size.max(1);
-    }
-    bins
 }

@@ -6,8 +6,8 @@
 use super::cluster::split;
 use super::counter::{Count, Counted};
 use super::network::CLASSES;
-use super::scan::{Point, flat_distance};
-use crate::geometry::{Vec3, add};
+use super::scan::Point;
+use crate::geometry::{Vec3, add, flat_distance};
 
 /// Echoes come from the skin: the middle of a body is this much farther from the radar, m.
 const SKIN_M: f64 = 0.10;

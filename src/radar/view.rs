@@ -3,6 +3,7 @@
 use super::Axis;
 use crate::geometry::{Pose, Vec3};
 use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
 
 /// What the stored numbers are: decides 20 or 10 log₁₀ on screen and nothing else (SPEC sections 4 and 6).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -54,6 +55,16 @@ pub struct View {
     pub axes: Vec<Axis>,
     /// A fixed EM region in bins, `[lo, hi)` per axis; wins over the configuration's `em_region`.
     pub region: Option<Vec<[usize; 2]>>,
+}
+
+/// The bin on each axis of a cell in C order; `shape` is the axes' bins.
+pub(crate) fn unravel(mut cell: usize, shape: &[usize]) -> SmallVec<[usize; 3]> {
+    let mut bins = SmallVec::from_elem(0, shape.len());
+    for (bin, &size) in bins.iter_mut().zip(shape).rev() {
+        *bin = cell % size.max(1);
+        cell /= size.max(1);
+    }
+    bins
 }
 
 impl View {

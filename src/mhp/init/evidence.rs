@@ -6,12 +6,12 @@
 //!
 //! What the axes alone decide ([`Layout`]) is worked out once for all maps of a view. Cells are f32 of the map's largest.
 
-use super::layout::{Layout, NEAREST_M, unravel};
+use super::layout::{Layout, NEAREST_M};
 use super::locate::Mark;
 use crate::geometry::{Vec3, mat_t_vec};
 use crate::mhp::for_neighbours;
 use crate::mhp::splat::Seen;
-use crate::radar::AxisKind;
+use crate::radar::{AxisKind, unravel};
 use smallvec::SmallVec;
 use std::sync::Arc;
 

@@ -6,7 +6,7 @@ use super::locate::{Mark, locate};
 use super::place::{self, Place};
 use super::template::Template;
 use super::towards_radar;
-use crate::geometry::{Vec3, add, norm, scale};
+use crate::geometry::{Vec3, add, flat_distance, norm, scale};
 use crate::mhp::{FitError, Problem};
 use crate::radar::{AxisKind, View};
 
@@ -36,7 +36,7 @@ pub(super) fn find_one(
     template: &Template,
     peaks: &[Peak],
     notes: &mut Vec<String>,
-) -> Result<(Vec3, Option<Expectation>), FitError> {
+) -> Result<(Vec3, Expectation), FitError> {
     let places = place::places(problem, evidence, peaks);
     notes.push(format!("{} peaks, {} places tried", peaks.len(), places.len()));
     let mut ranked = rank(&places, template, |body| shared_excess(evidence, body));
@@ -44,17 +44,15 @@ pub(super) fn find_one(
         notes.push("the views agree on no place: the strongest echo of one view was taken".to_owned());
         ranked = rank(&places, template, |body| evidence.iter().map(|e| e.mean_excess(body)).sum());
     }
-    let (at, expected) = most_bodily(problem, evidence, &ranked).ok_or_else(|| FitError::NoStart {
+    most_bodily(problem, evidence, &ranked).ok_or_else(|| FitError::NoStart {
         reason: format!("none of {} peaks stands above its background", peaks.len()),
-    })?;
-    Ok((at, Some(expected)))
+    })
 }
 
 /// How far the nearest of the other `places` is from the `k`-th on the floor, m; infinite where there is no other.
 pub(super) fn apart_m(places: &[Vec3], k: usize) -> f64 {
-    let apart = |other: &Vec3| (other[0] - places[k][0]).hypot(other[1] - places[k][1]);
     let others = places.iter().enumerate().filter(|(other, _)| *other != k);
-    others.map(|(_, other)| apart(other)).fold(f64::INFINITY, f64::min)
+    others.map(|(_, &other)| flat_distance(other, places[k])).fold(f64::INFINITY, f64::min)
 }
 
 /// The body that is lit near the `k`-th of `seeds`.
@@ -63,7 +61,7 @@ pub(super) fn near(problem: &Problem, evidence: &[Evidence], seeds: &[Vec3], k: 
     let apart_m = apart_m(seeds, k);
     let (at, expectation) = centre(problem, evidence, seed, apart_m);
     // Somebody else may shine brighter: a person is not looked for beyond arm's reach of the place it was given.
-    if (at[0] - seed[0]).hypot(at[1] - seed[1]) > SEED_REACH_M.min(SEED_SHARE * apart_m) {
+    if flat_distance(at, seed) > SEED_REACH_M.min(SEED_SHARE * apart_m) {
         let at = [seed[0], seed[1], at[2]];
         return (at, Expectation::new(evidence, at));
     }
@@ -123,7 +121,7 @@ fn most_bodily(problem: &Problem, evidence: &[Evidence], places: &[Vec3]) -> Opt
     let mut tried: Vec<(Vec3, Expectation)> = Vec::new();
     let mut starts: Vec<Vec3> = Vec::new();
     for &place in places {
-        if starts.iter().any(|start| (start[0] - place[0]).hypot(start[1] - place[1]) < DISTINCT_M) {
+        if starts.iter().any(|&start| flat_distance(start, place) < DISTINCT_M) {
             continue;
         }
         starts.push(place);

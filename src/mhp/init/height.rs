@@ -2,6 +2,7 @@
 
 use super::evidence::{DEPTH_LN, Evidence, SPECKLE};
 use crate::geometry::Vec3;
+use crate::mhp::percentile;
 
 /// Where the middle of a body is expected when nothing tells its height: a radar stands at about chest height, m.
 const UNSEEN_MIDDLE_M: f64 = -0.2;
@@ -44,10 +45,12 @@ impl Stature {
     /// From the lowest and highest lit heights (world frame, m) in the frames that show any, for a radar `radar_height_m`
     /// above the floor.
     pub(super) fn new(lit_m: impl Iterator<Item = [f64; 2]>, radar_height_m: f64) -> Self {
-        let (mut low, mut top): (Vec<f64>, Vec<f64>) = lit_m.map(|[low, top]| (low, top)).unzip();
+        let (lows, tops): (Vec<f64>, Vec<f64>) = lit_m.map(|[low, top]| (low, top)).unzip();
         let unknown = Self { standing_m: STATURE_M, top_m: None };
-        let (Some(low), Some(top)) = (median(&mut low), median(&mut top)) else { return unknown };
-        let (low, top) = (low + radar_height_m, top + radar_height_m);
+        if lows.is_empty() {
+            return unknown;
+        }
+        let [low, top] = [lows, tops].map(|heights| percentile(&heights, 50.0) + radar_height_m);
         // What shines beyond the feet shines beyond the head; feet are often dark, heads are not.
         let foot = if low < LOWEST_FOOT_M { USUAL_FOOT_M } else { low.min(0.0) };
         let seen_m = top + SHARED_HALO * foot - HALO_M;
@@ -57,13 +60,6 @@ impl Stature {
         let trust = STATURE_SPREAD_M.powi(2) / (STATURE_SPREAD_M.powi(2) + TOP_SPREAD_M.powi(2));
         Self { standing_m: STATURE_M + trust * (seen_m - STATURE_M), top_m: (low < FEET_M).then_some(seen_m) }
     }
-}
-
-/// The middle value, the mean of two; `None` where there are none.
-fn median(values: &mut [f64]) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().checked_sub(1)?;
-    Some(f64::midpoint(values[last / 2], values[last.div_ceil(2)]))
 }
 
 /// Where the middle of the body is expected.

@@ -1,8 +1,7 @@
 //! What the axes of a view alone decide for its evidence, worked out once for all its maps: which cells lie at the same
 //! range, and how a map with a Doppler axis becomes one without.
 
-use crate::radar::{Axis, AxisKind, View};
-use smallvec::SmallVec;
+use crate::radar::{Axis, AxisKind, View, unravel};
 
 /// Echoes nearer than this are leakage from the radar itself, m.
 pub(super) const NEAREST_M: f64 = 0.5;
@@ -99,9 +98,10 @@ impl Layout {
         if self.axes.len() == self.view.axes.len() {
             return (map.iter().map(|&h| relative(h)).collect(), Vec::new());
         }
+        let shape = self.view.shape();
         let (mut value, mut source) = (vec![0.0; self.cells.len()], vec![0; self.cells.len()]);
         for (cell, &h) in map.iter().enumerate() {
-            let bins = unravel(cell, &self.view.shape());
+            let bins = unravel(cell, &shape);
             let spatial = self.axes.iter().fold(0, |flat, (k, axis)| flat * axis.bins + bins[*k]);
             if relative(h) > value[spatial] {
                 (value[spatial], source[spatial]) = (relative(h), cell as u32);
@@ -119,14 +119,4 @@ fn median(bits: &mut [u32]) -> f32 {
     }
     let middle = bits.len() / 2;
     f32::from_bits(*bits.select_nth_unstable(middle).1)
-}
-
-/// The index on each axis of a flat index in C order.
-pub(super) fn unravel(mut flat: usize, shape: &[usize]) -> SmallVec<[usize; 3]> {
-    let mut bins = SmallVec::from_elem(0, shape.len());
-    for k in (0..shape.len()).rev() {
-        bins[k] = flat % shape[k];
-        flat /= shape[k];
-    }
-    bins
 }

@@ -50,6 +50,7 @@ use velocity::{Radial, Source};
 const FASTEST_MPS: f64 = 4.0;
 /// Steps in which a posture's place is looked for, m.
 const POSTURE_STEP_M: f64 = 0.06;
+const MOST_STEPS: usize = 12;
 /// The L_EM of a posture other than standing, of that of standing, at which it is believed of somebody who does not walk.
 const CLEARLY_BETTER: f64 = 0.9;
 
@@ -139,13 +140,11 @@ pub fn initialise_people(
         .filter(|&k| problem.filled_cells(k) > 0)
         .map(|k| format!("{}: {} missing cells filled", problem.views[k].array, problem.filled_cells(k)))
         .collect();
+    let seen = |(at, expected): (Vec3, Expectation)| (at, Some(expected));
     let found = match seeds {
         _ if !config.init.position => vec![(middle_of_views(problem), None)],
-        [] => vec![find_one(problem, evidence, &template, &peaks, &mut notes)?],
-        seeds => {
-            let body = |k: usize| near(problem, evidence, seeds, k);
-            (0..seeds.len()).map(body).map(|(at, expected)| (at, Some(expected))).collect()
-        }
+        [] => vec![seen(find_one(problem, evidence, &template, &peaks, &mut notes)?)],
+        seeds => (0..seeds.len()).map(|k| seen(near(problem, evidence, seeds, k))).collect(),
     };
     let mut persons = Vec::with_capacity(found.len());
     let places: Vec<Vec3> = found.iter().map(|(at, _)| *at).collect();
@@ -187,12 +186,7 @@ fn choose_postures(
             let body = |at: Vec3| assemble(problem, &config, template, &[own(at)]);
             let at = persons[k].at;
             let objective = Objective::new(Arc::clone(problem), config, Precision::F32, &body(at))?;
-            let mut lowest = f64::INFINITY;
-            descend(at, POSTURE_STEP_M, 0, |p| {
-                let loss = objective.em_loss(&body(p));
-                lowest = lowest.min(loss);
-                loss
-            });
+            let lowest = lowest_near(at, POSTURE_STEP_M, |p| objective.em_loss(&body(p)));
             if best.is_none_or(|(loss, _)| lowest < better * loss) {
                 best = Some((lowest, posture));
             }
@@ -272,25 +266,21 @@ pub(super) fn anchors(problem: &Problem, config: &FitConfig, params: &Pppr) -> V
     (0..middles.len()).map(of_person).collect()
 }
 
-/// Walks downhill on a grid that is halved `halvings` times: to the best of the six neighbours until none is better.
-fn descend(start: Vec3, step_m: f64, halvings: usize, mut cost: impl FnMut(Vec3) -> f64) -> Vec3 {
-    let (mut at, mut lowest, mut step) = (start, cost(start), step_m);
-    for _ in 0..=halvings {
-        for _ in 0..12 {
-            let moves = (0..6).map(|k| {
-                let mut to = at;
-                to[k / 2] += if k % 2 == 0 { step } else { -step };
-                (to, cost(to))
-            });
-            let Some((to, value)) = moves.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, value)| *value < lowest)
-            else {
-                break;
-            };
-            (at, lowest) = (to, value);
-        }
-        step *= 0.5;
+/// The lowest `cost` on the way downhill from `at` on a grid, to the best of the six neighbours until none is better.
+fn lowest_near(mut at: Vec3, step_m: f64, cost: impl Fn(Vec3) -> f64) -> f64 {
+    let mut lowest = cost(at);
+    for _ in 0..MOST_STEPS {
+        let moves = (0..6).map(|k| {
+            let mut to = at;
+            to[k / 2] += if k % 2 == 0 { step_m } else { -step_m };
+            (to, cost(to))
+        });
+        let Some((to, value)) = moves.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, value)| *value < lowest) else {
+            break;
+        };
+        (at, lowest) = (to, value);
     }
-    at
+    lowest
 }
 
 /// The settings under which a start is what this frame's peaks alone say.

@@ -38,6 +38,13 @@ pub(super) struct Track {
 }
 
 impl Track {
+    fn through(sightings: Vec<Sighting>) -> Self {
+        let (at, [vx, vy, _]) = line(sightings.iter().map(|seen| (seen.t_s, seen.at)));
+        // Heights are read too coarsely to follow them.
+        let height_m = sightings.iter().map(|seen| seen.at[2]).sum::<f64>() / sightings.len() as f64;
+        Self { at: [at[0], at[1], height_m], velocity: [vx, vy, 0.0], sightings }
+    }
+
     /// The direction of walking on the floor; `None` where the person stands, or falls: who falls need not look where.
     pub(super) fn heading(&self) -> Option<[f64; 2]> {
         let speed = self.velocity[0].hypot(self.velocity[1]);
@@ -45,16 +52,10 @@ impl Track {
             .then(|| [self.velocity[0] / speed, self.velocity[1] / speed])
     }
 
-    /// How fast the top of what is lit rises, m/s: least squares over the frames that show it.
+    /// How fast the top of what is lit rises, m/s, over the frames that show it.
     fn rises_mps(&self) -> f64 {
-        let tops = self.sightings.iter().filter_map(|seen| seen.lit_m.map(|[_, top]| (seen.t_s, top)));
-        let (n, t, z) = tops.clone().fold((0.0, 0.0, 0.0), |(n, t, z), (t_s, top)| (n + 1.0, t + t_s, z + top));
-        let (mut spread, mut shared) = (0.0, 0.0);
-        for (t_s, top) in tops {
-            spread += (t_s - t / n).powi(2);
-            shared += (t_s - t / n) * (top - z / n);
-        }
-        if spread > 0.0 { shared / spread } else { 0.0 }
+        let tops = self.sightings.iter().filter_map(|seen| seen.lit_m.map(|[_, top]| (seen.t_s, [0.0, 0.0, top])));
+        line(tops).1[2]
     }
 }
 
@@ -78,7 +79,7 @@ pub(super) fn track(problem: &Problem, here: Sighting, apart_m: f64) -> Option<T
             sightings.push(found);
         }
     }
-    (sightings.len() > 1).then(|| line(sightings))
+    (sightings.len() > 1).then(|| Track::through(sightings))
 }
 
 /// The middle of what is lit near `expected`; `None` where that is somebody else.
@@ -88,24 +89,22 @@ fn follow(problem: &Problem, evidence: &[Evidence], t_s: f64, expected: Vec3, ap
     (off[0].hypot(off[1]) < LEASH_M).then_some(Sighting { t_s, at, lit_m: expectation.lit })
 }
 
-/// Least squares through the places.
-fn line(sightings: Vec<Sighting>) -> Track {
-    let n = sightings.len() as f64;
+/// Least squares through (time, s; point, m): the point at time 0 and the velocity, m/s.
+fn line(points: impl Iterator<Item = (f64, Vec3)> + Clone) -> (Vec3, Vec3) {
+    let n = points.clone().count().max(1) as f64;
     let (mut mean, mut time) = ([0.0; 3], 0.0);
-    for seen in &sightings {
-        add_scaled(&mut mean, seen.at, 1.0 / n);
-        time += seen.t_s / n;
+    for (t, point) in points.clone() {
+        add_scaled(&mut mean, point, 1.0 / n);
+        time += t / n;
     }
     let (mut slope, mut spread) = ([0.0; 3], 0.0);
-    for seen in &sightings {
-        add_scaled(&mut slope, sub(seen.at, mean), seen.t_s - time);
-        spread += (seen.t_s - time).powi(2);
+    for (t, point) in points {
+        add_scaled(&mut slope, sub(point, mean), t - time);
+        spread += (t - time).powi(2);
     }
-    let mut velocity = if spread > 0.0 { scale(slope, 1.0 / spread) } else { [0.0; 3] };
-    velocity[2] = 0.0;
-    let mut at = mean;
-    add_scaled(&mut at, velocity, -time);
-    Track { at, velocity, sightings }
+    let velocity = if spread > 0.0 { scale(slope, 1.0 / spread) } else { [0.0; 3] };
+    add_scaled(&mut mean, velocity, -time);
+    (mean, velocity)
 }
 
 #[cfg(test)]
@@ -117,20 +116,21 @@ mod tests {
     #[test]
     fn a_line_gives_place_and_velocity_at_the_frame() {
         let seen = |t_s: f64, at: Vec3| Sighting { t_s, at, lit_m: None };
-        let track = line([0.0, 0.1, 0.2, -0.1].map(|t| seen(t, [3.0 - 1.2 * t, 0.5 + 0.4 * t, 0.1])).to_vec());
+        let track =
+            Track::through([0.0, 0.1, 0.2, -0.1].map(|t| seen(t, [3.0 - 1.2 * t, 0.5 + 0.4 * t, 0.1])).to_vec());
         assert!((track.at[0] - 3.0).abs() < 1e-12 && (track.at[1] - 0.5).abs() < 1e-12);
         assert!((track.velocity[0] + 1.2).abs() < 1e-12 && (track.velocity[1] - 0.4).abs() < 1e-12);
         let heading = track.heading().unwrap();
         assert!((heading[0] + 1.2 / 1.2f64.hypot(0.4)).abs() < 1e-12);
-        assert_eq!(line(vec![seen(0.0, [1.0; 3]), seen(0.1, [1.01, 1.0, 1.0])]).heading(), None);
+        assert_eq!(Track::through(vec![seen(0.0, [1.0; 3]), seen(0.1, [1.01, 1.0, 1.0])]).heading(), None);
     }
 
     #[test]
     fn who_falls_has_no_heading() {
         let seen = |t_s: f64, top: f64| Sighting { t_s, at: [3.0 + 1.2 * t_s, 0.0, 0.0], lit_m: Some([-1.0, top]) };
-        let walks = line(vec![seen(0.0, 0.8), seen(0.1, 0.84), seen(-0.1, 0.78)]);
+        let walks = Track::through(vec![seen(0.0, 0.8), seen(0.1, 0.84), seen(-0.1, 0.78)]);
         assert!(walks.heading().is_some_and(|heading| (heading[0] - 1.0).abs() < 1e-12));
-        let falls = line(vec![seen(0.0, 0.6), seen(0.1, 0.4), seen(-0.1, 0.8)]);
+        let falls = Track::through(vec![seen(0.0, 0.6), seen(0.1, 0.4), seen(-0.1, 0.8)]);
         assert!((falls.rises_mps() + 2.0).abs() < 1e-9 && falls.heading().is_none());
     }
 }

@@ -5,7 +5,7 @@
 
 use super::evidence::{Evidence, Peak};
 use super::locate::{Mark, locate, locate_from};
-use crate::geometry::{Vec3, add_scaled, norm, scale};
+use crate::geometry::{Vec3, add_scaled, flat_distance, norm, scale};
 use crate::mhp::Problem;
 use kodama::{Method, linkage};
 
@@ -72,7 +72,7 @@ fn groups(points: &[Point]) -> Vec<Vec<usize>> {
     if points.len() > 1 {
         let mut distances: Vec<f64> = Vec::with_capacity(points.len() * (points.len() - 1) / 2);
         for (i, a) in points.iter().enumerate() {
-            distances.extend(points[i + 1..].iter().map(|b| (a.at[0] - b.at[0]).hypot(a.at[1] - b.at[1])));
+            distances.extend(points[i + 1..].iter().map(|b| flat_distance(a.at, b.at)));
         }
         let tree = linkage(&mut distances, points.len(), Method::Average);
         for step in tree.steps() {

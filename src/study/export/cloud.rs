@@ -8,7 +8,7 @@ use crate::body::{Group, Pppr, PpprShape};
 use crate::config::FitConfig;
 use crate::geometry::{Vec3, add, dot, norm, scale, sub};
 use crate::mhp::{Precision, Problem, simulate};
-use crate::radar::{AxisKind, View};
+use crate::radar::{AxisKind, View, unravel};
 
 /// One point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -103,13 +103,4 @@ fn moved_to(view: &View, bins: &[usize], mut p: Vec3) -> Vec3 {
         }
     }
     p
-}
-
-fn unravel(mut flat: usize, shape: &[usize]) -> Vec<usize> {
-    let mut bins = vec![0; shape.len()];
-    for (bin, &size) in bins.iter_mut().zip(shape).rev() {
-        *bin = flat % size.max(1);
-        flat /= size.max(1);
-    }
-    bins
 }
