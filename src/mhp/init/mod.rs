@@ -150,7 +150,8 @@ pub fn initialise_people(
     let places: Vec<Vec3> = found.iter().map(|(at, _)| *at).collect();
     for (k, (at, expected)) in found.into_iter().enumerate() {
         let lit_m = expected.and_then(|expected| expected.lit);
-        let track = motion::track(problem, Sighting { t_s: 0.0, at, lit_m }, apart_m(&places, k));
+        let here = Sighting { t_s: 0.0, at, lit_m };
+        let track = followed(config).then(|| motion::track(problem, here, apart_m(&places, k))).flatten();
         let radial = velocity::radial(problem, at, config.init.velocity_gain_mps);
         persons.push(Person { at, expected, track, radial, posture: Posture::Standing });
     }
@@ -223,8 +224,9 @@ fn postures(
 /// Without that frame among those around they stay where they are.
 pub fn predict(problem: &Problem, before: &Pppr) -> Pppr {
     let mut params = before.clone();
-    let Surroundings { now, around } = problem.surroundings();
-    let Some((t_s, then)) = around.iter().rev().find(|(t_s, _)| *t_s < 0.0) else { return params };
+    let surroundings = problem.surroundings();
+    let Some((t_s, then)) = surroundings.around(problem).rev().find(|(t_s, _)| *t_s < 0.0) else { return params };
+    let (now, then) = (surroundings.now.as_slice(), then());
     let joints = params.shape().joints;
     let places = super::region::centres(before);
     for (person, &at) in places.iter().enumerate() {
@@ -281,6 +283,11 @@ fn lowest_near(mut at: Vec3, step_m: f64, cost: impl Fn(Vec3) -> f64) -> f64 {
         (at, lowest) = (to, value);
     }
     lowest
+}
+
+/// Whether some setting asks where a person is in the frames around.
+fn followed(config: &FitConfig) -> bool {
+    config.yaw == Yaw::Motion || config.height == Height::Floor || config.w_time > 0.0 || config.starts > 1
 }
 
 /// The settings under which a start is what this frame's peaks alone say.

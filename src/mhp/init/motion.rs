@@ -65,15 +65,15 @@ pub(super) fn track(problem: &Problem, here: Sighting, apart_m: f64) -> Option<T
     let surroundings = problem.surroundings();
     let mut sightings = vec![here];
     for forwards in [true, false] {
-        let side = surroundings.around.iter().filter(|(t_s, _)| (*t_s > 0.0) == forwards && *t_s != 0.0);
-        let mut ordered: Vec<&(f64, Vec<Evidence>)> = side.collect();
+        let side = surroundings.around(problem).filter(|(t_s, _)| (*t_s > 0.0) == forwards && *t_s != 0.0);
+        let mut ordered: Vec<_> = side.collect();
         ordered.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
         let (mut last, mut velocity) = (here, [0.0; 3]);
         for (t_s, evidence) in ordered {
             let step_s = t_s - last.t_s;
             let mut expected = last.at;
             add_scaled(&mut expected, velocity, step_s);
-            let Some(found) = follow(problem, evidence, *t_s, expected, apart_m) else { break };
+            let Some(found) = follow(problem, evidence(), t_s, expected, apart_m) else { break };
             velocity = scale(sub(found.at, last.at), 1.0 / step_s);
             last = found;
             sightings.push(found);

@@ -19,8 +19,8 @@ type Views = Vec<Evidence>;
 pub(in crate::mhp) struct Surroundings {
     /// The frame itself.
     pub(super) now: Views,
-    /// Frames around with their times after this one, s, in the order of time.
-    pub(super) around: Vec<(f64, Views)>,
+    /// What each frame around shows, when it is first asked for: most starts look at one of them, or at none.
+    around: Vec<OnceLock<Views>>,
 }
 
 impl Surroundings {
@@ -30,12 +30,18 @@ impl Surroundings {
         let plain: Views =
             layouts.iter().enumerate().map(|(k, layout)| Evidence::new(layout, problem.map(k))).collect();
         let now = moving(problem, &plain).unwrap_or(plain);
-        let of_neighbour = |neighbour: &crate::mhp::Neighbour| {
-            let views = now.iter().enumerate().map(|(k, now)| now.at_another_time(neighbour.map(k)));
-            (neighbour.offset_s, views.collect())
-        };
-        let around = problem.neighbours().iter().map(of_neighbour).collect();
-        Self { now, around }
+        Self { now, around: problem.neighbours().iter().map(|_| OnceLock::new()).collect() }
+    }
+
+    /// The frames around with their times after this one, s, in the order of time, each worked out when it is taken.
+    pub(super) fn around<'a>(
+        &'a self,
+        problem: &'a Problem,
+    ) -> impl DoubleEndedIterator<Item = (f64, impl FnOnce() -> &'a [Evidence])> {
+        self.around.iter().zip(problem.neighbours()).map(move |(known, neighbour)| {
+            let views = || self.now.iter().enumerate().map(|(k, now)| now.at_another_time(neighbour.map(k))).collect();
+            (neighbour.offset_s, move || known.get_or_init(views).as_slice())
+        })
     }
 }
 

@@ -4,7 +4,6 @@
 //! in units of the steepest gradient of the map. A magnitude has no sign; the sign is that of the optical flow: where the
 //! map brightens on the far side of the slope, the echo goes away.
 
-use super::surroundings::Surroundings;
 use crate::geometry::{Vec3, norm, scale, sub};
 use crate::mhp::Problem;
 
@@ -27,7 +26,8 @@ pub(super) enum Source {
 
 /// The radial velocity at `at` from the first view that tells it.
 pub(super) fn radial(problem: &Problem, at: Vec3, gain_mps: f64) -> Option<Radial> {
-    let Surroundings { now, around } = problem.surroundings();
+    let surroundings = problem.surroundings();
+    let now = &surroundings.now;
     let along = |k: usize, mps: f64, source: Source| {
         let from_radar = sub(at, problem.views[k].pose.world_from_view([0.0; 3]));
         Radial { mps, vector: scale(from_radar, mps / norm(from_radar).max(1e-6)), source }
@@ -35,8 +35,8 @@ pub(super) fn radial(problem: &Problem, at: Vec3, gain_mps: f64) -> Option<Radia
     let doppler = now.iter().enumerate().find_map(|(k, e)| Some(along(k, e.radial_mps(at)?, Source::Doppler)));
     doppler.or_else(|| {
         // The nearest frame in time tells the change best.
-        let (offset_s, near) = around.iter().min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))?;
-        now.iter().zip(near).enumerate().find_map(|(k, (now, then))| {
+        let (offset_s, near) = surroundings.around(problem).min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))?;
+        now.iter().zip(near()).enumerate().find_map(|(k, (now, then))| {
             let flow = now.flow(then, at)?;
             Some(along(k, gain_mps * flow.steepness * flow.sign * offset_s.signum(), Source::Gradient))
         })
