@@ -50,7 +50,7 @@ pub fn norm(a: Vec3) -> f64 {
 
 /// Distance of two points on the floor, whatever their heights.
 pub fn flat_distance(a: Vec3, b: Vec3) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+    norm([a[0] - b[0], a[1] - b[1], 0.0])
 }
 
 /// M a
