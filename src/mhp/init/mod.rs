@@ -42,6 +42,7 @@ use find::{apart_m, centre, find_one, middle_of_views, near};
 use height::{Expectation, Stature};
 use motion::{Sighting, Track};
 use pose::Posture;
+use scatterers::Dress;
 use std::sync::Arc;
 use template::Template;
 use velocity::{Radial, Source};
@@ -76,6 +77,8 @@ struct Person {
     track: Option<Track>,
     radial: Option<Radial>,
     posture: Posture,
+    /// The template in that posture.
+    body: Arc<Template>,
 }
 
 impl Person {
@@ -135,7 +138,7 @@ pub fn initialise_people(
     let evidence = &problem.surroundings().now;
     let peaks: Vec<Peak> = evidence.iter().flat_map(evidence::Evidence::peaks).collect();
     let peaks = perturb::drop_some(problem, &config.init, peaks);
-    let template = Template::new(&problem.skeleton);
+    let template = Arc::new(Template::new(&problem.skeleton));
     let mut notes: Vec<String> = (0..problem.views.len())
         .filter(|&k| problem.filled_cells(k) > 0)
         .map(|k| format!("{}: {} missing cells filled", problem.views[k].array, problem.filled_cells(k)))
@@ -153,14 +156,17 @@ pub fn initialise_people(
         let here = Sighting { t_s: 0.0, at, lit_m };
         let track = followed(config).then(|| motion::track(problem, here, apart_m(&places, k))).flatten();
         let radial = velocity::radial(problem, at, config.init.velocity_gain_mps);
-        persons.push(Person { at, expected, track, radial, posture: Posture::Standing });
+        persons.push(Person { at, expected, track, radial, posture: Posture::Standing, body: Arc::clone(&template) });
     }
     if config.starts > 1 {
         choose_postures(problem, config, &template, &mut persons)?;
     }
-    let mut params = assemble(problem, config, &template, &persons);
-    let plain = persons.iter().map(|person| Person { posture: Posture::Standing, ..person.clone() });
-    let mut unrefined = assemble(problem, &unrefined(config), &template, &plain.collect::<Vec<_>>());
+    let dress = Dress::new(&problem.skeleton, config.scatterers);
+    let mut params = assemble(problem, config, &dress, &persons);
+    let standing =
+        |person: &Person| Person { posture: Posture::Standing, body: Arc::clone(&template), ..person.clone() };
+    let plain: Vec<Person> = persons.iter().map(standing).collect();
+    let mut unrefined = assemble(problem, &unrefined(config), &dress, &plain);
     for start in [&mut params, &mut unrefined] {
         perturb::spoil(problem, &config.init, start);
     }
@@ -177,23 +183,25 @@ fn choose_postures(
     persons: &mut [Person],
 ) -> Result<(), FitError> {
     let config = FitConfig { summation: Summation::Incoherent, w_time: 0.0, ..*config };
+    let dress = Dress::new(&problem.skeleton, config.scatterers);
     for k in 0..persons.len() {
         let walks = persons[k].walks();
         let stature = persons[k].stature(problem, &config).filter(|_| !walks);
         let tried = postures(template, problem, config.starts, walks, stature);
-        let mut best: Option<(f64, Posture)> = None;
+        let mut best: Option<(f64, Posture, Arc<Template>)> = None;
         for (posture, better) in tried {
-            let own = |at: Vec3| Person { at, posture, ..persons[k].clone() };
-            let body = |at: Vec3| assemble(problem, &config, template, &[own(at)]);
+            let posed = Arc::new(pose::posed(template, &problem.skeleton, posture));
+            let own = |at: Vec3| Person { at, posture, body: Arc::clone(&posed), ..persons[k].clone() };
+            let body = |at: Vec3| assemble(problem, &config, &dress, &[own(at)]);
             let at = persons[k].at;
             let objective = Objective::new(Arc::clone(problem), config, Precision::F32, &body(at))?;
             let lowest = lowest_near(at, POSTURE_STEP_M, |p| objective.em_loss(&body(p)));
-            if best.is_none_or(|(loss, _)| lowest < better * loss) {
-                best = Some((lowest, posture));
+            if best.as_ref().is_none_or(|(loss, ..)| lowest < better * loss) {
+                best = Some((lowest, posture, posed));
             }
         }
-        if let Some((_, posture)) = best {
-            persons[k].posture = posture;
+        if let Some((_, posture, body)) = best {
+            (persons[k].posture, persons[k].body) = (posture, body);
         }
     }
     Ok(())
@@ -302,13 +310,13 @@ fn behind_skin(config: &FitConfig, at: Vec3) -> Vec3 {
 }
 
 /// The parameters of `persons`.
-fn assemble(problem: &Problem, config: &FitConfig, template: &Template, persons: &[Person]) -> Pppr {
+fn assemble(problem: &Problem, config: &FitConfig, dress: &Dress, persons: &[Person]) -> Pppr {
     let joints = problem.skeleton.joints.len();
     let doppler_features = problem.radar.doppler_features;
     let mut params = Pppr::zeros(PpprShape { persons: persons.len(), joints, doppler_features });
     for (k, person) in persons.iter().enumerate() {
         let velocity = person.velocity(config);
-        let body = pose::posed(template, &problem.skeleton, person.posture);
+        let body = &person.body;
         let at = match &person.track {
             Some(track) if config.w_time > 0.0 => [track.at[0], track.at[1], person.at[2]],
             _ => person.at,
@@ -324,7 +332,7 @@ fn assemble(problem: &Problem, config: &FitConfig, template: &Template, persons:
             params.set_vec3(Group::Velocity, k * joints + joint, velocity);
         }
     }
-    scatterers::dress(&mut params, &problem.skeleton, config.scatterers);
+    dress.put_on(&mut params, &problem.skeleton);
     params
 }
 

@@ -38,23 +38,34 @@ fn part(word: &str) -> Option<Part> {
     }
 }
 
-/// Gives the joints of all persons their scales, orientations and opacities; positions must be there.
-pub(super) fn dress(params: &mut Pppr, skeleton: &Skeleton, kind: Scatterers) {
-    for joint in 0..params.shape().total_joints() {
-        params.set_vec3(Group::LogScale, joint, [EQUAL_SCALE_M.ln(); 3]);
-        params.joint_mut(Group::Rotation, joint).copy_from_slice(&[1.0, 0.0, 0.0, 0.0]);
-        params.joint_mut(Group::Beta, joint).fill(0.0);
-        if kind == Scatterers::BodyParts {
-            by_part(params, skeleton, joint);
+/// What each joint of a skeleton looks like; `None`: an equal, round Gaussian. The joints' names are read once.
+pub(super) struct Dress(Vec<Option<Part>>);
+
+impl Dress {
+    pub(super) fn new(skeleton: &Skeleton, kind: Scatterers) -> Self {
+        let of_joint = |name: &String| match kind {
+            Scatterers::Equal => None,
+            Scatterers::BodyParts => name.to_lowercase().split(['_', ' ', '-']).rev().find_map(part),
+        };
+        Self(skeleton.joints.iter().map(of_joint).collect())
+    }
+
+    /// Gives the joints of all persons their scales, orientations and opacities; positions must be there.
+    pub(super) fn put_on(&self, params: &mut Pppr, skeleton: &Skeleton) {
+        for joint in 0..params.shape().total_joints() {
+            params.set_vec3(Group::LogScale, joint, [EQUAL_SCALE_M.ln(); 3]);
+            params.joint_mut(Group::Rotation, joint).copy_from_slice(&[1.0, 0.0, 0.0, 0.0]);
+            params.joint_mut(Group::Beta, joint).fill(0.0);
+            if let Some(Some(part)) = self.0.get(joint % self.0.len().max(1)) {
+                by_part(params, skeleton, joint, part);
+            }
         }
     }
 }
 
-fn by_part(params: &mut Pppr, skeleton: &Skeleton, joint: usize) {
+fn by_part(params: &mut Pppr, skeleton: &Skeleton, joint: usize, part: &Part) {
     let joints = skeleton.joints.len().max(1);
     let (first, own) = (joint - joint % joints, joint % joints);
-    let name = skeleton.joints.get(own).map(|name| name.to_lowercase()).unwrap_or_default();
-    let Some(part) = name.split(['_', ' ', '-']).rev().find_map(part) else { return };
     let bones = skeleton.bones.iter().filter(|bone| bone.contains(&own));
     let along = bones.map(|&[m, n]| sub(params.position(first + m), params.position(first + n)));
     let along = principal(along);
@@ -118,7 +129,7 @@ mod tests {
         params.set_vec3(Group::Position, hip, [0.3, 0.0, 0.9]);
         params.set_vec3(Group::Position, knee, [0.0, 0.0, 0.5]);
         params.set_vec3(Group::Position, ankle, [-0.3, 0.0, 0.1]);
-        dress(&mut params, &skeleton, Scatterers::BodyParts);
+        Dress::new(&skeleton, Scatterers::BodyParts).put_on(&mut params, &skeleton);
         let along = mat_vec(&rotation_from_quaternion(params.rotation(knee)), [1.0, 0.0, 0.0]);
         assert!((along[0].abs() - 0.6).abs() < 1e-6 && (along[2].abs() - 0.8).abs() < 1e-6, "{along:?}");
         assert!(params.scale(knee)[0] > 2.0 * params.scale(knee)[1]);
