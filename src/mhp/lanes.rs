@@ -46,6 +46,12 @@ impl<S: Simd> Lanes<S> {
         Self::new(self.simd, self.simd.mul_add_f32s(self.value, b.value, c.value))
     }
 
+    /// self − a · b
+    #[inline(always)]
+    pub(super) fn minus(self, a: Self, b: Self) -> Self {
+        Self::new(self.simd, self.simd.negate_mul_add_f32s(a.value, b.value, self.value))
+    }
+
     #[inline(always)]
     pub(super) fn min(self, b: Self) -> Self {
         Self::new(self.simd, self.simd.min_f32s(self.value, b.value))
@@ -94,6 +100,16 @@ impl<S: Simd> Lanes<S> {
             bits |= u32::from(bytes[0] != 0) << lane;
         }
         bits
+    }
+
+    #[inline(always)]
+    pub(super) fn first(self) -> f32 {
+        bytemuck::cast_slice(std::slice::from_ref(&self.value)).first().copied().unwrap_or(f32::NAN)
+    }
+
+    #[inline(always)]
+    pub(super) fn largest(self) -> f32 {
+        self.simd.reduce_max_f32s(self.value)
     }
 
     #[inline(always)]

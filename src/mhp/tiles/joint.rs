@@ -1,9 +1,14 @@
 //! A splat in powers of two, and as every row of tiles sees it.
 
-use super::strip::bits;
-use super::{ACROSS, ALONG, Block, CELLS, REACH, SIDE, STEPS, Simd, Tiling, lanes, splat, store};
+use super::{
+    ACROSS, ACROSS_BINS, ALONG, ALONG_BINS, BLOCK, Block, Cells, Lanes, Pair, REACH_ACROSS, REACH_ALONG, Row, STEPS,
+    STRONGEST, Simd, Sixteen, Tiling, cell_parts, lanes, splat, store, tile_parts,
+};
 use crate::mhp::splat::Splat;
 use std::f64::consts::{LOG2_E, TAU};
+
+/// log₂ of what tables of factors hold, at most and one by it.
+const HELD: f32 = 100.0;
 
 /// The spectrum of ω along a Doppler axis, a tile: what it is in the middle, how far its bins lie from that, and those
 /// distances a cell. Empty where the axis is no Doppler axis.
@@ -12,48 +17,47 @@ pub(super) struct Spectrum {
     /// Largest of all its bins.
     pub largest: f32,
     /// Middles and farthest distances of sixteen tiles.
-    pub blocks: Vec<[[f32; CELLS]; 2]>,
-    pub cells: Vec<[f32; CELLS]>,
+    pub blocks: Vec<[Sixteen; 2]>,
+    pub cells: Vec<Cells>,
 }
 
 impl Spectrum {
-    /// `ln` is the spectrum of the whole axis; `lane` picks the bin of a tile that a cell lies in.
-    fn fill(&mut self, ln: &[f64], lo: usize, tiles: usize, lane: impl Fn(usize) -> usize) {
+    /// `ln` is the spectrum of the whole axis; a tile has `bins` of it, and `lane` picks the one that a cell lies in.
+    fn fill(&mut self, ln: &[f64], lo: usize, tiles: usize, bins: usize, lane: impl Fn(usize) -> usize) {
         self.blocks.clear();
         self.cells.clear();
         self.largest = if ln.is_empty() { 0.0 } else { (LOG2_E * ln.iter().copied().fold(f64::MIN, f64::max)) as f32 };
         if ln.is_empty() {
             return;
         }
-        self.blocks.resize(tiles.div_ceil(CELLS), [[0.0; CELLS]; 2]);
+        self.blocks.resize(tiles.div_ceil(BLOCK), [Sixteen::ZERO; 2]);
         for tile in 0..tiles {
-            let bins: [f64; SIDE] =
-                std::array::from_fn(|i| LOG2_E * ln.get(lo + tile * SIDE + i).copied().unwrap_or(0.0));
-            let (low, high) = bins.iter().fold((f64::MAX, f64::MIN), |(a, b), &x| (a.min(x), b.max(x)));
+            let bin = |i: usize| LOG2_E * ln.get(lo + tile * bins + i).copied().unwrap_or(0.0);
+            let (low, high) = (0..bins).map(bin).fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
             let middle = f64::midpoint(low, high);
-            let [middles, most] = &mut self.blocks[tile / CELLS];
-            (middles[tile % CELLS], most[tile % CELLS]) = (middle as f32, (0.5 * (high - low)) as f32);
-            self.cells.push(std::array::from_fn(|cell| (bins[lane(cell)] - middle) as f32));
+            let [middles, most] = &mut self.blocks[tile / BLOCK];
+            (middles[tile % BLOCK], most[tile % BLOCK]) = (middle as f32, (0.5 * (high - low)) as f32);
+            self.cells.push(Row(std::array::from_fn(|cell| (bin(lane(cell)) - middle) as f32)));
         }
     }
 
     /// How far the bins of a tile lie from what the spectrum is in its middle.
     pub(super) fn most(&self, tile: usize) -> f32 {
-        self.blocks.get(tile / CELLS).map_or(0.0, |[_, most]| most[tile % CELLS])
+        self.blocks.get(tile / BLOCK).map_or(0.0, |[_, most]| most[tile % BLOCK])
     }
 }
 
 /// Sixteen rows of tiles as a joint sees them, a number a row.
 #[derive(Debug, Clone, Copy, Default)]
 struct Lines {
-    top: [f32; CELLS],
+    top: Sixteen,
     /// log₂ in the row, at most, but for a spectrum along it.
-    highest: [f32; CELLS],
-    slope: [f32; CELLS],
-    nearest: [f32; CELLS],
-    rest: [f32; CELLS],
-    turn: [f32; CELLS],
-    delta: [f32; CELLS],
+    highest: Sixteen,
+    slope: Sixteen,
+    nearest: Sixteen,
+    rest: Sixteen,
+    turn: [Sixteen; 2],
+    delta: Sixteen,
 }
 
 /// A row of tiles as a joint sees it.
@@ -65,8 +69,8 @@ pub(super) struct Line {
     /// From the ridge to the middle of the first tile, bins: a multiple of a tile, and the rest.
     pub nearest: f32,
     pub rest: f32,
-    /// Phase beside the joint, turns.
-    pub turn: f32,
+    /// e^{i…} beside the joint.
+    pub turn: [f32; 2],
     /// Middle of the row minus joint, bins.
     pub delta: f32,
 }
@@ -84,27 +88,33 @@ pub(super) struct Joint {
     /// φ and κ in turns.
     phase: f64,
     kappa: [f64; 3],
-    /// −2 h₂, k₂₁ and κ₂ (turns) for the tiles of a row.
+    /// −2 h₂ and k₂₁ for the tiles of a row.
     pub bend: f32,
     pub shear: f32,
-    pub along_turns: f32,
     /// From the joint to the middle of the first tile of a row, bins: a multiple of a tile, and the rest.
     pub first: [f32; 2],
     /// Largest fall of the exponent from the middle of a tile to its corner by curvature alone.
     pub curvature: f32,
     /// Within a tile: the quadratic form, and e^{iκΔ}.
-    pub quadratic: [f32; CELLS],
-    pub turn: [[f32; CELLS]; 2],
+    pub quadratic: Cells,
+    pub turn: Pair,
+    /// Both in one; and what takes every cell one tile further along the row, but for the middle's own exponent.
+    pub shape: Pair,
+    pub step: Pair,
+    /// e^{iκΔ} of the tiles of a row, sixteen at a time.
+    columns: Vec<[Sixteen; 2]>,
     lines: Vec<Lines>,
-    /// Blocks whose rows the joint reaches.
-    pub reached: Vec<u32>,
+    /// A bit a row, sixteen at a time: those that the joint reaches.
+    rows: Vec<u32>,
+    /// Nowhere above what single precision holds, and a Gaussian along both axes.
+    pub bounded: bool,
     pub along: Spectrum,
     pub across: Spectrum,
 }
 
 impl Joint {
     #[inline(always)]
-    pub(super) fn fill<S: Simd>(&mut self, simd: S, splat_of: &Splat, grid: &Tiling) {
+    pub(super) fn fill<S: Simd, const COHERENT: bool>(&mut self, simd: S, splat_of: &Splat, grid: &Tiling) {
         let missing = 3 - splat_of.dims;
         let at = |k: usize| k.checked_sub(missing);
         let p = |k: usize, l: usize| match (at(k), at(l)) {
@@ -119,93 +129,158 @@ impl Joint {
         let k10 = s(1, 0) / s(1, 1);
         self.half = [s(0, 0) - s(0, 1) * s(1, 0) / s(1, 1), s(1, 1), p(2, 2)].map(|h| 0.5 * LOG2_E * h);
         self.skew = [k10, k20, k21];
-        (self.bend, self.shear, self.along_turns) = ((-2.0 * self.half[2]) as f32, k21 as f32, self.kappa[2] as f32);
+        (self.bend, self.shear) = ((-2.0 * self.half[2]) as f32, k21 as f32);
         self.first = nearest_tile(grid.middle()[1] - self.bin[2]).map(|bins| bins as f32);
-        let reach = f64::from(REACH);
-        self.curvature = (self.half[1] * reach.powi(2) + self.half[2] * (reach * (1.0 + k21.abs())).powi(2)) as f32;
-        for (cell, (&x, &y)) in ALONG.iter().zip(&ACROSS).enumerate() {
+        let (reach_y, reach_x) = (f64::from(REACH_ACROSS), f64::from(REACH_ALONG));
+        let most_x = reach_x + reach_y * k21.abs();
+        self.curvature = (self.half[1] * reach_y * reach_y + self.half[2] * most_x * most_x) as f32;
+        for (cell, (&x, &y)) in ALONG.iter().zip(ACROSS.iter()).enumerate() {
             let (x, y) = (f64::from(x), f64::from(y));
             self.quadratic[cell] = -(self.half[1] * y * y + self.half[2] * (x + k21 * y).powi(2)) as f32;
         }
-        for part in 0..STEPS.len() / S::F32_LANES {
-            let by_x = lanes(simd, &ALONG, part) * splat(simd, self.along_turns);
-            let turns = lanes(simd, &ACROSS, part).mul_add(splat(simd, self.kappa[1] as f32), by_x);
-            for (table, values) in self.turn.iter_mut().zip(turns.turn()) {
-                store(table, part, values);
-            }
-        }
+        self.tables::<S, COHERENT>(simd, grid);
         let spectrum = |k: usize| at(k).map_or(&[] as &[f64], |k| splat_of.spectrum[k].as_slice());
-        self.along.fill(spectrum(2), grid.lo[2], grid.columns, |cell| cell % SIDE);
-        self.across.fill(spectrum(1), grid.lo[1], grid.rows, |cell| cell / SIDE);
+        self.along.fill(spectrum(2), grid.lo[2], grid.columns, ALONG_BINS, |cell| cell % ALONG_BINS);
+        self.across.fill(spectrum(1), grid.lo[1], grid.rows, ACROSS_BINS, |cell| cell / ALONG_BINS);
         self.lines.clear();
         for slice in 0..grid.size[0] {
             let outer = spectrum(0).get(grid.lo[0] + slice).map_or(0.0, |ln| LOG2_E * ln);
-            for block in 0..grid.rows.div_ceil(CELLS) {
-                let lines = self.sixteen(grid, slice, block, outer);
+            for block in 0..grid.rows.div_ceil(BLOCK) {
+                let lines = self.sixteen(simd, grid, slice, block, outer);
                 self.lines.push(lines);
             }
         }
     }
 
+    /// What is the same in every tile, and along every row.
+    #[inline(always)]
+    fn tables<S: Simd, const COHERENT: bool>(&mut self, simd: S, grid: &Tiling) {
+        let (across, along) = (splat(simd, self.kappa[1] as f32), splat(simd, self.kappa[2] as f32));
+        let further = if COHERENT { turn(simd, ALONG_BINS as f64 * self.kappa[2]) } else { [1.0, 0.0] };
+        let rise = ALONG_BINS as f32 * self.bend;
+        for part in 0..cell_parts::<S>() {
+            let (x, y) = (lanes(simd, &ALONG, part), lanes(simd, &ACROSS, part));
+            let none = [splat(simd, 1.0), splat(simd, 0.0)];
+            let within = if COHERENT { y.mul_add(across, x * along).turn() } else { none };
+            let bump = factor(simd, lanes(simd, &self.quadratic, part));
+            let gain = factor(simd, y.mul_add(splat(simd, rise * self.shear), x * splat(simd, rise)));
+            for i in 0..2 {
+                store(&mut self.turn[i], part, within[i]);
+                store(&mut self.shape[i], part, bump * within[i]);
+                store(&mut self.step[i], part, gain * splat(simd, further[i]));
+            }
+        }
+        self.columns.clear();
+        for column in (0..grid.columns).step_by(BLOCK) {
+            let bins = grid.middle()[1] + (column * ALONG_BINS) as f64 - self.bin[2];
+            let first = splat(simd, whole_turns_off(self.kappa[2] * bins));
+            let mut columns = [Sixteen::ZERO; 2];
+            for part in 0..tile_parts::<S>() {
+                let turns = lanes(simd, &STEPS, part).mul_add(along, first).turn();
+                for (table, values) in columns.iter_mut().zip(turns) {
+                    store(table, part, values);
+                }
+            }
+            self.columns.push(columns);
+        }
+    }
+
     /// Sixteen rows from row 16 `block` of a slice on; `outer` is the spectrum there, log₂.
     #[inline(always)]
-    fn sixteen(&self, grid: &Tiling, slice: usize, block: usize, outer: f64) -> Lines {
+    fn sixteen<S: Simd>(&self, simd: S, grid: &Tiling, slice: usize, block: usize, outer: f64) -> Lines {
         let Self { half: [h0, h1, _], skew: [k10, k20, k21], kappa: [kappa0, kappa1, _], .. } = *self;
         let [middle_y, middle_x] = grid.middle();
         let d0 = (grid.lo[0] + slice) as f64 - self.bin[0];
-        let first_y = middle_y + (block * CELLS * SIDE) as f64 - self.bin[1];
+        let first_y = middle_y + (block * BLOCK * ACROSS_BINS) as f64 - self.bin[1];
         let (top, turn) = (self.top + outer - h0 * d0 * d0, self.phase + kappa0 * d0);
         let (shift_y, shift_x) = (k10 * d0, middle_x - self.bin[2] + k20 * d0);
         let [middle, most] = self.across.blocks.get(block).copied().unwrap_or_default();
         let mut lines = Lines::default();
-        for i in 0..CELLS {
-            let y = first_y + (i * SIDE) as f64;
+        let mut turns = Sixteen::ZERO;
+        for i in 0..BLOCK {
+            let y = first_y + (i * ACROSS_BINS) as f64;
             let from_ridge = y + shift_y;
             let slope = -2.0 * h1 * from_ridge;
             let [nearest, rest] = nearest_tile(shift_x + k21 * y);
-            let turn = turn + kappa1 * y;
             lines.top[i] = (top + 0.5 * slope * from_ridge) as f32 + middle[i];
             lines.slope[i] = slope as f32;
-            lines.highest[i] = lines.top[i] + REACH * lines.slope[i].abs() + most[i];
+            lines.highest[i] = lines.top[i] + REACH_ACROSS * lines.slope[i].abs() + most[i];
             (lines.nearest[i], lines.rest[i]) = (nearest as f32, rest as f32);
-            lines.turn[i] = (turn - turn.round_ties_even()) as f32;
+            turns[i] = whole_turns_off(turn + kappa1 * y);
             lines.delta[i] = y as f32;
+        }
+        for part in 0..tile_parts::<S>() {
+            for (table, values) in lines.turn.iter_mut().zip(lanes(simd, &turns, part).turn()) {
+                store(table, part, values);
+            }
         }
         lines
     }
 
     #[inline(always)]
     pub(super) fn line(&self, grid: &Tiling, block: &Block) -> Line {
-        let lines = &self.lines[block.slice * grid.rows.div_ceil(CELLS) + block.row / CELLS];
-        let i = block.row % CELLS;
+        let lines = &self.lines[block.slice * grid.rows.div_ceil(BLOCK) + block.row / BLOCK];
+        let i = block.row % BLOCK;
         Line {
             top: lines.top[i],
             slope: lines.slope[i],
             nearest: lines.nearest[i],
             rest: lines.rest[i],
-            turn: lines.turn[i],
+            turn: [lines.turn[0][i], lines.turn[1][i]],
             delta: lines.delta[i],
         }
     }
 
-    /// Lists the blocks in whose rows the joint is stronger than `cut`, log₂, or may be.
+    /// Marks the rows in which the joint is stronger than `cut` or may be, and whether it fits into f32 with `scale`, log₂.
     #[inline(always)]
-    pub(super) fn reach<S: Simd>(&mut self, simd: S, grid: &Tiling, cut: f32) {
-        let (row_blocks, along) = (grid.rows.div_ceil(CELLS), grid.columns.div_ceil(CELLS));
-        self.reached.clear();
-        self.reached.reserve(grid.blocks.len());
+    pub(super) fn reach<S: Simd>(&mut self, simd: S, grid: &Tiling, cut: f32, scale: f64) {
+        let blocks = grid.rows.div_ceil(BLOCK);
+        let least = splat(simd, cut - self.along.largest);
+        self.rows.clear();
         for (index, lines) in self.lines.iter().enumerate() {
-            let (slice, first) = (index / row_blocks, index % row_blocks * CELLS);
             let mut rows = 0;
-            for part in 0..CELLS / S::F32_LANES {
-                let spare = lanes(simd, &lines.highest, part) - splat(simd, cut - self.along.largest);
-                rows |= spare.positive() << (part * S::F32_LANES);
+            for part in 0..tile_parts::<S>() {
+                rows |= (lanes(simd, &lines.highest, part) - least).positive() << (part * S::F32_LANES);
             }
-            for row in bits(rows & (u32::MAX >> (32 - (grid.rows - first).min(CELLS)))) {
-                let block = (slice * grid.rows + first + row) * along;
-                self.reached.extend((block..block + along).map(|block| block as u32));
-            }
+            self.rows.push(rows & low_bits(grid.rows - index % blocks * BLOCK));
         }
+        let gaussian = self.along.cells.is_empty() && self.across.cells.is_empty();
+        self.bounded = gaussian && self.top - scale < f64::from(STRONGEST);
+    }
+
+    /// Whether the joint reaches a block's row.
+    #[inline(always)]
+    pub(super) fn reaches(&self, grid: &Tiling, block: &Block) -> bool {
+        self.rows[block.slice * grid.rows.div_ceil(BLOCK) + block.row / BLOCK] >> (block.row % BLOCK) & 1 == 1
+    }
+
+    /// (exponent, slope across, slope along) in some of a block's tile middles, log₂.
+    #[inline(always)]
+    pub(super) fn middles<S: Simd>(&self, simd: S, (block, line): (&Block, &Line), part: usize) -> [Lanes<S>; 3] {
+        // All but the rest is whole: x keeps its digits near the ridge.
+        let whole = lanes(simd, &STEPS, part) + splat(simd, line.nearest + (block.column * ALONG_BINS) as f32);
+        let x = whole + splat(simd, line.rest);
+        let along = x * splat(simd, self.bend);
+        let mut exponent = along.mul_add(x * splat(simd, 0.5), splat(simd, line.top));
+        if let Some([middle, _]) = self.along.blocks.get(block.column / BLOCK) {
+            exponent += lanes(simd, middle, part);
+        }
+        [exponent, along.mul_add(splat(simd, self.shear), splat(simd, line.slope)), along]
+    }
+
+    /// How far the joint's spectrum may lie above its middles, in some of a block's tiles.
+    #[inline(always)]
+    pub(super) fn slack<S: Simd>(&self, simd: S, block: &Block, part: usize) -> Lanes<S> {
+        let across = splat(simd, self.across.most(block.row));
+        self.along.blocks.get(block.column / BLOCK).map_or(across, |[_, most]| across + lanes(simd, most, part))
+    }
+
+    /// e^{i…} in the middle of a block's tile.
+    #[inline(always)]
+    pub(super) fn middle_turn(&self, block: &Block, line: &Line, tile: usize) -> [f32; 2] {
+        let columns = &self.columns[block.column / BLOCK];
+        let ([a, b], [c, d]) = (line.turn, [columns[0][tile], columns[1][tile]]);
+        [a * c - b * d, a * d + b * c]
     }
 
     /// The most that spectra within tiles add, log₂.
@@ -219,9 +294,33 @@ impl Joint {
     }
 }
 
+/// The lowest `count` bits of sixteen.
+fn low_bits(count: usize) -> u32 {
+    u32::MAX >> (32 - count.min(BLOCK))
+}
+
+/// What is left of `turns` beside whole ones.
+#[inline(always)]
+fn whole_turns_off(turns: f64) -> f32 {
+    (turns - turns.round_ties_even()) as f32
+}
+
+/// cos and sin of a number of turns.
+#[inline(always)]
+fn turn<S: Simd>(simd: S, turns: f64) -> [f32; 2] {
+    let [cos, sin] = splat(simd, whole_turns_off(turns)).turn();
+    [cos.first(), sin.first()]
+}
+
+/// 2ˣ, held within bounds.
+#[inline(always)]
+fn factor<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
+    x.max(splat(simd, -HELD)).min(splat(simd, HELD)).exp2()
+}
+
 /// `bins` as a multiple of a tile and the rest: both keep their digits in single precision.
 #[inline(always)]
 fn nearest_tile(bins: f64) -> [f64; 2] {
-    let nearest = (bins * (1.0 / SIDE as f64)).round_ties_even() * SIDE as f64;
+    let nearest = (bins * (1.0 / ALONG_BINS as f64)).round_ties_even() * ALONG_BINS as f64;
     [nearest, bins - nearest]
 }

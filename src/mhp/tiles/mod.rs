@@ -3,12 +3,12 @@
 //! One view goes through five stages, none of which allocates once its buffers have grown:
 //! 1. [`Joint`]: a splat in powers of two, its quadratic form and phase within a tile as tables, and what is the same
 //!    along a row of tiles.
-//! 2. Cull: in the middle of every tile all joints' exponents; the strongest ones' percentile is a guess of the
-//!    threshold. A joint is dropped where it is far below the soft mask's reach under that threshold, or far below the
-//!    tile's strongest joint; bounds over the tile make this safe. What is left is a list of [`Strip`]s a joint.
-//! 3. Sum: a joint in a tile costs one exponential and one complex product for 16 cells, relative to a scale of the
-//!    whole view.
-//! 4. Mask: percentile, soft mask, its slope. Where the threshold was guessed too high, back to 2 with a lower guess.
+//! 2. Guess: the strongest joints' percentile over the middles of tiles, for the threshold.
+//! 3. Sum, a block of sixteen tiles at a time. A joint is dropped from a tile where it is far below the soft mask's reach
+//!    under the guessed threshold, or far below the tile's strongest joint; bounds over the tile make this safe. What is
+//!    left is a [`Strip`] of tiles, where each tile's 16 cells follow from the tile before by one complex product.
+//!    All is relative to a scale of the whole view.
+//! 4. Mask: percentile, soft mask, its slope. Where the threshold was guessed too high, back to 3 with a lower guess.
 //! 5. Collect: the strips once more, in the tiles where the mask has a slope, into each joint's moments.
 //!
 //! The answer depends on the parameters alone: what is kept from the last evaluation only speeds the percentile up.
@@ -18,8 +18,8 @@
 )]
 
 mod collect;
-mod cull;
 mod joint;
+mod mask;
 mod strip;
 mod sum;
 
@@ -30,21 +30,88 @@ use super::percentile::{between, place};
 use super::simulate::EPSILON;
 use super::splat::Splat;
 use crate::config::Summation;
+use collect::Gathered;
 use joint::Joint;
 use pulp::{Arch, Simd, WithSimd};
 use std::f64::consts::LOG2_E;
+use std::ops::{Deref, DerefMut};
 use strip::Strip;
 
-const SIDE: usize = 4;
-const CELLS: usize = SIDE * SIDE;
+/// Bins of a tile along the last axis and along the one before.
+const ALONG_BINS: usize = 4;
+const ACROSS_BINS: usize = 8;
+const CELLS: usize = ALONG_BINS * ACROSS_BINS;
+/// Tiles of a block.
+const BLOCK: usize = 16;
 /// From a tile's middle to its outermost cells.
-const REACH: f32 = 1.5;
-/// Cells of a tile relative to its middle, along the last axis and the one before.
-const ALONG: [f32; CELLS] = [-1.5, -0.5, 0.5, 1.5, -1.5, -0.5, 0.5, 1.5, -1.5, -0.5, 0.5, 1.5, -1.5, -0.5, 0.5, 1.5];
-const ACROSS: [f32; CELLS] = [-1.5, -1.5, -1.5, -1.5, -0.5, -0.5, -0.5, -0.5, 0.5, 0.5, 0.5, 0.5, 1.5, 1.5, 1.5, 1.5];
+const REACH_ALONG: f32 = 0.5 * (ALONG_BINS - 1) as f32;
+const REACH_ACROSS: f32 = 0.5 * (ACROSS_BINS - 1) as f32;
+/// Cells of a tile relative to its middle.
+const ALONG: Cells = from_middle(1, ALONG_BINS);
+const ACROSS: Cells = from_middle(ALONG_BINS, ACROSS_BINS);
 /// From the first tile of a block to each of its sixteen, bins.
-const STEPS: [f32; CELLS] =
-    [0.0, 4.0, 8.0, 12.0, 16.0, 20.0, 24.0, 28.0, 32.0, 36.0, 40.0, 44.0, 48.0, 52.0, 56.0, 60.0];
+const STEPS: Sixteen = {
+    let mut steps = [0.0; BLOCK];
+    let mut tile = 0;
+    while tile < BLOCK {
+        steps[tile] = (tile * ALONG_BINS) as f32;
+        tile += 1;
+    }
+    Row(steps)
+};
+
+/// Numbers that lie as registers want them.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+struct Row<const N: usize>([f32; N]);
+
+/// A number a cell of a tile.
+type Cells = Row<CELLS>;
+/// Re and Im.
+type Pair = [Cells; 2];
+/// A number a tile of a block, or a row of tiles of sixteen.
+type Sixteen = Row<BLOCK>;
+
+impl<const N: usize> Row<N> {
+    const ZERO: Self = Self::all(0.0);
+
+    const fn all(x: f32) -> Self {
+        Self([x; N])
+    }
+}
+
+impl<const N: usize> Default for Row<N> {
+    fn default() -> Self {
+        Self::ZERO
+    }
+}
+
+impl<const N: usize> Deref for Row<N> {
+    type Target = [f32; N];
+    #[inline(always)]
+    fn deref(&self) -> &[f32; N] {
+        &self.0
+    }
+}
+
+impl<const N: usize> DerefMut for Row<N> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [f32; N] {
+        &mut self.0
+    }
+}
+
+/// Each cell's bin, of those that are `stride` cells apart, from the middle of `bins`.
+const fn from_middle(stride: usize, bins: usize) -> Cells {
+    let mut from = [0.0; CELLS];
+    let mut cell = 0;
+    while cell < CELLS {
+        from[cell] = (cell / stride % bins) as f32 - 0.5 * (bins - 1) as f32;
+        cell += 1;
+    }
+    Row(from)
+}
+
 /// Softest mask, T, whose reach the powers of two of f32 hold; softer ones take the plain kernel.
 const SOFTEST: f64 = 1.5;
 /// Below e^−16T of the threshold a cell neither counts nor pulls (1e-7).
@@ -59,7 +126,7 @@ const HIGH: f64 = 12.0;
 /// Guesses of the threshold at most.
 const TRIES: usize = 40;
 /// A joint this much weaker (in ln) than the strongest at its cells is dropped (8e-7).
-const RELATIVE: f64 = 14.0;
+const RELATIVE: f64 = 11.0;
 /// ln of the weakest return that counts relative to the view's scale.
 const WEAKEST: f64 = -36.0;
 /// log₂ below which no return is taken: squares of its parts are normal f32, for others cost a hundred cycles.
@@ -84,8 +151,8 @@ pub(super) struct Tiling {
     rows: usize,
     columns: usize,
     blocks: Vec<Block>,
-    /// 16 numbers a tile, 16 tiles a block: B_ori as 0 or 1, −1 beyond the box.
-    target: Vec<f32>,
+    /// Sixteen tiles a block: B_ori as 0 or 1, −1 beyond the box.
+    target: Vec<Cells>,
     cells: usize,
     marked: usize,
 }
@@ -105,77 +172,64 @@ impl Tiling {
         for (k, &[from, to]) in bins.iter().rev().take(3).enumerate() {
             (lo[2 - k], size[2 - k]) = (from, to.saturating_sub(from));
         }
-        let (rows, columns) = (size[1].div_ceil(SIDE), size[2].div_ceil(SIDE));
+        let (rows, columns) = (size[1].div_ceil(ACROSS_BINS), size[2].div_ceil(ALONG_BINS));
         let marked = ori.iter().filter(|&&b| b).count();
         let of_line = |line| {
             let (slice, row) = (line / rows, line % rows);
-            (0..columns).step_by(CELLS).map(move |column| Block { slice, row, column })
+            (0..columns).step_by(BLOCK).map(move |column| Block { slice, row, column })
         };
         let blocks = (0..size[0] * rows).flat_map(of_line).collect();
         let mut tiling = Self { lo, size, rows, columns, blocks, target: Vec::new(), cells: ori.len(), marked };
-        let mut target = vec![-1.0; size[0] * rows * columns.div_ceil(CELLS) * CELLS * CELLS];
-        for (place, &ori) in tiling.places().zip(ori) {
-            target[place] = f32::from(u8::from(ori));
+        let mut target = vec![Cells::all(-1.0); size[0] * rows * columns.div_ceil(BLOCK) * BLOCK];
+        for ([tile, cell], &ori) in tiling.places().zip(ori) {
+            target[tile][cell] = f32::from(u8::from(ori));
         }
         tiling.target = target;
         tiling
     }
 
-    /// Where each cell of the box lies among the tiles' numbers, in C order.
-    fn places(&self) -> impl Iterator<Item = usize> {
+    /// The tile of each cell of the box, and which of its cells it is, in C order.
+    fn places(&self) -> impl Iterator<Item = [usize; 2]> {
         let [slices, height, width] = self.size;
-        let (rows, row_tiles) = (self.rows, self.columns.div_ceil(CELLS) * CELLS);
+        let (rows, row_tiles) = (self.rows, self.columns.div_ceil(BLOCK) * BLOCK);
         (0..slices * height).flat_map(move |line| {
             let (slice, y) = (line / height, line % height);
-            let first = (slice * rows + y / SIDE) * row_tiles * CELLS + y % SIDE * SIDE;
-            (0..width).map(move |x| first + x / SIDE * CELLS + x % SIDE)
+            let first = (slice * rows + y / ACROSS_BINS) * row_tiles;
+            (0..width).map(move |x| [first + x / ALONG_BINS, y % ACROSS_BINS * ALONG_BINS + x % ALONG_BINS])
         })
     }
 
     /// Bins of the first tile's middle, across and along.
     fn middle(&self) -> [f64; 2] {
-        let half = (SIDE - 1) as f64 * 0.5;
-        [self.lo[1] as f64 + half, self.lo[2] as f64 + half]
+        [self.lo[1] as f64 + f64::from(REACH_ACROSS), self.lo[2] as f64 + f64::from(REACH_ALONG)]
     }
-}
-
-/// The strongest joint in the middle of a tile.
-#[derive(Debug, Clone, Copy)]
-struct Crest {
-    exponent: [f32; CELLS],
-    slope: [[f32; CELLS]; 2],
-    slack: [f32; CELLS],
-    /// log₂ of any joint in the tile, at most.
-    highest: [f32; CELLS],
-}
-
-impl Crest {
-    const NOTHING: Self =
-        Self { exponent: [f32::MIN; CELLS], slope: [[0.0; CELLS]; 2], slack: [0.0; CELLS], highest: [f32::MIN; CELLS] };
 }
 
 /// Buffers of one view.
 #[derive(Debug, Default)]
 pub(super) struct Tiles {
     joints: Vec<Joint>,
-    /// A block each.
-    crests: Vec<Crest>,
-    /// Joint by joint; `ends` tells where each joint's strips end.
+    /// Those that reach a row.
+    present: Vec<u32>,
+    /// Block by block; `ends` tells where each block's strips end.
     strips: Vec<Strip>,
-    ends: Vec<usize>,
+    ends: Vec<u32>,
+    /// log₂ of the strongest joint in any tile's middle.
+    highest: f32,
     /// Tiles that are summed: a bit each, a block's in one number; and their places, ascending.
     lit_bits: Vec<u32>,
     lit: Vec<u32>,
-    /// Re and Im of the sum over joints, 16 a tile (Σ(AK)² where the sum is incoherent); later times w/|S|². This and
-    /// what follows holds where tiles are lit.
-    re: Vec<f32>,
-    im: Vec<f32>,
+    /// The sum over joints a tile (Σ(AK)² where the sum is incoherent); later times w/|S|². This and what follows holds
+    /// where tiles are lit.
+    sums: Vec<Pair>,
     /// H² relative to the scale; −1 beyond the box.
-    power: Vec<f32>,
+    power: Vec<Cells>,
     /// m(1 − m)/|S|² · d ln(H + h)/d ln|S|.
-    soft: Vec<f32>,
+    soft: Vec<Cells>,
     /// Tiles where the mask has a slope: a bit each, a block's in one number.
     sloped: Vec<u32>,
+    /// Each joint's moments over the blocks, a number a cell of a tile.
+    gathered: Vec<Gathered>,
     /// Scratch of percentiles.
     ranked: Vec<u32>,
     /// log₂ of the last threshold: where the percentile is looked for first.
@@ -237,12 +291,11 @@ impl Tiles {
 
     fn values<const COHERENT: bool>(&self, tiling: &Tiling, log2: f64) -> Vec<f64> {
         let (unit, floor) = ((2.0 * log2).exp2(), EPSILON * EPSILON);
-        let of = |place: usize| {
-            let tile = place / CELLS;
-            if self.lit_bits[tile / CELLS] >> (tile % CELLS) & 1 == 0 {
+        let of = |[tile, cell]: [usize; 2]| {
+            if self.lit_bits[tile / BLOCK] >> (tile % BLOCK) & 1 == 0 {
                 return EPSILON;
             }
-            let (re, im) = (f64::from(self.re[place]), f64::from(self.im[place]));
+            let [re, im] = [0, 1].map(|part| f64::from(self.sums[tile][part][cell]));
             (unit * if COHERENT { re * re + im * im } else { re } + floor).sqrt()
         };
         tiling.places().map(of).collect()
@@ -261,7 +314,7 @@ impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> ViewAnswer {
         let Self { tiles, question, moments } = self;
-        if !tiles.fill(simd, question.splats, question.tiling) {
+        if !tiles.fill::<S, COHERENT>(simd, question.splats, question.tiling) {
             return ViewAnswer { loss: f64::NAN, iou: None };
         }
         let floor = EPSILON.log2();
@@ -269,8 +322,7 @@ impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
         let mut tries = 0..TRIES;
         loop {
             let scale = Scale::new(guess, question.softness);
-            tiles.cull(simd, question.tiling, &scale);
-            tiles.sum::<S, COHERENT>(simd);
+            tiles.sum::<S, COHERENT>(simd, question.tiling, &scale);
             let threshold = tiles.threshold::<S, COHERENT>(simd, question, &scale);
             let low = guess > floor && threshold.log2 < guess - GUESS * LOG2_E;
             let high = threshold.log2 > guess + HIGH * LOG2_E;
@@ -304,19 +356,15 @@ impl<const COHERENT: bool> WithSimd for Whole<'_, COHERENT> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Option<Vec<f64>> {
         let Self { tiles, splats, tiling } = self;
-        if !tiles.fill(simd, splats, tiling) {
+        if !tiles.fill::<S, COHERENT>(simd, splats, tiling) {
             return None;
         }
         let loudest = tiles.joints.iter().map(|joint| joint.top + f64::from(joint.spectrum())).fold(f64::MIN, f64::max);
         let scale = Scale::below(loudest);
-        tiles.cull(simd, tiling, &scale);
+        tiles.sum::<S, COHERENT>(simd, tiling, &scale);
         // A map that none of the joints reaches in its own cells has its largest values elsewhere in f32's range.
-        let highest = tiles.crests.iter().flat_map(|crest| crest.exponent).fold(f32::MIN, f32::max);
-        if f64::from(highest) < loudest - OUTSIDE {
-            return None;
-        }
-        tiles.sum::<S, COHERENT>(simd);
-        Some(tiles.values::<COHERENT>(tiling, scale.log2))
+        let within = f64::from(tiles.highest) >= loudest - OUTSIDE;
+        within.then(|| tiles.values::<COHERENT>(tiling, scale.log2))
     }
 }
 
@@ -381,14 +429,23 @@ impl Mask {
     }
 }
 
-#[inline(always)]
-fn lanes<S: Simd>(simd: S, of: &[f32], part: usize) -> Lanes<S> {
-    Lanes::new(simd, S::as_simd_f32s(of).0[part])
+/// Parts of a tile's cells, and of a block's tiles.
+const fn cell_parts<S: Simd>() -> usize {
+    CELLS / S::F32_LANES
+}
+
+const fn tile_parts<S: Simd>() -> usize {
+    BLOCK / S::F32_LANES
 }
 
 #[inline(always)]
-fn store<S: Simd>(into: &mut [f32], part: usize, x: Lanes<S>) {
-    S::as_mut_simd_f32s(into).0[part] = x.value;
+fn lanes<S: Simd, const N: usize>(simd: S, of: &Row<N>, part: usize) -> Lanes<S> {
+    Lanes::new(simd, S::as_simd_f32s(&of.0).0[part])
+}
+
+#[inline(always)]
+fn store<S: Simd, const N: usize>(into: &mut Row<N>, part: usize, x: Lanes<S>) {
+    S::as_mut_simd_f32s(&mut into.0).0[part] = x.value;
 }
 
 /// A float as an integer that sorts as it.
@@ -404,16 +461,11 @@ fn unordered(key: u32) -> f32 {
 impl Tiles {
     /// Takes the splats in; false where one is not finite.
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, splats: &[Splat], grid: &Tiling) -> bool {
+    fn fill<S: Simd, const COHERENT: bool>(&mut self, simd: S, splats: &[Splat], grid: &Tiling) -> bool {
         self.joints.resize_with(splats.len(), Joint::default);
         for (joint, splat) in self.joints.iter_mut().zip(splats) {
-            joint.fill(simd, splat, grid);
+            joint.fill::<S, COHERENT>(simd, splat, grid);
         }
         self.joints.iter().all(Joint::is_finite)
-    }
-
-    /// Parts of 16 numbers.
-    const fn parts<S: Simd>() -> usize {
-        CELLS / S::F32_LANES
     }
 }

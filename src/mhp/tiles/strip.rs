@@ -1,26 +1,30 @@
-//! A joint in sixteen tiles beside each other.
+//! A joint in tiles beside each other.
 
-use super::{ACROSS, ALONG, CELLS, FAINTEST, Joint, Lanes, STRONGEST, Simd, lanes, splat};
+use super::joint::{Joint, Line};
+use super::{
+    ACROSS, ALONG, ALONG_BINS, Block, Cells, FAINTEST, Lanes, Pair, REACH_ACROSS, REACH_ALONG, STRONGEST, Simd, Sixteen,
+    cell_parts, lanes, splat, store, tile_parts,
+};
+use std::ops::Range;
 
-/// A joint in those of a block's tiles that it matters to.
-#[derive(Debug, Clone, Copy, Default)]
+/// log₂ of how far a joint may rise or fall from a tile's middle to its corner where tiles follow from each other.
+const GENTLE: f32 = 30.0;
+/// log₂ below which a tile's middle is not taken.
+const LOWEST: f32 = -110.0;
+
+/// A joint in those of a block's tiles that it matters to, which lie side by side.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Strip {
-    pub block: u32,
-    pub slice: u32,
-    pub row: u32,
-    /// First of the block's tiles in the row.
-    pub column: u32,
-    /// A bit a tile that the joint matters to.
-    pub tiles: u32,
-    /// Middle of the row minus joint, bins.
-    pub across: f32,
-    /// Middle minus joint along the row, bins, a tile.
-    pub along: [f32; CELLS],
-    /// log₂ in a tile's middle relative to the view's scale, and its slopes across and along.
-    pub exponent: [f32; CELLS],
-    pub slope: [[f32; CELLS]; 2],
-    /// e^{i…} in the middle.
-    pub turn: [[f32; CELLS]; 2],
+    pub joint: u32,
+    /// First of the tiles among the block's, and how many.
+    first: u32,
+    count: u32,
+    /// Whether each tile follows from the one before.
+    pub chained: bool,
+    /// A K in the middles of the block's tiles where they do, else its log₂; relative to the view's scale.
+    pub middles: Sixteen,
+    /// The first tile's cells beside its middle, Re and Im.
+    start: Pair,
 }
 
 /// The places of a number's bits, from the lowest on.
@@ -32,32 +36,169 @@ pub(super) fn bits(mut of: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-impl Strip {
-    /// A K of some cells of tile `tile` (of sixteen), and its real and imaginary part (nothing where the sum is incoherent).
+impl Joint {
+    /// The joint in `tiles` (a bit each) of a block and those between them, whose middles it reaches with `exponent`, log₂
+    /// relative to the view's scale.
     #[inline(always)]
-    pub(super) fn at<S: Simd, const COHERENT: bool>(
+    pub(super) fn strip<S: Simd, const COHERENT: bool>(
         &self,
         simd: S,
-        joint: &Joint,
+        (block, line): (&Block, &Line),
+        (joint, tiles): (u32, u32),
+        exponent: &Sixteen,
+    ) -> Strip {
+        let first = tiles.trailing_zeros();
+        // A tile between others costs less than what tells it from them.
+        let count = 32 - tiles.leading_zeros() - first;
+        let last = first + count - 1;
+        let [[a, b], [c, d]] = [self.slopes(block, line, first as usize), self.slopes(block, line, last as usize)];
+        let steepest = REACH_ACROSS * a.abs().max(c.abs()) + REACH_ALONG * b.abs().max(d.abs());
+        let chained = self.bounded && steepest + self.curvature < GENTLE;
+        let mut strip = Strip { joint, first, count, chained, middles: *exponent, start: [Cells::ZERO; 2] };
+        if !chained {
+            return strip;
+        }
+        for part in 0..tile_parts::<S>() {
+            let within = lanes(simd, exponent, part).max(splat(simd, LOWEST)).min(splat(simd, STRONGEST));
+            store(&mut strip.middles, part, within.exp2());
+        }
+        let [cos, sin] = self.middle_turn(block, line, first as usize);
+        for part in 0..cell_parts::<S>() {
+            let by_x = lanes(simd, &ALONG, part) * splat(simd, b);
+            let rise = lanes(simd, &ACROSS, part).mul_add(splat(simd, a), by_x).exp2();
+            let mut start = [rise * lanes(simd, &self.shape[0], part), rise * lanes(simd, &self.shape[1], part)];
+            if COHERENT {
+                start = product(start, [splat(simd, cos), splat(simd, sin)]);
+            }
+            store(&mut strip.start[0], part, start[0]);
+            store(&mut strip.start[1], part, start[1]);
+        }
+        strip
+    }
+
+    /// Slopes across and along in the middle of a block's tile, log₂ a bin.
+    #[inline(always)]
+    fn slopes(&self, block: &Block, line: &Line, tile: usize) -> [f32; 2] {
+        let along = self.bend * (line.nearest + ((block.column + tile) * ALONG_BINS) as f32 + line.rest);
+        [along * self.shear + line.slope, along]
+    }
+
+    /// One tile by itself: where the Gaussian is so narrow that single precision does not hold a tile of it at once, and
+    /// along Doppler axes.
+    #[inline(always)]
+    pub(super) fn tile<S: Simd, const COHERENT: bool>(
+        &self,
+        simd: S,
+        (block, line): (&Block, &Line),
         tile: usize,
         part: usize,
-    ) -> [Lanes<S>; 3] {
-        let [across, along] = [self.slope[0][tile], self.slope[1][tile]];
-        let bent = lanes(simd, &joint.quadratic, part) + splat(simd, self.exponent[tile]);
+        middle: f32,
+    ) -> [Lanes<S>; 2] {
+        let [across, along] = self.slopes(block, line, tile);
+        let bent = lanes(simd, &self.quadratic, part) + splat(simd, middle);
         let mut exponent = lanes(simd, &ALONG, part).mul_add(splat(simd, along), bent);
         exponent = lanes(simd, &ACROSS, part).mul_add(splat(simd, across), exponent);
-        if let Some(spectrum) = joint.along.cells.get(self.column as usize + tile) {
+        if let Some(spectrum) = self.along.cells.get(block.column + tile) {
             exponent += lanes(simd, spectrum, part);
         }
-        if let Some(spectrum) = joint.across.cells.get(self.row as usize) {
+        if let Some(spectrum) = self.across.cells.get(block.row) {
             exponent += lanes(simd, spectrum, part);
         }
         let a = exponent.max(splat(simd, FAINTEST)).min(splat(simd, STRONGEST)).exp2();
         if !COHERENT {
-            return [a, splat(simd, 0.0), splat(simd, 0.0)];
+            return [a * a, splat(simd, 0.0)];
         }
-        let (c, s) = (splat(simd, self.turn[0][tile]), splat(simd, self.turn[1][tile]));
-        let (re, im) = (lanes(simd, &joint.turn[0], part), lanes(simd, &joint.turn[1], part));
-        [a, a * (c * re - s * im), a * c.mul_add(im, s * re)]
+        let turn = self.middle_turn(block, line, tile);
+        let within = [lanes(simd, &self.turn[0], part), lanes(simd, &self.turn[1], part)];
+        let [re, im] = product(within, [splat(simd, turn[0]), splat(simd, turn[1])]);
+        [a * re, a * im]
     }
+}
+
+impl Strip {
+    /// A bit a tile of the block.
+    pub(super) fn bits(&self) -> u32 {
+        (u32::MAX >> (32 - self.count)) << self.first
+    }
+
+    pub(super) fn tiles(&self) -> Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
+    }
+
+    /// Adds what returns from the strip's cells to the sums of its block.
+    #[inline(always)]
+    pub(super) fn add_to<S: Simd, const COHERENT: bool>(
+        &self,
+        simd: S,
+        joint: &Joint,
+        (block, line): (&Block, &Line),
+        sums: &mut [Pair],
+    ) {
+        let tiles = self.tiles();
+        let (middles, sums) = (&self.middles[tiles.clone()], &mut sums[tiles]);
+        if !self.chained {
+            for ((tile, &middle), sum) in self.tiles().zip(middles).zip(sums) {
+                for part in 0..cell_parts::<S>() {
+                    let [re, im] = joint.tile::<S, COHERENT>(simd, (block, line), tile, part, middle);
+                    for (sum, of) in sum.iter_mut().zip([re, im]) {
+                        let sums = of + lanes(simd, sum, part);
+                        store(sum, part, sums);
+                    }
+                }
+            }
+            return;
+        }
+        // Two at a time: a product waits for the one before it.
+        for part in (0..cell_parts::<S>()).step_by(2) {
+            let mut chains = [self.chain(simd, joint, part), self.chain(simd, joint, part + 1)];
+            for (&middle, sum) in middles.iter().zip(&mut *sums) {
+                let middle = splat(simd, middle);
+                for (k, chain) in chains.iter_mut().enumerate() {
+                    let [re, im] = chain.now;
+                    if COHERENT {
+                        let re = re.mul_add(middle, lanes(simd, &sum[0], part + k));
+                        let im = im.mul_add(middle, lanes(simd, &sum[1], part + k));
+                        store(&mut sum[0], part + k, re);
+                        store(&mut sum[1], part + k, im);
+                    } else {
+                        let a = re * middle;
+                        let squares = a.mul_add(a, lanes(simd, &sum[0], part + k));
+                        store(&mut sum[0], part + k, squares);
+                    }
+                    chain.go::<COHERENT>();
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn chain<S: Simd>(&self, simd: S, joint: &Joint, part: usize) -> Chain<S> {
+        Chain {
+            now: [lanes(simd, &self.start[0], part), lanes(simd, &self.start[1], part)],
+            step: [lanes(simd, &joint.step[0], part), lanes(simd, &joint.step[1], part)],
+        }
+    }
+}
+
+/// Some cells of a strip, from tile to tile.
+pub(super) struct Chain<S: Simd> {
+    pub now: [Lanes<S>; 2],
+    step: [Lanes<S>; 2],
+}
+
+impl<S: Simd> Chain<S> {
+    #[inline(always)]
+    pub(super) fn go<const COHERENT: bool>(&mut self) {
+        if COHERENT {
+            self.now = product(self.now, self.step);
+        } else {
+            self.now[0] = self.now[0] * self.step[0];
+        }
+    }
+}
+
+/// The product of two complex numbers.
+#[inline(always)]
+fn product<S: Simd>([a, b]: [Lanes<S>; 2], [c, d]: [Lanes<S>; 2]) -> [Lanes<S>; 2] {
+    [(a * c).minus(b, d), a.mul_add(d, b * c)]
 }

@@ -1,259 +1,209 @@
-//! H in the tiles, its percentile, the mask and its slope.
+//! A guess of the threshold, which joints matter to which tiles, and the sum of what returns there.
 
+use super::joint::Line;
 use super::strip::bits;
 use super::{
-    CELLS, Lanes, Mask, NO_SLOPE, Question, Scale, Simd, Threshold, Tiles, between, lanes, place, splat, store,
+    BLOCK, Block, CELLS, Cells, Joint, LOG2_E, Lanes, Pair, Question, REACH_ACROSS, REACH_ALONG, RELATIVE, Scale, Simd, Sixteen,
+    Tiles, Tiling, cell_parts, lanes, ordered, place, splat, store, tile_parts, unordered,
 };
-use std::ops::Range;
 
-/// The square of the threshold is looked for between these multiples of the last one.
-const LEVELS: [f64; 6] = [0.06, 0.5, 0.93, 1.07, 2.0, 16.0];
-/// log₂ of m/(1 − m) is cut off here, both ways; there is no slope so far up.
-const ODDS: f32 = 60.0;
-/// Tiles whose soft masks are added up in single precision.
-const FEW: usize = 64;
+/// The threshold is guessed from at least this many rows of tiles, and from one in so many.
+const ROWS: usize = 10;
+const STRIDE: usize = 4;
+/// The strongest joint in the middle of a block's tiles.
+struct Crest {
+    exponent: Sixteen,
+    slope: [Sixteen; 2],
+    slack: Sixteen,
+    /// log₂ of any joint in the tile, at most.
+    highest: Sixteen,
+}
 
-/// A tile's cells among those of all.
-fn cells(tile: u32) -> Range<usize> {
-    tile as usize * CELLS..(tile as usize + 1) * CELLS
+impl Crest {
+    #[inline(always)]
+    fn new<S: Simd>(simd: S, joints: &[Joint], present: &[u32], grid: &Tiling, block: &Block) -> Self {
+        let mut crest = Self {
+            exponent: Sixteen::ZERO,
+            slope: [Sixteen::ZERO; 2],
+            slack: Sixteen::ZERO,
+            highest: Sixteen::ZERO,
+        };
+        for part in 0..tile_parts::<S>() {
+            let (lowest, zero) = (splat(simd, f32::MIN), splat(simd, 0.0));
+            let [mut exponent, mut across, mut along, mut slack, mut highest] = [lowest, zero, zero, zero, lowest];
+            for &joint in present {
+                let joint = &joints[joint as usize];
+                let [e, a, b] = joint.middles(simd, (block, &joint.line(grid, block)), part);
+                let s = joint.slack(simd, block, part);
+                highest = highest.max(rise(simd, a, b) + e + s);
+                let s = s + splat(simd, joint.curvature);
+                let best = exponent;
+                exponent = e.max(best);
+                across = e.choose(best, a, across);
+                along = e.choose(best, b, along);
+                slack = e.choose(best, s, slack);
+            }
+            store(&mut crest.exponent, part, exponent);
+            store(&mut crest.slope[0], part, across);
+            store(&mut crest.slope[1], part, along);
+            store(&mut crest.slack, part, slack);
+            store(&mut crest.highest, part, highest);
+        }
+        crest
+    }
+}
+
+/// How far slopes across and along rise from a tile's middle to its outermost cell.
+#[inline(always)]
+fn rise<S: Simd>(simd: S, across: Lanes<S>, along: Lanes<S>) -> Lanes<S> {
+    across.abs().mul_add(splat(simd, REACH_ACROSS), along.abs() * splat(simd, REACH_ALONG))
+}
+
+/// What tells a joint that matters in a tile from one that does not.
+struct Bounds<S: Simd> {
+    cut: Lanes<S>,
+    low: Lanes<S>,
+    fading: Lanes<S>,
+    log2: Lanes<S>,
+}
+
+impl<S: Simd> Bounds<S> {
+    #[inline(always)]
+    fn new(simd: S, scale: &Scale, joints: usize) -> Self {
+        Self {
+            cut: splat(simd, scale.cut + scale.log2 as f32),
+            // Σ of all joints by the strongest, at most.
+            low: splat(simd, scale.low - (joints.max(1) as f32).log2()),
+            fading: splat(simd, scale.fading),
+            log2: splat(simd, scale.log2 as f32),
+        }
+    }
+
+    /// A bit a tile of the block that the joint matters to, and its exponents in their middles, log₂ relative to the scale.
+    #[inline(always)]
+    fn tiles(
+        &self,
+        simd: S,
+        joint: &Joint,
+        (block, line): (&Block, &Line),
+        crest: &Crest,
+        exponents: &mut Sixteen,
+    ) -> u32 {
+        let relative = splat(simd, (RELATIVE * LOG2_E) as f32);
+        let mut tiles = 0;
+        for part in 0..tile_parts::<S>() {
+            let [exponent, across, along] = joint.middles(simd, (block, line), part);
+            let slack = joint.slack(simd, block, part);
+            let highest = rise(simd, across, along) + exponent + slack;
+            let (best_across, best_along) = (lanes(simd, &crest.slope[0], part), lanes(simd, &crest.slope[1], part));
+            let apart = rise(simd, across - best_across, along - best_along);
+            let nearest =
+                exponent - lanes(simd, &crest.exponent, part) + slack + lanes(simd, &crest.slack, part) + relative;
+            let faded = (self.low - lanes(simd, &crest.highest, part)).max(splat(simd, 0.0));
+            let spare = (highest - faded.mul_add(self.fading, self.cut)).min(apart + nearest);
+            tiles |= spare.positive() << (part * S::F32_LANES);
+            store(exponents, part, exponent - self.log2);
+        }
+        tiles
+    }
 }
 
 impl Tiles {
-    /// Adds every joint's return to its tiles.
+    /// A guess of log₂ of the threshold: the percentile of the strongest joints in the middles of tiles.
     #[inline(always)]
-    pub(super) fn sum<S: Simd, const COHERENT: bool>(&mut self, simd: S) {
-        let Self { joints, strips, ends, re, im, .. } = self;
-        let mut from = 0;
-        for (joint, &to) in joints.iter().zip(ends.iter()) {
-            for strip in &strips[from..to] {
-                for tile in bits(strip.tiles) {
-                    let cells = cells(strip.block * CELLS as u32 + tile as u32);
-                    let (re, im) = (&mut re[cells.clone()], &mut im[cells]);
-                    for part in 0..Self::parts::<S>() {
-                        let [a, a_re, a_im] = strip.at::<S, COHERENT>(simd, joint, tile, part);
-                        let old = lanes(simd, re, part);
-                        if COHERENT {
-                            store(re, part, a_re + old);
-                            store(im, part, a_im + lanes(simd, im, part));
-                        } else {
-                            store(re, part, a.mul_add(a, old));
-                        }
-                    }
-                }
-            }
-            from = to;
-        }
-    }
-
-    /// H² of every cell that is summed, and the percentile of H over all cells.
-    #[inline(always)]
-    pub(super) fn threshold<S: Simd, const COHERENT: bool>(
-        &mut self,
-        simd: S,
-        question: &Question<'_>,
-        scale: &Scale,
-    ) -> Threshold {
+    pub(super) fn guess<S: Simd>(&mut self, simd: S, question: &Question<'_>) -> f64 {
         let grid = question.tiling;
-        let square = self.last.map_or(f64::NAN, |last| (2.0 * (last - scale.log2)).exp2());
-        let levels = LEVELS.map(|level| (level * square) as f32);
-        let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
-        let mut above = [zero; LEVELS.len()];
-        for &tile in &self.lit {
-            let cells = cells(tile);
-            let target = &grid.target[cells.clone()];
-            let (re, im, power) = (&self.re[cells.clone()], &self.im[cells.clone()], &mut self.power[cells]);
-            for part in 0..Self::parts::<S>() {
-                let (re, im) = (lanes(simd, re, part), lanes(simd, im, part));
-                let square = if COHERENT { re.mul_add(re, im * im) } else { re };
-                let value = square + splat(simd, scale.epsilon_sq);
-                // What lies beyond the box ranks below all.
-                let value = lanes(simd, target, part).choose(splat(simd, -0.5), value, splat(simd, -1.0));
-                store(power, part, value);
-                for (above, level) in above.iter_mut().zip(levels) {
-                    *above += value.choose(splat(simd, level), one, zero);
-                }
-            }
-        }
-        let last = grid.cells.saturating_sub(1);
-        let (lower_index, weight) = place(last, 100.0 - question.tau_pct);
-        // Counted from the strongest.
-        let rank = last - lower_index;
-        let mut counted = [0; LEVELS.len()];
-        for (count, above) in counted.iter_mut().zip(above) {
-            *count = above.sum() as usize;
-        }
-        let counted = || levels.into_iter().zip(counted);
-        // With its upper neighbour.
-        let low = counted().rev().find(|&(_, above)| above > rank).map_or(-0.5, |(level, _)| level);
-        let (high, above) = counted().find(|&(level, above)| level > low && above < rank).unwrap_or((f32::MAX, 0));
-        self.between(simd, [low, high]);
-        let found = order(&mut self.ranked, rank - above);
-        // Where only the upper neighbour is summed, the lower one is nothing beside it.
-        let split = || {
-            let least = self.ranked.iter().copied().min().filter(|_| self.ranked.len() == rank && weight > 0.0);
-            least.map(|upper| [scale.epsilon_sq, f32::from_bits(upper)])
-        };
-        let found = found.or_else(split);
-        let among_lit = found.is_some();
-        let [lower, upper] = found.unwrap_or([scale.epsilon_sq; 2]);
-        let upper = if upper.is_nan() { lower } else { upper };
-        let value = between(f64::from(lower).sqrt(), f64::from(upper).sqrt(), weight);
-        Threshold { lower, value, log2: value.log2() + scale.log2, among_lit }
-    }
-
-    /// Lists the squares in (low, high] as what is ranked.
-    #[inline(always)]
-    fn between<S: Simd>(&mut self, simd: S, [low, high]: [f32; 2]) {
         self.ranked.clear();
-        for &tile in &self.lit {
-            let power = &self.power[cells(tile)];
-            let mut any = false;
-            for part in 0..Self::parts::<S>() {
-                let value = lanes(simd, power, part);
-                any |= (value - splat(simd, low)).min(splat(simd, high) - value).any_positive();
-            }
-            if any {
-                self.ranked.extend(power.iter().filter(|&&x| x > low && x <= high).map(|x| x.to_bits()));
-            }
-        }
-    }
-
-    /// The soft mask: its sums, and a cell's m(1 − m)/|S|² · d ln(H + h)/d ln|S|.
-    #[inline(always)]
-    pub(super) fn mask<S: Simd, const COHERENT: bool>(
-        &mut self,
-        simd: S,
-        question: &Question<'_>,
-        scale: &Scale,
-        threshold: &Threshold,
-    ) -> Mask {
-        let grid = question.tiling;
-        let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
-        let flat = splat(simd, (f64::from(NO_SLOPE) * question.softness) as f32);
-        let centre = (threshold.value + f64::from(scale.soft_floor)).log2();
-        let odds = Odds::new(question.softness, scale.soft_floor, threshold.value);
-        self.sloped.clear();
-        self.sloped.resize(self.lit_bits.len(), 0);
-        let mut mask = Mask::default();
-        let (mut common, mut soft) = (0.0, 0.0);
-        let (mut both, mut hard, mut marked, mut lit_cells) = (zero, zero, zero, zero);
-        for tiles in self.lit.chunks(FEW) {
-            let (mut few_common, mut few_soft) = (zero, zero);
-            for &tile in tiles {
-                let cells = cells(tile);
-                let target = &grid.target[cells.clone()];
-                let (power, out) = (&self.power[cells.clone()], &mut self.soft[cells]);
-                let mut steep = false;
-                for part in 0..Self::parts::<S>() {
-                    let (target, power) = (lanes(simd, target, part), lanes(simd, power, part));
-                    let inside = target.choose(splat(simd, -0.5), one, zero);
-                    let b = target.max(zero);
-                    let [odds, by_power] = odds.at(simd, power.max(splat(simd, f32::MIN_POSITIVE)));
-                    let share = one / (one + odds);
-                    let m = odds * share * inside;
-                    few_common += m * b;
-                    few_soft += m;
-                    steep |= (m * share - flat).any_positive();
-                    store(out, part, by_power * share * share * inside);
-                    let sim = power.choose(splat(simd, threshold.lower), inside, zero);
-                    both += sim * b;
-                    hard += sim;
-                    marked += b;
-                    lit_cells += inside;
+        let stride = (grid.size[0] * grid.rows / ROWS).clamp(1, STRIDE);
+        for block in grid.blocks.iter().filter(|block| (block.slice * grid.rows + block.row).is_multiple_of(stride)) {
+            let mut highest = Sixteen::all(f32::MIN);
+            for part in 0..tile_parts::<S>() {
+                let mut best = splat(simd, f32::MIN);
+                for joint in &self.joints {
+                    let [exponent, ..] = joint.middles(simd, (block, &joint.line(grid, block)), part);
+                    best = best.max(exponent);
                 }
-                self.sloped[tile as usize / CELLS] |= u32::from(steep) << (tile as usize % CELLS);
+                store(&mut highest, part, best);
             }
-            common += f64::from(few_common.sum());
-            soft += f64::from(few_soft.sum());
+            let here = (grid.columns - block.column).min(BLOCK);
+            self.ranked.extend(highest[..here].iter().map(|&x| ordered(x)));
         }
-        // Cells that were not summed are at the floor, and alike.
-        let [both, hard, marked, lit_cells] = [both.sum(), hard.sum(), marked.sum(), lit_cells.sum()];
-        let idle_marked = grid.marked as f64 - f64::from(marked);
-        let idle = grid.cells as f64 - f64::from(lit_cells);
-        let floor = f64::from(scale.epsilon_sq.sqrt()) + f64::from(scale.soft_floor);
-        let idle_soft = 1.0 / (1.0 + ((centre - floor.log2()) / question.softness).exp2());
-        mask.common = common + idle_soft * idle_marked;
-        mask.union = soft + idle_soft * idle + grid.marked as f64 - mask.common;
-        mask.both = both as usize;
-        mask.either = hard as usize + grid.marked - mask.both;
-        mask
+        let Some(last) = self.ranked.len().checked_sub(1) else { return 0.0 };
+        let (lower, _) = place(last, 100.0 - question.tau_pct);
+        let (_, &mut key, _) = self.ranked.select_nth_unstable(lower);
+        f64::from(unordered(key))
     }
 
-    /// Turns the sums into w S*/|S|² (or w/Σ(AK)² where the sum is incoherent), w = ∂L/∂ln|S|.
+    /// Block by block: which joints matter to which tiles, and the sum of their returns there.
     #[inline(always)]
-    pub(super) fn weigh<S: Simd, const COHERENT: bool>(
-        &mut self,
-        simd: S,
-        question: &Question<'_>,
-        mask: &Mask,
-        factor: f64,
-    ) {
-        let grid = question.tiling;
-        let inside = splat(simd, (-factor / mask.union) as f32);
-        let outside = splat(simd, (factor * mask.common / (mask.union * mask.union)) as f32);
-        for (block, &tiles) in self.sloped.iter().enumerate() {
-            for tile in bits(tiles) {
-                let cells = cells((block * CELLS + tile) as u32);
-                let target = &grid.target[cells.clone()];
-                let (re, im, soft) = (&mut self.re[cells.clone()], &mut self.im[cells.clone()], &self.soft[cells]);
-                for part in 0..Self::parts::<S>() {
-                    let by_m = lanes(simd, target, part).choose(splat(simd, 0.5), inside, outside);
-                    let weight = lanes(simd, soft, part) * by_m;
-                    if COHERENT {
-                        store(re, part, lanes(simd, re, part) * weight);
-                        store(im, part, lanes(simd, im, part) * weight);
-                    } else {
-                        store(re, part, weight);
+    pub(super) fn sum<S: Simd, const COHERENT: bool>(&mut self, simd: S, grid: &Tiling, scale: &Scale) {
+        let Self { joints, present, strips, ends, sums, power, soft, lit_bits, lit, ranked, .. } = self;
+        for joint in joints.iter_mut() {
+            joint.reach(simd, grid, scale.cut + scale.log2 as f32, scale.log2);
+        }
+        let tiles = grid.blocks.len() * BLOCK;
+        sums.resize(tiles, [Cells::ZERO; 2]);
+        power.resize(tiles, Cells::ZERO);
+        soft.resize(tiles, Cells::ZERO);
+        ranked.reserve((tiles * CELLS).saturating_sub(ranked.len()));
+        for list in [&mut *lit_bits, &mut *ends] {
+            list.clear();
+            list.reserve(grid.blocks.len());
+        }
+        lit.clear();
+        lit.reserve(tiles);
+        // Room to grow, for the number of strips drifts while a fit moves. Memory that is not touched costs nothing.
+        let (used, most) = (strips.len(), joints.len() * grid.blocks.len());
+        if strips.capacity() < most.min(used + used / 2 + 16) {
+            strips.reserve_exact(most.min(4 * used + 64) - used);
+        }
+        strips.clear();
+        present.reserve(joints.len());
+        self.highest = f32::MIN;
+        let bounds = Bounds::new(simd, scale, joints.len());
+        for (index, block) in grid.blocks.iter().enumerate() {
+            if block.column == 0 {
+                present.clear();
+                present.extend((0..joints.len() as u32).filter(|&joint| joints[joint as usize].reaches(grid, block)));
+            }
+            let mut tiles_lit = 0;
+            if !present.is_empty() {
+                let crest = Crest::new(simd, joints, present, grid, block);
+                let sums = &mut sums[index * BLOCK..(index + 1) * BLOCK];
+                let inside = u32::MAX >> (32 - (grid.columns - block.column).min(BLOCK));
+                for &number in present.iter() {
+                    let joint = &joints[number as usize];
+                    let line = joint.line(grid, block);
+                    let mut exponents = Sixteen::ZERO;
+                    let tiles = bounds.tiles(simd, joint, (block, &line), &crest, &mut exponents) & inside;
+                    if tiles == 0 {
+                        continue;
                     }
+                    if tiles_lit == 0 {
+                        clear(simd, sums);
+                    }
+                    let at = (block, &line);
+                    let strip = joint.strip::<S, COHERENT>(simd, at, (number, tiles), &exponents);
+                    strip.add_to::<S, COHERENT>(simd, joint, at, sums);
+                    tiles_lit |= strip.bits();
+                    strips.push(strip);
+                }
+                for part in 0..tile_parts::<S>() {
+                    self.highest = self.highest.max(lanes(simd, &crest.exponent, part).largest());
                 }
             }
+            ends.push(strips.len() as u32);
+            lit_bits.push(tiles_lit);
+            lit.extend(bits(tiles_lit).map(|tile| (index * BLOCK + tile) as u32));
         }
     }
 }
 
-/// m/(1 − m) of the soft mask, (H + h)^(1/T) by that of the threshold.
-struct Odds {
-    /// 1/T
-    sharpness: f32,
-    /// 0 where it is nothing beside the threshold.
-    soft_floor: f32,
-    /// log₂ of the threshold, and 1 by its square.
-    centre: f32,
-    square: f32,
-}
-
-impl Odds {
-    fn new(softness: f64, soft_floor: f32, threshold: f64) -> Self {
-        let soft_floor = if f64::from(soft_floor) < 1e-8 * threshold { 0.0 } else { soft_floor };
-        let raised = threshold + f64::from(soft_floor);
-        Self {
-            sharpness: (1.0 / softness) as f32,
-            soft_floor,
-            centre: raised.log2() as f32,
-            square: (1.0 / (raised * raised)) as f32,
+#[inline(always)]
+fn clear<S: Simd>(simd: S, sums: &mut [Pair]) {
+    for sum in sums.as_flattened_mut() {
+        for part in 0..cell_parts::<S>() {
+            store(sum, part, splat(simd, 0.0));
         }
     }
-
-    /// The odds where H² is `power`, and these times d ln(H + h)/d ln H by H².
-    #[inline(always)]
-    fn at<S: Simd>(&self, simd: S, power: Lanes<S>) -> [Lanes<S>; 2] {
-        let of = |x: f32| splat(simd, x);
-        if self.soft_floor == 0.0 && self.sharpness == 2.0 {
-            // T = ½ takes no powers.
-            let (odds, most) = (power * of(self.square), of(ODDS.exp2()));
-            return [odds.min(most), odds.choose(most, of(0.0), of(self.square))];
-        }
-        let h = power.sqrt();
-        let raised = h + of(self.soft_floor);
-        let odds = ((raised.log2() - of(self.centre)) * of(self.sharpness)).min(of(ODDS)).max(of(-ODDS)).exp2();
-        [odds, odds / (raised * h)]
-    }
-}
-
-/// The value of a rank, counted from the strongest, among floats as bits, and the next above it (NaN where there is none).
-fn order(ranked: &mut [u32], rank: usize) -> Option<[f32; 2]> {
-    let from_below = ranked.len().checked_sub(rank + 1)?;
-    let (_, &mut lower, stronger) = ranked.select_nth_unstable(from_below);
-    let upper = stronger.iter().copied().min();
-    Some([f32::from_bits(lower), upper.map_or(f32::NAN, f32::from_bits)])
 }

@@ -1,0 +1,232 @@
+//! H in the tiles, its percentile, the mask and its slope.
+
+use super::strip::bits;
+use super::{
+    BLOCK, FAINTEST, Lanes, Mask, NO_SLOPE, Question, Scale, Simd, Threshold, Tiles, between, cell_parts, lanes, place,
+    splat, store,
+};
+
+/// The square of the threshold is looked for between these multiples of the last one.
+const LEVELS: [f64; 6] = [0.06, 0.5, 0.93, 1.07, 2.0, 16.0];
+/// log₂ of m/(1 − m) is cut off here, both ways; there is no slope so far up.
+const ODDS: f32 = 60.0;
+/// Tiles whose soft masks are added up in single precision.
+const FEW: usize = 64;
+
+impl Tiles {
+    /// H² of every cell that is summed, and the percentile of H over all cells.
+    #[inline(always)]
+    pub(super) fn threshold<S: Simd, const COHERENT: bool>(
+        &mut self,
+        simd: S,
+        question: &Question<'_>,
+        scale: &Scale,
+    ) -> Threshold {
+        let grid = question.tiling;
+        let square = self.last.map_or(f64::NAN, |last| (2.0 * (last - scale.log2)).exp2());
+        let levels = LEVELS.map(|level| (level * square) as f32);
+        let (zero, one, faint) = (splat(simd, 0.0), splat(simd, 1.0), splat(simd, FAINTEST.exp2()));
+        let mut above = [zero; LEVELS.len()];
+        for &tile in &self.lit {
+            let tile = tile as usize;
+            let (target, [re, im], power) = (&grid.target[tile], &self.sums[tile], &mut self.power[tile]);
+            for part in 0..cell_parts::<S>() {
+                let (re, im) = (lanes(simd, re, part), lanes(simd, im, part));
+                let square = if COHERENT {
+                    // What is too faint to be squared is nothing beside the threshold.
+                    let (re, im) = (re.abs().max(faint), im.abs().max(faint));
+                    re.mul_add(re, im * im)
+                } else {
+                    re
+                };
+                let value = square + splat(simd, scale.epsilon_sq);
+                // What lies beyond the box ranks below all.
+                let value = lanes(simd, target, part).choose(splat(simd, -0.5), value, splat(simd, -1.0));
+                store(power, part, value);
+                for (above, level) in above.iter_mut().zip(levels) {
+                    *above += value.choose(splat(simd, level), one, zero);
+                }
+            }
+        }
+        let last = grid.cells.saturating_sub(1);
+        let (lower_index, weight) = place(last, 100.0 - question.tau_pct);
+        // Counted from the strongest.
+        let rank = last - lower_index;
+        let mut counted = [0; LEVELS.len()];
+        for (count, above) in counted.iter_mut().zip(above) {
+            *count = above.sum() as usize;
+        }
+        let counted = || levels.into_iter().zip(counted);
+        // With its upper neighbour.
+        let low = counted().rev().find(|&(_, above)| above > rank).map_or(-0.5, |(level, _)| level);
+        let (high, above) = counted().find(|&(level, above)| level > low && above < rank).unwrap_or((f32::MAX, 0));
+        self.between(simd, [low, high]);
+        let found = order(&mut self.ranked, rank - above);
+        // Where only the upper neighbour is summed, the lower one is nothing beside it.
+        let split = || {
+            let least = self.ranked.iter().copied().min().filter(|_| self.ranked.len() == rank && weight > 0.0);
+            least.map(|upper| [scale.epsilon_sq, f32::from_bits(upper)])
+        };
+        let found = found.or_else(split);
+        let among_lit = found.is_some();
+        let [lower, upper] = found.unwrap_or([scale.epsilon_sq; 2]);
+        let upper = if upper.is_nan() { lower } else { upper };
+        let value = between(f64::from(lower).sqrt(), f64::from(upper).sqrt(), weight);
+        Threshold { lower, value, log2: value.log2() + scale.log2, among_lit }
+    }
+
+    /// Lists the squares in (low, high] as what is ranked.
+    #[inline(always)]
+    fn between<S: Simd>(&mut self, simd: S, [low, high]: [f32; 2]) {
+        self.ranked.clear();
+        for &tile in &self.lit {
+            let power = &self.power[tile as usize];
+            let mut any = false;
+            for part in 0..cell_parts::<S>() {
+                let value = lanes(simd, power, part);
+                any |= (value - splat(simd, low)).min(splat(simd, high) - value).any_positive();
+            }
+            if any {
+                self.ranked.extend(power.iter().filter(|&&x| x > low && x <= high).map(|x| x.to_bits()));
+            }
+        }
+    }
+
+    /// The soft mask: its sums, and a cell's m(1 − m)/|S|² · d ln(H + h)/d ln|S|.
+    #[inline(always)]
+    pub(super) fn mask<S: Simd, const COHERENT: bool>(
+        &mut self,
+        simd: S,
+        question: &Question<'_>,
+        scale: &Scale,
+        threshold: &Threshold,
+    ) -> Mask {
+        let grid = question.tiling;
+        let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
+        let flat = splat(simd, (f64::from(NO_SLOPE) * question.softness) as f32);
+        let centre = (threshold.value + f64::from(scale.soft_floor)).log2();
+        let odds = Odds::new(question.softness, scale.soft_floor, threshold.value);
+        self.sloped.clear();
+        self.sloped.resize(self.lit_bits.len(), 0);
+        let mut mask = Mask::default();
+        let (mut common, mut soft) = (0.0, 0.0);
+        let (mut both, mut hard, mut marked, mut lit_cells) = (zero, zero, zero, zero);
+        for tiles in self.lit.chunks(FEW) {
+            let (mut few_common, mut few_soft) = (zero, zero);
+            for &tile in tiles {
+                let tile = tile as usize;
+                let (target, power, out) = (&grid.target[tile], &self.power[tile], &mut self.soft[tile]);
+                let mut steep = false;
+                for part in 0..cell_parts::<S>() {
+                    let (target, power) = (lanes(simd, target, part), lanes(simd, power, part));
+                    let inside = target.choose(splat(simd, -0.5), one, zero);
+                    let b = target.max(zero);
+                    let [odds, by_power] = odds.at(simd, power.max(splat(simd, f32::MIN_POSITIVE)));
+                    let share = one / (one + odds);
+                    let m = odds * share * inside;
+                    few_common += m * b;
+                    few_soft += m;
+                    steep |= (m * share - flat).any_positive();
+                    store(out, part, by_power * share * share * inside);
+                    let sim = power.choose(splat(simd, threshold.lower), inside, zero);
+                    both += sim * b;
+                    hard += sim;
+                    marked += b;
+                    lit_cells += inside;
+                }
+                self.sloped[tile / BLOCK] |= u32::from(steep) << (tile % BLOCK);
+            }
+            common += f64::from(few_common.sum());
+            soft += f64::from(few_soft.sum());
+        }
+        // Cells that were not summed are at the floor, and alike.
+        let [both, hard, marked, lit_cells] = [both.sum(), hard.sum(), marked.sum(), lit_cells.sum()];
+        let idle_marked = grid.marked as f64 - f64::from(marked);
+        let idle = grid.cells as f64 - f64::from(lit_cells);
+        let floor = f64::from(scale.epsilon_sq.sqrt()) + f64::from(scale.soft_floor);
+        let idle_soft = 1.0 / (1.0 + ((centre - floor.log2()) / question.softness).exp2());
+        mask.common = common + idle_soft * idle_marked;
+        mask.union = soft + idle_soft * idle + grid.marked as f64 - mask.common;
+        mask.both = both as usize;
+        mask.either = hard as usize + grid.marked - mask.both;
+        mask
+    }
+
+    /// Turns the sums into w S*/|S|² (or w/Σ(AK)² where the sum is incoherent), w = ∂L/∂ln|S|.
+    #[inline(always)]
+    pub(super) fn weigh<S: Simd, const COHERENT: bool>(
+        &mut self,
+        simd: S,
+        question: &Question<'_>,
+        mask: &Mask,
+        factor: f64,
+    ) {
+        let grid = question.tiling;
+        let inside = splat(simd, (-factor / mask.union) as f32);
+        let outside = splat(simd, (factor * mask.common / (mask.union * mask.union)) as f32);
+        for (block, &tiles) in self.sloped.iter().enumerate() {
+            for tile in bits(tiles) {
+                let tile = block * BLOCK + tile;
+                let (target, [re, im], soft) = (&grid.target[tile], &mut self.sums[tile], &self.soft[tile]);
+                for part in 0..cell_parts::<S>() {
+                    let by_m = lanes(simd, target, part).choose(splat(simd, 0.5), inside, outside);
+                    let weight = lanes(simd, soft, part) * by_m;
+                    if COHERENT {
+                        let (weighed_re, weighed_im) = (lanes(simd, re, part) * weight, lanes(simd, im, part) * weight);
+                        store(re, part, weighed_re);
+                        store(im, part, weighed_im);
+                    } else {
+                        store(re, part, weight);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// m/(1 − m) of the soft mask, (H + h)^(1/T) by that of the threshold.
+struct Odds {
+    /// 1/T
+    sharpness: f32,
+    /// 0 where it is nothing beside the threshold.
+    soft_floor: f32,
+    /// log₂ of the threshold, and 1 by its square.
+    centre: f32,
+    square: f32,
+}
+
+impl Odds {
+    fn new(softness: f64, soft_floor: f32, threshold: f64) -> Self {
+        let soft_floor = if f64::from(soft_floor) < 1e-8 * threshold { 0.0 } else { soft_floor };
+        let raised = threshold + f64::from(soft_floor);
+        Self {
+            sharpness: (1.0 / softness) as f32,
+            soft_floor,
+            centre: raised.log2() as f32,
+            square: (1.0 / (raised * raised)) as f32,
+        }
+    }
+
+    /// The odds where H² is `power`, and these times d ln(H + h)/d ln H by H².
+    #[inline(always)]
+    fn at<S: Simd>(&self, simd: S, power: Lanes<S>) -> [Lanes<S>; 2] {
+        let of = |x: f32| splat(simd, x);
+        if self.soft_floor == 0.0 && self.sharpness == 2.0 {
+            // T = ½ takes no powers.
+            let (odds, most) = (power * of(self.square), of(ODDS.exp2()));
+            return [odds.min(most), odds.choose(most, of(0.0), of(self.square))];
+        }
+        let h = power.sqrt();
+        let raised = h + of(self.soft_floor);
+        let odds = ((raised.log2() - of(self.centre)) * of(self.sharpness)).min(of(ODDS)).max(of(-ODDS)).exp2();
+        [odds, odds / (raised * h)]
+    }
+}
+
+/// The value of a rank, counted from the strongest, among floats as bits, and the next above it (NaN where there is none).
+fn order(ranked: &mut [u32], rank: usize) -> Option<[f32; 2]> {
+    let from_below = ranked.len().checked_sub(rank + 1)?;
+    let (_, &mut lower, stronger) = ranked.select_nth_unstable(from_below);
+    let upper = stronger.iter().copied().min();
+    Some([f32::from_bits(lower), upper.map_or(f32::NAN, f32::from_bits)])
+}
