@@ -4,6 +4,7 @@
 //! powers of Δ = b − b_j. Adjoints are named after what they belong to (`d` is ∂L/∂d); those of directions and angles
 //! are collected first and folded into ∂L/∂p at the end, so that each formula of `splat.rs` appears once.
 
+use super::form::Form;
 use super::splat::{Row, Scene, Splat, Trace, feature_at};
 use crate::body::{Group, Pppr};
 use crate::geometry::{Mat3, Vec3, add_scaled, dot, mat_mul, mat_t_vec, mat_vec, norm, scale, transpose};
@@ -58,20 +59,20 @@ struct Geometry {
     radial: f64,
 }
 
-/// Adds the gradient that `moments` imply to joint `joint` of `gradient`; SPEC section 3.
+/// Adds the gradient that `moments` imply to joint `joint` of `gradient`, but for shape, whose adjoint ∂L/∂(R S Sᵀ Rᵀ) is
+/// added to `covariance_bar`; SPEC section 3.
 pub(super) fn pull_back(
     scene: &Scene<'_>,
-    splat: &Splat,
-    trace: &Trace,
+    (form, splat, trace): (&Form, &Splat, &Trace),
     moments: &Moments,
     joint: usize,
-    gradient: &mut Pppr,
+    (gradient, covariance_bar): (&mut Pppr, &mut Mat3),
 ) {
     let mut geometry = Geometry::default();
     let (c_bar, b_bar) = gaussian(splat, moments);
     let blurred_bar = covariance(&mut geometry, scene, trace, &c_bar, splat.dims);
     coordinates(&mut geometry, scene, trace, b_bar, splat.dims);
-    let omega_mean_bar = ramp(&mut geometry, scene, trace, moments, splat.dims);
+    let omega_mean_bar = ramp(&mut geometry, scene, (form, trace), moments, splat.dims);
     phases(&mut geometry, scene, trace, moments.q);
     if scene.config.operators.attenuation {
         geometry.d -= 4.0 * moments.r / trace.seen.d.value;
@@ -82,8 +83,11 @@ pub(super) fn pull_back(
     let pose = &scene.view.pose;
     add_to(gradient.joint_mut(Group::Position, joint), &mat_t_vec(&pose.rotation, p_bar));
     add_to(gradient.joint_mut(Group::Velocity, joint), &mat_t_vec(&pose.rotation, v_bar));
-    gradient.joint_mut(Group::Beta, joint)[0] += moments.r * (1.0 - trace.opacity);
-    shape(scene, trace, &blurred_bar, joint, gradient);
+    gradient.joint_mut(Group::Beta, joint)[0] += moments.r * (1.0 - form.opacity);
+    let (bar, rotation) = (mat_mul(&blurred_bar, &pose.rotation), transpose(&pose.rotation));
+    for (sum, row) in covariance_bar.iter_mut().zip(mat_mul(&rotation, &bar)) {
+        add_scaled(sum, row, 1.0);
+    }
     features(moments, omega_mean_bar, gradient.joint_mut(Group::Omega, joint));
 }
 
@@ -135,7 +139,13 @@ fn coordinates(geometry: &mut Geometry, scene: &Scene<'_>, trace: &Trace, b_bar:
 }
 
 /// κ_k = ω̄ v·D_k; returns ∂L/∂ω̄.
-fn ramp(geometry: &mut Geometry, scene: &Scene<'_>, trace: &Trace, moments: &Moments, dims: usize) -> f64 {
+fn ramp(
+    geometry: &mut Geometry,
+    scene: &Scene<'_>,
+    (form, trace): (&Form, &Trace),
+    moments: &Moments,
+    dims: usize,
+) -> f64 {
     if !scene.config.operators.doppler {
         return 0.0;
     }
@@ -144,8 +154,8 @@ fn ramp(geometry: &mut Geometry, scene: &Scene<'_>, trace: &Trace, moments: &Mom
         let row: &Row = &trace.rows[k];
         let kappa_bar = moments.q_delta[k];
         omega_mean_bar += kappa_bar * dot(trace.velocity, row.displacement);
-        add_scaled(&mut geometry.v, row.displacement, kappa_bar * trace.omega_mean);
-        let displacement_bar = scale(trace.velocity, kappa_bar * trace.omega_mean * row.step);
+        add_scaled(&mut geometry.v, row.displacement, kappa_bar * form.omega_mean);
+        let displacement_bar = scale(trace.velocity, kappa_bar * form.omega_mean * row.step);
         let along = dot(displacement_bar, row.direction);
         geometry.direction(trace, axis, scale(displacement_bar, row.arm / row.slope));
         geometry.arm(axis.kind, along / row.slope);
@@ -289,40 +299,6 @@ fn unmove(scene: &Scene<'_>, unmoved: Vec3, p_bar: Vec3) -> Vec3 {
         add_scaled(&mut bar, radial, dot(p_bar, unmoved) * factor_slope);
     }
     bar
-}
-
-/// Σ' = M Mᵀ + …, M = R_view R(q/‖q‖) diag(e^log_scale).
-fn shape(scene: &Scene<'_>, trace: &Trace, blurred_bar: &Mat3, joint: usize, gradient: &mut Pppr) {
-    let view_bar = mat_mul(blurred_bar, &trace.spread);
-    let spread_bar = mat_mul(&transpose(&scene.view.pose.rotation), &view_bar).map(|row| scale(row, 2.0));
-    let log_scale = gradient.joint_mut(Group::LogScale, joint);
-    for k in 0..3 {
-        let scale_bar: f64 = (0..3).map(|i| trace.rotation[i][k] * spread_bar[i][k]).sum();
-        log_scale[k] += scale_bar * trace.scale[k];
-    }
-    let rotation_bar: Mat3 = std::array::from_fn(|i| std::array::from_fn(|k| spread_bar[i][k] * trace.scale[k]));
-    add_to(gradient.joint_mut(Group::Rotation, joint), &quaternion(trace.quaternion, &rotation_bar));
-}
-
-/// ∂L/∂q through the normalisation; the zero quaternion stands for the identity and has no gradient.
-fn quaternion(q: [f64; 4], m: &Mat3) -> [f64; 4] {
-    let length = q.iter().map(|c| c * c).sum::<f64>().sqrt();
-    if length == 0.0 {
-        return [0.0; 4];
-    }
-    let [w, x, y, z] = q.map(|c| c / length);
-    let unit_bar = [
-        2.0 * (x * (m[2][1] - m[1][2]) + y * (m[0][2] - m[2][0]) + z * (m[1][0] - m[0][1])),
-        2.0 * (w * (m[2][1] - m[1][2]) + y * (m[0][1] + m[1][0]) + z * (m[0][2] + m[2][0])
-            - 2.0 * x * (m[1][1] + m[2][2])),
-        2.0 * (w * (m[0][2] - m[2][0]) + x * (m[0][1] + m[1][0]) + z * (m[1][2] + m[2][1])
-            - 2.0 * y * (m[0][0] + m[2][2])),
-        2.0 * (w * (m[1][0] - m[0][1]) + x * (m[0][2] + m[2][0]) + y * (m[1][2] + m[2][1])
-            - 2.0 * z * (m[0][0] + m[1][1])),
-    ];
-    let along = w * unit_bar[0] + x * unit_bar[1] + y * unit_bar[2] + z * unit_bar[3];
-    let unit = [w, x, y, z];
-    std::array::from_fn(|i| (unit_bar[i] - unit[i] * along) / length)
 }
 
 /// Spectrum exp(ω(t) − ω̄) and the mean ω̄.

@@ -2,6 +2,7 @@
 
 use super::Precision;
 use super::adjoint::{Moments, pull_back};
+use super::form::Form;
 use super::kernel::Kernel;
 use super::percentile::percentile;
 use super::region::Region;
@@ -11,6 +12,7 @@ use super::splat::{Scene, Splat, Trace};
 use super::tiles::{self, Question, Tiles, Tiling};
 use crate::body::Pppr;
 use crate::config::FitConfig;
+use crate::geometry::Mat3;
 
 /// h of SPEC section 4: the floor in the logarithms of the soft mask.
 pub(super) const SOFT_FLOOR: f64 = 1e-30;
@@ -56,29 +58,35 @@ pub(super) struct Aim {
     pub tiling: Tiling,
 }
 
-/// Evaluates L_view at `aim`, and adds its gradient times `scale` to `gradient` where one is given: (`scale`, `gradient`).
+/// Where a view adds its gradient, times `factor`.
+pub(super) struct Slopes<'a> {
+    pub factor: f64,
+    pub gradient: &'a mut Pppr,
+    /// ∂L/∂(R S Sᵀ Rᵀ), a joint.
+    pub covariance: &'a mut [Mat3],
+}
+
+/// Evaluates L_view at `aim`, and its gradient where it is asked for; `forms` are those of `params`.
 pub(super) fn evaluate(
     scene: &Scene<'_>,
     precision: Precision,
-    params: &Pppr,
+    (params, forms): (&Pppr, &[Form]),
     aim: &Aim,
-    gradient: Option<(f64, &mut Pppr)>,
+    slopes: Option<Slopes<'_>>,
     workspace: &mut Workspace,
 ) -> ViewAnswer {
     let joints = params.shape().total_joints();
     let Workspace { splats, traces, moments, tiles } = workspace;
     splats.resize_with(joints, Splat::default);
     traces.clear();
-    for (joint, slot) in splats.iter_mut().enumerate() {
-        let (splat, trace) = scene.splat(params, joint, std::mem::take(&mut slot.spectrum));
-        *slot = splat;
-        traces.push(trace);
+    for ((joint, splat), form) in splats.iter_mut().enumerate().zip(forms) {
+        traces.push(scene.splat(params, joint, form, splat));
     }
     moments.resize_with(joints, Moments::default);
     for moments in moments.iter_mut() {
         moments.clear(&scene.view.axes);
     }
-    let scale = gradient.as_ref().map(|(scale, _)| *scale);
+    let scale = slopes.as_ref().map(|slopes| slopes.factor);
     let answer = match precision {
         Precision::F64 => plain::<f64>(scene, splats, aim, scale, moments),
         Precision::F32 if tiles::reaches(scene.config.softness) => {
@@ -88,9 +96,10 @@ pub(super) fn evaluate(
         }
         Precision::F32 => plain::<f32>(scene, splats, aim, scale, moments),
     };
-    if let Some((_, gradient)) = gradient {
-        for (joint, moments) in moments.iter().enumerate() {
-            pull_back(scene, &splats[joint], &traces[joint], moments, joint, gradient);
+    if let Some(Slopes { gradient, covariance, .. }) = slopes {
+        for (joint, (moments, bar)) in moments.iter().zip(covariance).enumerate() {
+            let seen = (&forms[joint], &splats[joint], &traces[joint]);
+            pull_back(scene, seen, moments, joint, (&mut *gradient, bar));
         }
     }
     answer

@@ -11,6 +11,7 @@ mod convergence;
 mod em;
 mod fill;
 mod fitter;
+mod form;
 mod init;
 mod kernel;
 mod kinematic;

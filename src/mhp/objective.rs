@@ -1,6 +1,7 @@
 //! L(Θ) and ∂L/∂Θ; SPEC section 4.
 
-use super::em::{self, Aim, ViewAnswer, Workspace};
+use super::em::{self, Aim, Slopes, ViewAnswer, Workspace};
+use super::form::Form;
 use super::init::anchors;
 use super::percentile::percentile;
 use super::region::{self, Region};
@@ -9,7 +10,7 @@ use super::tiles::Tiling;
 use super::{Evaluation, FitError, Precision, Problem, kinematic};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::{Vec3, add, add_scaled, dot, scale, sub};
+use crate::geometry::{Mat3, Vec3, add, add_scaled, dot, scale, sub};
 use std::sync::Arc;
 
 /// The objective of one fit: its EM region and the mask of H_ori are fixed by the initial parameters.
@@ -22,6 +23,9 @@ pub struct Objective {
     /// Each view's region with B_ori over its cells.
     aims: Vec<Aim>,
     workspaces: Vec<Workspace>,
+    /// Scratch a joint: its form, and ∂L/∂(R S Sᵀ Rᵀ).
+    forms: Vec<Form>,
+    covariance: Vec<Mat3>,
     initial: Pppr,
     /// Where the frames around say that each person's middle is, m; empty where they say nothing.
     anchors: Vec<Vec3>,
@@ -70,6 +74,8 @@ impl Objective {
             regions,
             aims,
             workspaces,
+            forms: Vec::new(),
+            covariance: Vec::new(),
             initial: initial.clone(),
             anchors: Vec::new(),
             warnings,
@@ -140,13 +146,20 @@ impl Objective {
         iou.clear();
         let views = self.problem.views.len() as f64;
         let mut em = 0.0;
-        let mut workspaces = std::mem::take(&mut self.workspaces);
-        for (index, workspace) in workspaces.iter_mut().enumerate() {
-            let answer = self.view(index, params, Some((1.0 / views, &mut *em_gradient)), workspace);
+        let Self { problem, config, precision, aims, workspaces, forms, covariance, .. } = self;
+        Form::all(params, forms);
+        covariance.clear();
+        covariance.resize(forms.len(), [[0.0; 3]; 3]);
+        for ((view, aim), workspace) in problem.views.iter().zip(&*aims).zip(workspaces) {
+            let scene = Scene { radar: &problem.radar, view, config };
+            let slopes = Slopes { factor: 1.0 / views, gradient: &mut *em_gradient, covariance: &mut *covariance };
+            let answer = em::evaluate(&scene, *precision, (params, forms), aim, Some(slopes), workspace);
             em += answer.loss / views;
             iou.push(answer.iou);
         }
-        self.workspaces = workspaces;
+        for (joint, (form, bar)) in forms.iter().zip(covariance).enumerate() {
+            form.pull_back(bar, joint, em_gradient);
+        }
         *terms = kinematic::evaluate(&self.problem.skeleton, &self.config, params, gradient);
         terms.em = em;
         for group in Group::ALL {
@@ -163,20 +176,13 @@ impl Objective {
 
     /// L_EM alone, without its gradient.
     pub fn em_loss(&self, params: &Pppr) -> f64 {
-        let mut workspace = Workspace::default();
-        let losses = (0..self.aims.len()).map(|index| self.view(index, params, None, &mut workspace).loss);
+        let (mut workspace, mut forms) = (Workspace::default(), Vec::new());
+        Form::all(params, &mut forms);
+        let losses = self.problem.views.iter().zip(&self.aims).map(|(view, aim)| {
+            let scene = Scene { radar: &self.problem.radar, view, config: &self.config };
+            em::evaluate(&scene, self.precision, (params, &forms), aim, None, &mut workspace).loss
+        });
         losses.sum::<f64>() / self.problem.views.len() as f64
-    }
-
-    fn view(
-        &self,
-        index: usize,
-        params: &Pppr,
-        gradient: Option<(f64, &mut Pppr)>,
-        workspace: &mut Workspace,
-    ) -> ViewAnswer {
-        let scene = Scene { radar: &self.problem.radar, view: &self.problem.views[index], config: &self.config };
-        em::evaluate(&scene, self.precision, params, &self.aims[index], gradient, workspace)
     }
 }
 

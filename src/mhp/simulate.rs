@@ -3,7 +3,8 @@
 use super::kernel::Kernel;
 use super::region::Region;
 use super::scalar::Real;
-use super::splat::{Scene, Spectra, Splat};
+use super::form::Form;
+use super::splat::{Scene, Splat};
 use super::tiles::{Tiles, Tiling};
 use super::{Precision, Problem};
 use crate::body::Pppr;
@@ -25,7 +26,12 @@ fn ln_hypot(a: f64, b: f64) -> f64 {
 
 /// Every joint of `params` in one view.
 pub(super) fn splats(scene: &Scene<'_>, params: &Pppr) -> Vec<Splat> {
-    (0..params.shape().total_joints()).map(|joint| scene.splat(params, joint, Spectra::default()).0).collect()
+    let of = |joint: usize| {
+        let mut splat = Splat::default();
+        scene.splat(params, joint, &Form::new(params, joint), &mut splat);
+        splat
+    };
+    (0..params.shape().total_joints()).map(of).collect()
 }
 
 /// √(S² + ε²) from ln S, in linear f64: values that differ by less than a step of ln H near the floor stay apart, and the

@@ -3,9 +3,10 @@
 //! What is kept is what the per-cell kernel needs ([`Splat`]) and what the derivative needs on the way back
 //! ([`Seen`], [`Row`]); `adjoint.rs` reads like this file from bottom to top.
 
+use super::form::Form;
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::{Mat3, Vec3, add_scaled, dot, mat_mul, mat_vec, norm, rotation_from_quaternion, scale};
+use crate::geometry::{Mat3, Vec3, add_scaled, dot, mat_mul, mat_vec, norm, scale};
 use crate::radar::{Axis, AxisKind, RadarConfig, SPEED_OF_LIGHT, Spacing, View};
 use std::f64::consts::{PI, TAU};
 
@@ -13,6 +14,8 @@ use std::f64::consts::{PI, TAU};
 pub(super) const DISTANCE_FLOOR_M: f64 = 0.01;
 /// Cosines that stand in a denominator are held above this.
 pub(super) const COSINE_FLOOR: f64 = 0.05;
+/// ln 2π
+const LN_TAU: f64 = 1.837_877_066_409_345_3;
 
 /// A quantity held above a floor; its gradient is zero while it is.
 #[derive(Debug, Clone, Copy)]
@@ -190,18 +193,10 @@ pub(super) struct Trace {
     pub rows: [Row; 3],
     /// v in the view frame, m/s.
     pub velocity: Vec3,
-    pub opacity: f64,
-    /// (w, x, y, z) as stored.
-    pub quaternion: [f64; 4],
-    pub rotation: Mat3,
-    pub scale: Vec3,
-    /// R_view R S.
-    pub spread: Mat3,
     /// Σ', m².
     pub blurred: Mat3,
     pub w_az: f64,
     pub w_el: f64,
-    pub omega_mean: f64,
 }
 
 /// A view, a radar and a configuration: everything that is the same for all joints.
@@ -244,36 +239,33 @@ impl Scene<'_> {
         (skin.value / d.value, d, skin)
     }
 
-    /// Projects flat joint `joint` of `params` into this view; `spectrum` is overwritten and becomes the splat's.
-    pub(super) fn splat(&self, params: &Pppr, joint: usize, mut spectrum: Spectra) -> (Splat, Trace) {
+    /// Projects flat joint `joint` of `params`, which has this form, into this view: overwrites `splat`.
+    pub(super) fn splat(&self, params: &Pppr, joint: usize, form: &Form, splat: &mut Splat) -> Trace {
         let pose = &self.view.pose;
         let unmoved = pose.view_from_world(params.position(joint));
         let seen = Seen::new(scale(unmoved, self.surface_factor(unmoved).0));
         let velocity = mat_vec(&pose.rotation, params.velocity(joint));
         let radial = dot(velocity, seen.u);
         let omega = params.joint(Group::Omega, joint);
-        let omega_mean = omega.iter().sum::<f64>() / omega.len().max(1) as f64;
 
         let psf = &self.view.psf;
-        let (rotation, scales) = (rotation_from_quaternion(params.rotation(joint)), params.scale(joint));
-        let world_spread: Mat3 = std::array::from_fn(|i| std::array::from_fn(|k| rotation[i][k] * scales[k]));
-        let spread = mat_mul(&pose.rotation, &world_spread);
+        let spread = mat_mul(&pose.rotation, &form.spread);
         let w_az = seen.rho.value * psf.azimuth_rad / seen.cos_az_floored.value;
         let w_el = seen.d.value * psf.elevation_rad / seen.cos_el_floored.value;
         let blurred = blurred(&spread, &seen, psf.range_m, w_az, w_el);
 
         let dims = self.view.axes.len().min(3);
         let (mut rows, mut bin, mut kappa) = ([Row::default(); 3], [0.0; 3], [0.0; 3]);
-        spectrum.iter_mut().for_each(Vec::clear);
+        splat.spectrum.iter_mut().for_each(Vec::clear);
         let mut covariance = [[0.0; 3]; 3];
         for (k, axis) in self.view.axes.iter().take(dims).enumerate() {
             rows[k] = self.row(&seen, axis);
             bin[k] = axis.bin(if rows[k].seen { seen.coordinate(axis, radial) } else { 0.0 });
             if self.config.operators.doppler {
-                kappa[k] = omega_mean * dot(velocity, rows[k].displacement);
+                kappa[k] = form.omega_mean * dot(velocity, rows[k].displacement);
             }
             if axis.kind == AxisKind::Doppler {
-                spectrum[k].extend(spectrum_of(omega, omega_mean, axis.bins));
+                splat.spectrum[k].extend(spectrum_of(omega, form.omega_mean, axis.bins));
             }
             covariance[k][k] = self.own_variance(axis) + 1.0 / 12.0;
         }
@@ -284,36 +276,12 @@ impl Scene<'_> {
         }
         let (precision, ln_det) = inverse_and_ln_det(&covariance, dims);
 
-        let opacity = params.opacity(joint);
         let attenuation =
             if self.config.operators.attenuation { 4.0 * (self.radar.r_max_m / seen.d.value).ln() } else { 0.0 };
-        let ln_weight =
-            ln_opacity(params.joint(Group::Beta, joint)[0]) + attenuation - 0.5 * (dims as f64 * TAU.ln() + ln_det);
-        let splat = Splat {
-            dims,
-            bin,
-            precision,
-            ln_weight,
-            phase: self.phase(&seen, radial).rem_euclid(TAU),
-            kappa,
-            spectrum,
-        };
-        let trace = Trace {
-            unmoved,
-            seen,
-            rows,
-            velocity,
-            opacity,
-            quaternion: params.rotation(joint),
-            rotation,
-            scale: scales,
-            spread,
-            blurred,
-            w_az,
-            w_el,
-            omega_mean,
-        };
-        (splat, trace)
+        splat.ln_weight = form.ln_opacity + attenuation - 0.5 * (dims as f64 * LN_TAU + ln_det);
+        splat.phase = self.phase(&seen, radial).rem_euclid(TAU);
+        (splat.dims, splat.bin, splat.precision, splat.kappa) = (dims, bin, precision, kappa);
+        Trace { unmoved, seen, rows, velocity, blurred, w_az, w_el }
     }
 
     fn row(&self, seen: &Seen, axis: &Axis) -> Row {
@@ -380,11 +348,6 @@ fn spectrum_of(omega: &[f64], mean: f64, bins: usize) -> impl Iterator<Item = f6
         let upper = if t == 0.0 { 0.0 } else { at(lower + 1) * t };
         at(lower) * (1.0 - t) + upper - mean
     })
-}
-
-/// ln σ(β), exact for large |β|.
-fn ln_opacity(beta: f64) -> f64 {
-    beta.min(0.0) - (-beta.abs()).exp().ln_1p()
 }
 
 /// The inverse of a symmetric positive definite matrix (leading `dims` block) and the ln of its determinant.

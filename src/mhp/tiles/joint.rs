@@ -134,10 +134,6 @@ impl Joint {
         let (reach_y, reach_x) = (f64::from(REACH_ACROSS), f64::from(REACH_ALONG));
         let most_x = reach_x + reach_y * k21.abs();
         self.curvature = (self.half[1] * reach_y * reach_y + self.half[2] * most_x * most_x) as f32;
-        for (cell, (&x, &y)) in ALONG.iter().zip(ACROSS.iter()).enumerate() {
-            let (x, y) = (f64::from(x), f64::from(y));
-            self.quadratic[cell] = -(self.half[1] * y * y + self.half[2] * (x + k21 * y).powi(2)) as f32;
-        }
         self.tables::<S, COHERENT>(simd, grid);
         let spectrum = |k: usize| at(k).map_or(&[] as &[f64], |k| splat_of.spectrum[k].as_slice());
         self.along.fill(spectrum(2), grid.lo[2], grid.columns, ALONG_BINS, |cell| cell % ALONG_BINS);
@@ -158,11 +154,15 @@ impl Joint {
         let (across, along) = (splat(simd, self.kappa[1] as f32), splat(simd, self.kappa[2] as f32));
         let further = if COHERENT { turn(simd, ALONG_BINS as f64 * self.kappa[2]) } else { [1.0, 0.0] };
         let rise = ALONG_BINS as f32 * self.bend;
+        let (half_y, half_x) = (splat(simd, -self.half[1] as f32), splat(simd, -self.half[2] as f32));
         for part in 0..cell_parts::<S>() {
             let (x, y) = (lanes(simd, &ALONG, part), lanes(simd, &ACROSS, part));
             let none = [splat(simd, 1.0), splat(simd, 0.0)];
             let within = if COHERENT { y.mul_add(across, x * along).turn() } else { none };
-            let bump = factor(simd, lanes(simd, &self.quadratic, part));
+            let bent = y.mul_add(splat(simd, self.shear), x);
+            let quadratic = (bent * bent).mul_add(half_x, y * y * half_y);
+            store(&mut self.quadratic, part, quadratic);
+            let bump = factor(simd, quadratic);
             let gain = factor(simd, y.mul_add(splat(simd, rise * self.shear), x * splat(simd, rise)));
             for i in 0..2 {
                 store(&mut self.turn[i], part, within[i]);

@@ -115,9 +115,9 @@ const fn from_middle(stride: usize, bins: usize) -> Cells {
 /// Softest mask, T, whose reach the powers of two of f32 hold; softer ones take the plain kernel.
 const SOFTEST: f64 = 1.5;
 /// Below e^−16T of the threshold a cell neither counts nor pulls (1e-7).
-const MASK_REACH: f64 = 16.0;
+const MASK_REACH: f64 = 12.0;
 /// A joint this much weaker (in ln) than the threshold is dropped, and at least `MARGIN` under the weakest cell that counts.
-const BELOW: f64 = 16.0;
+const BELOW: f64 = 11.0;
 const MARGIN: f64 = 3.0;
 /// The guess of ln threshold may be this much too high.
 const GUESS: f64 = 2.0;
@@ -138,7 +138,7 @@ const ROOM: f64 = 8.0;
 /// log₂ of how far a map may stay under its strongest joint.
 const OUTSIDE: f64 = 30.0;
 /// m(1 − m)/T below which a tile has no slope.
-const NO_SLOPE: f32 = 1e-7;
+const NO_SLOPE: f32 = 3e-6;
 
 /// A box of cells in tiles, and B_ori over it: fixed for a fit. Sixteen tiles beside each other are a block; the last
 /// block of a row may reach beyond the box, as may the last row and column of tiles.
