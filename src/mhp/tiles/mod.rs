@@ -211,8 +211,9 @@ pub(super) struct Tiles {
     joints: Vec<Joint>,
     /// Those that reach a row.
     present: Vec<u32>,
-    /// Block by block; `ends` tells where each block's strips end.
+    /// Block by block, the first `used` of them; `ends` tells where each block's strips end.
     strips: Vec<Strip>,
+    used: usize,
     ends: Vec<u32>,
     /// log₂ of the strongest joint in any tile's middle.
     highest: f32,

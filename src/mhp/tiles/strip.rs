@@ -13,7 +13,7 @@ const GENTLE: f32 = 30.0;
 const LOWEST: f32 = -110.0;
 
 /// A joint in those of a block's tiles that it matters to, which lie side by side.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Strip {
     pub joint: u32,
     /// First of the tiles among the block's, and how many.
@@ -37,26 +37,28 @@ pub(super) fn bits(mut of: u32) -> impl Iterator<Item = usize> {
 }
 
 impl Joint {
-    /// The joint in `tiles` (a bit each) of a block and those between them, whose middles it reaches with `exponent`, log₂
-    /// relative to the view's scale.
+    /// Writes down the joint in `tiles` (a bit each) of a block and those between them, whose middles it reaches with
+    /// `exponent`, log₂ relative to the view's scale.
     #[inline(always)]
-    pub(super) fn strip<S: Simd, const COHERENT: bool>(
+    pub(super) fn lay<S: Simd, const COHERENT: bool>(
         &self,
         simd: S,
         (block, line): (&Block, &Line),
-        (joint, tiles): (u32, u32),
+        tiles: u32,
         exponent: &Sixteen,
-    ) -> Strip {
+        strip: &mut Strip,
+    ) {
         let first = tiles.trailing_zeros();
         // A tile between others costs less than what tells it from them.
         let count = 32 - tiles.leading_zeros() - first;
         let last = first + count - 1;
         let [[a, b], [c, d]] = [self.slopes(block, line, first as usize), self.slopes(block, line, last as usize)];
         let steepest = REACH_ACROSS * a.abs().max(c.abs()) + REACH_ALONG * b.abs().max(d.abs());
-        let chained = self.bounded && steepest + self.curvature < GENTLE;
-        let mut strip = Strip { joint, first, count, chained, middles: *exponent, start: [Cells::ZERO; 2] };
-        if !chained {
-            return strip;
+        (strip.first, strip.count) = (first, count);
+        strip.chained = self.bounded && steepest + self.curvature < GENTLE;
+        if !strip.chained {
+            strip.middles = *exponent;
+            return;
         }
         for part in 0..tile_parts::<S>() {
             let within = lanes(simd, exponent, part).max(splat(simd, LOWEST)).min(splat(simd, STRONGEST));
@@ -73,7 +75,6 @@ impl Joint {
             store(&mut strip.start[0], part, start[0]);
             store(&mut strip.start[1], part, start[1]);
         }
-        strip
     }
 
     /// Slopes across and along in the middle of a block's tile, log₂ a bin.

@@ -1,7 +1,7 @@
 //! A guess of the threshold, which joints matter to which tiles, and the sum of what returns there.
 
 use super::joint::Line;
-use super::strip::bits;
+use super::strip::{Strip, bits};
 use super::{
     BLOCK, Block, CELLS, Cells, Joint, LOG2_E, Lanes, Pair, Question, REACH_ACROSS, REACH_ALONG, RELATIVE, Scale, Simd, Sixteen,
     Tiles, Tiling, cell_parts, lanes, ordered, place, splat, store, tile_parts, unordered,
@@ -137,7 +137,7 @@ impl Tiles {
     /// Block by block: which joints matter to which tiles, and the sum of their returns there.
     #[inline(always)]
     pub(super) fn sum<S: Simd, const COHERENT: bool>(&mut self, simd: S, grid: &Tiling, scale: &Scale) {
-        let Self { joints, present, strips, ends, sums, power, soft, lit_bits, lit, ranked, .. } = self;
+        let Self { joints, present, strips, used, ends, sums, power, soft, lit_bits, lit, ranked, .. } = self;
         for joint in joints.iter_mut() {
             joint.reach(simd, grid, scale.cut + scale.log2 as f32, scale.log2);
         }
@@ -152,12 +152,12 @@ impl Tiles {
         }
         lit.clear();
         lit.reserve(tiles);
-        // Room to grow, for the number of strips drifts while a fit moves. Memory that is not touched costs nothing.
-        let (used, most) = (strips.len(), joints.len() * grid.blocks.len());
-        if strips.capacity() < most.min(used + used / 2 + 16) {
-            strips.reserve_exact(most.min(4 * used + 64) - used);
+        // Room to grow, for the number of strips drifts while a fit moves.
+        let room = (*used + *used / 2 + 16).min(joints.len() * grid.blocks.len());
+        if strips.len() < room {
+            strips.resize(2 * room, Strip::default());
         }
-        strips.clear();
+        *used = 0;
         present.reserve(joints.len());
         self.highest = f32::MIN;
         let bounds = Bounds::new(simd, scale, joints.len());
@@ -183,16 +183,21 @@ impl Tiles {
                         clear(simd, sums);
                     }
                     let at = (block, &line);
-                    let strip = joint.strip::<S, COHERENT>(simd, at, (number, tiles), &exponents);
+                    if *used == strips.len() {
+                        strips.push(Strip::default());
+                    }
+                    let strip = &mut strips[*used];
+                    *used += 1;
+                    strip.joint = number;
+                    joint.lay::<S, COHERENT>(simd, at, tiles, &exponents, strip);
                     strip.add_to::<S, COHERENT>(simd, joint, at, sums);
                     tiles_lit |= strip.bits();
-                    strips.push(strip);
                 }
                 for part in 0..tile_parts::<S>() {
                     self.highest = self.highest.max(lanes(simd, &crest.exponent, part).largest());
                 }
             }
-            ends.push(strips.len() as u32);
+            ends.push(*used as u32);
             lit_bits.push(tiles_lit);
             lit.extend(bits(tiles_lit).map(|tile| (index * BLOCK + tile) as u32));
         }
