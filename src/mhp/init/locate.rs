@@ -21,22 +21,25 @@ pub(super) struct Mark {
 /// The world point that best agrees with all `marks` at once, and the root mean square disagreement, m. What no axis
 /// tells stays at the radar's boresight.
 pub(super) fn locate(views: &[View], marks: &[&Mark]) -> (Vec3, f64) {
-    locate_from(BEFORE_RADAR, views, marks)
+    locate_from(BEFORE_RADAR, f64::INFINITY, views, marks)
 }
 
-/// As [`locate`], looking first at `p`: what no axis tells stays there.
-pub(super) fn locate_from(mut p: Vec3, views: &[View], marks: &[&Mark]) -> (Vec3, f64) {
+/// As [`locate`], looking first at `p`: what no axis tells stays there. Where it is clear that the disagreement will stay
+/// above `tolerated_m`, any point with such a disagreement is the answer.
+pub(super) fn locate_from(mut p: Vec3, tolerated_m: f64, views: &[View], marks: &[&Mark]) -> (Vec3, f64) {
     let mut misfit = f64::INFINITY;
     for _ in 0..25 {
         let (mut normal, mut pull) = ([[0.0; 3]; 3], [0.0; 3]);
         let (mut squares, mut count) = (0.0, 0.0);
-        for (direction, gap_m) in marks.iter().flat_map(|mark| equations(&views[mark.view], mark, p)) {
-            for i in 0..3 {
-                add_scaled(&mut normal[i], direction, direction[i]);
-            }
-            add_scaled(&mut pull, direction, gap_m);
-            squares += gap_m * gap_m;
-            count += 1.0;
+        for mark in marks {
+            equations(&views[mark.view], mark, p, |direction, gap_m| {
+                for i in 0..3 {
+                    add_scaled(&mut normal[i], direction, direction[i]);
+                }
+                add_scaled(&mut pull, direction, gap_m);
+                squares += gap_m * gap_m;
+                count += 1.0;
+            });
         }
         misfit = (squares / f64::max(count, 1.0)).sqrt();
         for (i, row) in normal.iter_mut().enumerate() {
@@ -46,25 +49,24 @@ pub(super) fn locate_from(mut p: Vec3, views: &[View], marks: &[&Mark]) -> (Vec3
         // A long step would jump to the other side of the radar.
         let length = dot(step, step).sqrt();
         add_scaled(&mut p, step, if length > 1.0 { 1.0 / length } else { 1.0 });
-        if length < LOCATED_M {
+        // No coordinate changes faster than the point moves, and steps more than halve.
+        if length < LOCATED_M || misfit - 2.0 * length > tolerated_m {
             break;
         }
     }
     (p, misfit)
 }
 
-/// For each spatial axis of the mark's view: the unit direction in which the coordinate grows (world) and the gap
+/// Tells for each spatial axis of the mark's view the unit direction in which the coordinate grows (world) and the gap
 /// between the mark's coordinate and that of `p`, m.
-fn equations(view: &View, mark: &Mark, p: Vec3) -> Vec<(Vec3, f64)> {
+fn equations(view: &View, mark: &Mark, p: Vec3, mut tell: impl FnMut(Vec3, f64)) {
     let seen = Seen::new(view.pose.view_from_world(p));
-    let spatial = view.axes.iter().filter(|axis| axis.kind != AxisKind::Doppler).zip(&mark.bin);
-    spatial
-        .map(|(axis, &bin)| {
-            let (direction, arm) = seen.direction_and_arm(axis.kind);
-            let gap = (axis.at(bin) - seen.coordinate(axis, 0.0)) * arm / seen.slope(axis);
-            (mat_t_vec(&view.pose.rotation, direction), gap)
-        })
-        .collect()
+    let spatial = view.axes.iter().filter(|axis| axis.kind != AxisKind::Doppler);
+    for (axis, &bin) in spatial.zip(&mark.bin) {
+        let (direction, arm) = seen.direction_and_arm(axis.kind);
+        let gap = (axis.at(bin) - seen.coordinate(axis, 0.0)) * arm / seen.slope(axis);
+        tell(mat_t_vec(&view.pose.rotation, direction), gap);
+    }
 }
 
 /// Solves the 3×3 system by Cramer's rule; the matrix is positive definite.

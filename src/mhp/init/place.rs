@@ -56,7 +56,7 @@ fn pairs(problem: &Problem, evidence: &[Evidence], peaks: &[Peak]) -> Vec<Point>
     for (i, (a, excess_a)) in marks.iter().enumerate() {
         let (near, _) = locate(&problem.views, &[a]);
         for (b, excess_b) in marks[i + 1..].iter().filter(|(b, _)| b.view != a.view) {
-            let (at, misfit) = locate_from(near, &problem.views, &[a, b]);
+            let (at, misfit) = locate_from(near, LARGEST_MISFIT_M, &problem.views, &[a, b]);
             if misfit < LARGEST_MISFIT_M && norm(at).is_finite() {
                 let weight = (excess_a * excess_b).sqrt();
                 points.push(Point { at, weight: weight * (1.0 - misfit / LARGEST_MISFIT_M) });

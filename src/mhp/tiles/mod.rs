@@ -181,22 +181,23 @@ impl Tiling {
         let blocks = (0..size[0] * rows).flat_map(of_line).collect();
         let mut tiling = Self { lo, size, rows, columns, blocks, target: Vec::new(), cells: ori.len(), marked };
         let mut target = vec![Cells::all(-1.0); size[0] * rows * columns.div_ceil(BLOCK) * BLOCK];
-        for ([tile, cell], &ori) in tiling.places().zip(ori) {
-            target[tile][cell] = f32::from(u8::from(ori));
-        }
+        let mut ori = ori.iter();
+        tiling.for_places(|tile, cell| target[tile][cell] = ori.next().map_or(-1.0, |&ori| f32::from(u8::from(ori))));
         tiling.target = target;
         tiling
     }
 
-    /// The tile of each cell of the box, and which of its cells it is, in C order.
-    fn places(&self) -> impl Iterator<Item = [usize; 2]> {
-        let [slices, height, width] = self.size;
-        let (rows, row_tiles) = (self.rows, self.columns.div_ceil(BLOCK) * BLOCK);
-        (0..slices * height).flat_map(move |line| {
-            let (slice, y) = (line / height, line % height);
-            let first = (slice * rows + y / ACROSS_BINS) * row_tiles;
-            (0..width).map(move |x| [first + x / ALONG_BINS, y % ACROSS_BINS * ALONG_BINS + x % ALONG_BINS])
-        })
+    /// Calls `each` with the tile of every cell of the box and which of its cells it is, in C order.
+    fn for_places(&self, mut each: impl FnMut(usize, usize)) {
+        let ([slices, height, width], row_tiles) = (self.size, self.columns.div_ceil(BLOCK) * BLOCK);
+        for slice in 0..slices {
+            for y in 0..height {
+                let first = (slice * self.rows + y / ACROSS_BINS) * row_tiles;
+                for x in 0..width {
+                    each(first + x / ALONG_BINS, y % ACROSS_BINS * ALONG_BINS + x % ALONG_BINS);
+                }
+            }
+        }
     }
 
     /// Bins of the first tile's middle, across and along.
@@ -292,14 +293,14 @@ impl Tiles {
 
     fn values<const COHERENT: bool>(&self, tiling: &Tiling, log2: f64) -> Vec<f64> {
         let (unit, floor) = ((2.0 * log2).exp2(), EPSILON * EPSILON);
-        let of = |[tile, cell]: [usize; 2]| {
-            if self.lit_bits[tile / BLOCK] >> (tile % BLOCK) & 1 == 0 {
-                return EPSILON;
-            }
+        let mut values = Vec::with_capacity(tiling.cells);
+        tiling.for_places(|tile, cell| {
+            let lit = self.lit_bits[tile / BLOCK] >> (tile % BLOCK) & 1 == 1;
             let [re, im] = [0, 1].map(|part| f64::from(self.sums[tile][part][cell]));
-            (unit * if COHERENT { re * re + im * im } else { re } + floor).sqrt()
-        };
-        tiling.places().map(of).collect()
+            let square = if COHERENT { re * re + im * im } else { re };
+            values.push(if lit { (unit * square + floor).sqrt() } else { EPSILON });
+        });
+        values
     }
 }
 
