@@ -7,7 +7,7 @@ use super::{
 };
 
 /// The square of the threshold is looked for between these multiples of the last one.
-const LEVELS: [f64; 6] = [0.06, 0.5, 0.93, 1.07, 2.0, 16.0];
+const LEVELS: [f64; 4] = [0.5, 0.93, 1.07, 2.0];
 /// log₂ of m/(1 − m) is cut off here, both ways; there is no slope so far up.
 const ODDS: f32 = 60.0;
 /// Tiles whose soft masks are added up in single precision.
@@ -81,13 +81,12 @@ impl Tiles {
         self.ranked.clear();
         for &tile in &self.lit {
             let power = &self.power[tile as usize];
-            let mut any = false;
             for part in 0..cell_parts::<S>() {
                 let value = lanes(simd, power, part);
-                any |= (value - splat(simd, low)).min(splat(simd, high) - value).any_positive();
-            }
-            if any {
-                self.ranked.extend(power.iter().filter(|&&x| x > low && x <= high).map(|x| x.to_bits()));
+                let above = (value - splat(simd, low)).positive();
+                for cell in bits(above & !(value - splat(simd, high)).positive()) {
+                    self.ranked.push(power[part * S::F32_LANES + cell].to_bits());
+                }
             }
         }
     }

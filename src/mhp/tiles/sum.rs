@@ -179,19 +179,22 @@ impl Tiles {
                     if tiles == 0 {
                         continue;
                     }
-                    if tiles_lit == 0 {
-                        clear(simd, sums);
-                    }
-                    let at = (block, &line);
                     if *used == strips.len() {
                         strips.push(Strip::default());
                     }
                     let strip = &mut strips[*used];
                     *used += 1;
                     strip.joint = number;
-                    joint.lay::<S, COHERENT>(simd, at, tiles, &exponents, strip);
-                    strip.add_to::<S, COHERENT>(simd, joint, at, sums);
+                    joint.lay::<S, COHERENT>(simd, (block, &line), tiles, &exponents, strip);
                     tiles_lit |= strip.bits();
+                }
+                if tiles_lit != 0 {
+                    clear(simd, sums);
+                }
+                let first = ends.last().map_or(0, |&end| end as usize);
+                for strip in &strips[first..*used] {
+                    let joint = &joints[strip.joint as usize];
+                    strip.add_to::<S, COHERENT>(simd, joint, (block, &joint.line(grid, block)), sums);
                 }
                 for part in 0..tile_parts::<S>() {
                     self.highest = self.highest.max(lanes(simd, &crest.exponent, part).largest());
