@@ -119,11 +119,13 @@ fn covariance(geometry: &mut Geometry, scene: &Scene<'_>, trace: &Trace, c_bar: 
             add_scaled(&mut blurred_bar[i], mixed, row.gradient[i]);
         }
         if row.seen {
-            let g_bar = scale(mat_vec(&trace.blurred, mixed), 2.0 / row.step);
-            let along = dot(g_bar, row.direction);
-            geometry.direction(trace, axis, scale(g_bar, row.slope / row.arm));
-            geometry.arm(axis.kind, -along * row.slope / (row.arm * row.arm));
-            geometry.slope(trace, axis, along / row.arm);
+            let g_bar = scale(mat_vec(&trace.blurred, mixed), 2.0 * scene.by_step[k]);
+            geometry.direction(trace, axis, scale(g_bar, row.ratio));
+            if axis.kind.is_angular() {
+                let along = dot(g_bar, row.direction);
+                geometry.arm(axis.kind, -along * row.ratio / row.arm);
+                geometry.slope(trace, axis, along / row.arm);
+            }
         }
     }
     blurred_bar
@@ -133,7 +135,7 @@ fn covariance(geometry: &mut Geometry, scene: &Scene<'_>, trace: &Trace, c_bar: 
 fn coordinates(geometry: &mut Geometry, scene: &Scene<'_>, trace: &Trace, b_bar: [f64; 3], dims: usize) {
     for (k, axis) in scene.view.axes.iter().take(dims).enumerate() {
         if trace.rows[k].seen {
-            geometry.coordinate(trace, axis, b_bar[k] / trace.rows[k].step);
+            geometry.coordinate(trace, axis, b_bar[k] * scene.by_step[k]);
         }
     }
 }
@@ -155,11 +157,13 @@ fn ramp(
         let kappa_bar = moments.q_delta[k];
         omega_mean_bar += kappa_bar * dot(trace.velocity, row.displacement);
         add_scaled(&mut geometry.v, row.displacement, kappa_bar * form.omega_mean);
-        let displacement_bar = scale(trace.velocity, kappa_bar * form.omega_mean * row.step);
-        let along = dot(displacement_bar, row.direction);
-        geometry.direction(trace, axis, scale(displacement_bar, row.arm / row.slope));
-        geometry.arm(axis.kind, along / row.slope);
-        geometry.slope(trace, axis, -along * row.arm / (row.slope * row.slope));
+        let displacement_bar = scale(trace.velocity, kappa_bar * form.omega_mean * scene.step[k]);
+        geometry.direction(trace, axis, scale(displacement_bar, row.by_ratio));
+        if axis.kind.is_angular() {
+            let along = dot(displacement_bar, row.direction) / row.slope;
+            geometry.arm(axis.kind, along);
+            geometry.slope(trace, axis, -along * row.by_ratio);
+        }
     }
     omega_mean_bar
 }
@@ -180,15 +184,17 @@ fn blur(geometry: &mut Geometry, scene: &Scene<'_>, trace: &Trace, blurred_bar: 
     let pull_az = mat_vec(blurred_bar, seen.e_az);
     add_scaled(&mut geometry.e_az, pull_az, 2.0 * trace.w_az * trace.w_az);
     let w_az_bar = 2.0 * trace.w_az * dot(seen.e_az, pull_az);
-    geometry.rho += w_az_bar * psf.azimuth_rad / seen.cos_az_floored.value;
-    let cos_az_bar = -w_az_bar * trace.w_az / seen.cos_az_floored.value;
+    let w_az_bar = w_az_bar / seen.cos_az_floored.value;
+    geometry.rho += w_az_bar * psf.azimuth_rad;
+    let cos_az_bar = -w_az_bar * trace.w_az;
     geometry.azimuth -= cos_az_bar * seen.sin_az * seen.cos_az_floored.pass;
 
     let pull_el = mat_vec(blurred_bar, seen.e_el);
     add_scaled(&mut geometry.e_el, pull_el, 2.0 * trace.w_el * trace.w_el);
     let w_el_bar = 2.0 * trace.w_el * dot(seen.e_el, pull_el);
-    geometry.d += w_el_bar * psf.elevation_rad / seen.cos_el_floored.value;
-    let cos_el_bar = -w_el_bar * trace.w_el / seen.cos_el_floored.value;
+    let w_el_bar = w_el_bar / seen.cos_el_floored.value;
+    geometry.d += w_el_bar * psf.elevation_rad;
+    let cos_el_bar = -w_el_bar * trace.w_el;
     geometry.elevation -= cos_el_bar * seen.sin_el * seen.cos_el_floored.pass;
 }
 
@@ -209,16 +215,16 @@ impl Geometry {
     /// e_cone = (ŷ − s u)/cos.
     fn cone_direction(&mut self, trace: &Trace, bar: Vec3) {
         let seen = &trace.seen;
-        let cosine = seen.cos_cone.value;
-        add_scaled(&mut self.u, bar, -seen.sin_cone / cosine);
+        let cosine = seen.cos_cone().value;
+        add_scaled(&mut self.u, bar, -seen.u[1] / cosine);
         self.u[1] -= dot(bar, seen.u) / cosine;
-        self.cone_cosine(trace, -dot(bar, seen.e_cone) / cosine);
+        self.cone_cosine(trace, -dot(bar, seen.e_cone()) / cosine);
     }
 
     /// cos = √(1 − s²), s = u_y.
     fn cone_cosine(&mut self, trace: &Trace, bar: f64) {
-        let seen = &trace.seen;
-        self.u[1] -= bar * seen.sin_cone / seen.cos_cone.value * seen.cos_cone.pass;
+        let (s, cosine) = (trace.seen.u[1], trace.seen.cos_cone());
+        self.u[1] -= bar * s / cosine.value * cosine.pass;
     }
 
     /// ∂L/∂(arm of an axis): ρ or d.
@@ -250,7 +256,7 @@ impl Geometry {
             AxisKind::Elevation => self.elevation += bar * if sine { seen.cos_el } else { 1.0 },
             AxisKind::Cone if sine => self.u[1] += bar,
             // At the pole of the cone the arcsine has no derivative; the floor keeps the answer finite.
-            AxisKind::Cone => self.u[1] += bar / (1.0 - seen.sin_cone * seen.sin_cone).sqrt().max(1e-9),
+            AxisKind::Cone => self.u[1] += bar / (1.0 - seen.u[1] * seen.u[1]).sqrt().max(1e-9),
             AxisKind::Doppler => self.radial += bar,
             AxisKind::X => self.p[0] += bar,
             AxisKind::Y => self.p[1] += bar,
@@ -293,10 +299,11 @@ fn inverse(length_m: f64) -> f64 {
 fn unmove(scene: &Scene<'_>, unmoved: Vec3, p_bar: Vec3) -> Vec3 {
     let (factor, d, skin) = scene.surface_factor(unmoved);
     let mut bar = scale(p_bar, factor);
-    if norm(unmoved) > 0.0 {
-        let radial = scale(unmoved, 1.0 / norm(unmoved));
-        let factor_slope = d.pass * (skin.pass / d.value - skin.value / (d.value * d.value));
-        add_scaled(&mut bar, radial, dot(p_bar, unmoved) * factor_slope);
+    let length = norm(unmoved);
+    if length > 0.0 {
+        // The slope of the factor, along the unit vector of p₀.
+        let slope = d.pass * (skin.pass - factor) / (d.value * length);
+        add_scaled(&mut bar, unmoved, dot(p_bar, unmoved) * slope);
     }
     bar
 }

@@ -151,7 +151,7 @@ impl Objective {
         covariance.clear();
         covariance.resize(forms.len(), [[0.0; 3]; 3]);
         for ((view, aim), workspace) in problem.views.iter().zip(&*aims).zip(workspaces) {
-            let scene = Scene { radar: &problem.radar, view, config };
+            let scene = Scene::new(&problem.radar, view, config);
             let slopes = Slopes { factor: 1.0 / views, gradient: &mut *em_gradient, covariance: &mut *covariance };
             let answer = em::evaluate(&scene, *precision, (params, forms), aim, Some(slopes), workspace);
             em += answer.loss / views;
@@ -179,7 +179,7 @@ impl Objective {
         let (mut workspace, mut forms) = (Workspace::default(), Vec::new());
         Form::all(params, &mut forms);
         let losses = self.problem.views.iter().zip(&self.aims).map(|(view, aim)| {
-            let scene = Scene { radar: &self.problem.radar, view, config: &self.config };
+            let scene = Scene::new(&self.problem.radar, view, &self.config);
             em::evaluate(&scene, self.precision, (params, &forms), aim, None, &mut workspace).loss
         });
         losses.sum::<f64>() / self.problem.views.len() as f64

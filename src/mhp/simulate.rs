@@ -48,7 +48,7 @@ pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, par
         .views
         .iter()
         .map(|view| {
-            let splats = splats(&Scene { radar: &problem.radar, view, config }, params);
+            let splats = splats(&Scene::new(&problem.radar, view, config), params);
             let region = Region::whole(view);
             match precision {
                 Precision::F64 => map::<f64>(&splats, &region, config.summation),

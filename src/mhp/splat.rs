@@ -8,7 +8,7 @@ use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::geometry::{Mat3, Vec3, add_scaled, dot, mat_mul, mat_vec, norm, scale};
 use crate::radar::{Axis, AxisKind, RadarConfig, SPEED_OF_LIGHT, Spacing, View};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// Distances are held above this, m.
 pub(super) const DISTANCE_FLOOR_M: f64 = 0.01;
@@ -52,16 +52,10 @@ pub(super) struct Seen {
     pub cos_az_floored: Floored,
     /// cos θ_el where it stands in a denominator.
     pub cos_el_floored: Floored,
-    /// s = u_y, the sine of the cone angle.
-    pub sin_cone: f64,
-    /// √(1 − s²).
-    pub cos_cone: Floored,
-    /// Radial unit vector.
+    /// Radial unit vector; u_y = s is the sine of the cone angle.
     pub u: Vec3,
     pub e_az: Vec3,
     pub e_el: Vec3,
-    /// (ŷ − s u)/cos.
-    pub e_cone: Vec3,
     /// Horizontal radial unit vector, (cos az, sin az, 0).
     pub e_rho: Vec3,
     /// Unit vector of (x, 0, z).
@@ -73,12 +67,13 @@ impl Seen {
         let [x, y, z] = p;
         let (rho, h, d) = ((x * x + y * y).sqrt(), (x * x + z * z).sqrt(), norm(p));
         // At the origin and above it, angles are 0.
-        let unit = |a: f64, b: f64, length: f64| if length == 0.0 { [1.0, 0.0] } else { [a / length, b / length] };
+        let unit = |a: f64, b: f64, length: f64| {
+            let by_length = 1.0 / length;
+            if length == 0.0 { [1.0, 0.0] } else { [a * by_length, b * by_length] }
+        };
         let ([cos_az, sin_az], [cos_el, sin_el]) = (unit(x, y, rho), unit(rho, z, d));
         let u = [cos_el * cos_az, cos_el * sin_az, sin_el];
-        let sin_cone = u[1];
-        let cos_cone = Floored::new((1.0 - sin_cone * sin_cone).max(0.0).sqrt(), COSINE_FLOOR);
-        let e_cone = scale([-sin_cone * u[0], 1.0 - sin_cone * u[1], -sin_cone * u[2]], 1.0 / cos_cone.value);
+        let [h_x, h_z] = unit(x, z, h);
         Self {
             p,
             d: Floored::new(d, DISTANCE_FLOOR_M),
@@ -90,15 +85,23 @@ impl Seen {
             cos_el,
             cos_az_floored: Floored::new(cos_az, COSINE_FLOOR),
             cos_el_floored: Floored::new(cos_el, COSINE_FLOOR),
-            sin_cone,
-            cos_cone,
             u,
             e_az: [-sin_az, cos_az, 0.0],
             e_el: [-sin_el * cos_az, -sin_el * sin_az, cos_el],
-            e_cone,
             e_rho: [cos_az, sin_az, 0.0],
-            e_h: if h > 0.0 { [x / h, 0.0, z / h] } else { [1.0, 0.0, 0.0] },
+            e_h: [h_x, 0.0, h_z],
         }
+    }
+
+    /// √(1 − s²), the cosine of the cone angle.
+    pub(super) fn cos_cone(&self) -> Floored {
+        Floored::new((1.0 - self.u[1] * self.u[1]).max(0.0).sqrt(), COSINE_FLOOR)
+    }
+
+    /// (ŷ − s u)/cos.
+    pub(super) fn e_cone(&self) -> Vec3 {
+        let [x, s, z] = self.u;
+        scale([-s * x, 1.0 - s * s, -s * z], 1.0 / self.cos_cone().value)
     }
 
     /// The coordinate ξ of this point on `axis`, in axis units; `radial_mps` is v_r.
@@ -110,8 +113,8 @@ impl Seen {
             AxisKind::Azimuth => self.sin_az.atan2(self.cos_az),
             AxisKind::Elevation if sine => self.sin_el,
             AxisKind::Elevation => self.sin_el.atan2(self.cos_el),
-            AxisKind::Cone if sine => self.sin_cone,
-            AxisKind::Cone => self.sin_cone.clamp(-1.0, 1.0).asin(),
+            AxisKind::Cone if sine => self.u[1],
+            AxisKind::Cone => self.u[1].clamp(-1.0, 1.0).asin(),
             AxisKind::Doppler => radial_mps,
             AxisKind::X => self.p[0],
             AxisKind::Y => self.p[1],
@@ -126,7 +129,7 @@ impl Seen {
         match (axis.spacing, axis.kind) {
             (Spacing::Sine, AxisKind::Azimuth) => self.cos_az_floored.value,
             (Spacing::Sine, AxisKind::Elevation) => self.cos_el_floored.value,
-            (Spacing::Sine, AxisKind::Cone) => self.cos_cone.value,
+            (Spacing::Sine, AxisKind::Cone) => self.cos_cone().value,
             _ => 1.0,
         }
     }
@@ -137,7 +140,7 @@ impl Seen {
             AxisKind::Range => (self.u, 1.0),
             AxisKind::Azimuth => (self.e_az, self.rho.value),
             AxisKind::Elevation => (self.e_el, self.d.value),
-            AxisKind::Cone => (self.e_cone, self.d.value),
+            AxisKind::Cone => (self.e_cone(), self.d.value),
             AxisKind::Doppler => ([0.0; 3], 1.0),
             AxisKind::X => ([1.0, 0.0, 0.0], 1.0),
             AxisKind::Y => ([0.0, 1.0, 0.0], 1.0),
@@ -153,9 +156,11 @@ impl Seen {
 pub(super) struct Row {
     /// Whether the axis sees the joint (its operator is on, or it has none).
     pub seen: bool,
-    pub step: f64,
     pub slope: f64,
     pub arm: f64,
+    /// slope/arm and arm/slope.
+    pub ratio: f64,
+    pub by_ratio: f64,
     pub direction: Vec3,
     /// ∂b/∂p; zero where the axis does not see the joint.
     pub gradient: Vec3,
@@ -199,39 +204,64 @@ pub(super) struct Trace {
     pub w_el: f64,
 }
 
-/// A view, a radar and a configuration: everything that is the same for all joints.
+/// A view, a radar and a configuration, and what is the same for all joints.
 pub(super) struct Scene<'a> {
     pub radar: &'a RadarConfig,
     pub view: &'a View,
     pub config: &'a FitConfig,
+    /// A bin of each axis in axis units, and bins a unit.
+    pub step: [f64; 3],
+    pub by_step: [f64; 3],
+    /// The variance of each axis whose width does not come through Σ', bins².
+    own_variance: [f64; 3],
+    /// Of φ: by d², v_r, sin θ_az and sin θ_el; 0 where an operator is off.
+    phase: [f64; 4],
+}
+
+/// Whether the operator behind an axis is on.
+fn sees(config: &FitConfig, kind: AxisKind) -> bool {
+    let on = config.operators;
+    match kind {
+        AxisKind::Range => on.range,
+        AxisKind::Azimuth | AxisKind::Elevation | AxisKind::Cone => on.angle,
+        AxisKind::Doppler => on.doppler,
+        _ => true,
+    }
+}
+
+/// The standard deviation of an axis whose width does not come through Σ', in axis units.
+fn own_width(config: &FitConfig, view: &View, kind: AxisKind) -> f64 {
+    let psf = &view.psf;
+    match kind {
+        AxisKind::Doppler => psf.doppler_mps,
+        kind if sees(config, kind) => 0.0,
+        AxisKind::Range => psf.range_m,
+        AxisKind::Azimuth | AxisKind::Cone => psf.azimuth_rad,
+        AxisKind::Elevation => psf.elevation_rad,
+        _ => 0.0,
+    }
+}
+
+impl<'a> Scene<'a> {
+    pub(super) fn new(radar: &'a RadarConfig, view: &'a View, config: &'a FitConfig) -> Self {
+        let (mut step, mut by_step, mut own_variance) = ([1.0; 3], [1.0; 3], [0.0; 3]);
+        for (k, axis) in view.axes.iter().take(3).enumerate() {
+            (step[k], by_step[k]) = (axis.step(), 1.0 / axis.step());
+            own_variance[k] = (own_width(config, view, axis.kind) / step[k]).powi(2);
+        }
+        let (on, per_metre) = (config.operators, TAU / radar.wavelength_m());
+        let gate = |on: bool, x: f64| if on { x } else { 0.0 };
+        let phase = [
+            gate(on.range, TAU * radar.slope_hz_per_s() * (2.0 / SPEED_OF_LIGHT).powi(2)),
+            gate(on.doppler, per_metre * 2.0 * radar.frame_s),
+            gate(on.angle, per_metre * radar.l_az_m),
+            gate(on.angle, per_metre * radar.l_el_m),
+        ];
+        Self { radar, view, config, step, by_step, own_variance, phase }
+    }
 }
 
 impl Scene<'_> {
-    /// Whether the operator behind an axis is on.
-    pub(super) fn sees(&self, kind: AxisKind) -> bool {
-        let on = self.config.operators;
-        match kind {
-            AxisKind::Range => on.range,
-            AxisKind::Azimuth | AxisKind::Elevation | AxisKind::Cone => on.angle,
-            AxisKind::Doppler => on.doppler,
-            _ => true,
-        }
-    }
-
-    /// The variance f of an axis whose width does not come through Σ', bins².
-    fn own_variance(&self, axis: &Axis) -> f64 {
-        let psf = &self.view.psf;
-        let sigma = match axis.kind {
-            AxisKind::Doppler => psf.doppler_mps,
-            kind if self.sees(kind) => 0.0,
-            AxisKind::Range => psf.range_m,
-            AxisKind::Azimuth | AxisKind::Cone => psf.azimuth_rad,
-            AxisKind::Elevation => psf.elevation_rad,
-            _ => 0.0,
-        };
-        (sigma / axis.step()).powi(2)
-    }
-
     /// The factor of p that moves a joint to its skin: max(d − δ, floor)/d.
     pub(super) fn surface_factor(&self, unmoved: Vec3) -> (f64, Floored, Floored) {
         let d = Floored::new(norm(unmoved), DISTANCE_FLOOR_M);
@@ -259,15 +289,15 @@ impl Scene<'_> {
         splat.spectrum.iter_mut().for_each(Vec::clear);
         let mut covariance = [[0.0; 3]; 3];
         for (k, axis) in self.view.axes.iter().take(dims).enumerate() {
-            rows[k] = self.row(&seen, axis);
-            bin[k] = axis.bin(if rows[k].seen { seen.coordinate(axis, radial) } else { 0.0 });
+            rows[k] = self.row(&seen, k, axis);
+            bin[k] = (if rows[k].seen { seen.coordinate(axis, radial) } else { 0.0 } - axis.lo) * self.by_step[k];
             if self.config.operators.doppler {
                 kappa[k] = form.omega_mean * dot(velocity, rows[k].displacement);
             }
             if axis.kind == AxisKind::Doppler {
                 splat.spectrum[k].extend(spectrum_of(omega, form.omega_mean, axis.bins));
             }
-            covariance[k][k] = self.own_variance(axis) + 1.0 / 12.0;
+            covariance[k][k] = self.own_variance[k] + 1.0 / 12.0;
         }
         for k in 0..dims {
             for l in 0..dims {
@@ -279,44 +309,31 @@ impl Scene<'_> {
         let attenuation =
             if self.config.operators.attenuation { 4.0 * (self.radar.r_max_m / seen.d.value).ln() } else { 0.0 };
         splat.ln_weight = form.ln_opacity + attenuation - 0.5 * (dims as f64 * LN_TAU + ln_det);
-        splat.phase = self.phase(&seen, radial).rem_euclid(TAU);
+        let phase = self.phase(&seen, radial);
+        splat.phase = phase - TAU * (phase * (1.0 / TAU)).floor();
         (splat.dims, splat.bin, splat.precision, splat.kappa) = (dims, bin, precision, kappa);
         Trace { unmoved, seen, rows, velocity, blurred, w_az, w_el }
     }
 
-    fn row(&self, seen: &Seen, axis: &Axis) -> Row {
+    fn row(&self, seen: &Seen, k: usize, axis: &Axis) -> Row {
         let (direction, arm) = seen.direction_and_arm(axis.kind);
-        let (slope, step, on) = (seen.slope(axis), axis.step(), self.sees(axis.kind));
-        let gradient = if on { scale(direction, slope / (arm * step)) } else { [0.0; 3] };
-        Row { seen: on, step, slope, arm, direction, gradient, displacement: scale(direction, arm / slope * step) }
+        let (slope, on) = (seen.slope(axis), sees(self.config, axis.kind));
+        let (ratio, by_ratio) = if axis.kind.is_angular() { (slope / arm, arm / slope) } else { (1.0, 1.0) };
+        let gradient = if on { scale(direction, ratio * self.by_step[k]) } else { [0.0; 3] };
+        let displacement = scale(direction, by_ratio * self.step[k]);
+        Row { seen: on, slope, arm, ratio, by_ratio, direction, gradient, displacement }
     }
 
     fn phase(&self, seen: &Seen, radial_mps: f64) -> f64 {
-        let (radar, on, per_metre) = (self.radar, self.config.operators, TAU / self.radar.wavelength_m());
-        let mut phase = 0.0;
-        if on.range {
-            phase += TAU * radar.slope_hz_per_s() * (2.0 * seen.d.value / SPEED_OF_LIGHT).powi(2);
-        }
-        if on.doppler {
-            phase += per_metre * 2.0 * radial_mps * radar.frame_s;
-        }
-        if on.angle {
-            phase += per_metre * (radar.l_az_m * seen.sin_az + radar.l_el_m * seen.sin_el);
-        }
-        phase
+        let [by_d_sq, by_radial, by_az, by_el] = self.phase;
+        let d = seen.d.value;
+        by_d_sq * d * d + by_radial * radial_mps + by_az * seen.sin_az + by_el * seen.sin_el
     }
 
     /// (∂φ/∂d, ∂φ/∂v_r, ∂φ/∂θ_az, ∂φ/∂θ_el).
     pub(super) fn phase_slopes(&self, seen: &Seen) -> [f64; 4] {
-        let (radar, on, per_metre) = (self.radar, self.config.operators, TAU / self.radar.wavelength_m());
-        let gate = |on: bool, x: f64| if on { x } else { 0.0 };
-        let tau = 2.0 * seen.d.value / SPEED_OF_LIGHT;
-        [
-            gate(on.range, 8.0 * PI * radar.slope_hz_per_s() * tau / SPEED_OF_LIGHT),
-            gate(on.doppler, per_metre * 2.0 * radar.frame_s),
-            gate(on.angle, per_metre * radar.l_az_m * seen.cos_az),
-            gate(on.angle, per_metre * radar.l_el_m * seen.cos_el),
-        ]
+        let [by_d_sq, by_radial, by_az, by_el] = self.phase;
+        [2.0 * by_d_sq * seen.d.value, by_radial, by_az * seen.cos_az, by_el * seen.cos_el]
     }
 }
 
@@ -364,6 +381,7 @@ fn inverse_and_ln_det(c: &Mat3, dims: usize) -> (Mat3, f64) {
         m[a][p] * m[b][q] - m[a][q] * m[b][p]
     };
     let determinant = m[0][0] * cofactor(0, 0) + m[0][1] * cofactor(0, 1) + m[0][2] * cofactor(0, 2);
-    let inverse = std::array::from_fn(|i| std::array::from_fn(|k| cofactor(k, i) / determinant));
+    let by_determinant = 1.0 / determinant;
+    let inverse = std::array::from_fn(|i| std::array::from_fn(|k| cofactor(k, i) * by_determinant));
     (inverse, determinant.ln())
 }
