@@ -11,7 +11,6 @@ use super::simulate::{EPSILON, floored, ln_floored};
 use super::splat::{Scene, Splat, Trace};
 use super::tiles::{self, Question, Tiles, Tiling};
 use crate::body::Pppr;
-use pulp::{Arch, Simd, WithSimd};
 use crate::config::FitConfig;
 use crate::geometry::Mat3;
 
@@ -80,7 +79,9 @@ pub(super) fn evaluate(
     let Workspace { splats, traces, moments, tiles } = workspace;
     splats.resize_with(joints, Splat::default);
     traces.clear();
-    Arch::new().dispatch(Project { scene, params, forms, splats, traces });
+    for ((joint, splat), form) in splats.iter_mut().enumerate().zip(forms) {
+        traces.push(scene.splat(params, joint, form, splat));
+    }
     moments.resize_with(joints, Moments::default);
     for moments in moments.iter_mut() {
         moments.clear(&scene.view.axes);
@@ -95,51 +96,13 @@ pub(super) fn evaluate(
         }
         Precision::F32 => plain::<f32>(scene, splats, aim, scale, moments),
     };
-    if let Some(slopes) = slopes {
-        Arch::new().dispatch(PullBack { scene, forms, splats, traces, moments, slopes });
+    if let Some(Slopes { gradient, covariance, .. }) = slopes {
+        for (joint, (moments, bar)) in moments.iter().zip(covariance).enumerate() {
+            let seen = (&forms[joint], &splats[joint], &traces[joint]);
+            pull_back(scene, seen, moments, joint, (&mut *gradient, bar));
+        }
     }
     answer
-}
-
-/// Projects all joints; compiled for the instruction set at hand.
-struct Project<'a> {
-    scene: &'a Scene<'a>,
-    params: &'a Pppr,
-    forms: &'a [Form],
-    splats: &'a mut [Splat],
-    traces: &'a mut Vec<Trace>,
-}
-
-impl WithSimd for Project<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        for ((joint, splat), form) in self.splats.iter_mut().enumerate().zip(self.forms) {
-            self.traces.push(self.scene.splat(self.params, joint, form, splat));
-        }
-    }
-}
-
-/// The way back of [`Project`].
-struct PullBack<'a> {
-    scene: &'a Scene<'a>,
-    forms: &'a [Form],
-    splats: &'a [Splat],
-    traces: &'a [Trace],
-    moments: &'a [Moments],
-    slopes: Slopes<'a>,
-}
-
-impl WithSimd for PullBack<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let Slopes { gradient, covariance, .. } = self.slopes;
-        for (joint, (moments, bar)) in self.moments.iter().zip(covariance).enumerate() {
-            let seen = (&self.forms[joint], &self.splats[joint], &self.traces[joint]);
-            pull_back(self.scene, seen, moments, joint, (&mut *gradient, bar));
-        }
-    }
 }
 
 /// Every cell by itself, as SPEC reads: the oracle, and the way out for masks softer than f32's range.

@@ -1,6 +1,6 @@
 //! L(Θ) and ∂L/∂Θ; SPEC section 4.
 
-use super::em::{self, Aim, Slopes, ViewAnswer, Workspace};
+use super::em::{self, Aim, Slopes, Workspace};
 use super::form::Form;
 use super::init::anchors;
 use super::percentile::percentile;

@@ -1,9 +1,9 @@
 //! H_sim over whole maps; SPEC section 3.
 
+use super::form::Form;
 use super::kernel::Kernel;
 use super::region::Region;
 use super::scalar::Real;
-use super::form::Form;
 use super::splat::{Scene, Splat};
 use super::tiles::{Tiles, Tiling};
 use super::{Precision, Problem};

@@ -3,8 +3,8 @@
 use super::joint::Joint;
 use super::strip::{Strip, bits};
 use super::{
-    ACROSS, ACROSS_BINS, ALONG, ALONG_BINS, BLOCK, Block, Cells, Lanes, Moments, Pair, STEPS, Simd, Sixteen,
-    Tiles, Tiling, cell_parts, lanes, splat, store, tile_parts,
+    ACROSS, ACROSS_BINS, ALONG, ALONG_BINS, BLOCK, Block, Cells, Lanes, Moments, Pair, STEPS, Simd, Sixteen, Tiles,
+    Tiling, cell_parts, lanes, splat, store, tile_parts,
 };
 use std::ops::Range;
 
@@ -14,12 +14,7 @@ pub(super) type Gathered = [Cells; 9];
 impl Tiles {
     /// Adds to each joint's moments what the cells want.
     #[inline(always)]
-    pub(super) fn collect<S: Simd, const COHERENT: bool>(
-        &mut self,
-        simd: S,
-        grid: &Tiling,
-        moments: &mut [Moments],
-    ) {
+    pub(super) fn collect<S: Simd, const COHERENT: bool>(&mut self, simd: S, grid: &Tiling, moments: &mut [Moments]) {
         let mut gathered = std::mem::take(&mut self.gathered);
         gathered.clear();
         gathered.resize(self.joints.len(), [Cells::ZERO; 9]);
@@ -52,7 +47,6 @@ impl Tiles {
     }
 
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "a strip, its place, and what it adds to")]
     fn gather<S: Simd, const COHERENT: bool>(
         &self,
         simd: S,
@@ -159,10 +153,8 @@ struct Weights {
 impl Weights {
     #[inline(always)]
     fn new<S: Simd, const COHERENT: bool>(simd: S, strip: &Strip, tiles: u32, along: &Sixteen) -> Self {
-        let mut weights = Self {
-            of: [strip.middles; 3],
-            tiles: strip.tiles().start..(u32::BITS - tiles.leading_zeros()) as usize,
-        };
+        let mut weights =
+            Self { of: [strip.middles; 3], tiles: strip.tiles().start..(u32::BITS - tiles.leading_zeros()) as usize };
         // Between tiles where the mask has a slope may be some where it has none.
         let mut without = !tiles & ((1 << weights.tiles.end) - 1);
         while without != 0 {

@@ -1,4 +1,4 @@
-//! The fast path of L_EM: f32, in tiles of 4 × 4 cells, each summed over the joints that matter there.
+//! The fast path of L_EM: f32, in tiles of 4 × 8 cells, each summed over the joints that matter there.
 //!
 //! One view goes through five stages, none of which allocates once its buffers have grown:
 //! 1. [`Joint`]: a splat in powers of two, its quadratic form and phase within a tile as tables, and what is the same
@@ -6,7 +6,7 @@
 //! 2. Guess: the strongest joints' percentile over the middles of tiles, for the threshold.
 //! 3. Sum, a block of sixteen tiles at a time. A joint is dropped from a tile where it is far below the soft mask's reach
 //!    under the guessed threshold, or far below the tile's strongest joint; bounds over the tile make this safe. What is
-//!    left is a [`Strip`] of tiles, where each tile's 16 cells follow from the tile before by one complex product.
+//!    left is a [`Strip`] of tiles, where each tile's cells follow from the tile before by one complex product.
 //!    All is relative to a scale of the whole view.
 //! 4. Mask: percentile, soft mask, its slope. Where the threshold was guessed too high, back to 3 with a lower guess.
 //! 5. Collect: the strips once more, in the tiles where the mask has a slope, into each joint's moments.
@@ -115,9 +115,9 @@ const fn from_middle(stride: usize, bins: usize) -> Cells {
 /// Softest mask, T, whose reach the powers of two of f32 hold; softer ones take the plain kernel.
 const SOFTEST: f64 = 1.5;
 /// Below e^−16T of the threshold a cell neither counts nor pulls (1e-7).
-const MASK_REACH: f64 = 12.0;
+const MASK_REACH: f64 = 14.0;
 /// A joint this much weaker (in ln) than the threshold is dropped, and at least `MARGIN` under the weakest cell that counts.
-const BELOW: f64 = 11.0;
+const BELOW: f64 = 14.0;
 const MARGIN: f64 = 3.0;
 /// The guess of ln threshold may be this much too high.
 const GUESS: f64 = 2.0;
@@ -126,7 +126,7 @@ const HIGH: f64 = 12.0;
 /// Guesses of the threshold at most.
 const TRIES: usize = 40;
 /// A joint this much weaker (in ln) than the strongest at its cells is dropped (8e-7).
-const RELATIVE: f64 = 11.0;
+const RELATIVE: f64 = 12.0;
 /// ln of the weakest return that counts relative to the view's scale.
 const WEAKEST: f64 = -36.0;
 /// log₂ below which no return is taken: squares of its parts are normal f32, for others cost a hundred cycles.
@@ -138,7 +138,7 @@ const ROOM: f64 = 8.0;
 /// log₂ of how far a map may stay under its strongest joint.
 const OUTSIDE: f64 = 30.0;
 /// m(1 − m)/T below which a tile has no slope.
-const NO_SLOPE: f32 = 3e-6;
+const NO_SLOPE: f32 = 3e-7;
 
 /// A box of cells in tiles, and B_ori over it: fixed for a fit. Sixteen tiles beside each other are a block; the last
 /// block of a row may reach beyond the box, as may the last row and column of tiles.

@@ -2,7 +2,7 @@
 
 use super::joint::{Joint, Line};
 use super::{
-    ACROSS, ALONG, ALONG_BINS, Block, Cells, FAINTEST, Lanes, Pair, REACH_ACROSS, REACH_ALONG, STRONGEST, Simd, Sixteen,
+    ACROSS, ALONG, ALONG_BINS, Block, FAINTEST, Lanes, Pair, REACH_ACROSS, REACH_ALONG, STRONGEST, Simd, Sixteen,
     cell_parts, lanes, splat, store, tile_parts,
 };
 use std::ops::Range;

@@ -3,8 +3,8 @@
 use super::joint::Line;
 use super::strip::{Strip, bits};
 use super::{
-    BLOCK, Block, CELLS, Cells, Joint, LOG2_E, Lanes, Pair, Question, REACH_ACROSS, REACH_ALONG, RELATIVE, Scale, Simd, Sixteen,
-    Tiles, Tiling, cell_parts, lanes, ordered, place, splat, store, tile_parts, unordered,
+    BLOCK, Block, CELLS, Cells, Joint, LOG2_E, Lanes, Pair, Question, REACH_ACROSS, REACH_ALONG, RELATIVE, Scale, Simd,
+    Sixteen, Tiles, Tiling, cell_parts, lanes, ordered, place, splat, store, tile_parts, unordered,
 };
 
 /// The threshold is guessed from at least this many rows of tiles, and from one in so many.
@@ -22,12 +22,8 @@ struct Crest {
 impl Crest {
     #[inline(always)]
     fn new<S: Simd>(simd: S, joints: &[Joint], present: &[u32], grid: &Tiling, block: &Block) -> Self {
-        let mut crest = Self {
-            exponent: Sixteen::ZERO,
-            slope: [Sixteen::ZERO; 2],
-            slack: Sixteen::ZERO,
-            highest: Sixteen::ZERO,
-        };
+        let mut crest =
+            Self { exponent: Sixteen::ZERO, slope: [Sixteen::ZERO; 2], slack: Sixteen::ZERO, highest: Sixteen::ZERO };
         for part in 0..tile_parts::<S>() {
             let (lowest, zero) = (splat(simd, f32::MIN), splat(simd, 0.0));
             let [mut exponent, mut across, mut along, mut slack, mut highest] = [lowest, zero, zero, zero, lowest];
