@@ -14,6 +14,8 @@ use std::f64::consts::TAU;
 pub(super) const DISTANCE_FLOOR_M: f64 = 0.01;
 /// Cosines that stand in a denominator are held above this.
 pub(super) const COSINE_FLOOR: f64 = 0.05;
+/// τ of an echo, s a metre.
+const PER_METRE_S: f64 = 2.0 / SPEED_OF_LIGHT;
 /// ln 2π
 const LN_TAU: f64 = 1.837_877_066_409_345_3;
 
@@ -214,7 +216,7 @@ pub(super) struct Scene<'a> {
     pub by_step: [f64; 3],
     /// The variance of each axis whose width does not come through Σ', bins².
     own_variance: [f64; 3],
-    /// Of φ: by d², v_r, sin θ_az and sin θ_el; 0 where an operator is off.
+    /// Of φ: by τ², v_r, sin θ_az and sin θ_el; 0 where an operator is off.
     phase: [f64; 4],
 }
 
@@ -252,7 +254,7 @@ impl<'a> Scene<'a> {
         let (on, per_metre) = (config.operators, TAU / radar.wavelength_m());
         let gate = |on: bool, x: f64| if on { x } else { 0.0 };
         let phase = [
-            gate(on.range, TAU * radar.slope_hz_per_s() * (2.0 / SPEED_OF_LIGHT).powi(2)),
+            gate(on.range, TAU * radar.slope_hz_per_s()),
             gate(on.doppler, per_metre * 2.0 * radar.frame_s),
             gate(on.angle, per_metre * radar.l_az_m),
             gate(on.angle, per_metre * radar.l_el_m),
@@ -325,15 +327,16 @@ impl Scene<'_> {
     }
 
     fn phase(&self, seen: &Seen, radial_mps: f64) -> f64 {
-        let [by_d_sq, by_radial, by_az, by_el] = self.phase;
-        let d = seen.d.value;
-        by_d_sq * d * d + by_radial * radial_mps + by_az * seen.sin_az + by_el * seen.sin_el
+        let [by_tau_sq, by_radial, by_az, by_el] = self.phase;
+        let tau = seen.d.value * PER_METRE_S;
+        by_tau_sq * tau * tau + by_radial * radial_mps + by_az * seen.sin_az + by_el * seen.sin_el
     }
 
     /// (∂φ/∂d, ∂φ/∂v_r, ∂φ/∂θ_az, ∂φ/∂θ_el).
     pub(super) fn phase_slopes(&self, seen: &Seen) -> [f64; 4] {
-        let [by_d_sq, by_radial, by_az, by_el] = self.phase;
-        [2.0 * by_d_sq * seen.d.value, by_radial, by_az * seen.cos_az, by_el * seen.cos_el]
+        let [by_tau_sq, by_radial, by_az, by_el] = self.phase;
+        let tau = seen.d.value * PER_METRE_S;
+        [2.0 * by_tau_sq * tau * PER_METRE_S, by_radial, by_az * seen.cos_az, by_el * seen.cos_el]
     }
 }
 
