@@ -13,7 +13,7 @@ use crate::mhp::for_neighbours;
 use crate::mhp::splat::Seen;
 use crate::radar::{AxisKind, unravel};
 use smallvec::SmallVec;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Spread of speckle, ln: a Rayleigh amplitude has 0.64. What rises less over the background is not counted.
 pub(super) const SPECKLE: f64 = 0.64;
@@ -55,8 +55,8 @@ pub(super) struct Evidence {
     value: Vec<f32>,
     source: Vec<u32>,
     largest: f64,
-    /// One over the background of each ring.
-    background: Vec<f32>,
+    /// One over the background of each ring, worked out where it is asked for.
+    background: Vec<OnceLock<f32>>,
     /// How restless each spatial cell is, 0 to 1: what stands still is no evidence. `None` where nothing tells.
     unrest: Option<Arc<Vec<f32>>>,
 }
@@ -65,15 +65,14 @@ impl Evidence {
     pub(super) fn new(layout: &Arc<Layout>, map: &[f64]) -> Self {
         let largest = map.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
         let (value, source) = layout.spatial(map, largest);
-        let background = layout.background(&value);
-        Self { layout: Arc::clone(layout), value, source, largest, background, unrest: None }
+        Self { layout: Arc::clone(layout), value, source, largest, background: layout.unknown(), unrest: None }
     }
 
     /// Another map of the same view, a short time before or after, on the scale and with the stillness of this one. The
     /// background is its own: that of a ring rises with the sidelobes of whoever stands in it.
     pub(super) fn at_another_time(&self, map: &[f64]) -> Self {
         let (value, source) = self.layout.spatial(map, self.largest);
-        let background = self.layout.background(&value);
+        let background = self.layout.unknown();
         Self { value, source, background, layout: Arc::clone(&self.layout), unrest: self.unrest.clone(), ..*self }
     }
 
@@ -96,7 +95,8 @@ impl Evidence {
 
     /// ln H over the background, ≥ 0.
     fn over_background(&self, cell: usize) -> f64 {
-        let ratio = self.value[cell] * self.background[self.layout.ring_of[cell] as usize];
+        let ring = self.layout.ring_of[cell] as usize;
+        let ratio = self.value[cell] * self.background[ring].get_or_init(|| self.layout.background(&self.value, ring));
         if ratio > 1.0 { f64::from(ratio.ln()) } else { 0.0 }
     }
 
@@ -138,12 +138,9 @@ impl Evidence {
     }
 
     fn is_maximum(&self, cell: usize) -> bool {
-        let mut highest = self.excess(cell) > 0.0;
-        if !highest {
-            return false;
-        }
+        let mut highest = true;
         for_neighbours(&self.layout.shape, cell, |other| highest &= self.value[other] <= self.value[cell]);
-        highest
+        highest && self.excess(cell) > 0.0
     }
 
     fn peak(&self, cell: usize) -> Peak {
@@ -292,11 +289,12 @@ impl Evidence {
         let cells = window.iter().zip(&self.layout.shape).fold(vec![0], |cells: Vec<usize>, (&[lo, hi], &bins)| {
             cells.iter().flat_map(|&cell| (lo..hi).map(move |bin| cell * bins + bin)).collect()
         });
-        let strongest = cells.iter().map(|&cell| self.salience(cell)).fold(0.0, f64::max);
+        let lit: Vec<(usize, f64)> = cells.into_iter().map(|cell| (cell, self.salience(cell))).collect();
+        let strongest = lit.iter().map(|(_, salience)| *salience).fold(0.0, f64::max);
         let floor = (strongest - DEPTH_LN).max(SPECKLE);
         let (mut sum, mut weights): (SmallVec<[f64; 3]>, f64) = (SmallVec::from_elem(0.0, self.layout.axes.len()), 0.0);
-        for cell in cells {
-            let weight = self.salience(cell) - floor;
+        for (cell, salience) in lit {
+            let weight = salience - floor;
             if weight > 0.0 {
                 weights += weight;
                 let mut rest = cell;

@@ -2,6 +2,8 @@
 //! range, and how a map with a Doppler axis becomes one without.
 
 use crate::radar::{Axis, AxisKind, View, unravel};
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Echoes nearer than this are leakage from the radar itself, m.
 pub(super) const NEAREST_M: f64 = 0.5;
@@ -27,8 +29,27 @@ pub(super) struct Layout {
     deaf: usize,
 }
 
+/// Layouts that were asked for last: frame after frame has the same views.
+static KNOWN: Mutex<VecDeque<Arc<Layout>>> = Mutex::new(VecDeque::new());
+/// So many are kept.
+const MOST_KNOWN: usize = 8;
+
 impl Layout {
-    pub(super) fn new(index: usize, view: &View) -> Self {
+    /// The layout of a view, as it is remembered or worked out.
+    pub(super) fn of(index: usize, view: &View) -> Arc<Self> {
+        let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        let same = |layout: &&Arc<Self>| layout.index == index && layout.view == *view;
+        if let Some(layout) = known().iter().find(same) {
+            return Arc::clone(layout);
+        }
+        let layout = Arc::new(Self::new(index, view));
+        let mut known = known();
+        known.truncate(MOST_KNOWN - 1);
+        known.push_front(Arc::clone(&layout));
+        layout
+    }
+
+    fn new(index: usize, view: &View) -> Self {
         let spatial = view.axes.iter().enumerate().filter(|(_, axis)| axis.kind != AxisKind::Doppler);
         let axes: Vec<(usize, Axis)> = spatial.map(|(k, axis)| (k, axis.clone())).collect();
         let shape: Vec<usize> = axes.iter().map(|(_, axis)| axis.bins).collect();
@@ -78,18 +99,21 @@ impl Layout {
         Some(squares.into_iter().map(f64::sqrt).collect())
     }
 
-    /// One over the median of each ring; 0 where nothing is told. `value` must be positive.
-    pub(super) fn background(&self, value: &[f32]) -> Vec<f32> {
+    /// A place for the background of each ring.
+    pub(super) fn unknown(&self) -> Vec<OnceLock<f32>> {
+        vec![OnceLock::new(); self.rings.len() - 1]
+    }
+
+    /// One over the median of a ring, or of the whole map where the ring is small; 0 where nothing is told. `value` must be
+    /// positive.
+    pub(super) fn background(&self, value: &[f32], ring: usize) -> f32 {
+        if ring < self.deaf {
+            return 0.0;
+        }
+        let members = &self.cells[self.rings[ring]..self.rings[ring + 1]];
+        let of = if members.len() < SMALLEST_RING { &self.cells[..] } else { members };
         // Positive floats sort as their bits do, and integers are partitioned several times as fast.
-        let mut bits: Vec<u32> = self.cells.iter().map(|&cell| value[cell as usize].to_bits()).collect();
-        let small = self.rings.windows(2).any(|ends| ends[1] - ends[0] < SMALLEST_RING);
-        let overall = if small { median(&mut bits.clone()) } else { 1.0 };
-        let of_ring = |(ring, ends): (usize, &[usize])| match &mut bits[ends[0]..ends[1]] {
-            _ if ring < self.deaf => 0.0,
-            few if few.len() < SMALLEST_RING => 1.0 / overall,
-            members => 1.0 / median(members),
-        };
-        self.rings.windows(2).enumerate().map(of_ring).collect()
+        1.0 / median(&mut of.iter().map(|&cell| value[cell as usize].to_bits()).collect::<Vec<_>>())
     }
 
     /// H of each spatial cell in shares of `largest`, and the full cell each was taken from where that is another.

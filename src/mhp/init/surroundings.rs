@@ -25,8 +25,7 @@ pub(in crate::mhp) struct Surroundings {
 
 impl Surroundings {
     fn new(problem: &Problem) -> Self {
-        let layouts: Vec<Arc<Layout>> =
-            problem.views.iter().enumerate().map(|(k, view)| Arc::new(Layout::new(k, view))).collect();
+        let layouts: Vec<Arc<Layout>> = problem.views.iter().enumerate().map(|(k, view)| Layout::of(k, view)).collect();
         let plain: Views =
             layouts.iter().enumerate().map(|(k, layout)| Evidence::new(layout, problem.map(k))).collect();
         let now = moving(problem, &plain).unwrap_or(plain);
