@@ -206,6 +206,9 @@ impl Pppr {
 
     /// True where every number of every group is finite.
     pub fn is_finite(&self) -> bool {
-        self.groups.iter().flatten().all(|x| x.is_finite())
+        // Without a way out of the loop it is many at a time.
+        const EXPONENT: u64 = 0x7FF0_0000_0000_0000;
+        let odd = |x: &f64| x.to_bits() & EXPONENT == EXPONENT;
+        !self.groups.iter().any(|group| group.iter().fold(false, |any, x| any | odd(x)))
     }
 }

@@ -32,12 +32,14 @@ pub(super) struct Moments {
 impl Moments {
     /// All zeros for a view with these axes; keeps the memory of what was there.
     pub(super) fn clear(&mut self, axes: &[Axis]) {
-        let mut r_by_bin = std::mem::take(&mut self.r_by_bin);
+        let Self { dims, r, r_delta, r_delta_delta, q, q_delta, r_by_bin } = self;
+        *dims = axes.len().min(3);
+        (*r, *r_delta, *r_delta_delta) = (0.0, [0.0; 3], [[0.0; 3]; 3]);
+        (*q, *q_delta) = (0.0, [0.0; 3]);
         for (by_bin, axis) in r_by_bin.iter_mut().zip(axes) {
             by_bin.clear();
             by_bin.resize(if axis.kind == AxisKind::Doppler { axis.bins } else { 0 }, 0.0);
         }
-        *self = Self { dims: axes.len().min(3), r_by_bin, ..Self::default() };
     }
 }
 

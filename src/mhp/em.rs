@@ -78,9 +78,9 @@ pub(super) fn evaluate(
     let joints = params.shape().total_joints();
     let Workspace { splats, traces, moments, tiles } = workspace;
     splats.resize_with(joints, Splat::default);
-    traces.clear();
-    for ((joint, splat), form) in splats.iter_mut().enumerate().zip(forms) {
-        traces.push(scene.splat(params, joint, form, splat));
+    traces.resize_with(joints, Trace::default);
+    for (joint, ((splat, trace), form)) in splats.iter_mut().zip(&mut *traces).zip(forms).enumerate() {
+        scene.splat(params, joint, form, splat, trace);
     }
     moments.resize_with(joints, Moments::default);
     for moments in moments.iter_mut() {

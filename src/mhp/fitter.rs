@@ -224,6 +224,9 @@ fn evaluate_into(
 }
 
 fn first_non_finite(params: &Pppr) -> Option<(usize, Group)> {
+    if params.is_finite() {
+        return None;
+    }
     (0..params.shape().total_joints())
         .flat_map(|joint| Group::ALL.map(|group| (joint, group)))
         .find(|&(joint, group)| params.joint(group, joint).iter().any(|x| !x.is_finite()))

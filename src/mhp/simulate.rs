@@ -4,7 +4,7 @@ use super::form::Form;
 use super::kernel::Kernel;
 use super::region::Region;
 use super::scalar::Real;
-use super::splat::{Scene, Splat};
+use super::splat::{Scene, Splat, Trace};
 use super::tiles::{Tiles, Tiling};
 use super::{Precision, Problem};
 use crate::body::Pppr;
@@ -28,7 +28,7 @@ fn ln_hypot(a: f64, b: f64) -> f64 {
 pub(super) fn splats(scene: &Scene<'_>, params: &Pppr) -> Vec<Splat> {
     let of = |joint: usize| {
         let mut splat = Splat::default();
-        scene.splat(params, joint, &Form::new(params, joint), &mut splat);
+        scene.splat(params, joint, &Form::new(params, joint), &mut splat, &mut Trace::default());
         splat
     };
     (0..params.shape().total_joints()).map(of).collect()

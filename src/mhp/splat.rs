@@ -20,7 +20,7 @@ const PER_METRE_S: f64 = 2.0 / SPEED_OF_LIGHT;
 const LN_TAU: f64 = 1.837_877_066_409_345_3;
 
 /// A quantity held above a floor; its gradient is zero while it is.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Floored {
     /// max(x, floor)
     pub value: f64,
@@ -36,7 +36,7 @@ impl Floored {
 }
 
 /// A point in the view frame and the directions around it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Seen {
     /// The point after the surface offset, m.
     pub p: Vec3,
@@ -192,7 +192,7 @@ pub(super) struct Splat {
 }
 
 /// What the derivative needs besides.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Trace {
     /// The joint before the surface offset, view frame.
     pub unmoved: Vec3,
@@ -271,8 +271,8 @@ impl Scene<'_> {
         (skin.value / d.value, d, skin)
     }
 
-    /// Projects flat joint `joint` of `params`, which has this form, into this view: overwrites `splat`.
-    pub(super) fn splat(&self, params: &Pppr, joint: usize, form: &Form, splat: &mut Splat) -> Trace {
+    /// Projects flat joint `joint` of `params`, which has this form, into this view: overwrites `splat` and `trace`.
+    pub(super) fn splat(&self, params: &Pppr, joint: usize, form: &Form, splat: &mut Splat, trace: &mut Trace) {
         let pose = &self.view.pose;
         let unmoved = pose.view_from_world(params.position(joint));
         let seen = Seen::new(scale(unmoved, self.surface_factor(unmoved).0));
@@ -314,7 +314,7 @@ impl Scene<'_> {
         let phase = self.phase(&seen, radial);
         splat.phase = phase - TAU * (phase * (1.0 / TAU)).floor();
         (splat.dims, splat.bin, splat.precision, splat.kappa) = (dims, bin, precision, kappa);
-        Trace { unmoved, seen, rows, velocity, blurred, w_az, w_el }
+        *trace = Trace { unmoved, seen, rows, velocity, blurred, w_az, w_el };
     }
 
     fn row(&self, seen: &Seen, k: usize, axis: &Axis) -> Row {
