@@ -79,7 +79,8 @@ proptest! {
                 let frame = frame(index, cells);
                 let bytes = frame.bytes();
                 prop_assert!(bytes >= cells * 8);
-                cache.insert(index, frame);
+                let bytes = frame.bytes();
+                cache.insert(index, frame, bytes);
                 held.map(|at| model.remove(at));
                 if bytes <= budget {
                     while model.iter().map(|entry| entry.1).sum::<usize>() + bytes > budget {

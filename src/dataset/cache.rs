@@ -1,6 +1,5 @@
-//! Frames in memory, within a byte budget.
+//! Frames, or parts of them, in memory within a byte budget.
 
-use super::Frame;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
@@ -9,8 +8,8 @@ pub const DEFAULT_BUDGET: usize = 512 << 20;
 
 /// Least recently used frames go first, so that what is held never exceeds the budget.
 #[derive(Debug)]
-pub struct FrameCache {
-    frames: HashMap<usize, (Arc<Frame>, usize, u64)>,
+pub struct Cache<T> {
+    frames: HashMap<usize, (Arc<T>, usize, u64)>,
     /// Index by time of last use.
     order: BTreeMap<u64, usize>,
     clock: u64,
@@ -18,20 +17,23 @@ pub struct FrameCache {
     budget: usize,
 }
 
-impl Default for FrameCache {
+/// Whole frames.
+pub type FrameCache = Cache<super::Frame>;
+
+impl<T> Default for Cache<T> {
     fn default() -> Self {
         Self::new(DEFAULT_BUDGET)
     }
 }
 
-impl FrameCache {
+impl<T> Cache<T> {
     /// An empty cache that will hold at most `budget` bytes of frames.
     pub fn new(budget: usize) -> Self {
         Self { frames: HashMap::new(), order: BTreeMap::new(), clock: 0, bytes: 0, budget }
     }
 
     /// The frame `index`, which is now the most recently used.
-    pub fn get(&mut self, index: usize) -> Option<Arc<Frame>> {
+    pub fn get(&mut self, index: usize) -> Option<Arc<T>> {
         let (frame, _, used) = self.frames.get_mut(&index)?;
         self.order.remove(used);
         self.clock += 1;
@@ -45,10 +47,9 @@ impl FrameCache {
         self.frames.contains_key(&index)
     }
 
-    /// Keeps a frame, dropping old ones for it. A frame larger than the whole budget is not kept.
-    pub fn insert(&mut self, index: usize, frame: Arc<Frame>) {
+    /// Keeps a frame of `bytes`, dropping old ones for it. A frame larger than the whole budget is not kept.
+    pub fn insert(&mut self, index: usize, frame: Arc<T>, bytes: usize) {
         self.remove(index);
-        let bytes = frame.bytes();
         if bytes > self.budget {
             return;
         }

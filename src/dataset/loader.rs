@@ -126,7 +126,7 @@ fn run(shared: &Shared) {
         });
         let mut state = shared.lock();
         if let Ok(frame) = &loaded {
-            state.cache.insert(index, Arc::clone(frame));
+            state.cache.insert(index, Arc::clone(frame), frame.bytes());
         }
         // A frame read ahead may have been asked for meanwhile; one asked for may be stale.
         let answers = state.current == Some(index) && (asked || state.wanted == Some(index));

@@ -3,6 +3,7 @@
 use super::{Dataset, DatasetError, Heatmap};
 use std::collections::VecDeque;
 use std::ops::Range;
+use std::sync::{Arc, PoisonError};
 
 /// Reads the maps of consecutive frames in the calling thread, in the order of the data set. An item is the maps of one
 /// frame in the order of its views, or why they cannot be read; the frames after it are read nevertheless.
@@ -18,6 +19,22 @@ impl Dataset {
     /// The maps of `frames`, read as they are asked for. Frames of a stacked file are read many at a time.
     pub fn maps(&self, frames: Range<usize>) -> MapReader<'_> {
         MapReader { dataset: self, left: frames, at_once: self.maps_at_once(), ready: VecDeque::new() }
+    }
+
+    /// The maps of one frame, kept for a while: whoever looks at the frames around each of many frames asks for the same
+    /// ones again and again.
+    ///
+    /// # Errors
+    /// As [`Self::load`], for what the maps need.
+    pub fn recent_maps(&self, index: usize) -> Result<Arc<Vec<Heatmap>>, DatasetError> {
+        let recent = || self.recent.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(maps) = recent().get(index) {
+            return Ok(maps);
+        }
+        let maps = Arc::new(self.read_maps(&(index..index + 1))?.into_iter().next().unwrap_or_default());
+        let bytes = maps.iter().map(|map| map.data.len() * size_of::<f64>()).sum();
+        recent().insert(index, Arc::clone(&maps), bytes);
+        Ok(maps)
     }
 }
 

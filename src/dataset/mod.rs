@@ -28,7 +28,7 @@ mod words;
 mod xrf55;
 
 pub use bare::{BareCatalog, BareChoice, Remembered};
-pub use cache::{DEFAULT_BUDGET, FrameCache};
+pub use cache::{Cache, DEFAULT_BUDGET, FrameCache};
 pub use error::DatasetError;
 pub(crate) use error::panic_text;
 pub use frame::{Frame, Heatmap, ImageAnnotations, Truth};

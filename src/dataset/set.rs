@@ -1,6 +1,7 @@
 //! `Dataset`: what was opened, and its frames one at a time.
 
 use super::bare::{BareCatalog, BareChoice, Remembered, assumptions, frames_of};
+use super::cache::Cache;
 use super::files::{RADAR_SUFFIX, Segment, matching, segments};
 use super::manifest::{Layout, Manifest};
 use super::source::{Names, Source};
@@ -12,12 +13,14 @@ use crate::radar::{RadarConfig, View};
 use sha2::{Digest as _, Sha256};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock};
 
 /// The name of a manifest inside a data set's folder.
 pub const MANIFEST_NAME: &str = "dataset.toml";
 /// Maps of a stacked file that are read in one pass, bytes: every pass reads the file from its start.
 const STACKED_BYTES: usize = 64 << 20;
+/// Maps of frames around others that are kept, bytes.
+const RECENT_BYTES: usize = 64 << 20;
 
 /// What is true of every frame of a data set.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,6 +55,8 @@ pub struct Dataset {
     start: usize,
     names: Names,
     fingerprint: OnceLock<String>,
+    /// Maps that were asked for last beside others.
+    pub(super) recent: Mutex<Cache<Vec<Heatmap>>>,
 }
 
 impl Dataset {
@@ -268,7 +273,7 @@ impl Dataset {
 
     fn of(info: DatasetInfo, source: Source, start: usize) -> Self {
         let names = source.names(&info.name);
-        Self { info, source, start, names, fingerprint: OnceLock::new() }
+        Self { info, source, start, names, fingerprint: OnceLock::new(), recent: Mutex::new(Cache::new(RECENT_BYTES)) }
     }
 
     /// What is true of every frame.

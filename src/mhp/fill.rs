@@ -1,5 +1,7 @@
 //! Filling the cells of a map that hold no number; SPEC section 4.
 
+use crate::radar::unravel;
+
 /// Replaces NaN and infinite cells by the mean of their finite 3^D neighbours, all at once, repeated until none is
 /// left. `map` is a C-ordered array of shape `shape`. Returns how many cells were filled, or `None` where no cell is
 /// finite (the map is then unchanged).
@@ -38,13 +40,15 @@ fn neighbour_mean(map: &[f64], shape: &[usize], cell: usize) -> Option<f64> {
 
 /// Calls `visit` with the flat index of each of the up to 3^D − 1 neighbours of `cell`.
 pub(crate) fn for_neighbours(shape: &[usize], cell: usize, mut visit: impl FnMut(usize)) {
-    let dims = shape.len();
-    let mut index = vec![0_usize; dims];
-    let mut rest = cell;
-    for k in (0..dims).rev() {
-        index[k] = rest % shape[k];
-        rest /= shape[k];
-    }
+    all_neighbours(shape, cell, |other| {
+        visit(other);
+        true
+    });
+}
+
+/// Whether `holds` for all neighbours of `cell`; none is asked after the first for which it does not.
+pub(super) fn all_neighbours(shape: &[usize], cell: usize, mut holds: impl FnMut(usize) -> bool) -> bool {
+    let (dims, index) = (shape.len(), unravel(cell, shape));
     for code in 0..3_usize.pow(dims as u32) {
         let (mut other, mut digits, mut inside, mut same) = (0, code, true, true);
         for k in 0..dims {
@@ -57,10 +61,11 @@ pub(crate) fn for_neighbours(shape: &[usize], cell: usize, mut visit: impl FnMut
                 None => inside = false,
             }
         }
-        if inside && !same {
-            visit(other);
+        if inside && !same && !holds(other) {
+            return false;
         }
     }
+    true
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ pub fn problem_of(dataset: &Dataset, frame: &Frame) -> Result<Problem, FitError>
     let sequence = dataset.sequence(frame.index);
     let around = frame.index.saturating_sub(REACH)..(frame.index + REACH + 1).min(dataset.len());
     for other in around.filter(|&other| other != frame.index && dataset.sequence(other) == sequence) {
-        let Some(Ok(maps)) = dataset.maps(other..other + 1).next() else { continue };
+        let Ok(maps) = dataset.recent_maps(other) else { continue };
         let maps: Vec<&[f64]> = maps.iter().map(|map| map.data.as_slice()).collect();
         let offset_s = (other as f64 - frame.index as f64) / rate_hz;
         if let Err(error) = problem.add_neighbour(offset_s, &maps) {

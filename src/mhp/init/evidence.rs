@@ -9,6 +9,7 @@
 use super::layout::{Layout, NEAREST_M};
 use super::locate::Mark;
 use crate::geometry::{Vec3, mat_t_vec};
+use crate::mhp::fill::all_neighbours;
 use crate::mhp::for_neighbours;
 use crate::mhp::splat::Seen;
 use crate::radar::{AxisKind, unravel};
@@ -138,9 +139,8 @@ impl Evidence {
     }
 
     fn is_maximum(&self, cell: usize) -> bool {
-        let mut highest = true;
-        for_neighbours(&self.layout.shape, cell, |other| highest &= self.value[other] <= self.value[cell]);
-        highest && self.excess(cell) > 0.0
+        let highest = |other: usize| self.value[other] <= self.value[cell];
+        all_neighbours(&self.layout.shape, cell, highest) && self.excess(cell) > 0.0
     }
 
     fn peak(&self, cell: usize) -> Peak {
