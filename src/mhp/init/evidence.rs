@@ -18,6 +18,8 @@ use std::sync::{Arc, OnceLock};
 
 /// Spread of speckle, ln: a Rayleigh amplitude has 0.64. What rises less over the background is not counted.
 pub(super) const SPECKLE: f64 = 0.64;
+/// e^[`SPECKLE`]
+const SPECKLE_RATIO: f64 = 1.896_480_879_304_951_5;
 /// Percentiles tried for local maxima, strictest first, until [`ENOUGH_PEAKS`] are found.
 const PERCENTILES: [f64; 6] = [99.5, 99.0, 98.0, 96.0, 92.0, 85.0];
 const ENOUGH_PEAKS: usize = 12;
@@ -94,22 +96,20 @@ impl Evidence {
         self.unrest.as_ref().map_or(1.0, |unrest| f64::from(unrest[cell]))
     }
 
-    /// ln H over the background, ≥ 0.
-    fn over_background(&self, cell: usize) -> f64 {
+    /// H over the background.
+    fn over_background(&self, cell: usize) -> f32 {
         let ring = self.layout.ring_of[cell] as usize;
-        let ratio = self.value[cell] * self.background[ring].get_or_init(|| self.layout.background(&self.value, ring));
-        if ratio > 1.0 { f64::from(ratio.ln()) } else { 0.0 }
+        self.value[cell] * self.background[ring].get_or_init(|| self.layout.background(&self.value, ring))
     }
 
     /// ln H over the background of what moves, ≥ 0.
     fn salience(&self, cell: usize) -> f64 {
-        self.over_background(cell) * self.unrest(cell)
+        f64::from(self.over_background(cell).max(1.0).ln()) * self.unrest(cell)
     }
 
-    /// H over the background of what moves, of the map's largest.
+    /// H over the background and what speckle rises above it, of what moves, of the map's largest.
     fn excess(&self, cell: usize) -> f64 {
-        let salience = self.over_background(cell);
-        let over_speckle = if salience > SPECKLE { 1.0 - (SPECKLE - salience).exp() } else { 0.0 };
+        let over_speckle = (1.0 - SPECKLE_RATIO / f64::from(self.over_background(cell))).max(0.0);
         f64::from(self.value[cell]) * over_speckle * self.unrest(cell)
     }
 
@@ -117,11 +117,16 @@ impl Evidence {
     pub(super) fn peaks(&self) -> Vec<Peak> {
         let mut bits: Vec<u32> = self.value.iter().map(|x| x.to_bits()).collect();
         let last = bits.len().saturating_sub(1);
-        // From the strictest down: everything above the last level is already in the upper part.
-        let mut rest = bits.as_mut_slice();
+        let place = |q: f64| (last as f64 * q / 100.0).ceil() as usize;
+        // What lies under the laxest level is of no interest.
+        let laxest = place(PERCENTILES[PERCENTILES.len() - 1]).min(last);
+        if !bits.is_empty() {
+            bits.select_nth_unstable(laxest);
+        }
+        let mut rest = bits.get_mut(laxest..).unwrap_or_default();
         let mut kept: Vec<(f64, usize)> = Vec::new();
         for q in PERCENTILES {
-            let at = (last as f64 * q / 100.0).ceil() as usize;
+            let at = place(q) - laxest;
             if at >= rest.len() {
                 continue;
             }
