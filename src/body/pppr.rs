@@ -60,6 +60,21 @@ impl PpprShape {
         }
     }
 
+    /// Where a group's numbers lie among those of all.
+    fn range(self, group: Group) -> std::ops::Range<usize> {
+        // In the order of the groups, each as wide as said above.
+        let before = match group {
+            Group::Position => 0,
+            Group::LogScale => 3,
+            Group::Rotation => 6,
+            Group::Velocity => 10,
+            Group::Beta => 13,
+            Group::Omega => 14,
+        };
+        let joints = self.total_joints();
+        before * joints..(before + self.width(group)) * joints
+    }
+
     /// Joints of all persons together.
     pub fn total_joints(self) -> usize {
         self.persons * self.joints
@@ -82,14 +97,15 @@ impl PpprShape {
 /// The parameters of all joints of all persons (or their gradients, or Adam's moments): one flat array a group,
 /// ordered (person, joint, component); SPEC section 2.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Unchecked")]
+#[serde(try_from = "Unchecked", into = "Unchecked")]
 pub struct Pppr {
     shape: PpprShape,
-    groups: [Vec<f64>; 6],
+    /// Group after group: one piece of memory, for a fit keeps every iteration's.
+    numbers: Vec<f64>,
 }
 
 /// What a file says, before its sizes are compared.
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 struct Unchecked {
     shape: PpprShape,
     groups: [Vec<f64>; 6],
@@ -107,37 +123,39 @@ impl TryFrom<Unchecked> for Pppr {
                 return Err(format!("`{key}` has {found} numbers; expected {expected}"));
             }
         }
-        Ok(Self { shape, groups })
+        Ok(Self { shape, numbers: groups.concat() })
+    }
+}
+
+impl From<Pppr> for Unchecked {
+    fn from(of: Pppr) -> Self {
+        Self { shape: of.shape, groups: Group::ALL.map(|group| of.group(group).to_vec()) }
     }
 }
 
 impl Clone for Pppr {
     fn clone(&self) -> Self {
-        Self { shape: self.shape, groups: self.groups.clone() }
+        Self { shape: self.shape, numbers: self.numbers.clone() }
     }
 
     /// Keeps the memory that is there: a fit copies its parameters every iteration.
     fn clone_from(&mut self, source: &Self) {
         self.shape = source.shape;
-        for (own, other) in self.groups.iter_mut().zip(&source.groups) {
-            own.clone_from(other);
-        }
+        self.numbers.clone_from(&source.numbers);
     }
 }
 
 impl Pppr {
     /// All zeros (the zero quaternion included): a gradient to be accumulated.
     pub fn zeros(shape: PpprShape) -> Self {
-        Self { shape, groups: Group::ALL.map(|g| vec![0.0; shape.width(g) * shape.total_joints()]) }
+        Self { shape, numbers: vec![0.0; shape.total()] }
     }
 
     /// All zeros again, in the memory that is there.
     pub fn reset(&mut self, shape: PpprShape) {
         self.shape = shape;
-        for (group, numbers) in Group::ALL.into_iter().zip(&mut self.groups) {
-            numbers.clear();
-            numbers.resize(shape.width(group) * shape.total_joints(), 0.0);
-        }
+        self.numbers.clear();
+        self.numbers.resize(shape.total(), 0.0);
     }
 
     /// The sizes.
@@ -147,24 +165,25 @@ impl Pppr {
 
     /// The flat array of a group, (persons · joints · width).
     pub fn group(&self, group: Group) -> &[f64] {
-        &self.groups[group as usize]
+        &self.numbers[self.shape.range(group)]
     }
 
     /// The flat array of a group, to be written.
     pub fn group_mut(&mut self, group: Group) -> &mut [f64] {
-        &mut self.groups[group as usize]
+        let range = self.shape.range(group);
+        &mut self.numbers[range]
     }
 
     /// The numbers of flat joint `joint` (person · joints + joint) in `group`.
     pub fn joint(&self, group: Group, joint: usize) -> &[f64] {
         let width = self.shape.width(group);
-        &self.groups[group as usize][joint * width..(joint + 1) * width]
+        &self.group(group)[joint * width..(joint + 1) * width]
     }
 
     /// The numbers of flat joint `joint` in `group`, to be written.
     pub fn joint_mut(&mut self, group: Group, joint: usize) -> &mut [f64] {
         let width = self.shape.width(group);
-        &mut self.groups[group as usize][joint * width..(joint + 1) * width]
+        &mut self.group_mut(group)[joint * width..(joint + 1) * width]
     }
 
     /// A 3-vector group at flat joint `joint`.
@@ -209,6 +228,6 @@ impl Pppr {
         // Without a way out of the loop it is many at a time.
         const EXPONENT: u64 = 0x7FF0_0000_0000_0000;
         let odd = |x: &f64| x.to_bits() & EXPONENT == EXPONENT;
-        !self.groups.iter().any(|group| group.iter().fold(false, |any, x| any | odd(x)))
+        !self.numbers.iter().fold(false, |any, x| any | odd(x))
     }
 }

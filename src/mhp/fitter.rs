@@ -41,10 +41,11 @@ impl Clone for FitState {
 pub struct Fitter {
     objective: Objective,
     body: Articulation,
-    state: FitState,
+    /// Shared with whoever keeps the history; what nobody keeps is written over.
+    state: Arc<FitState>,
     evaluation: Evaluation,
     // Of the next step, until it is known to be finite; then they change places with those above.
-    next: FitState,
+    next: Arc<FitState>,
     next_evaluation: Evaluation,
     /// The step by the coordinates of root and bones.
     turns: Vec<f64>,
@@ -67,7 +68,7 @@ impl Fitter {
         let adam = Adam::new(initial.shape());
         let losses = vec![evaluation.loss];
         let state = FitState { iteration: 0, params: initial, adam, losses };
-        let (next, next_evaluation) = (state.clone(), evaluation.clone());
+        let (state, next, next_evaluation) = (Arc::new(state.clone()), Arc::new(state), evaluation.clone());
         Ok(Self { objective, body, state, evaluation, next, next_evaluation, turns: Vec::new() })
     }
 
@@ -77,13 +78,17 @@ impl Fitter {
     /// [`FitError::Diverged`] where the new parameters or their loss are not finite; the fitter then stays where it was.
     pub fn step(&mut self) -> Result<StepReport, FitError> {
         let Self { objective, body, state, evaluation, next, next_evaluation, turns } = self;
-        next.clone_from(state);
-        next.iteration += 1;
-        next.adam.update(&mut next.params, &evaluation.gradient, objective.config(), body, turns);
-        evaluate_into(objective, &next.params, next.iteration, next_evaluation)?;
-        next.losses.push(next_evaluation.loss);
-        let surplus = next.losses.len().saturating_sub(LOOK_BACK + 1);
-        next.losses.drain(..surplus);
+        match Arc::get_mut(next) {
+            Some(own) => own.clone_from(state),
+            None => *next = Arc::new(FitState::clone(state)),
+        }
+        let next_state = Arc::make_mut(next);
+        next_state.iteration += 1;
+        next_state.adam.update(&mut next_state.params, &evaluation.gradient, objective.config(), body, turns);
+        evaluate_into(objective, &next_state.params, next_state.iteration, next_evaluation)?;
+        next_state.losses.push(next_evaluation.loss);
+        let surplus = next_state.losses.len().saturating_sub(LOOK_BACK + 1);
+        next_state.losses.drain(..surplus);
         std::mem::swap(state, next);
         std::mem::swap(evaluation, next_evaluation);
         Ok(self.report())
@@ -117,15 +122,15 @@ impl Fitter {
     }
 
     /// The state to come back to.
-    pub fn state(&self) -> FitState {
-        self.state.clone()
+    pub fn state(&self) -> Arc<FitState> {
+        Arc::clone(&self.state)
     }
 
     /// Goes to `state`; the configuration stays as it is.
     ///
     /// # Errors
     /// Where the state's parameters have the wrong sizes or are not finite; the fitter then stays where it was.
-    pub fn restore(&mut self, state: FitState) -> Result<(), FitError> {
+    pub fn restore(&mut self, state: Arc<FitState>) -> Result<(), FitError> {
         self.objective.problem().check(&state.params)?;
         self.evaluation = evaluate(&mut self.objective, &state.params, state.iteration)?;
         self.state = state;
@@ -142,11 +147,12 @@ impl Fitter {
         self.objective.set_config(config);
         match evaluate(&mut self.objective, &self.state.params, self.state.iteration) {
             Ok(evaluation) => {
-                if let Some(last) = self.state.losses.last_mut() {
+                let state = Arc::make_mut(&mut self.state);
+                if let Some(last) = state.losses.last_mut() {
                     *last = evaluation.loss;
                 }
                 if config.parameterization != before.parameterization {
-                    self.state.adam = Adam::new(self.state.params.shape());
+                    state.adam = Adam::new(state.params.shape());
                 }
                 self.evaluation = evaluation;
                 Ok(())
@@ -165,9 +171,10 @@ impl Fitter {
     pub fn set_params(&mut self, params: Pppr) -> Result<(), FitError> {
         self.objective.problem().check(&params)?;
         self.evaluation = evaluate(&mut self.objective, &params, self.state.iteration)?;
-        self.state.adam = Adam::new(params.shape());
-        self.state.params = params;
-        self.state.losses = vec![self.evaluation.loss];
+        let state = Arc::make_mut(&mut self.state);
+        state.adam = Adam::new(params.shape());
+        state.params = params;
+        state.losses = vec![self.evaluation.loss];
         Ok(())
     }
 

@@ -13,9 +13,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Snapshots are published at most this often while running.
-const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(33);
+const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(50);
 /// A running fit spends at most one part in this many on snapshots.
-const SNAPSHOT_SHARE: u32 = 5;
+const SNAPSHOT_SHARE: u32 = 40;
 /// Rows are sent in batches at most this often while running.
 const ROWS_INTERVAL: Duration = Duration::from_millis(33);
 
@@ -230,7 +230,7 @@ impl Job {
         let warnings = viewer.warnings().to_vec();
         let resumed = state.is_some();
         if let Some(state) = state {
-            fitter.restore(FitState::clone(&state))?;
+            fitter.restore(state)?;
         }
         let now = Instant::now();
         let mut new = Self {
@@ -275,8 +275,7 @@ impl Job {
     }
 
     fn push_row(&mut self) {
-        let row =
-            HistoryRow { branch: self.branch, report: self.fitter.report(), state: Arc::new(self.fitter.state()) };
+        let row = HistoryRow { branch: self.branch, report: self.fitter.report(), state: self.fitter.state() };
         self.rows.push(row);
         self.dirty = true;
     }
@@ -322,7 +321,7 @@ impl Job {
             WorkerCommand::Branch { branch, state, config } => {
                 self.target = 0;
                 self.fitter.set_config(*config)?;
-                self.fitter.restore(FitState::clone(&state))?;
+                self.fitter.restore(state)?;
                 self.branch = branch;
                 self.branch_start = self.iteration();
                 self.push_row();
