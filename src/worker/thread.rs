@@ -5,7 +5,9 @@ use super::protocol::{
     HistoryRow, JobId, Prepare, Prepared, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
 };
 use crate::config::FitConfig;
-use crate::mhp::{FitError, FitState, Fitter, Objective, Precision, Problem, StopReason, masks, predict, simulate};
+use crate::mhp::{
+    FitError, FitState, Fitter, Objective, Precision, Problem, StepReport, StopReason, masks, predict, simulate,
+};
 use crate::start::{begin, problem_of};
 use crossbeam_channel::{Receiver, Sender};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -251,7 +253,7 @@ impl Job {
             dirty: true,
         };
         if !resumed {
-            new.push_row();
+            new.push_row(new.fitter.report());
         }
         Ok((new, Prepared { problem, begun, initial, warnings, init_ms }))
     }
@@ -274,21 +276,21 @@ impl Job {
         }
     }
 
-    fn push_row(&mut self) {
-        let row = HistoryRow { branch: self.branch, report: self.fitter.report(), state: self.fitter.state() };
-        self.rows.push(row);
+    fn push_row(&mut self, report: StepReport) {
+        self.rows.push(HistoryRow { branch: self.branch, report, state: self.fitter.state() });
         self.dirty = true;
     }
 
     fn step(&mut self) -> Result<Option<StopReason>, FitError> {
         let report = self.fitter.step()?;
         self.steps_in_run += 1;
-        self.push_row();
-        if report.converged && self.fitter.config().stop_when_converged {
+        let (iteration, converged) = (report.iteration, report.converged);
+        self.push_row(report);
+        if converged && self.fitter.config().stop_when_converged {
             self.target = 0;
             return Ok(Some(StopReason::Converged));
         }
-        Ok((report.iteration >= self.target).then_some(StopReason::Iterations))
+        Ok((iteration >= self.target).then_some(StopReason::Iterations))
     }
 
     fn handle(&mut self, command: WorkerCommand) -> Result<Reply, FitError> {
@@ -314,7 +316,7 @@ impl Job {
                 let (branch, iteration) = (self.branch, self.iteration());
                 if iteration == self.branch_start {
                     // The branch begins with these settings, so its first row is theirs.
-                    self.push_row();
+                    self.push_row(self.fitter.report());
                 }
                 return Ok(Reply::Event(WorkerEvent::ConfigApplied { branch, iteration, config }));
             }
@@ -324,11 +326,11 @@ impl Job {
                 self.fitter.restore(state)?;
                 self.branch = branch;
                 self.branch_start = self.iteration();
-                self.push_row();
+                self.push_row(self.fitter.report());
             }
             WorkerCommand::Edit(params) => {
                 self.fitter.set_params(*params)?;
-                self.push_row();
+                self.push_row(self.fitter.report());
             }
             WorkerCommand::Inspect { branch, state, config } => {
                 return Ok(Reply::Show(Box::new(self.inspect(branch, &state, &config))));
