@@ -98,8 +98,8 @@ impl Evidence {
 
     /// H over the background.
     fn over_background(&self, cell: usize) -> f32 {
-        let ring = self.layout.ring_of[cell] as usize;
-        self.value[cell] * self.background[ring].get_or_init(|| self.layout.background(&self.value, ring))
+        let place = self.layout.place(cell);
+        self.value[cell] * self.background[place].get_or_init(|| self.layout.background(&self.value, place))
     }
 
     /// ln H over the background of what moves, ≥ 0.

@@ -21,7 +21,7 @@ pub(super) struct Layout {
     pub(super) axes: Vec<(usize, Axis)>,
     pub(super) shape: Vec<usize>,
     /// The ring of each spatial cell.
-    pub(super) ring_of: Vec<u32>,
+    ring_of: Vec<u32>,
     /// Spatial cells ring by ring, and where each ring begins.
     cells: Vec<u32>,
     rings: Vec<usize>,
@@ -99,21 +99,26 @@ impl Layout {
         Some(squares.into_iter().map(f64::sqrt).collect())
     }
 
-    /// A place for the background of each ring.
+    /// A place for the background of each ring, and one for that of the whole map.
     pub(super) fn unknown(&self) -> Vec<OnceLock<f32>> {
-        vec![OnceLock::new(); self.rings.len() - 1]
+        vec![OnceLock::new(); self.rings.len()]
     }
 
-    /// One over the median of a ring, or of the whole map where the ring is small; 0 where nothing is told. `value` must be
-    /// positive.
-    pub(super) fn background(&self, value: &[f32], ring: usize) -> f32 {
-        if ring < self.deaf {
+    /// Whose background a cell has: its ring's, or the whole map's where the ring is small.
+    pub(super) fn place(&self, cell: usize) -> usize {
+        let ring = self.ring_of[cell] as usize;
+        let small = self.rings[ring + 1] - self.rings[ring] < SMALLEST_RING;
+        if small && ring >= self.deaf { self.rings.len() - 1 } else { ring }
+    }
+
+    /// One over the median at a place; 0 where nothing is told. `value` must be positive.
+    pub(super) fn background(&self, value: &[f32], place: usize) -> f32 {
+        if place < self.deaf.min(self.rings.len() - 1) {
             return 0.0;
         }
-        let members = &self.cells[self.rings[ring]..self.rings[ring + 1]];
-        let of = if members.len() < SMALLEST_RING { &self.cells[..] } else { members };
+        let ends = self.rings.get(place + 1).map_or(0..self.cells.len(), |&end| self.rings[place]..end);
         // Positive floats sort as their bits do, and integers are partitioned several times as fast.
-        1.0 / median(&mut of.iter().map(|&cell| value[cell as usize].to_bits()).collect::<Vec<_>>())
+        1.0 / median(&mut self.cells[ends].iter().map(|&cell| value[cell as usize].to_bits()).collect::<Vec<_>>())
     }
 
     /// H of each spatial cell in shares of `largest`, and the full cell each was taken from where that is another.
