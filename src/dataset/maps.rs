@@ -1,6 +1,8 @@
 //! The maps of many frames, one after the other: what a study over a whole data set needs, without labels and truth.
 
-use super::{Dataset, DatasetError, Heatmap};
+use super::source::Source;
+use super::{Dataset, DatasetError, Heatmap, generic, hupr, mmvr, xrf55};
+use crate::radar::View;
 use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::{Arc, PoisonError};
@@ -14,6 +16,9 @@ pub struct MapReader<'a> {
     at_once: usize,
     ready: VecDeque<Vec<Heatmap>>,
 }
+
+/// Maps of a stacked file that are read in one pass, bytes: every pass reads the file from its start.
+const STACKED_BYTES: usize = 64 << 20;
 
 impl Dataset {
     /// The maps of `frames`, read as they are asked for. Frames of a stacked file are read many at a time.
@@ -35,6 +40,45 @@ impl Dataset {
         let bytes = maps.iter().map(|map| map.data.len() * size_of::<f64>()).sum();
         recent().insert(index, Arc::clone(&maps), bytes);
         Ok(maps)
+    }
+
+    /// Frames whose maps [`Self::maps`] reads in one go: 1, or as many of a stacked file as make 64 MiB.
+    pub fn maps_at_once(&self) -> usize {
+        match &self.source {
+            Source::Bare { stacked: true, .. } => {
+                let cells: usize = self.info.views.iter().map(View::cells).sum();
+                (STACKED_BYTES / (cells * size_of::<f64>()).max(1)).max(1)
+            }
+            _ => 1,
+        }
+    }
+
+    /// The maps of consecutive frames, in this thread; at most [`Self::maps_at_once`] are asked for.
+    fn read_maps(&self, frames: &Range<usize>) -> Result<Vec<Vec<Heatmap>>, DatasetError> {
+        let past = || DatasetError::NoSuchFrame {
+            index: frames.end.saturating_sub(1),
+            count: self.len(),
+            path: self.info.root.clone(),
+        };
+        if frames.end > self.len() {
+            return Err(past());
+        }
+        let one = match &self.source {
+            Source::Bare { stacked: true, .. } => return generic::stacked_maps(frames, &self.info.root, &self.info),
+            Source::Files(_) | Source::Bare { .. } => generic::maps_only(&self.frame_path(frames.start), &self.info),
+            Source::Stacks { steps, .. } => {
+                xrf55::maps_only(&self.frame_path(frames.start), frames.start % steps, &self.info)
+            }
+            Source::Hupr { .. } => {
+                let (segment, k) = self.segment(frames.start).ok_or_else(past)?;
+                hupr::maps_only(&segment.path, segment.stem(k), &self.info)
+            }
+            Source::Mmvr { .. } => {
+                let (segment, k) = self.segment(frames.start).ok_or_else(past)?;
+                mmvr::maps_only(&segment.path, segment.stem(k), &self.info)
+            }
+        };
+        Ok(vec![one?])
     }
 }
 

@@ -11,14 +11,11 @@ use crate::body::Skeleton;
 use crate::digest;
 use crate::radar::{RadarConfig, View};
 use sha2::{Digest as _, Sha256};
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock};
 
 /// The name of a manifest inside a data set's folder.
 pub const MANIFEST_NAME: &str = "dataset.toml";
-/// Maps of a stacked file that are read in one pass, bytes: every pass reads the file from its start.
-const STACKED_BYTES: usize = 64 << 20;
 /// Maps of frames around others that are kept, bytes.
 const RECENT_BYTES: usize = 64 << 20;
 
@@ -50,8 +47,8 @@ pub struct DatasetInfo {
 /// An open data set: an index of names. Frames are read by [`Self::load`], from any thread.
 #[derive(Debug)]
 pub struct Dataset {
-    info: DatasetInfo,
-    source: Source,
+    pub(super) info: DatasetInfo,
+    pub(super) source: Source,
     start: usize,
     names: Names,
     fingerprint: OnceLock<String>,
@@ -393,47 +390,8 @@ impl Dataset {
         }
     }
 
-    /// Frames whose maps [`Self::maps`] reads in one go: 1, or as many of a stacked file as make 64 MiB.
-    pub fn maps_at_once(&self) -> usize {
-        match &self.source {
-            Source::Bare { stacked: true, .. } => {
-                let cells: usize = self.info.views.iter().map(View::cells).sum();
-                (STACKED_BYTES / (cells * size_of::<f64>()).max(1)).max(1)
-            }
-            _ => 1,
-        }
-    }
-
-    /// The maps of consecutive frames, in this thread; at most [`Self::maps_at_once`] are asked for.
-    pub(super) fn read_maps(&self, frames: &Range<usize>) -> Result<Vec<Vec<Heatmap>>, DatasetError> {
-        let past = || DatasetError::NoSuchFrame {
-            index: frames.end.saturating_sub(1),
-            count: self.len(),
-            path: self.info.root.clone(),
-        };
-        if frames.end > self.len() {
-            return Err(past());
-        }
-        let one = match &self.source {
-            Source::Bare { stacked: true, .. } => return generic::stacked_maps(frames, &self.info.root, &self.info),
-            Source::Files(_) | Source::Bare { .. } => generic::maps_only(&self.frame_path(frames.start), &self.info),
-            Source::Stacks { steps, .. } => {
-                xrf55::maps_only(&self.frame_path(frames.start), frames.start % steps, &self.info)
-            }
-            Source::Hupr { .. } => {
-                let (segment, k) = self.segment(frames.start).ok_or_else(past)?;
-                hupr::maps_only(&segment.path, segment.stem(k), &self.info)
-            }
-            Source::Mmvr { .. } => {
-                let (segment, k) = self.segment(frames.start).ok_or_else(past)?;
-                mmvr::maps_only(&segment.path, segment.stem(k), &self.info)
-            }
-        };
-        Ok(vec![one?])
-    }
-
     /// The segment of frame `i` and the frame's index in it.
-    fn segment(&self, i: usize) -> Option<(&Segment, usize)> {
+    pub(super) fn segment(&self, i: usize) -> Option<(&Segment, usize)> {
         let (Source::Mmvr { segments, starts, frames } | Source::Hupr { segments, starts, frames, .. }) = &self.source
         else {
             return None;
