@@ -27,10 +27,15 @@ const STATURE_SPREAD_M: f64 = 0.13;
 const TOP_SPREAD_M: f64 = 0.09;
 /// An echo that ends higher above the floor than this misses the feet: it may be a piece of a body, m.
 const FEET_M: f64 = 0.15;
-/// Who does not reach the first height sits, who reaches the second stands; what exceeds the third is nobody, m.
-pub(super) const SITTING_M: f64 = 1.36;
-pub(super) const STANDING_M: f64 = 1.60;
+/// What exceeds this is nobody, m.
 const TALLEST_M: f64 = 2.1;
+/// ln of L_EM of a bent body over that of an upright one up to which somebody is believed to sit, sit down or get up: at 0,
+/// less a metre of the head's height, more for each m/s towards or away from the radar (where the chair is), less for each
+/// sideways. Logistic regression over simulated people who do not walk.
+const BENT_LN: f64 = 1.6;
+const BENT_LN_PER_M: f64 = 1.11;
+const BENT_LN_PER_MPS_ALONG: f64 = 0.90;
+const BENT_LN_PER_MPS_ACROSS: f64 = 0.47;
 
 /// What the top of an echo says of somebody on the floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,6 +65,12 @@ impl Stature {
         let trust = STATURE_SPREAD_M.powi(2) / (STATURE_SPREAD_M.powi(2) + TOP_SPREAD_M.powi(2));
         Self { standing_m: STATURE_M + trust * (seen_m - STATURE_M), top_m: (low < FEET_M).then_some(seen_m) }
     }
+}
+
+/// The share of an upright body's L_EM below which a bent one is believed of somebody whose head is seen at `top_m` and whose
+/// middle moves at these speeds along the line from the radar and across it, m/s.
+pub(super) fn bent_if_below(top_m: f64, [along, across]: [f64; 2]) -> f64 {
+    (BENT_LN - BENT_LN_PER_M * top_m + BENT_LN_PER_MPS_ALONG * along - BENT_LN_PER_MPS_ACROSS * across).exp()
 }
 
 /// Where the middle of the body is expected.
@@ -115,9 +126,16 @@ mod tests {
         let (tall, small) = (stature(&[[-1.1, 1.0]]), stature(&[[-1.1, 0.65]]));
         assert!(tall.standing_m > 1.8 && tall.standing_m < 1.9 && small.standing_m < 1.65);
         let sits = stature(&[[-1.1, 0.4], [-1.1, 0.8], [-1.1, 0.38]]).top_m;
-        assert!(sits.is_some_and(|top| top < SITTING_M), "one frame of three is not believed");
+        assert!(sits.is_some_and(|top| top < 1.4), "one frame of three is not believed");
         assert!(stature(&[[-0.5, 0.3]]).top_m.is_none(), "without feet it may be a piece");
         assert_eq!(stature(&[[-1.1, 1.6]]), unknown, "nobody is that tall");
+    }
+
+    #[test]
+    fn the_lower_a_head_and_the_more_it_comes_and_goes_the_likelier_somebody_sits() {
+        let better = |top_m: f64, along: f64, across: f64| bent_if_below(top_m, [along, across]);
+        assert!(better(1.3, 0.0, 0.0) > 1.1 && better(1.6, 0.0, 0.0) < 0.9);
+        assert!(better(1.6, 0.3, 0.0) > 1.05 && better(1.6, 0.0, 0.3) < better(1.6, 0.0, 0.0));
     }
 
     #[test]

@@ -91,6 +91,13 @@ impl Person {
         Some(Stature::new(lit_m.into_iter(), radar_height_m))
     }
 
+    /// How fast its middle moves along the line from the radar and across it, m/s; 0 without frames around.
+    fn speeds(&self) -> [f64; 2] {
+        let ([x, y], [vx, vy, _]) =
+            (towards_radar(self.at), self.track.as_ref().map_or([0.0; 3], |track| track.velocity));
+        [(x * vx + y * vy).abs(), (x * vy - y * vx).abs()]
+    }
+
     fn walks(&self) -> bool {
         self.track.as_ref().is_some_and(|track| track.heading().is_some())
     }
@@ -187,7 +194,7 @@ fn choose_postures(
     for k in 0..persons.len() {
         let walks = persons[k].walks();
         let stature = persons[k].stature(problem, &config).filter(|_| !walks);
-        let tried = postures(template, problem, config.starts, walks, stature);
+        let tried = postures(template, problem, config.starts, walks, stature, persons[k].speeds());
         let mut best: Option<(f64, Posture, Arc<Template>)> = None;
         for (posture, better) in tried {
             let posed = Arc::new(pose::posed(template, &problem.skeleton, posture));
@@ -208,24 +215,21 @@ fn choose_postures(
 }
 
 /// Postures to try, and the share of the best L_EM so far below which each is believed: who stands is as likely to stand as
-/// all else together, and who hardly reaches an adult's height to sit.
+/// all else together. `speeds` are those of [`Person::speeds`].
 fn postures(
     template: &Template,
     problem: &Problem,
     starts: usize,
     walks: bool,
     stature: Option<Stature>,
+    speeds: [f64; 2],
 ) -> Vec<(Posture, f64)> {
     let believed = |posture: Posture| (posture, if walks { 1.0 } else { CLEARLY_BETTER });
     let tried = pose::tried(starts, walks).into_iter().map(believed);
     let Some(top_m) = stature.and_then(|stature| stature.top_m) else { return tried.collect() };
     // Where the head's height is known, it says how far a body is bent.
     let upright = tried.filter(|(posture, _)| !matches!(posture, Posture::Bent(_)));
-    match pose::bent(template, &problem.skeleton, top_m) {
-        bent if top_m < height::SITTING_M => vec![(bent, 1.0)],
-        bent if top_m < height::STANDING_M => upright.chain([(bent, 1.0)]).collect(),
-        _ => upright.collect(),
-    }
+    upright.chain([(pose::bent(template, &problem.skeleton, top_m), height::bent_if_below(top_m, speeds))]).collect()
 }
 
 /// A warm start: the persons of the frame before, moved as the maps of the two frames say that each of them moved.
@@ -263,12 +267,12 @@ pub(super) fn anchors(problem: &Problem, config: &FitConfig, params: &Pppr) -> V
     let (joints, template) = (params.shape().joints.max(1), Template::new(&problem.skeleton));
     let middles = super::region::centres(params);
     let of_person = |person: usize| {
-        let own = person * joints..(person + 1) * joints;
-        let mean = scale(own.fold([0.0; 3], |sum, joint| add(sum, params.position(joint))), 1.0 / joints as f64);
+        let own: Vec<Vec3> = (person * joints..(person + 1) * joints).map(|joint| params.position(joint)).collect();
+        let mean = scale(own.iter().fold([0.0; 3], |sum, &p| add(sum, p)), 1.0 / joints as f64);
         let (lit, expected) = near(problem, &problem.surroundings().now, &middles, person);
         let here = Sighting { t_s: 0.0, at: lit, lit_m: expected.lit };
         let Some(track) = motion::track(problem, here, apart_m(&middles, person)) else { return mean };
-        let at = behind_skin(config, track.at);
+        let at = if template.is_bent(&own) { track.at } else { behind_skin(config, track.at) };
         // Where the floor is known, the start stands as high as it should.
         let floor = problem.radar.height_m.filter(|_| config.height == Height::Floor);
         [at[0], at[1], floor.map_or(at[2] + template.mean_over_middle_m(), |_| mean[2])]
@@ -303,7 +307,8 @@ fn unrefined(config: &FitConfig) -> FitConfig {
     FitConfig { yaw: Yaw::Radar, height: Height::Echo, w_time: 0.0, surface_offset_m: 0.0, ..*config }
 }
 
-/// Where the middle of a body is whose lit middle is `at`: the echoes come from the skin before it.
+/// Where the middle of a body is whose lit middle is `at`: the echoes come from the skin before it. Not so where somebody
+/// sits, whose legs are lit before the trunk.
 fn behind_skin(config: &FitConfig, at: Vec3) -> Vec3 {
     let behind = 1.0 + config.surface_offset_m / at[0].hypot(at[1]).max(0.5);
     [at[0] * behind, at[1] * behind, at[2]]
@@ -321,10 +326,11 @@ fn assemble(problem: &Problem, config: &FitConfig, dress: &Dress, persons: &[Per
             Some(track) if config.w_time > 0.0 => [track.at[0], track.at[1], person.at[2]],
             _ => person.at,
         };
-        let mut at = behind_skin(config, at);
+        let bent = matches!(person.posture, Posture::Bent(_));
+        let mut at = if bent { at } else { behind_skin(config, at) };
         if let (Some(stature), Some(radar_height_m)) = (person.stature(problem, config), problem.radar.height_m) {
-            let bent = matches!(person.posture, Posture::Bent(_));
-            let middle_m = if bent { body.middle_m() } else { body.middle_as_tall_as_m(stature.standing_m) };
+            let top_m = stature.top_m.filter(|_| bent).unwrap_or(stature.standing_m);
+            let middle_m = body.middle_as_tall_as_m(top_m);
             at[2] = middle_m - radar_height_m;
         }
         for (joint, p) in body.facing(at, person.forward(config.yaw)).into_iter().enumerate() {

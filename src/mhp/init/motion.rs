@@ -6,12 +6,16 @@
 use super::evidence::Evidence;
 use super::find::centre;
 use crate::geometry::{Vec3, add_scaled, scale, sub};
-use crate::mhp::Problem;
+use crate::mhp::{Problem, percentile};
 
 /// Slower than this, a person stands and the track's direction is its errors', m/s.
 const WALKING_MPS: f64 = 0.5;
+/// Who walks goes this share of its speed in the first and in the last half of the frames; who begins to fall does not.
+const STEADY_SHARE: f64 = 0.38;
 /// A head that comes down faster than this falls or sits down, m/s.
-const FALLING_MPS: f64 = -0.6;
+const FALLING_MPS: f64 = -0.35;
+/// Frames this far away count e^-½ of the frame itself for its place, s: nobody goes straight for long.
+const WINDOW_S: f64 = 0.15;
 /// Farther from the place that the frame before leads to, the track is somebody else, m.
 const LEASH_M: f64 = 0.35;
 
@@ -39,7 +43,9 @@ pub(super) struct Track {
 
 impl Track {
     fn through(sightings: Vec<Sighting>) -> Self {
-        let (at, [vx, vy, _]) = line(sightings.iter().map(|seen| (seen.t_s, seen.at)));
+        let places = sightings.iter().map(|seen| (seen.t_s, seen.at));
+        let (_, [vx, vy, _]) = line(places.clone(), f64::INFINITY);
+        let (at, _) = line(places, WINDOW_S);
         // Heights are read too coarsely to follow them.
         let height_m = sightings.iter().map(|seen| seen.at[2]).sum::<f64>() / sightings.len() as f64;
         Self { at: [at[0], at[1], height_m], velocity: [vx, vy, 0.0], sightings }
@@ -48,14 +54,30 @@ impl Track {
     /// The direction of walking on the floor; `None` where the person stands, or falls: who falls need not look where.
     pub(super) fn heading(&self) -> Option<[f64; 2]> {
         let speed = self.velocity[0].hypot(self.velocity[1]);
-        (speed > WALKING_MPS && self.rises_mps() > FALLING_MPS)
-            .then(|| [self.velocity[0] / speed, self.velocity[1] / speed])
+        let along = [self.velocity[0] / speed, self.velocity[1] / speed];
+        (speed > WALKING_MPS && self.is_steady(along, speed) && self.rises_mps() > FALLING_MPS).then_some(along)
     }
 
-    /// How fast the top of what is lit rises, m/s, over the frames that show it.
+    /// Whether both halves of the track go `along`.
+    fn is_steady(&self, along: [f64; 2], speed: f64) -> bool {
+        let mut ordered: Vec<(f64, Vec3)> = self.sightings.iter().map(|seen| (seen.t_s, seen.at)).collect();
+        ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let half = ordered.len().div_ceil(2);
+        [&ordered[..half], &ordered[ordered.len() - half..]].into_iter().all(|half| {
+            let (_, velocity) = line(half.iter().copied(), f64::INFINITY);
+            velocity[0] * along[0] + velocity[1] * along[1] > STEADY_SHARE * speed
+        })
+    }
+
+    /// How fast the top of what is lit rises, m/s: the median of the slopes between any two frames that show it (Theil and
+    /// Sen), for a hand or a ghost above the head now and then is no rise.
     fn rises_mps(&self) -> f64 {
-        let tops = self.sightings.iter().filter_map(|seen| seen.lit_m.map(|[_, top]| (seen.t_s, [0.0, 0.0, top])));
-        line(tops).1[2]
+        let tops: Vec<(f64, f64)> =
+            self.sightings.iter().filter_map(|seen| seen.lit_m.map(|[_, top]| (seen.t_s, top))).collect();
+        let pairs = tops.iter().enumerate().flat_map(|(k, a)| tops[k + 1..].iter().map(move |b| (a, b)));
+        let slopes: Vec<f64> =
+            pairs.map(|(a, b)| (b.1 - a.1) / (b.0 - a.0)).filter(|slope| slope.is_finite()).collect();
+        if slopes.is_empty() { 0.0 } else { percentile(&slopes, 50.0) }
     }
 }
 
@@ -89,18 +111,20 @@ fn follow(problem: &Problem, evidence: &[Evidence], t_s: f64, expected: Vec3, ap
     (off[0].hypot(off[1]) < LEASH_M).then_some(Sighting { t_s, at, lit_m: expectation.lit })
 }
 
-/// Least squares through (time, s; point, m): the point at time 0 and the velocity, m/s.
-fn line(points: impl Iterator<Item = (f64, Vec3)> + Clone) -> (Vec3, Vec3) {
-    let n = points.clone().count().max(1) as f64;
+/// Weighted least squares through (time, s; point, m): the point at time 0 and the velocity, m/s. A point at time t weighs
+/// e^(−½ (t / `window_s`)²).
+fn line(points: impl Iterator<Item = (f64, Vec3)> + Clone, window_s: f64) -> (Vec3, Vec3) {
+    let weight = |t: f64| (-0.5 * (t / window_s).powi(2)).exp();
+    let total = points.clone().map(|(t, _)| weight(t)).sum::<f64>().max(f64::MIN_POSITIVE);
     let (mut mean, mut time) = ([0.0; 3], 0.0);
     for (t, point) in points.clone() {
-        add_scaled(&mut mean, point, 1.0 / n);
-        time += t / n;
+        add_scaled(&mut mean, point, weight(t) / total);
+        time += t * weight(t) / total;
     }
     let (mut slope, mut spread) = ([0.0; 3], 0.0);
     for (t, point) in points {
-        add_scaled(&mut slope, sub(point, mean), t - time);
-        spread += (t - time).powi(2);
+        add_scaled(&mut slope, sub(point, mean), (t - time) * weight(t));
+        spread += (t - time).powi(2) * weight(t);
     }
     let velocity = if spread > 0.0 { scale(slope, 1.0 / spread) } else { [0.0; 3] };
     add_scaled(&mut mean, velocity, -time);
@@ -123,6 +147,22 @@ mod tests {
         let heading = track.heading().unwrap();
         assert!((heading[0] + 1.2 / 1.2f64.hypot(0.4)).abs() < 1e-12);
         assert_eq!(Track::through(vec![seen(0.0, [1.0; 3]), seen(0.1, [1.01, 1.0, 1.0])]).heading(), None);
+    }
+
+    #[test]
+    fn who_begins_to_move_has_no_heading_yet() {
+        let seen = |t_s: f64, x: f64| Sighting { t_s, at: [x, 0.0, 0.0], lit_m: None };
+        let track = Track::through(vec![
+            seen(0.0, 3.0),
+            seen(0.1, 3.1),
+            seen(0.2, 3.3),
+            seen(0.3, 3.5),
+            seen(-0.1, 3.0),
+            seen(-0.2, 3.01),
+            seen(-0.3, 3.0),
+        ]);
+        assert!(track.velocity[0] > WALKING_MPS && track.heading().is_none());
+        assert!((track.at[0] - 3.05).abs() < 0.04, "and is where the frames next to this one say: {}", track.at[0]);
     }
 
     #[test]

@@ -6,12 +6,20 @@
 
 use super::template::Template;
 use crate::body::{Side, Skeleton};
-use crate::geometry::{Vec3, add, mat_vec, rotation_from_quaternion, sub};
-use std::f64::consts::TAU;
+use crate::geometry::{Vec3, add, mat_vec, rotation_from_quaternion, scale, sub};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// How far hips and knees are bent on a chair, and at most: on the floor, knees up, rad.
-const ON_A_CHAIR: f64 = 1.4;
+const ON_A_CHAIR: f64 = FRAC_PI_2;
 const ON_THE_FLOOR: f64 = 2.4;
+/// Where the top of the head of somebody on a chair usually is and at the lowest, m, and how much less bent somebody is
+/// whose head is seen higher, rad/m.
+const USUAL_SEATED_M: f64 = 1.22;
+const LOWEST_SEATED_M: f64 = 1.1;
+const UNBENT_PER_M: f64 = 1.5;
+/// How far the trunk leans and the shanks tilt forwards half way to a chair, rad: whoever sits down keeps its balance.
+const MOST_LEAN: f64 = 0.6;
+const MOST_TILT: f64 = 0.25;
 
 /// How a body holds its limbs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,8 +71,16 @@ impl Posture {
                 let swinging = (-phase.sin()).max(0.0);
                 Limb { upper: 0.17 + 0.38 * phase.cos(), lower: -0.15 - 0.85 * swinging, spread: 0.0 }
             }
-            Self::Bent(angle) => Limb { upper: angle, lower: -angle, spread: 0.0 },
+            Self::Bent(angle) => Limb { upper: angle, lower: -angle - MOST_TILT * half_way(angle), spread: 0.0 },
             _ => Limb { upper: 0.0, lower: 0.0, spread: 0.0 },
+        }
+    }
+
+    /// How far the trunk leans forwards, rad.
+    fn lean(self) -> f64 {
+        match self {
+            Self::Bent(angle) => MOST_LEAN * half_way(angle),
+            _ => 0.0,
         }
     }
 
@@ -76,15 +92,29 @@ impl Posture {
             }
             Self::ArmsSideways => Limb { upper: 0.0, lower: 0.0, spread: 1.7 },
             Self::ArmsForward => Limb { upper: 1.6, lower: 0.1, spread: 0.0 },
-            _ => Limb { upper: 0.0, lower: 0.0, spread: 0.0 },
+            // The hands of somebody on a chair lie on the thighs.
+            Self::Bent(angle) => {
+                let seated = (angle / ON_A_CHAIR).min(1.0);
+                Limb { upper: 0.5 * seated, lower: seated, spread: 0.0 }
+            }
+            Self::Standing => Limb { upper: 0.0, lower: 0.0, spread: 0.0 },
         }
     }
 }
 
-/// Hips and knees bent so far that the top of the head comes down to `top_m` above the floor.
+/// 1 half way to a chair, 0 before and on it.
+fn half_way(angle: f64) -> f64 {
+    (PI * (angle / ON_A_CHAIR).min(1.0)).sin()
+}
+
+/// How somebody is bent the top of whose head is seen `top_m` above the floor. On a chair that says little, for who sits may
+/// be tall: least squares over simulated people. Whoever is lower than a chair is bent until the head comes down there.
 pub(super) fn bent(template: &Template, skeleton: &Skeleton, top_m: f64) -> Posture {
+    if top_m > LOWEST_SEATED_M {
+        return Posture::Bent((ON_A_CHAIR - UNBENT_PER_M * (top_m - USUAL_SEATED_M)).clamp(0.0, ON_A_CHAIR));
+    }
     let top_of = |angle: f64| posed(template, skeleton, Posture::Bent(angle)).top_m();
-    let (mut high, mut low) = (0.0, ON_THE_FLOOR);
+    let (mut high, mut low) = (ON_A_CHAIR, ON_THE_FLOOR);
     for _ in 0..12 {
         let angle = f64::midpoint(high, low);
         if top_of(angle) > top_m { high = angle } else { low = angle }
@@ -96,6 +126,7 @@ pub(super) fn bent(template: &Template, skeleton: &Skeleton, top_m: f64) -> Post
 pub(super) fn posed(template: &Template, skeleton: &Skeleton, posture: Posture) -> Template {
     let mut joints = template.joints.clone();
     let floor = lowest(&joints);
+    lean(&mut joints, skeleton, posture.lean());
     for side in [Side::Left, Side::Right] {
         let named = |words: &[&str]| -> Vec<usize> {
             let is = |joint: &usize| {
@@ -117,6 +148,23 @@ pub(super) fn posed(template: &Template, skeleton: &Skeleton, posture: Posture) 
         joint[2] += sunk;
     }
     Template { joints, crown_m: template.crown_m }
+}
+
+/// Turns all above the hips forwards about their middle.
+fn lean(joints: &mut [Vec3], skeleton: &Skeleton, angle: f64) {
+    let is = |joint: usize, words: &[&str]| {
+        skeleton.joints[joint].to_lowercase().split(['_', ' ', '-']).any(|word| words.contains(&word))
+    };
+    let hips: Vec<usize> = (0..joints.len()).filter(|&joint| is(joint, &["hip"])).collect();
+    if hips.is_empty() {
+        return;
+    }
+    let sum = hips.iter().fold([0.0; 3], |sum, &hip| add(sum, joints[hip]));
+    let pivot = scale(sum, 1.0 / hips.len() as f64);
+    let lower = ["hip", "pelvis", "root", "knee", "ankle", "heel", "foot", "toe"];
+    for joint in (0..joints.len()).filter(|&joint| !is(joint, &lower)) {
+        joints[joint] = turned(joints[joint], pivot, [0.0, 1.0, 0.0], angle);
+    }
 }
 
 /// Turns the upper part of a limb and what hangs on it, then the lower part.
@@ -181,16 +229,23 @@ mod tests {
     }
 
     #[test]
-    fn a_bent_body_comes_down_to_the_height_of_its_head_and_stays_where_it_was() {
+    fn a_bent_body_leans_half_way_and_stays_where_it_was() {
         let skeleton = Skeleton::preset("coco17").unwrap();
         let template = Template::new(&skeleton);
-        for top_m in [1.05, 1.2, 1.45] {
-            let body = posed(&template, &skeleton, bent(&template, &skeleton, top_m));
-            assert!((body.top_m() - top_m).abs() < 0.01, "{top_m} m: {} m", body.top_m());
+        let angle = |top_m: f64| {
+            let Posture::Bent(angle) = bent(&template, &skeleton, top_m) else { return f64::NAN };
+            angle
+        };
+        assert!((angle(1.15) - ON_A_CHAIR).abs() < 1e-12 && angle(1.4) < angle(1.3) && angle(2.4) == 0.0);
+        let crouching = posed(&template, &skeleton, bent(&template, &skeleton, 1.05));
+        assert!((crouching.top_m() - 1.05).abs() < 0.01, "{} m", crouching.top_m());
+        let ahead = |body: &Template| body.joints[5][0] - body.joints[11][0];
+        let [half, seated] = [0.5, 1.0].map(|share| posed(&template, &skeleton, Posture::Bent(share * ON_A_CHAIR)));
+        assert!(ahead(&half) > ahead(&seated) + 0.2, "the shoulders are before the hips");
+        for body in [&half, &seated, &crouching] {
             assert!((mean_ahead(&body.joints) - mean_ahead(&template.joints)).abs() < 1e-12);
+            assert!(template.is_bent(&body.joints) && !template.is_bent(&template.joints));
         }
-        let upright = posed(&template, &skeleton, bent(&template, &skeleton, 2.0));
-        assert!((upright.top_m() - template.top_m()).abs() < 0.01, "nobody grows");
     }
 
     #[test]

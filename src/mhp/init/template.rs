@@ -10,6 +10,8 @@ use crate::geometry::{Vec3, add, add_scaled, norm, scale, sub};
 /// Height of the body that the table describes, m.
 const TABLE_HEIGHT_M: f64 = 1.70;
 const RELAXATIONS: usize = 400;
+/// Who does not reach this share of a standing body's height sits, crouches or lies.
+const UPRIGHT_SHARE: f64 = 0.93;
 
 /// The body: x forward, y to its left, z up from the floor, m.
 pub(super) struct Template {
@@ -39,6 +41,11 @@ impl Template {
     /// Height of the top of the head above the soles, m.
     pub(super) fn top_m(&self) -> f64 {
         highest(&self.joints) + self.crown_m
+    }
+
+    /// Whether `joints`, those of somebody of this size, do not reach as high as those who stand do.
+    pub(super) fn is_bent(&self, joints: &[Vec3]) -> bool {
+        highest(joints) - lowest(joints) < UPRIGHT_SHARE * (highest(&self.joints) - lowest(&self.joints))
     }
 
     /// Height of the body's middle above its soles: half way to the top of the head, m.
