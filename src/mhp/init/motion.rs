@@ -16,8 +16,10 @@ const STEADY_SHARE: f64 = 0.38;
 const FALLING_MPS: f64 = -0.35;
 /// Frames this far away count e^-½ of the frame itself for its place, s: nobody goes straight for long.
 const WINDOW_S: f64 = 0.15;
-/// Farther from the place that the frame before leads to, the track is somebody else, m.
+/// Farther from the place that the frame before leads to, the track is somebody else, m, and share of the way to the nearest
+/// other person.
 const LEASH_M: f64 = 0.35;
+const LEASH_SHARE: f64 = 0.3;
 
 /// A person in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,7 +110,7 @@ pub(super) fn track(problem: &Problem, here: Sighting, apart_m: f64) -> Option<T
 fn follow(problem: &Problem, evidence: &[Evidence], t_s: f64, expected: Vec3, apart_m: f64) -> Option<Sighting> {
     let (at, expectation) = centre(problem, evidence, expected, apart_m);
     let off = sub(at, expected);
-    (off[0].hypot(off[1]) < LEASH_M).then_some(Sighting { t_s, at, lit_m: expectation.lit })
+    (off[0].hypot(off[1]) < LEASH_M.min(LEASH_SHARE * apart_m)).then_some(Sighting { t_s, at, lit_m: expectation.lit })
 }
 
 /// Weighted least squares through (time, s; point, m): the point at time 0 and the velocity, m/s. A point at time t weighs
