@@ -110,7 +110,7 @@ fn simulated(folder: &Path, params: &Path) -> Vec<Vec<f64>> {
     let (info, frame) = (dataset.info(), dataset.load(0).unwrap());
     let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
     let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap();
-    simulate(&problem, &FitConfig::default(), Precision::F64, &read_pppr(params, None).unwrap())
+    simulate(&problem, &FitConfig::default(), Precision::default(), &read_pppr(params, None).unwrap())
 }
 
 const PLAIN: Form = Form { descr: "<f4", fortran: false };

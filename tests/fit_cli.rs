@@ -148,7 +148,7 @@ fn by_hand(dataset: &Dataset, index: usize, config: &FitConfig, start: Option<Pp
         Some(before) => predict(&problem, &before),
         None => begin(&problem, config).unwrap().initialisation.params,
     };
-    let mut fitter = Fitter::new(problem, *config, Precision::F64, start).unwrap();
+    let mut fitter = Fitter::new(problem, *config, Precision::default(), start).unwrap();
     for _ in 0..config.iterations {
         fitter.step().unwrap();
     }

@@ -299,7 +299,7 @@ fn complexity_is_cut_by_stratum_and_its_mean_is_of_all() {
 #[test]
 fn the_numbers_are_those_of_fit() {
     let case = Case::new();
-    case.done(&["init", "--iterations", "4", "--frames", "1..3", "--precision", "f64"], "run");
+    case.done(&["init", "--iterations", "4", "--frames", "1..3"], "run");
     let run = Run::read(&case.run("run")).unwrap();
     let fit = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"))
         .args(["fit", "--iterations", "4", "--frames", "1..3", "--json"])

@@ -61,7 +61,7 @@ pub struct EvidenceArgs {
     #[arg(long, value_name = "FIT.toml")]
     config: Option<PathBuf>,
     /// Scalar of the per-cell kernel.
-    #[arg(long, value_enum, default_value = "f64")]
+    #[arg(long, value_enum, default_value = "f32")]
     precision: PrecisionArg,
     /// One JSON array instead of cards.
     #[arg(long)]

@@ -104,7 +104,7 @@ pub struct ExportArgs {
     #[arg(long, value_name = "N")]
     iterations: Option<usize>,
     /// Scalar of the per-cell kernel.
-    #[arg(long, value_enum, default_value = "f64")]
+    #[arg(long, value_enum, default_value = "f32")]
     precision: PrecisionArg,
     /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
     #[arg(long, value_name = "FILE")]

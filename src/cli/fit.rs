@@ -53,7 +53,7 @@ pub struct FitArgs {
     #[arg(long, value_name = "N")]
     iterations: Option<usize>,
     /// Scalar of the per-cell kernel.
-    #[arg(long, value_enum, default_value = "f64")]
+    #[arg(long, value_enum, default_value = "f32")]
     precision: PrecisionArg,
     /// Folder for summary.csv, fit.toml (the settings in force) and pppr/NAME.npz (the parameters of each frame, `_` for
     /// `/` in its name). Without it nothing is written.
