@@ -103,11 +103,6 @@ impl<S: Simd> Lanes<S> {
     }
 
     #[inline(always)]
-    pub(super) fn first(self) -> f32 {
-        bytemuck::cast_slice(std::slice::from_ref(&self.value)).first().copied().unwrap_or(f32::NAN)
-    }
-
-    #[inline(always)]
     pub(super) fn largest(self) -> f32 {
         self.simd.reduce_max_f32s(self.value)
     }

@@ -3,8 +3,8 @@
 use super::joint::Joint;
 use super::strip::{Strip, bits};
 use super::{
-    ACROSS, ACROSS_BINS, ALONG, ALONG_BINS, BLOCK, Block, Cells, Lanes, Moments, Pair, STEPS, Simd, Sixteen, Tiles,
-    Tiling, cell_parts, lanes, splat, store, tile_parts,
+    ACROSS, ACROSS_BINS, ALONG, ALONG_BINS, BLOCK, Block, Cells, Lanes, Moments, Pair, Simd, Tiles, Tiling, cell_parts,
+    lanes, splat, store,
 };
 use std::ops::Range;
 
@@ -63,27 +63,26 @@ impl Tiles {
         let joint = &self.joints[strip.joint as usize];
         let line = joint.line(grid, block);
         let sums = &self.sums[index * BLOCK..(index + 1) * BLOCK];
-        let first_x = splat(simd, joint.first[0] + (block.column * ALONG_BINS) as f32);
-        let mut along = Sixteen::ZERO;
-        for part in 0..tile_parts::<S>() {
-            let x = lanes(simd, &STEPS, part) + first_x + splat(simd, joint.first[1]);
-            store(&mut along, part, x);
-        }
+        let first_x = joint.first[0] + (block.column * ALONG_BINS) as f32 + joint.first[1];
         if strip.chained {
-            let weights = Weights::new::<S, COHERENT>(simd, strip, tiles, &along);
+            let last = u32::BITS - tiles.leading_zeros();
+            let tiles = strip.tiles().start..last as usize;
+            let before = splat(simd, first_x + (tiles.start as f32 - 1.0) * ALONG_BINS as f32);
             for part in (0..cell_parts::<S>()).step_by(2) {
-                let [even, odd] = weights.gather::<S, COHERENT>(simd, joint, strip, sums, part);
-                even.add_to(simd, line.delta, part, gathered);
-                odd.add_to(simd, line.delta, part + 1, gathered);
+                let pulls = strip.pulls::<S, COHERENT>(simd, joint, tiles.clone(), sums, part);
+                for k in 0..2 {
+                    let start = strip.returned::<S, COHERENT>(simd, part + k);
+                    pulls[k].along(simd, start, before).add_to(simd, line.delta, part + k, gathered);
+                }
             }
         } else {
             for part in 0..cell_parts::<S>() {
                 let mut of = Along::nothing(simd);
                 let one = splat(simd, 1.0);
                 for tile in bits(tiles) {
-                    let returned = joint.tile::<S, COHERENT>(simd, (block, &line), tile, part, strip.middles[tile]);
+                    let returned = joint.tile::<S, COHERENT>(simd, (block, &line), tile, part, strip.middles[0][tile]);
                     let wanted = wanted::<S, COHERENT>(simd, returned, &sums[tile], part);
-                    let x = splat(simd, along[tile]);
+                    let x = splat(simd, first_x + (tile * ALONG_BINS) as f32);
                     of.add(wanted, [one, x, x * x]);
                     by_bin(grid, block, tile, part, wanted[0], moments);
                 }
@@ -144,60 +143,75 @@ impl<S: Simd> Along<S> {
     }
 }
 
-/// What r counts for in a strip's tiles: A K in the middle (or its square), and that times Δx and Δx².
-struct Weights {
-    of: [Sixteen; 3],
-    tiles: Range<usize>,
-}
+/// Σ g^k Z, Σ (k + 1) g^k Z and Σ ½(k + 1)(k + 2) g^k Z over a strip's tiles k, Re and Im: Z is what the cells want of the
+/// middle, gᵏ what the first tile's cells have become.
+#[derive(Clone, Copy)]
+struct Pulls<S: Simd>([[Lanes<S>; 2]; 3]);
 
-impl Weights {
+impl<S: Simd> Pulls<S> {
+    /// Goes one tile back, to one that wants `z`.
     #[inline(always)]
-    fn new<S: Simd, const COHERENT: bool>(simd: S, strip: &Strip, tiles: u32, along: &Sixteen) -> Self {
-        let mut weights =
-            Self { of: [strip.middles; 3], tiles: strip.tiles().start..(u32::BITS - tiles.leading_zeros()) as usize };
-        // Between tiles where the mask has a slope may be some where it has none.
-        let mut without = !tiles & ((1 << weights.tiles.end) - 1);
-        while without != 0 {
-            weights.of[0][without.trailing_zeros() as usize] = 0.0;
-            without &= without - 1;
+    fn go(&mut self, gain: Lanes<S>, z: [Lanes<S>; 2]) {
+        for i in 0..2 {
+            self.0[0][i] = self.0[0][i].mul_add(gain, z[i]);
+            self.0[1][i] = self.0[1][i].mul_add(gain, self.0[0][i]);
+            self.0[2][i] = self.0[2][i].mul_add(gain, self.0[1][i]);
         }
-        for part in 0..tile_parts::<S>() {
-            let mut middle = lanes(simd, &weights.of[0], part);
-            if !COHERENT {
-                middle = middle * middle;
-            }
-            let x = lanes(simd, along, part);
-            store(&mut weights.of[0], part, middle);
-            store(&mut weights.of[1], part, middle * x);
-            store(&mut weights.of[2], part, middle * x * x);
-        }
-        weights
     }
 
-    /// Two parts at a time: a product waits for the one before it.
+    /// The same by Δx; `before` is Δx one tile before the first, `start` the first tile's cells.
     #[inline(always)]
-    fn gather<S: Simd, const COHERENT: bool>(
+    fn along(self, simd: S, start: [Lanes<S>; 2], before: Lanes<S>) -> Along<S> {
+        let [none, once, twice] = self.0;
+        let ([r, q], [r_k, q_k], [r_kk, _]) = (conjugate(start, none), conjugate(start, once), conjugate(start, twice));
+        let tile = splat(simd, ALONG_BINS as f32);
+        // Δx = before + 4 (k + 1), (k + 1)² = 2 · ½(k + 1)(k + 2) − (k + 1)
+        let square = (r_kk + r_kk - r_k) * tile * tile;
+        let rx = r.mul_add(before, r_k * tile);
+        let rxx = before.mul_add(rx + r_k * tile, square);
+        Along { r: [r, rx, rxx], q: [q, q.mul_add(before, q_k * tile)] }
+    }
+}
+
+/// a* b
+#[inline(always)]
+fn conjugate<S: Simd>([a, b]: [Lanes<S>; 2], [c, d]: [Lanes<S>; 2]) -> [Lanes<S>; 2] {
+    [a.mul_add(c, b * d), (a * d).minus(b, c)]
+}
+
+impl Strip {
+    /// From the last of `tiles` to the first, two parts at a time: a product waits for the one before it.
+    #[inline(always)]
+    fn pulls<S: Simd, const COHERENT: bool>(
         &self,
         simd: S,
         joint: &Joint,
-        strip: &Strip,
+        tiles: Range<usize>,
         sums: &[Pair],
         part: usize,
-    ) -> [Along<S>; 2] {
-        let mut along = [Along::nothing(simd), Along::nothing(simd)];
-        let mut chains = [strip.chain(simd, joint, part), strip.chain(simd, joint, part + 1)];
-        let tiles = self.tiles.clone();
-        let [a, b, c] = [&self.of[0][tiles.clone()], &self.of[1][tiles.clone()], &self.of[2][tiles.clone()]];
-        for (((sum, &a), &b), &c) in sums[tiles].iter().zip(a).zip(b).zip(c) {
-            let weights = [splat(simd, a), splat(simd, b), splat(simd, c)];
+    ) -> [Pulls<S>; 2] {
+        let mut pulls = [Pulls([[splat(simd, 0.0); 2]; 3]); 2];
+        let mut gain = [lanes(simd, &joint.gain, part), lanes(simd, &joint.gain, part + 1)];
+        if !COHERENT {
+            gain = [gain[0] * gain[0], gain[1] * gain[1]];
+        }
+        let [real, imaginary] = &self.middles;
+        let (real, imaginary) = (&real[tiles.clone()], &imaginary[tiles.clone()]);
+        for ((sum, &c), &d) in sums[tiles].iter().zip(real).zip(imaginary).rev() {
+            let middle = [splat(simd, if COHERENT { c } else { c * c }), splat(simd, d)];
             for k in 0..2 {
-                let [re, im] = chains[k].now;
-                let returned = if COHERENT { [re, im] } else { [re * re, im] };
-                along[k].add(wanted::<S, COHERENT>(simd, returned, sum, part + k), weights);
-                chains[k].go::<COHERENT>();
+                let z = wanted::<S, COHERENT>(simd, middle, sum, part + k);
+                pulls[k].go(gain[k], z);
             }
         }
-        along
+        pulls
+    }
+
+    /// What returns from the first tile's cells, beside its middle: Re and Im, or the square.
+    #[inline(always)]
+    fn returned<S: Simd, const COHERENT: bool>(&self, simd: S, part: usize) -> [Lanes<S>; 2] {
+        let [a, b] = self.start(simd, part);
+        if COHERENT { [a, b] } else { [a * a, b] }
     }
 }
 

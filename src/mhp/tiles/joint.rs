@@ -1,5 +1,6 @@
 //! A splat in powers of two, and as every row of tiles sees it.
 
+use super::strip::{GENTLE, product};
 use super::{
     ACROSS, ACROSS_BINS, ALONG, ALONG_BINS, BLOCK, Block, Cells, Lanes, Pair, REACH_ACROSS, REACH_ALONG, Row, STEPS,
     STRONGEST, Simd, Sixteen, Tiling, cell_parts, lanes, splat, store, tile_parts,
@@ -7,8 +8,8 @@ use super::{
 use crate::mhp::splat::Splat;
 use std::f64::consts::{LOG2_E, TAU};
 
-/// log₂ of what tables of factors hold, at most and one by it.
-const HELD: f32 = 100.0;
+/// log₂ of what tables of factors hold, at most and one by it: their squares stay in range, and no strip has larger ones.
+const HELD: f32 = 2.0 * GENTLE;
 
 /// The spectrum of ω along a Doppler axis, a tile: what it is in the middle, how far its bins lie from that, and those
 /// distances a cell. Empty where the axis is no Doppler axis.
@@ -98,9 +99,9 @@ pub(super) struct Joint {
     /// Within a tile: the quadratic form, and e^{iκΔ}.
     pub quadratic: Cells,
     pub turn: Pair,
-    /// Both in one; and what takes every cell one tile further along the row, but for the middle's own exponent.
+    /// Both in one; and what takes every cell one tile further along the row, but for what the middle does.
     pub shape: Pair,
-    pub step: Pair,
+    pub gain: Cells,
     /// e^{iκΔ} of the tiles of a row, sixteen at a time.
     columns: Vec<[Sixteen; 2]>,
     lines: Vec<Lines>,
@@ -152,7 +153,6 @@ impl Joint {
     #[inline(always)]
     fn tables<S: Simd, const COHERENT: bool>(&mut self, simd: S, grid: &Tiling) {
         let (across, along) = (splat(simd, self.kappa[1] as f32), splat(simd, self.kappa[2] as f32));
-        let further = if COHERENT { turn(simd, ALONG_BINS as f64 * self.kappa[2]) } else { [1.0, 0.0] };
         let rise = ALONG_BINS as f32 * self.bend;
         let (half_y, half_x) = (splat(simd, -self.half[1] as f32), splat(simd, -self.half[2] as f32));
         for part in 0..cell_parts::<S>() {
@@ -167,8 +167,8 @@ impl Joint {
             for i in 0..2 {
                 store(&mut self.turn[i], part, within[i]);
                 store(&mut self.shape[i], part, bump * within[i]);
-                store(&mut self.step[i], part, gain * splat(simd, further[i]));
             }
+            store(&mut self.gain, part, gain);
         }
         self.columns.clear();
         for column in (0..grid.columns).step_by(BLOCK) {
@@ -283,6 +283,14 @@ impl Joint {
         [a * c - b * d, a * d + b * c]
     }
 
+    /// e^{i…} in the middles of some of a block's tiles.
+    #[inline(always)]
+    pub(super) fn middle_turns<S: Simd>(&self, simd: S, (block, line): (&Block, &Line), part: usize) -> [Lanes<S>; 2] {
+        let [cos, sin] = &self.columns[block.column / BLOCK];
+        let line = [splat(simd, line.turn[0]), splat(simd, line.turn[1])];
+        product(line, [lanes(simd, cos, part), lanes(simd, sin, part)])
+    }
+
     /// The most that spectra within tiles add, log₂.
     pub(super) fn spectrum(&self) -> f32 {
         self.along.largest + self.across.largest
@@ -303,13 +311,6 @@ fn low_bits(count: usize) -> u32 {
 #[inline(always)]
 fn whole_turns_off(turns: f64) -> f32 {
     (turns - turns.round_ties_even()) as f32
-}
-
-/// cos and sin of a number of turns.
-#[inline(always)]
-fn turn<S: Simd>(simd: S, turns: f64) -> [f32; 2] {
-    let [cos, sin] = splat(simd, whole_turns_off(turns)).turn();
-    [cos.first(), sin.first()]
 }
 
 /// 2ˣ, held within bounds.

@@ -1,6 +1,7 @@
 //! H in the tiles, its percentile, the mask and its slope.
 
 use super::strip::bits;
+use super::sum::clear;
 use super::{
     BLOCK, FAINTEST, Lanes, Mask, NO_SLOPE, Question, Scale, Simd, Threshold, Tiles, between, cell_parts, lanes, place,
     splat, store,
@@ -163,7 +164,11 @@ impl Tiles {
         let grid = question.tiling;
         let inside = splat(simd, (-factor / mask.union) as f32);
         let outside = splat(simd, (factor * mask.common / (mask.union * mask.union)) as f32);
-        for (block, &tiles) in self.sloped.iter().enumerate() {
+        for (block, (&tiles, &lit)) in self.sloped.iter().zip(&self.lit_bits).enumerate() {
+            // Strips go through tiles without a slope, too.
+            for tile in bits(lit & !tiles) {
+                clear(simd, &mut self.sums[block * BLOCK + tile]);
+            }
             for tile in bits(tiles) {
                 let tile = block * BLOCK + tile;
                 let (target, [re, im], soft) = (&grid.target[tile], &mut self.sums[tile], &self.soft[tile]);

@@ -8,7 +8,7 @@ use super::{
 use std::ops::Range;
 
 /// log₂ of how far a joint may rise or fall from a tile's middle to its corner where tiles follow from each other.
-const GENTLE: f32 = 30.0;
+pub(super) const GENTLE: f32 = 30.0;
 /// log₂ below which a tile's middle is not taken.
 const LOWEST: f32 = -110.0;
 
@@ -21,10 +21,11 @@ pub(super) struct Strip {
     count: u32,
     /// Whether each tile follows from the one before.
     pub chained: bool,
-    /// A K in the middles of the block's tiles where they do, else its log₂; relative to the view's scale.
-    pub middles: Sixteen,
+    /// A K e^{i…} in the middles of the block's tiles where they do, else log₂ of A K in the first of the two; relative
+    /// to the view's scale.
+    pub middles: [Sixteen; 2],
     /// The first tile's cells beside its middle, Re and Im.
-    start: Pair,
+    pub start: Pair,
 }
 
 /// The places of a number's bits, from the lowest on.
@@ -57,23 +58,25 @@ impl Joint {
         (strip.first, strip.count) = (first, count);
         strip.chained = self.bounded && steepest + self.curvature < GENTLE;
         if !strip.chained {
-            strip.middles = *exponent;
+            strip.middles[0] = *exponent;
             return;
         }
         for part in 0..tile_parts::<S>() {
             let within = lanes(simd, exponent, part).max(splat(simd, LOWEST)).min(splat(simd, STRONGEST));
-            store(&mut strip.middles, part, within.exp2());
+            let middle = within.exp2();
+            if COHERENT {
+                let [cos, sin] = self.middle_turns(simd, (block, line), part);
+                store(&mut strip.middles[0], part, middle * cos);
+                store(&mut strip.middles[1], part, middle * sin);
+            } else {
+                store(&mut strip.middles[0], part, middle);
+            }
         }
-        let [cos, sin] = self.middle_turn(block, line, first as usize);
         for part in 0..cell_parts::<S>() {
             let by_x = lanes(simd, &ALONG, part) * splat(simd, b);
             let rise = lanes(simd, &ACROSS, part).mul_add(splat(simd, a), by_x).exp2();
-            let mut start = [rise * lanes(simd, &self.shape[0], part), rise * lanes(simd, &self.shape[1], part)];
-            if COHERENT {
-                start = product(start, [splat(simd, cos), splat(simd, sin)]);
-            }
-            store(&mut strip.start[0], part, start[0]);
-            store(&mut strip.start[1], part, start[1]);
+            store(&mut strip.start[0], part, rise * lanes(simd, &self.shape[0], part));
+            store(&mut strip.start[1], part, rise * lanes(simd, &self.shape[1], part));
         }
     }
 
@@ -136,9 +139,10 @@ impl Strip {
         sums: &mut [Pair],
     ) {
         let tiles = self.tiles();
-        let (middles, sums) = (&self.middles[tiles.clone()], &mut sums[tiles]);
+        let [real, imaginary] = &self.middles;
+        let (real, imaginary, sums) = (&real[tiles.clone()], &imaginary[tiles.clone()], &mut sums[tiles]);
         if !self.chained {
-            for ((tile, &middle), sum) in self.tiles().zip(middles).zip(sums) {
+            for ((tile, &middle), sum) in self.tiles().zip(real).zip(sums) {
                 for part in 0..cell_parts::<S>() {
                     let [re, im] = joint.tile::<S, COHERENT>(simd, (block, line), tile, part, middle);
                     for (sum, of) in sum.iter_mut().zip([re, im]) {
@@ -151,55 +155,38 @@ impl Strip {
         }
         // Two at a time: a product waits for the one before it.
         for part in (0..cell_parts::<S>()).step_by(2) {
-            let mut chains = [self.chain(simd, joint, part), self.chain(simd, joint, part + 1)];
-            for (&middle, sum) in middles.iter().zip(&mut *sums) {
-                let middle = splat(simd, middle);
-                for (k, chain) in chains.iter_mut().enumerate() {
-                    let [re, im] = chain.now;
+            let gain = [lanes(simd, &joint.gain, part), lanes(simd, &joint.gain, part + 1)];
+            let mut now = [self.start(simd, part), self.start(simd, part + 1)];
+            for ((sum, &c), &d) in sums.iter_mut().zip(real).zip(imaginary) {
+                let (c, d) = (splat(simd, c), splat(simd, d));
+                for k in 0..2 {
+                    let [a, b] = now[k];
                     if COHERENT {
-                        let re = re.mul_add(middle, lanes(simd, &sum[0], part + k));
-                        let im = im.mul_add(middle, lanes(simd, &sum[1], part + k));
+                        let re = a.mul_add(c, lanes(simd, &sum[0], part + k)).minus(b, d);
+                        let im = a.mul_add(d, b.mul_add(c, lanes(simd, &sum[1], part + k)));
                         store(&mut sum[0], part + k, re);
                         store(&mut sum[1], part + k, im);
+                        now[k] = [a * gain[k], b * gain[k]];
                     } else {
-                        let a = re * middle;
-                        let squares = a.mul_add(a, lanes(simd, &sum[0], part + k));
+                        let returned = a * c;
+                        let squares = returned.mul_add(returned, lanes(simd, &sum[0], part + k));
                         store(&mut sum[0], part + k, squares);
+                        now[k][0] = a * gain[k];
                     }
-                    chain.go::<COHERENT>();
                 }
             }
         }
     }
 
+    /// The first tile's cells beside its middle, Re and Im.
     #[inline(always)]
-    pub(super) fn chain<S: Simd>(&self, simd: S, joint: &Joint, part: usize) -> Chain<S> {
-        Chain {
-            now: [lanes(simd, &self.start[0], part), lanes(simd, &self.start[1], part)],
-            step: [lanes(simd, &joint.step[0], part), lanes(simd, &joint.step[1], part)],
-        }
-    }
-}
-
-/// Some cells of a strip, from tile to tile.
-pub(super) struct Chain<S: Simd> {
-    pub now: [Lanes<S>; 2],
-    step: [Lanes<S>; 2],
-}
-
-impl<S: Simd> Chain<S> {
-    #[inline(always)]
-    pub(super) fn go<const COHERENT: bool>(&mut self) {
-        if COHERENT {
-            self.now = product(self.now, self.step);
-        } else {
-            self.now[0] = self.now[0] * self.step[0];
-        }
+    pub(super) fn start<S: Simd>(&self, simd: S, part: usize) -> [Lanes<S>; 2] {
+        [lanes(simd, &self.start[0], part), lanes(simd, &self.start[1], part)]
     }
 }
 
 /// The product of two complex numbers.
 #[inline(always)]
-fn product<S: Simd>([a, b]: [Lanes<S>; 2], [c, d]: [Lanes<S>; 2]) -> [Lanes<S>; 2] {
+pub(super) fn product<S: Simd>([a, b]: [Lanes<S>; 2], [c, d]: [Lanes<S>; 2]) -> [Lanes<S>; 2] {
     [(a * c).minus(b, d), a.mul_add(d, b * c)]
 }

@@ -184,8 +184,8 @@ impl Tiles {
                     joint.lay::<S, COHERENT>(simd, (block, &line), tiles, &exponents, strip);
                     tiles_lit |= strip.bits();
                 }
-                if tiles_lit != 0 {
-                    clear(simd, sums);
+                for tile in bits(tiles_lit) {
+                    clear(simd, &mut sums[tile]);
                 }
                 let first = ends.last().map_or(0, |&end| end as usize);
                 for strip in &strips[first..*used] {
@@ -204,8 +204,8 @@ impl Tiles {
 }
 
 #[inline(always)]
-fn clear<S: Simd>(simd: S, sums: &mut [Pair]) {
-    for sum in sums.as_flattened_mut() {
+pub(super) fn clear<S: Simd>(simd: S, sums: &mut Pair) {
+    for sum in sums {
         for part in 0..cell_parts::<S>() {
             store(sum, part, splat(simd, 0.0));
         }
