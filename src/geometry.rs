@@ -2,17 +2,119 @@
 //!
 //! Arrays rather than a matrix crate, because the forward model's derivatives are easiest to check against the
 //! specification when every index is visible; the GPU side uses `glam`.
+#![expect(
+    clippy::inline_always,
+    reason = "all of it belongs into the functions that are compiled for an instruction set"
+)]
+
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// A vector in metres (or a direction, unitless): x forward, y left, z up.
-pub type Vec3 = [f64; 3];
+pub type Vec3<T = f64> = [T; 3];
 /// A 3×3 matrix in rows.
-pub type Mat3 = [[f64; 3]; 3];
+pub type Mat3<T = f64> = [[T; 3]; 3];
 
 /// The identity matrix.
 pub const IDENTITY: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
+/// A real number, or several that the machine computes at once: what a formula that needs no loop is written in.
+pub trait Number:
+    Copy
+    + Neg<Output = Self>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Add<f64, Output = Self>
+    + Sub<f64, Output = Self>
+    + Mul<f64, Output = Self>
+    + AddAssign
+    + SubAssign
+{
+    /// `x`, as many times as `self` is.
+    fn like(self, x: f64) -> Self;
+    /// `yes` where self < limit, else `no`.
+    fn below(self, limit: f64, yes: Self, no: Self) -> Self;
+    /// The larger of the two.
+    fn at_least(self, limit: f64) -> Self;
+    /// The smaller of the two.
+    fn at_most(self, limit: f64) -> Self;
+    /// √
+    fn root(self) -> Self;
+    /// The whole number at or below.
+    fn whole(self) -> Self;
+    /// eˣ
+    fn exp(self) -> Self;
+    /// ln x of a positive normal x.
+    fn ln(self) -> Self;
+    /// ln(1 + x) of a positive x.
+    fn ln_1p(self) -> Self;
+    /// `of` each.
+    fn each(self, of: impl Fn(f64) -> f64) -> Self;
+    /// `of` each and what is in its place in `other`.
+    fn each_with(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self;
+}
+
+impl Number for f64 {
+    #[inline(always)]
+    fn like(self, x: f64) -> Self {
+        x
+    }
+
+    #[inline(always)]
+    fn below(self, limit: f64, yes: Self, no: Self) -> Self {
+        if self < limit { yes } else { no }
+    }
+
+    #[inline(always)]
+    fn at_least(self, limit: f64) -> Self {
+        self.max(limit)
+    }
+
+    #[inline(always)]
+    fn at_most(self, limit: f64) -> Self {
+        self.min(limit)
+    }
+
+    #[inline(always)]
+    fn root(self) -> Self {
+        self.sqrt()
+    }
+
+    #[inline(always)]
+    fn whole(self) -> Self {
+        self.floor()
+    }
+
+    #[inline(always)]
+    fn exp(self) -> Self {
+        Self::exp(self)
+    }
+
+    #[inline(always)]
+    fn ln(self) -> Self {
+        Self::ln(self)
+    }
+
+    #[inline(always)]
+    fn ln_1p(self) -> Self {
+        Self::ln_1p(self)
+    }
+
+    #[inline(always)]
+    fn each(self, of: impl Fn(f64) -> f64) -> Self {
+        of(self)
+    }
+
+    #[inline(always)]
+    fn each_with(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
+        of(self, other)
+    }
+}
+
 /// a · b
-pub fn dot(a: Vec3, b: Vec3) -> f64 {
+#[inline(always)]
+pub fn dot<T: Number>(a: Vec3<T>, b: Vec3<T>) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
@@ -22,7 +124,8 @@ pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
 }
 
 /// a + b
-pub fn add(a: Vec3, b: Vec3) -> Vec3 {
+#[inline(always)]
+pub fn add<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
@@ -32,20 +135,23 @@ pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
 }
 
 /// k a
-pub fn scale(a: Vec3, k: f64) -> Vec3 {
+#[inline(always)]
+pub fn scale<T: Number>(a: Vec3<T>, k: T) -> Vec3<T> {
     [a[0] * k, a[1] * k, a[2] * k]
 }
 
 /// a += k b
-pub fn add_scaled(a: &mut Vec3, b: Vec3, k: f64) {
-    for i in 0..3 {
-        a[i] += k * b[i];
-    }
+#[inline(always)]
+pub fn add_scaled<T: Number>(a: &mut Vec3<T>, b: Vec3<T>, k: T) {
+    a[0] += k * b[0];
+    a[1] += k * b[1];
+    a[2] += k * b[2];
 }
 
 /// ‖a‖
-pub fn norm(a: Vec3) -> f64 {
-    dot(a, a).sqrt()
+#[inline(always)]
+pub fn norm<T: Number>(a: Vec3<T>) -> T {
+    dot(a, a).root()
 }
 
 /// Distance of two points on the floor, whatever their heights.
@@ -54,37 +160,51 @@ pub fn flat_distance(a: Vec3, b: Vec3) -> f64 {
 }
 
 /// M a
-pub fn mat_vec(m: &Mat3, a: Vec3) -> Vec3 {
+#[inline(always)]
+pub fn mat_vec<T: Number>(m: &Mat3<T>, a: Vec3<T>) -> Vec3<T> {
     [dot(m[0], a), dot(m[1], a), dot(m[2], a)]
 }
 
 /// Mᵀ a
-pub fn mat_t_vec(m: &Mat3, a: Vec3) -> Vec3 {
-    std::array::from_fn(|i| m[0][i] * a[0] + m[1][i] * a[1] + m[2][i] * a[2])
+#[inline(always)]
+pub fn mat_t_vec<T: Number>(m: &Mat3<T>, a: Vec3<T>) -> Vec3<T> {
+    mat_vec(&transpose(m), a)
 }
 
 /// A B
-pub fn mat_mul(a: &Mat3, b: &Mat3) -> Mat3 {
-    std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j]))
+#[inline(always)]
+pub fn mat_mul<T: Number>(a: &Mat3<T>, b: &Mat3<T>) -> Mat3<T> {
+    [mat_t_vec(b, a[0]), mat_t_vec(b, a[1]), mat_t_vec(b, a[2])]
 }
 
 /// Aᵀ
-pub fn transpose(a: &Mat3) -> Mat3 {
-    std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
+#[inline(always)]
+pub fn transpose<T: Copy>(a: &Mat3<T>) -> Mat3<T> {
+    [[a[0][0], a[1][0], a[2][0]], [a[0][1], a[1][1], a[2][1]], [a[0][2], a[1][2], a[2][2]]]
+}
+
+/// ‖q‖ and q/‖q‖; that of the zero quaternion is the identity's, (1, 0, 0, 0).
+#[inline(always)]
+pub fn unit_quaternion<T: Number>(q: [T; 4]) -> (T, [T; 4]) {
+    let n = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).root();
+    let (zero, one) = (n.like(0.0), n.like(1.0));
+    let mut unit = [one, zero, zero, zero];
+    for k in 0..4 {
+        unit[k] = n.below(f64::MIN_POSITIVE, unit[k], q[k] / n);
+    }
+    (n, unit)
 }
 
 /// The rotation matrix of the quaternion `q` = (w, x, y, z), normalised here; SPEC section 2, paper section 4.1.
 /// The zero quaternion gives the identity.
-pub fn rotation_from_quaternion(q: [f64; 4]) -> Mat3 {
-    let n = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
-    if n == 0.0 {
-        return IDENTITY;
-    }
-    let [w, x, y, z] = q.map(|c| c / n);
+#[inline(always)]
+pub fn rotation_from_quaternion<T: Number>(q: [T; 4]) -> Mat3<T> {
+    let (n, [w, x, y, z]) = unit_quaternion(q);
+    let one = n.like(1.0);
     [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        [one - (y * y + z * z) * 2.0, (x * y - w * z) * 2.0, (x * z + w * y) * 2.0],
+        [(x * y + w * z) * 2.0, one - (x * x + z * z) * 2.0, (y * z - w * x) * 2.0],
+        [(x * z - w * y) * 2.0, (y * z + w * x) * 2.0, one - (x * x + y * y) * 2.0],
     ]
 }
 

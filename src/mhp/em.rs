@@ -2,17 +2,17 @@
 
 use super::Precision;
 use super::adjoint::{Moments, pull_back};
-use super::form::Form;
+use super::batch::Columns;
+use super::form::Forms;
 use super::kernel::Kernel;
 use super::percentile::percentile;
 use super::region::Region;
 use super::scalar::Real;
 use super::simulate::{EPSILON, floored, ln_floored};
-use super::splat::{Scene, Splat, Trace};
+use super::splat::{Scene, Splat};
 use super::tiles::{self, Question, Tiles, Tiling};
 use crate::body::Pppr;
 use crate::config::FitConfig;
-use crate::geometry::Mat3;
 
 /// h of SPEC section 4: the floor in the logarithms of the soft mask.
 pub(super) const SOFT_FLOOR: f64 = 1e-30;
@@ -44,7 +44,6 @@ pub(super) fn share(both: usize, either: usize) -> Option<f64> {
 #[derive(Default)]
 pub(super) struct Workspace {
     splats: Vec<Splat>,
-    traces: Vec<Trace>,
     moments: Vec<Moments>,
     tiles: Tiles,
 }
@@ -63,26 +62,21 @@ pub(super) struct Slopes<'a> {
     pub factor: f64,
     pub gradient: &'a mut Pppr,
     /// ∂L/∂(R S Sᵀ Rᵀ), a joint.
-    pub covariance: &'a mut [Mat3],
+    pub covariance: &'a mut Columns<9>,
 }
 
 /// Evaluates L_view at `aim`, and its gradient where it is asked for; `forms` are those of `params`.
 pub(super) fn evaluate(
     scene: &Scene<'_>,
     precision: Precision,
-    (params, forms): (&Pppr, &[Form]),
+    (params, forms): (&Pppr, &Forms),
     aim: &Aim,
     slopes: Option<Slopes<'_>>,
     workspace: &mut Workspace,
 ) -> ViewAnswer {
-    let joints = params.shape().total_joints();
-    let Workspace { splats, traces, moments, tiles } = workspace;
-    splats.resize_with(joints, Splat::default);
-    traces.resize_with(joints, Trace::default);
-    for (joint, ((splat, trace), form)) in splats.iter_mut().zip(&mut *traces).zip(forms).enumerate() {
-        scene.splat(params, joint, form, splat, trace);
-    }
-    moments.resize_with(joints, Moments::default);
+    let Workspace { splats, moments, tiles } = workspace;
+    scene.splats((params, forms), precision, splats);
+    moments.resize_with(splats.len(), Moments::default);
     for moments in moments.iter_mut() {
         moments.clear(&scene.view.axes);
     }
@@ -97,10 +91,7 @@ pub(super) fn evaluate(
         Precision::F32 => plain::<f32>(scene, splats, aim, scale, moments),
     };
     if let Some(Slopes { gradient, covariance, .. }) = slopes {
-        for (joint, (moments, bar)) in moments.iter().zip(covariance).enumerate() {
-            let seen = (&forms[joint], &splats[joint], &traces[joint]);
-            pull_back(scene, seen, moments, joint, (&mut *gradient, bar));
-        }
+        pull_back(scene, forms, moments, (gradient, covariance), precision);
     }
     answer
 }

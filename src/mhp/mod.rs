@@ -7,6 +7,7 @@
 mod adam;
 mod adjoint;
 mod articulation;
+mod batch;
 mod convergence;
 mod em;
 mod fill;
@@ -21,6 +22,7 @@ mod percentile;
 mod problem;
 mod region;
 mod scalar;
+mod seen;
 mod simulate;
 mod splat;
 mod tiles;

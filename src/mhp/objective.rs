@@ -1,7 +1,8 @@
 //! L(Θ) and ∂L/∂Θ; SPEC section 4.
 
+use super::batch::Columns;
 use super::em::{self, Aim, Slopes, Workspace};
-use super::form::Form;
+use super::form::Forms;
 use super::init::anchors;
 use super::percentile::percentile;
 use super::region::{self, Region};
@@ -10,7 +11,7 @@ use super::tiles::Tiling;
 use super::{Evaluation, FitError, Precision, Problem, kinematic};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::{Mat3, Vec3, add, add_scaled, dot, scale, sub};
+use crate::geometry::{Vec3, add, add_scaled, dot, scale, sub};
 use std::sync::Arc;
 
 /// The objective of one fit: its EM region and the mask of H_ori are fixed by the initial parameters.
@@ -24,8 +25,8 @@ pub struct Objective {
     aims: Vec<Aim>,
     workspaces: Vec<Workspace>,
     /// Scratch a joint: its form, and ∂L/∂(R S Sᵀ Rᵀ).
-    forms: Vec<Form>,
-    covariance: Vec<Mat3>,
+    forms: Forms,
+    covariance: Columns<9>,
     initial: Pppr,
     /// Where the frames around say that each person's middle is, m; empty where they say nothing.
     anchors: Vec<Vec3>,
@@ -74,8 +75,8 @@ impl Objective {
             regions,
             aims,
             workspaces,
-            forms: Vec::new(),
-            covariance: Vec::new(),
+            forms: Forms::default(),
+            covariance: Columns::default(),
             initial: initial.clone(),
             anchors: Vec::new(),
             warnings,
@@ -147,19 +148,17 @@ impl Objective {
         let views = self.problem.views.len() as f64;
         let mut em = 0.0;
         let Self { problem, config, precision, aims, workspaces, forms, covariance, .. } = self;
-        Form::all(params, forms);
+        forms.fill(params, *precision);
+        covariance.hold(forms.joints());
         covariance.clear();
-        covariance.resize(forms.len(), [[0.0; 3]; 3]);
         for ((view, aim), workspace) in problem.views.iter().zip(&*aims).zip(workspaces) {
             let scene = Scene::new(&problem.radar, view, config);
             let slopes = Slopes { factor: 1.0 / views, gradient: &mut *em_gradient, covariance: &mut *covariance };
-            let answer = em::evaluate(&scene, *precision, (params, forms), aim, Some(slopes), workspace);
+            let answer = em::evaluate(&scene, *precision, (params, &*forms), aim, Some(slopes), workspace);
             em += answer.loss / views;
             iou.push(answer.iou);
         }
-        for (joint, (form, bar)) in forms.iter().zip(covariance).enumerate() {
-            form.pull_back(bar, joint, em_gradient);
-        }
+        forms.pull_back(covariance, em_gradient, *precision);
         *terms = kinematic::evaluate(&self.problem.skeleton, &self.config, params, gradient);
         terms.em = em;
         for group in Group::ALL {
@@ -176,8 +175,8 @@ impl Objective {
 
     /// L_EM alone, without its gradient.
     pub fn em_loss(&self, params: &Pppr) -> f64 {
-        let (mut workspace, mut forms) = (Workspace::default(), Vec::new());
-        Form::all(params, &mut forms);
+        let (mut workspace, mut forms) = (Workspace::default(), Forms::default());
+        forms.fill(params, self.precision);
         let losses = self.problem.views.iter().zip(&self.aims).map(|(view, aim)| {
             let scene = Scene::new(&self.problem.radar, view, &self.config);
             em::evaluate(&scene, self.precision, (params, &forms), aim, None, &mut workspace).loss

@@ -1,6 +1,6 @@
 //! The EM region: the box of cells over which the masks are compared; SPEC section 4.
 
-use super::splat::Seen;
+use super::seen::Seen;
 use super::{FitError, Problem};
 use crate::body::Pppr;
 use crate::config::EmRegion;

@@ -1,10 +1,10 @@
 //! H_sim over whole maps; SPEC section 3.
 
-use super::form::Form;
+use super::form::Forms;
 use super::kernel::Kernel;
 use super::region::Region;
 use super::scalar::Real;
-use super::splat::{Scene, Splat, Trace};
+use super::splat::{Scene, Splat};
 use super::tiles::{Tiles, Tiling};
 use super::{Precision, Problem};
 use crate::body::Pppr;
@@ -24,16 +24,6 @@ fn ln_hypot(a: f64, b: f64) -> f64 {
     high + 0.5 * (2.0 * (low - high)).exp().ln_1p()
 }
 
-/// Every joint of `params` in one view.
-pub(super) fn splats(scene: &Scene<'_>, params: &Pppr) -> Vec<Splat> {
-    let of = |joint: usize| {
-        let mut splat = Splat::default();
-        scene.splat(params, joint, &Form::new(params, joint), &mut splat, &mut Trace::default());
-        splat
-    };
-    (0..params.shape().total_joints()).map(of).collect()
-}
-
 /// √(S² + ε²) from ln S, in linear f64: values that differ by less than a step of ln H near the floor stay apart, and the
 /// floor itself is exactly ε, so that a strict comparison with a percentile behaves as SPEC section 4 says.
 pub(super) fn floored(ln_s: f64) -> f64 {
@@ -44,11 +34,14 @@ pub(super) fn floored(ln_s: f64) -> f64 {
 
 /// H_sim of every view over its whole map, C order, f64; SPEC section 3.
 pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, params: &Pppr) -> Vec<Vec<f64>> {
+    let mut forms = Forms::default();
+    forms.fill(params, precision);
+    let mut splats = Vec::new();
     problem
         .views
         .iter()
         .map(|view| {
-            let splats = splats(&Scene::new(&problem.radar, view, config), params);
+            Scene::new(&problem.radar, view, config).splats((params, &forms), precision, &mut splats);
             let region = Region::whole(view);
             match precision {
                 Precision::F64 => map::<f64>(&splats, &region, config.summation),

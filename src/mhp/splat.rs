@@ -1,173 +1,40 @@
 //! One joint seen by one view: its Gaussian in bin coordinates, its weight, its phases. All in f64; SPEC section 3.
 //!
 //! What is kept is what the per-cell kernel needs ([`Splat`]) and what the derivative needs on the way back
-//! ([`Seen`], [`Row`]); `adjoint.rs` reads like this file from bottom to top.
+//! ([`Look`], [`Row`]); `adjoint.rs` reads like this file from bottom to top.
+#![expect(
+    clippy::inline_always,
+    reason = "all of it belongs into the one function that is compiled for an instruction set"
+)]
 
-use super::form::Form;
+use super::Precision;
+use super::batch::{Batch, Task, each_joint};
+use super::form::{Form, Forms};
+use super::seen::{DISTANCE_FLOOR_M, Floored, Seen, uniform};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::{Mat3, Vec3, add_scaled, dot, mat_mul, mat_vec, norm, scale};
-use crate::radar::{Axis, AxisKind, RadarConfig, SPEED_OF_LIGHT, Spacing, View};
+use crate::geometry::{IDENTITY, Mat3, Number, Vec3, add_scaled, dot, mat_mul, mat_vec, norm, scale, transpose};
+use crate::radar::{Axis, AxisKind, RadarConfig, SPEED_OF_LIGHT, View};
 use std::f64::consts::TAU;
 
-/// Distances are held above this, m.
-pub(super) const DISTANCE_FLOOR_M: f64 = 0.01;
-/// Cosines that stand in a denominator are held above this.
-pub(super) const COSINE_FLOOR: f64 = 0.05;
 /// τ of an echo, s a metre.
 const PER_METRE_S: f64 = 2.0 / SPEED_OF_LIGHT;
 /// ln 2π
 const LN_TAU: f64 = 1.837_877_066_409_345_3;
 
-/// A quantity held above a floor; its gradient is zero while it is.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Floored {
-    /// max(x, floor)
-    pub value: f64,
-    /// 1 where the gradient passes, 0 where the floor holds.
-    pub pass: f64,
-}
-
-impl Floored {
-    pub(super) fn new(x: f64, floor: f64) -> Self {
-        // A NaN must stay visible, so the comparison lets it through.
-        if x < floor { Self { value: floor, pass: 0.0 } } else { Self { value: x, pass: 1.0 } }
-    }
-}
-
-/// A point in the view frame and the directions around it.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Seen {
-    /// The point after the surface offset, m.
-    pub p: Vec3,
-    /// d = ‖p‖, m.
-    pub d: Floored,
-    /// ρ = √(x² + y²), m.
-    pub rho: Floored,
-    /// √(x² + z²), m.
-    pub h: f64,
-    pub sin_az: f64,
-    pub cos_az: f64,
-    pub sin_el: f64,
-    pub cos_el: f64,
-    /// cos θ_az where it stands in a denominator.
-    pub cos_az_floored: Floored,
-    /// cos θ_el where it stands in a denominator.
-    pub cos_el_floored: Floored,
-    /// Radial unit vector; u_y = s is the sine of the cone angle.
-    pub u: Vec3,
-    pub e_az: Vec3,
-    pub e_el: Vec3,
-    /// Horizontal radial unit vector, (cos az, sin az, 0).
-    pub e_rho: Vec3,
-    /// Unit vector of (x, 0, z).
-    pub e_h: Vec3,
-}
-
-impl Seen {
-    pub(super) fn new(p: Vec3) -> Self {
-        let [x, y, z] = p;
-        let (rho, h, d) = ((x * x + y * y).sqrt(), (x * x + z * z).sqrt(), norm(p));
-        // At the origin and above it, angles are 0.
-        let unit = |a: f64, b: f64, length: f64| {
-            let by_length = 1.0 / length;
-            if length == 0.0 { [1.0, 0.0] } else { [a * by_length, b * by_length] }
-        };
-        let ([cos_az, sin_az], [cos_el, sin_el]) = (unit(x, y, rho), unit(rho, z, d));
-        let u = [cos_el * cos_az, cos_el * sin_az, sin_el];
-        let [h_x, h_z] = unit(x, z, h);
-        Self {
-            p,
-            d: Floored::new(d, DISTANCE_FLOOR_M),
-            rho: Floored::new(rho, DISTANCE_FLOOR_M),
-            h,
-            sin_az,
-            cos_az,
-            sin_el,
-            cos_el,
-            cos_az_floored: Floored::new(cos_az, COSINE_FLOOR),
-            cos_el_floored: Floored::new(cos_el, COSINE_FLOOR),
-            u,
-            e_az: [-sin_az, cos_az, 0.0],
-            e_el: [-sin_el * cos_az, -sin_el * sin_az, cos_el],
-            e_rho: [cos_az, sin_az, 0.0],
-            e_h: [h_x, 0.0, h_z],
-        }
-    }
-
-    /// √(1 − s²), the cosine of the cone angle.
-    pub(super) fn cos_cone(&self) -> Floored {
-        Floored::new((1.0 - self.u[1] * self.u[1]).max(0.0).sqrt(), COSINE_FLOOR)
-    }
-
-    /// (ŷ − s u)/cos.
-    pub(super) fn e_cone(&self) -> Vec3 {
-        let [x, s, z] = self.u;
-        scale([-s * x, 1.0 - s * s, -s * z], 1.0 / self.cos_cone().value)
-    }
-
-    /// The coordinate ξ of this point on `axis`, in axis units; `radial_mps` is v_r.
-    pub(super) fn coordinate(&self, axis: &Axis, radial_mps: f64) -> f64 {
-        let sine = axis.spacing == Spacing::Sine;
-        match axis.kind {
-            AxisKind::Range => self.d.value,
-            AxisKind::Azimuth if sine => self.sin_az,
-            AxisKind::Azimuth => self.sin_az.atan2(self.cos_az),
-            AxisKind::Elevation if sine => self.sin_el,
-            AxisKind::Elevation => self.sin_el.atan2(self.cos_el),
-            AxisKind::Cone if sine => self.u[1],
-            AxisKind::Cone => self.u[1].clamp(-1.0, 1.0).asin(),
-            AxisKind::Doppler => radial_mps,
-            AxisKind::X => self.p[0],
-            AxisKind::Y => self.p[1],
-            AxisKind::Z => self.p[2],
-            AxisKind::DepthH => self.h,
-            AxisKind::DepthV => self.rho.value,
-        }
-    }
-
-    /// dξ/dθ of an angular axis: 1, or the floored cosine on a sine axis.
-    pub(super) fn slope(&self, axis: &Axis) -> f64 {
-        match (axis.spacing, axis.kind) {
-            (Spacing::Sine, AxisKind::Azimuth) => self.cos_az_floored.value,
-            (Spacing::Sine, AxisKind::Elevation) => self.cos_el_floored.value,
-            (Spacing::Sine, AxisKind::Cone) => self.cos_cone().value,
-            _ => 1.0,
-        }
-    }
-
-    /// The unit direction along ∂ξ/∂p, and the arm: ∂ξ/∂p = direction · slope / arm. A Doppler axis has none.
-    pub(super) fn direction_and_arm(&self, kind: AxisKind) -> (Vec3, f64) {
-        match kind {
-            AxisKind::Range => (self.u, 1.0),
-            AxisKind::Azimuth => (self.e_az, self.rho.value),
-            AxisKind::Elevation => (self.e_el, self.d.value),
-            AxisKind::Cone => (self.e_cone(), self.d.value),
-            AxisKind::Doppler => ([0.0; 3], 1.0),
-            AxisKind::X => ([1.0, 0.0, 0.0], 1.0),
-            AxisKind::Y => ([0.0, 1.0, 0.0], 1.0),
-            AxisKind::Z => ([0.0, 0.0, 1.0], 1.0),
-            AxisKind::DepthH => (self.e_h, 1.0),
-            AxisKind::DepthV => (self.e_rho, 1.0),
-        }
-    }
-}
-
 /// One axis at one joint.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Row {
-    /// Whether the axis sees the joint (its operator is on, or it has none).
-    pub seen: bool,
-    pub slope: f64,
-    pub arm: f64,
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row<T> {
+    pub slope: T,
+    pub arm: T,
     /// slope/arm and arm/slope.
-    pub ratio: f64,
-    pub by_ratio: f64,
-    pub direction: Vec3,
+    pub ratio: T,
+    pub by_ratio: T,
+    pub direction: Vec3<T>,
     /// ∂b/∂p; zero where the axis does not see the joint.
-    pub gradient: Vec3,
+    pub gradient: Vec3<T>,
     /// Displacement of one bin, m.
-    pub displacement: Vec3,
+    pub displacement: Vec3<T>,
 }
 
 /// ln of the spectrum's factor a bin of each Doppler axis; empty on other axes.
@@ -191,19 +58,28 @@ pub(super) struct Splat {
     pub spectrum: Spectra,
 }
 
-/// What the derivative needs besides.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Trace {
+/// A joint as a view sees it: its splat, but for spectra.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Image<T> {
+    pub bin: Vec3<T>,
+    pub precision: Mat3<T>,
+    pub ln_weight: T,
+    pub phase: T,
+    pub kappa: Vec3<T>,
+}
+
+/// Where a view sees a joint, and how wide.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Look<T> {
     /// The joint before the surface offset, view frame.
-    pub unmoved: Vec3,
-    pub seen: Seen,
-    pub rows: [Row; 3],
+    pub unmoved: Vec3<T>,
+    pub seen: Seen<T>,
     /// v in the view frame, m/s.
-    pub velocity: Vec3,
+    pub velocity: Vec3<T>,
     /// Σ', m².
-    pub blurred: Mat3,
-    pub w_az: f64,
-    pub w_el: f64,
+    pub blurred: Mat3<T>,
+    pub w_az: T,
+    pub w_el: T,
 }
 
 /// A view, a radar and a configuration, and what is the same for all joints.
@@ -264,91 +140,166 @@ impl<'a> Scene<'a> {
 }
 
 impl Scene<'_> {
+    /// Number of axes, 1 to 3.
+    pub(super) fn dims(&self) -> usize {
+        self.view.axes.len().min(3)
+    }
+
+    /// Whether the operator behind an axis is on.
+    pub(super) fn sees(&self, kind: AxisKind) -> bool {
+        sees(self.config, kind)
+    }
+
     /// The factor of p that moves a joint to its skin: max(d − δ, floor)/d.
-    pub(super) fn surface_factor(&self, unmoved: Vec3) -> (f64, Floored, Floored) {
+    #[inline(always)]
+    pub(super) fn surface_factor<T: Number>(&self, unmoved: Vec3<T>) -> (T, Floored<T>, Floored<T>) {
         let d = Floored::new(norm(unmoved), DISTANCE_FLOOR_M);
         let skin = Floored::new(d.value - self.config.surface_offset_m, DISTANCE_FLOOR_M);
         (skin.value / d.value, d, skin)
     }
 
-    /// Projects flat joint `joint` of `params`, which has this form, into this view: overwrites `splat` and `trace`.
-    pub(super) fn splat(&self, params: &Pppr, joint: usize, form: &Form, splat: &mut Splat, trace: &mut Trace) {
-        let pose = &self.view.pose;
-        let unmoved = pose.view_from_world(params.position(joint));
-        let seen = Seen::new(scale(unmoved, self.surface_factor(unmoved).0));
-        let velocity = mat_vec(&pose.rotation, params.velocity(joint));
-        let radial = dot(velocity, seen.u);
-        let omega = params.joint(Group::Omega, joint);
+    /// Projects every joint of `params`, which has these forms, into this view: overwrites `splats`.
+    pub(super) fn splats(&self, (params, forms): (&Pppr, &Forms), precision: Precision, splats: &mut Vec<Splat>) {
+        splats.resize_with(forms.joints(), Splat::default);
+        each_joint(precision, forms.joints(), &mut Project { scene: self, params, forms, splats });
+    }
 
+    /// Where the view sees joints of this form, and how wide.
+    #[inline(always)]
+    pub(super) fn look<T: Number>(&self, form: &Form<T>) -> Look<T> {
+        let pose = &self.view.pose;
+        let turn = uniform(form.opacity, pose.rotation);
+        let [x, y, z] = mat_vec(&turn, form.position);
+        let unmoved = [x + pose.translation[0], y + pose.translation[1], z + pose.translation[2]];
+        let seen = Seen::new(scale(unmoved, self.surface_factor(unmoved).0));
         let psf = &self.view.psf;
-        let spread = mat_mul(&pose.rotation, &form.spread);
         let w_az = seen.rho.value * psf.azimuth_rad / seen.cos_az_floored.value;
         let w_el = seen.d.value * psf.elevation_rad / seen.cos_el_floored.value;
-        let blurred = blurred(&spread, &seen, psf.range_m, w_az, w_el);
+        let blurred = blurred(&mat_mul(&turn, &form.spread), &seen, psf.range_m, w_az, w_el);
+        Look { unmoved, seen, velocity: mat_vec(&turn, form.velocity), blurred, w_az, w_el }
+    }
 
-        let dims = self.view.axes.len().min(3);
-        let (mut rows, mut bin, mut kappa) = ([Row::default(); 3], [0.0; 3], [0.0; 3]);
-        splat.spectrum.iter_mut().for_each(Vec::clear);
-        let mut covariance = [[0.0; 3]; 3];
+    /// The view's axes there.
+    #[inline(always)]
+    pub(super) fn rows<T: Number>(&self, seen: &Seen<T>) -> [Row<T>; 3] {
+        let zero = seen.h.like(0.0);
+        let (slope, arm, ratio, by_ratio, none) = (zero, zero, zero, zero, [zero; 3]);
+        let missing = Row { slope, arm, ratio, by_ratio, direction: none, gradient: none, displacement: none };
+        let mut rows = [missing; 3];
+        for (k, axis) in self.view.axes.iter().take(3).enumerate() {
+            rows[k] = self.row(seen, k, axis);
+        }
+        rows
+    }
+
+    /// What the view makes of it.
+    #[inline(always)]
+    pub(super) fn image<T: Number>(&self, form: &Form<T>, look: &Look<T>, rows: &[Row<T>; 3]) -> Image<T> {
+        let Look { seen, velocity, blurred, .. } = look;
+        let zero = seen.h.like(0.0);
+        let dims = self.dims();
+        let radial = dot(*velocity, seen.u);
+        let (mut bin, mut kappa) = ([zero; 3], [zero; 3]);
+        let mut covariance = uniform(zero, IDENTITY);
         for (k, axis) in self.view.axes.iter().take(dims).enumerate() {
-            rows[k] = self.row(&seen, k, axis);
-            bin[k] = (if rows[k].seen { seen.coordinate(axis, radial) } else { 0.0 } - axis.lo) * self.by_step[k];
+            let coordinate = if self.sees(axis.kind) { seen.coordinate(axis, radial) } else { zero };
+            bin[k] = (coordinate - axis.lo) * self.by_step[k];
             if self.config.operators.doppler {
-                kappa[k] = form.omega_mean * dot(velocity, rows[k].displacement);
+                kappa[k] = form.omega_mean * dot(*velocity, rows[k].displacement);
             }
-            if axis.kind == AxisKind::Doppler {
-                splat.spectrum[k].extend(spectrum_of(omega, form.omega_mean, axis.bins));
-            }
-            covariance[k][k] = self.own_variance[k] + 1.0 / 12.0;
+            covariance[k][k] = zero.like(self.own_variance[k] + 1.0 / 12.0);
         }
         for k in 0..dims {
             for l in 0..dims {
-                covariance[k][l] += dot(rows[k].gradient, mat_vec(&blurred, rows[l].gradient));
+                covariance[k][l] += dot(rows[k].gradient, mat_vec(blurred, rows[l].gradient));
             }
         }
-        let (precision, ln_det) = inverse_and_ln_det(&covariance, dims);
+        let (precision, ln_det) = inverse_and_ln_det(&covariance);
 
-        let attenuation =
-            if self.config.operators.attenuation { 4.0 * (self.radar.r_max_m / seen.d.value).ln() } else { 0.0 };
-        splat.ln_weight = form.ln_opacity + attenuation - 0.5 * (dims as f64 * LN_TAU + ln_det);
-        let phase = self.phase(&seen, radial);
-        splat.phase = phase - TAU * (phase * (1.0 / TAU)).floor();
-        (splat.dims, splat.bin, splat.precision, splat.kappa) = (dims, bin, precision, kappa);
-        *trace = Trace { unmoved, seen, rows, velocity, blurred, w_az, w_el };
+        let mut ln_amplitude = form.ln_opacity;
+        if self.config.operators.attenuation {
+            ln_amplitude += (zero.like(self.radar.r_max_m) / seen.d.value).ln() * 4.0;
+        }
+        let ln_weight = ln_amplitude - (ln_det + dims as f64 * LN_TAU) * 0.5;
+        let phase = self.phase(seen, radial);
+        let phase = phase - (phase * (1.0 / TAU)).whole() * TAU;
+        Image { bin, precision, ln_weight, phase, kappa }
     }
 
-    fn row(&self, seen: &Seen, k: usize, axis: &Axis) -> Row {
+    #[inline(always)]
+    fn row<T: Number>(&self, seen: &Seen<T>, k: usize, axis: &Axis) -> Row<T> {
         let (direction, arm) = seen.direction_and_arm(axis.kind);
-        let (slope, on) = (seen.slope(axis), sees(self.config, axis.kind));
-        let (ratio, by_ratio) = if axis.kind.is_angular() { (slope / arm, arm / slope) } else { (1.0, 1.0) };
-        let gradient = if on { scale(direction, ratio * self.by_step[k]) } else { [0.0; 3] };
+        let slope = seen.slope(axis);
+        let (zero, one) = (arm.like(0.0), arm.like(1.0));
+        let (ratio, by_ratio) = if axis.kind.is_angular() { (slope / arm, arm / slope) } else { (one, one) };
+        let gradient = if self.sees(axis.kind) { scale(direction, ratio * self.by_step[k]) } else { [zero; 3] };
         let displacement = scale(direction, by_ratio * self.step[k]);
-        Row { seen: on, slope, arm, ratio, by_ratio, direction, gradient, displacement }
+        Row { slope, arm, ratio, by_ratio, direction, gradient, displacement }
     }
 
-    fn phase(&self, seen: &Seen, radial_mps: f64) -> f64 {
+    #[inline(always)]
+    fn phase<T: Number>(&self, seen: &Seen<T>, radial_mps: T) -> T {
         let [by_tau_sq, by_radial, by_az, by_el] = self.phase;
         let tau = seen.d.value * PER_METRE_S;
-        by_tau_sq * tau * tau + by_radial * radial_mps + by_az * seen.sin_az + by_el * seen.sin_el
+        tau * by_tau_sq * tau + radial_mps * by_radial + seen.sin_az * by_az + seen.sin_el * by_el
     }
 
     /// (∂φ/∂d, ∂φ/∂v_r, ∂φ/∂θ_az, ∂φ/∂θ_el).
-    pub(super) fn phase_slopes(&self, seen: &Seen) -> [f64; 4] {
+    #[inline(always)]
+    pub(super) fn phase_slopes<T: Number>(&self, seen: &Seen<T>) -> [T; 4] {
         let [by_tau_sq, by_radial, by_az, by_el] = self.phase;
         let tau = seen.d.value * PER_METRE_S;
-        [2.0 * by_tau_sq * tau * PER_METRE_S, by_radial, by_az * seen.cos_az, by_el * seen.cos_el]
+        [tau * (2.0 * by_tau_sq) * PER_METRE_S, tau.like(by_radial), seen.cos_az * by_az, seen.cos_el * by_el]
+    }
+}
+
+struct Project<'a> {
+    scene: &'a Scene<'a>,
+    params: &'a Pppr,
+    forms: &'a Forms,
+    splats: &'a mut [Splat],
+}
+
+impl Task for Project<'_> {
+    #[inline(always)]
+    fn run<B: Batch>(&mut self, batch: B) {
+        let Self { scene, params, forms, splats } = self;
+        let (axes, form) = (&scene.view.axes, forms.of(batch));
+        let look = scene.look(&form);
+        let image = scene.image(&form, &look, &scene.rows(&look.seen));
+        batch.scatter(image.ln_weight, |joint, x| splats[joint].ln_weight = x);
+        batch.scatter(image.phase, |joint, x| splats[joint].phase = x);
+        for k in 0..scene.dims() {
+            batch.scatter(image.bin[k], |joint, x| splats[joint].bin[k] = x);
+            batch.scatter(image.kappa[k], |joint, x| splats[joint].kappa[k] = x);
+            for l in 0..scene.dims() {
+                batch.scatter(image.precision[k][l], |joint, x| splats[joint].precision[k][l] = x);
+            }
+        }
+        batch.scatter(form.omega_mean, |joint, mean| {
+            splats[joint].dims = scene.dims();
+            for (spectrum, axis) in splats[joint].spectrum.iter_mut().zip(axes) {
+                spectrum.clear();
+                if axis.kind == AxisKind::Doppler {
+                    spectrum.extend(spectrum_of(params.joint(Group::Omega, joint), mean, axis.bins));
+                }
+            }
+        });
     }
 }
 
 /// Σ' = M Mᵀ + σ_r² u uᵀ + w_az² e_az e_azᵀ + w_el² e_el e_elᵀ, m².
-fn blurred(spread: &Mat3, seen: &Seen, sigma_r: f64, w_az: f64, w_el: f64) -> Mat3 {
-    std::array::from_fn(|i| {
-        let mut row: Vec3 = std::array::from_fn(|k| dot(spread[i], spread[k]));
-        add_scaled(&mut row, seen.u, sigma_r * sigma_r * seen.u[i]);
-        add_scaled(&mut row, seen.e_az, w_az * w_az * seen.e_az[i]);
-        add_scaled(&mut row, seen.e_el, w_el * w_el * seen.e_el[i]);
-        row
-    })
+#[inline(always)]
+fn blurred<T: Number>(spread: &Mat3<T>, seen: &Seen<T>, sigma_r: f64, w_az: T, w_el: T) -> Mat3<T> {
+    let mut blurred = *spread;
+    for i in 0..3 {
+        let row = &mut blurred[i];
+        *row = mat_vec(spread, spread[i]);
+        add_scaled(row, seen.u, seen.u[i] * (sigma_r * sigma_r));
+        add_scaled(row, seen.e_az, w_az * w_az * seen.e_az[i]);
+        add_scaled(row, seen.e_el, w_el * w_el * seen.e_el[i]);
+    }
+    blurred
 }
 
 /// Where bin `bin` of a Doppler axis lies among `features` entries of ω: lower entry and weight of the upper one.
@@ -370,21 +321,20 @@ fn spectrum_of(omega: &[f64], mean: f64, bins: usize) -> impl Iterator<Item = f6
     })
 }
 
-/// The inverse of a symmetric positive definite matrix (leading `dims` block) and the ln of its determinant.
-fn inverse_and_ln_det(c: &Mat3, dims: usize) -> (Mat3, f64) {
-    let mut full = *c;
-    for (k, row) in full.iter_mut().enumerate().skip(dims) {
-        *row = [0.0; 3];
-        row[k] = 1.0;
+/// The inverse of a symmetric positive definite matrix and the ln of its determinant.
+#[inline(always)]
+fn inverse_and_ln_det<T: Number>(m: &Mat3<T>) -> (Mat3<T>, T) {
+    let mut cofactors = *m;
+    for i in 0..3 {
+        for k in 0..3 {
+            let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+            let (p, q) = ((k + 1) % 3, (k + 2) % 3);
+            cofactors[i][k] = m[a][p] * m[b][q] - m[a][q] * m[b][p];
+        }
     }
-    let m = &full;
-    let cofactor = |i: usize, k: usize| {
-        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
-        let (p, q) = ((k + 1) % 3, (k + 2) % 3);
-        m[a][p] * m[b][q] - m[a][q] * m[b][p]
-    };
-    let determinant = m[0][0] * cofactor(0, 0) + m[0][1] * cofactor(0, 1) + m[0][2] * cofactor(0, 2);
-    let by_determinant = 1.0 / determinant;
-    let inverse = std::array::from_fn(|i| std::array::from_fn(|k| cofactor(k, i) * by_determinant));
+    let determinant = dot(m[0], cofactors[0]);
+    let by_determinant = determinant.like(1.0) / determinant;
+    let [a, b, c] = transpose(&cofactors);
+    let inverse = [scale(a, by_determinant), scale(b, by_determinant), scale(c, by_determinant)];
     (inverse, determinant.ln())
 }

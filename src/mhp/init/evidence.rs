@@ -11,7 +11,7 @@ use super::locate::Mark;
 use crate::geometry::{Vec3, mat_t_vec};
 use crate::mhp::fill::all_neighbours;
 use crate::mhp::for_neighbours;
-use crate::mhp::splat::Seen;
+use crate::mhp::seen::Seen;
 use crate::radar::{AxisKind, unravel};
 use smallvec::SmallVec;
 use std::sync::{Arc, OnceLock};

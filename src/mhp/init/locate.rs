@@ -1,7 +1,7 @@
 //! The point in space that the echoes of several views agree on.
 
 use crate::geometry::{Vec3, add_scaled, dot, mat_t_vec, scale};
-use crate::mhp::splat::Seen;
+use crate::mhp::seen::Seen;
 use crate::radar::{AxisKind, View};
 use smallvec::SmallVec;
 

@@ -16,7 +16,6 @@ impl Tiles {
     #[inline(always)]
     pub(super) fn collect<S: Simd, const COHERENT: bool>(&mut self, simd: S, grid: &Tiling, moments: &mut [Moments]) {
         let mut gathered = std::mem::take(&mut self.gathered);
-        gathered.clear();
         gathered.resize(self.joints.len(), [Cells::ZERO; 9]);
         let row_blocks = grid.rows * grid.columns.div_ceil(BLOCK);
         let mut from = 0;
@@ -34,10 +33,12 @@ impl Tiles {
             for ((joint, gathered), moments) in self.joints.iter().zip(&mut gathered).zip(&mut *moments) {
                 let mut sums = Sums::default();
                 for (total, sums) in sums.0.iter_mut().zip(gathered.iter_mut()) {
+                    let mut sum = splat(simd, 0.0);
                     for part in 0..cell_parts::<S>() {
-                        *total += f64::from(lanes(simd, sums, part).sum());
+                        sum += lanes(simd, sums, part);
                         store(sums, part, splat(simd, 0.0));
                     }
+                    *total = f64::from(sum.sum());
                 }
                 let slice = grid.lo[0] + slice;
                 sums.add_to(moments, slice, slice as f64 - joint.bin[0]);

@@ -210,6 +210,8 @@ impl Tiling {
 #[derive(Debug, Default)]
 pub(super) struct Tiles {
     joints: Vec<Joint>,
+    /// log₂ of the strongest joint in the middles of some blocks' tiles.
+    middles: Vec<Sixteen>,
     /// Those that reach a row.
     present: Vec<u32>,
     /// Block by block, the first `used` of them; `ends` tells where each block's strips end.
@@ -230,7 +232,7 @@ pub(super) struct Tiles {
     soft: Vec<Cells>,
     /// Tiles where the mask has a slope: a bit each, a block's in one number.
     sloped: Vec<u32>,
-    /// Each joint's moments over the blocks, a number a cell of a tile.
+    /// Each joint's moments over the blocks, a number a cell of a tile; zeros when they have been collected.
     gathered: Vec<Gathered>,
     /// Scratch of percentiles.
     ranked: Vec<u32>,
@@ -320,7 +322,7 @@ impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
             return ViewAnswer { loss: f64::NAN, iou: None };
         }
         let floor = EPSILON.log2();
-        let mut guess = tiles.guess(simd, question).max(floor);
+        let mut guess = tiles.guess(simd, question);
         let mut tries = 0..TRIES;
         loop {
             let scale = Scale::new(guess, question.softness);
@@ -448,16 +450,6 @@ fn lanes<S: Simd, const N: usize>(simd: S, of: &Row<N>, part: usize) -> Lanes<S>
 #[inline(always)]
 fn store<S: Simd, const N: usize>(into: &mut Row<N>, part: usize, x: Lanes<S>) {
     S::as_mut_simd_f32s(&mut into.0).0[part] = x.value;
-}
-
-/// A float as an integer that sorts as it.
-fn ordered(x: f32) -> u32 {
-    let bits = x.to_bits();
-    if bits >> 31 == 0 { bits | 0x8000_0000 } else { !bits }
-}
-
-fn unordered(key: u32) -> f32 {
-    f32::from_bits(if key >> 31 == 1 { key & 0x7FFF_FFFF } else { !key })
 }
 
 impl Tiles {

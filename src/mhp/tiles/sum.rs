@@ -3,13 +3,15 @@
 use super::joint::Line;
 use super::strip::{Strip, bits};
 use super::{
-    BLOCK, Block, CELLS, Cells, Joint, LOG2_E, Lanes, Pair, Question, REACH_ACROSS, REACH_ALONG, RELATIVE, Scale, Simd,
-    Sixteen, Tiles, Tiling, cell_parts, lanes, ordered, place, splat, store, tile_parts, unordered,
+    BLOCK, Block, CELLS, Cells, EPSILON, Joint, LOG2_E, Lanes, Pair, Question, REACH_ACROSS, REACH_ALONG, RELATIVE,
+    Scale, Simd, Sixteen, Tiles, Tiling, cell_parts, lanes, place, splat, store, tile_parts,
 };
 
 /// The threshold is guessed from at least this many rows of tiles, and from one in so many.
 const ROWS: usize = 10;
 const STRIDE: usize = 4;
+/// The guess is that near, log₂.
+const NEAR: f64 = 0.125;
 /// The strongest joint in the middle of a block's tiles.
 struct Crest {
     exponent: Sixteen,
@@ -109,7 +111,8 @@ impl Tiles {
     #[inline(always)]
     pub(super) fn guess<S: Simd>(&mut self, simd: S, question: &Question<'_>) -> f64 {
         let grid = question.tiling;
-        self.ranked.clear();
+        self.middles.clear();
+        let mut tiles = 0;
         let stride = (grid.size[0] * grid.rows / ROWS).clamp(1, STRIDE);
         for block in grid.blocks.iter().filter(|block| (block.slice * grid.rows + block.row).is_multiple_of(stride)) {
             let mut highest = Sixteen::all(f32::MIN);
@@ -122,12 +125,36 @@ impl Tiles {
                 store(&mut highest, part, best);
             }
             let here = (grid.columns - block.column).min(BLOCK);
-            self.ranked.extend(highest[..here].iter().map(|&x| ordered(x)));
+            // Beyond the box nothing is strong.
+            highest[here..].fill(f32::MIN);
+            self.middles.push(highest);
+            tiles += here;
         }
-        let Some(last) = self.ranked.len().checked_sub(1) else { return 0.0 };
+        let last = tiles.saturating_sub(1);
         let (lower, _) = place(last, 100.0 - question.tau_pct);
-        let (_, &mut key, _) = self.ranked.select_nth_unstable(lower);
-        f64::from(unordered(key))
+        self.level(simd, last - lower)
+    }
+
+    /// log₂ of what about `rank` of the listed middles lie above, no lower than the floor.
+    #[inline(always)]
+    fn level<S: Simd>(&self, simd: S, rank: usize) -> f64 {
+        let mut low = EPSILON.log2();
+        let mut high = self.joints.iter().map(|joint| joint.top + f64::from(joint.spectrum())).fold(low, f64::max);
+        while high - low > NEAR {
+            let level = f64::midpoint(low, high);
+            let mut above = splat(simd, 0.0);
+            for middles in &self.middles {
+                for part in 0..tile_parts::<S>() {
+                    above += lanes(simd, middles, part).choose(
+                        splat(simd, level as f32),
+                        splat(simd, 1.0),
+                        splat(simd, 0.0),
+                    );
+                }
+            }
+            if above.sum() as usize > rank { low = level } else { high = level }
+        }
+        low
     }
 
     /// Block by block: which joints matter to which tiles, and the sum of their returns there.
