@@ -8,7 +8,7 @@ use super::{
 };
 use std::ops::Range;
 
-/// Σr, ΣrΔx, ΣrΔy, ΣrΔx², ΣrΔxΔy, ΣrΔy², Σq, ΣqΔx, ΣqΔy of a joint, a number a cell of a tile.
+/// Σr, ΣrΔx, ΣrΔy, ΣrΔx², ΣrΔxΔy, ΣrΔy², Σq, ΣqΔx, ΣqΔy of a joint, a number a cell of a tile; Δ to the tiles' middles.
 pub(super) type Gathered = [Cells; 9];
 
 impl Tiles {
@@ -31,17 +31,13 @@ impl Tiles {
                 from = to;
             }
             for ((joint, gathered), moments) in self.joints.iter().zip(&mut gathered).zip(&mut *moments) {
-                let mut sums = Sums::default();
-                for (total, sums) in sums.0.iter_mut().zip(gathered.iter_mut()) {
-                    let mut sum = splat(simd, 0.0);
-                    for part in 0..cell_parts::<S>() {
-                        sum += lanes(simd, sums, part);
+                let slice = grid.lo[0] + slice;
+                Sums::new(simd, gathered).add_to(moments, slice, slice as f64 - joint.bin[0]);
+                for part in 0..cell_parts::<S>() {
+                    for sums in &mut *gathered {
                         store(sums, part, splat(simd, 0.0));
                     }
-                    *total = f64::from(sum.sum());
                 }
-                let slice = grid.lo[0] + slice;
-                sums.add_to(moments, slice, slice as f64 - joint.bin[0]);
             }
         }
         self.gathered = gathered;
@@ -130,17 +126,46 @@ impl<S: Simd> Along<S> {
     /// Adds to a joint's moments; `delta` is from the joint to the row's middle.
     #[inline(always)]
     fn add_to(self, simd: S, delta: f32, part: usize, gathered: &mut Gathered) {
-        let ([r, rx, rxx], [q, qx]) = (self.r, self.q);
-        let (x, y) = (lanes(simd, &ALONG, part), lanes(simd, &ACROSS, part) + splat(simd, delta));
-        let cell_rx = x.mul_add(r, rx);
-        let cell_rxx = x.mul_add(rx + cell_rx, rxx);
-        let cell_qx = x.mul_add(q, qx);
-        let ry = r * y;
-        let news = [r, cell_rx, ry, cell_rxx, cell_rx * y, ry * y, q, cell_qx, q * y];
-        for (sums, new) in gathered.iter_mut().zip(news) {
-            let sum = new + lanes(simd, sums, part);
-            store(sums, part, sum);
+        let ([r, rx, rxx], [q, qx], [y, yy]) = (self.r, self.q, [splat(simd, delta), splat(simd, delta * delta)]);
+        let mut sums = Cell::of(simd, gathered, part).0;
+        sums[0] += r;
+        sums[1] += rx;
+        sums[2] = r.mul_add(y, sums[2]);
+        sums[3] += rxx;
+        sums[4] = rx.mul_add(y, sums[4]);
+        sums[5] = r.mul_add(yy, sums[5]);
+        sums[6] += q;
+        sums[7] += qx;
+        sums[8] = q.mul_add(y, sums[8]);
+        for k in 0..9 {
+            store(&mut gathered[k], part, sums[k]);
         }
+    }
+}
+
+/// What is gathered in some cells of a tile.
+struct Cell<S: Simd>([Lanes<S>; 9]);
+
+impl<S: Simd> Cell<S> {
+    #[inline(always)]
+    fn of(simd: S, gathered: &Gathered, part: usize) -> Self {
+        let mut sums = [splat(simd, 0.0); 9];
+        for k in 0..9 {
+            sums[k] = lanes(simd, &gathered[k], part);
+        }
+        Self(sums)
+    }
+
+    /// From the tiles' middles to the cells.
+    #[inline(always)]
+    fn shifted(self, simd: S, part: usize) -> Self {
+        let [r, rx, ry, rxx, rxy, ryy, q, qx, qy] = self.0;
+        let (x, y) = (lanes(simd, &ALONG, part), lanes(simd, &ACROSS, part));
+        let (cell_rx, cell_ry) = (x.mul_add(r, rx), y.mul_add(r, ry));
+        let cell_rxx = x.mul_add(rx + cell_rx, rxx);
+        let cell_rxy = x.mul_add(ry, y.mul_add(cell_rx, rxy));
+        let cell_ryy = y.mul_add(ry + cell_ry, ryy);
+        Self([r, cell_rx, cell_ry, cell_rxx, cell_rxy, cell_ryy, q, x.mul_add(q, qx), y.mul_add(q, qy)])
     }
 }
 
@@ -239,10 +264,25 @@ fn by_bin<S: Simd>(grid: &Tiling, block: &Block, tile: usize, part: usize, r: La
 }
 
 /// Σr, ΣrΔx, ΣrΔy, ΣrΔx², ΣrΔxΔy, ΣrΔy², Σq, ΣqΔx, ΣqΔy of one slice.
-#[derive(Default)]
 struct Sums([f64; 9]);
 
 impl Sums {
+    #[inline(always)]
+    fn new<S: Simd>(simd: S, gathered: &Gathered) -> Self {
+        let mut totals = [splat(simd, 0.0); 9];
+        for part in 0..cell_parts::<S>() {
+            let cells = Cell::of(simd, gathered, part).shifted(simd, part).0;
+            for k in 0..9 {
+                totals[k] += cells[k];
+            }
+        }
+        let mut sums = [0.0; 9];
+        for k in 0..9 {
+            sums[k] = f64::from(totals[k].sum());
+        }
+        Self(sums)
+    }
+
     /// Folds a slice at bin `slice` of the outermost of three axes, `delta` from the joint, into the moments.
     fn add_to(&self, moments: &mut Moments, slice: usize, delta: f64) {
         let [r, rx, ry, rxx, rxy, ryy, q, qx, qy] = self.0;

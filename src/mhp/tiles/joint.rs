@@ -125,10 +125,13 @@ impl Joint {
         self.bin = std::array::from_fn(|k| at(k).map_or(0.0, |k| splat_of.bin[k]));
         self.kappa = std::array::from_fn(|k| at(k).map_or(0.0, |k| splat_of.kappa[k] / TAU));
         (self.phase, self.top) = (splat_of.phase / TAU, splat_of.ln_weight * LOG2_E);
-        let (k20, k21) = (p(2, 0) / p(2, 2), p(2, 1) / p(2, 2));
-        let s = |k: usize, l: usize| p(k, l) - p(k, 2) * p(2, l) / p(2, 2);
-        let k10 = s(1, 0) / s(1, 1);
-        self.half = [s(0, 0) - s(0, 1) * s(1, 0) / s(1, 1), s(1, 1), p(2, 2)].map(|h| 0.5 * LOG2_E * h);
+        let by_last = 1.0 / p(2, 2);
+        let (k20, k21) = (p(2, 0) * by_last, p(2, 1) * by_last);
+        // What is left of the other two axes.
+        let s = |k: usize, l: usize| p(k, l) - p(k, 2) * p(2, l) * by_last;
+        let (s10, s11) = (s(1, 0), s(1, 1));
+        let k10 = s10 / s11;
+        self.half = [s(0, 0) - s(0, 1) * k10, s11, p(2, 2)].map(|h| 0.5 * LOG2_E * h);
         self.skew = [k10, k20, k21];
         (self.bend, self.shear) = ((-2.0 * self.half[2]) as f32, k21 as f32);
         self.first = nearest_tile(grid.middle()[1] - self.bin[2]).map(|bins| bins as f32);

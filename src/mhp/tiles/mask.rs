@@ -124,12 +124,12 @@ impl Tiles {
                     let [odds, by_power] = odds.at(simd, power.max(splat(simd, f32::MIN_POSITIVE)));
                     let share = one / (one + odds);
                     let m = odds * share * inside;
-                    few_common += m * b;
+                    few_common = m.mul_add(b, few_common);
                     few_soft += m;
                     steep |= (m * share - flat).any_positive();
                     store(out, part, by_power * share * share * inside);
                     let sim = power.choose(splat(simd, threshold.lower), inside, zero);
-                    both += sim * b;
+                    both = sim.mul_add(b, both);
                     hard += sim;
                     marked += b;
                     lit_cells += inside;

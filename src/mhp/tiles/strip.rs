@@ -2,8 +2,8 @@
 
 use super::joint::{Joint, Line};
 use super::{
-    ACROSS, ALONG, ALONG_BINS, Block, FAINTEST, Lanes, Pair, REACH_ACROSS, REACH_ALONG, STRONGEST, Simd, Sixteen,
-    cell_parts, lanes, splat, store, tile_parts,
+    ACROSS, ALONG, ALONG_BINS, Block, FAINTEST, Lanes, Pair, STRONGEST, Simd, Sixteen, cell_parts, lanes, splat, store,
+    tile_parts,
 };
 use std::ops::Range;
 
@@ -28,6 +28,18 @@ pub(super) struct Strip {
     pub start: Pair,
 }
 
+/// A joint in the middles of a block's tiles.
+#[derive(Debug, Default)]
+pub(super) struct Middles {
+    /// log₂ of A K, relative to the view's scale.
+    pub exponent: Sixteen,
+    /// Its slopes across and along, a bin.
+    pub across: Sixteen,
+    pub along: Sixteen,
+    /// How far these rise to the tile's outermost cell.
+    pub rise: Sixteen,
+}
+
 /// The places of a number's bits, from the lowest on.
 pub(super) fn bits(mut of: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
@@ -38,31 +50,30 @@ pub(super) fn bits(mut of: u32) -> impl Iterator<Item = usize> {
 }
 
 impl Joint {
-    /// Writes down the joint in `tiles` (a bit each) of a block and those between them, whose middles it reaches with
-    /// `exponent`, log₂ relative to the view's scale.
+    /// Writes down the joint in `tiles` (a bit each) of a block and those between them.
     #[inline(always)]
     pub(super) fn lay<S: Simd, const COHERENT: bool>(
         &self,
         simd: S,
         (block, line): (&Block, &Line),
         tiles: u32,
-        exponent: &Sixteen,
+        middles: &Middles,
         strip: &mut Strip,
     ) {
         let first = tiles.trailing_zeros();
         // A tile between others costs less than what tells it from them.
         let count = 32 - tiles.leading_zeros() - first;
         let last = first + count - 1;
-        let [[a, b], [c, d]] = [self.slopes(block, line, first as usize), self.slopes(block, line, last as usize)];
-        let steepest = REACH_ACROSS * a.abs().max(c.abs()) + REACH_ALONG * b.abs().max(d.abs());
         (strip.first, strip.count) = (first, count);
+        // Slopes along a strip lie between those at its ends.
+        let steepest = middles.rise[first as usize].max(middles.rise[last as usize]);
         strip.chained = self.bounded && steepest + self.curvature < GENTLE;
         if !strip.chained {
-            strip.middles[0] = *exponent;
+            strip.middles[0] = middles.exponent;
             return;
         }
         for part in 0..tile_parts::<S>() {
-            let within = lanes(simd, exponent, part).max(splat(simd, LOWEST)).min(splat(simd, STRONGEST));
+            let within = lanes(simd, &middles.exponent, part).max(splat(simd, LOWEST)).min(splat(simd, STRONGEST));
             let middle = within.exp2();
             if COHERENT {
                 let [cos, sin] = self.middle_turns(simd, (block, line), part);
@@ -72,9 +83,10 @@ impl Joint {
                 store(&mut strip.middles[0], part, middle);
             }
         }
+        let (across, along) = (middles.across[first as usize], middles.along[first as usize]);
         for part in 0..cell_parts::<S>() {
-            let by_x = lanes(simd, &ALONG, part) * splat(simd, b);
-            let rise = lanes(simd, &ACROSS, part).mul_add(splat(simd, a), by_x).exp2();
+            let by_x = lanes(simd, &ALONG, part) * splat(simd, along);
+            let rise = lanes(simd, &ACROSS, part).mul_add(splat(simd, across), by_x).exp2();
             store(&mut strip.start[0], part, rise * lanes(simd, &self.shape[0], part));
             store(&mut strip.start[1], part, rise * lanes(simd, &self.shape[1], part));
         }

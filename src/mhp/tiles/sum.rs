@@ -1,7 +1,7 @@
 //! A guess of the threshold, which joints matter to which tiles, and the sum of what returns there.
 
 use super::joint::Line;
-use super::strip::{Strip, bits};
+use super::strip::{Middles, Strip, bits};
 use super::{
     BLOCK, Block, CELLS, Cells, EPSILON, Joint, LOG2_E, Lanes, Pair, Question, REACH_ACROSS, REACH_ALONG, RELATIVE,
     Scale, Simd, Sixteen, Tiles, Tiling, cell_parts, lanes, place, splat, store, tile_parts,
@@ -11,7 +11,7 @@ use super::{
 const ROWS: usize = 10;
 const STRIDE: usize = 4;
 /// The guess is that near, log₂.
-const NEAR: f64 = 0.125;
+const NEAR: f64 = 0.5;
 /// The strongest joint in the middle of a block's tiles.
 struct Crest {
     exponent: Sixteen,
@@ -77,7 +77,7 @@ impl<S: Simd> Bounds<S> {
         }
     }
 
-    /// A bit a tile of the block that the joint matters to, and its exponents in their middles, log₂ relative to the scale.
+    /// A bit a tile of the block that the joint matters to, and what the joint is in the tiles' middles.
     #[inline(always)]
     fn tiles(
         &self,
@@ -85,14 +85,15 @@ impl<S: Simd> Bounds<S> {
         joint: &Joint,
         (block, line): (&Block, &Line),
         crest: &Crest,
-        exponents: &mut Sixteen,
+        middles: &mut Middles,
     ) -> u32 {
         let relative = splat(simd, (RELATIVE * LOG2_E) as f32);
         let mut tiles = 0;
         for part in 0..tile_parts::<S>() {
             let [exponent, across, along] = joint.middles(simd, (block, line), part);
             let slack = joint.slack(simd, block, part);
-            let highest = rise(simd, across, along) + exponent + slack;
+            let rise_here = rise(simd, across, along);
+            let highest = rise_here + exponent + slack;
             let (best_across, best_along) = (lanes(simd, &crest.slope[0], part), lanes(simd, &crest.slope[1], part));
             let apart = rise(simd, across - best_across, along - best_along);
             let nearest =
@@ -100,7 +101,10 @@ impl<S: Simd> Bounds<S> {
             let faded = (self.low - lanes(simd, &crest.highest, part)).max(splat(simd, 0.0));
             let spare = (highest - faded.mul_add(self.fading, self.cut)).min(apart + nearest);
             tiles |= spare.positive() << (part * S::F32_LANES);
-            store(exponents, part, exponent - self.log2);
+            store(&mut middles.exponent, part, exponent - self.log2);
+            store(&mut middles.across, part, across);
+            store(&mut middles.along, part, along);
+            store(&mut middles.rise, part, rise_here);
         }
         tiles
     }
@@ -184,6 +188,7 @@ impl Tiles {
         present.reserve(joints.len());
         self.highest = f32::MIN;
         let bounds = Bounds::new(simd, scale, joints.len());
+        let mut middles = Middles::default();
         for (index, block) in grid.blocks.iter().enumerate() {
             if block.column == 0 {
                 present.clear();
@@ -197,8 +202,7 @@ impl Tiles {
                 for &number in present.iter() {
                     let joint = &joints[number as usize];
                     let line = joint.line(grid, block);
-                    let mut exponents = Sixteen::ZERO;
-                    let tiles = bounds.tiles(simd, joint, (block, &line), &crest, &mut exponents) & inside;
+                    let tiles = bounds.tiles(simd, joint, (block, &line), &crest, &mut middles) & inside;
                     if tiles == 0 {
                         continue;
                     }
@@ -208,7 +212,7 @@ impl Tiles {
                     let strip = &mut strips[*used];
                     *used += 1;
                     strip.joint = number;
-                    joint.lay::<S, COHERENT>(simd, (block, &line), tiles, &exponents, strip);
+                    joint.lay::<S, COHERENT>(simd, (block, &line), tiles, &middles, strip);
                     tiles_lit |= strip.bits();
                 }
                 for tile in bits(tiles_lit) {
