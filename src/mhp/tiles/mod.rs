@@ -125,8 +125,8 @@ const GUESS: f64 = 2.0;
 const HIGH: f64 = 12.0;
 /// Guesses of the threshold at most.
 const TRIES: usize = 40;
-/// A joint this much weaker (in ln) than the strongest at its cells is dropped (8e-7).
-const RELATIVE: f64 = 12.0;
+/// A joint this much weaker (in ln) than the strongest at its cells is dropped (5e-5).
+const RELATIVE: f64 = 10.0;
 /// ln of the weakest return that counts relative to the view's scale.
 const WEAKEST: f64 = -36.0;
 /// log₂ below which no return is taken: squares of its parts are normal f32, for others cost a hundred cycles.
