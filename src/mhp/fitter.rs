@@ -7,6 +7,7 @@ use super::{Evaluation, FitError, Objective, Precision, Problem, StepReport};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use serde::{Deserialize, Serialize};
+use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
 
 /// Everything that another step needs: restoring it continues the run bit for bit under the same configuration.
@@ -19,7 +20,7 @@ pub struct FitState {
     /// Adam's moments.
     pub adam: Adam,
     /// Losses of the last iterations (up to six), the current one last: the convergence criterion looks back five.
-    pub losses: Vec<f64>,
+    pub losses: SmallVec<[f64; LOOK_BACK + 2]>,
 }
 
 impl Clone for FitState {
@@ -66,7 +67,7 @@ impl Fitter {
         let mut objective = Objective::new(problem, config, precision, &initial)?;
         let evaluation = evaluate(&mut objective, &initial, 0)?;
         let adam = Adam::new(initial.shape());
-        let losses = vec![evaluation.loss];
+        let losses = smallvec![evaluation.loss];
         let state = FitState { iteration: 0, params: initial, adam, losses };
         let (state, next, next_evaluation) = (Arc::new(state.clone()), Arc::new(state), evaluation.clone());
         Ok(Self { objective, body, state, evaluation, next, next_evaluation, turns: Vec::new() })
@@ -174,7 +175,7 @@ impl Fitter {
         let state = Arc::make_mut(&mut self.state);
         state.adam = Adam::new(params.shape());
         state.params = params;
-        state.losses = vec![self.evaluation.loss];
+        state.losses = smallvec![self.evaluation.loss];
         Ok(())
     }
 
