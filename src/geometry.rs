@@ -45,9 +45,9 @@ pub trait Number:
     fn whole(self) -> Self;
     /// eˣ
     fn exp(self) -> Self;
-    /// ln x of a positive normal x.
+    /// ln x of a positive normal x; no finite number where x has no logarithm.
     fn ln(self) -> Self;
-    /// ln(1 + x) of a positive x.
+    /// ln(1 + x) of a positive x, to 1e-16 of 1 at least.
     fn ln_1p(self) -> Self;
     /// `of` each.
     fn each(self, of: impl Fn(f64) -> f64) -> Self;

@@ -303,7 +303,9 @@ impl<S: Simd> Number for Wide<S> {
         let exponent = self.bits(|bits| (bits >> MANTISSA) | HOLDER.to_bits()) - (HOLDER + BIAS);
         let m = self.bits(|bits| bits & (u64::MAX >> 12) | 1.0_f64.to_bits());
         let s = (m - SQRT_2) / (m + SQRT_2);
-        s * (s * s).series(&ATANH) + (exponent + 0.5) * LN_2
+        let ln = s * (s * s).series(&ATANH) + (exponent + 0.5) * LN_2;
+        // What has no logarithm, and what is not finite, must stay visible.
+        self.below(f64::MIN_POSITIVE, self.like(f64::NAN), ln + self * 0.0)
     }
 
     #[inline(always)]
@@ -373,5 +375,55 @@ impl<S: Simd> SubAssign for Wide<S> {
     #[inline(always)]
     fn sub_assign(&mut self, b: Self) {
         *self = *self - b;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Arguments, and what single precision makes of them: eˣ, ln x, ln(1 + x), ⌊x⌋.
+    struct Functions {
+        of: Vec<f64>,
+        found: Vec<[f64; 4]>,
+    }
+
+    impl Task for Functions {
+        #[inline(always)]
+        fn run<B: Batch>(&mut self, batch: B) {
+            let x = batch.gather(|k| self.of[k]);
+            for (which, y) in [x.exp(), x.ln(), x.ln_1p(), x.whole()].into_iter().enumerate() {
+                batch.scatter(y, |k, y| self.found[k][which] = y);
+            }
+        }
+    }
+
+    fn functions(of: Vec<f64>) -> Vec<[f64; 4]> {
+        let found = vec![[0.0; 4]; of.len()];
+        let mut task = Functions { of, found };
+        each_joint(Precision::F32, task.of.len(), &mut task);
+        task.found
+    }
+
+    #[test]
+    fn functions_of_several_joints_are_those_of_one() {
+        let of: Vec<f64> = (1..=997).map(|k| f64::from(k) * 0.37).chain([1e-300, 1e-9, 0.5, 1.0, 2.0, 1e300]).collect();
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-13 * b.abs().max(1.0);
+        for (&x, found) in of.iter().zip(functions(of.clone())) {
+            let [exp, ln, ln_1p, whole] = found;
+            assert!(x > 700.0 || (exp / x.exp() - 1.0).abs() < 1e-12, "e^{x}: {exp}");
+            assert!(near(ln, x.ln()) && near(ln_1p, x.ln_1p()), "ln of {x}: {ln}, {ln_1p}");
+            assert!(x > 1e15 || whole == x.floor(), "{x}: {whole}");
+        }
+        let below: Vec<f64> = vec![-0.5, -2.0, -3.25, -40.0, -700.0];
+        for (&x, [exp, _, _, whole]) in below.iter().zip(functions(below.clone())) {
+            assert!((exp / x.exp() - 1.0).abs() < 1e-12 && whole == x.floor(), "{x}: {exp}, {whole}");
+        }
+    }
+
+    #[test]
+    fn what_has_no_logarithm_stays_visible() {
+        let odd = functions(vec![-1.0, 0.0, f64::INFINITY, f64::NAN, -1e-310, f64::NEG_INFINITY]);
+        assert!(odd.iter().all(|[_, ln, ..]| !ln.is_finite()), "{odd:?}");
     }
 }

@@ -99,12 +99,12 @@ impl Person {
     }
 
     fn walks(&self) -> bool {
-        self.track.as_ref().is_some_and(|track| track.heading().is_some())
+        self.track.as_ref().is_some_and(|track| track.heading.is_some())
     }
 
     /// The direction in which it looks, on the floor.
     fn forward(&self, yaw: Yaw) -> [f64; 2] {
-        let walking = self.track.as_ref().filter(|_| yaw == Yaw::Motion).and_then(Track::heading);
+        let walking = self.track.as_ref().filter(|_| yaw == Yaw::Motion).and_then(|track| track.heading);
         walking.unwrap_or_else(|| towards_radar(self.at))
     }
 
@@ -345,7 +345,7 @@ fn assemble(problem: &Problem, config: &FitConfig, dress: &Dress, persons: &[Per
 /// What was found of a person, in words.
 fn tell(person: &Person, config: &FitConfig) -> Vec<String> {
     let at = person.at;
-    let walking = person.track.as_ref().filter(|track| config.yaw == Yaw::Motion && track.heading().is_some());
+    let walking = person.track.as_ref().filter(|track| config.yaw == Yaw::Motion && track.heading.is_some());
     let mut notes = vec![match walking {
         Some(track) => format!(
             "{} at x {:.2} m, y {:.2} m, facing where it goes: {:.2} m/s over {} frames",

@@ -39,6 +39,8 @@ pub(super) struct Track {
     pub at: Vec3,
     /// m/s; heights do not move.
     pub velocity: Vec3,
+    /// The direction of walking on the floor; `None` where the person stands, or falls: who falls need not look where.
+    pub heading: Option<[f64; 2]>,
     /// In every frame, the one in the middle included.
     pub sightings: Vec<Sighting>,
 }
@@ -50,37 +52,33 @@ impl Track {
         let (at, _) = line(places, WINDOW_S);
         // Heights are read too coarsely to follow them.
         let height_m = sightings.iter().map(|seen| seen.at[2]).sum::<f64>() / sightings.len() as f64;
-        Self { at: [at[0], at[1], height_m], velocity: [vx, vy, 0.0], sightings }
+        let speed = vx.hypot(vy);
+        let along = [vx / speed, vy / speed];
+        let walks = speed > WALKING_MPS && is_steady(&sightings, along, speed) && rises_mps(&sightings) > FALLING_MPS;
+        let (at, velocity) = ([at[0], at[1], height_m], [vx, vy, 0.0]);
+        Self { at, velocity, heading: walks.then_some(along), sightings }
     }
+}
 
-    /// The direction of walking on the floor; `None` where the person stands, or falls: who falls need not look where.
-    pub(super) fn heading(&self) -> Option<[f64; 2]> {
-        let speed = self.velocity[0].hypot(self.velocity[1]);
-        let along = [self.velocity[0] / speed, self.velocity[1] / speed];
-        (speed > WALKING_MPS && self.is_steady(along, speed) && self.rises_mps() > FALLING_MPS).then_some(along)
-    }
+/// Whether both halves of the track go `along`.
+fn is_steady(sightings: &[Sighting], along: [f64; 2], speed: f64) -> bool {
+    let mut ordered: Vec<(f64, Vec3)> = sightings.iter().map(|seen| (seen.t_s, seen.at)).collect();
+    ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = ordered.len().div_ceil(2);
+    [&ordered[..half], &ordered[ordered.len() - half..]].into_iter().all(|half| {
+        let (_, velocity) = line(half.iter().copied(), f64::INFINITY);
+        velocity[0] * along[0] + velocity[1] * along[1] > STEADY_SHARE * speed
+    })
+}
 
-    /// Whether both halves of the track go `along`.
-    fn is_steady(&self, along: [f64; 2], speed: f64) -> bool {
-        let mut ordered: Vec<(f64, Vec3)> = self.sightings.iter().map(|seen| (seen.t_s, seen.at)).collect();
-        ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let half = ordered.len().div_ceil(2);
-        [&ordered[..half], &ordered[ordered.len() - half..]].into_iter().all(|half| {
-            let (_, velocity) = line(half.iter().copied(), f64::INFINITY);
-            velocity[0] * along[0] + velocity[1] * along[1] > STEADY_SHARE * speed
-        })
-    }
-
-    /// How fast the top of what is lit rises, m/s: the median of the slopes between any two frames that show it (Theil and
-    /// Sen), for a hand or a ghost above the head now and then is no rise.
-    fn rises_mps(&self) -> f64 {
-        let tops: Vec<(f64, f64)> =
-            self.sightings.iter().filter_map(|seen| seen.lit_m.map(|[_, top]| (seen.t_s, top))).collect();
-        let pairs = tops.iter().enumerate().flat_map(|(k, a)| tops[k + 1..].iter().map(move |b| (a, b)));
-        let slopes: Vec<f64> =
-            pairs.map(|(a, b)| (b.1 - a.1) / (b.0 - a.0)).filter(|slope| slope.is_finite()).collect();
-        if slopes.is_empty() { 0.0 } else { percentile(&slopes, 50.0) }
-    }
+/// How fast the top of what is lit rises, m/s: the median of the slopes between any two frames that show it (Theil and
+/// Sen), for a hand or a ghost above the head now and then is no rise.
+fn rises_mps(sightings: &[Sighting]) -> f64 {
+    let tops: Vec<(f64, f64)> =
+        sightings.iter().filter_map(|seen| seen.lit_m.map(|[_, top]| (seen.t_s, top))).collect();
+    let pairs = tops.iter().enumerate().flat_map(|(k, a)| tops[k + 1..].iter().map(move |b| (a, b)));
+    let slopes: Vec<f64> = pairs.map(|(a, b)| (b.1 - a.1) / (b.0 - a.0)).filter(|slope| slope.is_finite()).collect();
+    if slopes.is_empty() { 0.0 } else { percentile(&slopes, 50.0) }
 }
 
 /// Follows the person who was found at `here`, `apart_m` from the nearest other, through the frames around; `None` where
@@ -146,9 +144,9 @@ mod tests {
             Track::through([0.0, 0.1, 0.2, -0.1].map(|t| seen(t, [3.0 - 1.2 * t, 0.5 + 0.4 * t, 0.1])).to_vec());
         assert!((track.at[0] - 3.0).abs() < 1e-12 && (track.at[1] - 0.5).abs() < 1e-12);
         assert!((track.velocity[0] + 1.2).abs() < 1e-12 && (track.velocity[1] - 0.4).abs() < 1e-12);
-        let heading = track.heading().unwrap();
+        let heading = track.heading.unwrap();
         assert!((heading[0] + 1.2 / 1.2f64.hypot(0.4)).abs() < 1e-12);
-        assert_eq!(Track::through(vec![seen(0.0, [1.0; 3]), seen(0.1, [1.01, 1.0, 1.0])]).heading(), None);
+        assert_eq!(Track::through(vec![seen(0.0, [1.0; 3]), seen(0.1, [1.01, 1.0, 1.0])]).heading, None);
     }
 
     #[test]
@@ -163,7 +161,7 @@ mod tests {
             seen(-0.2, 3.01),
             seen(-0.3, 3.0),
         ]);
-        assert!(track.velocity[0] > WALKING_MPS && track.heading().is_none());
+        assert!(track.velocity[0] > WALKING_MPS && track.heading.is_none());
         assert!((track.at[0] - 3.05).abs() < 0.04, "and is where the frames next to this one say: {}", track.at[0]);
     }
 
@@ -171,8 +169,8 @@ mod tests {
     fn who_falls_has_no_heading() {
         let seen = |t_s: f64, top: f64| Sighting { t_s, at: [3.0 + 1.2 * t_s, 0.0, 0.0], lit_m: Some([-1.0, top]) };
         let walks = Track::through(vec![seen(0.0, 0.8), seen(0.1, 0.84), seen(-0.1, 0.78)]);
-        assert!(walks.heading().is_some_and(|heading| (heading[0] - 1.0).abs() < 1e-12));
+        assert!(walks.heading.is_some_and(|heading| (heading[0] - 1.0).abs() < 1e-12));
         let falls = Track::through(vec![seen(0.0, 0.6), seen(0.1, 0.4), seen(-0.1, 0.8)]);
-        assert!((falls.rises_mps() + 2.0).abs() < 1e-9 && falls.heading().is_none());
+        assert!((rises_mps(&falls.sightings) + 2.0).abs() < 1e-9 && falls.heading.is_none());
     }
 }

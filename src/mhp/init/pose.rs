@@ -129,11 +129,8 @@ pub(super) fn posed(template: &Template, skeleton: &Skeleton, posture: Posture) 
     lean(&mut joints, skeleton, posture.lean());
     for side in [Side::Left, Side::Right] {
         let named = |words: &[&str]| -> Vec<usize> {
-            let is = |joint: &usize| {
-                let name = skeleton.joints[*joint].to_lowercase();
-                skeleton.side(*joint) == side && name.split(['_', ' ', '-']).any(|word| words.contains(&word))
-            };
-            (0..skeleton.joints.len()).filter(is).collect()
+            let own = |joint: &usize| skeleton.side(*joint) == side && is_named(skeleton, *joint, words);
+            (0..skeleton.joints.len()).filter(own).collect()
         };
         let ends = (named(&["ankle", "heel", "foot", "toe"]), named(&["wrist", "hand"]));
         bend(&mut joints, &named(&["hip"]), &named(&["knee"]), &ends.0, &posture.leg(side), side);
@@ -150,19 +147,21 @@ pub(super) fn posed(template: &Template, skeleton: &Skeleton, posture: Posture) 
     Template { joints, crown_m: template.crown_m }
 }
 
+/// Whether one of `words` stands in a joint's name.
+fn is_named(skeleton: &Skeleton, joint: usize, words: &[&str]) -> bool {
+    skeleton.joints[joint].to_lowercase().split(['_', ' ', '-']).any(|word| words.contains(&word))
+}
+
 /// Turns all above the hips forwards about their middle.
 fn lean(joints: &mut [Vec3], skeleton: &Skeleton, angle: f64) {
-    let is = |joint: usize, words: &[&str]| {
-        skeleton.joints[joint].to_lowercase().split(['_', ' ', '-']).any(|word| words.contains(&word))
-    };
-    let hips: Vec<usize> = (0..joints.len()).filter(|&joint| is(joint, &["hip"])).collect();
+    let hips: Vec<usize> = (0..joints.len()).filter(|&joint| is_named(skeleton, joint, &["hip"])).collect();
     if hips.is_empty() {
         return;
     }
     let sum = hips.iter().fold([0.0; 3], |sum, &hip| add(sum, joints[hip]));
     let pivot = scale(sum, 1.0 / hips.len() as f64);
     let lower = ["hip", "pelvis", "root", "knee", "ankle", "heel", "foot", "toe"];
-    for joint in (0..joints.len()).filter(|&joint| !is(joint, &lower)) {
+    for joint in (0..joints.len()).filter(|&joint| !is_named(skeleton, joint, &lower)) {
         joints[joint] = turned(joints[joint], pivot, [0.0, 1.0, 0.0], angle);
     }
 }
