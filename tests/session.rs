@@ -12,7 +12,7 @@ use mhp_inspector::session::{
     Command, Effect, FitStatus, History, LogLevel, PickKind, Row, Session, ThemeChoice, ViewState,
 };
 use mhp_inspector::worker::{
-    HistoryRow, JobId, Prepare, Prepared, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
+    HistoryRow, JobId, Kept, Prepare, Prepared, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -106,7 +106,8 @@ impl Bench {
     }
 
     fn rows(&mut self, job: JobId, branch: u32, iterations: std::ops::RangeInclusive<usize>) {
-        let rows = iterations.map(|k| HistoryRow { branch, report: report(k), state: self.state(k) }).collect();
+        let rows =
+            iterations.map(|k| HistoryRow { branch, report: report(k), kept: Kept::State(self.state(k)) }).collect();
         assert!(self.apply(Command::Worker(WorkerMessage::Rows(job, rows))).is_empty());
     }
 
@@ -722,7 +723,9 @@ fn a_long_history_thins_its_states_and_keeps_every_row() {
     let bytes = 3 * 8 * bench.params.shape().total();
     let count = (128 << 20) / bytes + 500;
     let state = bench.state(0);
-    let rows = (1..=count).map(|k| HistoryRow { branch: 0, report: report(k), state: Arc::clone(&state) }).collect();
+    let rows = (1..=count)
+        .map(|k| HistoryRow { branch: 0, report: report(k), kept: Kept::State(Arc::clone(&state)) })
+        .collect();
     bench.apply(Command::Worker(WorkerMessage::Rows(job, rows)));
     let branch = bench.session.fit.branch().unwrap();
     assert_eq!((branch.rows.len(), branch.head()), (count + 1, count));

@@ -197,6 +197,11 @@ impl Pppr {
         self.joint_mut(group, joint).copy_from_slice(&value);
     }
 
+    /// Positions p of all flat joints, m, world frame.
+    pub fn positions(&self) -> &[Vec3] {
+        self.group(Group::Position).as_chunks().0
+    }
+
     /// Position p of flat joint `joint`, m, world frame.
     pub fn position(&self, joint: usize) -> Vec3 {
         self.vec3(Group::Position, joint)

@@ -9,7 +9,6 @@ use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::{Dataset, Truth, panic_text, write_pppr};
 use crate::diagnose::{JointErrors, joint_errors};
-use crate::geometry::Vec3;
 use crate::mhp::{FitError, Fitter, Precision, StepReport, StopReason, predict};
 use crate::start::{begin, problem_of};
 use crossbeam_channel::Sender;
@@ -84,8 +83,7 @@ fn fit_watched(
 }
 
 fn errors(params: &Pppr, truth: &Truth, joints: usize) -> Option<JointErrors> {
-    let estimate: Vec<Vec3> = (0..params.shape().total_joints()).map(|joint| params.position(joint)).collect();
-    joint_errors(&estimate, &truth.joints, joints)
+    joint_errors(params.positions(), &truth.joints, joints)
 }
 
 /// Steps until the configuration says to stop; `watch` sees every iteration, the start included.

@@ -10,4 +10,6 @@ mod protocol;
 mod thread;
 
 pub use handle::Worker;
-pub use protocol::{HistoryRow, JobId, Prepare, Prepared, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage};
+pub use protocol::{
+    HistoryRow, JobId, Kept, Prepare, Prepared, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
+};

@@ -3,6 +3,7 @@
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::{Dataset, Frame};
+use crate::geometry::Vec3;
 use crate::mhp::{Evaluation, FitState, Masks, Precision, Problem, StepReport, StopReason};
 use crate::start::Begun;
 use std::sync::Arc;
@@ -122,8 +123,35 @@ pub struct HistoryRow {
     pub branch: u32,
     /// Loss, terms, IoU, convergence.
     pub report: StepReport,
-    /// Parameters and Adam moments.
-    pub state: Arc<FitState>,
+    /// What is kept of where it stood.
+    pub kept: Kept,
+}
+
+/// What a row keeps of where the fit stood.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Kept {
+    /// Parameters and Adam moments: the fit can go back there.
+    State(Arc<FitState>),
+    /// Positions of all joints, m: in long runs most iterations are only measured.
+    Positions(Box<[Vec3]>),
+}
+
+impl Kept {
+    /// The state, where there is one.
+    pub fn state(&self) -> Option<&Arc<FitState>> {
+        match self {
+            Self::State(state) => Some(state),
+            Self::Positions(_) => None,
+        }
+    }
+
+    /// Positions of all joints, m.
+    pub fn positions(&self) -> &[Vec3] {
+        match self {
+            Self::State(state) => state.params.positions(),
+            Self::Positions(positions) => positions,
+        }
+    }
 }
 
 /// The answer to [`WorkerCommand::Prepare`].

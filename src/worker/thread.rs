@@ -2,7 +2,7 @@
 
 use super::handle::Latest;
 use super::protocol::{
-    HistoryRow, JobId, Prepare, Prepared, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
+    HistoryRow, JobId, Kept, Prepare, Prepared, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
 };
 use crate::config::FitConfig;
 use crate::mhp::{
@@ -20,6 +20,9 @@ const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(50);
 const SNAPSHOT_SHARE: u32 = 40;
 /// Rows are sent in batches at most this often while running.
 const ROWS_INTERVAL: Duration = Duration::from_millis(33);
+/// So many iterations keep every state; in twice as many every second is kept, in four times as many every fourth: nobody
+/// goes through thousands one by one, and fresh memory for each is a large part of what being watched costs.
+const CLOSELY: usize = 1024;
 
 /// The start of a branch whose first row this job did not make.
 const NOWHERE: usize = usize::MAX;
@@ -194,7 +197,7 @@ impl Thread {
     fn send_rows(&mut self) {
         if let Some(job) = self.job.as_mut().filter(|job| !job.rows.is_empty()) {
             job.rows_sent = Instant::now();
-            let _ = self.outbox.send(WorkerMessage::Rows(job.id, std::mem::take(&mut job.rows)));
+            let _ = self.outbox.send(WorkerMessage::Rows(job.id, job.take_rows()));
             (self.wake)();
         }
     }
@@ -204,6 +207,11 @@ impl Thread {
         let _ = self.outbox.send(WorkerMessage::Event(self.current, event));
         (self.wake)();
     }
+}
+
+/// Of so many iterations the state of one is kept.
+fn stride(iteration: usize) -> usize {
+    (iteration / CLOSELY).next_power_of_two()
 }
 
 enum Reply {
@@ -277,8 +285,21 @@ impl Job {
     }
 
     fn push_row(&mut self, report: StepReport) {
-        self.rows.push(HistoryRow { branch: self.branch, report, state: self.fitter.state() });
+        let kept = if report.iteration % stride(report.iteration) == 0 {
+            Kept::State(self.fitter.state())
+        } else {
+            Kept::Positions(self.fitter.params().positions().into())
+        };
+        self.rows.push(HistoryRow { branch: self.branch, report, kept });
         self.dirty = true;
+    }
+
+    /// The rows since the last call. Where the fit stands it can always be gone back to.
+    fn take_rows(&mut self) -> Vec<HistoryRow> {
+        if let Some(last) = self.rows.last_mut().filter(|last| last.kept.state().is_none()) {
+            last.kept = Kept::State(self.fitter.state());
+        }
+        std::mem::take(&mut self.rows)
     }
 
     fn step(&mut self) -> Result<Option<StopReason>, FitError> {

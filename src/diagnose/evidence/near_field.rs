@@ -67,7 +67,7 @@ fn look<'a>(view: &'a View, wavelength_m: f64, params: &Pppr) -> Option<Seen<'a>
     let sigma_rad = sigmas.min_by(f64::total_cmp)?;
     let aperture_m = EVEN_SIGMA_BINS * wavelength_m / sigma_rad;
     let fraunhofer_m = 2.0 * aperture_m * aperture_m / wavelength_m;
-    let ranges = (0..params.shape().total_joints()).map(|j| (j, norm(view.pose.view_from_world(params.position(j)))));
+    let ranges = params.positions().iter().map(|&p| norm(view.pose.view_from_world(p))).enumerate();
     let (joint, range_m) = ranges.filter(|(_, r)| r.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1))?;
     let score = falling(range_m / fraunhofer_m);
     score.is_finite().then_some(Seen { view, sigma_rad, aperture_m, fraunhofer_m, joint, range_m, score })

@@ -1,7 +1,6 @@
 //! What the worker reports: rows, events, snapshots.
 
 use super::diagnosis::hashes;
-use crate::body::Group;
 use crate::diagnose::majpe_mm;
 use crate::session::command::Effect;
 use crate::session::fit::FitStatus;
@@ -26,12 +25,10 @@ impl Session {
     }
 
     pub(super) fn push_row(&mut self, row: HistoryRow) {
-        let majpe_mm = self.data.frame.as_ref().and_then(|frame| frame.truth.as_ref()).and_then(|truth| {
-            let positions: Vec<_> =
-                (0..row.state.params.shape().total_joints()).map(|j| row.state.params.position(j)).collect();
-            majpe_mm(&positions, &truth.joints)
-        });
-        self.fit.history.push(row.branch, Row { report: row.report, state: Some(row.state), majpe_mm });
+        let truth = self.data.frame.as_ref().and_then(|frame| frame.truth.as_ref());
+        let majpe_mm = truth.and_then(|truth| majpe_mm(row.kept.positions(), &truth.joints));
+        let state = row.kept.state().cloned();
+        self.fit.history.push(row.branch, Row { report: row.report, state, majpe_mm });
     }
 
     pub(super) fn summarise(&mut self) {
@@ -173,10 +170,8 @@ impl Session {
     }
 
     /// Positions of the joints that are drawn, m, world frame; empty where nothing is fitted yet.
-    pub fn shown_positions(&self) -> Vec<crate::geometry::Vec3> {
-        self.fit.shown.as_ref().map_or_else(Vec::new, |snapshot| {
-            snapshot.params.group(Group::Position).chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()
-        })
+    pub fn shown_positions(&self) -> &[crate::geometry::Vec3] {
+        self.fit.shown.as_ref().map_or(&[], |snapshot| snapshot.params.positions())
     }
 }
 

@@ -142,10 +142,10 @@ impl<'a> Loaded<'a> {
     /// What the labels say of `params`.
     fn measured(&self, params: &Pppr) -> RunNumbers {
         let (frame, info) = (&self.frame, self.dataset.info());
-        let joints: Vec<Vec3> = (0..params.shape().total_joints()).map(|joint| params.position(joint)).collect();
+        let joints = params.positions();
         let a_person = info.skeleton.joints.len();
-        let errors = frame.truth.as_ref().and_then(|truth| joint_errors(&joints, &truth.joints, a_person));
-        let image = self.reprojection(&joints, a_person);
+        let errors = frame.truth.as_ref().and_then(|truth| joint_errors(joints, &truth.joints, a_person));
+        let image = self.reprojection(joints, a_person);
         RunNumbers {
             majpe_mm: errors.map(|errors| errors.majpe_mm),
             pa_majpe_mm: errors.map(|errors| errors.pa_majpe_mm),

@@ -176,7 +176,7 @@ pub(super) fn draw(
             if several { theme::DARK.person(session.identity(person)) } else { theme::DARK.side(side) }
         };
         let stroke = |person: usize, side| Stroke::new(1.5, color(person, side));
-        bones(painter, skeleton, &positions, view, o, to_screen, &stroke);
+        bones(painter, skeleton, positions, view, o, to_screen, &stroke);
         for (joint, &p) in positions.iter().enumerate() {
             let at = to_screen(o.unit_from_bins(view, &view.bins_of(p)));
             let selected = session.joint == Some(joint);

@@ -60,9 +60,8 @@ pub(super) fn scene(session: &Session, camera: &Camera, tokens: &Tokens, px: f32
     if look.show_initial
         && let (Some(initial), Some(skeleton)) = (&session.fit.initial, skeleton)
     {
-        let positions: Vec<_> = (0..initial.shape().total_joints()).map(|j| initial.position(j)).collect();
         let stroke = Stroke { color: rgba(tokens.dim, 0.6), width_px: 1.0 * px };
-        bones(&mut scene.lines, skeleton, &positions, &|_, _| stroke);
+        bones(&mut scene.lines, skeleton, initial.positions(), &|_, _| stroke);
     }
     if look.show_truth
         && let (Some(truth), Some(dataset)) =
@@ -74,9 +73,8 @@ pub(super) fn scene(session: &Session, camera: &Camera, tokens: &Tokens, px: f32
     if look.show_baseline
         && let (Some(pin), Some(dataset)) = (session.pins.baseline(), &session.data.dataset)
     {
-        let positions: Vec<_> = (0..pin.params.shape().total_joints()).map(|j| pin.params.position(j)).collect();
         let stroke = Stroke { color: rgba(tokens.warn, 0.85), width_px: 1.5 * px };
-        bones(&mut scene.lines, &dataset.info().skeleton, &positions, &|_, _| stroke);
+        bones(&mut scene.lines, &dataset.info().skeleton, pin.params.positions(), &|_, _| stroke);
     }
     (scene, labels)
 }
@@ -125,8 +123,7 @@ fn person(
             labels.push((vec3(params.position(joint)), text.into(), color));
         }
     }
-    let positions: Vec<_> = (0..params.shape().total_joints()).map(|j| params.position(j)).collect();
-    bones(&mut scene.lines, skeleton, &positions, &|person, side| {
+    bones(&mut scene.lines, skeleton, params.positions(), &|person, side| {
         let color = match side {
             _ if several => person_color(person),
             Side::Middle => tokens.dim,
@@ -135,7 +132,7 @@ fn person(
         Stroke { color: rgba(color, 1.0), width_px: 2.0 * px }
     });
     if several {
-        for (person, body) in positions.chunks_exact(joints).enumerate() {
+        for (person, body) in params.positions().chunks_exact(joints).enumerate() {
             let highest = body.iter().copied().max_by(|a, b| a[2].total_cmp(&b[2])).unwrap_or_default();
             let above = geometry::add(highest, [0.0, 0.0, ABOVE_HEAD_M]);
             labels.push((vec3(above), person_name(session.identity(person)), person_color(person)));
@@ -230,11 +227,8 @@ fn gradients(
 
 /// A grid below the lowest joint of the start pose, so that it does not move while fitting.
 fn ground(session: &Session, tokens: &Tokens, px: f32) -> Vec<LineInstance> {
-    let lowest = session
-        .fit
-        .initial
-        .as_ref()
-        .map_or(-1.0, |p| (0..p.shape().total_joints()).map(|j| p.position(j)[2]).fold(f64::INFINITY, f64::min));
+    let lowest =
+        session.fit.initial.as_ref().map_or(-1.0, |p| p.positions().iter().map(|p| p[2]).fold(f64::INFINITY, f64::min));
     let z = if lowest.is_finite() { (lowest as f32 - 0.08).min(0.0) } else { -1.0 };
     let minor = Stroke { color: rgba(tokens.stroke, 0.9), width_px: px };
     let major = Stroke { color: rgba(tokens.dim, 0.45), width_px: px };
