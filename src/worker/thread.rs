@@ -285,7 +285,7 @@ impl Job {
     }
 
     fn push_row(&mut self, report: StepReport) {
-        let kept = if report.iteration % stride(report.iteration) == 0 {
+        let kept = if report.iteration.is_multiple_of(stride(report.iteration)) {
             Kept::State(self.fitter.state())
         } else {
             Kept::Positions(self.fitter.params().positions().into())

@@ -153,7 +153,7 @@ impl<'a> Loaded<'a> {
             annotated: frame.person_count.or_else(|| frame.truth.as_ref().map(|truth| truth.persons)),
             reprojection_px: image.reprojection_px,
             box_coverage: image.box_coverage,
-            map_box_coverage: self.map_box_coverage(&joints, a_person),
+            map_box_coverage: self.map_box_coverage(joints, a_person),
             ..RunNumbers::default()
         }
     }
