@@ -36,9 +36,9 @@ pub struct TrainCounterArgs {
     out: PathBuf,
     /// Sequences with one person to learn from, five frames each; half as many with two, a quarter with three, an eighth
     /// with nobody and with four.
-    #[arg(long, value_name = "N", default_value_t = 800, value_parser = at_least_one)]
+    #[arg(long, value_name = "N", default_value_t = 1600, value_parser = at_least_one)]
     sequences: usize,
-    /// Sequences to test on, likewise, fourteen frames each.
+    /// Sequences to test on, likewise, 24 frames each.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_one)]
     test_sequences: usize,
     /// Seed of what is learnt from, and of the training itself.
@@ -89,13 +89,13 @@ fn pick_alone(example: &Example) -> &Lesson {
     &example.alone
 }
 
-fn simulate(seed: u64, sequences: usize, length: usize) -> anyhow::Result<Vec<Example>> {
-    let recordings = recordings(seed, sequences, length)?;
+fn simulate(seed: u64, sequences: usize, frames: usize) -> anyhow::Result<Vec<Example>> {
+    let recordings = recordings(seed, sequences)?;
     let views = recordings.first().map(Recording::views).unwrap_or_default();
     // Only the detections and clusters are wanted: any weights do.
     let counter = Counter::with(&views, CounterOptions::default(), Network::untrained(FEATURES))?;
-    let bar = progress_bar(recordings.iter().map(Recording::len).sum());
-    let found = examples(&recordings, &counter, || bar.inc(1))?;
+    let bar = progress_bar(recordings.iter().map(Recording::sequences).sum::<usize>() * frames);
+    let found = examples(&recordings, frames, &counter, || bar.inc(1))?;
     bar.finish_and_clear();
     Ok(found)
 }

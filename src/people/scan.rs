@@ -11,8 +11,9 @@ use crate::radar::{View, unravel};
 
 /// Echoes of two views are one body's where their ranges differ by no more, m.
 const SAME_RANGE_M: f64 = 0.12;
-/// Frames before the present one that are looked at: people stay as many for a second, one frame's confusion does not.
-pub const HISTORY: usize = 9;
+/// Frames before the present one that are looked at, two seconds of most radars: people stay as many, while one who hides
+/// another, and a body on its way down that looks like two, hardly do for so long.
+pub const HISTORY: usize = 19;
 /// Of these, so many show what changed and what persists.
 pub const COMPARED: usize = 3;
 

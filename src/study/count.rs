@@ -3,15 +3,16 @@
 use crate::dataset::{Dataset, DatasetError, Frame, Heatmap};
 use crate::geometry::Vec3;
 use crate::mhp::fill_missing;
-use crate::people::{Confusion, Count, Counter, HISTORY, PeopleError, Scan, Tracker, TrackerOptions};
+use crate::people::{Confusion, Count, COMPARED, Counter, HISTORY, PeopleError, Scan, Tracker, TrackerOptions};
 use rayon::prelude::*;
 use std::collections::VecDeque;
 use std::ops::Range;
 
 /// Frames that one thread counts at a time.
 const CHUNK: usize = 64;
-/// Frames read before the first one asked for: those whose detections are looked at, and those that these are compared with.
-const LEAD_IN: usize = 2 * HISTORY;
+/// Frames read before the first one asked for: those that are looked at, those whose detections are looked at with these,
+/// and those that these are compared with.
+pub(super) const LEAD_IN: usize = HISTORY + 2 * COMPARED;
 
 /// One frame of a data set, counted.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,11 +4,17 @@ use super::Lesson;
 use crate::people::{Counter, HISTORY, PeopleError, Scan, map_statistics};
 use crate::simulate::{Options, Preset, Recording, SimulateError};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Scenarios of the lessons; the sequences take them in turn.
 const PRESETS: [Preset; 3] = [Preset::Easy, Preset::Medium, Preset::Hard];
 /// Of every so many sequences with one person there is one with 0, 1, 2, 3, 4: one person is what is seen most.
 const ONE_OF: [usize; 5] = [8, 1, 2, 4, 8];
+/// Frames of a sequence: long enough for somebody to fall and to lie, and to sit down and to rise.
+const LENGTH: usize = 30;
+/// From the first frame that is looked at in a sequence to that in the next: prime to how many there may be, so that all
+/// occur.
+const STRIDE: usize = 11;
 
 /// One frame, as the counter sees it and as the classifier alone does.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,17 +29,17 @@ pub struct Example {
     pub preset: Preset,
 }
 
-/// MMVR-like recordings of a seed, one for each number of people: `sequences` sequences of `length` frames with one person,
-/// half as many with two, a quarter with three, an eighth with four and with nobody.
+/// MMVR-like recordings of a seed, one for each number of people: `sequences` sequences with one person, half as many with
+/// two, a quarter with three, an eighth with four and with nobody.
 ///
 /// # Errors
 /// Where there are no sequences.
-pub fn recordings(seed: u64, sequences: usize, length: usize) -> Result<Vec<Recording>, SimulateError> {
+pub fn recordings(seed: u64, sequences: usize) -> Result<Vec<Recording>, SimulateError> {
     let recording = |(people, one_of): (usize, &usize)| {
         Recording::new(&Options {
             presets: PRESETS.to_vec(),
-            frames: sequences.div_ceil(*one_of) * length,
-            sequence_length: length,
+            frames: sequences.div_ceil(*one_of) * LENGTH,
+            sequence_length: LENGTH,
             people: Some(people..=people),
             // A scene of its own for each number.
             seed: seed.wrapping_mul(ONE_OF.len() as u64).wrapping_add(people as u64),
@@ -43,19 +49,25 @@ pub fn recordings(seed: u64, sequences: usize, length: usize) -> Result<Vec<Reco
     ONE_OF.iter().enumerate().map(recording).collect()
 }
 
-/// Simulates and scans all frames of the recordings, sequences side by side; `done` hears of every frame.
+/// Simulates and scans so many frames of every sequence of the recordings, from anywhere in it on, sequences side by side;
+/// `done` hears of every frame.
 ///
 /// # Errors
 /// As [`Counter::scan`].
 pub fn examples(
     recordings: &[Recording],
+    frames: usize,
     counter: &Counter,
     done: impl Fn() + Sync,
 ) -> Result<Vec<Example>, PeopleError> {
     let places: Vec<(usize, usize)> =
         recordings.iter().enumerate().flat_map(|(r, all)| (0..all.sequences()).map(move |k| (r, k))).collect();
-    let of =
-        |&(r, k): &(usize, usize)| recordings.get(r).map_or(Ok(Vec::new()), |all| sequence(all, k, counter, &done));
+    let frames = frames.min(LENGTH);
+    let first = |k: usize| k * STRIDE % (LENGTH - frames + 1);
+    let of = |&(r, k): &(usize, usize)| {
+        let shown = first(k)..first(k) + frames;
+        recordings.get(r).map_or(Ok(Vec::new()), |all| sequence(all, k, shown, counter, &done))
+    };
     let found: Result<Vec<Vec<Example>>, PeopleError> = places.par_iter().map(of).collect();
     Ok(found?.concat())
 }
@@ -63,12 +75,13 @@ pub fn examples(
 fn sequence(
     recording: &Recording,
     number: usize,
+    shown: Range<usize>,
     counter: &Counter,
     done: &(impl Fn() + Sync),
 ) -> Result<Vec<Example>, PeopleError> {
     let sequence = recording.sequence(number);
     let (mut scans, mut found): (Vec<Scan>, Vec<Example>) = (Vec::new(), Vec::new());
-    for k in 0..recording.frames_of(number).len() {
+    for (history, k) in shown.enumerate() {
         let frame = sequence.frame(k);
         let maps: Vec<Vec<f64>> = frame.maps.iter().map(|map| map.iter().map(|&x| f64::from(x)).collect()).collect();
         let maps: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
@@ -78,7 +91,7 @@ fn sequence(
         found.push(Example {
             counted: Lesson::of(counter, &now, &before, people),
             alone: Lesson { rows: vec![map_statistics(&maps).to_vec()], people, placed: false },
-            history: k,
+            history,
             preset: sequence.preset(),
         });
         scans.push(now);

@@ -4,14 +4,12 @@ use super::row::RunNumbers;
 use super::variant::Method;
 use crate::dataset::{Dataset, Heatmap};
 use crate::mhp::fill_missing;
-use crate::people::{CLASSES, Counter, HISTORY, Network, map_statistics};
-use crate::study::count::Window;
+use crate::people::{CLASSES, Counter, Network, map_statistics};
+use crate::study::count::{LEAD_IN, Window};
 use std::time::Instant;
 
 /// Frames of a unit: short enough for all cores, long against the frames that are read before it.
 pub(super) const CHUNK: usize = 32;
-/// Frames read before the first one, as `count` does: those that are looked at, and those that these are compared with.
-const LEAD_IN: usize = 2 * HISTORY;
 
 /// One frame's count, and the time that it took without reading, ms.
 pub(super) type Counted = (Result<RunNumbers, String>, Option<f64>);
