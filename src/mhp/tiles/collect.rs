@@ -3,20 +3,23 @@
 use super::joint::Joint;
 use super::strip::{Strip, bits};
 use super::{
-    ACROSS, ACROSS_BINS, ALONG, ALONG_BINS, BLOCK, Block, Cells, Lanes, Moments, Pair, Simd, Tiles, Tiling, cell_parts,
+    ACROSS, ACROSS_BINS, ALONG, ALONG_BINS, BLOCK, Block, Cells, Lanes, Moments, Pair, Row, Simd, Tiles, Tiling, cell_parts,
     lanes, splat, store,
 };
 use std::ops::Range;
 
-/// Σr, ΣrΔx, ΣrΔy, ΣrΔx², ΣrΔxΔy, ΣrΔy², Σq, ΣqΔx, ΣqΔy of a joint, a number a cell of a tile; Δ to the tiles' middles.
-pub(super) type Gathered = [Cells; 9];
+/// Σr, ΣrΔx, ΣrΔy, ΣrΔx², ΣrΔxΔy, ΣrΔy², Σq, ΣqΔx, ΣqΔy of a joint, a number a cell of a register; Δ to where the tile's
+/// middle is from its first register.
+pub(super) type Gathered = [Row<MOST_LANES>; 9];
+/// Numbers of the widest register.
+const MOST_LANES: usize = 16;
 
 impl Tiles {
     /// Adds to each joint's moments what the cells want.
     #[inline(always)]
     pub(super) fn collect<S: Simd, const COHERENT: bool>(&mut self, simd: S, grid: &Tiling, moments: &mut [Moments]) {
         let mut gathered = std::mem::take(&mut self.gathered);
-        gathered.resize(self.joints.len(), [Cells::ZERO; 9]);
+        gathered.resize(self.joints.len(), [Row::ZERO; 9]);
         let row_blocks = grid.rows * grid.columns.div_ceil(BLOCK);
         let mut from = 0;
         for (slice, blocks) in grid.blocks.chunks(row_blocks.max(1)).enumerate() {
@@ -33,11 +36,7 @@ impl Tiles {
             for ((joint, gathered), moments) in self.joints.iter().zip(&mut gathered).zip(&mut *moments) {
                 let slice = grid.lo[0] + slice;
                 Sums::new(simd, gathered).add_to(moments, slice, slice as f64 - joint.bin[0]);
-                for part in 0..cell_parts::<S>() {
-                    for sums in &mut *gathered {
-                        store(sums, part, splat(simd, 0.0));
-                    }
-                }
+                Cell::nothing(simd).keep(gathered);
             }
         }
         self.gathered = gathered;
@@ -61,32 +60,43 @@ impl Tiles {
         let line = joint.line(grid, block);
         let sums = &self.sums[index * BLOCK..(index + 1) * BLOCK];
         let first_x = joint.first[0] + (block.column * ALONG_BINS) as f32 + joint.first[1];
+        let mut cell = Cell::of(simd, gathered);
         if strip.chained {
             let last = u32::BITS - tiles.leading_zeros();
             let tiles = strip.tiles().start..last as usize;
-            let before = splat(simd, first_x + (tiles.start as f32 - 1.0) * ALONG_BINS as f32);
+            let before = first_x + (tiles.start as f32 - 1.0) * ALONG_BINS as f32;
             for part in (0..cell_parts::<S>()).step_by(2) {
                 let pulls = strip.pulls::<S, COHERENT>(simd, joint, tiles.clone(), sums, part);
                 for k in 0..2 {
                     let start = strip.returned::<S, COHERENT>(simd, part + k);
-                    pulls[k].along(simd, start, before).add_to(simd, line.delta, part + k, gathered);
+                    let [x, y] = beside_first::<S>(part + k);
+                    cell.add(simd, pulls[k].along(simd, start, splat(simd, before + x)), line.delta + y);
                 }
             }
         } else {
             for part in 0..cell_parts::<S>() {
                 let mut of = Along::nothing(simd);
                 let one = splat(simd, 1.0);
+                let [beside_x, beside_y] = beside_first::<S>(part);
                 for tile in bits(tiles) {
                     let returned = joint.tile::<S, COHERENT>(simd, (block, &line), tile, part, strip.middles[0][tile]);
                     let wanted = wanted::<S, COHERENT>(simd, returned, &sums[tile], part);
-                    let x = splat(simd, first_x + (tile * ALONG_BINS) as f32);
+                    let x = splat(simd, first_x + (tile * ALONG_BINS) as f32 + beside_x);
                     of.add(wanted, [one, x, x * x]);
                     by_bin(grid, block, tile, part, wanted[0], moments);
                 }
-                of.add_to(simd, line.delta, part, gathered);
+                cell.add(simd, of, line.delta + beside_y);
             }
         }
+        cell.keep(gathered);
     }
+}
+
+/// From the cells of a tile's first register to those of another, bins along and across.
+#[inline(always)]
+fn beside_first<S: Simd>(part: usize) -> [f32; 2] {
+    let first = part * S::F32_LANES;
+    [ALONG[first] - ALONG[0], ACROSS[first] - ACROSS[0]]
 }
 
 /// What some cells of a tile want of a joint that returns Re and Im there (or the square): r and q.
@@ -122,12 +132,38 @@ impl<S: Simd> Along<S> {
         self.q[0] = q.mul_add(weights[0], self.q[0]);
         self.q[1] = q.mul_add(weights[1], self.q[1]);
     }
+}
 
-    /// Adds to a joint's moments; `delta` is from the joint to the row's middle.
+/// What is gathered in the cells of a register.
+struct Cell<S: Simd>([Lanes<S>; 9]);
+
+impl<S: Simd> Cell<S> {
     #[inline(always)]
-    fn add_to(self, simd: S, delta: f32, part: usize, gathered: &mut Gathered) {
-        let ([r, rx, rxx], [q, qx], [y, yy]) = (self.r, self.q, [splat(simd, delta), splat(simd, delta * delta)]);
-        let mut sums = Cell::of(simd, gathered, part).0;
+    fn nothing(simd: S) -> Self {
+        Self([splat(simd, 0.0); 9])
+    }
+
+    #[inline(always)]
+    fn of(simd: S, gathered: &Gathered) -> Self {
+        let mut cell = Self::nothing(simd);
+        for k in 0..9 {
+            cell.0[k] = lanes(simd, &gathered[k], 0);
+        }
+        cell
+    }
+
+    #[inline(always)]
+    fn keep(&self, gathered: &mut Gathered) {
+        for k in 0..9 {
+            store(&mut gathered[k], 0, self.0[k]);
+        }
+    }
+
+    /// Adds a strip's; `delta` is from the joint to the row's middle, y.
+    #[inline(always)]
+    fn add(&mut self, simd: S, of: Along<S>, delta: f32) {
+        let ([r, rx, rxx], [q, qx], [y, yy]) = (of.r, of.q, [splat(simd, delta), splat(simd, delta * delta)]);
+        let sums = &mut self.0;
         sums[0] += r;
         sums[1] += rx;
         sums[2] = r.mul_add(y, sums[2]);
@@ -137,30 +173,13 @@ impl<S: Simd> Along<S> {
         sums[6] += q;
         sums[7] += qx;
         sums[8] = q.mul_add(y, sums[8]);
-        for k in 0..9 {
-            store(&mut gathered[k], part, sums[k]);
-        }
-    }
-}
-
-/// What is gathered in some cells of a tile.
-struct Cell<S: Simd>([Lanes<S>; 9]);
-
-impl<S: Simd> Cell<S> {
-    #[inline(always)]
-    fn of(simd: S, gathered: &Gathered, part: usize) -> Self {
-        let mut sums = [splat(simd, 0.0); 9];
-        for k in 0..9 {
-            sums[k] = lanes(simd, &gathered[k], part);
-        }
-        Self(sums)
     }
 
     /// From the tiles' middles to the cells.
     #[inline(always)]
-    fn shifted(self, simd: S, part: usize) -> Self {
+    fn shifted(self, simd: S) -> Self {
         let [r, rx, ry, rxx, rxy, ryy, q, qx, qy] = self.0;
-        let (x, y) = (lanes(simd, &ALONG, part), lanes(simd, &ACROSS, part));
+        let (x, y) = (lanes(simd, &ALONG, 0), lanes(simd, &ACROSS, 0));
         let (cell_rx, cell_ry) = (x.mul_add(r, rx), y.mul_add(r, ry));
         let cell_rxx = x.mul_add(rx + cell_rx, rxx);
         let cell_rxy = x.mul_add(ry, y.mul_add(cell_rx, rxy));
@@ -269,16 +288,10 @@ struct Sums([f64; 9]);
 impl Sums {
     #[inline(always)]
     fn new<S: Simd>(simd: S, gathered: &Gathered) -> Self {
-        let mut totals = [splat(simd, 0.0); 9];
-        for part in 0..cell_parts::<S>() {
-            let cells = Cell::of(simd, gathered, part).shifted(simd, part).0;
-            for k in 0..9 {
-                totals[k] += cells[k];
-            }
-        }
+        let cells = Cell::of(simd, gathered).shifted(simd).0;
         let mut sums = [0.0; 9];
         for k in 0..9 {
-            sums[k] = f64::from(totals[k].sum());
+            sums[k] = f64::from(cells[k].sum());
         }
         Self(sums)
     }
