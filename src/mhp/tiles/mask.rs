@@ -115,10 +115,10 @@ impl Tiles {
             let (mut few_common, mut few_soft) = (zero, zero);
             for &tile in tiles {
                 let tile = tile as usize;
-                let (target, power, out) = (&grid.target[tile], &self.power[tile], &mut self.soft[tile]);
+                let (target, cells) = (&grid.target[tile], &mut self.power[tile]);
                 let mut steep = false;
                 for part in 0..cell_parts::<S>() {
-                    let (target, power) = (lanes(simd, target, part), lanes(simd, power, part));
+                    let (target, power) = (lanes(simd, target, part), lanes(simd, cells, part));
                     let inside = target.choose(splat(simd, -0.5), one, zero);
                     let b = target.max(zero);
                     let [odds, by_power] = odds.at(simd, power.max(splat(simd, f32::MIN_POSITIVE)));
@@ -127,7 +127,7 @@ impl Tiles {
                     few_common = m.mul_add(b, few_common);
                     few_soft += m;
                     steep |= (m * share - flat).any_positive();
-                    store(out, part, by_power * share * share * inside);
+                    store(cells, part, by_power * share * share * inside);
                     let sim = power.choose(splat(simd, threshold.lower), inside, zero);
                     both = sim.mul_add(b, both);
                     hard += sim;
@@ -171,7 +171,7 @@ impl Tiles {
             }
             for tile in bits(tiles) {
                 let tile = block * BLOCK + tile;
-                let (target, [re, im], soft) = (&grid.target[tile], &mut self.sums[tile], &self.soft[tile]);
+                let (target, [re, im], soft) = (&grid.target[tile], &mut self.sums[tile], &self.power[tile]);
                 for part in 0..cell_parts::<S>() {
                     let by_m = lanes(simd, target, part).choose(splat(simd, 0.5), inside, outside);
                     let weight = lanes(simd, soft, part) * by_m;

@@ -226,10 +226,8 @@ pub(super) struct Tiles {
     /// The sum over joints a tile (Σ(AK)² where the sum is incoherent); later times w/|S|². This and what follows holds
     /// where tiles are lit.
     sums: Vec<Pair>,
-    /// H² relative to the scale; −1 beyond the box.
+    /// H² relative to the scale, −1 beyond the box; later m(1 − m)/|S|² · d ln(H + h)/d ln|S|.
     power: Vec<Cells>,
-    /// m(1 − m)/|S|² · d ln(H + h)/d ln|S|.
-    soft: Vec<Cells>,
     /// Tiles where the mask has a slope: a bit each, a block's in one number.
     sloped: Vec<u32>,
     /// Each joint's moments over the blocks, a number a cell of a tile; zeros when they have been collected.

@@ -164,14 +164,13 @@ impl Tiles {
     /// Block by block: which joints matter to which tiles, and the sum of their returns there.
     #[inline(always)]
     pub(super) fn sum<S: Simd, const COHERENT: bool>(&mut self, simd: S, grid: &Tiling, scale: &Scale) {
-        let Self { joints, present, strips, used, ends, sums, power, soft, lit_bits, lit, ranked, .. } = self;
+        let Self { joints, present, strips, used, ends, sums, power, lit_bits, lit, ranked, .. } = self;
         for joint in joints.iter_mut() {
             joint.reach(simd, grid, scale.cut + scale.log2 as f32, scale.log2);
         }
         let tiles = grid.blocks.len() * BLOCK;
         sums.resize(tiles, [Cells::ZERO; 2]);
         power.resize(tiles, Cells::ZERO);
-        soft.resize(tiles, Cells::ZERO);
         ranked.reserve((tiles * CELLS).saturating_sub(ranked.len()));
         for list in [&mut *lit_bits, &mut *ends] {
             list.clear();
