@@ -90,6 +90,7 @@ pub struct History {
     active: u32,
     next_id: u32,
     state_bytes: usize,
+    revision: u64,
 }
 
 impl History {
@@ -126,7 +127,7 @@ impl History {
         let id = self.next_id;
         self.next_id += 1;
         self.branches.push(Branch { id, parent, config, rows: Vec::new(), flags: Vec::new() });
-        self.active = id;
+        self.activate(id);
         id
     }
 
@@ -145,19 +146,30 @@ impl History {
         self.branch(self.active)
     }
 
+    /// Another number whenever anything but new rows at the end of a branch has changed.
+    pub fn revision(&self) -> u64 {
+        self.revision
+    }
+
     /// The rows of the active branch with those of its parents before it: the way that led to its head.
     pub fn lineage(&self) -> Vec<&Row> {
-        self.way().into_iter().map(|(_, row)| row).collect()
+        self.stretches().into_iter().flat_map(|(_, rows)| rows).collect()
+    }
+
+    /// The same, in the pieces that branches keep together.
+    pub fn way(&self) -> Vec<&[Row]> {
+        self.stretches().into_iter().map(|(_, rows)| rows).collect()
     }
 
     /// The settings in force at the first row of [`Self::lineage`], and where they changed on the way: the last iteration
     /// with the old ones, and the new ones.
     pub(super) fn settings_on_the_way(&self) -> Option<(FitConfig, Vec<(usize, FitConfig)>)> {
-        let way = self.way();
-        let (branch, first) = way.first()?;
+        let stretches = self.stretches();
+        let mut way = stretches.iter().flat_map(|(branch, rows)| rows.iter().map(|row| (*branch, row))).peekable();
+        let (branch, first) = way.peek()?;
         let begin = branch.config_at(first.report.iteration);
         let (mut now, mut before, mut changes) = (begin, first.report.iteration, Vec::new());
-        for (branch, row) in &way {
+        for (branch, row) in way {
             let config = branch.config_at(row.report.iteration);
             if config != now {
                 changes.push((before, config));
@@ -172,19 +184,20 @@ impl History {
         Some((begin, changes))
     }
 
-    /// The lineage, each row with its branch.
-    fn way(&self) -> Vec<(&Branch, &Row)> {
+    /// The branches on the way to the head of the active one, each with the rows that lie on it.
+    fn stretches(&self) -> Vec<(&Branch, &[Row])> {
         let Some(branch) = self.active() else { return Vec::new() };
-        let mut pieces: Vec<Vec<(&Branch, &Row)>> = vec![branch.rows.iter().map(|row| (branch, row)).collect()];
+        let mut stretches = vec![(branch, branch.rows.as_slice())];
         let (mut from, mut parent) = (branch.start(), branch.parent);
         while let Some((id, at)) = parent {
             let Some(before) = self.branch(id) else { break };
             let last = at.min(from);
-            let rows = before.rows.iter().filter(|row| row.report.iteration < last);
-            pieces.push(rows.map(|row| (before, row)).collect());
+            let count = last.saturating_sub(before.start()).min(before.rows.len());
+            stretches.push((before, &before.rows[..count]));
             (from, parent) = (before.start().min(last), before.parent);
         }
-        pieces.into_iter().rev().flatten().collect()
+        stretches.reverse();
+        stretches
     }
 
     /// Number of the active branch.
@@ -196,6 +209,7 @@ impl History {
     pub fn activate(&mut self, id: u32) {
         if self.branch(id).is_some() {
             self.active = id;
+            self.revision += 1;
         }
     }
 
@@ -216,7 +230,7 @@ impl History {
             gone.extend(more);
         }
         self.branches.retain(|branch| !gone.contains(&branch.id));
-        self.active = parent.0;
+        self.activate(parent.0);
         self.recount();
         Some(parent)
     }
@@ -230,6 +244,7 @@ impl History {
             first.flags.clear();
             self.active = first.id;
         }
+        self.revision += 1;
         self.recount();
     }
 
@@ -242,6 +257,7 @@ impl History {
             Some(last) if last.report.iteration == row.report.iteration => {
                 if branch.rows.len() == 1 {
                     branch.rows[0] = row;
+                    self.revision += 1;
                 }
             }
             Some(last) if last.report.iteration + 1 != row.report.iteration => {}

@@ -3,7 +3,7 @@
 use crate::dataset::{Dataset, DatasetError, Frame, Heatmap};
 use crate::geometry::Vec3;
 use crate::mhp::fill_missing;
-use crate::people::{Confusion, Count, COMPARED, Counter, HISTORY, PeopleError, Scan, Tracker, TrackerOptions};
+use crate::people::{COMPARED, Confusion, Count, Counter, HISTORY, PeopleError, Scan, Tracker, TrackerOptions};
 use rayon::prelude::*;
 use std::collections::VecDeque;
 use std::ops::Range;

@@ -4,7 +4,7 @@ use super::meter::{Meter, memory_mib, peak_memory_mib};
 use egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, Rect, TouchPhase, pos2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use mhp_inspector::app::InspectorApp;
+use mhp_inspector::app::{InspectorApp, PaneKind};
 use mhp_inspector::labels::Tag;
 use mhp_inspector::session::{Command, LabelStatus, Session, Sort, SortKey, StrataStatus, Strip};
 use std::fmt::Write as _;
@@ -252,21 +252,23 @@ impl Window {
     /// Agreement and statistics of 100,000 labels.
     fn panes(&mut self) {
         for pane in ["Agreement", "Statistics"] {
-            let Some(tab) = self.0.query_all_by_label(pane).next().map(|node| node.rect()) else {
-                println!("there is no tab {pane}");
-                continue;
-            };
-            let mut meter = Meter::new(&format!("showing {pane}"));
-            meter.pass_with(&mut self.0, |harness| harness.hover_at(tab.center()));
-            meter.pass_with(&mut self.0, |harness| harness.drag_at(tab.center()));
-            meter.pass_with(&mut self.0, |harness| harness.drop_at(tab.center()));
-            (0..60).for_each(|_| meter.pass(&mut self.0));
-            meter.print();
+            self.show(pane);
             let one = |s: &Session| s.labels.label(0).tags.contains(Tag::F4);
             let name = format!("tag F4 on one frame before {pane}");
             self.measured(&name, one, Some(Command::ToggleTag(Tag::F4)));
             self.measured("its undo", |s| !one(s), Some(Command::Undo));
         }
+    }
+
+    /// Clicks a pane's tab.
+    fn show(&mut self, pane: &str) {
+        let tab = self.rect(pane).center();
+        let mut meter = Meter::new(&format!("showing {pane}"));
+        meter.pass_with(&mut self.0, |harness| harness.hover_at(tab));
+        meter.pass_with(&mut self.0, |harness| harness.drag_at(tab));
+        meter.pass_with(&mut self.0, |harness| harness.drop_at(tab));
+        (0..60).for_each(|_| meter.pass(&mut self.0));
+        meter.print();
     }
 
     /// A run while the list is filtered by what the run changes.
@@ -277,6 +279,13 @@ impl Window {
         meter.pass_with(&mut self.0, |harness| harness.state_mut().apply(Command::StepFit(300)));
         self.passes_until(&mut meter, |s| s.fit.head() >= 300 && !s.fit.is_running());
         meter.print();
+        self.show("Curves");
+        assert!(self.0.state().pane_rect(PaneKind::Curves).is_some(), "the curves are on screen");
+        let mut meter = Meter::new("a run of 100,000 iterations");
+        meter.pass_with(&mut self.0, |harness| harness.state_mut().apply(Command::StepFit(100_000 - 300)));
+        self.passes_until(&mut meter, |s| s.fit.head() >= 100_000 && !s.fit.is_running());
+        meter.print();
+        self.repeat("idle, curves of 100,000 iterations", 60, |_, _| {});
         self.apply(Command::SetFilter(String::new()));
     }
 

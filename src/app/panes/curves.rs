@@ -1,13 +1,16 @@
 //! Loss, terms, IoU and MAJPE over the iterations, with flags where settings changed and a cursor that can be dragged.
 
+mod series;
 mod thin;
 
 use super::{Shared, empty};
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
 use crate::session::{Branch, Command, FitStatus, PinRow, Row, numbers};
+use crate::worker::JobId;
 use egui::{Color32, Ui};
 use egui_plot::{GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, VLine};
+use series::{SeriesCache, series};
 use thin::Window;
 
 /// What the plot remembers.
@@ -19,6 +22,8 @@ pub(in crate::app) struct State {
     before_click: usize,
     /// What was on screen in the pass before.
     window: Option<Window>,
+    /// Values of the curves of a job's history, as it was built up.
+    series: SeriesCache<(JobId, u64)>,
 }
 
 impl State {
@@ -63,7 +68,8 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             return empty(ui, "No iterations yet", shared.session.data.error.as_deref().unwrap_or(how));
         }
     };
-    let rows = fit.history.lineage();
+    let way = fit.history.way();
+    let first = way.first().and_then(|rows| rows.first()).map_or(0, |row| row.report.iteration);
     let curves = curves(shared, branch, state.tab);
     toolbar(ui, shared, state, &curves);
     let fit = &shared.session.fit;
@@ -95,21 +101,19 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         plot = plot.reset();
         state.window = None;
     }
-    let drawn = |pieces: Vec<Vec<PlotPoint>>| match &state.window {
-        Some(window) => pieces.into_iter().map(|piece| window.thinned(piece)).collect(),
-        None => pieces,
-    };
+    let State { series, window, tab, .. } = &mut *state;
+    let window = window.as_ref();
+    series.begin((fit.job, fit.history.revision()));
+    let visible = curves.iter().filter(|c| !hidden.contains(&c.key));
     let lines: Vec<(Vec<Vec<PlotPoint>>, &Curve)> =
-        curves.iter().filter(|c| !hidden.contains(&c.key)).map(|c| (drawn(points(&rows, c, log)), c)).collect();
-    let others: Vec<(u32, Vec<Vec<PlotPoint>>)> = fit
-        .history
-        .branches()
-        .iter()
-        .filter(|b| b.id != branch.id)
-        .filter_map(|b| Some((b.id, drawn(points(&b.rows.iter().collect::<Vec<_>>(), curves.first()?, log)))))
-        .collect();
-    let pinned: Vec<(String, Vec<Vec<PlotPoint>>)> =
-        pinned(shared, state.tab, log).into_iter().map(|(name, pieces)| (name, drawn(pieces))).collect();
+        visible.map(|c| (series.grown(None, &c.key, first, &way, &c.value).pieces(window, log), c)).collect();
+    let mut others: Vec<(u32, Vec<Vec<PlotPoint>>)> = Vec::new();
+    if let Some(c) = curves.first() {
+        for b in fit.history.branches().iter().filter(|b| b.id != branch.id) {
+            others.push((b.id, series.grown(Some(b.id), &c.key, b.start(), &[&b.rows], &c.value).pieces(window, log)));
+        }
+    }
+    let pinned = pinned(shared, *tab, window, log);
     let shown = fit.shown_iteration();
     let response = plot.show(ui, |plot| {
         for (id, pieces) in &others {
@@ -157,7 +161,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
 }
 
 /// The main curve of each pinned fit: L, or the mean IoU.
-fn pinned(shared: &Shared<'_>, tab: Tab, log: bool) -> Vec<(String, Vec<Vec<PlotPoint>>)> {
+fn pinned(shared: &Shared<'_>, tab: Tab, window: Option<&Window>, log: bool) -> Vec<(String, Vec<Vec<PlotPoint>>)> {
     let pins = shared.session.pins.list().iter();
     pins.map(|pin| {
         let value = |row: &PinRow| match tab {
@@ -165,7 +169,8 @@ fn pinned(shared: &Shared<'_>, tab: Tab, log: bool) -> Vec<(String, Vec<Vec<Plot
             Tab::Quality => numbers(&row.report, None)[1],
         };
         let what = if tab == Tab::Loss { "L" } else { "mean IoU" };
-        let pieces = pieces(pin.rows.iter().map(|row| (row.report.iteration, value(row))), log);
+        let first = pin.rows.first().map_or(0, |row| row.report.iteration);
+        let pieces = series(first, pin.rows.iter().map(value)).pieces(window, log);
         (format!("{} · {what}", pin.name), pieces)
     })
     .collect()
@@ -219,33 +224,12 @@ fn curves(shared: &Shared<'_>, branch: &Branch, tab: Tab) -> Vec<Curve> {
                     })
                 })
                 .collect();
-            if branch.rows.iter().any(|row| row.majpe_mm.is_some()) {
+            if branch.rows.last().is_some_and(|row| row.majpe_mm.is_some()) {
                 curves.push(curve("majpe", "MAJPE / m", 1.5, |r| r.majpe_mm.map(|mm| mm / 1000.0)));
             }
             curves
         }
     }
-}
-
-/// The points of a curve, in pieces: where there is no value (or on a logarithmic scale none above 1e−7) the line breaks.
-fn points(rows: &[&Row], curve: &Curve, log: bool) -> Vec<Vec<PlotPoint>> {
-    pieces(rows.iter().map(|row| (row.report.iteration, (curve.value)(row))), log)
-}
-
-fn pieces(values: impl Iterator<Item = (usize, Option<f64>)>, log: bool) -> Vec<Vec<PlotPoint>> {
-    let mut pieces: Vec<Vec<PlotPoint>> = vec![Vec::new()];
-    for (iteration, value) in values {
-        let value = value.filter(|v| v.is_finite() && (!log || *v > 1e-7));
-        match (value, pieces.last_mut()) {
-            (Some(value), Some(piece)) => {
-                let y = if log { value.log10() } else { value };
-                piece.push(PlotPoint::new(iteration as f64, y));
-            }
-            _ => pieces.push(Vec::new()),
-        }
-    }
-    pieces.retain(|piece| !piece.is_empty());
-    pieces
 }
 
 fn label(hover: &egui_plot::HoverPosition<'_>, log: bool) -> Option<String> {

@@ -3,8 +3,8 @@
 use super::joint::Joint;
 use super::strip::{Strip, bits};
 use super::{
-    ACROSS, ACROSS_BINS, ALONG, ALONG_BINS, BLOCK, Block, Cells, Lanes, Moments, Pair, Row, Simd, Tiles, Tiling, cell_parts,
-    lanes, splat, store,
+    ACROSS, ACROSS_BINS, ALONG, ALONG_BINS, BLOCK, Block, Cells, Lanes, Moments, Pair, Row, Simd, Tiles, Tiling,
+    cell_parts, lanes, splat, store,
 };
 use std::ops::Range;
 

@@ -19,6 +19,16 @@ impl Window {
         Self { drawn: lo - span..=hi + span, column: span / f64::from(pixels.max(1.0)) }
     }
 
+    /// Iterations that are drawn.
+    pub(super) fn drawn(&self) -> &RangeInclusive<f64> {
+        &self.drawn
+    }
+
+    /// Whole iterations that fall on one pixel column, at least 1.
+    pub(super) fn iterations_a_column(&self) -> usize {
+        (self.column as usize).max(1)
+    }
+
     /// The points that a curve through `points`, in the order of x, is drawn from. Both ends are always among them, so that
     /// the plot's own bounds do not depend on what it shows.
     pub(super) fn thinned(&self, points: Vec<PlotPoint>) -> Vec<PlotPoint> {
