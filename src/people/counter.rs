@@ -1,10 +1,11 @@
-//! Counting: detections of a few frames → clusters → the classifier's word on each → the sum → what ten frames agree on.
+//! Counting: detections of a few frames → clusters → the classifier's word on each → the sum → what twenty frames agree on.
 //!
 //! The paper feeds "cluster statistics" to a classifier of the count and leaves open how the statistics of several clusters
 //! become one vector of twelve. Here every cluster is asked by itself how many people it holds (0: clutter or a limb, 1, or
 //! several who stand too close); the distribution of the sum is the convolution of theirs. The classifier is trained
-//! through that sum, on nothing but the true count of a frame. The frames of the last second are then pooled: an arm that
-//! looks like a second person does so for some frames, the number of people stays.
+//! through that sum, on nothing but the true count of a frame. The frames of the last two seconds are then pooled: an arm that
+//! looks like a second person does so for some frames, and who stands behind another is hidden for some; the number of
+//! people stays.
 
 use super::cfar::CfarOptions;
 use super::cluster::{Cluster, ClusterOptions, cluster, refined};

@@ -7,7 +7,7 @@
 //!      ─ cluster.rs  DBSCAN over the detections of four frames
 //!      ─ features.rs the paper's twelve numbers a cluster, and how it stands to the stronger ones
 //!      ─ network.rs  31 → 64 → 32 → 5: how many people a cluster is
-//!      ─ counter.rs  the distribution of their sum, over ten frames → Count: number, probabilities
+//!      ─ counter.rs  the distribution of their sum, over twenty frames → Count: number, probabilities
 //!      ─ seeds.rs ── places for that number, or another         → starts of a fit
 //!      ─ identity.rs assignment to the frame before             → Tracker, match_people
 //! ```

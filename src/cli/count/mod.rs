@@ -15,7 +15,7 @@ use std::process::ExitCode;
 pub(super) const HELP: &str = "\
 What is done: what changed since the frames before (people never stand as still as a room), cells above mean + 2 standard
 deviations of the logarithms around, in metres with heights from the other view, DBSCAN (0.3 m, 3 points) over the
-detections of four frames, and a small network that says of each cluster how many people it is. What the last ten frames
+detections of four frames, and a small network that says of each cluster how many people it is. What the last twenty frames
 agree on is the count. The first frames of a sequence have few or none before them and are counted less surely.
 
 Columns of the CSV: frame, people, probability (of that number), p0 p1 p2 p3 p4 (4 and more), annotated (where the data
