@@ -9,9 +9,12 @@ use crate::app::theme::{self, Tokens};
 use crate::session::{Branch, Command, FitStatus, PinRow, Row, numbers};
 use crate::worker::JobId;
 use egui::{Color32, Ui};
-use egui_plot::{GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, VLine};
+use egui_plot::{GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, VLine, uniform_grid_spacer};
 use series::{SeriesCache, series};
 use thin::Window;
+
+/// Room on the right for half of the last number below the plot, points.
+const LAST_NUMBER: f32 = 12.0;
 
 /// What the plot remembers.
 #[derive(Default)]
@@ -80,6 +83,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         .x_axis_formatter(
             |mark, _| if mark.value.fract().abs() < 1e-9 { format!("{}", mark.value) } else { String::new() },
         )
+        .x_grid_spacer(uniform_grid_spacer(|input| iterations(input.base_step_size)))
         .show_grid([true, true])
         .grid_color(tokens.stroke)
         .allow_scroll(false)
@@ -90,7 +94,8 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         .label_formatter(move |hover| label(hover, log));
     let what = if state.tab == Tab::Loss { "L and its unweighted terms" } else { "IoU; MAJPE in m" };
     let caption = figure::of(shared.session, what);
-    plot = plot.height(figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref()).height());
+    let area = figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref());
+    plot = plot.height(area.height()).width((area.width() - LAST_NUMBER).max(1.0));
     if log {
         plot = plot.y_axis_formatter(|mark, _| power(mark.value)).y_grid_spacer(|input| decades(input.bounds));
     }
@@ -242,6 +247,17 @@ fn label(hover: &egui_plot::HoverPosition<'_>, log: bool) -> Option<String> {
     }
 }
 
+/// Steps of the grid along the iterations: between lines, between those with a number (1, 2 or 5 times a power of ten, which
+/// leaves room for it), and between the strongest; `base` are those that the plot would draw at most.
+fn iterations(base: f64) -> [f64; 3] {
+    // The plot asks for lines that are 8 points apart or more, and writes numbers 80 points apart.
+    let wanted = (10.0 * base).max(1.0);
+    let decade = 10f64.powf(wanted.log10().floor());
+    let round = [(1.0, 0.2), (2.0, 0.5), (5.0, 1.0), (10.0, 2.0)];
+    let (numbered, line) = round.into_iter().find(|(step, _)| step * decade >= wanted).unwrap_or((10.0, 2.0));
+    [(line * decade).max(1.0), numbered * decade, 10.0 * numbered * decade]
+}
+
 /// The grid of a log₁₀ axis: decades, and 2 and 5 between them where no more than three are seen.
 fn decades((lo, hi): (f64, f64)) -> Vec<GridMark> {
     let between: &[f64] = if hi - lo < 3.0 { &[2.0, 5.0] } else { &[] };
@@ -305,5 +321,19 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, curves: &[Cu
     });
     if view != shared.session.view {
         shared.set_view(|v| *v = view);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_along_the_iterations_are_round_and_have_room() {
+        assert_eq!(iterations(0.01), [1.0, 1.0, 10.0], "nothing lies between two iterations");
+        assert_eq!(iterations(0.75), [2.0, 10.0, 100.0]);
+        assert_eq!(iterations(16.0), [50.0, 200.0, 2000.0]);
+        assert_eq!(iterations(160.0), [500.0, 2000.0, 20_000.0]);
+        assert_eq!(iterations(30.0), [100.0, 500.0, 5000.0]);
     }
 }

@@ -70,7 +70,8 @@ impl Tiles {
                 for k in 0..2 {
                     let start = strip.returned::<S, COHERENT>(simd, part + k);
                     let [x, y] = beside_first::<S>(part + k);
-                    cell.add(simd, pulls[k].along(simd, start, splat(simd, before + x)), line.delta + y);
+                    let along = pulls[k].along(simd, start, splat(simd, before + x));
+                    cell.add(simd, &along, line.delta + y);
                 }
             }
         } else {
@@ -85,7 +86,7 @@ impl Tiles {
                     of.add(wanted, [one, x, x * x]);
                     by_bin(grid, block, tile, part, wanted[0], moments);
                 }
-                cell.add(simd, of, line.delta + beside_y);
+                cell.add(simd, &of, line.delta + beside_y);
             }
         }
         cell.keep(gathered);
@@ -161,7 +162,7 @@ impl<S: Simd> Cell<S> {
 
     /// Adds a strip's; `delta` is from the joint to the row's middle, y.
     #[inline(always)]
-    fn add(&mut self, simd: S, of: Along<S>, delta: f32) {
+    fn add(&mut self, simd: S, of: &Along<S>, delta: f32) {
         let ([r, rx, rxx], [q, qx], [y, yy]) = (of.r, of.q, [splat(simd, delta), splat(simd, delta * delta)]);
         let sums = &mut self.0;
         sums[0] += r;
