@@ -96,7 +96,12 @@ impl<T: Task> WithSimd for Together<'_, T> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         for first in (0..self.joints).step_by(S::F64_LANES) {
-            self.task.run(Several { simd, first, end: self.joints });
+            if first + 1 == self.joints {
+                // A register for one joint, as the last of seventeen is, would divide and take roots for eight.
+                self.task.run(One(first));
+            } else {
+                self.task.run(Several { simd, first, end: self.joints });
+            }
         }
     }
 }
