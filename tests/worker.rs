@@ -229,6 +229,35 @@ fn a_long_run_keeps_fewer_states_but_every_pose_and_always_the_last() {
 }
 
 #[test]
+fn a_branch_that_begins_late_keeps_where_it_begins_and_where_the_one_before_ended() {
+    let mut rig = Rig::new();
+    let (row, _) = rig.prepared();
+    let late = |iteration: usize| Arc::new(FitState { iteration, ..FitState::clone(state(&row)) });
+    // Odd iterations, of which nothing would be kept there; the commands come at once, so that rows wait together.
+    let config = Box::<FitConfig>::default();
+    for (branch, begins) in [(1, 2049), (2, 4099)] {
+        rig.send(WorkerCommand::Branch { branch, state: late(begins), config: config.clone() });
+        rig.send(WorkerCommand::RunTo { target: begins + 4, run: u64::from(branch) });
+        if branch == 1 {
+            let (rows, ..) = rig.finish();
+            assert!(rows[0].report.iteration == 2049 && rows[0].kept.state().is_some());
+            rig.send(WorkerCommand::RunTo { target: FOREVER, run: 3 });
+        }
+    }
+    let (mut rows, mut ended) = (Vec::new(), false);
+    while !ended {
+        match rig.message() {
+            WorkerMessage::Rows(1, more) => rows.extend(more),
+            WorkerMessage::Event(1, WorkerEvent::Finished { branch: 2, .. }) => ended = true,
+            other => panic!("did not expect {other:?}"),
+        }
+    }
+    let of = |branch: u32| rows.iter().filter(move |row| row.branch == branch);
+    assert!(of(1).next_back().is_none_or(|row| row.kept.state().is_some()), "the head of a branch that is left");
+    assert!(of(2).next().unwrap().kept.state().is_some() && of(2).next_back().unwrap().kept.state().is_some());
+}
+
+#[test]
 fn a_run_that_is_already_there_says_so() {
     let mut rig = Rig::new();
     rig.prepared();

@@ -285,7 +285,8 @@ impl Job {
     }
 
     fn push_row(&mut self, report: StepReport) {
-        let kept = if report.iteration.is_multiple_of(stride(report.iteration)) {
+        let begins = report.iteration == self.branch_start;
+        let kept = if begins || report.iteration.is_multiple_of(stride(report.iteration)) {
             Kept::State(self.fitter.state())
         } else {
             Kept::Positions(self.fitter.params().positions().into())
@@ -294,12 +295,17 @@ impl Job {
         self.dirty = true;
     }
 
-    /// The rows since the last call. Where the fit stands it can always be gone back to.
+    /// The rows since the last call.
     fn take_rows(&mut self) -> Vec<HistoryRow> {
+        self.keep_last();
+        std::mem::take(&mut self.rows)
+    }
+
+    /// Where the fit stands it can always be gone back to: before it is led elsewhere, and before anybody hears of it.
+    fn keep_last(&mut self) {
         if let Some(last) = self.rows.last_mut().filter(|last| last.kept.state().is_none()) {
             last.kept = Kept::State(self.fitter.state());
         }
-        std::mem::take(&mut self.rows)
     }
 
     fn step(&mut self) -> Result<Option<StopReason>, FitError> {
@@ -315,6 +321,7 @@ impl Job {
     }
 
     fn handle(&mut self, command: WorkerCommand) -> Result<Reply, FitError> {
+        self.keep_last();
         match command {
             WorkerCommand::RunTo { target, run } => {
                 (self.target, self.run) = (target, run);
