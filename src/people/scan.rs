@@ -59,6 +59,13 @@ pub(super) struct Scanner {
     options: CfarOptions,
 }
 
+impl Scan {
+    /// Lets go of the maps, which only the [`COMPARED`] frames after it ask for.
+    pub(crate) fn forget_maps(&mut self) {
+        self.amplitudes = Vec::new();
+    }
+}
+
 impl Scanner {
     /// # Errors
     /// Where no view tells a place.

@@ -97,6 +97,7 @@ impl<'a> Window<'a> {
             Ok((scan, count)) => {
                 self.scans.push_front(scan);
                 self.scans.truncate(HISTORY);
+                self.scans.iter_mut().skip(COMPARED).for_each(Scan::forget_maps);
                 Ok(count)
             }
             Err(why) => {
