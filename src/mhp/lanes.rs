@@ -64,7 +64,8 @@ impl<S: Simd> Lanes<S> {
 
     #[inline(always)]
     pub(super) fn abs(self) -> Self {
-        Self::new(self.simd, self.simd.abs_f32s(self.value))
+        // Pulp's own is not always inlined.
+        self.max(splat(self.simd, 0.0) - self)
     }
 
     #[inline(always)]

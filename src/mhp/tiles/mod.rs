@@ -114,13 +114,13 @@ const fn from_middle(stride: usize, bins: usize) -> Cells {
 
 /// Softest mask, T, whose reach the powers of two of f32 hold; softer ones take the plain kernel.
 const SOFTEST: f64 = 1.5;
-/// Below e^−16T of the threshold a cell neither counts nor pulls (1e-7).
+/// Below e^−15T of the threshold, `GUESS` included, a cell neither counts nor pulls (3e-7).
 const MASK_REACH: f64 = 14.0;
 /// A joint this much weaker (in ln) than the threshold is dropped, and at least `MARGIN` under the weakest cell that counts.
-const BELOW: f64 = 14.0;
+const BELOW: f64 = 13.0;
 const MARGIN: f64 = 3.0;
 /// The guess of ln threshold may be this much too high.
-const GUESS: f64 = 2.0;
+const GUESS: f64 = 1.0;
 /// And this much too low: beyond it the strongest returns would leave f32's range.
 const HIGH: f64 = 12.0;
 /// Guesses of the threshold at most.

@@ -146,17 +146,13 @@ impl Tiles {
         let mut high = self.joints.iter().map(|joint| joint.top + f64::from(joint.spectrum())).fold(low, f64::max);
         while high - low > NEAR {
             let level = f64::midpoint(low, high);
-            let mut above = splat(simd, 0.0);
+            let mut above = 0;
             for middles in &self.middles {
                 for part in 0..tile_parts::<S>() {
-                    above += lanes(simd, middles, part).choose(
-                        splat(simd, level as f32),
-                        splat(simd, 1.0),
-                        splat(simd, 0.0),
-                    );
+                    above += (lanes(simd, middles, part) - splat(simd, level as f32)).positive().count_ones();
                 }
             }
-            if above.sum() as usize > rank { low = level } else { high = level }
+            if above as usize > rank { low = level } else { high = level }
         }
         low
     }
@@ -190,8 +186,14 @@ impl Tiles {
         let mut middles = Middles::default();
         for (index, block) in grid.blocks.iter().enumerate() {
             if block.column == 0 {
-                present.clear();
-                present.extend((0..joints.len() as u32).filter(|&joint| joints[joint as usize].reaches(grid, block)));
+                present.resize(joints.len(), 0);
+                let mut found = 0;
+                for (number, joint) in joints.iter().enumerate() {
+                    // Written over by the next where it does not reach; a branch would be guessed wrong.
+                    present[found] = number as u32;
+                    found += usize::from(joint.reaches(grid, block));
+                }
+                present.truncate(found);
             }
             let mut tiles_lit = 0;
             if !present.is_empty() {
@@ -228,7 +230,9 @@ impl Tiles {
             }
             ends.push(*used as u32);
             lit_bits.push(tiles_lit);
-            lit.extend(bits(tiles_lit).map(|tile| (index * BLOCK + tile) as u32));
+            for tile in bits(tiles_lit) {
+                lit.push((index * BLOCK + tile) as u32);
+            }
         }
     }
 }
