@@ -24,6 +24,17 @@ pub enum Scatterers {
     BodyParts,
 }
 
+/// What tells where the one person stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Place {
+    /// Where the views' peaks agree best, in the frame alone.
+    #[default]
+    Peaks,
+    /// There, unless counting people over the frames around finds that person elsewhere.
+    Counted,
+}
+
 /// Where a start looks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -8,7 +8,7 @@ mod init;
 mod preset;
 
 pub use fields::{FIELDS, Field, FieldGroup};
-pub use init::{Height, InitConfig, LearningRates, Parameterization, Scatterers, Yaw};
+pub use init::{Height, InitConfig, LearningRates, Parameterization, Place, Scatterers, Yaw};
 pub use preset::Preset;
 
 use serde::{Deserialize, Serialize};
@@ -125,6 +125,8 @@ pub struct FitConfig {
     pub parameterization: Parameterization,
     /// What the start's Gaussians look like.
     pub scatterers: Scatterers,
+    /// What tells where the start of one person stands.
+    pub place: Place,
     /// Where the start looks.
     pub yaw: Yaw,
     /// Persons that are fitted; 0: as many as are counted.
@@ -161,6 +163,7 @@ impl Default for FitConfig {
             stop_when_converged: false,
             parameterization: Parameterization::default(),
             scatterers: Scatterers::default(),
+            place: Place::default(),
             yaw: Yaw::default(),
             people: 1,
             starts: 1,

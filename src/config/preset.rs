@@ -1,6 +1,6 @@
 //! Settings with a name.
 
-use super::{EmRegion, FitConfig, Height, LearningRates, Parameterization, Scatterers, Summation, Yaw};
+use super::{EmRegion, FitConfig, Height, LearningRates, Parameterization, Place, Scatterers, Summation, Yaw};
 
 /// A whole [`FitConfig`] with a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,6 +46,7 @@ impl Preset {
             Self::Recommended => FitConfig {
                 parameterization: Parameterization::Bones,
                 scatterers: Scatterers::BodyParts,
+                place: Place::Counted,
                 yaw: Yaw::Motion,
                 height: Height::Floor,
                 summation: Summation::Incoherent,

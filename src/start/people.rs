@@ -1,8 +1,8 @@
 //! How many persons a fit has: as many as the settings say, or as many as are counted (paper section 4.4).
 
-use crate::config::FitConfig;
+use crate::config::{FitConfig, Place};
 use crate::geometry::Vec3;
-use crate::mhp::{FitError, Initialisation, Neighbour, Problem, initialise, initialise_people};
+use crate::mhp::{FitError, Initialisation, Neighbour, Problem, initialise_people};
 use crate::people::{Count, Counter, Scan};
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use std::sync::Arc;
 pub struct Begun {
     /// The start.
     pub initialisation: Initialisation,
-    /// How many people were found, with probabilities; `None` for a fit of one person, which needs no count.
+    /// How many people were found, with probabilities; `None` for a fit of one person, which no count decides.
     pub count: Option<Count>,
 }
 
@@ -21,9 +21,12 @@ pub struct Begun {
 /// [`FitError::NoStart`] where nothing stands above the background, nobody was counted, or people cannot be counted in
 /// these views.
 pub fn begin(problem: &Arc<Problem>, config: &FitConfig) -> Result<Begun, FitError> {
-    // One person is looked for as the paper does, without a count.
     if config.people == 1 {
-        return Ok(Begun { initialisation: initialise(problem, config)?, count: None });
+        // The paper looks for one person without a count, and so it goes where nothing can be counted.
+        let asked = config.place == Place::Counted && !problem.neighbours().is_empty();
+        let counted = asked.then(|| count(problem).ok()).flatten().filter(|count| !count.clusters.is_empty());
+        let seeds = counted.map_or_else(Vec::new, |count| count.seeds(1));
+        return Ok(Begun { initialisation: initialise_people(problem, config, &seeds)?, count: None });
     }
     let count = count(problem)?;
     let people = if config.people == 0 { count.people() } else { config.people };

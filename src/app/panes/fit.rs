@@ -4,7 +4,7 @@ use super::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, chip, icon_button, iou_color, value_row};
 use crate::config::{
-    EmRegion, Field, FieldGroup, FitConfig, Height, Parameterization, Preset, Scatterers, Summation, Yaw,
+    EmRegion, Field, FieldGroup, FitConfig, Height, Parameterization, Place, Preset, Scatterers, Summation, Yaw,
 };
 use crate::mhp::Precision;
 use crate::session::{Command, FitStatus};
@@ -291,6 +291,14 @@ fn model(ui: &mut Ui, config: &mut FitConfig) {
         ui.selectable_value(&mut config.yaw, Yaw::Radar, "at the radar").on_hover_text("The paper.");
         ui.selectable_value(&mut config.yaw, Yaw::Motion, "where it goes")
             .on_hover_text("From its places in the frames around. Takes effect when a start is found.");
+    });
+    ui.horizontal(|ui| {
+        ui.label("Place");
+        ui.selectable_value(&mut config.place, Place::Peaks, "strongest peaks").on_hover_text("The paper.");
+        ui.selectable_value(&mut config.place, Place::Counted, "frames around").on_hover_text(
+            "One person stands where counting over the frames around finds it, if the peaks alone show somebody \
+             elsewhere. Takes effect when a start is found.",
+        );
     });
     ui.horizontal(|ui| {
         ui.label("Height");

@@ -36,8 +36,8 @@ pub(super) use surroundings::{Cached, Surroundings};
 
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
-use crate::config::{FitConfig, Height, Summation, Yaw};
-use crate::geometry::{Vec3, add, scale, sub};
+use crate::config::{FitConfig, Height, Place, Summation, Yaw};
+use crate::geometry::{Vec3, add, flat_distance, scale, sub};
 use find::{apart_m, centre, find_one, middle_of_views, near};
 use height::{Expectation, Stature};
 use motion::{Sighting, Track};
@@ -52,6 +52,8 @@ const FASTEST_MPS: f64 = 4.0;
 /// Steps in which a posture's place is looked for, m.
 const POSTURE_STEP_M: f64 = 0.06;
 const MOST_STEPS: usize = 12;
+/// What counting finds farther from a place than this is another place, m.
+const ELSEWHERE_M: f64 = 1.0;
 /// The L_EM of a posture other than standing, of that of standing, at which it is believed of somebody who does not walk.
 const CLEARLY_BETTER: f64 = 0.9;
 
@@ -133,7 +135,8 @@ pub fn initialise(problem: &Arc<Problem>, config: &FitConfig) -> Result<Initiali
     initialise_people(problem, config, &[])
 }
 
-/// Finds one person near each of `seeds` (world frame, m), or one anywhere where there are none.
+/// Finds one person near each of `seeds` (world frame, m), or one anywhere where there are none. One seed is where counting
+/// found the one person: with [`Place::Counted`] it decides only where the frame's own peaks show that person elsewhere.
 ///
 /// # Errors
 /// [`FitError::NoStart`] where no view shows anything above its background.
@@ -151,29 +154,41 @@ pub fn initialise_people(
         .map(|k| format!("{}: {} missing cells filled", problem.views[k].array, problem.filled_cells(k)))
         .collect();
     let seen = |(at, expected): (Vec3, Expectation)| (at, Some(expected));
+    let nearby = |k: usize| seen(near(problem, evidence, seeds, k));
+    let mut alone = || find_one(problem, evidence, &template, &peaks, &mut notes).map(seen);
     let found = match seeds {
         _ if !config.init.position => vec![(middle_of_views(problem), None)],
-        [] => vec![seen(find_one(problem, evidence, &template, &peaks, &mut notes)?)],
-        seeds => (0..seeds.len()).map(|k| seen(near(problem, evidence, seeds, k))).collect(),
+        [] => vec![alone()?],
+        [_] if config.place == Place::Counted => vec![alone().unwrap_or_else(|_| nearby(0))],
+        seeds => (0..seeds.len()).map(nearby).collect(),
     };
-    let mut persons = Vec::with_capacity(found.len());
     let places: Vec<Vec3> = found.iter().map(|(at, _)| *at).collect();
-    for (k, (at, expected)) in found.into_iter().enumerate() {
-        let lit_m = expected.and_then(|expected| expected.lit);
-        let here = Sighting { t_s: 0.0, at, lit_m };
-        let track = followed(config).then(|| motion::track(problem, here, apart_m(&places, k))).flatten();
+    let person = |at: Vec3, expected: Option<Expectation>, apart_m: f64| {
+        let here = Sighting { t_s: 0.0, at, lit_m: expected.and_then(|expected| expected.lit) };
+        let track = followed(config).then(|| motion::track(problem, here, apart_m)).flatten();
         let radial = velocity::radial(problem, at, config.init.velocity_gain_mps);
-        persons.push(Person { at, expected, track, radial, posture: Posture::Standing, body: Arc::clone(&template) });
-    }
+        Person { at, expected, track, radial, posture: Posture::Standing, body: Arc::clone(&template) }
+    };
+    let own: Vec<Person> =
+        found.into_iter().enumerate().map(|(k, (at, expected))| person(at, expected, apart_m(&places, k))).collect();
+    let elsewhere = match (seeds, &places[..]) {
+        ([seed], [place]) if config.init.position && flat_distance(*seed, *place) > ELSEWHERE_M => Some(nearby(0)),
+        _ => None,
+    };
+    let mut persons = match elsewhere {
+        Some((at, expected)) => {
+            let [x, y, _] = own[0].at;
+            notes.push(format!("the peaks alone show somebody at x {x:.2} m, y {y:.2} m; the frames around do not"));
+            vec![person(at, expected, f64::INFINITY)]
+        }
+        None => own.clone(),
+    };
     if config.starts > 1 {
         choose_postures(problem, config, &template, &mut persons)?;
     }
     let dress = Dress::new(&problem.skeleton, config.scatterers);
     let mut params = assemble(problem, config, &dress, &persons);
-    let standing =
-        |person: &Person| Person { posture: Posture::Standing, body: Arc::clone(&template), ..person.clone() };
-    let plain: Vec<Person> = persons.iter().map(standing).collect();
-    let mut unrefined = assemble(problem, &unrefined(config), &dress, &plain);
+    let mut unrefined = assemble(problem, &unrefined(config), &dress, &own);
     for start in [&mut params, &mut unrefined] {
         perturb::spoil(problem, &config.init, start);
     }
@@ -304,7 +319,14 @@ fn followed(config: &FitConfig) -> bool {
 
 /// The settings under which a start is what this frame's peaks alone say.
 fn unrefined(config: &FitConfig) -> FitConfig {
-    FitConfig { yaw: Yaw::Radar, height: Height::Echo, w_time: 0.0, surface_offset_m: 0.0, ..*config }
+    FitConfig {
+        place: Place::Peaks,
+        yaw: Yaw::Radar,
+        height: Height::Echo,
+        w_time: 0.0,
+        surface_offset_m: 0.0,
+        ..*config
+    }
 }
 
 /// Where the middle of a body is whose lit middle is `at`: the echoes come from the skin before it. Not so where somebody

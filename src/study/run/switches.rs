@@ -17,6 +17,7 @@ pub const SWITCHES: &[Switch] = &[
     Switch { name: "scales and opacities by body part", take: |to, from| to.scatterers = from.scatterers },
     Switch { name: "skin in front of the joints", take: |to, from| to.surface_offset_m = from.surface_offset_m },
     Switch { name: "powers add", take: |to, from| to.summation = from.summation },
+    Switch { name: "place from counting", take: |to, from| to.place = from.place },
     Switch { name: "heading from motion", take: |to, from| to.yaw = from.yaw },
     Switch { name: "several starts", take: |to, from| to.starts = from.starts },
     Switch { name: "temporal term", take: |to, from| to.w_time = from.w_time },
