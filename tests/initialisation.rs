@@ -8,9 +8,10 @@ mod common;
 mod reading;
 
 use cases::Case;
-use mhp_inspector::body::{Group, PpprShape};
+use mhp_inspector::body::{Group, Pppr, PpprShape};
+use mhp_inspector::config::{FitConfig, Place};
 use mhp_inspector::geometry::{norm, sub};
-use mhp_inspector::mhp::{FitError, Problem, initialise};
+use mhp_inspector::mhp::{FitError, Problem, initialise, initialise_people};
 use reading::{case_folders, read};
 use std::sync::Arc;
 
@@ -63,6 +64,46 @@ fn is_not_drawn_to_a_wall() {
     let start = initialise(&problem, &case.config).unwrap();
     let [across, up] = miss(centroid(start.params.group(Group::Position)), truth);
     assert!(across < 0.35 && up < 0.3, "{across:.2} m across, {up:.2} m up");
+}
+
+/// Something as tall as a person that outshines the person in both views: only the frames around tell.
+#[test]
+fn counting_tells_where_the_peaks_alone_are_wrong() {
+    let folder = case_folders().into_iter().find(|f| f.ends_with("mmvr-size")).unwrap();
+    let case = Case::open(&folder);
+    let truth = centroid(&read(&folder.join("frames/000000.npz"), "joints"));
+    let (views, shelf) = (case.problem.views.clone(), [truth[0] + 2.0, truth[1] + 1.0]);
+    let depths = [shelf[0], shelf[0].hypot(shelf[1])];
+    let maps: Vec<Vec<f64>> = (0..2)
+        .map(|view| {
+            let mut map = case.problem.map(view).to_vec();
+            let largest = map.iter().copied().fold(0.0, f64::max);
+            for (cell, value) in map.iter_mut().enumerate() {
+                let [depth, beside] =
+                    [views[view].axes[0].at((cell / 128) as f64), views[view].axes[1].at((cell % 128) as f64)];
+                let beside = if view == 0 { (beside - shelf[1]) / 0.15 } else { (beside.abs() - 0.8).max(0.0) / 0.1 };
+                *value += 3.0 * largest * (-((depth - depths[view]) / 0.12).powi(2) - beside * beside).exp();
+            }
+            map
+        })
+        .collect();
+    let slices: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
+    let problem = Arc::new(Problem::new(case.problem.radar, case.problem.skeleton, views, &slices).unwrap());
+    let config = FitConfig { place: Place::Counted, ..case.config };
+    let across = |params: &Pppr, place: [f64; 2]| {
+        let [x, y, _] = centroid(params.group(Group::Position));
+        (x - place[0]).hypot(y - place[1])
+    };
+    let person = [truth[0], truth[1]];
+    let begun = |seeds: &[[f64; 3]]| initialise_people(&problem, &config, seeds).unwrap();
+    let alone = begun(&[]);
+    assert!(across(&alone.params, shelf) < 0.4, "the peaks alone show the shelf: {:?}", alone.notes);
+    let counted = begun(&[truth]);
+    assert!(across(&counted.params, person) < 0.45 && across(&counted.unrefined, shelf) < 0.4, "{:?}", counted.notes);
+    assert!(counted.notes.iter().any(|note| note.contains("the frames around do not")), "{:?}", counted.notes);
+    // What counting finds nearby is less exact than the peaks.
+    let agreed = begun(&[[shelf[0] + 0.5, shelf[1], 0.0]]);
+    assert_eq!(agreed.params, alone.params);
 }
 
 #[test]
