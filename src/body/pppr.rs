@@ -158,6 +158,13 @@ impl Pppr {
         self.numbers.resize(shape.total(), 0.0);
     }
 
+    /// `own` · self + `share` · `other`, which has the same sizes.
+    pub fn mix(&mut self, own: f64, share: f64, other: &Self) {
+        for (x, other) in self.numbers.iter_mut().zip(&other.numbers) {
+            *x = own * *x + share * other;
+        }
+    }
+
     /// The sizes.
     pub fn shape(&self) -> PpprShape {
         self.shape
@@ -202,6 +209,18 @@ impl Pppr {
         self.group(Group::Position).as_chunks().0
     }
 
+    /// Velocities v of all flat joints, m/s, world frame.
+    pub fn velocities(&self) -> &[Vec3] {
+        self.group(Group::Velocity).as_chunks().0
+    }
+
+    /// Positions and velocities of all flat joints, to be written.
+    pub fn motion_mut(&mut self) -> [&mut [Vec3]; 2] {
+        let [positions, velocities] = [Group::Position, Group::Velocity].map(|group| self.shape.range(group));
+        let (before, after) = self.numbers.split_at_mut(velocities.start);
+        [before[positions].as_chunks_mut().0, after[..velocities.len()].as_chunks_mut().0]
+    }
+
     /// Position p of flat joint `joint`, m, world frame.
     pub fn position(&self, joint: usize) -> Vec3 {
         self.vec3(Group::Position, joint)
@@ -230,9 +249,14 @@ impl Pppr {
 
     /// True where every number of every group is finite.
     pub fn is_finite(&self) -> bool {
-        // Without a way out of the loop it is many at a time.
-        const EXPONENT: u64 = 0x7FF0_0000_0000_0000;
-        let odd = |x: &f64| x.to_bits() & EXPONENT == EXPONENT;
-        !self.numbers.iter().fold(false, |any, x| any | odd(x))
+        // Zero times what is not finite is no number; without a way out of the loop it is many at a time.
+        let (eights, rest) = self.numbers.as_chunks::<8>();
+        let mut zeros = [0.0; 8];
+        for eight in eights {
+            for (zero, x) in zeros.iter_mut().zip(eight) {
+                *zero += x * 0.0;
+            }
+        }
+        zeros.iter().all(|&zero| zero == 0.0) && rest.iter().all(|x| x.is_finite())
     }
 }

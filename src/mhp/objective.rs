@@ -161,11 +161,7 @@ impl Objective {
         forms.pull_back(covariance, em_gradient, *precision);
         *terms = kinematic::evaluate(&self.problem.skeleton, &self.config, params, gradient);
         terms.em = em;
-        for group in Group::ALL {
-            for (total, em) in gradient.group_mut(group).iter_mut().zip(em_gradient.group(group)) {
-                *total = self.config.w_kine * *total + self.config.w_em * em;
-            }
-        }
+        gradient.mix(self.config.w_kine, self.config.w_em, em_gradient);
         if self.config.w_time > 0.0 {
             terms.time = anchored(&self.anchors, params, self.config.w_time, gradient);
         }

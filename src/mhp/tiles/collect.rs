@@ -306,13 +306,12 @@ impl Sums {
         let squares = [[delta * delta * r, delta * ry, delta * rx], [delta * ry, ryy, rxy], [delta * rx, rxy, rxx]];
         moments.r += r;
         moments.q += q;
-        for k in missing..3 {
-            moments.r_delta[k - missing] += deltas[k];
-            moments.q_delta[k - missing] += turns[k];
-            for l in missing..3 {
-                moments.r_delta_delta[k - missing][l - missing] += squares[k][l];
-            }
-        }
+        let add = |sums: &mut [f64; 3], of: &[f64; 3]| {
+            sums.iter_mut().zip(&of[missing..]).for_each(|(sum, x)| *sum += x);
+        };
+        add(&mut moments.r_delta, &deltas);
+        add(&mut moments.q_delta, &turns);
+        moments.r_delta_delta.iter_mut().zip(&squares[missing..]).for_each(|(sums, of)| add(sums, of));
         if missing == 0
             && let Some(sum) = moments.r_by_bin[0].get_mut(slice)
         {
