@@ -22,9 +22,9 @@ pub struct Begun {
 /// these views.
 pub fn begin(problem: &Arc<Problem>, config: &FitConfig) -> Result<Begun, FitError> {
     if config.people == 1 {
-        // The paper looks for one person without a count, and so it goes where nothing can be counted.
+        // The paper looks for one person without a count, and so it goes where nothing can be counted, or nobody is.
         let asked = config.place == Place::Counted && !problem.neighbours().is_empty();
-        let counted = asked.then(|| count(problem).ok()).flatten().filter(|count| !count.clusters.is_empty());
+        let counted = asked.then(|| count(problem).ok()).flatten().filter(|count| count.people() > 0);
         let seeds = counted.map_or_else(Vec::new, |count| count.seeds(1));
         return Ok(Begun { initialisation: initialise_people(problem, config, &seeds)?, count: None });
     }

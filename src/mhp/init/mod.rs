@@ -11,8 +11,8 @@
 //! 6. Every joint gets its Gaussian ([`scatterers`]), and the start is spoiled where the settings ask for it
 //!    ([`perturb`]).
 //!
-//! Switches beside the paper's setting refine the start: behind the skin, on the line through the frames around, as high as
-//! floor and head say in all of them ([`height`]), in the posture that fits ([`pose`]). What it is without them is kept
+//! Switches beside the paper's setting refine the start: where counting finds the one person, behind the skin, on the line
+//! through the frames around, as high as floor and head say in all of them ([`height`]), in the posture that fits ([`pose`]). What it is without them is kept
 //! beside it. The evidence is worked out once for a problem ([`surroundings`]).
 //!
 //! Nothing here reads a label.
