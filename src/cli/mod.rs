@@ -17,6 +17,8 @@ pub mod simulate;
 mod study;
 #[cfg(feature = "train")]
 mod train_counter;
+#[cfg(feature = "train")]
+mod train_limbs;
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -171,6 +173,10 @@ pub enum Command {
     #[cfg(feature = "train")]
     #[command(after_help = train_counter::HELP)]
     TrainCounter(train_counter::TrainCounterArgs),
+    /// Make the linear map of the limbs anew
+    #[cfg(feature = "train")]
+    #[command(after_help = train_limbs::HELP)]
+    TrainLimbs(train_limbs::TrainLimbsArgs),
 }
 
 /// Runs a subcommand.
@@ -194,5 +200,7 @@ pub fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Simulate(args) => simulate::run(&args),
         #[cfg(feature = "train")]
         Command::TrainCounter(args) => train_counter::run(&args),
+        #[cfg(feature = "train")]
+        Command::TrainLimbs(args) => train_limbs::run(&args),
     }
 }

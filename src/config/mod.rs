@@ -8,7 +8,7 @@ mod init;
 mod preset;
 
 pub use fields::{FIELDS, Field, FieldGroup};
-pub use init::{Height, InitConfig, LearningRates, Parameterization, Place, Scatterers, Yaw};
+pub use init::{Height, InitConfig, LearningRates, Limbs, Parameterization, Place, Scatterers, Yaw};
 pub use preset::Preset;
 
 use serde::{Deserialize, Serialize};
@@ -137,6 +137,8 @@ pub struct FitConfig {
     pub w_time: f64,
     /// What tells how high a start stands.
     pub height: Height,
+    /// What tells where the limbs of a start are.
+    pub limbs: Limbs,
     /// The four operators.
     pub operators: Operators,
     /// Step sizes of single groups.
@@ -169,6 +171,7 @@ impl Default for FitConfig {
             starts: 1,
             w_time: 0.0,
             height: Height::default(),
+            limbs: Limbs::default(),
             operators: Operators::default(),
             learning_rates: LearningRates::default(),
             init: InitConfig::default(),

@@ -1,6 +1,6 @@
 //! Settings with a name.
 
-use super::{EmRegion, FitConfig, Height, LearningRates, Parameterization, Place, Scatterers, Summation, Yaw};
+use super::{EmRegion, FitConfig, Height, LearningRates, Limbs, Parameterization, Place, Scatterers, Summation, Yaw};
 
 /// A whole [`FitConfig`] with a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,7 +34,7 @@ impl Preset {
             Self::Paper => "The paper's setting: every joint moves by itself, equal round Gaussians, coherent sum.",
             Self::Recommended => {
                 "What fits best on synthetic data with truth: the body moves as one, skin in front of the joints, Gaussians by body \
-                 part, heading and place from the frames around, feet on the floor, the posture that fits, powers add."
+                 part, heading and place from the frames around, feet on the floor, the posture that fits, limbs as learned from simulated people, powers add."
             }
         }
     }
@@ -49,6 +49,7 @@ impl Preset {
                 place: Place::Counted,
                 yaw: Yaw::Motion,
                 height: Height::Floor,
+                limbs: Limbs::Learned,
                 summation: Summation::Incoherent,
                 em_region: EmRegion::HalfWidth(1.0),
                 surface_offset_m: 0.04,

@@ -32,7 +32,9 @@ pub use adam::Adam;
 pub use fill::fill_missing;
 pub(crate) use fill::for_neighbours;
 pub use fitter::{FitState, Fitter};
-pub use init::{Initialisation, Peak, initialise, initialise_people, predict};
+pub use init::{Initialisation, LimbMap, Peak, initialise, initialise_people, predict};
+#[cfg(feature = "train")]
+pub use init::{LimbLesson, learn_limbs};
 pub use objective::{Masks, Objective, masks};
 pub(crate) use percentile::{percentile, percentiles};
 pub use problem::{Neighbour, Problem};

@@ -4,7 +4,7 @@ use super::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, chip, icon_button, iou_color, value_row};
 use crate::config::{
-    EmRegion, Field, FieldGroup, FitConfig, Height, Parameterization, Place, Preset, Scatterers, Summation, Yaw,
+    EmRegion, Field, FieldGroup, FitConfig, Height, Limbs, Parameterization, Place, Preset, Scatterers, Summation, Yaw,
 };
 use crate::mhp::Precision;
 use crate::session::{Command, FitStatus};
@@ -302,9 +302,18 @@ fn model(ui: &mut Ui, config: &mut FitConfig) {
     });
     ui.horizontal(|ui| {
         ui.label("Height");
-        ui.selectable_value(&mut config.height, Height::Echo, "middle of the echo").on_hover_text("The paper.");
+        ui.selectable_value(&mut config.height, Height::Echo, "echo")
+            .on_hover_text("The middle of the echo: the paper.");
         ui.selectable_value(&mut config.height, Height::Floor, "floor and head").on_hover_text(
             "Where the data set tells the radar's height (height_m). Takes effect when a start is found.",
+        );
+    });
+    ui.horizontal(|ui| {
+        ui.label("Limbs");
+        ui.selectable_value(&mut config.limbs, Limbs::Posture, "of the posture").on_hover_text("The paper.");
+        ui.selectable_value(&mut config.limbs, Limbs::Learned, "learned").on_hover_text(
+            "Moved as what is lit around the person says; learned from simulated people. Takes effect when a start is \
+             found.",
         );
     });
     for field in FieldGroup::Regularisation.fields() {

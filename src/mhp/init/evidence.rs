@@ -8,7 +8,7 @@
 
 use super::layout::{Layout, NEAREST_M};
 use super::locate::Mark;
-use crate::geometry::{Vec3, mat_t_vec};
+use crate::geometry::{Vec3, dot, mat_t_vec};
 use crate::mhp::fill::all_neighbours;
 use crate::mhp::for_neighbours;
 use crate::mhp::seen::Seen;
@@ -158,7 +158,7 @@ impl Evidence {
     }
 
     /// The spatial cell at a world point; `None` outside the map.
-    fn cell(&self, p_world: Vec3) -> Option<usize> {
+    pub(super) fn cell(&self, p_world: Vec3) -> Option<usize> {
         let p = self.layout.view.pose.view_from_world(p_world);
         self.layout.axes.iter().try_fold(0, |flat, (_, axis)| {
             let bin = axis.bin(axis.coordinate(p)).round();
@@ -172,13 +172,18 @@ impl Evidence {
         sum / points.len().max(1) as f64
     }
 
-    /// Whether some axis of this view tells heights near a world point.
-    pub(super) fn resolves_height(&self, p_world: Vec3) -> bool {
+    /// Whether some axis of this view tells positions along `direction` (unit vector, world frame) near a world point.
+    pub(super) fn resolves(&self, p_world: Vec3, direction: Vec3) -> bool {
         let seen = Seen::new(self.layout.view.pose.view_from_world(p_world));
         self.layout.axes.iter().any(|(_, axis)| {
-            let up = mat_t_vec(&self.layout.view.pose.rotation, seen.direction_and_arm(axis.kind).0)[2];
-            up.abs() > 0.7
+            let along = mat_t_vec(&self.layout.view.pose.rotation, seen.direction_and_arm(axis.kind).0);
+            dot(along, direction).abs() > 0.7
         })
+    }
+
+    /// The largest salience of some cells, ln; 0 of none.
+    pub(super) fn brightest(&self, cells: &[usize]) -> f64 {
+        cells.iter().map(|&cell| self.salience(cell)).fold(0.0, f64::max)
     }
 
     /// The largest salience at height `z_m` within `reach_m` before and behind `p_world`, ln.

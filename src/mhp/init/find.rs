@@ -81,7 +81,7 @@ pub(super) fn centre(problem: &Problem, evidence: &[Evidence], mut at: Vec3, apa
         if misfit > LARGEST_MISFIT_M || !found.iter().all(|x| x.is_finite()) {
             break;
         }
-        let height_seen = evidence.iter().any(|e| e.resolves_height(found));
+        let height_seen = evidence.iter().any(|e| e.resolves(found, [0.0, 0.0, 1.0]));
         at = if height_seen { found } else { [found[0], found[1], at[2]] };
     }
     // The middle of what is lit says little of a body's height: heads outshine feet, or the other way round.

@@ -87,7 +87,7 @@ pub(super) struct Expectation {
 impl Expectation {
     /// Looks for feet and head of a body found near `at`.
     pub(super) fn new(evidence: &[Evidence], at: Vec3) -> Self {
-        let telling: Vec<&Evidence> = evidence.iter().filter(|e| e.resolves_height(at)).collect();
+        let telling: Vec<&Evidence> = evidence.iter().filter(|e| e.resolves(at, [0.0, 0.0, 1.0])).collect();
         let salience = |z: f64| {
             let sum: f64 = telling.iter().map(|e| e.salience_at_height(at, z, REACH_M)).sum();
             sum / telling.len().max(1) as f64

@@ -11,9 +11,10 @@
 //! 6. Every joint gets its Gaussian ([`scatterers`]), and the start is spoiled where the settings ask for it
 //!    ([`perturb`]).
 //!
-//! Switches beside the paper's setting refine the start: where counting finds the one person, behind the skin, on the line
-//! through the frames around, as high as floor and head say in all of them ([`height`]), in the posture that fits ([`pose`]). What it is without them is kept
-//! beside it. The evidence is worked out once for a problem ([`surroundings`]).
+//! Switches beside the paper's setting refine the start: where counting finds the one person, behind the skin, on the
+//! line through the frames around, as high as floor and head say in all of them ([`height`]), in the posture that fits
+//! ([`pose`]), with the limbs where simulated people have them who look alike ([`learned`]). What it is without them is
+//! kept beside it. The evidence is worked out once for a problem ([`surroundings`]).
 //!
 //! Nothing here reads a label.
 
@@ -21,6 +22,7 @@ mod evidence;
 mod find;
 mod height;
 mod layout;
+mod learned;
 mod locate;
 mod motion;
 mod perturb;
@@ -32,12 +34,15 @@ mod template;
 mod velocity;
 
 pub use evidence::Peak;
+pub use learned::LimbMap;
+#[cfg(feature = "train")]
+pub use learned::{Lesson as LimbLesson, learn as learn_limbs};
 pub(super) use surroundings::{Cached, Surroundings};
 
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
-use crate::config::{FitConfig, Height, Place, Summation, Yaw};
-use crate::geometry::{Vec3, add, flat_distance, scale, sub};
+use crate::config::{FitConfig, Height, Limbs, Place, Summation, Yaw};
+use crate::geometry::{Vec3, add, flat_distance, norm, scale, sub};
 use find::{apart_m, centre, find_one, middle_of_views, near};
 use height::{Expectation, Stature};
 use motion::{Sighting, Track};
@@ -54,6 +59,8 @@ const POSTURE_STEP_M: f64 = 0.06;
 const MOST_STEPS: usize = 12;
 /// What counting finds farther from a place than this is another place, m.
 const ELSEWHERE_M: f64 = 1.0;
+/// Somebody nearer than this is lit where the limbs are looked for, m.
+const ALONE_M: f64 = 1.8;
 /// The L_EM of a posture other than standing, of that of standing, at which it is believed of somebody who does not walk.
 const CLEARLY_BETTER: f64 = 0.9;
 
@@ -78,6 +85,8 @@ struct Person {
     expected: Option<Expectation>,
     track: Option<Track>,
     radial: Option<Radial>,
+    /// To the nearest other person, m.
+    apart_m: f64,
     posture: Posture,
     /// The template in that posture.
     body: Arc<Template>,
@@ -108,6 +117,28 @@ impl Person {
     fn forward(&self, yaw: Yaw) -> [f64; 2] {
         let walking = self.track.as_ref().filter(|_| yaw == Yaw::Motion).and_then(|track| track.heading);
         walking.unwrap_or_else(|| towards_radar(self.at))
+    }
+
+    /// Its joints, world frame, m.
+    fn joints(&self, problem: &Problem, config: &FitConfig) -> Vec<Vec3> {
+        let posed = self.posed(problem, config);
+        let learned = config.limbs == Limbs::Learned && self.apart_m > ALONE_M;
+        learned.then(|| learned::moved(problem, &posed)).flatten().unwrap_or(posed)
+    }
+
+    /// Its joints in its posture.
+    fn posed(&self, problem: &Problem, config: &FitConfig) -> Vec<Vec3> {
+        let at = match &self.track {
+            Some(track) if config.w_time > 0.0 => [track.at[0], track.at[1], self.at[2]],
+            _ => self.at,
+        };
+        let bent = matches!(self.posture, Posture::Bent(_));
+        let mut at = if bent { at } else { behind_skin(config, at) };
+        if let (Some(stature), Some(radar_height_m)) = (self.stature(problem, config), problem.radar.height_m) {
+            let top_m = stature.top_m.filter(|_| bent).unwrap_or(stature.standing_m);
+            at[2] = self.body.middle_as_tall_as_m(top_m) - radar_height_m;
+        }
+        self.body.facing(at, self.forward(config.yaw))
     }
 
     fn velocity(&self, config: &FitConfig) -> Vec3 {
@@ -167,7 +198,7 @@ pub fn initialise_people(
         let here = Sighting { t_s: 0.0, at, lit_m: expected.and_then(|expected| expected.lit) };
         let track = followed(config).then(|| motion::track(problem, here, apart_m)).flatten();
         let radial = velocity::radial(problem, at, config.init.velocity_gain_mps);
-        Person { at, expected, track, radial, posture: Posture::Standing, body: Arc::clone(&template) }
+        Person { at, expected, track, radial, apart_m, posture: Posture::Standing, body: Arc::clone(&template) }
     };
     let own: Vec<Person> =
         found.into_iter().enumerate().map(|(k, (at, expected))| person(at, expected, apart_m(&places, k))).collect();
@@ -188,11 +219,13 @@ pub fn initialise_people(
     }
     let dress = Dress::new(&problem.skeleton, config.scatterers);
     let mut params = assemble(problem, config, &dress, &persons);
+    let moved_m: Vec<f64> =
+        persons.iter().enumerate().map(|(k, person)| mean_way_m(&params, k, &person.posed(problem, config))).collect();
     let mut unrefined = assemble(problem, &unrefined(config), &dress, &own);
     for start in [&mut params, &mut unrefined] {
         perturb::spoil(problem, &config.init, start);
     }
-    notes.extend(persons.iter().flat_map(|person| tell(person, config)));
+    notes.extend(persons.iter().zip(moved_m).flat_map(|(person, moved_m)| tell(person, config, moved_m)));
     Ok(Initialisation { params, unrefined, peaks, notes })
 }
 
@@ -204,7 +237,7 @@ fn choose_postures(
     template: &Template,
     persons: &mut [Person],
 ) -> Result<(), FitError> {
-    let config = FitConfig { summation: Summation::Incoherent, w_time: 0.0, ..*config };
+    let config = FitConfig { summation: Summation::Incoherent, w_time: 0.0, limbs: Limbs::Posture, ..*config };
     let dress = Dress::new(&problem.skeleton, config.scatterers);
     for k in 0..persons.len() {
         let walks = persons[k].walks();
@@ -323,6 +356,7 @@ fn unrefined(config: &FitConfig) -> FitConfig {
         place: Place::Peaks,
         yaw: Yaw::Radar,
         height: Height::Echo,
+        limbs: Limbs::Posture,
         w_time: 0.0,
         surface_offset_m: 0.0,
         ..*config
@@ -343,19 +377,7 @@ fn assemble(problem: &Problem, config: &FitConfig, dress: &Dress, persons: &[Per
     let mut params = Pppr::zeros(PpprShape { persons: persons.len(), joints, doppler_features });
     for (k, person) in persons.iter().enumerate() {
         let velocity = person.velocity(config);
-        let body = &person.body;
-        let at = match &person.track {
-            Some(track) if config.w_time > 0.0 => [track.at[0], track.at[1], person.at[2]],
-            _ => person.at,
-        };
-        let bent = matches!(person.posture, Posture::Bent(_));
-        let mut at = if bent { at } else { behind_skin(config, at) };
-        if let (Some(stature), Some(radar_height_m)) = (person.stature(problem, config), problem.radar.height_m) {
-            let top_m = stature.top_m.filter(|_| bent).unwrap_or(stature.standing_m);
-            let middle_m = body.middle_as_tall_as_m(top_m);
-            at[2] = middle_m - radar_height_m;
-        }
-        for (joint, p) in body.facing(at, person.forward(config.yaw)).into_iter().enumerate() {
+        for (joint, p) in person.joints(problem, config).into_iter().enumerate() {
             params.set_vec3(Group::Position, k * joints + joint, p);
             params.set_vec3(Group::Velocity, k * joints + joint, velocity);
         }
@@ -364,8 +386,14 @@ fn assemble(problem: &Problem, config: &FitConfig, dress: &Dress, persons: &[Per
     params
 }
 
-/// What was found of a person, in words.
-fn tell(person: &Person, config: &FitConfig) -> Vec<String> {
+/// How far the joints of the `k`th person are from `posed`, on average, m.
+fn mean_way_m(params: &Pppr, k: usize, posed: &[Vec3]) -> f64 {
+    let way = |(joint, &p): (usize, &Vec3)| norm(sub(params.position(k * posed.len() + joint), p));
+    posed.iter().enumerate().map(way).sum::<f64>() / posed.len().max(1) as f64
+}
+
+/// What was found of a person, in words; `moved_m` is how far its joints are from its posture's.
+fn tell(person: &Person, config: &FitConfig, moved_m: f64) -> Vec<String> {
     let at = person.at;
     let walking = person.track.as_ref().filter(|track| config.yaw == Yaw::Motion && track.heading.is_some());
     let mut notes = vec![match walking {
@@ -395,5 +423,11 @@ fn tell(person: &Person, config: &FitConfig) -> Vec<String> {
         _ if walking.is_some() => "velocity from the frames around".to_owned(),
         _ => "velocity 0: no Doppler axis and no frame around".to_owned(),
     });
+    if config.limbs == Limbs::Learned {
+        notes.push(match moved_m {
+            0.0 => "limbs of the posture: nothing learned applies here".to_owned(),
+            moved_m => format!("joints {:.0} cm from the posture's, as learned of simulated people", 1e2 * moved_m),
+        });
+    }
     notes
 }

@@ -148,7 +148,7 @@ pub(super) fn posed(template: &Template, skeleton: &Skeleton, posture: Posture) 
 }
 
 /// Whether one of `words` stands in a joint's name.
-fn is_named(skeleton: &Skeleton, joint: usize, words: &[&str]) -> bool {
+pub(super) fn is_named(skeleton: &Skeleton, joint: usize, words: &[&str]) -> bool {
     skeleton.joints[joint].to_lowercase().split(['_', ' ', '-']).any(|word| words.contains(&word))
 }
 

@@ -159,7 +159,7 @@ fn size_ratio(skeleton: &Skeleton, joints: &[Vec3]) -> f64 {
 }
 
 /// All bones pull at once towards their lengths; a joint takes the mean of what its bones want.
-fn relax(skeleton: &Skeleton, joints: &mut [Vec3]) {
+pub(super) fn relax(skeleton: &Skeleton, joints: &mut [Vec3]) {
     let mut degree = vec![0.0_f64; joints.len()];
     for &[m, n] in &skeleton.bones {
         degree[m] += 1.0;

@@ -22,6 +22,7 @@ pub const SWITCHES: &[Switch] = &[
     Switch { name: "several starts", take: |to, from| to.starts = from.starts },
     Switch { name: "temporal term", take: |to, from| to.w_time = from.w_time },
     Switch { name: "height from the floor", take: |to, from| to.height = from.height },
+    Switch { name: "limbs as learned", take: |to, from| to.limbs = from.limbs },
     Switch { name: "people", take: |to, from| to.people = from.people },
     Switch { name: "softness", take: |to, from| to.softness = from.softness },
     Switch { name: "threshold", take: |to, from| to.tau_pct = from.tau_pct },

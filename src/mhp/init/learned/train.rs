@@ -1,0 +1,90 @@
+//! Ridge regression of the limbs over people with truth.
+
+use super::{ACROSS, AWAY, Frame, INPUTS, LimbMap, PARTS, Parts, UP, inputs};
+use crate::body::Pppr;
+use crate::geometry::{Vec3, add, norm, sub};
+use crate::mhp::Problem;
+use nalgebra::{Cholesky, DMatrix};
+
+/// A start whose middle is farther than this from the person's, m, stands elsewhere: it says nothing of limbs.
+const ELSEWHERE_M: f64 = 0.4;
+
+/// What one frame teaches.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lesson {
+    inputs: Vec<f32>,
+    /// How far each part is from where the start has it: away, to the left, up, m.
+    ways: [Vec3; PARTS],
+}
+
+impl Lesson {
+    /// Of a frame with one person whose joints are `truth` (world frame, m) and whose start is `start`; `None` where the
+    /// views or the skeleton say nothing of the limbs, or the start stands elsewhere.
+    pub fn of(problem: &Problem, start: &Pppr, truth: &[Vec3]) -> Option<Self> {
+        let parts = Parts::of(&problem.skeleton)?;
+        let joints: Vec<Vec3> = (0..start.shape().joints).map(|joint| start.position(joint)).collect();
+        if truth.len() != joints.len() {
+            return None;
+        }
+        let before = parts.places(&joints);
+        let frame = Frame::around(&before, &joints);
+        let (before, after) = (before.map(|p| frame.local(p)), parts.places(truth).map(|p| frame.local(p)));
+        let ways: [Vec3; PARTS] = std::array::from_fn(|part| sub(after[part], before[part]));
+        let whole = ways.iter().fold([0.0; 3], |sum, &way| add(sum, way));
+        if norm(whole) > ELSEWHERE_M * PARTS as f64 {
+            return None;
+        }
+        Some(Self { inputs: inputs(problem, &frame, &parts, &joints)?, ways })
+    }
+
+    /// The same scene left and right exchanged: a radar does not care, and what is learned must not either.
+    fn mirrored(&self) -> Self {
+        let of_part = |part: usize| [1.0, -1.0, 1.0].into_iter().zip(self.ways[Parts::mirrored(part)]);
+        let mut inputs = self.inputs.clone();
+        for row in inputs[..AWAY * ACROSS].chunks_exact_mut(ACROSS) {
+            row.reverse();
+        }
+        let first = AWAY * ACROSS + AWAY * UP + 1;
+        for part in 0..PARTS {
+            let from = first + 3 * Parts::mirrored(part);
+            let [away, left, up] = [0, 1, 2].map(|k| self.inputs[from + k]);
+            inputs[first + 3 * part..first + 3 * part + 3].copy_from_slice(&[away, -left, up]);
+        }
+        let ways = std::array::from_fn(|part| {
+            let mut way = of_part(part).map(|(sign, x)| sign * x);
+            std::array::from_fn(|_| way.next().unwrap_or_default())
+        });
+        Self { inputs, ways }
+    }
+
+    /// Mean distance of the parts from where they are, m: as the start has them, and as `map` moves them.
+    pub fn errors_m(&self, map: &LimbMap) -> [f64; 2] {
+        let said = map.apply(&self.inputs);
+        let mean = |of: &dyn Fn(usize) -> f64| (0..PARTS).map(of).sum::<f64>() / PARTS as f64;
+        [mean(&|part| norm(self.ways[part])), mean(&|part| norm(sub(self.ways[part], said[part])))]
+    }
+}
+
+/// Learns from `lessons` and their mirror images: the least squares of the ways, and of the weights of the standardised
+/// inputs, of which each counts as much as `ridge` of the lessons. `None` without lessons.
+pub fn learn(lessons: &[Lesson], ridge: f64) -> Option<LimbMap> {
+    let lessons: Vec<Lesson> = lessons.iter().flat_map(|lesson| [lesson.clone(), lesson.mirrored()]).collect();
+    let rows = lessons.len();
+    let x = DMatrix::from_fn(rows, INPUTS, |i, k| f64::from(lessons[i].inputs[k]));
+    let y = DMatrix::from_fn(rows, 3 * PARTS, |i, k| lessons[i].ways[k / 3][k % 3]);
+    let (mean, bias) = (x.row_mean(), y.row_mean());
+    let scale = x.row_variance().map(|variance| if variance > 1e-12 { variance.sqrt() } else { 1.0 });
+    let x = DMatrix::from_fn(rows, INPUTS, |i, k| (x[(i, k)] - mean[k]) / scale[k]);
+    let mut normal = x.transpose() * &x;
+    for k in 0..INPUTS {
+        normal[(k, k)] += ridge * rows as f64;
+    }
+    let weight = Cholesky::new(normal)?.solve(&(x.transpose() * &y));
+    Some(LimbMap {
+        header: Vec::new(),
+        mean: mean.iter().map(|&x| x as f32).collect(),
+        scale: scale.iter().map(|&x| x as f32).collect(),
+        weight: weight.column_iter().map(|column| column.iter().map(|&x| x as f32).collect()).collect(),
+        bias: bias.iter().map(|&x| x as f32).collect(),
+    })
+}
