@@ -88,3 +88,43 @@ pub fn learn(lessons: &[Lesson], ridge: f64) -> Option<LimbMap> {
         bias: bias.iter().map(|&x| x as f32).collect(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+
+    /// Inputs of many sizes, none of which follows from the others.
+    fn lesson(seed: usize) -> Lesson {
+        let noise = |k: usize| ((seed * 7919 + k * 104_729 + seed * k * 31) % 1009) as f32 / 1009.0;
+        let inputs: Vec<f32> = (0..INPUTS).map(noise).collect();
+        // The head goes where the distance says, and both hands outwards.
+        let distance = f64::from(inputs[AWAY * ACROSS + AWAY * UP]);
+        let mut ways = [[0.0; 3]; PARTS];
+        ways[0] = [0.2 * distance, 0.0, 0.1];
+        (ways[5], ways[6]) = ([0.0, -0.3 * distance, 0.0], [0.0, 0.3 * distance, 0.0]);
+        Lesson { inputs, ways }
+    }
+
+    #[test]
+    fn a_mirror_image_is_another_and_its_mirror_image_the_same() {
+        let lesson = lesson(3);
+        let mirrored = lesson.mirrored();
+        assert!(mirrored.inputs != lesson.inputs && mirrored.mirrored() == lesson);
+        assert_eq!(mirrored.inputs[0], lesson.inputs[ACROSS - 1], "the floor plan's left is its right");
+        assert_eq!(mirrored.inputs[AWAY * ACROSS], lesson.inputs[AWAY * ACROSS], "the upright lattice has no sides");
+        assert_eq!(mirrored.ways[5], lesson.ways[5], "outwards stays outwards");
+    }
+
+    #[test]
+    fn what_is_linear_is_found() {
+        let lessons: Vec<Lesson> = (0..1200).map(lesson).collect();
+        let map = learn(&lessons, 1e-6).unwrap();
+        for lesson in (2000..2040).map(lesson) {
+            let [before, after] = lesson.errors_m(&map);
+            assert!(after < 1e-3 * (before + 1.0), "{before} m before, {after} m after");
+        }
+        assert!(learn(&[], 0.35).is_none());
+    }
+}
