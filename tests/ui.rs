@@ -10,10 +10,13 @@ mod window;
 
 use egui::{Key, Modifiers, pos2};
 use egui_kittest::Harness;
-use mhp_inspector::app::InspectorApp;
+use mhp_inspector::app::{Begin, InspectorApp};
 use mhp_inspector::body::Group;
+use mhp_inspector::config::Preset;
+use mhp_inspector::dataset::{Dataset, Progress};
 use mhp_inspector::geometry::{norm, sub};
 use mhp_inspector::session::{Command, Compare, FitStatus, ThemeChoice};
+use mhp_inspector::start::{begin as begin_fit, problem_of};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use window::Window;
@@ -41,6 +44,22 @@ fn a_data_set_opens_runs_pauses_and_steps() {
     window.click("Follow newest");
     window.until("the newest", |w| w.fit().shown.as_ref().is_some_and(|s| s.iteration == head + 11));
     assert_eq!(window.fit().cursor, None);
+}
+
+/// A start is found as soon as a data set is open: settings that come later would not be in it.
+#[test]
+fn settings_given_at_the_beginning_are_in_the_first_start() {
+    let sample = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/walk");
+    let config = Preset::Recommended.config();
+    let begin = Begin { paths: vec![sample.clone()], config: Some(config), ..Begin::default() };
+    let harness = Harness::builder().with_size([1280.0, 800.0]).build_eframe(|cc| InspectorApp::begin(cc, &begin));
+    let mut window = Window { harness, folder: tempfile::tempdir().unwrap() };
+    window.ready(0);
+    let dataset = Dataset::open(&sample, &Progress::new()).unwrap();
+    let problem = Arc::new(problem_of(&dataset, &dataset.load(0).unwrap()).unwrap());
+    let start = begin_fit(&problem, &config).unwrap().initialisation.params;
+    assert_eq!(window.session().config, config);
+    assert_eq!(window.fit().initial.as_ref(), Some(&start));
 }
 
 #[test]

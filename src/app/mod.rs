@@ -14,6 +14,7 @@ mod sharing;
 mod theme;
 mod widgets;
 
+use crate::config::FitConfig;
 use crate::session::{Aim, Command, LogLevel, Runtime, Session, ViewState};
 use commands::{Act, AppAct};
 use layout::Layout;
@@ -43,6 +44,8 @@ pub struct Begin {
     pub results: Option<PathBuf>,
     /// The run folder of a study.
     pub study: Option<PathBuf>,
+    /// The settings, in force before anything is opened.
+    pub config: Option<FitConfig>,
     /// A session file, instead of all that.
     pub session: Option<PathBuf>,
 }
@@ -99,6 +102,9 @@ impl InspectorApp {
         if let Some(session) = &begin.session {
             app.apply(Command::OpenSession(session.clone()));
             return app;
+        }
+        if let Some(config) = begin.config {
+            app.apply(Command::SetConfig(Box::new(config)));
         }
         match begin.paths.first().cloned().or_else(crate::dataset::bundled_sample) {
             Some(path) => app.apply(Command::OpenAt(path, begin.aim.clone())),

@@ -81,8 +81,11 @@ pub struct WindowArgs {
     /// Run its fit until this iteration.
     #[arg(long, value_name = "K")]
     pub iteration: Option<usize>,
+    /// The settings to begin with.
+    #[arg(long, value_name = "FIT.toml")]
+    pub config: Option<PathBuf>,
     /// Open a session file: the same frame, iteration, camera, pins and layout.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["paths", "frame", "iteration", "results", "study"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["paths", "frame", "iteration", "results", "study", "config"])]
     pub session: Option<PathBuf>,
 }
 
@@ -111,6 +114,7 @@ impl WindowArgs {
             aim,
             results: self.results,
             study: self.study,
+            config: self.config.as_deref().map(crate::config::FitConfig::from_file).transpose()?,
             session: self.session,
         })
     }

@@ -2,7 +2,6 @@
 
 use super::common::config;
 use crate::app::{Begin, InspectorApp, PaneKind};
-use crate::config::FitConfig;
 use crate::session::{Command, FitStatus, LabelStatus, StrataStatus, ThemeChoice};
 use anyhow::{Context as _, bail};
 use clap::{Args, ValueEnum};
@@ -100,10 +99,10 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
 /// Where the data set or frame cannot be read, the fit fails, there is no graphics adapter, or the picture cannot be
 /// written.
 pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
-    let config = config(args.config.as_deref())?;
     let begin = Begin {
         paths: args.path.iter().cloned().collect(),
         study: args.study.clone(),
+        config: Some(config(args.config.as_deref())?),
         session: args.session.clone(),
         ..Begin::default()
     };
@@ -116,7 +115,7 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
         .with_render_cursor(false)
         .wgpu()
         .build_eframe(|cc| InspectorApp::begin(cc, &begin));
-    set_up(&mut harness, args, &config)?;
+    set_up(&mut harness, args)?;
     if let Some(pane) = pane {
         harness.state_mut().show_pane(pane);
     }
@@ -132,10 +131,7 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn set_up(harness: &mut Harness<'_, InspectorApp>, args: &ScreenshotArgs, config: &FitConfig) -> anyhow::Result<()> {
-    if args.session.is_none() {
-        harness.state_mut().apply(Command::SetConfig(Box::new(*config)));
-    }
+fn set_up(harness: &mut Harness<'_, InspectorApp>, args: &ScreenshotArgs) -> anyhow::Result<()> {
     until(harness, "the data set", |app| app.session().data.dataset.is_some() && app.session().data.opening.is_none())?;
     let mut view = harness.state().session().view.clone();
     match args.theme {
