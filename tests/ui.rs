@@ -12,7 +12,7 @@ use egui::{Key, Modifiers, pos2};
 use egui_kittest::Harness;
 use mhp_inspector::app::{Begin, InspectorApp};
 use mhp_inspector::body::Group;
-use mhp_inspector::config::Preset;
+use mhp_inspector::config::{FitConfig, Preset};
 use mhp_inspector::dataset::{Dataset, Progress};
 use mhp_inspector::geometry::{norm, sub};
 use mhp_inspector::session::{Command, Compare, FitStatus, ThemeChoice};
@@ -60,6 +60,19 @@ fn settings_given_at_the_beginning_are_in_the_first_start() {
     let start = begin_fit(&problem, &config).unwrap().initialisation.params;
     assert_eq!(window.session().config, config);
     assert_eq!(window.fit().initial.as_ref(), Some(&start));
+    // Where nothing was fitted yet, another preset finds another start; a slider does not, nor a preset after a run.
+    let paper = FitConfig::default();
+    window.apply(Command::SetConfig(Box::new(paper)));
+    window.ready(0);
+    let other = begin_fit(&problem, &paper).unwrap().initialisation.params;
+    assert!(window.fit().initial.as_ref() == Some(&other) && other != start);
+    let job = window.fit().job;
+    window.apply(Command::SetConfig(Box::new(FitConfig { w_em: 0.7, ..paper })));
+    window.apply(Command::StepFit(2));
+    window.paused_at(2);
+    window.apply(Command::SetConfig(Box::new(config)));
+    window.ready(0);
+    assert!(window.fit().job == job && window.fit().head() == 2, "what was fitted is kept");
 }
 
 #[test]

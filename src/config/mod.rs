@@ -234,6 +234,12 @@ impl FitConfig {
         Ok(self)
     }
 
+    /// Whether a start is found in the same way, as far as switches decide; a slider that is moved asks for no new start.
+    pub fn starts_as(&self, other: &Self) -> bool {
+        let switches = |c: &Self| (c.scatterers, c.place, c.yaw, c.people, c.starts, c.height, c.limbs);
+        switches(self) == switches(other) && self.init == other.init
+    }
+
     /// Reads `FIT.toml`; missing keys take their defaults.
     ///
     /// # Errors

@@ -72,6 +72,12 @@ impl Fit {
         self.branch().map_or(0, Branch::head)
     }
 
+    /// Whether this is a start that was found, and nothing was done with it yet.
+    pub fn is_untouched(&self) -> bool {
+        let found = self.begun.is_some() && !self.edited && self.status == FitStatus::Paused;
+        found && self.head() == 0 && self.history.branches().len() == 1
+    }
+
     /// The iteration that is looked at.
     pub fn shown_iteration(&self) -> usize {
         self.cursor.unwrap_or_else(|| self.head())

@@ -137,7 +137,11 @@ impl Session {
             stop_when_converged: self.config.stop_when_converged,
             ..config
         } == self.config;
+        let starts_alike = config.starts_as(&self.config);
         self.config = config;
+        if !starts_alike && self.fit.is_untouched() {
+            return self.reset();
+        }
         if matches!(self.fit.status, FitStatus::Idle | FitStatus::Failed(_)) {
             return Vec::new();
         }
