@@ -44,8 +44,13 @@ pub struct TrainLimbsArgs {
     #[arg(long, value_name = "DIR")]
     test: Vec<PathBuf>,
     /// How much the weights are held down, in lessons' worth of each input.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.35)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.35, value_parser = above_zero)]
     ridge: f64,
+}
+
+fn above_zero(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|x| x.is_finite() && *x > 0.0);
+    number.ok_or_else(|| "expected a number above 0".to_owned())
 }
 
 /// Runs `train-limbs`.

@@ -52,13 +52,14 @@ const FARTHEST_M: f64 = 0.5;
 pub struct LimbMap {
     /// How it came about: the command, the seeds and what was measured.
     pub header: Vec<String>,
-    /// Subtracted from the inputs.
+    /// Subtracted from the inputs, (265): what is lit on the floor plan (9, 9) and on the upright lattice (9, 16), ln over
+    /// the background; the distance from the radar, m; the parts' places (13, 3), m.
     pub mean: Vec<f32>,
-    /// Then divided by.
+    /// Then divided by, (265).
     pub scale: Vec<f32>,
-    /// Rows: away from the radar, to the left as it sees it, up, of each part, m; columns: inputs.
+    /// (39, 265), rows: away from the radar, to the left as it sees it, up, of each of 13 parts, m; columns: inputs.
     pub weight: Vec<Vec<f32>>,
-    /// One a row, m.
+    /// (39), m.
     pub bias: Vec<f32>,
 }
 
@@ -159,11 +160,11 @@ fn inputs(problem: &Problem, frame: &Frame, parts: &Parts, joints: &[Vec3]) -> O
         let mut sums = vec![0.0; lattice.points().len()];
         for &k in &telling {
             let whole = tells(k, left) && tells(k, up);
-            let cells: Vec<Seen> =
-                lattice.points().into_iter().map(|p| lattice.seen(&now[k], frame, p, whole)).collect();
+            let spots: Vec<Spot> =
+                lattice.points().into_iter().map(|p| lattice.spot(&now[k], frame, p, whole)).collect();
             for views in times() {
-                for (sum, seen) in sums.iter_mut().zip(&cells) {
-                    *sum += seen.iter().map(|cells| views[k].brightest(cells)).sum::<f64>();
+                for (sum, spot) in sums.iter_mut().zip(&spots) {
+                    *sum += spot.iter().map(|cells| views[k].brightest(cells)).sum::<f64>();
                 }
             }
         }
@@ -179,7 +180,7 @@ fn inputs(problem: &Problem, frame: &Frame, parts: &Parts, joints: &[Vec3]) -> O
 }
 
 /// Cells that stand for a point of a lattice: one of a group counts, the brightest, and of the groups the mean.
-type Seen = SmallVec<[SmallVec<[usize; 3]>; FINE * FINE]>;
+type Spot = SmallVec<[SmallVec<[usize; 3]>; FINE * FINE]>;
 
 /// Where a map is looked at around a person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -202,7 +203,7 @@ impl Lattice {
     }
 
     /// The cells of a view around a point of the lattice; `whole` where the view tells sides and heights.
-    fn seen(self, view: &Evidence, frame: &Frame, [away, second]: [f64; 2], whole: bool) -> Seen {
+    fn spot(self, view: &Evidence, frame: &Frame, [away, second]: [f64; 2], whole: bool) -> Spot {
         let beside = |k: usize| STEP_M / FINE as f64 * (k as f64 - 0.5 * (FINE - 1) as f64);
         let third: &[f64] = match (self, whole) {
             (Self::Floor, true) => &HEIGHTS_M,

@@ -39,7 +39,6 @@ impl Lesson {
 
     /// The same scene left and right exchanged: a radar does not care, and what is learned must not either.
     fn mirrored(&self) -> Self {
-        let of_part = |part: usize| [1.0, -1.0, 1.0].into_iter().zip(self.ways[Parts::mirrored(part)]);
         let mut inputs = self.inputs.clone();
         for row in inputs[..AWAY * ACROSS].chunks_exact_mut(ACROSS) {
             row.reverse();
@@ -51,8 +50,8 @@ impl Lesson {
             inputs[first + 3 * part..first + 3 * part + 3].copy_from_slice(&[away, -left, up]);
         }
         let ways = std::array::from_fn(|part| {
-            let mut way = of_part(part).map(|(sign, x)| sign * x);
-            std::array::from_fn(|_| way.next().unwrap_or_default())
+            let [away, left, up] = self.ways[Parts::mirrored(part)];
+            [away, -left, up]
         });
         Self { inputs, ways }
     }
@@ -66,8 +65,11 @@ impl Lesson {
 }
 
 /// Learns from `lessons` and their mirror images: the least squares of the ways, and of the weights of the standardised
-/// inputs, of which each counts as much as `ridge` of the lessons. `None` without lessons.
+/// inputs, of which each counts as much as `ridge` (above 0) of the lessons. `None` without lessons.
 pub fn learn(lessons: &[Lesson], ridge: f64) -> Option<LimbMap> {
+    if lessons.is_empty() {
+        return None;
+    }
     let lessons: Vec<Lesson> = lessons.iter().flat_map(|lesson| [lesson.clone(), lesson.mirrored()]).collect();
     let rows = lessons.len();
     let x = DMatrix::from_fn(rows, INPUTS, |i, k| f64::from(lessons[i].inputs[k]));
