@@ -294,7 +294,8 @@ fn model(ui: &mut Ui, config: &mut FitConfig) {
     });
     ui.horizontal(|ui| {
         ui.label("Place");
-        ui.selectable_value(&mut config.place, Place::Peaks, "strongest peaks").on_hover_text("The paper.");
+        ui.selectable_value(&mut config.place, Place::Peaks, "peaks")
+            .on_hover_text("The strongest of this frame: the paper.");
         ui.selectable_value(&mut config.place, Place::Counted, "frames around").on_hover_text(
             "One person stands where counting over the frames around finds it, if the peaks alone show somebody \
              elsewhere. Takes effect when a start is found.",
