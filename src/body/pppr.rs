@@ -181,6 +181,17 @@ impl Pppr {
         &mut self.numbers[range]
     }
 
+    /// The numbers of the groups `from` to `to`, which are beside each other.
+    pub(crate) fn groups(&self, from: Group, to: Group) -> &[f64] {
+        &self.numbers[self.shape.range(from).start..self.shape.range(to).end]
+    }
+
+    /// The same, to be written.
+    pub(crate) fn groups_mut(&mut self, from: Group, to: Group) -> &mut [f64] {
+        let range = self.shape.range(from).start..self.shape.range(to).end;
+        &mut self.numbers[range]
+    }
+
     /// The numbers of flat joint `joint` (person · joints + joint) in `group`.
     pub fn joint(&self, group: Group, joint: usize) -> &[f64] {
         let width = self.shape.width(group);

@@ -85,7 +85,8 @@ impl Fitter {
         }
         let next_state = Arc::make_mut(next);
         next_state.iteration += 1;
-        next_state.adam.update(&mut next_state.params, &evaluation.gradient, objective.config(), body, turns);
+        let how = (objective.config(), objective.precision());
+        next_state.adam.update(&mut next_state.params, &evaluation.gradient, how, body, turns);
         evaluate_into(objective, &next_state.params, next_state.iteration, next_evaluation)?;
         next_state.losses.push(next_evaluation.loss);
         let surplus = next_state.losses.len().saturating_sub(LOOK_BACK + 1);
