@@ -35,6 +35,8 @@ pub trait Number:
     fn like(self, x: f64) -> Self;
     /// `yes` where self < limit, else `no`.
     fn below(self, limit: f64, yes: Self, no: Self) -> Self;
+    /// self + a · b: several round once, one number twice, as the formulas are written.
+    fn plus(self, a: Self, b: Self) -> Self;
     /// The larger of the two.
     fn at_least(self, limit: f64) -> Self;
     /// The smaller of the two.
@@ -64,6 +66,11 @@ impl Number for f64 {
     #[inline(always)]
     fn below(self, limit: f64, yes: Self, no: Self) -> Self {
         if self < limit { yes } else { no }
+    }
+
+    #[inline(always)]
+    fn plus(self, a: Self, b: Self) -> Self {
+        self + a * b
     }
 
     #[inline(always)]
@@ -115,7 +122,7 @@ impl Number for f64 {
 /// a · b
 #[inline(always)]
 pub fn dot<T: Number>(a: Vec3<T>, b: Vec3<T>) -> T {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    (a[0] * b[0]).plus(a[1], b[1]).plus(a[2], b[2])
 }
 
 /// a × b
@@ -143,9 +150,9 @@ pub fn scale<T: Number>(a: Vec3<T>, k: T) -> Vec3<T> {
 /// a += k b
 #[inline(always)]
 pub fn add_scaled<T: Number>(a: &mut Vec3<T>, b: Vec3<T>, k: T) {
-    a[0] += k * b[0];
-    a[1] += k * b[1];
-    a[2] += k * b[2];
+    a[0] = a[0].plus(k, b[0]);
+    a[1] = a[1].plus(k, b[1]);
+    a[2] = a[2].plus(k, b[2]);
 }
 
 /// ‖a‖

@@ -11,213 +11,248 @@
 mod geometry;
 
 use super::Precision;
-use super::batch::{Batch, Columns, Task, each_joint};
-use super::form::{Form, Forms};
+use super::batch::{Batch, Columns, One, Task, each_joint};
+use super::form::{Form, FormBars, Forms};
 use super::seen::uniform;
-use super::splat::{Image, Look, Row, Scene, feature_at};
+use super::splat::{Look, Row, Scene, Widths, feature_at};
 use crate::body::{Group, Pppr};
-use crate::geometry::{Mat3, Number, Vec3, add_scaled, dot, mat_mul, mat_t_vec, mat_vec, scale, transpose};
+use crate::geometry::{Number, Vec3, add_scaled, dot, mat_t_vec, mat_vec, scale};
 use crate::radar::{Axis, AxisKind};
 use geometry::Geometry;
 
-/// Sums over the cells of a view for one joint; r = ∂L/∂ln A_jK_j, q = ∂L/∂ψ_j.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Moments {
-    /// Number of axes, 1 to 3.
-    pub dims: usize,
+/// Sums over the cells of a view for one joint; r = ∂L/∂ln A_jK_j, q = ∂L/∂ψ_j. The last axis is the third;
+/// those that are missing come first.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Sums<T = f64> {
     /// Σ r
-    pub r: f64,
-    /// Σ r Δ
-    pub r_delta: [f64; 3],
-    /// Σ r Δ Δᵀ
-    pub r_delta_delta: Mat3,
+    pub r: T,
     /// Σ q
-    pub q: f64,
+    pub q: T,
+    /// Σ r Δ
+    pub r_delta: Vec3<T>,
     /// Σ q Δ
-    pub q_delta: [f64; 3],
-    /// Σ r of each bin of a Doppler axis; empty on other axes.
-    pub r_by_bin: [Vec<f64>; 3],
+    pub q_delta: Vec3<T>,
+    /// Σ r Δ Δᵀ: 00, 10, 11, 20, 21, 22.
+    pub r_delta_delta: [T; 6],
+}
+
+/// Numbers of [`Sums`].
+const NUMBERS: usize = 14;
+
+/// Where the lower half of a symmetric matrix has its entry (k, l ≤ k), row by row.
+const fn lower(k: usize, l: usize) -> usize {
+    k * (k + 1) / 2 + l
+}
+
+/// The sums of all joints.
+#[derive(Debug, Default)]
+pub(super) struct Moments {
+    numbers: Columns<NUMBERS>,
+    /// Σ r, (joints, bins), of each bin of a Doppler axis; empty on other axes.
+    r_by_bin: [Vec<f64>; 3],
+    joints: usize,
 }
 
 impl Moments {
     /// All zeros for a view with these axes; keeps the memory of what was there.
-    pub(super) fn clear(&mut self, axes: &[Axis]) {
-        let Self { dims, r, r_delta, r_delta_delta, q, q_delta, r_by_bin } = self;
-        *dims = axes.len().min(3);
-        (*r, *r_delta, *r_delta_delta) = (0.0, [0.0; 3], [[0.0; 3]; 3]);
-        (*q, *q_delta) = (0.0, [0.0; 3]);
-        for (by_bin, axis) in r_by_bin.iter_mut().zip(axes) {
+    pub(super) fn reset(&mut self, joints: usize, axes: &[Axis]) {
+        self.joints = joints;
+        self.numbers.reset(joints);
+        for by_bin in &mut self.r_by_bin {
             by_bin.clear();
-            by_bin.resize(if axis.kind == AxisKind::Doppler { axis.bins } else { 0 }, 0.0);
+        }
+        for (by_bin, axis) in self.r_by_bin.iter_mut().skip(3_usize.saturating_sub(axes.len())).zip(axes) {
+            by_bin.resize(if axis.kind == AxisKind::Doppler { axis.bins * joints } else { 0 }, 0.0);
         }
     }
-}
 
-/// Some joints' [`Moments`], but for what is summed a bin.
-#[derive(Clone, Copy)]
-struct Wants<T> {
-    r: T,
-    r_delta: Vec3<T>,
-    r_delta_delta: Mat3<T>,
-    q: T,
-    q_delta: Vec3<T>,
-}
+    /// Adds to one joint's sums.
+    #[inline(never)]
+    pub(super) fn add(&mut self, joint: usize, sums: &Sums) {
+        let Sums { r, q, r_delta: [x, y, z], q_delta: [u, v, w], r_delta_delta: [a, b, c, d, e, f] } = *sums;
+        One(joint).add([r, q, x, y, z, u, v, w, a, b, c, d, e, f], &mut self.numbers);
+    }
 
-impl<T: Number> Wants<T> {
+    /// Σ r of one joint in each bin of an axis; empty unless that is a Doppler axis.
+    pub(super) fn by_bin(&mut self, joint: usize, axis: usize) -> &mut [f64] {
+        let all = &mut self.r_by_bin[axis];
+        let bins = all.len() / self.joints.max(1);
+        &mut all[joint * bins..(joint + 1) * bins]
+    }
+
     #[inline(always)]
-    fn new<B: Batch<Number = T>>(batch: B, moments: &[Moments], dims: usize) -> Self {
-        let zero = batch.all(0.0);
-        let (r, q) = (batch.gather(|joint| moments[joint].r), batch.gather(|joint| moments[joint].q));
-        let mut wants = Self { r, r_delta: [zero; 3], r_delta_delta: [[zero; 3]; 3], q, q_delta: [zero; 3] };
-        for k in 0..dims {
-            wants.r_delta[k] = batch.gather(|joint| moments[joint].r_delta[k]);
-            wants.q_delta[k] = batch.gather(|joint| moments[joint].q_delta[k]);
-            for l in 0..dims {
-                wants.r_delta_delta[k][l] = batch.gather(|joint| moments[joint].r_delta_delta[k][l]);
-            }
-        }
-        wants
+    fn of<B: Batch>(&self, batch: B) -> Sums<B::Number> {
+        let [r, q, x, y, z, u, v, w, a, b, c, d, e, f] = batch.load(&self.numbers);
+        Sums { r, q, r_delta: [x, y, z], q_delta: [u, v, w], r_delta_delta: [a, b, c, d, e, f] }
     }
 }
 
-/// Adds the gradient that `moments` imply to `gradient`, but for shape, whose adjoint ∂L/∂(R S Sᵀ Rᵀ) is added to
-/// `covariance_bar`; SPEC section 3.
+/// Adds what `moments` imply to `bars`, and to `gradient` what they say of single features; SPEC section 3.
 pub(super) fn pull_back(
     scene: &Scene<'_>,
     forms: &Forms,
-    moments: &[Moments],
-    (gradient, covariance_bar): (&mut Pppr, &mut Columns<9>),
+    moments: &mut Moments,
+    (gradient, bars): (&mut Pppr, &mut FormBars),
     precision: Precision,
 ) {
-    each_joint(precision, forms.joints(), &mut PullBack { scene, forms, moments, gradient, covariance_bar });
-}
-
-struct PullBack<'a> {
-    scene: &'a Scene<'a>,
-    forms: &'a Forms,
-    moments: &'a [Moments],
-    gradient: &'a mut Pppr,
-    covariance_bar: &'a mut Columns<9>,
-}
-
-impl Task for PullBack<'_> {
-    #[inline(always)]
-    fn run<B: Batch>(&mut self, batch: B) {
-        let Self { scene, forms, moments, gradient, covariance_bar } = self;
-        let (form, wants) = (forms.of(batch), Wants::new(batch, moments, scene.dims()));
-        // The way there once more: that costs less than to keep it.
-        let look = scene.look(&form);
-        let rows = scene.rows(&look.seen);
-        let image = scene.image(&form, &look, &rows);
-        let mut geometry = Geometry::nothing(batch.all(0.0));
-        let (c_bar, b_bar) = gaussian(&image, &wants);
-        let blurred_bar = covariance(&mut geometry, scene, (&look, &rows), &c_bar);
-        coordinates(&mut geometry, scene, &look, b_bar);
-        let omega_mean_bar = ramp(&mut geometry, scene, (&form, &look, &rows), &wants);
-        phases(&mut geometry, scene, &look, wants.q);
-        if scene.config.operators.attenuation {
-            geometry.d -= wants.r * 4.0 / look.seen.d.value;
-        }
-        blur(&mut geometry, scene, &look, &blurred_bar);
-
-        let (p_bar, v_bar) = geometry.fold(scene, &look);
-        let turn = uniform(wants.r, scene.view.pose.rotation);
-        for (group, bar) in [(Group::Position, mat_t_vec(&turn, p_bar)), (Group::Velocity, mat_t_vec(&turn, v_bar))] {
-            let numbers = gradient.group_mut(group);
-            for k in 0..3 {
-                batch.scatter(bar[k], |joint, x| numbers[3 * joint + k] += x);
+    match scene.dims() {
+        1 => each_joint(precision, forms.joints(), &mut PullBack::<1> { scene, forms, moments, bars }),
+        2 => each_joint(precision, forms.joints(), &mut PullBack::<2> { scene, forms, moments, bars }),
+        _ => each_joint(precision, forms.joints(), &mut PullBack::<3> { scene, forms, moments, bars }),
+    }
+    for (k, axis) in scene.view.axes.iter().enumerate().take(3) {
+        if axis.kind == AxisKind::Doppler {
+            for joint in 0..forms.joints() {
+                let by_bin = moments.by_bin(joint, 3 - scene.dims() + k);
+                features(by_bin, gradient.joint_mut(Group::Omega, joint));
+                bars.add_omega_mean(joint, -by_bin.iter().sum::<f64>());
             }
         }
-        let beta = gradient.group_mut(Group::Beta);
-        batch.scatter(wants.r * (wants.r.like(1.0) - form.opacity), |joint, x| beta[joint] += x);
-        let bar = mat_mul(&transpose(&turn), &mat_mul(&blurred_bar, &turn));
-        let mut sum = covariance_bar.matrix(batch);
-        for k in 0..3 {
-            add_scaled(&mut sum[k], bar[k], wants.r.like(1.0));
+    }
+}
+
+struct PullBack<'a, const D: usize> {
+    scene: &'a Scene<'a>,
+    forms: &'a Forms,
+    moments: &'a Moments,
+    bars: &'a mut FormBars,
+}
+
+impl<const D: usize> Task for PullBack<'_, D> {
+    #[inline(always)]
+    fn run<B: Batch>(&mut self, batch: B) {
+        let Self { scene, forms, moments, bars } = self;
+        let (form, sums) = (forms.of(batch), moments.of(batch));
+        // The way there once more: that costs less than to keep it.
+        let look = scene.look(&form);
+        let rows: [Row<B::Number>; D] = scene.rows(&look.seen);
+        let widths = scene.widths(&form, &look, &rows);
+        let kappa = scene.kappa(&form, &look, &rows);
+        let (squares, _) = scene.squares(&look, &widths);
+        let mut geometry = Geometry::nothing(batch.all(0.0));
+        let (c_bar, b_bar) = gaussian(&squares.precision(), kappa, &sums);
+        let covariance_bar = covariance(&mut geometry, scene, &form, (&look, &rows, &widths), &c_bar);
+        for k in 0..D {
+            let axis = &scene.view.axes[k];
+            if scene.sees(axis.kind) {
+                geometry.coordinate(&look, axis, b_bar[k] * scene.by_step[k]);
+            }
         }
-        covariance_bar.set_matrix(batch, sum);
-        batch.scatter(omega_mean_bar, |joint, mean| {
-            features(&moments[joint], mean, gradient.joint_mut(Group::Omega, joint));
-        });
+        let omega_mean_bar = ramp(&mut geometry, scene, (&form, &look, &rows), &sums);
+        phases(&mut geometry, scene, &look, sums.q);
+        if scene.config.operators.attenuation {
+            geometry.d -= sums.r * 4.0 / look.seen.d.value;
+        }
+        let (p_bar, v_bar) = geometry.fold(scene, &look);
+        let turn = uniform(sums.r, scene.view.pose.rotation);
+        let motion = [mat_t_vec(&turn, p_bar), mat_t_vec(&turn, v_bar)];
+        bars.add(batch, motion, covariance_bar, [sums.r, omega_mean_bar]);
     }
 }
 
 /// ∂L/∂C = ½ P (Σ rΔΔᵀ) P − ½ P Σr and ∂L/∂b = P ΣrΔ − κ Σq.
 #[inline(always)]
-fn gaussian<T: Number>(image: &Image<T>, wants: &Wants<T>) -> (Mat3<T>, Vec3<T>) {
-    let p = &image.precision;
-    let mut c_bar = mat_mul(&mat_mul(p, &wants.r_delta_delta), p);
-    let mut b_bar = mat_vec(p, wants.r_delta);
-    for k in 0..3 {
-        b_bar[k] -= image.kappa[k] * wants.q;
-        for l in 0..3 {
-            c_bar[k][l] = (c_bar[k][l] - p[k][l] * wants.r) * 0.5;
+fn gaussian<T: Number, const D: usize>(p: &[[T; D]; D], kappa: [T; D], sums: &Sums<T>) -> ([[T; D]; D], [T; D]) {
+    let zero = sums.r.like(0.0);
+    let (mut half, mut c_bar, mut b_bar) = ([[zero; D]; D], [[zero; D]; D], [zero; D]);
+    let first = 3 - D;
+    for k in 0..D {
+        b_bar[k] = -(kappa[k] * sums.q);
+        for l in 0..D {
+            b_bar[k] = b_bar[k].plus(p[k][l], sums.r_delta[first + l]);
+            for m in 0..D {
+                let r_delta_delta = sums.r_delta_delta[lower(first + m.max(l), first + m.min(l))];
+                half[k][l] = half[k][l].plus(p[k][m], r_delta_delta);
+            }
+        }
+    }
+    for k in 0..D {
+        for l in 0..=k {
+            let mut sum = -(p[k][l] * sums.r);
+            for m in 0..D {
+                sum = sum.plus(half[k][m], p[m][l]);
+            }
+            c_bar[k][l] = sum * 0.5;
+            c_bar[l][k] = c_bar[k][l];
         }
     }
     (c_bar, b_bar)
 }
 
-/// C = G Σ' Gᵀ: hands G̅ to the axes' directions and returns Σ̅'.
+/// C from how wide the joint and the point spread are along the axes: hands on what the axes' directions, lengths and
+/// the point spread want, and returns the adjoint of R S Sᵀ Rᵀ, its upper half row by row.
 #[inline(always)]
-fn covariance<T: Number>(
+fn covariance<T: Number, const D: usize>(
     geometry: &mut Geometry<T>,
     scene: &Scene<'_>,
-    (look, rows): (&Look<T>, &[Row<T>; 3]),
-    c_bar: &Mat3<T>,
-) -> Mat3<T> {
-    let zero = look.w_az.like(0.0);
-    let mut blurred_bar = [[zero; 3]; 3];
-    let dims = scene.dims();
-    for (k, axis) in scene.view.axes.iter().take(dims).enumerate() {
-        let row = &rows[k];
-        let mut mixed = [zero; 3];
-        for l in 0..dims {
-            add_scaled(&mut mixed, rows[l].gradient, c_bar[k][l]);
+    form: &Form<T>,
+    (look, rows, widths): (&Look<T>, &[Row<T>; D], &[Widths<T>; D]),
+    c_bar: &[[T; D]; D],
+) -> [T; 6] {
+    let zero = form.opacity.like(0.0);
+    let turn = uniform(zero, scene.view.pose.rotation);
+    let directions = [look.seen.u, look.seen.e_az, look.seen.e_el];
+    let (mut covariance_bar, mut blur_bar) = ([zero; 6], [zero; 3]);
+    for k in 0..D {
+        // What C̅ makes of all axes for this one.
+        let mut mixed = Widths { gradient: [zero; 3], own: [zero; 3], seen: [zero; 3] };
+        for l in 0..D {
+            add_scaled(&mut mixed.gradient, widths[l].gradient, c_bar[k][l]);
+            add_scaled(&mut mixed.own, widths[l].own, c_bar[k][l]);
+            add_scaled(&mut mixed.seen, widths[l].seen, c_bar[k][l]);
         }
+        let mut entry = 0;
         for i in 0..3 {
-            add_scaled(&mut blurred_bar[i], mixed, row.gradient[i]);
+            for j in i..3 {
+                covariance_bar[entry] = covariance_bar[entry].plus(widths[k].gradient[i], mixed.gradient[j]);
+                entry += 1;
+            }
         }
+        // ½ ∂L/∂(∂b/∂p), view frame.
+        let mut gradient_bar = mat_vec(&turn, mat_vec(&form.spread, mixed.own));
+        for i in 0..3 {
+            if scene.blurs[i] {
+                let pull = look.blur[i] * look.blur[i] * mixed.seen[i];
+                add_scaled(&mut gradient_bar, directions[i], pull);
+                geometry.blurred(i, scale(rows[k].gradient, pull * 2.0));
+                blur_bar[i] = blur_bar[i].plus(widths[k].seen[i], mixed.seen[i]);
+            }
+        }
+        let axis = &scene.view.axes[k];
         if scene.sees(axis.kind) {
-            let g_bar = scale(mat_vec(&look.blurred, mixed), zero.like(2.0 * scene.by_step[k]));
-            geometry.direction(look, axis, scale(g_bar, row.ratio));
+            let row = &rows[k];
+            let row_bar = scale(gradient_bar, zero.like(2.0 * scene.by_step[k]));
+            geometry.direction(look, axis, scale(row_bar, row.ratio));
             if axis.kind.is_angular() {
-                let along = dot(g_bar, row.direction);
+                let along = dot(row_bar, row.direction);
                 geometry.arm(axis.kind, -along * row.ratio / row.arm);
                 geometry.slope(look, axis, along / row.arm);
             }
         }
     }
-    blurred_bar
-}
-
-/// b = (ξ − lo)/step.
-#[inline(always)]
-fn coordinates<T: Number>(geometry: &mut Geometry<T>, scene: &Scene<'_>, look: &Look<T>, b_bar: Vec3<T>) {
-    for (k, axis) in scene.view.axes.iter().take(3).enumerate() {
-        if scene.sees(axis.kind) {
-            geometry.coordinate(look, axis, b_bar[k] * scene.by_step[k]);
-        }
-    }
+    blur(geometry, scene, look, blur_bar);
+    covariance_bar
 }
 
 /// κ_k = ω̄ v·D_k; returns ∂L/∂ω̄.
 #[inline(always)]
-fn ramp<T: Number>(
+fn ramp<T: Number, const D: usize>(
     geometry: &mut Geometry<T>,
     scene: &Scene<'_>,
-    (form, look, rows): (&Form<T>, &Look<T>, &[Row<T>; 3]),
-    wants: &Wants<T>,
+    (form, look, rows): (&Form<T>, &Look<T>, &[Row<T>; D]),
+    sums: &Sums<T>,
 ) -> T {
-    let mut omega_mean_bar = wants.q.like(0.0);
+    let mut omega_mean_bar = sums.q.like(0.0);
     if !scene.config.operators.doppler {
         return omega_mean_bar;
     }
-    for (k, axis) in scene.view.axes.iter().take(3).enumerate() {
-        let row: &Row<T> = &rows[k];
-        let kappa_bar = wants.q_delta[k];
-        omega_mean_bar += kappa_bar * dot(look.velocity, row.displacement);
-        add_scaled(&mut geometry.v, row.displacement, kappa_bar * form.omega_mean);
-        let displacement_bar = scale(look.velocity, kappa_bar * form.omega_mean * scene.step[k]);
+    for k in 0..D {
+        let (row, axis) = (&rows[k], &scene.view.axes[k]);
+        let kappa_bar = sums.q_delta[3 - D + k];
+        let by_omega_mean = kappa_bar * form.omega_mean;
+        omega_mean_bar = omega_mean_bar.plus(kappa_bar, dot(look.velocity, row.displacement));
+        add_scaled(&mut geometry.v, row.displacement, by_omega_mean);
+        let displacement_bar = scale(look.velocity, by_omega_mean * scene.step[k]);
         geometry.direction(look, axis, scale(displacement_bar, row.by_ratio));
         if axis.kind.is_angular() {
             let along = dot(displacement_bar, row.direction) / row.slope;
@@ -237,46 +272,32 @@ fn phases<T: Number>(geometry: &mut Geometry<T>, scene: &Scene<'_>, look: &Look<
     geometry.elevation += phase_bar * elevation;
 }
 
-/// The point-spread terms of Σ'.
+/// The point spread along e_az and e_el grows with distance; `bar` is ½ of what each wants times itself.
 #[inline(always)]
-fn blur<T: Number>(geometry: &mut Geometry<T>, scene: &Scene<'_>, look: &Look<T>, blurred_bar: &Mat3<T>) {
+fn blur<T: Number>(geometry: &mut Geometry<T>, scene: &Scene<'_>, look: &Look<T>, bar: [T; 3]) {
     let (seen, psf) = (&look.seen, &scene.view.psf);
-    add_scaled(&mut geometry.u, mat_vec(blurred_bar, seen.u), seen.h.like(2.0 * psf.range_m * psf.range_m));
-
-    let pull_az = mat_vec(blurred_bar, seen.e_az);
-    add_scaled(&mut geometry.e_az, pull_az, look.w_az * 2.0 * look.w_az);
-    let w_az_bar = look.w_az * 2.0 * dot(seen.e_az, pull_az);
-    let w_az_bar = w_az_bar / seen.cos_az_floored.value;
-    geometry.rho += w_az_bar * psf.azimuth_rad;
-    let cos_az_bar = -w_az_bar * look.w_az;
-    geometry.azimuth -= cos_az_bar * seen.sin_az * seen.cos_az_floored.pass;
-
-    let pull_el = mat_vec(blurred_bar, seen.e_el);
-    add_scaled(&mut geometry.e_el, pull_el, look.w_el * 2.0 * look.w_el);
-    let w_el_bar = look.w_el * 2.0 * dot(seen.e_el, pull_el);
-    let w_el_bar = w_el_bar / seen.cos_el_floored.value;
-    geometry.d += w_el_bar * psf.elevation_rad;
-    let cos_el_bar = -w_el_bar * look.w_el;
-    geometry.elevation -= cos_el_bar * seen.sin_el * seen.cos_el_floored.pass;
+    if scene.blurs[1] {
+        let bar = look.blur[1] * 2.0 * bar[1] / seen.cos_az_floored.value;
+        geometry.rho += bar * psf.azimuth_rad;
+        geometry.azimuth += bar * look.blur[1] * seen.sin_az * seen.cos_az_floored.pass;
+    }
+    if scene.blurs[2] {
+        let bar = look.blur[2] * 2.0 * bar[2] / seen.cos_el_floored.value;
+        geometry.d += bar * psf.elevation_rad;
+        geometry.elevation += bar * look.blur[2] * seen.sin_el * seen.cos_el_floored.pass;
+    }
 }
 
-/// Spectrum exp(ω(t) − ω̄) and the mean ω̄.
-fn features(moments: &Moments, omega_mean_bar: f64, omega: &mut [f64]) {
+/// The spectrum's exp(ω(t)); what its mean wants is summed apart.
+fn features(by_bin: &[f64], omega: &mut [f64]) {
     let count = omega.len();
-    let mut mean_bar = omega_mean_bar;
-    for by_bin in &moments.r_by_bin {
-        for (bin, &r) in by_bin.iter().enumerate() {
-            let (lower, t) = feature_at(bin, by_bin.len(), count);
-            if let Some(entry) = omega.get_mut(lower) {
-                *entry += r * (1.0 - t);
-            }
-            if let (true, Some(entry)) = (t != 0.0, omega.get_mut(lower + 1)) {
-                *entry += r * t;
-            }
-            mean_bar -= r;
+    for (bin, &r) in by_bin.iter().enumerate() {
+        let (lower, t) = feature_at(bin, by_bin.len(), count);
+        if let Some(entry) = omega.get_mut(lower) {
+            *entry += r * (1.0 - t);
         }
-    }
-    for entry in omega {
-        *entry += mean_bar / count as f64;
+        if let (true, Some(entry)) = (t != 0.0, omega.get_mut(lower + 1)) {
+            *entry += r * t;
+        }
     }
 }

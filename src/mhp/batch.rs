@@ -69,6 +69,16 @@ pub(super) trait Batch: Copy {
 
     /// Writes `N` numbers of each.
     fn store<const N: usize>(self, x: [Self::Number; N], into: &mut Columns<N>);
+
+    /// Adds `N` numbers to those of each.
+    #[inline(always)]
+    fn add<const N: usize>(self, x: [Self::Number; N], to: &mut Columns<N>) {
+        let mut sum = self.load(to);
+        for k in 0..N {
+            sum[k] += x[k];
+        }
+        self.store(sum, to);
+    }
 }
 
 /// What is done a joint.
@@ -126,9 +136,10 @@ impl<const N: usize> Columns<N> {
         self.0.resize(joints.div_ceil(ROW), [Row([0.0; ROW]); N]);
     }
 
-    /// All zeros.
-    pub(super) fn clear(&mut self) {
-        self.0.fill([Row([0.0; ROW]); N]);
+    /// Zeros for so many joints.
+    pub(super) fn reset(&mut self, joints: usize) {
+        self.0.clear();
+        self.hold(joints);
     }
 }
 
@@ -167,7 +178,12 @@ impl Batch for One {
     }
 
     fn load<const N: usize>(self, from: &Columns<N>) -> [f64; N] {
-        from.0[self.0 / ROW].map(|row| row.0[self.0 % ROW])
+        let (rows, lane) = (&from.0[self.0 / ROW], self.0 % ROW);
+        let mut x = [0.0; N];
+        for k in 0..N {
+            x[k] = rows[k].0[lane];
+        }
+        x
     }
 
     fn store<const N: usize>(self, x: [f64; N], into: &mut Columns<N>) {
@@ -271,6 +287,11 @@ impl<S: Simd> Number for Wide<S> {
     fn below(self, limit: f64, yes: Self, no: Self) -> Self {
         let mask = self.simd.less_than_f64s(self.value, self.simd.splat_f64s(limit));
         Self { simd: self.simd, value: self.simd.select_f64s(mask, yes.value, no.value) }
+    }
+
+    #[inline(always)]
+    fn plus(self, a: Self, b: Self) -> Self {
+        Self { simd: self.simd, value: self.simd.mul_add_f64s(a.value, b.value, self.value) }
     }
 
     #[inline(always)]

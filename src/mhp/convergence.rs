@@ -1,13 +1,13 @@
 //! The convergence criterion of SPEC section 4.
 
-use super::kinematic::bone_length;
+use super::kinematic::bone_length_sq;
 use crate::body::{Pppr, Skeleton};
 
 /// How far back the loss is compared.
 pub(super) const LOOK_BACK: usize = 5;
 const SMALL_LOSS: f64 = 1.0;
 const SMALL_CHANGE: f64 = 0.005;
-const BONE_RATIO: (f64, f64) = (0.5, 1.5);
+const BONE_RATIO: [f64; 2] = [0.5, 1.5];
 
 /// (L < 1, or the loss of five iterations ago differs by under half a percent) and every joint finite and every bone
 /// within 0.5 to 1.5 of its reference. `losses` ends with the current one.
@@ -22,8 +22,10 @@ fn bones_plausible(skeleton: &Skeleton, params: &Pppr) -> bool {
     let joints = params.shape().joints;
     (0..params.shape().persons).all(|person| {
         skeleton.bones.iter().zip(&skeleton.bone_lengths_m).all(|(bone, &reference)| {
-            let ratio = bone_length(params, bone.map(|j| person * joints + j)) / reference;
-            (BONE_RATIO.0..=BONE_RATIO.1).contains(&ratio)
+            // Squares need neither root nor quotient.
+            let length_sq = bone_length_sq(params, bone.map(|j| person * joints + j));
+            let bounds = BONE_RATIO.map(|ratio| (ratio * reference) * (ratio * reference));
+            (bounds[0]..=bounds[1]).contains(&length_sq)
         })
     })
 }

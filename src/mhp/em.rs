@@ -2,14 +2,13 @@
 
 use super::Precision;
 use super::adjoint::{Moments, pull_back};
-use super::batch::Columns;
-use super::form::Forms;
+use super::form::{FormBars, Forms};
 use super::kernel::Kernel;
 use super::percentile::percentile;
 use super::region::Region;
 use super::scalar::Real;
 use super::simulate::{EPSILON, floored, ln_floored};
-use super::splat::{Scene, Splat};
+use super::splat::{Scene, Splats};
 use super::tiles::{self, Question, Tiles, Tiling};
 use crate::body::Pppr;
 use crate::config::FitConfig;
@@ -43,8 +42,8 @@ pub(super) fn share(both: usize, either: usize) -> Option<f64> {
 /// What one evaluation of a view needs besides its answer; kept, so that the next one allocates nothing.
 #[derive(Default)]
 pub(super) struct Workspace {
-    splats: Vec<Splat>,
-    moments: Vec<Moments>,
+    splats: Splats,
+    moments: Moments,
     tiles: Tiles,
 }
 
@@ -60,9 +59,10 @@ pub(super) struct Aim {
 /// Where a view adds its gradient, times `factor`.
 pub(super) struct Slopes<'a> {
     pub factor: f64,
+    /// By single features.
     pub gradient: &'a mut Pppr,
-    /// ∂L/∂(R S Sᵀ Rᵀ), a joint.
-    pub covariance: &'a mut Columns<9>,
+    /// By all else.
+    pub bars: &'a mut FormBars,
 }
 
 /// Evaluates L_view at `aim`, and its gradient where it is asked for; `forms` are those of `params`.
@@ -76,10 +76,7 @@ pub(super) fn evaluate(
 ) -> ViewAnswer {
     let Workspace { splats, moments, tiles } = workspace;
     scene.splats((params, forms), precision, splats);
-    moments.resize_with(splats.len(), Moments::default);
-    for moments in moments.iter_mut() {
-        moments.clear(&scene.view.axes);
-    }
+    moments.reset(splats.joints(), &scene.view.axes);
     let scale = slopes.as_ref().map(|slopes| slopes.factor);
     let answer = match precision {
         Precision::F64 => plain::<f64>(scene, splats, aim, scale, moments),
@@ -90,8 +87,8 @@ pub(super) fn evaluate(
         }
         Precision::F32 => plain::<f32>(scene, splats, aim, scale, moments),
     };
-    if let Some(Slopes { gradient, covariance, .. }) = slopes {
-        pull_back(scene, forms, moments, (gradient, covariance), precision);
+    if let Some(Slopes { gradient, bars, .. }) = slopes {
+        pull_back(scene, forms, moments, (gradient, bars), precision);
     }
     answer
 }
@@ -99,10 +96,10 @@ pub(super) fn evaluate(
 /// Every cell by itself, as SPEC reads: the oracle, and the way out for masks softer than f32's range.
 fn plain<T: Real>(
     scene: &Scene<'_>,
-    splats: &[Splat],
+    splats: &Splats,
     aim: &Aim,
     scale: Option<f64>,
-    moments: &mut [Moments],
+    moments: &mut Moments,
 ) -> ViewAnswer {
     let mut kernel = Kernel::<T>::new(splats, &aim.region.bins, scene.config.summation);
     let mut ln_s = vec![f64::NEG_INFINITY; aim.region.cells()];

@@ -5,7 +5,7 @@
 )]
 
 use super::Precision;
-use super::batch::{Batch, Columns, Task, each_joint};
+use super::batch::{Batch, Columns, One, Task, each_joint};
 use crate::body::{Group, Pppr};
 use crate::geometry::{Mat3, Number, Vec3, mat_mul, rotation_from_quaternion, scale, unit_quaternion};
 
@@ -21,6 +21,50 @@ pub(super) struct Form<T = f64> {
     pub ln_opacity: T,
     /// ω̄
     pub omega_mean: T,
+}
+
+/// ω̄
+pub(super) fn mean(omega: &[f64]) -> f64 {
+    omega.iter().sum::<f64>() / omega.len().max(1) as f64
+}
+
+/// ∂L/∂ what [`Forms`] say, summed over the views.
+#[derive(Debug, Default)]
+pub(super) struct FormBars {
+    /// Of p and v, world frame.
+    motion: Columns<6>,
+    /// Of R S Sᵀ Rᵀ, world frame: xx, xy, xz, yy, yz, zz.
+    covariance: Columns<6>,
+    /// Of ln α and ω̄.
+    strength: Columns<2>,
+}
+
+impl FormBars {
+    /// Zeros for so many joints.
+    pub(super) fn reset(&mut self, joints: usize) {
+        self.motion.reset(joints);
+        self.covariance.reset(joints);
+        self.strength.reset(joints);
+    }
+
+    /// Adds what one view says of `position`, `velocity`, ln α, ω̄ and the covariance's upper half, row by row.
+    #[inline(always)]
+    pub(super) fn add<B: Batch>(
+        &mut self,
+        batch: B,
+        [[x, y, z], [u, v, w]]: [Vec3<B::Number>; 2],
+        covariance: [B::Number; 6],
+        strength: [B::Number; 2],
+    ) {
+        batch.add([x, y, z, u, v, w], &mut self.motion);
+        batch.add(covariance, &mut self.covariance);
+        batch.add(strength, &mut self.strength);
+    }
+
+    /// Adds to ∂L/∂ω̄ of one joint.
+    pub(super) fn add_omega_mean(&mut self, joint: usize, bar: f64) {
+        One(joint).add([0.0, bar], &mut self.strength);
+    }
 }
 
 /// The forms of all joints, and what their derivatives need besides.
@@ -67,9 +111,9 @@ impl Forms {
         }
     }
 
-    /// Adds to `gradient` what ∂L/∂(R S Sᵀ Rᵀ), world frame and symmetric, implies.
-    pub(super) fn pull_back(&self, covariance_bar: &Columns<9>, gradient: &mut Pppr, precision: Precision) {
-        each_joint(precision, self.joints, &mut PullBack { forms: self, covariance_bar, gradient });
+    /// Adds to `gradient` what `bars` imply.
+    pub(super) fn pull_back(&self, bars: &FormBars, gradient: &mut Pppr, precision: Precision) {
+        each_joint(precision, self.joints, &mut PullBack { forms: self, bars, gradient });
     }
 }
 
@@ -89,10 +133,7 @@ impl Task for Fill<'_> {
         let beta = batch.gather(numbers(Group::Beta, 1, 0));
         // Of e^−|β| alone: exact for large |β|.
         let (one, fading) = (beta.like(1.0), (-beta.at_least(0.0) + beta.at_most(0.0)).exp());
-        let omega_mean = batch.gather(|joint| {
-            let omega = params.joint(Group::Omega, joint);
-            omega.iter().sum::<f64>() / omega.len().max(1) as f64
-        });
+        let omega_mean = batch.gather(|joint| mean(params.joint(Group::Omega, joint)));
         let opacity = beta.below(0.0, fading, one) / (one + fading);
         let ln_opacity = beta.at_most(0.0) - fading.ln_1p();
         let (mut position, mut velocity, mut scale, mut quaternion) = ([one; 3], [one; 3], [one; 3], [one; 4]);
@@ -121,23 +162,45 @@ impl Task for Fill<'_> {
 
 struct PullBack<'a> {
     forms: &'a Forms,
-    covariance_bar: &'a Columns<9>,
+    bars: &'a FormBars,
     gradient: &'a mut Pppr,
 }
 
 impl Task for PullBack<'_> {
     #[inline(always)]
     fn run<B: Batch>(&mut self, batch: B) {
-        let Self { forms, covariance_bar, gradient } = self;
+        let Self { forms, bars, gradient } = self;
+        let [ln_opacity_bar, omega_mean_bar] = batch.load(&bars.strength);
+        let [opacity, ..] = batch.load(&forms.strength);
+        let beta = gradient.group_mut(Group::Beta);
+        batch.scatter(ln_opacity_bar * (opacity.like(1.0) - opacity), |joint, x| beta[joint] += x);
+        let motion = batch.load(&bars.motion);
+        for (group, first) in [(Group::Position, 0), (Group::Velocity, 3)] {
+            let numbers = gradient.group_mut(group);
+            for k in 0..3 {
+                batch.scatter(motion[first + k], |joint, x| numbers[3 * joint + k] += x);
+            }
+        }
+        batch.scatter(omega_mean_bar, |joint, mean_bar| {
+            let omega = gradient.joint_mut(Group::Omega, joint);
+            let share = mean_bar / omega.len().max(1) as f64;
+            for bar in omega {
+                *bar += share;
+            }
+        });
+
         let (quaternion, widths) = (batch.load(&forms.quaternion), batch.load(&forms.scale));
         let rotation = rotation_from_quaternion(quaternion);
-        let mut bar = mat_mul(&covariance_bar.matrix(batch), &forms.spread.matrix(batch));
+        let [xx, xy, xz, yy, yz, zz] = batch.load(&bars.covariance);
+        let covariance_bar = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+        let mut bar = mat_mul(&covariance_bar, &forms.spread.matrix(batch));
         for row in &mut bar {
             *row = scale(*row, widths[0].like(2.0));
         }
         let log_scale = gradient.group_mut(Group::LogScale);
         for k in 0..3 {
-            let width_bar = rotation[0][k] * bar[0][k] + rotation[1][k] * bar[1][k] + rotation[2][k] * bar[2][k];
+            let width_bar =
+                (rotation[0][k] * bar[0][k]).plus(rotation[1][k], bar[1][k]).plus(rotation[2][k], bar[2][k]);
             batch.scatter(width_bar * widths[k], |joint, x| log_scale[3 * joint + k] += x);
             for row in &mut bar {
                 row[k] = row[k] * widths[k];

@@ -5,10 +5,13 @@
 //! relative to their strongest joint, so f32 neither under- nor overflows; everything that is done once a row or once
 //! a joint is f64. The same code serves both precisions.
 
-use super::adjoint::Moments;
+use super::adjoint::{Moments, Sums};
 use super::scalar::Real;
-use super::splat::Splat;
+use super::splat::{Splat, Splats};
 use crate::config::Summation;
+
+/// The last axis among three.
+const LAST: usize = 2;
 
 /// A joint along the last axis: what does not change from row to row.
 struct Inner<T> {
@@ -35,7 +38,7 @@ struct OnRow<T> {
 
 /// Joints' splats over a box of cells of one view.
 pub(super) struct Kernel<'a, T> {
-    splats: &'a [Splat],
+    splats: Vec<Splat<'a>>,
     inner: Vec<Inner<T>>,
     bins: &'a [[usize; 2]],
     summation: Summation,
@@ -51,17 +54,18 @@ fn split<T: Real>(x: f64) -> (i64, T) {
     (whole as i64, T::of(x - whole))
 }
 
-/// The cells of the outer axes in C order: up to two indices (unused ones are 0).
+/// The cells of the outer axes in C order: two indices (those of missing axes, which come first, are 0).
 fn outer_cells(bins: &[[usize; 2]]) -> impl Iterator<Item = [usize; 2]> + use<> {
-    let outer = bins.split_last().map_or(&[] as &[_], |(_, outer)| outer);
-    let first = outer.first().map_or([0, 1], |b| *b);
-    let second = outer.get(1).map_or([0, 1], |b| *b);
+    let mut outer = bins.iter().rev().skip(1).copied();
+    let second = outer.next().unwrap_or([0, 1]);
+    let first = outer.next().unwrap_or([0, 1]);
     (first[0]..first[1]).flat_map(move |a| (second[0]..second[1]).map(move |b| [a, b]))
 }
 
 impl<'a, T: Real> Kernel<'a, T> {
     /// Prepares the sum of `splats` over the box `bins` ([lo, hi) per axis).
-    pub(super) fn new(splats: &'a [Splat], bins: &'a [[usize; 2]], summation: Summation) -> Self {
+    pub(super) fn new(splats: &'a Splats, bins: &'a [[usize; 2]], summation: Summation) -> Self {
+        let splats: Vec<_> = splats.iter().collect();
         let [lo, hi] = bins.last().copied().unwrap_or([0, 0]);
         let (width, joints) = (hi.saturating_sub(lo), splats.len());
         Self {
@@ -95,7 +99,7 @@ impl<'a, T: Real> Kernel<'a, T> {
     }
 
     /// Adds to each joint's `moments` what the cells want: `weight` is ∂L/∂ln|S| a cell of the box.
-    pub(super) fn backward(&mut self, weight: &[f64], moments: &mut [Moments]) {
+    pub(super) fn backward(&mut self, weight: &[f64], moments: &mut Moments) {
         let width = self.width();
         if width == 0 {
             return;
@@ -107,7 +111,7 @@ impl<'a, T: Real> Kernel<'a, T> {
                 let power = self.power(i);
                 *scaled = if power > T::zero() { T::of(weight[i] / power.wide()) } else { T::zero() };
             }
-            for (joint, moments) in moments.iter_mut().enumerate() {
+            for joint in 0..self.splats.len() {
                 self.collect(joint, outer, &scaled, moments);
             }
         }
@@ -197,8 +201,8 @@ impl<'a, T: Real> Kernel<'a, T> {
         let (inner, (c, s)) = (&self.inner[joint], self.on_row[joint].turn);
         let start = (lo as i64 - inner.bin.0) as i32;
         let coherent = self.summation == Summation::Coherent;
-        let last = self.bins.len().saturating_sub(1);
         let [mut r0, mut r1, mut r2, mut q0, mut q1] = [T::zero(); 5];
+        let by_bin = moments.by_bin(joint, LAST);
         for (i, &a) in self.amplitude[joint * width..(joint + 1) * width].iter().enumerate() {
             let delta = T::of(f64::from(start + i as i32)) - inner.bin.1;
             let r = if coherent {
@@ -215,64 +219,56 @@ impl<'a, T: Real> Kernel<'a, T> {
             r0 += r;
             r1 += r * delta;
             r2 += r * delta * delta;
-            if let Some(sum) = moments.r_by_bin[last].get_mut(lo + i) {
+            if let Some(sum) = by_bin.get_mut(lo + i) {
                 *sum += r.wide();
             }
         }
         let row = [r0, r1, r2, q0, q1].map(T::wide);
-        add_row(moments, &self.splats[joint], outer, row);
+        let splat = &self.splats[joint];
+        moments.add(joint, &row_sums(splat, outer, row));
+        for k in 0..LAST {
+            if let Some(sum) = moments.by_bin(joint, k).get_mut(outer[k]) {
+                *sum += row[0];
+            }
+        }
     }
 }
 
-/// Folds a row's sums [Σr, ΣrΔ, ΣrΔ², Σq, ΣqΔ] (Δ along the last axis) into a joint's moments.
-fn add_row(moments: &mut Moments, splat: &Splat, outer: [usize; 2], [r0, r1, r2, q0, q1]: [f64; 5]) {
-    let last = splat.dims - 1;
-    let delta: [f64; 2] = std::array::from_fn(|k| outer[k] as f64 - splat.bin[k]);
-    moments.r += r0;
-    moments.q += q0;
-    moments.r_delta[last] += r1;
-    moments.q_delta[last] += q1;
-    moments.r_delta_delta[last][last] += r2;
-    for k in 0..last {
-        moments.r_delta[k] += delta[k] * r0;
-        moments.q_delta[k] += delta[k] * q0;
-        moments.r_delta_delta[k][last] += delta[k] * r1;
-        moments.r_delta_delta[last][k] += delta[k] * r1;
-        for l in 0..last {
-            moments.r_delta_delta[k][l] += delta[k] * delta[l] * r0;
-        }
-        if let Some(sum) = moments.r_by_bin[k].get_mut(outer[k]) {
-            *sum += r0;
-        }
+/// A joint's sums on a row from [Σr, ΣrΔ, ΣrΔ², Σq, ΣqΔ] (Δ along the last axis).
+fn row_sums(splat: &Splat<'_>, outer: [usize; 2], [r, r2, r22, q, q2]: [f64; 5]) -> Sums {
+    let [d0, d1] = outer_deltas(splat, outer);
+    Sums {
+        r,
+        q,
+        r_delta: [d0 * r, d1 * r, r2],
+        q_delta: [d0 * q, d1 * q, q2],
+        r_delta_delta: [d0 * d0 * r, d1 * d0 * r, d1 * d1 * r, d0 * r2, d1 * r2, r22],
     }
+}
+
+/// From the joint to the row at `outer`.
+fn outer_deltas(splat: &Splat<'_>, outer: [usize; 2]) -> [f64; 2] {
+    std::array::from_fn(|k| outer[k] as f64 - splat.bin[k])
 }
 
 /// A joint on the row at `outer`: largest exponent, the bin where it lies, and the phase at Δ_n = 0.
-fn on_row(splat: &Splat, outer: [usize; 2]) -> (f64, f64, f64) {
-    let (last, p) = (splat.dims - 1, &splat.precision);
-    let (mut top, mut shift, mut phase) = (splat.ln_weight, 0.0, splat.phase);
-    for k in 0..last {
-        let delta = outer[k] as f64 - splat.bin[k];
-        phase += splat.kappa[k] * delta;
-        shift += p[k][last] * delta;
-        top += splat.spectrum[k].get(outer[k]).copied().unwrap_or(0.0);
-        for l in 0..last {
-            let schur = p[k][l] - p[k][last] * p[l][last] / p[last][last];
-            top -= 0.5 * schur * delta * (outer[l] as f64 - splat.bin[l]);
-        }
-    }
-    (top, splat.bin[last] - shift / p[last][last], phase)
+fn on_row(splat: &Splat<'_>, outer: [usize; 2]) -> (f64, f64, f64) {
+    let ([d0, d1], [w0, w1, _], [s10, s20, s21]) = (outer_deltas(splat, outer), splat.weight, splat.skew);
+    let from_ridge = d1 + s10 * d0;
+    let spectrum = |k: usize| splat.spectrum[k].get(outer[k]).copied().unwrap_or(0.0);
+    let top = splat.ln_weight + spectrum(0) + spectrum(1) - 0.5 * (w0 * d0 * d0 + w1 * from_ridge * from_ridge);
+    let phase = splat.phase + splat.kappa[0] * d0 + splat.kappa[1] * d1;
+    (top, splat.bin[LAST] - (s20 * d0 + s21 * d1), phase)
 }
 
 impl<T: Real> Inner<T> {
-    fn new(splat: &Splat, lo: usize, hi: usize) -> Self {
-        let last = splat.dims - 1;
-        let turns = (lo..hi).map(|i| splat.kappa[last] * (i as f64 - splat.bin[last]));
+    fn new(splat: &Splat<'_>, lo: usize, hi: usize) -> Self {
+        let turns = (lo..hi).map(|i| splat.kappa[LAST] * (i as f64 - splat.bin[LAST]));
         Self {
-            half_precision: T::of(0.5 * splat.precision[last][last]),
-            bin: split(splat.bin[last]),
+            half_precision: T::of(0.5 * splat.weight[LAST]),
+            bin: split(splat.bin[LAST]),
             turn: turns.map(|psi| (T::of(psi.cos()), T::of(psi.sin()))).unzip(),
-            spectrum: splat.spectrum[last].get(lo..hi).unwrap_or(&[]).iter().map(|&x| T::of(x)).collect(),
+            spectrum: splat.spectrum[LAST].get(lo..hi).unwrap_or(&[]).iter().map(|&x| T::of(x)).collect(),
         }
     }
 }

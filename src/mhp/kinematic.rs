@@ -3,7 +3,7 @@
 use super::Terms;
 use crate::body::{Pppr, Skeleton};
 use crate::config::FitConfig;
-use crate::geometry::{Vec3, add, add_scaled, cross, dot, norm, scale, sub};
+use crate::geometry::{Vec3, add, add_scaled, cross, dot, scale, sub};
 use smallvec::SmallVec;
 
 /// δ of the pseudo-Huber function ψ.
@@ -14,11 +14,27 @@ const LENGTH_FLOOR_SQ: f64 = 1e-12;
 /// ψ(x) = √(x² + δ²) − δ, written so that small x keeps its digits, and its derivative.
 fn pseudo_huber(x: f64) -> (f64, f64) {
     let root = (x * x + HUBER_DELTA * HUBER_DELTA).sqrt();
-    (x * x / (root + HUBER_DELTA), x / root)
+    let beyond = root + HUBER_DELTA;
+    let by_both = x / (root * beyond);
+    (x * root * by_both, beyond * by_both)
 }
 
 fn length(e: Vec3) -> f64 {
     (dot(e, e) + LENGTH_FLOOR_SQ).sqrt()
+}
+
+/// θ_max, rad.
+struct Limit {
+    theta: f64,
+    sin: f64,
+    cos: f64,
+}
+
+impl Limit {
+    fn new(theta: f64) -> Self {
+        let (sin, cos) = theta.sin_cos();
+        Self { theta, sin, cos }
+    }
 }
 
 /// What the terms read of the joints, and where they add their slopes.
@@ -42,7 +58,7 @@ pub(super) fn evaluate(skeleton: &Skeleton, config: &FitConfig, params: &Pppr, g
         count: params.shape().joints,
     };
     let mut terms = Terms::default();
-    let theta_max = config.theta_max_deg.to_radians();
+    let limit = Limit::new(config.theta_max_deg.to_radians());
     for person in 0..params.shape().persons {
         let first = person * joints.count;
         for (&[m, n], &reference) in skeleton.bones.iter().zip(&skeleton.bone_lengths_m) {
@@ -51,7 +67,7 @@ pub(super) fn evaluate(skeleton: &Skeleton, config: &FitConfig, params: &Pppr, g
             terms.rigid += rigid;
         }
         for triplet in &skeleton.angles {
-            terms.joint += joints.angle(triplet.map(|j| first + j), theta_max);
+            terms.joint += joints.angle(triplet.map(|j| first + j), &limit);
         }
     }
     terms.sep = joints.separation(config.d_sep_m);
@@ -64,27 +80,34 @@ impl Joints<'_> {
     fn bone(&mut self, [m, n]: [usize; 2], reference: f64) -> (f64, f64) {
         let e = sub(self.positions[m], self.positions[n]);
         let l = length(e);
+        let unit = scale(e, 1.0 / l);
         let (stretch, stretch_slope) = pseudo_huber(l - reference);
 
         let dv = sub(self.velocities[m], self.velocities[n]);
-        let (rigid, rigid_slope) = pseudo_huber(dot(dv, e) / l);
-        let mut e_bar = scale(e, stretch_slope / l - rigid_slope * dot(dv, e) / (l * l * l));
-        add_scaled(&mut e_bar, dv, rigid_slope / l);
+        let along = dot(dv, unit);
+        let (rigid, rigid_slope) = pseudo_huber(along);
+        let by_l = rigid_slope / l;
+        let mut e_bar = scale(unit, stretch_slope - by_l * along);
+        add_scaled(&mut e_bar, dv, by_l);
 
         for (joint, sign) in [(m, 1.0), (n, -1.0)] {
             add_scaled(&mut self.position_bars[joint], e_bar, sign);
-            add_scaled(&mut self.velocity_bars[joint], e, sign * rigid_slope / l);
+            add_scaled(&mut self.velocity_bars[joint], unit, sign * rigid_slope);
         }
         (stretch, rigid)
     }
 
     /// max(0, θ − θ_max)² at the vertex n of (m, n, o).
-    fn angle(&mut self, [m, n, o]: [usize; 3], theta_max: f64) -> f64 {
+    fn angle(&mut self, [m, n, o]: [usize; 3], limit: &Limit) -> f64 {
         let a = sub(self.positions[m], self.positions[n]);
         let b = sub(self.positions[o], self.positions[n]);
         let c = cross(a, b);
         let (y, x) = (length(c), dot(a, b));
-        let over = y.atan2(x) - theta_max;
+        // sin(θ − θ_max): most angles are far below, and need no arctangent.
+        if y * limit.cos <= x * limit.sin {
+            return 0.0;
+        }
+        let over = y.atan2(x) - limit.theta;
         if over <= 0.0 {
             return 0.0;
         }
@@ -142,7 +165,8 @@ fn repulsion(e: Vec3, limit: f64) -> Option<(f64, Vec3)> {
     (gap > 0.0).then(|| (2.0 * gap * gap, scale(e, -4.0 * gap / l)))
 }
 
-/// Length of bone (m, n), m, without the floor: for the convergence criterion.
-pub(super) fn bone_length(params: &Pppr, [m, n]: [usize; 2]) -> f64 {
-    norm(sub(params.position(m), params.position(n)))
+/// Square of the length of bone (m, n), m², without the floor: for the convergence criterion.
+pub(super) fn bone_length_sq(params: &Pppr, [m, n]: [usize; 2]) -> f64 {
+    let e = sub(params.position(m), params.position(n));
+    dot(e, e)
 }

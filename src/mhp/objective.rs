@@ -1,8 +1,7 @@
 //! L(Θ) and ∂L/∂Θ; SPEC section 4.
 
-use super::batch::Columns;
 use super::em::{self, Aim, Slopes, Workspace};
-use super::form::Forms;
+use super::form::{FormBars, Forms};
 use super::init::anchors;
 use super::percentile::percentile;
 use super::region::{self, Region};
@@ -24,9 +23,9 @@ pub struct Objective {
     /// Each view's region with B_ori over its cells.
     aims: Vec<Aim>,
     workspaces: Vec<Workspace>,
-    /// Scratch a joint: its form, and ∂L/∂(R S Sᵀ Rᵀ).
+    /// Scratch a joint: its form, and the form's adjoint.
     forms: Forms,
-    covariance: Columns<9>,
+    bars: FormBars,
     initial: Pppr,
     /// Where the frames around say that each person's middle is, m; empty where they say nothing.
     anchors: Vec<Vec3>,
@@ -76,7 +75,7 @@ impl Objective {
             aims,
             workspaces,
             forms: Forms::default(),
-            covariance: Columns::default(),
+            bars: FormBars::default(),
             initial: initial.clone(),
             anchors: Vec::new(),
             warnings,
@@ -147,18 +146,17 @@ impl Objective {
         iou.clear();
         let views = self.problem.views.len() as f64;
         let mut em = 0.0;
-        let Self { problem, config, precision, aims, workspaces, forms, covariance, .. } = self;
+        let Self { problem, config, precision, aims, workspaces, forms, bars, .. } = self;
         forms.fill(params, *precision);
-        covariance.hold(forms.joints());
-        covariance.clear();
+        bars.reset(forms.joints());
         for ((view, aim), workspace) in problem.views.iter().zip(&*aims).zip(workspaces) {
             let scene = Scene::new(&problem.radar, view, config);
-            let slopes = Slopes { factor: 1.0 / views, gradient: &mut *em_gradient, covariance: &mut *covariance };
+            let slopes = Slopes { factor: 1.0 / views, gradient: &mut *em_gradient, bars: &mut *bars };
             let answer = em::evaluate(&scene, *precision, (params, &*forms), aim, Some(slopes), workspace);
             em += answer.loss / views;
             iou.push(answer.iou);
         }
-        forms.pull_back(covariance, em_gradient, *precision);
+        forms.pull_back(bars, em_gradient, *precision);
         *terms = kinematic::evaluate(&self.problem.skeleton, &self.config, params, gradient);
         terms.em = em;
         gradient.mix(self.config.w_kine, self.config.w_em, em_gradient);

@@ -4,7 +4,7 @@ use super::form::Forms;
 use super::kernel::Kernel;
 use super::region::Region;
 use super::scalar::Real;
-use super::splat::{Scene, Splat};
+use super::splat::{Scene, Splats};
 use super::tiles::{Tiles, Tiling};
 use super::{Precision, Problem};
 use crate::body::Pppr;
@@ -36,7 +36,7 @@ pub(super) fn floored(ln_s: f64) -> f64 {
 pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, params: &Pppr) -> Vec<Vec<f64>> {
     let mut forms = Forms::default();
     forms.fill(params, precision);
-    let mut splats = Vec::new();
+    let mut splats = Splats::default();
     problem
         .views
         .iter()
@@ -55,7 +55,7 @@ pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, par
         .collect()
 }
 
-fn map<T: Real>(splats: &[Splat], region: &Region, summation: Summation) -> Vec<f64> {
+fn map<T: Real>(splats: &Splats, region: &Region, summation: Summation) -> Vec<f64> {
     let mut map = vec![f64::NEG_INFINITY; region.cells()];
     Kernel::<T>::new(splats, &region.bins, summation).forward(&mut map);
     for value in &mut map {

@@ -1,20 +1,20 @@
 //! One joint seen by one view: its Gaussian in bin coordinates, its weight, its phases. All in f64; SPEC section 3.
 //!
-//! What is kept is what the per-cell kernel needs ([`Splat`]) and what the derivative needs on the way back
-//! ([`Look`], [`Row`]); `adjoint.rs` reads like this file from bottom to top.
+//! What is kept is what the per-cell kernel needs ([`Splats`]); what the derivative needs besides ([`Look`], [`Row`],
+//! [`Widths`]) it computes once more, and `adjoint.rs` reads like this file from bottom to top.
 #![expect(
     clippy::inline_always,
     reason = "all of it belongs into the one function that is compiled for an instruction set"
 )]
 
 use super::Precision;
-use super::batch::{Batch, Task, each_joint};
-use super::form::{Form, Forms};
+use super::batch::{Batch, Columns, One, Task, each_joint};
+use super::form::{Form, Forms, mean};
 use super::seen::{DISTANCE_FLOOR_M, Floored, Seen, uniform};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::{IDENTITY, Mat3, Number, Vec3, add_scaled, dot, mat_mul, mat_vec, norm, scale, transpose};
-use crate::radar::{Axis, AxisKind, RadarConfig, SPEED_OF_LIGHT, View};
+use crate::geometry::{Number, Vec3, dot, mat_t_vec, mat_vec, norm, scale};
+use crate::radar::{AxisKind, RadarConfig, SPEED_OF_LIGHT, View};
 use std::f64::consts::TAU;
 
 /// τ of an echo, s a metre.
@@ -37,38 +37,80 @@ pub(super) struct Row<T> {
     pub displacement: Vec3<T>,
 }
 
-/// ln of the spectrum's factor a bin of each Doppler axis; empty on other axes.
-pub(super) type Spectra = [Vec<f64>; 3];
-
-/// What the per-cell kernel needs of one joint in one view.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Splat {
-    /// Number of axes, 1 to 3.
-    pub dims: usize,
-    /// Bin coordinates b.
-    pub bin: [f64; 3],
-    /// C⁻¹ in its leading dims × dims block, bins⁻².
-    pub precision: Mat3,
-    /// ln of amplitude times the Gaussian's norm.
-    pub ln_weight: f64,
-    /// φ, reduced to one turn.
-    pub phase: f64,
-    /// Phase ramp κ, rad per bin.
-    pub kappa: [f64; 3],
-    pub spectrum: Spectra,
-}
-
-/// A joint as a view sees it: its splat, but for spectra.
+/// The covariance C of a joint's Gaussian, bins², as L D Lᵀ. Its exponent at Δ = i − b is −½ Σ_k (Δ_k + Σ_l<k s_kl Δ_l)²/D_k,
+/// squares completed from the last axis on, so that elongated Gaussians keep their digits; s is L⁻¹ below its diagonal.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Image<T> {
-    pub bin: Vec3<T>,
-    pub precision: Mat3<T>,
-    pub ln_weight: T,
-    pub phase: T,
-    pub kappa: Vec3<T>,
+pub(super) struct Squares<T, const D: usize> {
+    /// 1/D_k
+    pub weight: [T; D],
+    /// s_10, s_20, s_21
+    pub skew: [T; 3],
 }
 
-/// Where a view sees a joint, and how wide.
+/// A joint as a view of `D` axes sees it: its splat, but for spectra.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Image<T, const D: usize> {
+    /// Bin coordinates b.
+    pub bin: [T; D],
+    pub squares: Squares<T, D>,
+    /// ln of amplitude times the Gaussian's norm.
+    pub ln_weight: T,
+    /// φ, reduced to one turn.
+    pub phase: T,
+    /// Phase ramp κ, rad per bin.
+    pub kappa: [T; D],
+}
+
+/// Numbers of an [`Image`] of three axes.
+const NUMBERS: usize = 14;
+
+/// What the per-cell kernel needs of all joints in one view.
+#[derive(Debug, Default)]
+pub(super) struct Splats {
+    joints: usize,
+    numbers: Columns<NUMBERS>,
+    /// ln of the spectrum's factor, (joints, bins), of each Doppler axis; empty on other axes.
+    spectra: [Vec<f64>; 3],
+}
+
+/// What the per-cell kernel needs of one joint in one view. The last axis is the third; axes that are missing come first,
+/// as axes of one bin in whose middle the joint lies.
+#[derive(Debug, Clone)]
+pub(super) struct Splat<'a> {
+    pub bin: [f64; 3],
+    /// 1/D_k and s of [`Squares`].
+    pub weight: [f64; 3],
+    pub skew: [f64; 3],
+    pub ln_weight: f64,
+    pub phase: f64,
+    pub kappa: [f64; 3],
+    /// ln of the spectrum's factor a bin of each Doppler axis; empty on other axes.
+    pub spectrum: [&'a [f64]; 3],
+}
+
+impl Splats {
+    pub(super) fn joints(&self) -> usize {
+        self.joints
+    }
+
+    #[inline(always)]
+    pub(super) fn of(&self, joint: usize) -> Splat<'_> {
+        let [b0, b1, b2, w0, w1, w2, s0, s1, s2, ln_weight, phase, k0, k1, k2] = One(joint).load(&self.numbers);
+        let mut spectrum = [&[] as &[f64]; 3];
+        for (of, all) in spectrum.iter_mut().zip(&self.spectra) {
+            let bins = all.len() / self.joints;
+            *of = &all[joint * bins..(joint + 1) * bins];
+        }
+        let (bin, weight, skew, kappa) = ([b0, b1, b2], [w0, w1, w2], [s0, s1, s2], [k0, k1, k2]);
+        Splat { bin, weight, skew, ln_weight, phase, kappa, spectrum }
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = Splat<'_>> {
+        (0..self.joints).map(|joint| self.of(joint))
+    }
+}
+
+/// Where a view sees a joint.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Look<T> {
     /// The joint before the surface offset, view frame.
@@ -76,15 +118,23 @@ pub(super) struct Look<T> {
     pub seen: Seen<T>,
     /// v in the view frame, m/s.
     pub velocity: Vec3<T>,
-    /// Σ', m².
-    pub blurred: Mat3<T>,
-    pub w_az: T,
-    pub w_el: T,
+    /// The point spread along u, e_az and e_el, m.
+    pub blur: [T; 3],
+}
+
+/// How far the joint's own widths and the point spread reach along an axis; C is the sum of their products.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Widths<T> {
+    /// ∂b/∂p, world frame.
+    pub gradient: Vec3<T>,
+    /// That along the columns of R S, bins.
+    pub own: Vec3<T>,
+    /// ∂b/∂p along u, e_az and e_el, bins a metre; zero where the point spread is.
+    pub seen: [T; 3],
 }
 
 /// A view, a radar and a configuration, and what is the same for all joints.
 pub(super) struct Scene<'a> {
-    pub radar: &'a RadarConfig,
     pub view: &'a View,
     pub config: &'a FitConfig,
     /// A bin of each axis in axis units, and bins a unit.
@@ -94,6 +144,10 @@ pub(super) struct Scene<'a> {
     own_variance: [f64; 3],
     /// Of φ: by τ², v_r, sin θ_az and sin θ_el; 0 where an operator is off.
     phase: [f64; 4],
+    /// Whether the point spread has a width along u, e_az and e_el.
+    pub blurs: [bool; 3],
+    /// ln of what all joints' weights share.
+    ln_share: f64,
 }
 
 /// Whether the operator behind an axis is on.
@@ -135,7 +189,11 @@ impl<'a> Scene<'a> {
             gate(on.angle, per_metre * radar.l_az_m),
             gate(on.angle, per_metre * radar.l_el_m),
         ];
-        Self { radar, view, config, step, by_step, own_variance, phase }
+        let psf = &view.psf;
+        let blurs = [psf.range_m, psf.azimuth_rad, psf.elevation_rad].map(|width| width != 0.0);
+        let near = if on.attenuation { 4.0 * radar.r_max_m.ln() } else { 0.0 };
+        let ln_share = near - 0.5 * view.axes.len().min(3) as f64 * LN_TAU;
+        Self { view, config, step, by_step, own_variance, phase, blurs, ln_share }
     }
 }
 
@@ -159,75 +217,153 @@ impl Scene<'_> {
     }
 
     /// Projects every joint of `params`, which has these forms, into this view: overwrites `splats`.
-    pub(super) fn splats(&self, (params, forms): (&Pppr, &Forms), precision: Precision, splats: &mut Vec<Splat>) {
-        splats.resize_with(forms.joints(), Splat::default);
-        each_joint(precision, forms.joints(), &mut Project { scene: self, params, forms, splats });
+    pub(super) fn splats(&self, (params, forms): (&Pppr, &Forms), precision: Precision, splats: &mut Splats) {
+        let (joints, axes) = (forms.joints(), &self.view.axes);
+        splats.joints = joints;
+        splats.numbers.hold(joints);
+        match self.dims() {
+            1 => each_joint(precision, joints, &mut Project::<1> { scene: self, forms, splats }),
+            2 => each_joint(precision, joints, &mut Project::<2> { scene: self, forms, splats }),
+            _ => each_joint(precision, joints, &mut Project::<3> { scene: self, forms, splats }),
+        }
+        for spectra in &mut splats.spectra {
+            spectra.clear();
+        }
+        for (spectra, axis) in splats.spectra.iter_mut().skip(3 - self.dims()).zip(axes) {
+            if axis.kind == AxisKind::Doppler {
+                for joint in 0..joints {
+                    spectra.extend(spectrum_of(params.joint(Group::Omega, joint), axis.bins));
+                }
+            }
+        }
     }
 
-    /// Where the view sees joints of this form, and how wide.
+    /// Where the view sees joints of this form.
     #[inline(always)]
     pub(super) fn look<T: Number>(&self, form: &Form<T>) -> Look<T> {
         let pose = &self.view.pose;
         let turn = uniform(form.opacity, pose.rotation);
         let [x, y, z] = mat_vec(&turn, form.position);
         let unmoved = [x + pose.translation[0], y + pose.translation[1], z + pose.translation[2]];
-        let seen = Seen::new(scale(unmoved, self.surface_factor(unmoved).0));
+        let moved = self.config.surface_offset_m != 0.0;
+        let seen = Seen::new(if moved { scale(unmoved, self.surface_factor(unmoved).0) } else { unmoved });
         let psf = &self.view.psf;
-        let w_az = seen.rho.value * psf.azimuth_rad / seen.cos_az_floored.value;
-        let w_el = seen.d.value * psf.elevation_rad / seen.cos_el_floored.value;
-        let blurred = blurred(&mat_mul(&turn, &form.spread), &seen, psf.range_m, w_az, w_el);
-        Look { unmoved, seen, velocity: mat_vec(&turn, form.velocity), blurred, w_az, w_el }
+        let mut blur = [x.like(psf.range_m), x.like(0.0), x.like(0.0)];
+        if self.blurs[1] {
+            blur[1] = seen.rho.value * psf.azimuth_rad / seen.cos_az_floored.value;
+        }
+        if self.blurs[2] {
+            blur[2] = seen.d.value * psf.elevation_rad / seen.cos_el_floored.value;
+        }
+        Look { unmoved, seen, velocity: mat_vec(&turn, form.velocity), blur }
     }
 
     /// The view's axes there.
     #[inline(always)]
-    pub(super) fn rows<T: Number>(&self, seen: &Seen<T>) -> [Row<T>; 3] {
-        let zero = seen.h.like(0.0);
-        let (slope, arm, ratio, by_ratio, none) = (zero, zero, zero, zero, [zero; 3]);
-        let missing = Row { slope, arm, ratio, by_ratio, direction: none, gradient: none, displacement: none };
-        let mut rows = [missing; 3];
-        for (k, axis) in self.view.axes.iter().take(3).enumerate() {
-            rows[k] = self.row(seen, k, axis);
+    pub(super) fn rows<T: Number, const D: usize>(&self, seen: &Seen<T>) -> [Row<T>; D] {
+        let mut rows = [self.row(seen, 0); D];
+        for k in 1..D {
+            rows[k] = self.row(seen, k);
         }
         rows
     }
 
+    /// How wide joints of this form are along them.
+    #[inline(always)]
+    pub(super) fn widths<T: Number, const D: usize>(
+        &self,
+        form: &Form<T>,
+        look: &Look<T>,
+        rows: &[Row<T>; D],
+    ) -> [Widths<T>; D] {
+        let (zero, seen) = (form.opacity.like(0.0), &look.seen);
+        let turn = uniform(zero, self.view.pose.rotation);
+        let mut widths = [Widths { gradient: [zero; 3], own: [zero; 3], seen: [zero; 3] }; D];
+        for k in 0..D {
+            let gradient = mat_t_vec(&turn, rows[k].gradient);
+            widths[k].own = mat_t_vec(&form.spread, gradient);
+            widths[k].gradient = gradient;
+            for (i, direction) in [seen.u, seen.e_az, seen.e_el].into_iter().enumerate() {
+                if self.blurs[i] {
+                    widths[k].seen[i] = dot(rows[k].gradient, direction);
+                }
+            }
+        }
+        widths
+    }
+
+    /// C of those widths, in its squares, and its determinant.
+    #[inline(always)]
+    pub(super) fn squares<T: Number, const D: usize>(
+        &self,
+        look: &Look<T>,
+        widths: &[Widths<T>; D],
+    ) -> (Squares<T, D>, T) {
+        let zero = look.seen.h.like(0.0);
+        let mut covariance = [[zero; D]; D];
+        for k in 0..D {
+            for l in 0..=k {
+                covariance[k][l] = dot(widths[k].own, widths[l].own);
+                for i in 0..3 {
+                    if self.blurs[i] {
+                        let reach = look.blur[i] * look.blur[i] * widths[k].seen[i];
+                        covariance[k][l] = covariance[k][l].plus(reach, widths[l].seen[i]);
+                    }
+                }
+            }
+            covariance[k][k] = covariance[k][k] + (self.own_variance[k] + 1.0 / 12.0);
+        }
+        Squares::new(&covariance)
+    }
+
     /// What the view makes of it.
     #[inline(always)]
-    pub(super) fn image<T: Number>(&self, form: &Form<T>, look: &Look<T>, rows: &[Row<T>; 3]) -> Image<T> {
-        let Look { seen, velocity, blurred, .. } = look;
+    pub(super) fn image<T: Number, const D: usize>(
+        &self,
+        form: &Form<T>,
+        look: &Look<T>,
+        rows: &[Row<T>; D],
+    ) -> Image<T, D> {
+        let Look { seen, velocity, .. } = look;
         let zero = seen.h.like(0.0);
-        let dims = self.dims();
         let radial = dot(*velocity, seen.u);
-        let (mut bin, mut kappa) = ([zero; 3], [zero; 3]);
-        let mut covariance = uniform(zero, IDENTITY);
-        for (k, axis) in self.view.axes.iter().take(dims).enumerate() {
+        let mut bin = [zero; D];
+        for k in 0..D {
+            let axis = &self.view.axes[k];
             let coordinate = if self.sees(axis.kind) { seen.coordinate(axis, radial) } else { zero };
             bin[k] = (coordinate - axis.lo) * self.by_step[k];
-            if self.config.operators.doppler {
-                kappa[k] = form.omega_mean * dot(*velocity, rows[k].displacement);
-            }
-            covariance[k][k] = zero.like(self.own_variance[k] + 1.0 / 12.0);
         }
-        for k in 0..dims {
-            for l in 0..dims {
-                covariance[k][l] += dot(rows[k].gradient, mat_vec(blurred, rows[l].gradient));
-            }
-        }
-        let (precision, ln_det) = inverse_and_ln_det(&covariance);
-
-        let mut ln_amplitude = form.ln_opacity;
+        let (squares, mut inverse_weight_sq) = self.squares(look, &self.widths(form, look, rows));
         if self.config.operators.attenuation {
-            ln_amplitude += (zero.like(self.radar.r_max_m) / seen.d.value).ln() * 4.0;
+            let d_sq = seen.d.value * seen.d.value;
+            inverse_weight_sq = inverse_weight_sq * (d_sq * d_sq) * (d_sq * d_sq);
         }
-        let ln_weight = ln_amplitude - (ln_det + dims as f64 * LN_TAU) * 0.5;
+        let ln_weight = form.ln_opacity - inverse_weight_sq.ln() * 0.5 + self.ln_share;
         let phase = self.phase(seen, radial);
         let phase = phase - (phase * (1.0 / TAU)).whole() * TAU;
-        Image { bin, precision, ln_weight, phase, kappa }
+        Image { bin, squares, ln_weight, phase, kappa: self.kappa(form, look, rows) }
+    }
+
+    /// κ = ω̄ v·D, rad per bin; 0 where Doppler is off.
+    #[inline(always)]
+    pub(super) fn kappa<T: Number, const D: usize>(
+        &self,
+        form: &Form<T>,
+        look: &Look<T>,
+        rows: &[Row<T>; D],
+    ) -> [T; D] {
+        let mut kappa = [form.omega_mean.like(0.0); D];
+        if self.config.operators.doppler {
+            for k in 0..D {
+                kappa[k] = form.omega_mean * dot(look.velocity, rows[k].displacement);
+            }
+        }
+        kappa
     }
 
     #[inline(always)]
-    fn row<T: Number>(&self, seen: &Seen<T>, k: usize, axis: &Axis) -> Row<T> {
+    fn row<T: Number>(&self, seen: &Seen<T>, k: usize) -> Row<T> {
+        let axis = &self.view.axes[k];
         let (direction, arm) = seen.direction_and_arm(axis.kind);
         let slope = seen.slope(axis);
         let (zero, one) = (arm.like(0.0), arm.like(1.0));
@@ -253,53 +389,82 @@ impl Scene<'_> {
     }
 }
 
-struct Project<'a> {
-    scene: &'a Scene<'a>,
-    params: &'a Pppr,
-    forms: &'a Forms,
-    splats: &'a mut [Splat],
-}
-
-impl Task for Project<'_> {
+impl<T: Number, const D: usize> Squares<T, D> {
+    /// Of the lower half of C, which is positive definite; and its determinant.
     #[inline(always)]
-    fn run<B: Batch>(&mut self, batch: B) {
-        let Self { scene, params, forms, splats } = self;
-        let (axes, form) = (&scene.view.axes, forms.of(batch));
-        let look = scene.look(&form);
-        let image = scene.image(&form, &look, &scene.rows(&look.seen));
-        batch.scatter(image.ln_weight, |joint, x| splats[joint].ln_weight = x);
-        batch.scatter(image.phase, |joint, x| splats[joint].phase = x);
-        for k in 0..scene.dims() {
-            batch.scatter(image.bin[k], |joint, x| splats[joint].bin[k] = x);
-            batch.scatter(image.kappa[k], |joint, x| splats[joint].kappa[k] = x);
-            for l in 0..scene.dims() {
-                batch.scatter(image.precision[k][l], |joint, x| splats[joint].precision[k][l] = x);
+    fn new(c: &[[T; D]; D]) -> (Self, T) {
+        let one = c[0][0].like(1.0);
+        let mut squares = Self { weight: [one / c[0][0]; D], skew: [one.like(0.0); 3] };
+        let mut determinant = c[0][0];
+        if D > 1 {
+            let s_10 = -c[1][0] * squares.weight[0];
+            let d_1 = c[1][1].plus(s_10, c[1][0]);
+            (squares.weight[1], squares.skew[0]) = (one / d_1, s_10);
+            determinant = determinant * d_1;
+            if D > 2 {
+                let (l_20, mixed) = (c[2][0] * squares.weight[0], c[2][1].plus(s_10, c[2][0]));
+                let s_21 = -mixed * squares.weight[1];
+                let d_2 = (c[2][2] - l_20 * c[2][0]).plus(s_21, mixed);
+                squares.weight[2] = one / d_2;
+                (squares.skew[1], squares.skew[2]) = ((-l_20).plus(s_21, s_10), s_21);
+                determinant = determinant * d_2;
             }
         }
-        batch.scatter(form.omega_mean, |joint, mean| {
-            splats[joint].dims = scene.dims();
-            for (spectrum, axis) in splats[joint].spectrum.iter_mut().zip(axes) {
-                spectrum.clear();
-                if axis.kind == AxisKind::Doppler {
-                    spectrum.extend(spectrum_of(params.joint(Group::Omega, joint), mean, axis.bins));
-                }
+        (squares, determinant)
+    }
+
+    /// C⁻¹, bins⁻².
+    #[inline(always)]
+    pub(super) fn precision(&self) -> [[T; D]; D] {
+        let Self { weight, skew } = self;
+        let mut precision = [[weight[0]; D]; D];
+        if D > 1 {
+            let s_10 = skew[0];
+            precision[1][0] = s_10 * weight[1];
+            precision[0][0] = weight[0].plus(s_10, precision[1][0]);
+            precision[1][1] = weight[1];
+            if D > 2 {
+                let (s_20, s_21) = (skew[1], skew[2]);
+                let (by_0, by_1) = (s_20 * weight[2], s_21 * weight[2]);
+                precision[0][0] = precision[0][0].plus(s_20, by_0);
+                precision[1][0] = precision[1][0].plus(s_21, by_0);
+                precision[1][1] = precision[1][1].plus(s_21, by_1);
+                (precision[2][0], precision[2][1], precision[2][2]) = (by_0, by_1, weight[2]);
             }
-        });
+        }
+        for k in 0..D {
+            for l in k + 1..D {
+                precision[k][l] = precision[l][k];
+            }
+        }
+        precision
     }
 }
 
-/// Σ' = M Mᵀ + σ_r² u uᵀ + w_az² e_az e_azᵀ + w_el² e_el e_elᵀ, m².
-#[inline(always)]
-fn blurred<T: Number>(spread: &Mat3<T>, seen: &Seen<T>, sigma_r: f64, w_az: T, w_el: T) -> Mat3<T> {
-    let mut blurred = *spread;
-    for i in 0..3 {
-        let row = &mut blurred[i];
-        *row = mat_vec(spread, spread[i]);
-        add_scaled(row, seen.u, seen.u[i] * (sigma_r * sigma_r));
-        add_scaled(row, seen.e_az, w_az * w_az * seen.e_az[i]);
-        add_scaled(row, seen.e_el, w_el * w_el * seen.e_el[i]);
+struct Project<'a, const D: usize> {
+    scene: &'a Scene<'a>,
+    forms: &'a Forms,
+    splats: &'a mut Splats,
+}
+
+impl<const D: usize> Task for Project<'_, D> {
+    #[inline(always)]
+    fn run<B: Batch>(&mut self, batch: B) {
+        let form = self.forms.of(batch);
+        let look = self.scene.look(&form);
+        let image: Image<B::Number, D> = self.scene.image(&form, &look, &self.scene.rows(&look.seen));
+        let (zero, one) = (batch.all(0.0), batch.all(1.0));
+        let (mut bin, mut weight, mut kappa) = ([zero; 3], [one; 3], [zero; 3]);
+        for k in 0..D {
+            let axis = 3 - D + k;
+            (bin[axis], weight[axis], kappa[axis]) = (image.bin[k], image.squares.weight[k], image.kappa[k]);
+        }
+        let [s10, s20, s21] = image.squares.skew;
+        let skew = if D == 2 { [zero, zero, s10] } else { [s10, s20, s21] };
+        let ([b0, b1, b2], [w0, w1, w2], [s0, s1, s2], [k0, k1, k2]) = (bin, weight, skew, kappa);
+        let numbers = [b0, b1, b2, w0, w1, w2, s0, s1, s2, image.ln_weight, image.phase, k0, k1, k2];
+        batch.store(numbers, &mut self.splats.numbers);
     }
-    blurred
 }
 
 /// Where bin `bin` of a Doppler axis lies among `features` entries of ω: lower entry and weight of the upper one.
@@ -312,29 +477,13 @@ pub(super) fn feature_at(bin: usize, bins: usize, features: usize) -> (usize, f6
     (lower, t - lower as f64)
 }
 
-fn spectrum_of(omega: &[f64], mean: f64, bins: usize) -> impl Iterator<Item = f64> {
+/// ω(t) − ω̄ a bin.
+fn spectrum_of(omega: &[f64], bins: usize) -> impl Iterator<Item = f64> {
+    let mean = mean(omega);
     (0..bins).map(move |bin| {
         let (lower, t) = feature_at(bin, bins, omega.len());
         let at = |i: usize| omega.get(i).copied().unwrap_or(0.0);
         let upper = if t == 0.0 { 0.0 } else { at(lower + 1) * t };
         at(lower) * (1.0 - t) + upper - mean
     })
-}
-
-/// The inverse of a symmetric positive definite matrix and the ln of its determinant.
-#[inline(always)]
-fn inverse_and_ln_det<T: Number>(m: &Mat3<T>) -> (Mat3<T>, T) {
-    let mut cofactors = *m;
-    for i in 0..3 {
-        for k in 0..3 {
-            let (a, b) = ((i + 1) % 3, (i + 2) % 3);
-            let (p, q) = ((k + 1) % 3, (k + 2) % 3);
-            cofactors[i][k] = m[a][p] * m[b][q] - m[a][q] * m[b][p];
-        }
-    }
-    let determinant = dot(m[0], cofactors[0]);
-    let by_determinant = determinant.like(1.0) / determinant;
-    let [a, b, c] = transpose(&cofactors);
-    let inverse = [scale(a, by_determinant), scale(b, by_determinant), scale(c, by_determinant)];
-    (inverse, determinant.ln())
 }

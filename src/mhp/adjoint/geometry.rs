@@ -74,6 +74,17 @@ impl<T: Number> Geometry<T> {
         self.u[1] -= bar * s / cosine.value * cosine.pass;
     }
 
+    /// ∂L/∂(the direction of a point spread): u, e_az or e_el.
+    #[inline(always)]
+    pub(super) fn blurred(&mut self, along: usize, bar: Vec3<T>) {
+        let one = bar[0].like(1.0);
+        match along {
+            0 => add_scaled(&mut self.u, bar, one),
+            1 => add_scaled(&mut self.e_az, bar, one),
+            _ => add_scaled(&mut self.e_el, bar, one),
+        }
+    }
+
     /// ∂L/∂(arm of an axis): ρ or d.
     #[inline(always)]
     pub(super) fn arm(&mut self, kind: AxisKind, bar: T) {
@@ -150,6 +161,9 @@ fn inverse<T: Number>(length_m: T) -> T {
 /// p = p₀ max(d₀ − δ, floor)/d₀.
 #[inline(always)]
 fn unmove<T: Number>(scene: &Scene<'_>, unmoved: Vec3<T>, p_bar: Vec3<T>) -> Vec3<T> {
+    if scene.config.surface_offset_m == 0.0 {
+        return p_bar;
+    }
     let (factor, d, skin) = scene.surface_factor(unmoved);
     let mut bar = scale(p_bar, factor);
     let length = norm(unmoved);

@@ -1,5 +1,6 @@
 //! What the cells want of each joint.
 
+use super::adjoint::Sums;
 use super::joint::Joint;
 use super::strip::{Strip, bits};
 use super::{
@@ -17,7 +18,7 @@ const MOST_LANES: usize = 16;
 impl Tiles {
     /// Adds to each joint's moments what the cells want.
     #[inline(always)]
-    pub(super) fn collect<S: Simd, const COHERENT: bool>(&mut self, simd: S, grid: &Tiling, moments: &mut [Moments]) {
+    pub(super) fn collect<S: Simd, const COHERENT: bool>(&mut self, simd: S, grid: &Tiling, moments: &mut Moments) {
         let mut gathered = std::mem::take(&mut self.gathered);
         gathered.resize(self.joints.len(), [Row::ZERO; 9]);
         let row_blocks = grid.rows * grid.columns.div_ceil(BLOCK);
@@ -27,15 +28,18 @@ impl Tiles {
                 let to = self.ends[index] as usize;
                 for strip in &self.strips[from..to] {
                     let number = strip.joint as usize;
-                    let (gathered, moments) = (&mut gathered[number], &mut moments[number]);
                     let at = (index, block);
-                    self.gather::<S, COHERENT>(simd, grid, at, strip, gathered, moments);
+                    self.gather::<S, COHERENT>(simd, grid, at, strip, &mut gathered[number], moments);
                 }
                 from = to;
             }
-            for ((joint, gathered), moments) in self.joints.iter().zip(&mut gathered).zip(&mut *moments) {
-                let slice = grid.lo[0] + slice;
-                Sums::new(simd, gathered).add_to(moments, slice, slice as f64 - joint.bin[0]);
+            let slice = grid.lo[0] + slice;
+            for (number, (joint, gathered)) in self.joints.iter().zip(&mut gathered).enumerate() {
+                let sums = slice_sums(simd, gathered, slice as f64 - joint.bin[0]);
+                moments.add(number, &sums);
+                if let Some(sum) = moments.by_bin(number, 0).get_mut(slice) {
+                    *sum += sums.r;
+                }
                 Cell::nothing(simd).keep(gathered);
             }
         }
@@ -84,7 +88,9 @@ impl Tiles {
                     let wanted = wanted::<S, COHERENT>(simd, returned, &sums[tile], part);
                     let x = splat(simd, first_x + (tile * ALONG_BINS) as f32 + beside_x);
                     of.add(wanted, [one, x, x * x]);
-                    by_bin(grid, block, tile, part, wanted[0], moments);
+                    let mut cells = Cells::ZERO;
+                    store(&mut cells, part, wanted[0]);
+                    by_bin(grid, block, tile, &cells, strip.joint as usize, moments);
                 }
                 cell.add(simd, &of, line.delta + beside_y);
             }
@@ -261,16 +267,13 @@ impl Strip {
     }
 }
 
-/// Adds `r` to the bins of the Doppler axes.
-#[inline(always)]
-fn by_bin<S: Simd>(grid: &Tiling, block: &Block, tile: usize, part: usize, r: Lanes<S>, moments: &mut Moments) {
-    let mut cells = Cells::ZERO;
-    store(&mut cells, part, r);
+/// Adds what the cells of a tile want, r, to the bins of a joint along Doppler axes.
+#[inline(never)]
+fn by_bin(grid: &Tiling, block: &Block, tile: usize, cells: &Cells, joint: usize, moments: &mut Moments) {
     let axes: [(usize, usize); 2] =
         [(1, grid.lo[1] + block.row * ACROSS_BINS), (2, grid.lo[2] + (block.column + tile) * ALONG_BINS)];
-    let missing = 3 - moments.dims;
     for (axis, first) in axes {
-        let Some(bins) = axis.checked_sub(missing).map(|k| &mut moments.r_by_bin[k]) else { continue };
+        let bins = moments.by_bin(joint, axis);
         if bins.is_empty() {
             continue;
         }
@@ -283,39 +286,20 @@ fn by_bin<S: Simd>(grid: &Tiling, block: &Block, tile: usize, part: usize, r: La
     }
 }
 
-/// Σr, ΣrΔx, ΣrΔy, ΣrΔx², ΣrΔxΔy, ΣrΔy², Σq, ΣqΔx, ΣqΔy of one slice.
-struct Sums([f64; 9]);
-
-impl Sums {
-    #[inline(always)]
-    fn new<S: Simd>(simd: S, gathered: &Gathered) -> Self {
-        let cells = Cell::of(simd, gathered).shifted(simd).0;
-        let mut sums = [0.0; 9];
-        for k in 0..9 {
-            sums[k] = f64::from(cells[k].sum());
-        }
-        Self(sums)
+/// The sums of one slice, `delta` from the joint along the outermost of three axes.
+#[inline(always)]
+fn slice_sums<S: Simd>(simd: S, gathered: &Gathered, delta: f64) -> Sums {
+    let cells = Cell::of(simd, gathered).shifted(simd).0;
+    let mut sums = [0.0; 9];
+    for k in 0..9 {
+        sums[k] = f64::from(cells[k].sum());
     }
-
-    /// Folds a slice at bin `slice` of the outermost of three axes, `delta` from the joint, into the moments.
-    fn add_to(&self, moments: &mut Moments, slice: usize, delta: f64) {
-        let [r, rx, ry, rxx, rxy, ryy, q, qx, qy] = self.0;
-        let missing = 3 - moments.dims;
-        let deltas = [delta * r, ry, rx];
-        let turns = [delta * q, qy, qx];
-        let squares = [[delta * delta * r, delta * ry, delta * rx], [delta * ry, ryy, rxy], [delta * rx, rxy, rxx]];
-        moments.r += r;
-        moments.q += q;
-        let add = |sums: &mut [f64; 3], of: &[f64; 3]| {
-            sums.iter_mut().zip(&of[missing..]).for_each(|(sum, x)| *sum += x);
-        };
-        add(&mut moments.r_delta, &deltas);
-        add(&mut moments.q_delta, &turns);
-        moments.r_delta_delta.iter_mut().zip(&squares[missing..]).for_each(|(sums, of)| add(sums, of));
-        if missing == 0
-            && let Some(sum) = moments.r_by_bin[0].get_mut(slice)
-        {
-            *sum += r;
-        }
+    let [r, rx, ry, rxx, rxy, ryy, q, qx, qy] = sums;
+    Sums {
+        r,
+        q,
+        r_delta: [delta * r, ry, rx],
+        q_delta: [delta * q, qy, qx],
+        r_delta_delta: [delta * delta * r, delta * ry, ryy, delta * rx, rxy, rxx],
     }
 }

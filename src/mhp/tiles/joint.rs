@@ -115,41 +115,31 @@ pub(super) struct Joint {
 
 impl Joint {
     #[inline(always)]
-    pub(super) fn fill<S: Simd, const COHERENT: bool>(&mut self, simd: S, splat_of: &Splat, grid: &Tiling) {
-        let missing = 3 - splat_of.dims;
-        let at = |k: usize| k.checked_sub(missing);
-        let p = |k: usize, l: usize| match (at(k), at(l)) {
-            (Some(k), Some(l)) => splat_of.precision[k][l],
-            _ => f64::from(u8::from(k == l)),
-        };
-        self.bin = std::array::from_fn(|k| at(k).map_or(0.0, |k| splat_of.bin[k]));
-        self.kappa = std::array::from_fn(|k| at(k).map_or(0.0, |k| splat_of.kappa[k] / TAU));
-        (self.phase, self.top) = (splat_of.phase / TAU, splat_of.ln_weight * LOG2_E);
-        let by_last = 1.0 / p(2, 2);
-        let (k20, k21) = (p(2, 0) * by_last, p(2, 1) * by_last);
-        // What is left of the other two axes.
-        let s = |k: usize, l: usize| p(k, l) - p(k, 2) * p(2, l) * by_last;
-        let (s10, s11) = (s(1, 0), s(1, 1));
-        let k10 = s10 / s11;
-        self.half = [s(0, 0) - s(0, 1) * k10, s11, p(2, 2)].map(|h| 0.5 * LOG2_E * h);
-        self.skew = [k10, k20, k21];
+    pub(super) fn fill<S: Simd, const COHERENT: bool>(&mut self, simd: S, splat_of: &Splat<'_>, grid: &Tiling) {
+        let Splat { bin, weight, skew, ln_weight, phase, kappa, spectrum } = splat_of;
+        let [turns0, turns1, turns2] = *kappa;
+        (self.bin, self.skew) = (*bin, *skew);
+        self.kappa = [turns0 * (1.0 / TAU), turns1 * (1.0 / TAU), turns2 * (1.0 / TAU)];
+        self.half = [weight[0] * (0.5 * LOG2_E), weight[1] * (0.5 * LOG2_E), weight[2] * (0.5 * LOG2_E)];
+        (self.phase, self.top) = (phase * (1.0 / TAU), ln_weight * LOG2_E);
+        let k21 = self.skew[2];
         (self.bend, self.shear) = ((-2.0 * self.half[2]) as f32, k21 as f32);
         self.first = nearest_tile(grid.middle()[1] - self.bin[2]).map(|bins| bins as f32);
         let (reach_y, reach_x) = (f64::from(REACH_ACROSS), f64::from(REACH_ALONG));
         let most_x = reach_x + reach_y * k21.abs();
         self.curvature = (self.half[1] * reach_y * reach_y + self.half[2] * most_x * most_x) as f32;
         self.tables::<S, COHERENT>(simd, grid);
-        let spectrum = |k: usize| at(k).map_or(&[] as &[f64], |k| splat_of.spectrum[k].as_slice());
-        self.along.fill(spectrum(2), grid.lo[2], grid.columns, ALONG_BINS, |cell| cell % ALONG_BINS);
-        self.across.fill(spectrum(1), grid.lo[1], grid.rows, ACROSS_BINS, |cell| cell / ALONG_BINS);
-        self.lines.clear();
-        for slice in 0..grid.size[0] {
-            let outer = spectrum(0).get(grid.lo[0] + slice).map_or(0.0, |ln| LOG2_E * ln);
-            for block in 0..grid.rows.div_ceil(BLOCK) {
-                let lines = self.sixteen(simd, grid, slice, block, outer);
-                self.lines.push(lines);
-            }
+        self.along.fill(spectrum[2], grid.lo[2], grid.columns, ALONG_BINS, |cell| cell % ALONG_BINS);
+        self.across.fill(spectrum[1], grid.lo[1], grid.rows, ACROSS_BINS, |cell| cell / ALONG_BINS);
+        let blocks = grid.rows.div_ceil(BLOCK);
+        let mut lines = std::mem::take(&mut self.lines);
+        lines.resize(grid.size[0] * blocks, Lines::default());
+        for (index, lines) in lines.iter_mut().enumerate() {
+            let (slice, block) = (index / blocks, index % blocks);
+            let outer = spectrum[0].get(grid.lo[0] + slice).map_or(0.0, |ln| LOG2_E * ln);
+            self.sixteen(simd, grid, (slice, block), outer, lines);
         }
+        self.lines = lines;
     }
 
     /// What is the same in every tile, and along every row.
@@ -173,24 +163,22 @@ impl Joint {
             }
             store(&mut self.gain, part, gain);
         }
-        self.columns.clear();
-        for column in (0..grid.columns).step_by(BLOCK) {
-            let bins = grid.middle()[1] + (column * ALONG_BINS) as f64 - self.bin[2];
+        self.columns.resize(grid.columns.div_ceil(BLOCK), [Sixteen::ZERO; 2]);
+        for (block, columns) in self.columns.iter_mut().enumerate() {
+            let bins = grid.middle()[1] + (block * BLOCK * ALONG_BINS) as f64 - self.bin[2];
             let first = splat(simd, whole_turns_off(self.kappa[2] * bins));
-            let mut columns = [Sixteen::ZERO; 2];
             for part in 0..tile_parts::<S>() {
                 let turns = lanes(simd, &STEPS, part).mul_add(along, first).turn();
-                for (table, values) in columns.iter_mut().zip(turns) {
-                    store(table, part, values);
+                for i in 0..2 {
+                    store(&mut columns[i], part, turns[i]);
                 }
             }
-            self.columns.push(columns);
         }
     }
 
-    /// Sixteen rows from row 16 `block` of a slice on; `outer` is the spectrum there, log₂.
+    /// Fills in sixteen rows from row 16 `block` of a slice on; `outer` is the spectrum there, log₂.
     #[inline(always)]
-    fn sixteen<S: Simd>(&self, simd: S, grid: &Tiling, slice: usize, block: usize, outer: f64) -> Lines {
+    fn sixteen<S: Simd>(&self, simd: S, grid: &Tiling, (slice, block): (usize, usize), outer: f64, lines: &mut Lines) {
         let Self { half: [h0, h1, _], skew: [k10, k20, k21], kappa: [kappa0, kappa1, _], .. } = *self;
         let [middle_y, middle_x] = grid.middle();
         let d0 = (grid.lo[0] + slice) as f64 - self.bin[0];
@@ -198,7 +186,6 @@ impl Joint {
         let (top, turn) = (self.top + outer - h0 * d0 * d0, self.phase + kappa0 * d0);
         let (shift_y, shift_x) = (k10 * d0, middle_x - self.bin[2] + k20 * d0);
         let [middle, most] = self.across.blocks.get(block).copied().unwrap_or_default();
-        let mut lines = Lines::default();
         let mut turns = Sixteen::ZERO;
         for i in 0..BLOCK {
             let y = first_y + (i * ACROSS_BINS) as f64;
@@ -217,7 +204,6 @@ impl Joint {
                 store(table, part, values);
             }
         }
-        lines
     }
 
     #[inline(always)]

@@ -7,8 +7,9 @@ use super::{
     splat, store,
 };
 
-/// The square of the threshold is looked for between these multiples of the last one.
-const LEVELS: [f64; 4] = [0.5, 0.93, 1.07, 2.0];
+/// The square of the threshold is looked for between these multiples of the last one, and then between those.
+const NEAR: [f64; 2] = [0.93, 1.07];
+const FAR: [f64; 2] = [0.5, 2.0];
 /// log₂ of m/(1 − m) is cut off here, both ways; there is no slope so far up.
 const ODDS: f32 = 60.0;
 /// Tiles whose soft masks are added up in single precision.
@@ -25,9 +26,9 @@ impl Tiles {
     ) -> Threshold {
         let grid = question.tiling;
         let square = self.last.map_or(f64::NAN, |last| (2.0 * (last - scale.log2)).exp2());
-        let levels = LEVELS.map(|level| (level * square) as f32);
+        let levels = NEAR.map(|level| (level * square) as f32);
         let (zero, one, faint) = (splat(simd, 0.0), splat(simd, 1.0), splat(simd, FAINTEST.exp2()));
-        let mut above = [zero; LEVELS.len()];
+        let mut above = [zero; 2];
         for &tile in &self.lit {
             let tile = tile as usize;
             let (target, [re, im], power) = (&grid.target[tile], &self.sums[tile], &mut self.power[tile]);
@@ -53,14 +54,23 @@ impl Tiles {
         let (lower_index, weight) = place(last, 100.0 - question.tau_pct);
         // Counted from the strongest.
         let rank = last - lower_index;
-        let mut counted = [0; LEVELS.len()];
-        for (count, above) in counted.iter_mut().zip(above) {
-            *count = above.sum() as usize;
+        // A level that fewer than these lie above, with their upper neighbour, is beyond the threshold.
+        let (mut low, mut high, mut stronger) = (-0.5, f32::MAX, 0);
+        let mut bound = |levels: [f32; 2], above: [usize; 2]| {
+            for (level, above) in levels.into_iter().zip(above) {
+                if above > rank {
+                    low = level.max(low);
+                } else if above < rank && level < high {
+                    (high, stronger) = (level, above);
+                }
+            }
+            low > 0.0 && high < f32::MAX
+        };
+        if !bound(levels, [above[0].sum() as usize, above[1].sum() as usize]) {
+            let levels = FAR.map(|level| (level * square) as f32);
+            bound(levels, self.above(simd, levels));
         }
-        let counted = || levels.into_iter().zip(counted);
-        // With its upper neighbour.
-        let low = counted().rev().find(|&(_, above)| above > rank).map_or(-0.5, |(level, _)| level);
-        let (high, above) = counted().find(|&(level, above)| level > low && above < rank).unwrap_or((f32::MAX, 0));
+        let above = stronger;
         self.between(simd, [low, high]);
         let found = order(&mut self.ranked, rank - above);
         // Where only the upper neighbour is summed, the lower one is nothing beside it.
@@ -74,6 +84,21 @@ impl Tiles {
         let upper = if upper.is_nan() { lower } else { upper };
         let value = between(f64::from(lower).sqrt(), f64::from(upper).sqrt(), weight);
         Threshold { lower, value, log2: value.log2() + scale.log2, among_lit }
+    }
+
+    /// How many squares lie above each level.
+    #[inline(always)]
+    fn above<S: Simd>(&self, simd: S, levels: [f32; 2]) -> [usize; 2] {
+        let mut above = [0; 2];
+        for &tile in &self.lit {
+            for part in 0..cell_parts::<S>() {
+                let value = lanes(simd, &self.power[tile as usize], part);
+                for (above, level) in above.iter_mut().zip(levels) {
+                    *above += (value - splat(simd, level)).positive().count_ones() as usize;
+                }
+            }
+        }
+        above
     }
 
     /// Lists the squares in (low, high] as what is ranked.

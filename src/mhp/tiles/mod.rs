@@ -23,12 +23,12 @@ mod mask;
 mod strip;
 mod sum;
 
-use super::adjoint::Moments;
+use super::adjoint::{self, Moments};
 use super::em::{SOFT_FLOOR, ViewAnswer, share};
 use super::lanes::{Lanes, splat};
 use super::percentile::{between, place};
 use super::simulate::EPSILON;
-use super::splat::Splat;
+use super::splat::Splats;
 use crate::config::Summation;
 use collect::Gathered;
 use joint::Joint;
@@ -125,8 +125,10 @@ const GUESS: f64 = 1.0;
 const HIGH: f64 = 12.0;
 /// Guesses of the threshold at most.
 const TRIES: usize = 40;
-/// A joint this much weaker (in ln) than the strongest at its cells is dropped (5e-5).
-const RELATIVE: f64 = 10.0;
+/// A joint this much weaker (in ln) than the strongest at its cells is dropped: from the objective (3e-4), whose mask is
+/// soft, and from a map (5e-5).
+const RELATIVE: f64 = 8.0;
+const RELATIVE_IN_MAPS: f64 = 10.0;
 /// ln of the weakest return that counts relative to the view's scale.
 const WEAKEST: f64 = -36.0;
 /// log₂ below which no return is taken: squares of its parts are normal f32, for others cost a hundred cycles.
@@ -234,13 +236,14 @@ pub(super) struct Tiles {
     gathered: Vec<Gathered>,
     /// Scratch of percentiles.
     ranked: Vec<u32>,
-    /// log₂ of the last threshold: where the percentile is looked for first.
+    /// log₂ of the last threshold, and the level of the last guess: where these are looked for first.
     last: Option<f64>,
+    last_level: f64,
 }
 
 /// What one view asks.
 pub(super) struct Question<'a> {
-    pub splats: &'a [Splat],
+    pub splats: &'a Splats,
     pub tiling: &'a Tiling,
     pub summation: Summation,
     pub tau_pct: f64,
@@ -274,7 +277,7 @@ pub fn simd_path() -> &'static str {
 
 impl Tiles {
     /// Answers `question`, and fills `moments` (one a joint, zeroed) where a gradient is wanted.
-    pub(super) fn evaluate(&mut self, question: &Question<'_>, moments: &mut [Moments]) -> ViewAnswer {
+    pub(super) fn evaluate(&mut self, question: &Question<'_>, moments: &mut Moments) -> ViewAnswer {
         match question.summation {
             Summation::Coherent => Arch::new().dispatch(Run::<true> { tiles: self, question, moments }),
             Summation::Incoherent => Arch::new().dispatch(Run::<false> { tiles: self, question, moments }),
@@ -284,7 +287,7 @@ impl Tiles {
 
 impl Tiles {
     /// H_sim of every cell in C order, f64; `None` where f32's range does not hold it.
-    pub(super) fn map(&mut self, splats: &[Splat], tiling: &Tiling, summation: Summation) -> Option<Vec<f64>> {
+    pub(super) fn map(&mut self, splats: &Splats, tiling: &Tiling, summation: Summation) -> Option<Vec<f64>> {
         match summation {
             Summation::Coherent => Arch::new().dispatch(Whole::<true> { tiles: self, splats, tiling }),
             Summation::Incoherent => Arch::new().dispatch(Whole::<false> { tiles: self, splats, tiling }),
@@ -307,7 +310,7 @@ impl Tiles {
 struct Run<'a, const COHERENT: bool> {
     tiles: &'a mut Tiles,
     question: &'a Question<'a>,
-    moments: &'a mut [Moments],
+    moments: &'a mut Moments,
 }
 
 impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
@@ -348,7 +351,7 @@ impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
 /// H_sim over a box.
 struct Whole<'a, const COHERENT: bool> {
     tiles: &'a mut Tiles,
-    splats: &'a [Splat],
+    splats: &'a Splats,
     tiling: &'a Tiling,
 }
 
@@ -383,12 +386,15 @@ struct Scale {
     /// that is as strong as the threshold: 1/T − 1.
     low: f32,
     fading: f32,
+    /// log₂ of how much weaker than the strongest a joint counts.
+    relative: f32,
 }
 
 impl Scale {
     /// For a whole map whose strongest joint has `log2` at its middle: all that f32's range holds below it.
     fn below(log2: f64) -> Self {
-        Self { log2: log2 - f64::from(STRONGEST) + ROOM, fading: 0.0, ..Self::new(0.0, 1.0) }
+        let relative = (RELATIVE_IN_MAPS * LOG2_E) as f32;
+        Self { log2: log2 - f64::from(STRONGEST) + ROOM, fading: 0.0, relative, ..Self::new(0.0, 1.0) }
     }
 
     fn new(guess: f64, softness: f64) -> Self {
@@ -403,6 +409,7 @@ impl Scale {
             soft_floor,
             low: (guess - GUESS * LOG2_E) as f32,
             fading: (1.0 / softness - 1.0).max(0.0) as f32,
+            relative: (RELATIVE * LOG2_E) as f32,
         }
     }
 }
@@ -453,10 +460,10 @@ fn store<S: Simd, const N: usize>(into: &mut Row<N>, part: usize, x: Lanes<S>) {
 impl Tiles {
     /// Takes the splats in; false where one is not finite.
     #[inline(always)]
-    fn fill<S: Simd, const COHERENT: bool>(&mut self, simd: S, splats: &[Splat], grid: &Tiling) -> bool {
-        self.joints.resize_with(splats.len(), Joint::default);
-        for (joint, splat) in self.joints.iter_mut().zip(splats) {
-            joint.fill::<S, COHERENT>(simd, splat, grid);
+    fn fill<S: Simd, const COHERENT: bool>(&mut self, simd: S, splats: &Splats, grid: &Tiling) -> bool {
+        self.joints.resize_with(splats.joints(), Joint::default);
+        for (joint, splat) in self.joints.iter_mut().zip(splats.iter()) {
+            joint.fill::<S, COHERENT>(simd, &splat, grid);
         }
         self.joints.iter().all(Joint::is_finite)
     }

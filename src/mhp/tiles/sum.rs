@@ -3,8 +3,8 @@
 use super::joint::Line;
 use super::strip::{Middles, Strip, bits};
 use super::{
-    BLOCK, Block, CELLS, Cells, EPSILON, Joint, LOG2_E, Lanes, Pair, Question, REACH_ACROSS, REACH_ALONG, RELATIVE,
-    Scale, Simd, Sixteen, Tiles, Tiling, cell_parts, lanes, place, splat, store, tile_parts,
+    BLOCK, Block, CELLS, Cells, EPSILON, Joint, Lanes, Pair, Question, REACH_ACROSS, REACH_ALONG, Scale, Simd, Sixteen,
+    Tiles, Tiling, cell_parts, lanes, place, splat, store, tile_parts,
 };
 
 /// The threshold is guessed from at least this many rows of tiles, and from one in so many.
@@ -62,6 +62,7 @@ struct Bounds<S: Simd> {
     cut: Lanes<S>,
     low: Lanes<S>,
     fading: Lanes<S>,
+    relative: Lanes<S>,
     log2: Lanes<S>,
 }
 
@@ -73,6 +74,7 @@ impl<S: Simd> Bounds<S> {
             // Σ of all joints by the strongest, at most.
             low: splat(simd, scale.low - (joints.max(1) as f32).log2()),
             fading: splat(simd, scale.fading),
+            relative: splat(simd, scale.relative),
             log2: splat(simd, scale.log2 as f32),
         }
     }
@@ -87,7 +89,6 @@ impl<S: Simd> Bounds<S> {
         crest: &Crest,
         middles: &mut Middles,
     ) -> u32 {
-        let relative = splat(simd, (RELATIVE * LOG2_E) as f32);
         let mut tiles = 0;
         for part in 0..tile_parts::<S>() {
             let [exponent, across, along] = joint.middles(simd, (block, line), part);
@@ -97,7 +98,7 @@ impl<S: Simd> Bounds<S> {
             let (best_across, best_along) = (lanes(simd, &crest.slope[0], part), lanes(simd, &crest.slope[1], part));
             let apart = rise(simd, across - best_across, along - best_along);
             let nearest =
-                exponent - lanes(simd, &crest.exponent, part) + slack + lanes(simd, &crest.slack, part) + relative;
+                exponent - lanes(simd, &crest.exponent, part) + slack + lanes(simd, &crest.slack, part) + self.relative;
             let faded = (self.low - lanes(simd, &crest.highest, part)).max(splat(simd, 0.0));
             let spare = (highest - faded.mul_add(self.fading, self.cut)).min(apart + nearest);
             tiles |= spare.positive() << (part * S::F32_LANES);
@@ -139,22 +140,34 @@ impl Tiles {
         self.level(simd, last - lower)
     }
 
-    /// log₂ of what about `rank` of the listed middles lie above, no lower than the floor.
+    /// The highest multiple of [`NEAR`] that more than `rank` of the listed middles lie above, no lower than the floor.
     #[inline(always)]
-    fn level<S: Simd>(&self, simd: S, rank: usize) -> f64 {
-        let mut low = EPSILON.log2();
-        let mut high = self.joints.iter().map(|joint| joint.top + f64::from(joint.spectrum())).fold(low, f64::max);
-        while high - low > NEAR {
-            let level = f64::midpoint(low, high);
+    fn level<S: Simd>(&mut self, simd: S, rank: usize) -> f64 {
+        let floor = EPSILON.log2();
+        let top = self.joints.iter().map(|joint| joint.top + f64::from(joint.spectrum())).fold(floor, f64::max);
+        let (mut low, mut high) = ((floor / NEAR).floor(), (top / NEAR).floor() + 1.0);
+        // The answer is the same wherever the search begins: near that of the last evaluation it is soon found.
+        let (mut probe, mut step) = (self.last_level, 1.0);
+        while high - low > 1.0 {
+            if !(probe > low && probe < high) {
+                probe = f64::midpoint(low, high).floor();
+            }
+            let level = splat(simd, (probe * NEAR) as f32);
             let mut above = 0;
             for middles in &self.middles {
                 for part in 0..tile_parts::<S>() {
-                    above += (lanes(simd, middles, part) - splat(simd, level as f32)).positive().count_ones();
+                    above += (lanes(simd, middles, part) - level).positive().count_ones();
                 }
             }
-            if above as usize > rank { low = level } else { high = level }
+            if above as usize > rank {
+                (low, probe) = (probe, probe + step);
+            } else {
+                (high, probe) = (probe, probe - step);
+            }
+            step *= 2.0;
         }
-        low
+        self.last_level = low;
+        (low * NEAR).max(floor)
     }
 
     /// Block by block: which joints matter to which tiles, and the sum of their returns there.
