@@ -19,6 +19,7 @@ use crate::body::{Group, Pppr};
 use crate::geometry::{Number, Vec3, add_scaled, dot, mat_t_vec, mat_vec, scale};
 use crate::radar::{Axis, AxisKind};
 use geometry::Geometry;
+use std::ops::Range;
 
 /// Sums over the cells of a view for one joint; r = ∂L/∂ln A_jK_j, q = ∂L/∂ψ_j. The last axis is the third;
 /// those that are missing come first.
@@ -73,11 +74,19 @@ impl Moments {
         One(joint).add([r, q, x, y, z, u, v, w, a, b, c, d, e, f], &mut self.numbers);
     }
 
-    /// Σ r of one joint in each bin of an axis; empty unless that is a Doppler axis.
+    /// Σ r of one joint in each bin of an axis, to be added to; empty unless that is a Doppler axis.
     pub(super) fn by_bin(&mut self, joint: usize, axis: usize) -> &mut [f64] {
-        let all = &mut self.r_by_bin[axis];
-        let bins = all.len() / self.joints.max(1);
-        &mut all[joint * bins..(joint + 1) * bins]
+        let bins = self.bins(joint, axis);
+        &mut self.r_by_bin[axis][bins]
+    }
+
+    fn of_bins(&self, joint: usize, axis: usize) -> &[f64] {
+        &self.r_by_bin[axis][self.bins(joint, axis)]
+    }
+
+    fn bins(&self, joint: usize, axis: usize) -> Range<usize> {
+        let bins = self.r_by_bin[axis].len() / self.joints.max(1);
+        joint * bins..(joint + 1) * bins
     }
 
     #[inline(always)]
@@ -91,7 +100,7 @@ impl Moments {
 pub(super) fn pull_back(
     scene: &Scene<'_>,
     forms: &Forms,
-    moments: &mut Moments,
+    moments: &Moments,
     (gradient, bars): (&mut Pppr, &mut FormBars),
     precision: Precision,
 ) {
@@ -103,7 +112,7 @@ pub(super) fn pull_back(
     for (k, axis) in scene.view.axes.iter().enumerate().take(3) {
         if axis.kind == AxisKind::Doppler {
             for joint in 0..forms.joints() {
-                let by_bin = moments.by_bin(joint, 3 - scene.dims() + k);
+                let by_bin = moments.of_bins(joint, 3 - scene.dims() + k);
                 features(by_bin, gradient.joint_mut(Group::Omega, joint));
                 bars.add_omega_mean(joint, -by_bin.iter().sum::<f64>());
             }

@@ -56,41 +56,44 @@ pub(super) struct Aim {
     pub tiling: Tiling,
 }
 
-/// Where a view adds its gradient, times `factor`.
-pub(super) struct Slopes<'a> {
-    pub factor: f64,
-    /// By single features.
-    pub gradient: &'a mut Pppr,
-    /// By all else.
-    pub bars: &'a mut FormBars,
-}
-
-/// Evaluates L_view at `aim`, and its gradient where it is asked for; `forms` are those of `params`.
-pub(super) fn evaluate(
-    scene: &Scene<'_>,
-    precision: Precision,
-    (params, forms): (&Pppr, &Forms),
-    aim: &Aim,
-    slopes: Option<Slopes<'_>>,
-    workspace: &mut Workspace,
-) -> ViewAnswer {
-    let Workspace { splats, moments, tiles } = workspace;
-    scene.splats((params, forms), precision, splats);
-    moments.reset(splats.joints(), &scene.view.axes);
-    let scale = slopes.as_ref().map(|slopes| slopes.factor);
-    let answer = match precision {
-        Precision::F64 => plain::<f64>(scene, splats, aim, scale, moments),
-        Precision::F32 if tiles::reaches(scene.config.softness) => {
-            let FitConfig { summation, tau_pct, softness, .. } = *scene.config;
-            let question = Question { splats, tiling: &aim.tiling, summation, tau_pct, softness, scale };
-            tiles.evaluate(&question, moments)
-        }
-        Precision::F32 => plain::<f32>(scene, splats, aim, scale, moments),
-    };
-    if let Some(Slopes { gradient, bars, .. }) = slopes {
-        pull_back(scene, forms, moments, (gradient, bars), precision);
+impl Workspace {
+    /// Sees the joints of `params`, which have these forms.
+    pub(super) fn project(&mut self, scene: &Scene<'_>, of: (&Pppr, &Forms), precision: Precision) {
+        scene.splats(of, precision, &mut self.splats);
     }
-    answer
+
+    /// Evaluates L_view at `aim` for the joints last seen, and where a gradient is wanted what the cells say of them, times
+    /// `factor`.
+    pub(super) fn compare(
+        &mut self,
+        scene: &Scene<'_>,
+        aim: &Aim,
+        factor: Option<f64>,
+        precision: Precision,
+    ) -> ViewAnswer {
+        let Self { splats, moments, tiles } = self;
+        moments.reset(splats.joints(), &scene.view.axes);
+        match precision {
+            Precision::F64 => plain::<f64>(scene, splats, aim, factor, moments),
+            Precision::F32 if tiles::reaches(scene.config.softness) => {
+                let FitConfig { summation, tau_pct, softness, .. } = *scene.config;
+                let question = Question { splats, tiling: &aim.tiling, summation, tau_pct, softness, scale: factor };
+                tiles.evaluate(&question, moments)
+            }
+            Precision::F32 => plain::<f32>(scene, splats, aim, factor, moments),
+        }
+    }
+
+    /// Hands what the cells said to the joints' forms and features.
+    pub(super) fn pull_back(
+        &self,
+        scene: &Scene<'_>,
+        forms: &Forms,
+        onto: (&mut Pppr, &mut FormBars),
+        precision: Precision,
+    ) {
+        pull_back(scene, forms, &self.moments, onto, precision);
+    }
 }
 
 /// Every cell by itself, as SPEC reads: the oracle, and the way out for masks softer than f32's range.

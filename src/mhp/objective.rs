@@ -1,6 +1,6 @@
 //! L(Θ) and ∂L/∂Θ; SPEC section 4.
 
-use super::em::{self, Aim, Slopes, Workspace};
+use super::em::{self, Aim, Workspace};
 use super::form::{FormBars, Forms};
 use super::init::anchors;
 use super::percentile::percentile;
@@ -11,6 +11,7 @@ use super::{Evaluation, FitError, Precision, Problem, kinematic};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::geometry::{Vec3, add, add_scaled, dot, scale, sub};
+use smallvec::SmallVec;
 use std::sync::Arc;
 
 /// The objective of one fit: its EM region and the mask of H_ori are fixed by the initial parameters.
@@ -146,25 +147,33 @@ impl Objective {
         iou.clear();
         let views = self.problem.views.len() as f64;
         let mut em = 0.0;
-        let Self { problem, config, precision, aims, workspaces, forms, bars, .. } = self;
+        let Self { problem, config, precision, aims, workspaces, forms, bars, anchors, .. } = self;
+        let config = &*config;
         forms.fill(params, *precision);
         bars.reset(forms.joints());
-        for ((view, aim), workspace) in problem.views.iter().zip(&*aims).zip(workspaces) {
-            let scene = Scene::new(&problem.radar, view, config);
-            let slopes = Slopes { factor: 1.0 / views, gradient: &mut *em_gradient, bars: &mut *bars };
-            let answer = em::evaluate(&scene, *precision, (params, &*forms), aim, Some(slopes), workspace);
+        // Stage by stage rather than view by view: each stage's instructions then stay at hand.
+        let scenes: SmallVec<[Scene<'_>; 4]> =
+            problem.views.iter().map(|view| Scene::new(&problem.radar, view, config)).collect();
+        for (scene, workspace) in scenes.iter().zip(&mut *workspaces) {
+            workspace.project(scene, (params, &*forms), *precision);
+        }
+        for ((scene, aim), workspace) in scenes.iter().zip(&*aims).zip(&mut *workspaces) {
+            let answer = workspace.compare(scene, aim, Some(1.0 / views), *precision);
             em += answer.loss / views;
             iou.push(answer.iou);
         }
+        for (scene, workspace) in scenes.iter().zip(&*workspaces) {
+            workspace.pull_back(scene, forms, (&mut *em_gradient, &mut *bars), *precision);
+        }
         forms.pull_back(bars, em_gradient, *precision);
-        *terms = kinematic::evaluate(&self.problem.skeleton, &self.config, params, gradient);
+        *terms = kinematic::evaluate(&problem.skeleton, config, params, gradient);
         terms.em = em;
-        gradient.mix(self.config.w_kine, self.config.w_em, em_gradient);
-        if self.config.w_time > 0.0 {
-            terms.time = anchored(&self.anchors, params, self.config.w_time, gradient);
+        gradient.mix(config.w_kine, config.w_em, em_gradient);
+        if config.w_time > 0.0 {
+            terms.time = anchored(anchors, params, config.w_time, gradient);
         }
         let kinematic = terms.bone + terms.rigid + terms.joint + terms.sep + terms.coll;
-        *loss = self.config.w_em * em + self.config.w_time * terms.time + self.config.w_kine * kinematic;
+        *loss = config.w_em * em + config.w_time * terms.time + config.w_kine * kinematic;
     }
 
     /// L_EM alone, without its gradient.
@@ -173,7 +182,8 @@ impl Objective {
         forms.fill(params, self.precision);
         let losses = self.problem.views.iter().zip(&self.aims).map(|(view, aim)| {
             let scene = Scene::new(&self.problem.radar, view, &self.config);
-            em::evaluate(&scene, self.precision, (params, &forms), aim, None, &mut workspace).loss
+            workspace.project(&scene, (params, &forms), self.precision);
+            workspace.compare(&scene, aim, None, self.precision).loss
         });
         losses.sum::<f64>() / self.problem.views.len() as f64
     }
