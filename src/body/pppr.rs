@@ -96,7 +96,7 @@ impl PpprShape {
 
 /// The parameters of all joints of all persons (or their gradients, or Adam's moments): one flat array a group,
 /// ordered (person, joint, component); SPEC section 2.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked", into = "Unchecked")]
 pub struct Pppr {
     shape: PpprShape,
@@ -133,18 +133,6 @@ impl From<Pppr> for Unchecked {
     }
 }
 
-impl Clone for Pppr {
-    fn clone(&self) -> Self {
-        Self { shape: self.shape, numbers: self.numbers.clone() }
-    }
-
-    /// Keeps the memory that is there: a fit copies its parameters every iteration.
-    fn clone_from(&mut self, source: &Self) {
-        self.shape = source.shape;
-        self.numbers.clone_from(&source.numbers);
-    }
-}
-
 impl Pppr {
     /// All zeros (the zero quaternion included): a gradient to be accumulated.
     pub fn zeros(shape: PpprShape) -> Self {
@@ -155,6 +143,12 @@ impl Pppr {
     pub fn reset(&mut self, shape: PpprShape) {
         self.shape = shape;
         self.numbers.clear();
+        self.numbers.resize(shape.total(), 0.0);
+    }
+
+    /// Has these sizes, and numbers that are to be written over.
+    pub(crate) fn resize(&mut self, shape: PpprShape) {
+        self.shape = shape;
         self.numbers.resize(shape.total(), 0.0);
     }
 

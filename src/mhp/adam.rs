@@ -10,7 +10,6 @@ use crate::body::{Group, Pppr, PpprShape};
 use crate::config::{FitConfig, Parameterization};
 use pulp::Arch;
 use serde::{Deserialize, Serialize};
-use smallvec::SmallVec;
 
 const BETA_1: f64 = 0.9;
 const BETA_2: f64 = 0.999;
@@ -19,7 +18,7 @@ const EPSILON: f64 = 1e-8;
 const FAINTEST: f64 = 1e-36;
 
 /// The two moments, and how many steps they have seen.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Adam {
     /// Exponential mean of the gradient.
     pub first: Pppr,
@@ -30,23 +29,6 @@ pub struct Adam {
     pub bones: [Vec<f64>; 2],
     /// Steps since the moments were zero.
     pub steps: u32,
-}
-
-impl Clone for Adam {
-    fn clone(&self) -> Self {
-        let Self { first, second, bones, steps } = self;
-        Self { first: first.clone(), second: second.clone(), bones: bones.clone(), steps: *steps }
-    }
-
-    /// Keeps the memory that is there.
-    fn clone_from(&mut self, source: &Self) {
-        self.first.clone_from(&source.first);
-        self.second.clone_from(&source.second);
-        for (own, other) in self.bones.iter_mut().zip(&source.bones) {
-            own.clone_from(other);
-        }
-        self.steps = source.steps;
-    }
 }
 
 /// One number's update.
@@ -83,22 +65,25 @@ impl Step {
     }
 }
 
-/// Some numbers with what belongs to them.
-struct Numbers<'a> {
-    params: &'a mut [f64],
-    gradient: &'a [f64],
-    first: &'a mut [f64],
-    second: &'a mut [f64],
+/// Some parameters or moments before a step and after it.
+struct Change<'a> {
+    before: &'a [f64],
+    after: &'a mut [f64],
 }
 
-impl Numbers<'_> {
-    /// Moves each by `of` of its gradient and moments.
-    #[inline(always)]
-    fn step(self, rate: f64, of: impl Fn(f64, &mut f64, &mut f64) -> f64) {
-        let moments = self.first.iter_mut().zip(self.second);
-        for ((x, &g), (m, v)) in self.params.iter_mut().zip(self.gradient).zip(moments) {
-            *x += rate * of(g, m, v);
-        }
+/// Moves parameters and their two moments, each by `of` of its gradient and moments.
+#[inline(always)]
+fn advance(
+    [params, first, second]: [Change<'_>; 3],
+    gradient: &[f64],
+    rate: f64,
+    of: impl Fn(f64, &mut f64, &mut f64) -> f64,
+) {
+    let before = params.before.iter().zip(first.before).zip(second.before);
+    let after = params.after.iter_mut().zip(first.after).zip(second.after);
+    for ((&g, ((&x, &m), &v)), ((next_x, next_m), next_v)) in gradient.iter().zip(before).zip(after) {
+        (*next_m, *next_v) = (m, v);
+        *next_x = x + rate * of(g, next_m, next_v);
     }
 }
 
@@ -108,40 +93,52 @@ impl Adam {
         Self { first: Pppr::zeros(shape), second: Pppr::zeros(shape), bones: [const { Vec::new() }; 2], steps: 0 }
     }
 
-    /// One update of `params` against `gradient` (same sizes); the moments move on. `turns` is overwritten.
+    /// One update of `params` against `gradient` (same sizes), written over what is in `next`: moments and parameters.
+    /// `turns` is overwritten.
     pub(super) fn update(
-        &mut self,
-        params: &mut Pppr,
+        &self,
+        params: &Pppr,
         gradient: &Pppr,
         (config, precision): (&FitConfig, Precision),
         body: &Articulation,
         turns: &mut Vec<f64>,
+        (next, moved): (&mut Self, &mut Pppr),
     ) {
-        self.steps += 1;
-        let step = Step::new(self.steps);
-        let turned = config.parameterization == Parameterization::Bones;
-        if turned {
-            body.pull_back(params, gradient, turns);
-            self.turn(turns, config, body);
+        for numbers in [&mut next.first, &mut next.second, &mut *moved] {
+            numbers.resize(params.shape());
         }
-        let moved = Group::ALL.into_iter().filter(|&group| !(group == Group::Position && turned));
-        let moved: SmallVec<[Group; Group::ALL.len()]> = moved.collect();
-        for groups in moved.chunk_by(|&a, &b| rate(config, a) == rate(config, b)) {
+        for (bones, before) in next.bones.iter_mut().zip(&self.bones) {
+            bones.clone_from(before);
+        }
+        next.steps = self.steps + 1;
+        let step = Step::new(next.steps);
+        let turned = config.parameterization == Parameterization::Bones;
+        let by_group = if turned { &Group::ALL[1..] } else { &Group::ALL };
+        for groups in by_group.chunk_by(|&a, &b| rate(config, a) == rate(config, b)) {
             let (&[from, ..], &[.., to]) = (groups, groups) else { continue };
-            let numbers = Numbers {
-                params: params.groups_mut(from, to),
-                gradient: gradient.groups(from, to),
-                first: self.first.groups_mut(from, to),
-                second: self.second.groups_mut(from, to),
-            };
-            let rate = rate(config, from);
+            let changes = [
+                Change { before: params.groups(from, to), after: moved.groups_mut(from, to) },
+                Change { before: self.first.groups(from, to), after: next.first.groups_mut(from, to) },
+                Change { before: self.second.groups(from, to), after: next.second.groups_mut(from, to) },
+            ];
+            let (gradient, rate) = (gradient.groups(from, to), rate(config, from));
             match precision {
-                Precision::F64 => numbers.step(rate, |g, m, v| step.of(g, m, v)),
-                Precision::F32 => Arch::new().dispatch(|| numbers.step(rate, |g, m, v| step.quickly(g, m, v))),
+                Precision::F64 => advance(changes, gradient, rate, |g, m, v| step.of(g, m, v)),
+                Precision::F32 => {
+                    Arch::new().dispatch(|| advance(changes, gradient, rate, |g, m, v| step.quickly(g, m, v)));
+                }
             }
         }
         if turned {
-            body.advance(params, turns);
+            // The first group, positions, follows root and bones; its own moments stand still.
+            for (after, before) in
+                [(&mut *moved, params), (&mut next.first, &self.first), (&mut next.second, &self.second)]
+            {
+                after.group_mut(Group::Position).copy_from_slice(before.group(Group::Position));
+            }
+            body.pull_back(params, gradient, turns);
+            next.turn(turns, config, body);
+            body.advance(moved, turns);
         }
     }
 
@@ -180,6 +177,20 @@ mod tests {
         crate::body::Skeleton { joints: vec!["pelvis".into()], bones: vec![], bone_lengths_m: vec![], angles: vec![] }
     }
 
+    fn updated(
+        adam: &Adam,
+        params: &Pppr,
+        gradient: &Pppr,
+        how: (&FitConfig, Precision),
+        body: &Articulation,
+    ) -> (Adam, Pppr) {
+        // Over what is of other sizes.
+        let other = PpprShape { persons: 0, joints: 0, doppler_features: 0 };
+        let mut next = (Adam::new(other), Pppr::zeros(other));
+        adam.update(params, gradient, how, body, &mut Vec::new(), (&mut next.0, &mut next.1));
+        next
+    }
+
     /// Two steps by hand on one number: g = 2, then g = −1, rate 0.1.
     #[test]
     fn two_steps_by_hand() {
@@ -188,11 +199,11 @@ mod tests {
         let config = FitConfig { learning_rate: 0.1, ..FitConfig::default() };
         let body = Articulation::new(&lone_joint());
         gradient.group_mut(Group::Beta)[0] = 2.0;
-        adam.update(&mut params, &gradient, (&config, Precision::F64), &body, &mut Vec::new());
+        (adam, params) = updated(&adam, &params, &gradient, (&config, Precision::F64), &body);
         // m̂ = 2, v̂ = 4: a full step of the rate.
         assert!((params.group(Group::Beta)[0] + 0.1).abs() < 1e-9);
         gradient.group_mut(Group::Beta)[0] = -1.0;
-        adam.update(&mut params, &gradient, (&config, Precision::F64), &body, &mut Vec::new());
+        (_, params) = updated(&adam, &params, &gradient, (&config, Precision::F64), &body);
         let (m, v) = (0.9 * 0.2 - 0.1, 0.999 * 0.004 + 0.001);
         let want = -0.1 - 0.1 * (m / 0.19) / (f64::sqrt(v / (1.0 - 0.999 * 0.999)) + 1e-8);
         assert!((params.group(Group::Beta)[0] - want).abs() < 1e-9);
@@ -208,13 +219,8 @@ mod tests {
         let mut config = FitConfig { parameterization: Parameterization::Bones, ..FitConfig::default() };
         config.learning_rates.beta = Some(0.5);
         config.learning_rates.position = Some(0.25);
-        adam.update(
-            &mut params,
-            &gradient,
-            (&config, Precision::F64),
-            &Articulation::new(&lone_joint()),
-            &mut Vec::new(),
-        );
+        (adam, params) =
+            updated(&adam, &params, &gradient, (&config, Precision::F64), &Articulation::new(&lone_joint()));
         assert!((params.group(Group::Beta)[0] + 0.5).abs() < 1e-6);
         assert!((params.group(Group::Position)[1] - 0.25).abs() < 1e-6);
         assert_eq!(adam.first.group(Group::Position), [0.0; 3]);
@@ -235,7 +241,7 @@ mod tests {
                         *g = size * f64::from((step * 7 + k as i32 * 3) % 11 - 5);
                     }
                 }
-                adam.update(&mut params, &gradient, (&config, precision), &body, &mut Vec::new());
+                (adam, params) = updated(&adam, &params, &gradient, (&config, precision), &body);
             }
             params
         };

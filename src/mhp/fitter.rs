@@ -11,7 +11,7 @@ use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
 
 /// Everything that another step needs: restoring it continues the run bit for bit under the same configuration.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitState {
     /// Adam steps taken.
     pub iteration: usize,
@@ -21,21 +21,6 @@ pub struct FitState {
     pub adam: Adam,
     /// Losses of the last iterations (up to six), the current one last: the convergence criterion looks back five.
     pub losses: SmallVec<[f64; LOOK_BACK + 2]>,
-}
-
-impl Clone for FitState {
-    fn clone(&self) -> Self {
-        let Self { iteration, params, adam, losses } = self;
-        Self { iteration: *iteration, params: params.clone(), adam: adam.clone(), losses: losses.clone() }
-    }
-
-    /// Keeps the memory that is there.
-    fn clone_from(&mut self, source: &Self) {
-        self.iteration = source.iteration;
-        self.params.clone_from(&source.params);
-        self.adam.clone_from(&source.adam);
-        self.losses.clone_from(&source.losses);
-    }
 }
 
 /// Adam on the objective of one frame.
@@ -79,14 +64,16 @@ impl Fitter {
     /// [`FitError::Diverged`] where the new parameters or their loss are not finite; the fitter then stays where it was.
     pub fn step(&mut self) -> Result<StepReport, FitError> {
         let Self { objective, body, state, evaluation, next, next_evaluation, turns } = self;
-        match Arc::get_mut(next) {
-            Some(own) => own.clone_from(state),
-            None => *next = Arc::new(FitState::clone(state)),
+        // What somebody keeps stays as it is.
+        if Arc::get_mut(next).is_none() {
+            *next = Arc::new(FitState::clone(state));
         }
         let next_state = Arc::make_mut(next);
-        next_state.iteration += 1;
+        next_state.iteration = state.iteration + 1;
+        next_state.losses.clone_from(&state.losses);
         let how = (objective.config(), objective.precision());
-        next_state.adam.update(&mut next_state.params, &evaluation.gradient, how, body, turns);
+        let moved = (&mut next_state.adam, &mut next_state.params);
+        state.adam.update(&state.params, &evaluation.gradient, how, body, turns, moved);
         evaluate_into(objective, &next_state.params, next_state.iteration, next_evaluation)?;
         next_state.losses.push(next_evaluation.loss);
         let surplus = next_state.losses.len().saturating_sub(LOOK_BACK + 1);
