@@ -52,7 +52,7 @@ impl Step {
     #[inline(always)]
     fn quickly(self, gradient: f64, first: &mut f64, second: &mut f64) -> f64 {
         let [first, second] = self.moments(gradient, first, second);
-        let root = (second.max(FAINTEST) as f32).sqrt() + EPSILON as f32;
+        let root = (second.clamp(FAINTEST, f64::from(f32::MAX)) as f32).sqrt() + EPSILON as f32;
         -first * f64::from(1.0 / root)
     }
 

@@ -193,7 +193,7 @@ impl Batch for One {
     }
 }
 
-/// A register of joints from `first` on; beyond the last there are copies of it, which are nowhere written.
+/// A register of joints from `first` on; beyond the last, what is gathered are copies of it, and what is stored nobody reads.
 #[derive(Clone, Copy)]
 struct Several<S: Simd> {
     simd: S,

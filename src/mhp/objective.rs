@@ -139,7 +139,8 @@ impl Objective {
         evaluation
     }
 
-    /// As [`Self::evaluate`], into an evaluation of before: in single precision nothing is allocated from the second time on.
+    /// As [`Self::evaluate`], into an evaluation of before: in single precision nothing is allocated from the second
+    /// time on where there are no more than four views.
     pub fn evaluate_into(&mut self, params: &Pppr, evaluation: &mut Evaluation) {
         let Evaluation { loss, terms, iou, gradient, em_gradient } = evaluation;
         em_gradient.reset(params.shape());

@@ -146,7 +146,7 @@ fn check_skeleton(skeleton: &Skeleton) -> Result<(), FitError> {
 fn check_view(view: &View) -> Result<(), FitError> {
     let wrong = |reason: String| Err(FitError::WrongView { array: view.array.clone(), reason });
     if !(1..=3).contains(&view.axes.len()) {
-        return wrong(format!("{} axes; expected 2 or 3", view.axes.len()));
+        return wrong(format!("{} axes; expected 1 to 3", view.axes.len()));
     }
     for axis in &view.axes {
         if axis.bins == 0 || !axis.step().is_finite() || axis.step() == 0.0 {

@@ -286,7 +286,7 @@ impl Joint {
     }
 
     pub(super) fn is_finite(&self) -> bool {
-        let own = [self.top, self.phase];
+        let own = [self.top, self.phase, f64::from(self.spectrum())];
         own.iter().chain(&self.half).chain(&self.skew).chain(&self.bin).chain(&self.kappa).all(|x| x.is_finite())
     }
 }

@@ -75,7 +75,7 @@ impl Tiles {
         let found = order(&mut self.ranked, rank - above);
         // Where only the upper neighbour is summed, the lower one is nothing beside it.
         let split = || {
-            let least = self.ranked.iter().copied().min().filter(|_| self.ranked.len() == rank && weight > 0.0);
+            let least = self.ranked.iter().copied().min().filter(|_| self.ranked.len() + above == rank && weight > 0.0);
             least.map(|upper| [scale.epsilon_sq, f32::from_bits(upper)])
         };
         let found = found.or_else(split);

@@ -151,6 +151,10 @@ impl Tiles {
         while high - low > 1.0 {
             if !(probe > low && probe < high) {
                 probe = f64::midpoint(low, high).floor();
+                // Levels so far up have no multiple between them.
+                if !(probe > low && probe < high) {
+                    break;
+                }
             }
             let level = splat(simd, (probe * NEAR) as f32);
             let mut above = 0;
