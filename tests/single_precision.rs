@@ -83,10 +83,8 @@ fn params(persons: usize, rng: &mut StdRng) -> Pppr {
     params
 }
 
-/// Loss and gradients of one scene in both precisions; `None` beside a coherent null.
-fn scene(seed: u64, bins: &Range<usize>) -> Option<[Evaluation; 2]> {
-    let rng = &mut StdRng::seed_from_u64(seed);
-    let radar = RadarConfig {
+fn radar() -> RadarConfig {
+    RadarConfig {
         start_hz: 77e9,
         bandwidth_hz: 2.5e9,
         chirp_s: 60e-6,
@@ -96,13 +94,21 @@ fn scene(seed: u64, bins: &Range<usize>) -> Option<[Evaluation; 2]> {
         l_el_m: 0.0021,
         doppler_features: FEATURES,
         height_m: None,
-    };
-    let skeleton = Skeleton {
+    }
+}
+
+fn skeleton() -> Skeleton {
+    Skeleton {
         joints: (0..JOINTS).map(|k| format!("joint {k}")).collect(),
         bones: (1..JOINTS).map(|k| [k - 1, k]).collect(),
         bone_lengths_m: vec![0.3; JOINTS - 1],
         angles: vec![[0, 1, 2]],
-    };
+    }
+}
+
+/// Loss and gradients of one scene in both precisions; `None` beside a coherent null.
+fn scene(seed: u64, bins: &Range<usize>) -> Option<[Evaluation; 2]> {
+    let rng = &mut StdRng::seed_from_u64(seed);
     let views: Vec<View> = (0..rng.random_range(1..3)).map(|k| view(k, bins, rng)).collect();
     let maps: Vec<Vec<f64>> =
         views.iter().map(|v| (0..v.cells()).map(|_| rng.random_range(0.0..1.0)).collect()).collect();
@@ -117,7 +123,7 @@ fn scene(seed: u64, bins: &Range<usize>) -> Option<[Evaluation; 2]> {
         ..FitConfig::default()
     };
     let params = params(rng.random_range(1..4), rng);
-    let problem = Arc::new(Problem::new(radar, skeleton, views, &maps).unwrap());
+    let problem = Arc::new(Problem::new(radar(), skeleton(), views, &maps).unwrap());
     if config.summation == Summation::Coherent {
         let incoherent = FitConfig { summation: Summation::Incoherent, ..config };
         let [sum, most] =
@@ -160,6 +166,29 @@ fn check(seeds: Range<u64>, bins: &Range<usize>) {
         })
         .collect();
     assert!(wrong.is_empty(), "{} of {scenes}:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+/// A spectrum may raise a return far above the joint's own strength, whichever axis it lies along.
+#[test]
+fn a_strong_spectrum_along_any_axis_is_not_cut_off() {
+    let kinds = [AxisKind::Doppler, AxisKind::Range, AxisKind::Azimuth];
+    for first in 0..kinds.len() {
+        let rng = &mut StdRng::seed_from_u64(1);
+        let mut spectral = view(0, &(24..25), rng);
+        spectral.axes = (0..kinds.len()).map(|k| axis(kinds[(first + k) % kinds.len()], 24..25, rng)).collect();
+        let map = vec![1.0; spectral.cells()];
+        let problem = Problem::new(radar(), skeleton(), vec![spectral], &[&map]).unwrap();
+        let mut params = params(1, rng);
+        for joint in 0..JOINTS {
+            params.joint_mut(Group::Omega, joint).copy_from_slice(&[-20.0, -20.0, 0.0, 40.0, 0.0, 0.0]);
+        }
+        let config = FitConfig { summation: Summation::Incoherent, ..FitConfig::default() };
+        let [want, got] =
+            [Precision::F64, Precision::F32].map(|precision| simulate(&problem, &config, precision, &params).concat());
+        let most = want.iter().copied().fold(0.0, f64::max);
+        let off = want.iter().zip(&got).map(|(want, got)| (want - got).abs()).fold(0.0, f64::max);
+        assert!(most > 0.0 && off <= 2e-4 * most, "{first}: {off} of {most}");
+    }
 }
 
 #[test]

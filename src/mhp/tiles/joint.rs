@@ -27,7 +27,7 @@ impl Spectrum {
     fn fill(&mut self, ln: &[f64], lo: usize, tiles: usize, bins: usize, lane: impl Fn(usize) -> usize) {
         self.blocks.clear();
         self.cells.clear();
-        self.largest = if ln.is_empty() { 0.0 } else { (LOG2_E * ln.iter().copied().fold(f64::MIN, f64::max)) as f32 };
+        self.largest = largest(ln);
         if ln.is_empty() {
             return;
         }
@@ -46,6 +46,11 @@ impl Spectrum {
     pub(super) fn most(&self, tile: usize) -> f32 {
         self.blocks.get(tile / BLOCK).map_or(0.0, |[_, most]| most[tile % BLOCK])
     }
+}
+
+/// log₂ of the largest of a spectrum; 0 where there is none.
+fn largest(ln: &[f64]) -> f32 {
+    if ln.is_empty() { 0.0 } else { (LOG2_E * ln.iter().copied().fold(f64::MIN, f64::max)) as f32 }
 }
 
 /// Sixteen rows of tiles as a joint sees them, a number a row.
@@ -111,6 +116,8 @@ pub(super) struct Joint {
     pub bounded: bool,
     pub along: Spectrum,
     pub across: Spectrum,
+    /// log₂ of the largest of the spectrum along the outermost of three axes, where that is a Doppler axis.
+    outer: f32,
 }
 
 impl Joint {
@@ -131,6 +138,7 @@ impl Joint {
         self.tables::<S, COHERENT>(simd, grid);
         self.along.fill(spectrum[2], grid.lo[2], grid.columns, ALONG_BINS, |cell| cell % ALONG_BINS);
         self.across.fill(spectrum[1], grid.lo[1], grid.rows, ACROSS_BINS, |cell| cell / ALONG_BINS);
+        self.outer = largest(spectrum[0]);
         let blocks = grid.rows.div_ceil(BLOCK);
         let mut lines = std::mem::take(&mut self.lines);
         lines.resize(grid.size[0] * blocks, Lines::default());
@@ -234,7 +242,7 @@ impl Joint {
             self.rows.push(rows & low_bits(grid.rows - index % blocks * BLOCK));
         }
         let gaussian = self.along.cells.is_empty() && self.across.cells.is_empty();
-        self.bounded = gaussian && self.top - scale < f64::from(STRONGEST);
+        self.bounded = gaussian && self.top + f64::from(self.outer) - scale < f64::from(STRONGEST);
     }
 
     /// Whether the joint reaches a block's row.
@@ -280,9 +288,9 @@ impl Joint {
         product(line, [lanes(simd, cos, part), lanes(simd, sin, part)])
     }
 
-    /// The most that spectra within tiles add, log₂.
+    /// The most that spectra add, log₂.
     pub(super) fn spectrum(&self) -> f32 {
-        self.along.largest + self.across.largest
+        self.outer + self.along.largest + self.across.largest
     }
 
     pub(super) fn is_finite(&self) -> bool {
