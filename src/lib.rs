@@ -44,6 +44,7 @@
 //! | [`radar`] | chirp, axes, views, point-spread functions, FMCW synthesis of a MIMO array and the FFT chain |
 //! | [`config`] | `FitConfig`: defaults, ranges, help text; the only source for files, command line and sliders |
 //! | [`folders`] | where the user's settings, labels and caches lie |
+//! | [`input`] | opening what others made: regular files only, bounded |
 //! | [`geometry`] | 3-vectors, 3×3 matrices, quaternions, the spherical triad |
 
 pub mod body;
@@ -54,6 +55,7 @@ pub mod diagnose;
 mod digest;
 pub mod folders;
 pub mod geometry;
+pub mod input;
 pub mod labels;
 pub mod mhp;
 pub mod people;

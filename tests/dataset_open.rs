@@ -4,7 +4,7 @@
 use mhp_inspector::body::Skeleton;
 use mhp_inspector::dataset::npz::{ArrayView, write, write_npy};
 use mhp_inspector::dataset::{
-    BareCatalog, BareChoice, Dataset, DatasetError, Layout, Manifest, Progress, Remembered, read_pppr,
+    BareCatalog, BareChoice, Dataset, DatasetError, Layout, Manifest, OpenOptions, Progress, Remembered, read_pppr,
 };
 use mhp_inspector::radar::{AxisKind, PointSpread, RadarConfig};
 use std::path::{Path, PathBuf};
@@ -195,7 +195,12 @@ fn a_manifest_overrides_the_preset_of_mmvr() {
         axes = [{ kind = "depth_h", bins = 4, lo = 4, hi = 0 }, { kind = "y", bins = 3, lo = 1, hi = -2 }]
     "#;
     let manifest = Manifest::parse(text, Path::new("ours.toml")).unwrap();
-    let dataset = Dataset::open_with_manifest(folder.path(), &manifest, &Progress::new()).unwrap();
+    let dataset = Dataset::open_with(
+        folder.path(),
+        OpenOptions { manifest: Some(&manifest), ..OpenOptions::default() },
+        &Progress::new(),
+    )
+    .unwrap();
     let info = dataset.info();
     assert_eq!((info.name.as_str(), info.layout, info.radar.start_hz), ("ours", Layout::Mmvr, 60e9));
     assert_eq!(info.radar.doppler_features, 32);
@@ -203,7 +208,16 @@ fn a_manifest_overrides_the_preset_of_mmvr() {
     assert_eq!(info.skeleton, Skeleton::preset("coco17").unwrap());
     assert_eq!(dataset.load(0).unwrap().maps[0].shape, [4, 3]);
     let single = folder.path().join("00007_radar.npz");
-    assert_eq!(Dataset::open_with_manifest(&single, &manifest, &Progress::new()).unwrap().info(), info);
+    assert_eq!(
+        Dataset::open_with(
+            &single,
+            OpenOptions { manifest: Some(&manifest), ..OpenOptions::default() },
+            &Progress::new()
+        )
+        .unwrap()
+        .info(),
+        info
+    );
     std::fs::write(folder.path().join("dataset.toml"), text).unwrap();
     assert_eq!(open(folder.path()).unwrap().info(), info, "beside the frames it needs no flag");
 }
@@ -308,7 +322,12 @@ fn a_bare_npy_opens_with_a_manifest_or_a_guess() {
     let text = GENERIC.replace("\"rd\"", "\"array\"").replace("bins = 2", "bins = 256");
     let text = text.replace("bins = 3", "bins = 128");
     let manifest = Manifest::parse(&text, Path::new("m.toml")).unwrap();
-    let dataset = Dataset::open_with_manifest(&path, &manifest, &Progress::new()).unwrap();
+    let dataset = Dataset::open_with(
+        &path,
+        OpenOptions { manifest: Some(&manifest), ..OpenOptions::default() },
+        &Progress::new(),
+    )
+    .unwrap();
     assert_eq!((dataset.len(), dataset.info().skeleton.joints.len()), (1, 2));
     assert_eq!(dataset.load(0).unwrap().maps[0].data.len(), 256 * 128);
 }

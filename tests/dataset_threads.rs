@@ -167,7 +167,7 @@ fn start(path: &std::path::Path, manifest: Option<std::path::PathBuf>) -> (OpenJ
     let wake = move || {
         let _ = sender.send(());
     };
-    (OpenJob::start(path.to_owned(), manifest, wake), woken)
+    (OpenJob::start(path.to_owned(), manifest, false, wake), woken)
 }
 
 #[test]

@@ -149,6 +149,13 @@ const PRESETS: [Preset; 3] = [
     },
 ];
 
+/// Joints, bones or angles of a skeleton at most: every pair of joints of two people is looked at in every iteration.
+const MAX_PARTS: usize = 256;
+/// Bytes of a joint's name at most.
+const MAX_NAME: usize = 100;
+/// Length of a bone at most, m.
+const MAX_BONE_M: f64 = 10.0;
+
 impl Skeleton {
     /// The names that [`Self::preset`] knows.
     pub const PRESETS: [&'static str; 3] = ["coco17", "h36m17", "hupr14"];
@@ -178,6 +185,14 @@ impl Skeleton {
         if n == 0 {
             return Some("`joints` is empty; expected at least one name".into());
         }
+        let lists = [("joints", n), ("bones", self.bones.len()), ("angles", self.angles.len())];
+        if let Some((key, long)) = lists.into_iter().find(|(_, long)| *long > MAX_PARTS) {
+            return Some(format!("`{key}` has {long} entries; expected at most {MAX_PARTS}"));
+        }
+        if let Some(long) = self.joints.iter().find(|name| name.len() > MAX_NAME) {
+            let begin: String = long.chars().take(20).collect();
+            return Some(format!("joint `{begin}…` has a name of {} bytes; expected at most {MAX_NAME}", long.len()));
+        }
         if let Some(twice) = self.joints.iter().enumerate().find(|(i, name)| self.joint(name) != Some(*i)) {
             return Some(format!("joint `{}` is listed twice", twice.1));
         }
@@ -189,8 +204,8 @@ impl Skeleton {
         if let Some(bad) = self.bones.iter().find(|b| bone(b)) {
             return Some(format!("bone {bad:?}: expected two different joint indices below {n}"));
         }
-        if let Some(bad) = self.bone_lengths_m.iter().find(|l| !(l.is_finite() && **l > 0.0)) {
-            return Some(format!("bone length {bad}: expected metres above 0"));
+        if let Some(bad) = self.bone_lengths_m.iter().find(|l| !(**l > 0.0 && **l <= MAX_BONE_M)) {
+            return Some(format!("bone length {bad}: expected metres above 0, at most {MAX_BONE_M}"));
         }
         let angle = |&[a, b, c]: &[usize; 3]| a >= n || b >= n || c >= n || a == b || b == c || a == c;
         self.angles

@@ -1,7 +1,7 @@
 //! What several subcommands share: opening, settings, precision, printing.
 
 use crate::config::{FitConfig, Preset};
-use crate::dataset::{Dataset, Manifest, Progress};
+use crate::dataset::{Dataset, Manifest, OpenOptions, Progress};
 use crate::mhp::Precision;
 use anyhow::Context as _;
 use clap::ValueEnum;
@@ -42,10 +42,9 @@ pub(super) fn preset(name: &str) -> Result<Preset, String> {
 /// As [`Dataset::open`] and [`Manifest::from_file`].
 pub(super) fn open(path: &Path, manifest: Option<&Path>) -> anyhow::Result<Dataset> {
     let progress = Progress::new();
-    Ok(match manifest {
-        Some(file) => Dataset::open_with_manifest(path, &Manifest::from_file(file)?, &progress)?,
-        None => Dataset::open(path, &progress)?,
-    })
+    let manifest = manifest.map(Manifest::from_file).transpose()?;
+    let options = OpenOptions { manifest: manifest.as_ref(), allow_outside: false };
+    Ok(Dataset::open_with(path, options, &progress)?)
 }
 
 /// The fit configuration of a file, or the defaults.

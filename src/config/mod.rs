@@ -11,6 +11,7 @@ pub use fields::{FIELDS, Field, FieldGroup};
 pub use init::{Height, InitConfig, LearningRates, Limbs, Parameterization, Place, Scatterers, Yaw};
 pub use preset::Preset;
 
+use crate::input::{MOST_TEXT, read_text};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -245,8 +246,8 @@ impl FitConfig {
     /// # Errors
     /// Where the file cannot be read, is not TOML, has an unknown key (named, with its line), or a number out of range.
     pub fn from_file(path: &Path) -> Result<Self, ConfigError> {
-        let text =
-            std::fs::read_to_string(path).map_err(|reason| ConfigError::Read { reason, path: path.to_owned() })?;
+        let text = read_text(path, "a fit configuration (TOML)", MOST_TEXT)
+            .map_err(|reason| ConfigError::Read { reason, path: path.to_owned() })?;
         Self::parse(&text, path)
     }
 

@@ -1,10 +1,11 @@
 //! Files of maps that say nothing of their axes: what is in them, a first guess, and the memory of what a person chose.
 
-use super::manifest::{ViewText, view_fault};
+use super::manifest::{ViewText, cells_fault, view_fault};
 use super::npz::{Entry, NpzArchive, replace_file, shape_text};
 use super::{DatasetError, words};
 use crate::body::Skeleton;
 use crate::geometry::Pose;
+use crate::input::{MOST_TEXT, read_text};
 use crate::radar::{Axis, AxisKind, PointSpread, Quantity, Spacing, View};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -103,10 +104,13 @@ impl BareChoice {
 /// Checks views against arrays; the number of frames is 1, or the length of the arrays' first axis.
 pub(super) fn frames_of(views: &[View], stacked: bool, catalog: &BareCatalog) -> Result<usize, DatasetError> {
     let bad = |message: String| DatasetError::BadChoice { message, path: catalog.path.clone() };
+    if let Some(fault) = cells_fault(views) {
+        return Err(bad(fault));
+    }
     let mut frames = None;
     for view in views {
         if let Some(fault) = view_fault(view) {
-            return Err(bad(fault));
+            return Err(bad(fault.message));
         }
         let Some(entry) = catalog.arrays.iter().find(|e| e.key == view.array) else {
             return Err(bad(format!("no map `{}`; the file holds {}", view.array, listed(&catalog.arrays))));
@@ -176,7 +180,7 @@ impl Remembered {
     }
 
     fn all(&self) -> BTreeMap<String, ChoiceText> {
-        let text = std::fs::read_to_string(&self.file).unwrap_or_default();
+        let text = read_text(&self.file, "remembered axes", MOST_TEXT).unwrap_or_default();
         toml::from_str(&text).unwrap_or_else(|error| {
             tracing::warn!("{}: remembered axes are unreadable and ignored: {}", self.file.display(), error.message());
             BTreeMap::new()

@@ -50,6 +50,30 @@ pub enum DatasetError {
         /// The folder.
         path: PathBuf,
     },
+    /// More of something than any data set has.
+    #[error("{path}: more than {most} {what} in it; open a folder further inside", path = path.display())]
+    TooMany {
+        /// Folders or frames.
+        what: &'static str,
+        /// How many are accepted.
+        most: usize,
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A manifest that leads out of its folder.
+    #[error(
+        "{place}: `frames = \"{frames}\"` leads out of the data set's folder; expected files inside it (--allow-outside opens it \
+         nevertheless)",
+        place = place(path, *line)
+    )]
+    Outside {
+        /// The pattern.
+        frames: String,
+        /// The line, counted from 1, where one is known.
+        line: Option<usize>,
+        /// The manifest.
+        path: PathBuf,
+    },
     /// A file of arrays of which none can be a map.
     #[error("{path}: no array in it can be a map; expected real numbers with 2 or 3 axes; it holds {present}", path = path.display())]
     NoMaps {

@@ -1,15 +1,17 @@
 //! Which files a data set is made of: names only, nothing is opened and nothing is asked of a file but its name, because
 //! 1.7 million calls to `stat` take longer than anybody waits.
 
+use super::walk::{Walk, is_special};
 use super::{DatasetError, Progress};
-use rayon::prelude::*;
 use std::cmp::Ordering;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// The ending of a file that makes a frame of MMVR.
 pub(super) const RADAR_SUFFIX: &str = "_radar.npz";
-/// Folders inside each other: a data set has four; the limit ends loops of links.
+/// Folders inside each other: a data set has four.
 const MAX_DEPTH: usize = 12;
+/// Files that match a pattern at most.
+const MAX_MATCHES: usize = 1_000_000;
 
 /// One folder of frames: names in one string, because 345,000 small strings are slow and large.
 #[derive(Debug)]
@@ -69,59 +71,31 @@ fn is_session(name: &str) -> bool {
         .is_some_and(|(day, session)| digits(day) && digits(session))
 }
 
-/// The folders with MMVR frames at or below `root`, in natural order; and notes about folders that could not be read.
+/// The folders with MMVR frames at or below `root`, in natural order; and notes about what was left out.
 ///
 /// # Errors
-/// Where `root` itself cannot be read, or on cancel.
+/// As [`Walk::of`].
 pub(super) fn segments(
     root: &Path,
     deep: bool,
     progress: &Progress,
 ) -> Result<(Vec<Segment>, Vec<String>), DatasetError> {
     progress.begin("listing folders", 0);
-    let found = list(root, if deep { 0 } else { MAX_DEPTH }, progress)?;
-    let mut segments = found.0;
-    segments.sort_by(|a, b| natural(&a.path.to_string_lossy(), &b.path.to_string_lossy()));
-    Ok((segments, found.1))
+    // Links to companions are not asked whether they are folders.
+    let skip = |name: &str| Path::new(name).extension().is_some_and(|ending| ending == "npz");
+    let depth = if deep { MAX_DEPTH } else { 0 };
+    let (folders, notes) = Walk { depth, stem: radar_stem, skip, progress }.of(root)?;
+    Ok((folders.into_iter().map(|folder| Segment::new(joined(root, &folder.below), folder.stems)).collect(), notes))
 }
 
-fn list(folder: &Path, depth: usize, progress: &Progress) -> Result<(Vec<Segment>, Vec<String>), DatasetError> {
-    progress.check()?;
-    progress.grow(1);
-    let failed = |reason| DatasetError::Read { reason, path: folder.to_owned() };
-    let (mut stems, mut below) = (Vec::new(), Vec::new());
-    for entry in std::fs::read_dir(folder).map_err(failed)? {
-        let entry = entry.map_err(failed)?;
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        if let Some(stem) = name.strip_suffix(RADAR_SUFFIX).filter(|stem| !stem.is_empty()) {
-            stems.push(stem.to_owned());
-        } else if depth < MAX_DEPTH && !name.starts_with('.') && !name.ends_with(".npz") && is_folder(&entry) {
-            below.push(entry.path());
-        }
-    }
-    progress.advance(1);
-    let inside = below.into_par_iter().map(|path| list(&path, depth + 1, progress)).collect::<Vec<_>>();
-    let (mut segments, mut notes) = (Vec::new(), Vec::new());
-    if !stems.is_empty() {
-        segments.push(Segment::new(folder.to_owned(), stems));
-    }
-    for result in inside {
-        match result {
-            Ok((more, told)) => {
-                segments.extend(more);
-                notes.extend(told);
-            }
-            Err(DatasetError::Cancelled) => return Err(DatasetError::Cancelled),
-            Err(error) => notes.push(format!("skipped: {error}")),
-        }
-    }
-    Ok((segments, notes))
+/// `00383` of `00383_radar.npz`.
+pub(super) fn radar_stem(name: &str) -> Option<&str> {
+    name.strip_suffix(RADAR_SUFFIX).filter(|stem| !stem.is_empty())
 }
 
-/// A folder, or a link to one; the type comes with the name, only links are looked up.
-pub(super) fn is_folder(entry: &std::fs::DirEntry) -> bool {
-    entry.file_type().is_ok_and(|kind| kind.is_dir() || kind.is_symlink() && entry.path().is_dir())
+/// `root` itself where nothing is below it: a path that ends in no separator.
+fn joined(root: &Path, below: &Path) -> PathBuf {
+    if below.as_os_str().is_empty() { root.to_owned() } else { root.join(below) }
 }
 
 /// Numbers inside names by value, the rest by character: `d9s1` before `d10s1`.
@@ -152,6 +126,13 @@ fn leading_number(text: &[u8]) -> (&[u8], &[u8]) {
     (digits.get(zeros..).unwrap_or_default(), rest)
 }
 
+/// Whether a pattern names files outside the folder that it begins in.
+pub(super) fn leads_out(pattern: &str) -> bool {
+    let path = Path::new(pattern);
+    let inside = |part| matches!(part, Component::Normal(_) | Component::CurDir);
+    !path.components().all(inside) || pattern.split(['/', '\\']).any(|part| part == "..")
+}
+
 /// The files below `root` that match a pattern with `*` and `?` in any of its parts, sorted by name; relative paths.
 ///
 /// # Errors
@@ -171,6 +152,9 @@ pub(super) fn matching(root: &Path, pattern: &str, progress: &Progress) -> Resul
                 next.push(base.join(part));
             }
             progress.advance(1);
+            if next.len() > MAX_MATCHES {
+                return Err(DatasetError::TooMany { what: "frames", most: MAX_MATCHES, path: root.to_owned() });
+            }
         }
         next.sort();
         found = next;
@@ -187,8 +171,18 @@ fn matches_in(root: &Path, base: &Path, part: &str, file: bool) -> Result<Vec<Pa
         let name = entry.file_name();
         let text = name.to_string_lossy();
         let hidden = text.starts_with('.') && !part.starts_with('.');
-        if !hidden && fits(part.as_bytes(), text.as_bytes()) && is_folder(&entry) != file {
+        if hidden || !fits(part.as_bytes(), text.as_bytes()) {
+            continue;
+        }
+        let kind = entry.file_type().map_err(failed)?;
+        let is_folder = kind.is_dir() || kind.is_symlink() && entry.path().is_dir();
+        let special =
+            !is_folder && (!kind.is_file() && !kind.is_symlink() || kind.is_symlink() && is_special(&entry.path()));
+        if is_folder != file && !special {
             names.push(base.join(&name));
+        }
+        if names.len() > MAX_MATCHES {
+            return Err(DatasetError::TooMany { what: "frames", most: MAX_MATCHES, path: root.to_owned() });
         }
     }
     Ok(names)

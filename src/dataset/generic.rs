@@ -1,8 +1,9 @@
 //! One frame of a generic data set (an npz beside a manifest) and of a bare file.
 
-use super::npz::{Array, NpzArchive};
-use super::{DatasetError, DatasetInfo, Frame, Heatmap, NpzError, Truth};
+use super::npz::{Array, NpzArchive, shape_text};
+use super::{DatasetError, DatasetInfo, Frame, Heatmap, MAX_PERSONS, NpzError, Truth};
 use crate::geometry::Vec3;
+use crate::radar::View;
 use std::ops::Range;
 use std::path::Path;
 
@@ -46,11 +47,14 @@ pub(super) fn maps_only(path: &Path, info: &DatasetInfo) -> Result<Vec<Heatmap>,
 }
 
 fn read_maps(file: &mut NpzArchive, info: &DatasetInfo) -> Result<Vec<Heatmap>, NpzError> {
-    let maps = info.views.iter().map(|view| {
-        let map = file.read(&view.array)?;
-        heatmap(file, &view.array, map, &view.shape())
-    });
-    maps.collect()
+    info.views.iter().map(|view| read_map(file, view)).collect()
+}
+
+/// The map of a view, refused by its header where it is another.
+fn read_map(file: &mut NpzArchive, view: &View) -> Result<Heatmap, NpzError> {
+    file.require_shape(&view.array, &view.shape(), ", the bins of its axes")?;
+    let Array { shape, data, dtype } = file.read(&view.array)?;
+    Ok(Heatmap { shape, data, dtype })
 }
 
 /// The maps of consecutive frames of a stacked bare file, read in one pass.
@@ -62,12 +66,9 @@ pub(super) fn stacked_maps(
     let mut file = NpzArchive::open(path)?;
     let mut maps: Vec<Vec<Heatmap>> = frames.clone().map(|_| Vec::with_capacity(info.views.len())).collect();
     for view in &info.views {
-        let slabs = file.read_slabs(&view.array, frames.clone())?;
         let shape = view.shape();
-        if slabs.shape.get(1..) != Some(&shape[..]) {
-            let expected = format!("(frames, …) of {}, the bins of its axes", super::npz::shape_text(&shape));
-            return Err(file.wrong_shape(&view.array, &slabs.shape, expected).into());
-        }
+        require_stack(&mut file, view)?;
+        let slabs = file.read_slabs(&view.array, frames.clone())?;
         for (maps, cells) in maps.iter_mut().zip(slabs.data.chunks_exact(view.cells().max(1))) {
             maps.push(Heatmap { shape: shape.clone(), data: cells.to_vec(), dtype: slabs.dtype.clone() });
         }
@@ -85,8 +86,12 @@ pub(super) fn load_bare(
 ) -> Result<Frame, DatasetError> {
     let mut file = NpzArchive::open(path)?;
     let maps = info.views.iter().map(|view| {
-        let map = if stacked { file.read_slab(&view.array, index)? } else { file.read(&view.array)? };
-        heatmap(&file, &view.array, map, &view.shape())
+        if !stacked {
+            return read_map(&mut file, view);
+        }
+        require_stack(&mut file, view)?;
+        let Array { shape, data, dtype } = file.read_slab(&view.array, index)?;
+        Ok(Heatmap { shape, data, dtype })
     });
     Ok(Frame {
         index,
@@ -102,12 +107,13 @@ pub(super) fn load_bare(
     })
 }
 
-fn heatmap(file: &NpzArchive, key: &str, map: Array, expected: &[usize]) -> Result<Heatmap, NpzError> {
-    if map.shape != expected {
-        let expected = format!("{}, the bins of its axes", super::npz::shape_text(expected));
-        return Err(file.wrong_shape(key, &map.shape, expected));
-    }
-    Ok(Heatmap { shape: map.shape, data: map.data, dtype: map.dtype })
+/// Refuses an array that is not frames of a view's maps, one after the other.
+fn require_stack(file: &mut NpzArchive, view: &View) -> Result<(), NpzError> {
+    let shape = view.shape();
+    file.require(&view.array, |got| match got.split_first() {
+        Some((_, rest)) if rest == shape => Ok(()),
+        _ => Err(format!("(frames, …) of {}, the bins of its axes", shape_text(&shape))),
+    })
 }
 
 /// A number: 0-d, or one element.
@@ -115,11 +121,9 @@ pub(super) fn scalar(file: &mut NpzArchive, key: &str) -> Result<Option<f64>, Np
     if !file.contains(key) {
         return Ok(None);
     }
-    let array = file.read(key)?;
-    match array.data[..] {
-        [one] => Ok(Some(one)),
-        _ => Err(file.wrong_shape(key, &array.shape, "one number".into())),
-    }
+    let one = |shape: &[usize]| shape.iter().all(|&n| n == 1);
+    file.require(key, |shape| if one(shape) { Ok(()) } else { Err("one number".into()) })?;
+    Ok(file.read(key)?.data.first().copied())
 }
 
 pub(super) fn read_truth(file: &mut NpzArchive, joints: usize) -> Result<Option<Truth>, NpzError> {
@@ -139,12 +143,11 @@ fn vectors(file: &mut NpzArchive, key: &str, joints: usize) -> Result<Option<(us
     if !file.contains(key) {
         return Ok(None);
     }
+    file.require(key, |shape| match *shape {
+        [persons, n, 3] if n == joints && persons <= MAX_PERSONS => Ok(()),
+        [_, n, 3] if n == joints => Err(format!("at most {MAX_PERSONS} persons")),
+        _ => Err(format!("(persons, {joints}, 3), {joints} being the joints of the skeleton")),
+    })?;
     let array = file.read(key)?;
-    match array.shape[..] {
-        [persons, n, 3] if n == joints => Ok(Some((persons, array.data.as_chunks::<3>().0.to_vec()))),
-        _ => {
-            let expected = format!("(persons, {joints}, 3), {joints} being the joints of the skeleton");
-            Err(file.wrong_shape(key, &array.shape, expected))
-        }
-    }
+    Ok(Some((array.shape.first().copied().unwrap_or(0), array.data.as_chunks::<3>().0.to_vec())))
 }

@@ -1,7 +1,7 @@
 //! Work off the window's thread: one piece on a thread of its own, with progress, an answer and a way to stop it.
 
 use super::error::panic_text;
-use super::{Dataset, DatasetError, Manifest, Progress};
+use super::{Dataset, DatasetError, Manifest, OpenOptions, Progress};
 use crossbeam_channel::{Receiver, TryRecvError, bounded};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -79,12 +79,18 @@ pub struct OpenJob {
 }
 
 impl OpenJob {
-    /// Begins; `wake` is called once, when the answer is there. With a manifest's path, that manifest is used.
-    pub fn start(path: PathBuf, manifest: Option<PathBuf>, wake: impl Fn() + Send + 'static) -> Self {
+    /// Begins; `wake` is called once, when the answer is there. With a manifest's path, that manifest is used;
+    /// `allow_outside` as in [`OpenOptions`].
+    pub fn start(
+        path: PathBuf,
+        manifest: Option<PathBuf>,
+        allow_outside: bool,
+        wake: impl Fn() + Send + 'static,
+    ) -> Self {
         let (here, broken_at) = (path.clone(), path.clone());
-        let work = move |progress: &Progress| match &manifest {
-            Some(file) => Dataset::open_with_manifest(&here, &Manifest::from_file(file)?, progress),
-            None => Dataset::open(&here, progress),
+        let work = move |progress: &Progress| {
+            let manifest = manifest.as_deref().map(Manifest::from_file).transpose()?;
+            Dataset::open_with(&here, OpenOptions { manifest: manifest.as_ref(), allow_outside }, progress)
         };
         let broken = move |message| DatasetError::Internal { message, path: broken_at.clone() };
         Self { path, job: Job::start("open-dataset", work, broken, wake) }

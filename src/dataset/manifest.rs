@@ -3,9 +3,11 @@
 //! Unknown keys are errors with their line, because a typo in `bandwidth_hz` would otherwise silently become a default.
 
 use super::DatasetError;
+use super::npz::MAX_ELEMENTS;
 use crate::body::Skeleton;
-use crate::geometry::{IDENTITY, Mat3, Pose, Vec3};
-use crate::radar::{Axis, PointSpread, Quantity, RadarConfig, Spacing, View};
+use crate::geometry::{IDENTITY, Mat3, Pose, Vec3, dot};
+use crate::input::{MOST_TEXT, read_text};
+use crate::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
 use serde::de::{self, MapAccess, Visitor, value::MapAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::f64::consts::TAU;
@@ -13,8 +15,12 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
-/// Cells of one map that are accepted: 2²⁸.
-const MAX_CELLS: usize = 1 << 28;
+/// Cells of all maps of a frame that are accepted: a fit holds some ten numbers for each.
+const MAX_CELLS: usize = MAX_ELEMENTS;
+/// Bytes of an array's key that are accepted.
+const MAX_KEY: usize = 200;
+/// Views of a frame that are accepted.
+const MAX_VIEWS: usize = 16;
 
 /// How a data set lies on disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -63,6 +69,8 @@ pub struct Manifest {
     pub layout: Layout,
     /// Files of the frames relative to the folder, with `*` in any part; sorted by name, one frame a file.
     pub frames: Option<String>,
+    /// The line of `frames`, counted from 1, for messages.
+    pub(super) frames_line: Option<usize>,
     /// Frames a second.
     pub frame_rate_hz: Option<f64>,
     /// The skeleton of the joints.
@@ -98,7 +106,7 @@ pub(super) struct ViewText {
     rotation: Mat3,
     #[serde(default)]
     translation: Vec3,
-    axes: Vec<Axis>,
+    axes: Vec<Spanned<Axis>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     region: Option<Vec<[usize; 2]>>,
 }
@@ -110,11 +118,13 @@ fn identity() -> Mat3 {
 impl ViewText {
     pub(super) fn into_view(self) -> View {
         let pose = Pose { rotation: self.rotation, translation: self.translation };
-        View { array: self.array, quantity: self.quantity, psf: self.psf, pose, axes: self.axes, region: self.region }
+        let axes = self.axes.into_iter().map(Spanned::into_inner).collect();
+        View { array: self.array, quantity: self.quantity, psf: self.psf, pose, axes, region: self.region }
     }
 
     pub(super) fn of(view: &View) -> Self {
         let View { array, quantity, psf, pose, axes, region } = view.clone();
+        let axes = axes.into_iter().map(|axis| Spanned::new(0..0, axis)).collect();
         Self { array, quantity, psf, rotation: pose.rotation, translation: pose.translation, axes, region }
     }
 }
@@ -151,7 +161,7 @@ impl Manifest {
     /// Where it cannot be read; or naming the line and the key where it is not TOML, has an unknown or missing key, or a
     /// value that makes no sense.
     pub fn from_file(path: &Path) -> Result<Self, DatasetError> {
-        let text = std::fs::read_to_string(path).map_err(|reason| match reason.kind() {
+        let text = read_text(path, "a manifest (TOML)", MOST_TEXT).map_err(|reason| match reason.kind() {
             std::io::ErrorKind::NotFound => DatasetError::NotFound { path: path.to_owned() },
             _ => DatasetError::Read { reason, path: path.to_owned() },
         })?;
@@ -173,7 +183,7 @@ impl Manifest {
         let check =
             |fault_in: Option<String>, span: Range<usize>| fault_in.map_or(Ok(()), |m| Err(fault(m, Some(span))));
         if let Some(rate) = &parsed.frame_rate_hz {
-            check(positive("frame_rate_hz", *rate.get_ref()), rate.span())?;
+            check(outside("frame_rate_hz", *rate.get_ref(), 1e-6, 1e6), rate.span())?;
         }
         if let Some(radar) = &parsed.radar {
             check(radar_fault(radar.get_ref()).map(|m| format!("[radar]: {m}")), radar.span())?;
@@ -184,15 +194,26 @@ impl Manifest {
         if let Some(frames) = parsed.frames.as_ref().filter(|frames| frames.get_ref().trim().is_empty()) {
             check(Some("`frames` is empty; expected a pattern such as \"frames/*.npz\"".into()), frames.span())?;
         }
+        if let Some(one_more) = parsed.view.get(MAX_VIEWS) {
+            check(Some(format!("more than {MAX_VIEWS} views; expected at most so many")), one_more.span())?;
+        }
         let mut views: Vec<View> = Vec::new();
         for spanned in parsed.view {
             let span = spanned.span();
-            let view = spanned.into_inner().into_view();
+            let text = spanned.into_inner();
+            let lines: Vec<Range<usize>> = text.axes.iter().map(Spanned::span).collect();
+            let view = text.into_view();
             let twice = views.iter().any(|other| other.array == view.array);
             let twice = twice.then(|| format!("view `{}` is described twice", view.array));
-            check(twice.or_else(|| view_fault(&view)), span)?;
+            check(twice, span.clone())?;
+            if let Some(ViewFault { message, axis }) = view_fault(&view) {
+                let at = axis.and_then(|axis| lines.get(axis).cloned()).unwrap_or(span);
+                return Err(fault(message, Some(at)));
+            }
             views.push(view);
+            check(cells_fault(&views), span)?;
         }
+        let frames_line = parsed.frames.as_ref().map(|frames| line_of(text, frames.span().start));
         let missing = |key: &str| fault(format!("missing key `{key}`; layout \"npz\" needs it"), None);
         if parsed.layout == Layout::Npz && views.is_empty() {
             return Err(missing("[[view]]"));
@@ -205,6 +226,7 @@ impl Manifest {
             name: parsed.name,
             layout: parsed.layout,
             frames: parsed.frames.map(Spanned::into_inner),
+            frames_line,
             frame_rate_hz: parsed.frame_rate_hz.map(Spanned::into_inner),
             skeleton: parsed.skeleton.map(|skeleton| skeleton.into_inner().0),
             radar: parsed.radar.map(Spanned::into_inner),
@@ -251,69 +273,119 @@ fn in_our_words(message: &str) -> String {
     }
 }
 
-fn positive(key: &str, value: f64) -> Option<String> {
-    (!(value.is_finite() && value > 0.0)).then(|| format!("`{key}` is {value}; expected a number above 0"))
+/// What is wrong with a number that should lie between two others.
+fn outside(key: &str, value: f64, least: f64, most: f64) -> Option<String> {
+    if value.is_finite() && value > 0.0 {
+        let inside = (least..=most).contains(&value);
+        return (!inside).then(|| format!("`{key}` is {value:e}; expected {least:e} to {most:e}"));
+    }
+    Some(format!("`{key}` is {value}; expected a number above 0"))
 }
 
+/// The bounds are wider than any radar that exists, and narrow enough for their products to stay finite.
 fn radar_fault(radar: &RadarConfig) -> Option<String> {
     let numbers = [
-        ("start_hz", radar.start_hz),
-        ("bandwidth_hz", radar.bandwidth_hz),
-        ("chirp_s", radar.chirp_s),
-        ("frame_s", radar.frame_s),
-        ("r_max_m", radar.r_max_m),
-        ("l_az_m", radar.l_az_m),
-        ("l_el_m", radar.l_el_m),
+        ("start_hz", radar.start_hz, 1e6, 1e13),
+        ("bandwidth_hz", radar.bandwidth_hz, 1.0, 1e13),
+        ("chirp_s", radar.chirp_s, 1e-12, 1e3),
+        ("frame_s", radar.frame_s, 1e-12, 1e3),
+        ("r_max_m", radar.r_max_m, 1e-3, 1e5),
+        ("l_az_m", radar.l_az_m, 1e-9, 1e3),
+        ("l_el_m", radar.l_el_m, 1e-9, 1e3),
     ];
     let few = radar.doppler_features == 0 || radar.doppler_features > 4096;
     let features = || few.then(|| format!("`doppler_features` is {}; expected 1 to 4096", radar.doppler_features));
-    let known = radar.height_m.map(|height_m| ("height_m", height_m));
-    numbers.into_iter().chain(known).find_map(|(key, value)| positive(key, value)).or_else(features)
+    let known = radar.height_m.map(|height_m| ("height_m", height_m, 1e-6, 1e3));
+    let mut numbers = numbers.into_iter().chain(known);
+    numbers.find_map(|(key, value, least, most)| outside(key, value, least, most)).or_else(features)
+}
+
+/// What is wrong with a view.
+#[derive(Debug)]
+pub(super) struct ViewFault {
+    /// In words, naming view and key.
+    pub(super) message: String,
+    /// The axis that it is about.
+    axis: Option<usize>,
 }
 
 /// What is wrong with a view, in words; `None` if nothing is.
-pub(super) fn view_fault(view: &View) -> Option<String> {
-    let name = |message: String| format!("view `{}`: {message}", view.array);
+pub(super) fn view_fault(view: &View) -> Option<ViewFault> {
+    let fault =
+        |axis: Option<usize>, message: String| ViewFault { message: format!("view `{}`: {message}", view.array), axis };
     if view.array.is_empty() {
-        return Some("a view's `array` is empty; expected the key of an array".into());
+        let message = "a view's `array` is empty; expected the key of an array".into();
+        return Some(ViewFault { message, axis: None });
+    }
+    if view.array.len() > MAX_KEY || view.array.contains(char::is_control) {
+        let shown: String = view.array.chars().take(20).flat_map(char::escape_debug).collect();
+        let message = format!(
+            "`array` is \"{shown}…\"; expected the key of an array, {MAX_KEY} bytes at most, without control characters"
+        );
+        return Some(ViewFault { message, axis: None });
     }
     if !(2..=3).contains(&view.axes.len()) {
-        return Some(name(format!("{} axes; expected 2 or 3", view.axes.len())));
+        return Some(fault(None, format!("{} axes; expected 2 or 3", view.axes.len())));
     }
-    let axes = view.axes.iter().enumerate();
-    if let Some(fault) =
-        axes.clone().find_map(|(k, axis)| axis_fault(axis).map(|m| format!("axis {k} ({}): {m}", axis.kind.name())))
-    {
-        return Some(name(fault));
+    let named =
+        |(k, axis): (usize, &Axis)| axis_fault(axis).map(|m| (k, format!("axis {k} ({}): {m}", axis.kind.name())));
+    if let Some((k, message)) = view.axes.iter().enumerate().find_map(named) {
+        return Some(fault(Some(k), message));
     }
-    if view
-        .axes
-        .iter()
-        .try_fold(1_usize, |cells, axis| cells.checked_mul(axis.bins))
-        .is_none_or(|cells| cells > MAX_CELLS)
-    {
-        return Some(name(format!("its bins make more than {MAX_CELLS} cells")));
-    }
-    let psf = view.psf;
-    let widths = [
-        ("range_m", psf.range_m),
-        ("azimuth_rad", psf.azimuth_rad),
-        ("elevation_rad", psf.elevation_rad),
-        ("doppler_mps", psf.doppler_mps),
-    ];
-    if let Some((key, value)) = widths.into_iter().find(|(_, value)| !(value.is_finite() && *value >= 0.0)) {
-        return Some(name(format!("psf `{key}` is {value}; expected 0 or more")));
-    }
-    if !view.pose.rotation.iter().flatten().chain(&view.pose.translation).all(|x| x.is_finite()) {
-        return Some(name("`rotation` and `translation` must be finite numbers".into()));
-    }
-    region_fault(view).map(name)
+    let message = psf_fault(view).or_else(|| pose_fault(view)).or_else(|| region_fault(view))?;
+    Some(fault(None, message))
 }
+
+/// More cells than a fit can hold, in all views together.
+pub(super) fn cells_fault(views: &[View]) -> Option<String> {
+    let of_view = |view: &View| view.axes.iter().fold(1_usize, |cells, axis| cells.saturating_mul(axis.bins));
+    let cells = views.iter().fold(0_usize, |cells, view| cells.saturating_add(of_view(view)));
+    let last = views.last().map_or("", |view| view.array.as_str());
+    (cells > MAX_CELLS).then(|| {
+        format!("view `{last}`: `bins` make {cells} cells in all views up to this one; expected at most {MAX_CELLS}")
+    })
+}
+
+fn psf_fault(view: &View) -> Option<String> {
+    let PointSpread { range_m, azimuth_rad, elevation_rad, doppler_mps } = view.psf;
+    let widths = [
+        ("range_m", range_m, 100.0),
+        ("azimuth_rad", azimuth_rad, TAU),
+        ("elevation_rad", elevation_rad, TAU),
+        ("doppler_mps", doppler_mps, MAX_SPEED_MPS),
+    ];
+    let bad = widths.into_iter().find(|(_, value, most)| !(0.0..=*most).contains(value));
+    bad.map(|(key, value, most)| format!("psf `{key}` is {value}; expected 0 to {most:.4}"))
+}
+
+/// A rotation keeps lengths and angles; a mirror does too, and is let pass.
+fn pose_fault(view: &View) -> Option<String> {
+    let Pose { rotation, translation } = view.pose;
+    if !rotation.iter().flatten().chain(&translation).all(|x| x.is_finite()) {
+        return Some("`rotation` and `translation` must be finite numbers".into());
+    }
+    if translation.iter().any(|x| x.abs() > MAX_EXTENT_M) {
+        return Some(format!("`translation` is {translation:?} m; expected at most {MAX_EXTENT_M} each way"));
+    }
+    let skew = |a: usize, b: usize| (dot(rotation[a], rotation[b]) - f64::from(u8::from(a == b))).abs() > 1e-3;
+    let bad = (0..3).any(|a| (a..3).any(|b| skew(a, b)));
+    bad.then(|| "`rotation` is no rotation; expected three rows of length 1 at right angles".into())
+}
+
+/// Farther than a radar for people, cars or ships' berths sees, m.
+const MAX_EXTENT_M: f64 = 1000.0;
+/// Faster than anything that such a radar sees, m/s.
+const MAX_SPEED_MPS: f64 = 1000.0;
+/// The finest step that is accepted, in the axis' unit; and as a share of its farthest coordinate.
+const LEAST_STEP: f64 = 1e-6;
 
 fn axis_fault(axis: &Axis) -> Option<String> {
     let Axis { bins, lo, hi, .. } = *axis;
     let angular = axis.kind.is_angular();
-    let steep = lo.abs().max(hi.abs());
+    let far = lo.abs().max(hi.abs());
+    let (most, unit) = if axis.kind == AxisKind::Doppler { (MAX_SPEED_MPS, "m/s") } else { (MAX_EXTENT_M, "m") };
+    let step = axis.step().abs();
+    let least = LEAST_STEP * far.max(1.0);
     if bins == 0 {
         Some("`bins` is 0; expected 1 or more".into())
     } else if !(lo.is_finite() && hi.is_finite()) {
@@ -322,10 +394,16 @@ fn axis_fault(axis: &Axis) -> Option<String> {
         Some(format!("`lo` and `hi` are both {lo}; expected different numbers"))
     } else if axis.spacing == Spacing::Sine && !angular {
         Some("spacing \"sine\" is for azimuth, elevation and cone".into())
-    } else if axis.spacing == Spacing::Sine && steep > 2.0 {
+    } else if axis.spacing == Spacing::Sine && far > 2.0 {
         Some(format!("`lo` {lo} and `hi` {hi} are sines on a sine axis; expected about −1 to 1"))
-    } else if angular && axis.spacing == Spacing::Linear && steep > TAU {
+    } else if angular && axis.spacing == Spacing::Linear && far > TAU {
         Some(format!("`lo` {lo} and `hi` {hi} are radians; they look like degrees"))
+    } else if !angular && far > most {
+        Some(format!("`lo` {lo:e} and `hi` {hi:e} are in {unit}; expected −{most} to {most}, as far as a radar sees"))
+    } else if step < least {
+        Some(format!(
+            "`lo` {lo:e} and `hi` {hi:e} make {bins} bins {step:.1e} apart; expected a step of {least:.1e} or more"
+        ))
     } else {
         None
     }

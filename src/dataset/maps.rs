@@ -64,7 +64,10 @@ impl Dataset {
             return Err(past());
         }
         let one = match &self.source {
-            Source::Bare { stacked: true, .. } => return generic::stacked_maps(frames, &self.info.root, &self.info),
+            Source::Bare { stacked: true, sums, .. } => {
+                sums.of(&self.info.root, &self.info)?;
+                return generic::stacked_maps(frames, &self.info.root, &self.info);
+            }
             Source::Files(_) | Source::Bare { .. } => generic::maps_only(&self.frame_path(frames.start), &self.info),
             Source::Stacks { steps, .. } => {
                 xrf55::maps_only(&self.frame_path(frames.start), frames.start % steps, &self.info)

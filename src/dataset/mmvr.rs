@@ -6,11 +6,15 @@
 use super::files::RADAR_SUFFIX;
 use super::npz::{Array, NpzArchive, NpzError, shape_text};
 use super::truth::truth_beside;
-use super::{DatasetError, DatasetInfo, Frame, Heatmap, ImageAnnotations};
+use super::{DatasetError, DatasetInfo, Frame, Heatmap, ImageAnnotations, MAX_PERSONS};
 use crate::radar::View;
 use rayon::prelude::*;
 use std::path::Path;
 
+/// Bytes of a frame's global id: the grouped variant has four of five characters.
+const ID_BYTES: u64 = 4096;
+/// Width or height of an image that is accepted, px.
+const MAX_SIDE: usize = 8192;
 /// Camera images of MMVR, (width, height), px.
 const IMAGE_SIZE: [usize; 2] = [640, 480];
 
@@ -58,17 +62,15 @@ pub(super) fn maps_only(folder: &Path, stem: &str, info: &DatasetInfo) -> Result
 }
 
 fn read_map(file: &mut NpzArchive, view: &View) -> Result<Heatmap, DatasetError> {
-    let Array { shape, data, dtype } = file.read(&view.array)?;
     let expected = view.shape();
-    if shape.len() == expected.len() + 1 && shape.ends_with(&expected) {
-        let (got, expected) = (shape_text(&shape), shape_text(&expected));
+    let got = file.entry(&view.array)?.shape;
+    if got.len() == expected.len() + 1 && got.ends_with(&expected) {
+        let (got, expected) = (shape_text(&got), shape_text(&expected));
         let path = file.path().to_owned();
         return Err(DatasetError::Grouped { key: view.array.clone(), got, expected, path });
     }
-    if shape != expected {
-        let expected = format!("{}, the bins of its axes", shape_text(&expected));
-        return Err(file.wrong_shape(&view.array, &shape, expected).into());
-    }
+    file.require_shape(&view.array, &expected, ", the bins of its axes")?;
+    let Array { shape, data, dtype } = file.read(&view.array)?;
     Ok(Heatmap { shape, data, dtype })
 }
 
@@ -76,7 +78,7 @@ fn read_map(file: &mut NpzArchive, view: &View) -> Result<Heatmap, DatasetError>
 fn load_labels(folder: &Path, stem: &str, info: &DatasetInfo) -> Frame {
     let mut labels = Labels { folder, stem, notes: Vec::new() };
     let global_id = labels.open("meta", "no global frame id").and_then(|mut file| {
-        let ids = file.read_texts("global_frame_id");
+        let ids = file.require_bytes("global_frame_id", ID_BYTES).and_then(|()| file.read_texts("global_frame_id"));
         labels.keep(ids).map(|ids| ids.join(", "))
     });
     let Boxes { on_maps: map_boxes, in_image: image_boxes } = labels.boxes(info);
@@ -139,17 +141,15 @@ impl Labels<'_> {
 
     /// An array of shape (n, …rest), as rows of its first axis.
     fn rows(&mut self, file: &mut NpzArchive, key: &str, rest: &[usize]) -> Option<Vec<Vec<f64>>> {
+        let fits = file.require(key, |shape| match shape.split_first() {
+            // No person at all is stored with any number of axes.
+            _ if shape.contains(&0) => Ok(()),
+            Some((&persons, got)) if got == rest && persons <= MAX_PERSONS => Ok(()),
+            Some((_, got)) if got == rest => Err(format!("at most {MAX_PERSONS} persons")),
+            _ => Err(format!("(persons, {})", rest.iter().map(usize::to_string).collect::<Vec<_>>().join(", "))),
+        });
+        self.keep(fits)?;
         let array = self.keep(file.read(key))?;
-        // No person at all is stored with any number of axes.
-        if array.data.is_empty() {
-            return Some(Vec::new());
-        }
-        if array.shape.get(1..) != Some(rest) {
-            let rest: Vec<String> = rest.iter().map(usize::to_string).collect();
-            let error = file.wrong_shape(key, &array.shape, format!("(persons, {})", rest.join(", ")));
-            self.notes.push(error.to_string());
-            return None;
-        }
         let width: usize = rest.iter().product();
         Some(array.data.chunks_exact(width.max(1)).map(<[f64]>::to_vec).collect())
     }
@@ -183,12 +183,14 @@ impl Labels<'_> {
     /// One mask a person and the image's size (width, height).
     fn masks(&mut self) -> Option<([usize; 2], Vec<Vec<bool>>)> {
         let mut file = self.open("mask", "no masks")?;
+        let fits = file.require("mask", |shape| match *shape {
+            [n, height, width] if n <= MAX_PERSONS && height <= MAX_SIDE && width <= MAX_SIDE => Ok(()),
+            [_, _, _] => Err(format!("at most {MAX_PERSONS} persons of {MAX_SIDE} × {MAX_SIDE} px")),
+            _ => Err("(persons, height, width)".into()),
+        });
+        self.keep(fits)?;
         let (shape, flags) = self.keep(file.read_flags("mask"))?;
-        let [_, height, width] = shape[..] else {
-            let error = file.wrong_shape("mask", &shape, "(persons, height, width)".into());
-            self.notes.push(error.to_string());
-            return None;
-        };
+        let [_, height, width] = shape[..] else { return None };
         if flags.is_empty() {
             return Some((IMAGE_SIZE, Vec::new()));
         }

@@ -24,8 +24,12 @@ mod sample;
 mod set;
 mod source;
 mod truth;
+mod walk;
 mod words;
 mod xrf55;
+
+/// Persons of a frame that labels or truth may speak of. A room holds fewer; a damaged count would take all memory.
+pub const MAX_PERSONS: usize = 256;
 
 pub use bare::{BareCatalog, BareChoice, Remembered};
 pub use cache::{Cache, DEFAULT_BUDGET, FrameCache};
@@ -41,6 +45,6 @@ pub use npz::NpzError;
 pub use pppr_io::{read_pppr, write_pppr};
 pub use progress::{Progress, ProgressState};
 pub use sample::bundled_sample;
-pub use set::{Dataset, DatasetInfo, MANIFEST_NAME};
+pub use set::{Dataset, DatasetInfo, MANIFEST_NAME, OpenOptions};
 pub use words::{axes_badge, axis_position, axis_words, system_words, view_words};
 pub use xrf55::STEPS as XRF55_STEPS;

@@ -1,8 +1,12 @@
 //! PPPR files: npz with the arrays of SPEC section 2, any real dtype, byte and memory order.
 
+use super::MAX_PERSONS;
 use super::npz::{ArrayView, NpzArchive, NpzError, write};
 use crate::body::{Group, Pppr, PpprShape};
 use std::path::Path;
+
+/// Parameters of all joints of all persons that a file may hold: 2²², 32 MiB.
+const MAX_NUMBERS: usize = 1 << 22;
 
 /// Reads the parameters of all joints of all persons. `position` sets the persons and joints, `omega` the Doppler
 /// features; every other array must agree, and all with `expected` where it is given.
@@ -19,14 +23,18 @@ pub fn read_pppr(path: &Path, expected: Option<PpprShape>) -> Result<Pppr, NpzEr
         let [.., doppler_features] = axes_of(&mut file, Group::Omega, "(persons, joints, Doppler features)")?;
         PpprShape { persons, joints, doppler_features }
     };
+    let numbers = Group::ALL.iter().map(|&group| shape.array_shape(group).iter().product::<usize>());
+    if numbers.fold(0_usize, usize::saturating_add) > MAX_NUMBERS {
+        let entry = file.entry(Group::Omega.key())?;
+        let expected = format!("at most {MAX_NUMBERS} parameters of all joints");
+        return Err(file.wrong_shape(Group::Omega.key(), &entry.shape, expected));
+    }
+    for group in Group::ALL {
+        file.require_shape(group.key(), &shape.array_shape(group), ", as the other arrays and the skeleton say")?;
+    }
     let mut arrays = Vec::with_capacity(Group::ALL.len());
     for group in Group::ALL {
         let array = file.read(group.key())?;
-        let wanted = shape.array_shape(group);
-        if array.shape != wanted {
-            let expected = format!("{}, as the other arrays and the skeleton say", super::npz::shape_text(&wanted));
-            return Err(file.wrong_shape(group.key(), &array.shape, expected));
-        }
         if let Some((at, value)) = array.data.iter().enumerate().find(|(_, x)| !x.is_finite()) {
             let message = format!("element {at} is {value}; expected finite numbers");
             return Err(NpzError::Corrupt { key: group.key().into(), message, path: path.to_owned() });
@@ -44,7 +52,10 @@ pub fn read_pppr(path: &Path, expected: Option<PpprShape>) -> Result<Pppr, NpzEr
 fn axes_of(file: &mut NpzArchive, group: Group, expected: &str) -> Result<[usize; 3], NpzError> {
     let entry = file.entry(group.key())?;
     match entry.shape[..] {
-        [persons, joints, width] if persons > 0 && joints > 0 => Ok([persons, joints, width]),
+        [persons, joints, width] if persons > 0 && joints > 0 && persons <= MAX_PERSONS => Ok([persons, joints, width]),
+        [persons, ..] if persons > MAX_PERSONS => {
+            Err(file.wrong_shape(group.key(), &entry.shape, format!("at most {MAX_PERSONS} persons")))
+        }
         _ => Err(file.wrong_shape(group.key(), &entry.shape, expected.into())),
     }
 }

@@ -2,9 +2,9 @@
 
 use super::bare::{BareCatalog, BareChoice, Remembered, assumptions, frames_of};
 use super::cache::Cache;
-use super::files::{RADAR_SUFFIX, Segment, matching, segments};
+use super::files::{RADAR_SUFFIX, Segment, leads_out, matching, radar_stem, segments};
 use super::manifest::{Layout, Manifest};
-use super::source::{Names, Source};
+use super::source::{MAX_NAME_BYTES, Names, Source};
 use super::words::axes_badge;
 use super::{DatasetError, Frame, Heatmap, Progress, generic, hupr, mmvr, xrf55};
 use crate::body::Skeleton;
@@ -44,6 +44,15 @@ pub struct DatasetInfo {
     pub notes: Vec<String>,
 }
 
+/// How a data set is opened.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct OpenOptions<'a> {
+    /// What says what the path is, whatever lies beside it: overrides a preset, or describes a bare file.
+    pub manifest: Option<&'a Manifest>,
+    /// Whether a manifest may name frames outside its own folder.
+    pub allow_outside: bool,
+}
+
 /// An open data set: an index of names. Frames are read by [`Self::load`], from any thread.
 #[derive(Debug)]
 pub struct Dataset {
@@ -63,17 +72,28 @@ impl Dataset {
     /// # Errors
     /// One error that names file, key and expectation; [`DatasetError::NeedsAxes`] for a bare file seen the first time.
     pub fn open(path: &Path, progress: &Progress) -> Result<Self, DatasetError> {
+        Self::open_with(path, OpenOptions::default(), progress)
+    }
+
+    /// As [`Self::open`], with options.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_with(path: &Path, options: OpenOptions<'_>, progress: &Progress) -> Result<Self, DatasetError> {
         progress.begin("opening", 0);
+        if let Some(manifest) = options.manifest {
+            return Self::open_as(path, manifest, options, progress);
+        }
         if is_folder(path)? {
             return match manifest_in(path)? {
-                Some(manifest) => Self::open_folder(path, &manifest, progress),
+                Some(manifest) => Self::open_folder(path, &manifest, options, progress),
                 None => Self::open_known(path, progress),
             };
         }
         if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
-            return Self::open_folder(parent(path), &Manifest::from_file(path)?, progress);
+            return Self::open_folder(parent(path), &Manifest::from_file(path)?, options, progress);
         }
-        if let Some(stem) = radar_stem(path) {
+        if let Some(stem) = stem_of(path) {
             let beside = manifest_in(parent(path))?.filter(|manifest| manifest.layout == Layout::Mmvr);
             let manifest = beside.map_or_else(Manifest::mmvr, Ok)?;
             return Self::open_mmvr(parent(path), false, Some(&stem), &manifest, progress);
@@ -85,19 +105,20 @@ impl Dataset {
         }
     }
 
-    /// Opens `path` as `manifest` says, whatever lies beside it: overrides a preset, or describes a bare file.
-    ///
-    /// # Errors
-    /// As [`Self::open`].
-    pub fn open_with_manifest(path: &Path, manifest: &Manifest, progress: &Progress) -> Result<Self, DatasetError> {
-        progress.begin("opening", 0);
+    /// Opens `path` as `manifest` says.
+    fn open_as(
+        path: &Path,
+        manifest: &Manifest,
+        options: OpenOptions<'_>,
+        progress: &Progress,
+    ) -> Result<Self, DatasetError> {
         if is_folder(path)? {
-            return Self::open_folder(path, manifest, progress);
+            return Self::open_folder(path, manifest, options, progress);
         }
         if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
-            return Self::open_folder(parent(path), manifest, progress);
+            return Self::open_folder(parent(path), manifest, options, progress);
         }
-        match (manifest.layout, radar_stem(path)) {
+        match (manifest.layout, stem_of(path)) {
             (Layout::Mmvr, Some(stem)) => Self::open_mmvr(parent(path), false, Some(&stem), manifest, progress),
             (Layout::Npz, _) => Self::from_manifest(path, manifest),
             (layout, _) => {
@@ -132,9 +153,14 @@ impl Dataset {
         Ok(opened)
     }
 
-    fn open_folder(root: &Path, manifest: &Manifest, progress: &Progress) -> Result<Self, DatasetError> {
+    fn open_folder(
+        root: &Path,
+        manifest: &Manifest,
+        options: OpenOptions<'_>,
+        progress: &Progress,
+    ) -> Result<Self, DatasetError> {
         match manifest.layout {
-            Layout::Npz => Self::open_files(root, manifest, progress),
+            Layout::Npz => Self::open_files(root, manifest, options, progress),
             Layout::Mmvr => Self::open_mmvr(root, true, None, manifest, progress),
             Layout::Hupr => Self::open_hupr(root, manifest, progress),
             Layout::Xrf55 => Self::open_xrf55(root, manifest, progress),
@@ -175,7 +201,7 @@ impl Dataset {
         info.notes = notes;
         info.assumptions.extend(hupr::assumptions());
         let labels = hupr::Annotations::beside(root, &segments);
-        Ok(Self::of(info, Source::Hupr { segments, starts, frames, labels }, 0))
+        Self::of(info, Source::Hupr { segments, starts, frames, labels }, 0)
     }
 
     fn open_xrf55(root: &Path, manifest: &Manifest, progress: &Progress) -> Result<Self, DatasetError> {
@@ -192,20 +218,29 @@ impl Dataset {
             info.assumptions.extend(xrf55::assumptions());
         }
         let steps = if info.views.iter().all(|view| view.axes.len() == 2) { xrf55::STEPS } else { 1 };
-        Ok(Self::of(info, Source::Stacks { files, steps }, 0))
+        Self::of(info, Source::Stacks { files, steps }, 0)
     }
 
-    fn open_files(root: &Path, manifest: &Manifest, progress: &Progress) -> Result<Self, DatasetError> {
+    fn open_files(
+        root: &Path,
+        manifest: &Manifest,
+        options: OpenOptions<'_>,
+        progress: &Progress,
+    ) -> Result<Self, DatasetError> {
         let Some(pattern) = &manifest.frames else {
             let message = "missing key `frames`; layout \"npz\" needs it, for example \"frames/*.npz\"".into();
             return Err(DatasetError::Manifest { message, line: None, path: manifest.path.clone() });
         };
+        if leads_out(pattern) && !options.allow_outside {
+            let (frames, line, path) = (pattern.clone(), manifest.frames_line, manifest.path.clone());
+            return Err(DatasetError::Outside { frames, line, path });
+        }
         let files = matching(root, pattern, progress)?;
         if files.is_empty() {
             let expected = format!("files that match `frames = \"{pattern}\"` of {}", manifest.path.display());
             return Err(DatasetError::NoFrames { expected, path: root.to_owned() });
         }
-        Ok(Self::of(info_of(root, manifest, manifest, folder_name(root)), Source::Files(files), 0))
+        Self::of(info_of(root, manifest, manifest, folder_name(root)), Source::Files(files), 0)
     }
 
     fn open_mmvr(
@@ -237,7 +272,7 @@ impl Dataset {
                 .push("point spread: 0.06 m and 0.03 rad are assumed; MMVR does not publish its own".into());
             info.assumptions.push("quantity: amplitudes are assumed, from the spread of the values".into());
         }
-        Ok(Self::of(info, Source::Mmvr { segments, starts, frames }, start.unwrap_or(0)))
+        Self::of(info, Source::Mmvr { segments, starts, frames }, start.unwrap_or(0))
     }
 
     fn from_choice(catalog: &BareCatalog, choice: &BareChoice) -> Result<Self, DatasetError> {
@@ -255,7 +290,7 @@ impl Dataset {
             views: choice.views.clone(),
             notes: Vec::new(),
         };
-        Ok(Self::of(info, Source::Bare { frames, stacked: choice.first_axis_is_frame }, 0))
+        Self::of(info, Source::bare(frames, choice.first_axis_is_frame), 0)
     }
 
     fn from_manifest(path: &Path, manifest: &Manifest) -> Result<Self, DatasetError> {
@@ -265,12 +300,17 @@ impl Dataset {
         let frames = frames_of(&manifest.views, stacked, &catalog)?;
         let mut info = info_of(path, manifest, manifest, file_stem(path));
         info.layout = Layout::Bare;
-        Ok(Self::of(info, Source::Bare { frames, stacked }, 0))
+        Self::of(info, Source::bare(frames, stacked), 0)
     }
 
-    fn of(info: DatasetInfo, source: Source, start: usize) -> Self {
-        let names = source.names(&info.name);
-        Self { info, source, start, names, fingerprint: OnceLock::new(), recent: Mutex::new(Cache::new(RECENT_BYTES)) }
+    fn of(info: DatasetInfo, source: Source, start: usize) -> Result<Self, DatasetError> {
+        let names = source.names(&info.name).ok_or_else(|| DatasetError::TooMany {
+            what: "bytes in the names of all frames",
+            most: MAX_NAME_BYTES,
+            path: info.root.clone(),
+        })?;
+        let (fingerprint, recent) = (OnceLock::new(), Mutex::new(Cache::new(RECENT_BYTES)));
+        Ok(Self { info, source, start, names, fingerprint, recent })
     }
 
     /// What is true of every frame.
@@ -382,7 +422,12 @@ impl Dataset {
                 hupr::load(i, &segment.path, &segment.sequence, segment.stem(k), labels, &self.info)
             }
             Source::Files(_) => generic::load(i, name, &path, &self.info),
-            Source::Bare { stacked, .. } => generic::load_bare(i, name, &path, *stacked, &self.info),
+            Source::Bare { stacked, sums, .. } => {
+                if *stacked {
+                    sums.of(&path, &self.info)?;
+                }
+                generic::load_bare(i, name, &path, *stacked, &self.info)
+            }
             Source::Mmvr { .. } => {
                 let (segment, k) = self.segment(i).ok_or_else(past)?;
                 mmvr::load(i, &segment.path, &segment.sequence, segment.stem(k), &self.info)
@@ -468,8 +513,7 @@ fn file_stem(path: &Path) -> String {
     path.file_stem().map_or_else(|| "file".into(), |stem| stem.to_string_lossy().into_owned())
 }
 
-/// `00383` of `00383_radar.npz`.
-fn radar_stem(path: &Path) -> Option<String> {
-    let name = path.file_name()?.to_str()?;
-    name.strip_suffix(RADAR_SUFFIX).filter(|stem| !stem.is_empty()).map(str::to_owned)
+/// `00383` of `.../00383_radar.npz`.
+fn stem_of(path: &Path) -> Option<String> {
+    radar_stem(path.file_name()?.to_str()?).map(str::to_owned)
 }

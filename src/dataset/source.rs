@@ -2,8 +2,11 @@
 
 use super::files::Segment;
 use super::hupr::Annotations;
+use super::npz::NpzArchive;
+use super::{DatasetInfo, NpzError};
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 #[derive(Debug)]
 pub(super) enum Source {
@@ -16,11 +19,51 @@ pub(super) enum Source {
     /// Files relative to the root.
     Files(Vec<PathBuf>),
     /// One file; `stacked` where the arrays' first axis counts frames.
-    Bare { frames: usize, stacked: bool },
+    Bare { frames: usize, stacked: bool, sums: Sums },
 }
 
+/// The checksums of a stacked file. Its frames are read one by one, which no checksum covers; so the whole file is read once,
+/// by whoever asks for the first frame, and what is wrong with it is told with every frame.
+#[derive(Debug, Default)]
+pub(super) struct Sums(Mutex<Option<Verdict>>);
+
+/// The array that is damaged and how, if one is.
+type Verdict = Option<(String, String)>;
+
+impl Sums {
+    /// Compares them where that was not done before. One thread does, the others wait for it.
+    ///
+    /// # Errors
+    /// Where an array is damaged, or the file cannot be read.
+    pub(super) fn of(&self, path: &Path, info: &DatasetInfo) -> Result<(), NpzError> {
+        let mut verdict = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if verdict.is_none() {
+            let mut file = NpzArchive::open(path)?;
+            *verdict = Some(match info.views.iter().try_for_each(|view| file.verify(&view.array)) {
+                Ok(()) => None,
+                Err(NpzError::Corrupt { key, message, .. }) => Some((key, message)),
+                Err(error) => return Err(error),
+            });
+        }
+        let damaged = verdict.clone().flatten();
+        damaged.map_or(Ok(()), |(key, message)| Err(NpzError::Corrupt { key, message, path: path.to_owned() }))
+    }
+}
+
+/// Bytes that the names of all frames may take together.
+pub(super) const MAX_NAME_BYTES: usize = 256 << 20;
+
 impl Source {
-    pub(super) fn names(&self, dataset: &str) -> Names {
+    pub(super) fn bare(frames: usize, stacked: bool) -> Self {
+        Self::Bare { frames, stacked, sums: Sums::default() }
+    }
+
+    /// The names of all frames of the data set `dataset`; `None` where they are too long to be held.
+    pub(super) fn names(&self, dataset: &str) -> Option<Names> {
+        if let Self::Bare { frames, .. } = self {
+            // The only number of frames that a few bytes can claim.
+            (*frames).checked_mul(dataset.len() + 7 + size_of::<u32>()).filter(|&bytes| bytes <= MAX_NAME_BYTES)?;
+        }
         let mut names = Names::default();
         match self {
             Self::Mmvr { segments, .. } | Self::Hupr { segments, .. } => {
@@ -47,14 +90,14 @@ impl Source {
                     names.push(format_args!("{}", file.with_extension("").to_string_lossy()));
                 }
             }
-            Self::Bare { frames, stacked: true } => {
+            Self::Bare { frames, stacked: true, .. } => {
                 for i in 0..*frames {
                     names.push(format_args!("{dataset}/{i:06}"));
                 }
             }
             Self::Bare { .. } => names.push(format_args!("{dataset}")),
         }
-        names
+        (names.text.len() <= MAX_NAME_BYTES).then_some(names)
     }
 }
 

@@ -3,9 +3,10 @@
 //! What the axes are is not published. A view of two axes takes each of the 17 as a frame, a view of three takes a file as one;
 //! the preset (`assets/xrf55.toml`) says which is assumed. XX_YY_ZZ are volunteer, action and repetition, however they are padded.
 
-use super::files::{is_folder, natural};
+use super::files::natural;
 use super::npz::{NPY_KEY, NpzArchive, shape_text};
 use super::truth::truth_beside;
+use super::walk::{Folder, Walk};
 use super::{DatasetError, DatasetInfo, Frame, Heatmap, Progress};
 use std::path::{Path, PathBuf};
 
@@ -16,48 +17,22 @@ const MAX_DEPTH: usize = 6;
 /// The other sensors' folders, whose files have the same names.
 const OTHERS: [&str; 2] = ["rfid", "wifi"];
 
-/// The stacks at or below `root`, in natural order, relative to it; and notes about folders that could not be read.
+/// The stacks at or below `root`, in natural order, relative to it; and notes about what was left out.
 ///
 /// # Errors
-/// Where `root` cannot be read, or on cancel.
+/// As [`Walk::of`].
 pub(super) fn stacks(root: &Path, progress: &Progress) -> Result<(Vec<PathBuf>, Vec<String>), DatasetError> {
-    let (mut found, mut notes) = (Vec::new(), Vec::new());
-    find(root, Path::new(""), 0, progress, &mut found, &mut notes)?;
-    found.sort_by(|a: &PathBuf, b: &PathBuf| natural(&a.to_string_lossy(), &b.to_string_lossy()));
+    let skip = |name: &str| OTHERS.iter().any(|sensor| name.eq_ignore_ascii_case(sensor));
+    let (folders, notes) = Walk { depth: MAX_DEPTH, stem: stack_name, skip, progress }.of(root)?;
+    let inside = |folder: Folder| folder.stems.into_iter().map(move |name| folder.below.join(name));
+    let mut found: Vec<PathBuf> = folders.into_iter().flat_map(inside).collect();
+    found.sort_by(|a, b| natural(&a.to_string_lossy(), &b.to_string_lossy()));
     Ok((found, notes))
 }
 
-fn find(
-    root: &Path,
-    below: &Path,
-    depth: usize,
-    progress: &Progress,
-    found: &mut Vec<PathBuf>,
-    notes: &mut Vec<String>,
-) -> Result<(), DatasetError> {
-    progress.check()?;
-    let folder = root.join(below);
-    let entries = match std::fs::read_dir(&folder) {
-        Ok(entries) => entries,
-        Err(reason) if depth == 0 => return Err(DatasetError::Read { reason, path: folder }),
-        Err(reason) => {
-            notes.push(format!("skipped: {}: {reason}", folder.display()));
-            return Ok(());
-        }
-    };
-    for entry in entries.flatten() {
-        let name = entry.file_name();
-        let text = name.to_string_lossy();
-        if text.strip_suffix(".npy").is_some_and(is_stack) {
-            found.push(below.join(&name));
-        } else if depth < MAX_DEPTH && !text.starts_with('.') && is_folder(&entry) {
-            let other = OTHERS.iter().any(|sensor| text.eq_ignore_ascii_case(sensor));
-            if !other {
-                find(root, &below.join(&name), depth + 1, progress, found, notes)?;
-            }
-        }
-    }
-    Ok(())
+/// The name itself where it is that of a stack.
+fn stack_name(name: &str) -> Option<&str> {
+    name.strip_suffix(".npy").is_some_and(is_stack).then_some(name)
 }
 
 /// Three whole numbers: `01_07_12`, `15_4_3`.

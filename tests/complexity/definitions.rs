@@ -3,7 +3,7 @@
 use super::naive::{self, Row};
 use super::sets::{SHAPES, Set, cells, file, open};
 use mhp_inspector::dataset::npz::{ArrayView, write_npy};
-use mhp_inspector::dataset::{Dataset, Manifest, Progress};
+use mhp_inspector::dataset::{Dataset, Manifest, OpenOptions, Progress};
 use mhp_inspector::study::StudyError;
 use mhp_inspector::study::complexity::{Complexity, ComplexityOptions, Stratum, compute};
 use serde_json::Value;
@@ -126,7 +126,12 @@ fn a_stacked_file_is_one_sequence() {
     write_npy(&path, &ArrayView::f64(&[23, 9, 8], &stack)).unwrap();
     let text = std::fs::read_to_string(&manifest.path).unwrap().replace("\"plane\"", "\"array\"");
     let manifest = Manifest::parse(&text, Path::new("stack.toml")).unwrap();
-    let dataset = Dataset::open_with_manifest(&path, &manifest, &Progress::new()).unwrap();
+    let dataset = Dataset::open_with(
+        &path,
+        OpenOptions { manifest: Some(&manifest), ..OpenOptions::default() },
+        &Progress::new(),
+    )
+    .unwrap();
     let complexity = computed(&dataset, &ComplexityOptions::default());
     let wanted = naive::complexity(&set.frames(), &SHAPES[..1], &ComplexityOptions::default());
     assert_same(&complexity, &wanted, "stacked");
@@ -142,7 +147,12 @@ fn frames_of_a_stacked_file_fail_one_by_one() {
     let mut stack: Vec<f64> = (0..7 * 72).map(|i| f64::from(i * i % 101)).collect();
     stack[3 * 72..4 * 72].fill(f64::NAN);
     write_npy(&path, &ArrayView::f64(&[7, 9, 8], &stack)).unwrap();
-    let dataset = Dataset::open_with_manifest(&path, &manifest, &Progress::new()).unwrap();
+    let dataset = Dataset::open_with(
+        &path,
+        OpenOptions { manifest: Some(&manifest), ..OpenOptions::default() },
+        &Progress::new(),
+    )
+    .unwrap();
     let complexity = computed(&dataset, &ComplexityOptions::default());
     assert_eq!(complexity.failures.iter().map(|f| f.0).collect::<Vec<_>>(), [3]);
     assert!(complexity.failures[0].1.contains("stack.npy: array `array` has no finite cell"));

@@ -6,6 +6,7 @@
 
 use crate::dataset::ImageAnnotations;
 use crate::dataset::files::{Segment, natural};
+use crate::input::open_file;
 use serde::Deserialize;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -14,6 +15,8 @@ use std::sync::OnceLock;
 /// Width and height of the images, px.
 const IMAGE_SIZE: [usize; 2] = [256, 256];
 const JOINTS: usize = 14;
+/// Bytes of a file that are read: the largest that is published has 50 MB.
+const MOST_BYTES: u64 = 128 << 20;
 const SPLITS: [&str; 3] = ["train", "val", "test"];
 
 /// The label files of a data set.
@@ -105,7 +108,11 @@ impl Annotations {
     }
 
     fn add(&self, split: &str, path: &Path, labels: &mut Labels) -> Result<(), String> {
-        let file = std::fs::File::open(path).map_err(|error| error.to_string())?;
+        let file = open_file(path, "a list of annotations").map_err(|error| error.to_string())?;
+        let bytes = file.metadata().map_err(|error| error.to_string())?.len();
+        if bytes > MOST_BYTES {
+            return Err(format!("it has {bytes} bytes; expected at most {MOST_BYTES}"));
+        }
         let read: Vec<Vec<Block>> =
             serde_json::from_reader(std::io::BufReader::new(file)).map_err(|error| error.to_string())?;
         let numbers = self.sequences_of(split, read.len())?;

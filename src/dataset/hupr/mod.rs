@@ -11,9 +11,10 @@ pub(super) use annotations::Annotations;
 use super::files::{Segment, natural};
 use super::npz::{NPY_KEY, NpzArchive, shape_text};
 use super::truth::truth_beside;
+use super::walk::Walk;
 use super::{DatasetError, DatasetInfo, Frame, Heatmap, Progress};
 use crate::radar::View;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Bins of the last axis, and the one that is taken.
@@ -21,76 +22,39 @@ const LEVELS: usize = 8;
 const LEVEL: usize = 3;
 /// The folders of the two cubes of a frame.
 pub(super) const RADARS: [&str; 2] = ["hori", "vert"];
-/// Folders inside each other that are looked into.
-const MAX_DEPTH: usize = 6;
+/// Folders inside each other that are looked into: those of the two radars included.
+const MAX_DEPTH: usize = 7;
 
 /// The sequences at or below `root`, in natural order, and notes about frames of which one cube is missing.
 ///
 /// # Errors
-/// Where `root` cannot be read, or on cancel.
+/// As [`Walk::of`].
 pub(super) fn sequences(root: &Path, progress: &Progress) -> Result<(Vec<Segment>, Vec<String>), DatasetError> {
-    let (mut found, mut notes) = (Vec::new(), Vec::new());
-    find(root, 0, progress, &mut found, &mut notes)?;
+    let (folders, mut notes) = Walk { depth: MAX_DEPTH, stem: cube_stem, skip: |_| false, progress }.of(root)?;
+    let mut sequences: BTreeMap<PathBuf, [BTreeSet<String>; 2]> = BTreeMap::new();
+    for folder in folders {
+        let Some(radar) = RADARS.iter().position(|radar| folder.below.ends_with(radar)) else { continue };
+        let parent = folder.below.parent().unwrap_or(Path::new(""));
+        sequences.entry(root.join(parent)).or_default()[radar] = folder.stems.into_iter().collect();
+    }
+    let mut found = Vec::new();
+    for (folder, [hori, vert]) in sequences {
+        let missing = hori.symmetric_difference(&vert).count();
+        if missing > 0 {
+            notes.push(format!("{}: {missing} frames have only one of hori and vert", folder.display()));
+        }
+        let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        let all = hori.union(&vert).cloned().collect();
+        found.push(Segment::named(folder, name, all));
+    }
     found.sort_by(|a: &Segment, b: &Segment| natural(&a.path.to_string_lossy(), &b.path.to_string_lossy()));
     notes.sort();
     Ok((found, notes))
 }
 
-fn find(
-    folder: &Path,
-    depth: usize,
-    progress: &Progress,
-    found: &mut Vec<Segment>,
-    notes: &mut Vec<String>,
-) -> Result<(), DatasetError> {
-    progress.check()?;
-    let below = match folders(folder) {
-        Ok(below) => below,
-        Err(error) if depth == 0 => return Err(error),
-        Err(error) => {
-            notes.push(format!("skipped: {error}"));
-            return Ok(());
-        }
-    };
-    if below.iter().any(|path| RADARS.iter().any(|radar| path.ends_with(radar))) {
-        let [hori, vert] = RADARS.map(|radar| stems(&folder.join(radar)));
-        let missing = hori.symmetric_difference(&vert).count();
-        if missing > 0 {
-            notes.push(format!("{}: {missing} frames have only one of hori and vert", folder.display()));
-        }
-        let all: Vec<String> = hori.union(&vert).cloned().collect();
-        if !all.is_empty() {
-            let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-            found.push(Segment::named(folder.to_owned(), name, all));
-        }
-    } else if depth < MAX_DEPTH {
-        for path in below {
-            find(&path, depth + 1, progress, found, notes)?;
-        }
-    }
-    Ok(())
-}
-
-fn folders(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
-    let failed = |reason| DatasetError::Read { reason, path: folder.to_owned() };
-    let mut below = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(failed)? {
-        let entry = entry.map_err(failed)?;
-        if !entry.file_name().to_string_lossy().starts_with('.') && super::files::is_folder(&entry) {
-            below.push(entry.path());
-        }
-    }
-    Ok(below)
-}
-
-/// Names of the cubes without their ending; a folder that is not there has none.
-fn stems(folder: &Path) -> BTreeSet<String> {
-    let Ok(entries) = std::fs::read_dir(folder) else { return BTreeSet::new() };
-    let name = |entry: std::io::Result<std::fs::DirEntry>| {
-        let name = entry.ok()?.file_name().to_string_lossy().into_owned();
-        name.strip_suffix(".npy").filter(|stem| !stem.is_empty() && !stem.starts_with('.')).map(str::to_owned)
-    };
-    entries.filter_map(name).collect()
+/// `000000007` of `000000007.npy`.
+fn cube_stem(name: &str) -> Option<&str> {
+    name.strip_suffix(".npy").filter(|stem| !stem.is_empty() && !stem.starts_with('.'))
 }
 
 /// Loads the frame `stem` of a sequence.

@@ -3,6 +3,7 @@
 use super::decode::{Array, flags, numbers, texts};
 use super::header::{Header, Scalar, read_header};
 use super::{Form, NpzError, shape_text, shown};
+use crate::input::open_file;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::ops::Range;
@@ -10,8 +11,10 @@ use std::path::{Path, PathBuf};
 
 /// The key under which the only array of an `.npy` file is known.
 pub const NPY_KEY: &str = "array";
-/// Elements of an array that are accepted: 2²⁸, 2 GiB once they are `f64`.
-const MAX_ELEMENTS: usize = 1 << 28;
+/// Elements of an array that are held at once: 2²⁴, 128 MiB once they are `f64`. A cube of 256 × 256 × 256 cells has as many.
+pub const MAX_ELEMENTS: usize = 1 << 24;
+/// Bytes of an array that are held at once as they lie in the file: elements of text can be wide.
+const MAX_BYTES: u64 = 8 * MAX_ELEMENTS as u64;
 /// Deflate cannot pack tighter than this, so an entry that claims more lies about its size.
 const MAX_RATIO: u64 = 1032;
 /// Rows of the last axis that are read at a time where an array is read in pieces.
@@ -52,11 +55,8 @@ impl NpzArchive {
     /// Where it cannot be opened, is empty, is neither npz nor npy, or is truncated.
     pub fn open(path: &Path) -> Result<Self, NpzError> {
         let read_error = |reason| NpzError::Read { reason, path: path.to_owned() };
-        let mut file = File::open(path).map_err(read_error)?;
+        let mut file = open_file(path, "an npz or npy file").map_err(read_error)?;
         let meta = file.metadata().map_err(read_error)?;
-        if meta.is_dir() {
-            return Err(read_error(std::io::Error::other("it is a folder; expected an npz or npy file")));
-        }
         let mut magic = Vec::new();
         (&mut file).take(32).read_to_end(&mut magic).map_err(read_error)?;
         file.rewind().map_err(read_error)?;
@@ -119,10 +119,55 @@ impl NpzArchive {
         self.with_entry(key, |source| Ok(Form::new(source.header.clone())))
     }
 
+    /// Refuses an array by its header, before a byte of its data is read: `fits` says what was expected where a shape does not.
+    ///
+    /// # Errors
+    /// Where it is missing, its header is damaged, or its shape does not fit.
+    pub(crate) fn require(
+        &mut self,
+        key: &str,
+        fits: impl FnOnce(&[usize]) -> Result<(), String>,
+    ) -> Result<(), NpzError> {
+        let shape = self.with_entry(key, |source| Ok(source.header.shape.clone()))?;
+        fits(&shape).map_err(|expected| self.wrong_shape(key, &shape, expected))
+    }
+
+    /// As [`Self::require`], for exactly this shape, which `why` explains.
+    ///
+    /// # Errors
+    /// As [`Self::require`].
+    pub(crate) fn require_shape(&mut self, key: &str, shape: &[usize], why: &str) -> Result<(), NpzError> {
+        let fits = |got: &[usize]| if got == shape { Ok(()) } else { Err(format!("{}{why}", shape_text(shape))) };
+        self.require(key, fits)
+    }
+
+    /// Refuses an array whose data have more bytes than a caller has use for.
+    ///
+    /// # Errors
+    /// Where it is missing, its header is damaged, or it is larger.
+    pub(crate) fn require_bytes(&mut self, key: &str, most: u64) -> Result<(), NpzError> {
+        self.with_entry(key, |source| source.check(source.header.data_bytes(), most))
+    }
+
+    /// Reads an array to its end without keeping it, so that the archive compares its checksum. An `.npy` file has none.
+    ///
+    /// # Errors
+    /// Where it is missing, or damaged.
+    pub fn verify(&mut self, key: &str) -> Result<(), NpzError> {
+        if matches!(self.kind, Kind::Npy(_)) {
+            return Ok(());
+        }
+        self.with_entry(key, |source| {
+            let read = std::io::copy(&mut source.reader, &mut std::io::sink());
+            read.map(drop).map_err(|error| source.corrupt(error.to_string()))
+        })
+    }
+
     /// Reads an array of real numbers to its end, checksum included.
     ///
     /// # Errors
-    /// Missing key, object array, complex numbers or text, a size that the file cannot hold, damaged data.
+    /// Missing key, object array, complex numbers or text, a size that the file cannot hold or that is beyond
+    /// [`MAX_ELEMENTS`], damaged data.
     pub fn read(&mut self, key: &str) -> Result<Array, NpzError> {
         let (bytes, header) = self.read_bytes(key)?;
         let data = numbers(&bytes, &header).ok_or_else(|| self.wrong_type(key, &header, REAL))?;
@@ -130,7 +175,7 @@ impl NpzArchive {
     }
 
     /// Reads the slab `index` of an array along its first axis: what [`Self::read`] would give, of one dimension less.
-    /// In C order only the bytes up to the slab are read, so the archive's checksum is not.
+    /// In C order only the bytes up to the slab are read, so the archive's checksum is not compared: see [`Self::verify`].
     ///
     /// # Errors
     /// As [`Self::read`], and where the first axis has no such index.
@@ -294,9 +339,11 @@ impl Source<'_> {
         NpzError::Corrupt { key: self.key.to_owned(), message, path: self.path.to_owned() }
     }
 
-    /// Refuses object arrays, and sizes that cannot be there, before anything is allocated.
-    fn check(&self) -> Result<(), NpzError> {
+    /// Refuses object arrays, sizes that cannot be there, and reading more than `most` bytes at once, before anything is
+    /// allocated; `bytes` is what is about to be held.
+    fn check(&self, bytes: u64, most: u64) -> Result<(), NpzError> {
         let (key, path) = (self.key.to_owned(), self.path.to_owned());
+        let elements = usize::try_from(bytes / self.header.width.max(1) as u64).unwrap_or(usize::MAX);
         if self.header.scalar == Scalar::Object {
             return Err(NpzError::Pickled { key, path });
         }
@@ -304,8 +351,12 @@ impl Source<'_> {
         let holds = self.available.saturating_sub(self.header.bytes);
         let limit = if declared > holds {
             format!("the file holds at most {holds}; refused before allocating")
-        } else if self.header.len() > MAX_ELEMENTS {
-            format!("at most {MAX_ELEMENTS} elements are read; refused before allocating")
+        } else if bytes > most || elements > MAX_ELEMENTS {
+            let most = most / self.header.width.max(1) as u64;
+            format!(
+                "at most {} elements of it are read at once; refused before allocating",
+                most.min(MAX_ELEMENTS as u64)
+            )
         } else {
             return Ok(());
         };
@@ -325,7 +376,7 @@ impl Source<'_> {
 
     /// All bytes of the data; the read past them makes the archive check its sum.
     fn all(&mut self) -> Result<Vec<u8>, NpzError> {
-        self.check()?;
+        self.check(self.header.data_bytes(), MAX_BYTES)?;
         let bytes = self.take(self.header.data_bytes())?;
         match self.reader.read(&mut [0_u8]) {
             Ok(0) => Ok(bytes),
@@ -336,10 +387,11 @@ impl Source<'_> {
 
     /// |x| of every `every`th complex number from `first` on.
     fn amplitudes(&mut self, every: usize, first: usize) -> Result<Vec<f64>, NpzError> {
-        self.check()?;
         let rows = self.header.len() / every.max(1);
         let row = (every * self.header.width) as u64;
         let (width, big_endian) = (self.header.width, self.header.big_endian);
+        // One number of a row is kept, of half the width of a complex one or more.
+        self.check((rows * width) as u64, MAX_BYTES.saturating_mul(2))?;
         let mut data = Vec::with_capacity(rows);
         while data.len() < rows {
             let count = (rows - data.len()).min(PIECE_ROWS);
@@ -360,9 +412,9 @@ impl Source<'_> {
 
     /// The bytes of these slabs, of `cells` elements each.
     fn slabs(&mut self, slabs: &Range<usize>, cells: usize) -> Result<Vec<u8>, NpzError> {
-        self.check()?;
         let slab = (cells as u64).saturating_mul(self.header.width as u64);
         let count = slab.saturating_mul(slabs.len() as u64);
+        self.check(count, MAX_BYTES)?;
         let skip = slab.saturating_mul(slabs.start as u64);
         let skipped = std::io::copy(&mut (&mut *self.reader).take(skip), &mut std::io::sink());
         match skipped {

@@ -3,6 +3,7 @@
 use super::header::{Header, Scalar};
 use super::write::{Sink, replace_file};
 use super::{NPY_KEY, NpzError, shape_text};
+use crate::input::open_file;
 use half::f16;
 use std::io::{Read as _, Write as _};
 use std::path::Path;
@@ -145,7 +146,7 @@ fn push(bytes: &mut Vec<u8>, x: f64, header: &Header) -> Result<(), String> {
 /// Where `from` cannot be read or `to` cannot be written; an existing file is then untouched.
 pub fn copy_with(from: &Path, to: &Path, replaced: &[(String, Vec<u8>)]) -> Result<(), NpzError> {
     let reading = |reason| NpzError::Read { reason, path: from.to_owned() };
-    let mut file = std::fs::File::open(from).map_err(reading)?;
+    let mut file = open_file(from, "an npz or npy file").map_err(reading)?;
     let mut magic = [0_u8; 2];
     file.read_exact(&mut magic).map_err(reading)?;
     let written = if &magic == b"PK" {

@@ -12,7 +12,7 @@ mod form;
 mod header;
 mod write;
 
-pub use archive::{Entry, NPY_KEY, NpzArchive, read_array};
+pub use archive::{Entry, MAX_ELEMENTS, NPY_KEY, NpzArchive, read_array};
 pub use decode::Array;
 pub use error::NpzError;
 pub(crate) use error::{shape_text, shown};

@@ -37,6 +37,7 @@ pub struct Runtime {
     picked: (Sender<PathBuf>, Receiver<PathBuf>),
     answers: (Sender<Command>, Receiver<Command>),
     startup_error: Option<String>,
+    allow_outside: bool,
     labels: LabelKeeper,
     evidence: EvidenceKeeper,
     grading: Option<ComplexityJob>,
@@ -62,7 +63,13 @@ impl Runtime {
             picked: unbounded(),
             answers: unbounded(),
             startup_error,
+            allow_outside: false,
         }
+    }
+
+    /// Whether manifests may name frames outside their own folder.
+    pub fn allow_outside(self, allow_outside: bool) -> Self {
+        Self { allow_outside, ..self }
     }
 
     /// Applies a command and carries out what follows from it.
@@ -130,7 +137,7 @@ impl Runtime {
         match effect {
             Effect::Open(path) => {
                 let wake = Arc::clone(&self.wake);
-                let job = OpenJob::start(path.clone(), None, move || wake());
+                let job = OpenJob::start(path.clone(), None, self.allow_outside, move || wake());
                 self.opening = Some((path, job));
             }
             Effect::OpenBare(path, choice) => self.on_thread("open-bare", move || {
