@@ -3,7 +3,7 @@
 use cap::Cap;
 use clap::Parser;
 use mhp_inspector::cli::bench::{Meter, count_bytes_with};
-use mhp_inspector::cli::{Cli, EXIT_BAD_INPUT, WindowArgs, run};
+use mhp_inspector::cli::{Cli, EXIT_BAD_INPUT, WindowArgs, begin_again, run};
 use std::alloc::System;
 use std::io::IsTerminal as _;
 use std::process::ExitCode;
@@ -24,6 +24,7 @@ fn main() -> ExitCode {
         .init();
     count_bytes_with(Meter { total_bytes: || ALLOCATOR.total_allocated(), peak_bytes: || ALLOCATOR.max_allocated() });
     let cli = Cli::parse();
+    begin_again(cli.command.as_ref());
     let done = match cli.command {
         Some(command) => run(command),
         None => open_window(cli.window),

@@ -59,6 +59,46 @@ fn a_part_gives_the_same_rows_as_the_whole() {
     }
 }
 
+/// Furniture stands still in both directions of time: the first frame of a sequence is counted with those after it, and a
+/// frame that is all there is says that it is.
+#[test]
+fn furniture_is_nobody_in_the_first_frame_of_a_sequence_either() {
+    let recorded = tempfile::tempdir().unwrap();
+    let simulate = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"))
+        .args([
+            "simulate",
+            recorded.path().to_str().unwrap(),
+            "--preset",
+            "hard",
+            "--frames",
+            "24",
+            "--sequence-length",
+            "4",
+        ])
+        .args(["--people", "1", "--seed", "991"])
+        .output()
+        .unwrap();
+    assert!(simulate.status.success(), "{}", text(&simulate.stderr));
+    let frames = json(recorded.path(), &[]);
+    let frames = frames["frames"].as_array().unwrap();
+    for first in frames.iter().step_by(4) {
+        assert_eq!((first["people"].as_u64(), first["uncertain"].as_bool()), (Some(1), Some(false)), "{first}");
+    }
+}
+
+#[test]
+fn a_lone_frame_says_whether_it_is_uncertain() {
+    let folder = data_set(1);
+    let document = json(folder.path(), &[]);
+    let row = &document["frames"][0];
+    let uncertain = row["probability"].as_f64().unwrap() < 0.9;
+    assert_eq!(row["uncertain"].as_bool(), Some(uncertain));
+    let table = text(&count(folder.path(), &[]).stdout);
+    assert_eq!(table.contains("counted from one frame alone"), uncertain, "{table}");
+    let document = json(data_set(3).path(), &[]);
+    assert!(document["frames"].as_array().unwrap().iter().all(|row| row["uncertain"] == false));
+}
+
 #[test]
 fn the_table_of_frames_is_written() {
     let folder = data_set(3);

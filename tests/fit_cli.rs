@@ -285,6 +285,44 @@ fn frames_of_one_flat_name_do_not_overwrite_each_other() {
     assert_ne!(first, second);
 }
 
+/// What is out of range is named; what is in range and strange ends.
+#[test]
+fn hostile_settings_are_refused_or_end() {
+    let small = Small::new(&[("a/000", 0.0)]);
+    let (file, out) = (small.path().join("FIT.toml"), small.path().join("out"));
+    let run = |settings: &str| {
+        std::fs::write(&file, settings).unwrap();
+        fit(small.path(), &["--frames", "0..1", "--config", file.to_str().unwrap(), "--out", out.to_str().unwrap()])
+    };
+    let refused = [
+        ("tau_pct = 1e-300", "tau_pct is 1e-300; expected a number in 0.1 ..= 100"),
+        ("softness = 1e-300", "softness is 1e-300; expected a number in 0.01 ..= 10"),
+        ("learning_rate = 1e300", "learning_rate is 1e300; expected a number in 0.000001 ..= 1"),
+        ("learning_rates = { log_scale = 1e300 }", "learning_rates.log_scale is 1e300; expected a number in 0 ..= 1"),
+        ("iterations = 1000000000000000000", "iterations is 1e18; expected a number in 1 ..= 100000"),
+        ("people = 1000000000", "people is 1000000000; expected a number in 0 ..= 8"),
+        ("scale_max_m = 0.0", "scale_max_m is 0; expected a number in 0.01 ..= 10"),
+        ("em_region = { half_width_m = inf }", "half_width_m = METRES } with METRES > 0"),
+    ];
+    for (settings, told) in refused {
+        let output = run(settings);
+        assert_eq!(code(&output), 2, "{settings}: {}", text(&output.stderr));
+        assert!(text(&output.stderr).contains(told), "{settings}: {}", text(&output.stderr));
+    }
+    let taken = [
+        "em_region = { half_width_m = 1e308 }",
+        "em_region = { half_width_m = 1e-308 }",
+        "tau_pct = 0.1\nsoftness = 0.01\nlearning_rate = 1.0",
+        "tau_pct = 100\nsoftness = 10.0\nw_em = 1000.0\nw_kine = 0.0\nlearning_rate = 1.0",
+    ];
+    for settings in taken {
+        let _ = std::fs::remove_dir_all(&out);
+        let output = run(&format!("iterations = 50\n{settings}"));
+        let told = text(&output.stderr);
+        assert!(code(&output) == 0 || told.contains("diverged at iteration"), "{settings}: {told}");
+    }
+}
+
 #[test]
 fn where_no_frame_can_be_fitted_the_code_is_two_and_the_table_still_valid() {
     let small = Small::new(&[]);

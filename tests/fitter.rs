@@ -52,6 +52,33 @@ fn the_first_step_moves_every_parameter_with_a_gradient_by_the_rate() {
     }
 }
 
+/// The objective alone may want a Gaussian as large as the room.
+#[test]
+fn no_step_grows_a_gaussian_beyond_a_part_of_a_body() {
+    for precision in [Precision::F64, Precision::F32] {
+        let Case { problem, mut config, mut params } = case("polar-two-views");
+        let wide = 3;
+        params.set_vec3(Group::LogScale, wide, [0.4_f64.ln(); 3]);
+        let largest = |params: &mhp_inspector::body::Pppr, of_wide: bool| {
+            let joints = (0..params.shape().total_joints()).filter(|&joint| (joint == wide) == of_wide);
+            joints.flat_map(|joint| params.scale(joint)).fold(0.0, f64::max)
+        };
+        config.scale_max_m = 1.05 * largest(&params, false);
+        config.learning_rates.log_scale = Some(0.1);
+        let most = config.scale_max_m * (1.0 + 1e-12);
+        let mut fitter = Fitter::new(Arc::new(problem), config, precision, params).unwrap();
+        let mut held = false;
+        for _ in 0..30 {
+            let before = largest(fitter.params(), true);
+            fitter.step().unwrap();
+            let (wide, others) = (largest(fitter.params(), true), largest(fitter.params(), false));
+            assert!(others <= most && wide <= before.max(most), "{others} m, {wide} m after {before} m");
+            held |= others > 0.999 * config.scale_max_m;
+        }
+        assert!(held, "nothing grew so far that it had to be held");
+    }
+}
+
 #[test]
 fn restoring_a_state_repeats_the_run_bit_for_bit() {
     let mut fitter = fitter(case("range-doppler"));

@@ -1,4 +1,5 @@
-//! The start pose on scenes with truth: the one-person reference cases.
+//! The start pose on scenes with truth: the one-person reference cases. And whatever maps, axes and radars hold that is still
+//! a number: a start, a fit, a count and the evidence are finite then, or say what is wrong.
 #![expect(clippy::unwrap_used, reason = "a test stops where its material is missing")]
 
 #[path = "common/cases.rs"]
@@ -8,10 +9,17 @@ mod common;
 mod reading;
 
 use cases::Case;
+use mhp_inspector::body::Skeleton;
 use mhp_inspector::body::{Group, Pppr, PpprShape};
-use mhp_inspector::config::{FitConfig, Place};
-use mhp_inspector::geometry::{norm, sub};
-use mhp_inspector::mhp::{FitError, Problem, initialise, initialise_people};
+use mhp_inspector::config::{FitConfig, Place, Preset};
+use mhp_inspector::diagnose::{Annotated, EarlierFrame, EvidenceInput, evidence};
+use mhp_inspector::geometry::{Pose, norm, sub};
+use mhp_inspector::mhp::{FitError, Fitter, Precision, Problem, initialise, initialise_people, masks, simulate};
+use mhp_inspector::people::{Counter, Scan};
+use mhp_inspector::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
+use mhp_inspector::start::begin;
+use proptest::prelude::*;
+use proptest::sample::select;
 use reading::{case_folders, read};
 use std::sync::Arc;
 
@@ -131,5 +139,197 @@ fn starts_with_bones_of_reference_length_and_the_stated_values() {
         assert_eq!(params.rotation(joint), [1.0, 0.0, 0.0, 0.0]);
         assert_eq!(params.velocity(joint), [0.0; 3]);
         assert_eq!(params.opacity(joint), 0.5);
+    }
+}
+
+/// How a map is filled.
+#[derive(Debug, Clone, Copy)]
+enum Pattern {
+    Constant,
+    Spike,
+    Alternating,
+    Ramp,
+    Holes,
+}
+
+/// A map of such values: all of them finite but for holes.
+fn filled(pattern: Pattern, cells: usize, [a, b]: [f64; 2], at: usize) -> Vec<f64> {
+    let value = |cell: usize| match pattern {
+        Pattern::Constant => a,
+        Pattern::Spike => {
+            if cell == at % cells {
+                a
+            } else {
+                b
+            }
+        }
+        Pattern::Alternating => {
+            if cell.is_multiple_of(2) {
+                a
+            } else {
+                b
+            }
+        }
+        Pattern::Ramp => a * (cell as f64 / cells as f64) + b * (((cell * 7 + at) % 13) as f64 / 13.0),
+        Pattern::Holes => {
+            if cell % 3 == at % 3 {
+                a
+            } else {
+                f64::NAN
+            }
+        }
+    };
+    (0..cells).map(value).collect()
+}
+
+fn patterns() -> impl Strategy<Value = (Pattern, [f64; 2], usize)> {
+    let pattern = select(vec![Pattern::Constant, Pattern::Spike, Pattern::Alternating, Pattern::Ramp, Pattern::Holes]);
+    let size = || select(vec![0.0, 5e-324, 1e-308, 1e-30, 1.0, 3.5, 1e30, 1e155, 1e300, 1.7e308, -1e308]);
+    (pattern, [size(), size()], 0..10_000_usize)
+}
+
+/// Two axes that tell places, and a third that may be there.
+fn kinds() -> impl Strategy<Value = Vec<AxisKind>> {
+    use AxisKind::{Azimuth, Cone, DepthH, DepthV, Doppler, Elevation, Range, X, Y, Z};
+    select(vec![
+        vec![DepthH, Y],
+        vec![DepthV, Z],
+        vec![Range, Azimuth],
+        vec![Range, Cone, Elevation],
+        vec![Range, Azimuth, Doppler],
+        vec![Doppler, Range],
+        vec![X, Y, Z],
+        vec![Elevation, Range],
+    ])
+}
+
+fn axis_of(kind: AxisKind, bins: usize, [lo, hi]: [f64; 2]) -> Axis {
+    let [lo, hi] = if kind.is_angular() { [lo, hi].map(|x: f64| x.clamp(-1.5, 1.5)) } else { [lo, hi] };
+    Axis { kind, bins, lo, hi, spacing: Spacing::Linear }
+}
+
+/// The usual sizes as often as the others, so that some fits are only strange in one thing.
+fn axes() -> impl Strategy<Value = Vec<Axis>> {
+    let end = || {
+        prop_oneof![
+            3 => Just([0.0, 6.0]),
+            2 => Just([-2.0, 2.0]),
+            3 => [0, 1].map(|_| select(vec![-1e300, -1e9, -2.0, -1e-9, 0.0, 1e-308, 1e-9, 0.5, 6.0, 1e9, 1e300, 1e308])),
+        ]
+    };
+    let bins = || prop_oneof![2 => 8..24_usize, 1 => select(vec![1, 2, 3, 60])];
+    kinds().prop_flat_map(move |kinds| {
+        kinds
+            .into_iter()
+            .map(|kind| (bins(), end()).prop_map(move |(bins, ends)| axis_of(kind, bins, ends)))
+            .collect::<Vec<_>>()
+    })
+}
+
+fn views() -> impl Strategy<Value = Vec<View>> {
+    let width = || prop_oneof![2 => Just(0.05), 1 => select(vec![0.0, 1e-300, 1e-9, 1e9, 1e300])];
+    let view = (axes(), [width(), width(), width(), width()], any::<bool>()).prop_map(|(axes, psf, power)| View {
+        array: "map".into(),
+        quantity: if power { Quantity::Power } else { Quantity::Amplitude },
+        psf: PointSpread { range_m: psf[0], azimuth_rad: psf[1], elevation_rad: psf[2], doppler_mps: psf[3] },
+        pose: Pose::default(),
+        axes,
+        region: None,
+    });
+    prop::collection::vec(view, 1..3)
+}
+
+fn radars() -> impl Strategy<Value = RadarConfig> {
+    let of = |usual: f64| prop_oneof![3 => Just(usual), 1 => select(vec![1e-300, 1e-9, 1.0, 1e30, 1e300])];
+    (of(77e9), of(2.5e9), of(60e-6), of(0.0128), of(8.0), of(0.0019)).prop_map(
+        |(start, band, chirp, frame, far, apart)| RadarConfig {
+            start_hz: start,
+            bandwidth_hz: band,
+            chirp_s: chirp,
+            frame_s: frame,
+            r_max_m: far,
+            l_az_m: apart,
+            l_el_m: apart,
+            doppler_features: 4,
+            height_m: Some(1.0),
+        },
+    )
+}
+
+/// Start, three steps, maps, masks and evidence of a problem: finite, or an error that says something.
+fn fitted(problem: &Arc<Problem>, config: FitConfig, precision: Precision, earlier: &[&[f64]]) -> Result<(), String> {
+    let start = begin(problem, &config).map_err(|error| error.to_string())?.initialisation.params;
+    assert!(start.is_finite(), "{start:?}");
+    let mut fitter = Fitter::new(Arc::clone(problem), config, precision, start).map_err(|error| error.to_string())?;
+    for _ in 0..3 {
+        let report = fitter.step().map_err(|error| error.to_string())?;
+        assert!(report.loss.is_finite() && report.iou.iter().flatten().all(|iou| (0.0..=1.0).contains(iou)));
+    }
+    let simulated = simulate(problem, &config, precision, fitter.params());
+    let masks: Vec<_> = simulated.iter().enumerate().map(|(k, map)| masks(fitter.objective(), k, map)).collect();
+    let before = [EarlierFrame { index: 0, maps: earlier.to_vec() }];
+    let annotated = Annotated::default();
+    let input =
+        EvidenceInput { problem, config: &config, params: fitter.params(), masks: &masks, before: &before, annotated };
+    for mode in evidence(&input) {
+        assert!(mode.score.is_none_or(|score| (0.0..=1.0).contains(&score)), "{mode:?}");
+    }
+    Ok(())
+}
+
+/// The count of two frames: probabilities whatever they hold.
+fn counted(views: &[View], frames: [&[&[f64]]; 2]) -> Result<(), String> {
+    let counter = Counter::new(views).map_err(|error| error.to_string())?;
+    let mut scans: Vec<Scan> = Vec::new();
+    for maps in frames {
+        let before: Vec<&Scan> = scans.iter().rev().collect();
+        let scan = counter.scan(maps, &before).map_err(|error| error.to_string())?;
+        let count = counter.count(&scan, &before);
+        let sum: f64 = count.probabilities.iter().sum();
+        assert!((sum - 1.0).abs() < 1e-6, "{:?}", count.probabilities);
+        assert!(count.seeds(2).iter().flatten().all(|x| x.is_finite()), "{:?}", count.clusters);
+        scans.push(scan);
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 192, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whatever_is_a_number_ends_finite_or_with_an_error(
+        views in views(),
+        radar in radars(),
+        patterns in [patterns(), patterns(), patterns(), patterns()],
+        recommended in any::<bool>(),
+        neighbours in 0..3_usize,
+    ) {
+        let map = |frame: usize, k: usize| {
+            let (pattern, sizes, at) = patterns[(frame + 2 * k) % 4];
+            filled(pattern, views[k].cells(), sizes, at + frame)
+        };
+        let frames: Vec<Vec<Vec<f64>>> = (0..3).map(|frame| (0..views.len()).map(|k| map(frame, k)).collect()).collect();
+        let of = |frame: usize| frames[frame].iter().map(Vec::as_slice).collect::<Vec<&[f64]>>();
+        let skeleton = Skeleton::preset("coco17").unwrap();
+        let mut told = Vec::new();
+        match Problem::new(radar, skeleton, views.clone(), &of(0)) {
+            Err(error) => told.push(Err(error.to_string())),
+            Ok(mut problem) => {
+                for frame in 1..=neighbours {
+                    let offset_s = if frame == 1 { -0.1 } else { 0.1 };
+                    problem.add_neighbour(offset_s, &of(frame)).unwrap();
+                }
+                let problem = Arc::new(problem);
+                let preset = if recommended { Preset::Recommended } else { Preset::Paper };
+                for precision in [Precision::F64, Precision::F32] {
+                    told.push(fitted(&problem, preset.config(), precision, &of(1)));
+                }
+                let filled: Vec<&[f64]> = (0..views.len()).map(|k| problem.map(k)).collect();
+                told.push(counted(&views, [&filled, &of(0)]));
+            }
+        }
+        for error in told.into_iter().filter_map(Result::err) {
+            prop_assert!(!error.is_empty());
+        }
     }
 }

@@ -469,3 +469,23 @@ fn the_default_layout_in_the_dark() {
 fn the_default_layout_in_the_light() {
     picture(ThemeChoice::Light, "default_light");
 }
+
+/// As in a container: nothing says where a Wayland server is, and nobody asked for one.
+#[test]
+#[cfg(unix)]
+fn a_picture_without_a_session_is_drawn_in_silence() {
+    let folder = tempfile::tempdir().unwrap();
+    blob::write_dataset(folder.path(), 1);
+    let picture = folder.path().join("window.png");
+    let drawn = std::process::Command::new(env!("CARGO_BIN_EXE_mhp-inspector"))
+        .args(["screenshot", folder.path().to_str().unwrap(), "--iterations", "2", "--size", "640x400"])
+        .args(["--out", picture.to_str().unwrap()])
+        .env("MHP_INSPECTOR_HOME", folder.path().join("home"))
+        .env_remove("XDG_RUNTIME_DIR")
+        .env_remove("NODEVICE_SELECT")
+        .output()
+        .unwrap();
+    let told = String::from_utf8_lossy(&drawn.stderr);
+    assert!(drawn.status.success() && picture.exists(), "{told}");
+    assert_eq!(told, "");
+}

@@ -116,6 +116,10 @@ impl Orientation {
     }
 }
 
+/// The lowest level that is told apart, dB re max: far below it is what a simulated map is where no joint returns, and zeros
+/// have no level at all. Limits that are set lower by hand take it with them.
+pub(crate) const FLOOR_DB: f64 = -60.0;
+
 /// Stored values as shown: relative to the largest finite value, in dB or linear.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Shown {
@@ -123,10 +127,27 @@ pub(crate) struct Shown {
     pub(crate) values: Vec<f64>,
     /// The stored value that is 0 dB or 1.
     pub(crate) reference: f64,
+    /// What lies lower, zeros included, is shown as this; −∞ where everything is shown as it is.
+    pub(crate) floor: f64,
+}
+
+/// The floor of shown values.
+pub(crate) fn floor(scale: MapScale, range: ColorRange) -> f64 {
+    match (scale, range) {
+        (MapScale::Linear, _) => f64::NEG_INFINITY,
+        (MapScale::Decibel, ColorRange::Fixed { lo, .. }) => lo.min(FLOOR_DB),
+        (MapScale::Decibel, ColorRange::Percentile { .. }) => FLOOR_DB,
+    }
+}
+
+/// A shown value as text: `≤` before what may lie anywhere below the floor.
+pub(crate) fn level(value: f64, floor: f64) -> String {
+    if value <= floor { format!("≤ {value:.2}") } else { format!("{value:.2}") }
 }
 
 /// Converts a picture of stored values.
-pub(crate) fn shown(picture: &[f64], scale: MapScale, db_factor: f64) -> Shown {
+pub(crate) fn shown(picture: &[f64], scale: MapScale, range: ColorRange, db_factor: f64) -> Shown {
+    let floor = floor(scale, range);
     let reference = picture.iter().copied().filter(|x| x.is_finite()).fold(0.0, f64::max);
     let reference = if reference > 0.0 { reference } else { 1.0 };
     let values = picture
@@ -134,10 +155,10 @@ pub(crate) fn shown(picture: &[f64], scale: MapScale, db_factor: f64) -> Shown {
         .map(|&value| match scale {
             MapScale::Linear => value / reference,
             MapScale::Decibel if value.is_nan() => f64::NAN,
-            MapScale::Decibel => (db_factor * (value.max(0.0) / reference).log10()).max(-400.0),
+            MapScale::Decibel => (db_factor * (value.max(0.0) / reference).log10()).max(floor),
         })
         .collect();
-    Shown { values, reference }
+    Shown { values, reference, floor }
 }
 
 /// The limits of the colour bar for shown values.
@@ -257,11 +278,28 @@ mod tests {
 
     #[test]
     fn decibels_follow_the_quantity() {
-        let amplitude = shown(&[1.0, 10.0], MapScale::Decibel, 20.0);
+        let amplitude = shown(&[1.0, 10.0], MapScale::Decibel, ColorRange::default(), 20.0);
         assert_eq!(amplitude.values, vec![-20.0, 0.0]);
-        let power = shown(&[1.0, 10.0, f64::NAN], MapScale::Decibel, 10.0);
+        let power = shown(&[1.0, 10.0, f64::NAN], MapScale::Decibel, ColorRange::default(), 10.0);
         assert_eq!(power.values[..2], [-10.0, 0.0]);
         assert!(power.values.last().unwrap().is_nan());
+    }
+
+    /// A tenth of the cells without any echo, and one far below the floor, leave the colours to the others.
+    #[test]
+    fn zeros_are_the_floor_and_do_not_stretch_the_limits() {
+        let mut stored: Vec<f64> = (1..=180).map(|k| 0.05 * f64::from(k)).collect();
+        stored.extend([0.0; 20]);
+        stored.push(1e-30);
+        let of = |range| shown(&stored, MapScale::Decibel, range, 20.0);
+        let Shown { values, floor, .. } = of(ColorRange::default());
+        assert_eq!((floor, values[180], *values.last().unwrap()), (-60.0, -60.0, -60.0));
+        assert_eq!(limits(&values, ColorRange::default()).0, -60.0);
+        assert_eq!((level(values[180], floor), level(values[179], floor)), ("≤ -60.00".into(), "0.00".into()));
+        let lower = of(ColorRange::Fixed { lo: -90.0, hi: 0.0 });
+        assert_eq!((lower.floor, lower.values[180]), (-90.0, -90.0));
+        let linear = shown(&stored, MapScale::Linear, ColorRange::default(), 20.0);
+        assert_eq!((linear.values[180], level(0.0, linear.floor)), (0.0, "0.00".into()));
     }
 
     #[test]

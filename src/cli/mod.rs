@@ -183,6 +183,17 @@ pub enum Command {
     TrainLimbs(train_limbs::TrainLimbsArgs),
 }
 
+/// Starts the program once more where a subcommand needs another environment than it has, and never returns then. For `main`
+/// alone, before anything else.
+pub fn begin_again(command: Option<&Command>) {
+    #[cfg(all(feature = "viewer", unix))]
+    if let Some(Command::Screenshot(_)) = command {
+        screenshot::without_device_selection();
+    }
+    #[cfg(not(all(feature = "viewer", unix)))]
+    let _ = command;
+}
+
 /// Runs a subcommand.
 ///
 /// # Errors

@@ -93,6 +93,27 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
+/// What switches Mesa's layer for the choice of a device off.
+#[cfg(unix)]
+const NO_SELECTION: &str = "NODEVICE_SELECT";
+
+/// Starts the program once more without Mesa's layer for the choice of a device, where that would only complain.
+///
+/// The layer asks the Wayland server which device it draws on, and libwayland writes to stderr where `XDG_RUNTIME_DIR` does
+/// not say where one is, as in a container or a job of a cluster. The choice is ours in any case: adapters in software come
+/// first. The layer reads its switch from the environment, which a running process cannot change safely.
+#[cfg(unix)]
+pub(super) fn without_device_selection() {
+    use std::os::unix::process::CommandExt as _;
+    let told = std::env::var_os("XDG_RUNTIME_DIR").is_some_and(|folder| std::path::Path::new(&folder).is_absolute());
+    if told || std::env::var_os(NO_SELECTION).is_some() {
+        return;
+    }
+    let Ok(program) = std::env::current_exe() else { return };
+    let failed = std::process::Command::new(program).args(std::env::args_os().skip(1)).env(NO_SELECTION, "1").exec();
+    tracing::debug!("not started again without {NO_SELECTION}: {failed}");
+}
+
 /// Runs `screenshot`.
 ///
 /// # Errors

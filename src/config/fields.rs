@@ -163,6 +163,17 @@ pub const FIELDS: &[Field] = &[
         set: |c, x| c.d_joint_m = x,
     },
     Field {
+        key: "scale_max_m",
+        group: FieldGroup::Limits,
+        label: "s_max",
+        help: "A joint's Gaussian is a part of a body: no step makes its standard deviation larger than this along any of its axes. At 0.43 m four of them hold a whole body of 1.70 m. What is wider already may shrink. Acts on the step, not on the objective.",
+        unit: "m",
+        range: (0.01, 10.0),
+        logarithmic: true,
+        get: |c| c.scale_max_m,
+        set: |c, x| c.scale_max_m = x,
+    },
+    Field {
         key: "w_time",
         group: FieldGroup::Regularisation,
         label: "w_time",

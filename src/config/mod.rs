@@ -116,6 +116,8 @@ pub struct FitConfig {
     pub em_region: EmRegion,
     /// How far in front of the joint its echo comes from, m.
     pub surface_offset_m: f64,
+    /// Largest standard deviation that a step may grow a Gaussian to, m.
+    pub scale_max_m: f64,
     /// Iterations of a run.
     pub iterations: usize,
     /// Adam's learning rate.
@@ -161,6 +163,7 @@ impl Default for FitConfig {
             summation: Summation::default(),
             em_region: EmRegion::default(),
             surface_offset_m: 0.0,
+            scale_max_m: 0.43,
             iterations: 100,
             learning_rate: 1e-3,
             stop_when_converged: false,
@@ -184,7 +187,7 @@ impl Default for FitConfig {
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     /// A number is outside its range.
-    #[error("{key} is {value}; expected a number in {lo} ..= {hi}")]
+    #[error("{key} is {value}; expected a number in {lo} ..= {hi}", value = plainly(*value))]
     OutOfRange {
         /// The key.
         key: &'static str,
@@ -273,6 +276,12 @@ impl FitConfig {
     pub fn to_toml(&self) -> String {
         toml::to_string(self).unwrap_or_default()
     }
+}
+
+/// A number as somebody would write it: not with three hundred zeros.
+fn plainly(value: f64) -> String {
+    let size = value.abs();
+    if size != 0.0 && !(1e-6..1e15).contains(&size) { format!("{value:e}") } else { value.to_string() }
 }
 
 fn place(path: &Path, line: Option<usize>) -> String {

@@ -4,12 +4,12 @@ use super::Precision;
 use super::adjoint::{Moments, pull_back};
 use super::form::{FormBars, Forms};
 use super::kernel::Kernel;
+use super::laid::Laid;
 use super::percentile::percentile;
-use super::region::Region;
 use super::scalar::Real;
 use super::simulate::{EPSILON, floored, ln_floored};
 use super::splat::{Scene, Splats};
-use super::tiles::{self, Question, Tiles, Tiling};
+use super::tiles::{self, Question, Tiles};
 use crate::body::Pppr;
 use crate::config::FitConfig;
 
@@ -49,11 +49,10 @@ pub(super) struct Workspace {
 
 /// Where L_view is evaluated, and B_ori there.
 pub(super) struct Aim {
-    pub region: Region,
     /// B_ori over the region's cells in C order.
     pub target: Vec<bool>,
-    /// The same in tiles.
-    pub tiling: Tiling,
+    /// The region as it is summed, marked by B_ori.
+    pub laid: Laid,
 }
 
 impl Workspace {
@@ -62,7 +61,7 @@ impl Workspace {
         scene.splats(of, precision, &mut self.splats);
     }
 
-    /// Evaluates L_view at `aim` for the joints last seen, and where a gradient is wanted what the cells say of them, times
+    /// Evaluates L_view at `aim`, of whose view `scene` is, for the joints last seen, and where a gradient is wanted what the cells say of them, times
     /// `factor`.
     pub(super) fn compare(
         &mut self,
@@ -74,13 +73,14 @@ impl Workspace {
         let Self { splats, moments, tiles } = self;
         moments.reset(splats.joints(), &scene.view.axes);
         match precision {
-            Precision::F64 => plain::<f64>(scene, splats, aim, factor, moments),
+            Precision::F64 => plain::<f64>(scene, splats, &aim.laid, factor, moments),
             Precision::F32 if tiles::reaches(scene.config.softness) => {
                 let FitConfig { summation, tau_pct, softness, .. } = *scene.config;
-                let question = Question { splats, tiling: &aim.tiling, summation, tau_pct, softness, scale: factor };
+                let question =
+                    Question { splats, tiling: &aim.laid.tiling, summation, tau_pct, softness, scale: factor };
                 tiles.evaluate(&question, moments)
             }
-            Precision::F32 => plain::<f32>(scene, splats, aim, factor, moments),
+            Precision::F32 => plain::<f32>(scene, splats, &aim.laid, factor, moments),
         }
     }
 
@@ -100,16 +100,16 @@ impl Workspace {
 fn plain<T: Real>(
     scene: &Scene<'_>,
     splats: &Splats,
-    aim: &Aim,
+    laid: &Laid,
     scale: Option<f64>,
     moments: &mut Moments,
 ) -> ViewAnswer {
-    let mut kernel = Kernel::<T>::new(splats, &aim.region.bins, scene.config.summation);
-    let mut ln_s = vec![f64::NEG_INFINITY; aim.region.cells()];
+    let mut kernel = Kernel::<T>::new(splats, &laid.bins, scene.config.summation);
+    let mut ln_s = vec![f64::NEG_INFINITY; laid.marked.len()];
     kernel.forward(&mut ln_s);
-    let mask = SoftMask::new(&ln_s, &aim.target, scene.config.tau_pct, scene.config.softness);
+    let mask = SoftMask::new(&ln_s, &laid.marked, scene.config.tau_pct, scene.config.softness);
     if let Some(scale) = scale {
-        kernel.backward(&mask.weight(&ln_s, &aim.target, scale), moments);
+        kernel.backward(&mask.weight(&ln_s, &laid.marked, scale), moments);
     }
     ViewAnswer { loss: mask.loss(), iou: mask.iou }
 }

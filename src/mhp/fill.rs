@@ -1,6 +1,7 @@
 //! Filling the cells of a map that hold no number; SPEC section 4.
 
 use crate::radar::unravel;
+use smallvec::SmallVec;
 
 /// Replaces NaN and infinite cells by the mean of their finite 3^D neighbours, all at once, repeated until none is
 /// left. `map` is a C-ordered array of shape `shape`. Returns how many cells were filled, or `None` where no cell is
@@ -11,31 +12,36 @@ pub fn fill_missing(map: &mut [f64], shape: &[usize]) -> Option<usize> {
     if filled == map.len() {
         return None;
     }
+    // Only what borders on a number can be filled, and after the first round only what borders on what was filled last: the
+    // work grows with the missing cells, not with their square.
     while !missing.is_empty() {
         let found: Vec<(usize, f64)> =
             missing.iter().filter_map(|&cell| neighbour_mean(map, shape, cell).map(|mean| (cell, mean))).collect();
+        missing.clear();
         for &(cell, mean) in &found {
             map[cell] = mean;
         }
-        missing.retain(|&cell| !map[cell].is_finite());
-        if found.is_empty() {
-            break;
+        for &(cell, _) in &found {
+            for_neighbours(shape, cell, |other| {
+                if !map[other].is_finite() {
+                    missing.push(other);
+                }
+            });
         }
+        missing.sort_unstable();
+        missing.dedup();
     }
     Some(filled)
 }
 
 fn neighbour_mean(map: &[f64], shape: &[usize], cell: usize) -> Option<f64> {
-    let (mut sum, mut count) = (0.0, 0_u32);
-    for_neighbours(shape, cell, |other| {
-        if map[other].is_finite() {
-            sum += map[other];
-            count += 1;
-        }
-    });
-    let mean = sum / f64::from(count);
-    // A mean of huge numbers may overflow; halving first keeps it finite.
-    (count > 0).then(|| if mean.is_finite() { mean } else { mean.signum() * f64::MAX })
+    let mut near: SmallVec<[f64; 26]> = SmallVec::new();
+    for_neighbours(shape, cell, |other| near.extend(Some(map[other]).filter(|x| x.is_finite())));
+    let count = near.len() as f64;
+    let mean = near.iter().sum::<f64>() / count;
+    // The sum of huge numbers may overflow; that of their shares cannot.
+    let mean = if mean.is_finite() { mean } else { near.iter().map(|x| x / count).sum() };
+    (!near.is_empty()).then_some(mean)
 }
 
 /// Calls `visit` with the flat index of each of the up to 3^D − 1 neighbours of `cell`.
@@ -79,6 +85,25 @@ mod tests {
         assert_eq!(fill_missing(&mut map, &[2, 3]), Some(4));
         // Cells (0, 1) and (1, 1) see 1 and 4 in the first round; (0, 2) and (1, 2) see those two in the second.
         assert_eq!(map, vec![1.0, 2.5, 2.5, 4.0, 2.5, 2.5]);
+    }
+
+    #[test]
+    fn huge_numbers_of_both_signs_have_a_finite_mean() {
+        let mut map = vec![1e308, 1e308, f64::NAN, -1e308, -1e308, f64::INFINITY, 1.7e308, 1.7e308, f64::NAN];
+        assert_eq!(fill_missing(&mut map, &[9]), Some(3));
+        assert_eq!((map[2], map[5], map[8]), (0.0, 1.7e308 / 2.0 - 1e308 / 2.0, 1.7e308));
+        let mut map = vec![1.7e308, f64::NAN, 1.7e308, f64::NAN];
+        assert_eq!(fill_missing(&mut map, &[4]), Some(2));
+        assert!(map.iter().all(|x| *x == 1.7e308), "{map:?}");
+    }
+
+    /// Rounds times missing cells would be 10¹⁰ means.
+    #[test]
+    fn a_long_row_with_one_number_is_filled_from_it() {
+        let mut map = vec![f64::NAN; 100_000];
+        map[0] = 3.0;
+        assert_eq!(fill_missing(&mut map, &[1, 100_000]), Some(99_999));
+        assert!(map.iter().all(|x| *x == 3.0));
     }
 
     #[test]

@@ -74,6 +74,7 @@ impl Fitter {
         let how = (objective.config(), objective.precision());
         let moved = (&mut next_state.adam, &mut next_state.params);
         state.adam.update(&state.params, &evaluation.gradient, how, body, turns, moved);
+        hold_scales(&state.params, &mut next_state.params, objective.config().scale_max_m);
         evaluate_into(objective, &next_state.params, next_state.iteration, next_evaluation)?;
         next_state.losses.push(next_evaluation.loss);
         let surplus = next_state.losses.len().saturating_sub(LOOK_BACK + 1);
@@ -175,6 +176,19 @@ impl Fitter {
     /// The objective: regions, warnings, masks.
     pub fn objective(&self) -> &Objective {
         &self.objective
+    }
+}
+
+/// Brings the Gaussians of a step back to `scale_max_m` where they grew beyond it, m; one that was wider before does not grow.
+/// The objective knows no such bound: where a map's mask has more cells than a body, it is best served by Gaussians as large
+/// as a room.
+fn hold_scales(before: &Pppr, after: &mut Pppr, scale_max_m: f64) {
+    let most = scale_max_m.ln();
+    for (after, &before) in after.group_mut(Group::LogScale).iter_mut().zip(before.group(Group::LogScale)) {
+        // A NaN stays, for it must be told.
+        if *after > most {
+            *after = before.clamp(most, f64::MAX).min(*after);
+        }
     }
 }
 

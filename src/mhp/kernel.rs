@@ -17,8 +17,9 @@ const LAST: usize = 2;
 struct Inner<T> {
     /// ½ P_nn
     half_precision: T,
-    /// Bin coordinate of the joint, whole and fractional part, so that i − b keeps its digits in f32.
-    bin: (i64, T),
+    /// Bin coordinate of the joint, whole and fractional part, so that i − b keeps its digits in f32. The whole part is no
+    /// integer: a joint far beyond a fine axis lies at a bin that none holds.
+    bin: (f64, T),
     /// Re and Im of e^{iκ_n(i − b_n)} a cell of the row.
     turn: (Vec<T>, Vec<T>),
     /// ln of the spectrum a cell of the row; empty unless the last axis is a Doppler axis.
@@ -31,7 +32,7 @@ struct OnRow<T> {
     /// Largest exponent, relative to the row's reference.
     top: T,
     /// Where it lies, whole and fractional bin.
-    centre: (i64, T),
+    centre: (f64, T),
     /// e^{i(φ + κ·Δ)} of the outer axes.
     turn: (T, T),
 }
@@ -49,9 +50,9 @@ pub(super) struct Kernel<'a, T> {
     sum: (Vec<T>, Vec<T>),
 }
 
-fn split<T: Real>(x: f64) -> (i64, T) {
+fn split<T: Real>(x: f64) -> (f64, T) {
     let whole = x.floor();
-    (whole as i64, T::of(x - whole))
+    (whole, T::of(x - whole))
 }
 
 /// The cells of the outer axes in C order: two indices (those of missing axes, which come first, are 0).
@@ -176,13 +177,13 @@ impl<'a, T: Real> Kernel<'a, T> {
 
     /// Writes every joint's exponents along the row, and each cell's largest.
     fn exponents(&mut self) {
-        let (width, lo) = (self.width(), self.bins.last().map_or(0, |b| b[0]) as i64);
+        let (width, lo) = (self.width(), self.bins.last().map_or(0, |b| b[0]));
         self.reference.fill(T::neg_infinity());
         for (joint, exponents) in self.amplitude.chunks_exact_mut(width).enumerate() {
             let (on_row, inner) = (&self.on_row[joint], &self.inner[joint]);
-            let (start, fraction) = ((lo - on_row.centre.0) as i32, on_row.centre.1);
+            let (start, fraction) = (lo as f64 - on_row.centre.0, on_row.centre.1);
             for (i, exponent) in exponents.iter_mut().enumerate() {
-                let x = T::of(f64::from(start + i as i32)) - fraction;
+                let x = T::of(start + i as f64) - fraction;
                 *exponent = on_row.top - inner.half_precision * x * x;
             }
             for (exponent, &spectrum) in exponents.iter_mut().zip(&inner.spectrum) {
@@ -199,12 +200,12 @@ impl<'a, T: Real> Kernel<'a, T> {
     fn collect(&self, joint: usize, outer: [usize; 2], weight: &[T], moments: &mut Moments) {
         let (width, lo) = (self.width(), self.bins.last().map_or(0, |b| b[0]));
         let (inner, (c, s)) = (&self.inner[joint], self.on_row[joint].turn);
-        let start = (lo as i64 - inner.bin.0) as i32;
+        let start = lo as f64 - inner.bin.0;
         let coherent = self.summation == Summation::Coherent;
         let [mut r0, mut r1, mut r2, mut q0, mut q1] = [T::zero(); 5];
         let by_bin = moments.by_bin(joint, LAST);
         for (i, &a) in self.amplitude[joint * width..(joint + 1) * width].iter().enumerate() {
-            let delta = T::of(f64::from(start + i as i32)) - inner.bin.1;
+            let delta = T::of(start + i as f64) - inner.bin.1;
             let r = if coherent {
                 let (re, im) = (inner.turn.0[i], inner.turn.1[i]);
                 let (z_re, z_im) = (a * (c * re - s * im), a * (c * im + s * re));

@@ -16,6 +16,7 @@ mod form;
 mod init;
 mod kernel;
 mod kinematic;
+mod laid;
 mod lanes;
 mod objective;
 mod percentile;

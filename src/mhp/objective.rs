@@ -3,10 +3,10 @@
 use super::em::{self, Aim, Workspace};
 use super::form::{FormBars, Forms};
 use super::init::anchors;
+use super::laid::Laid;
 use super::percentile::percentile;
 use super::region::{self, Region};
 use super::splat::Scene;
-use super::tiles::Tiling;
 use super::{Evaluation, FitError, Precision, Problem, kinematic};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
@@ -65,7 +65,7 @@ impl Objective {
         problem.check(initial)?;
         let centres = region::centres(initial);
         let (regions, warnings) = region::regions(&problem, config.em_region, &centres)?;
-        let aims = aims(&problem, &regions, config.tau_pct);
+        let aims = aims(&problem, &regions, config.tau_pct, precision);
         let workspaces = regions.iter().map(|_| Workspace::default()).collect();
         let mut objective = Self {
             problem,
@@ -101,7 +101,7 @@ impl Objective {
             (self.regions, self.warnings) = (regions, warnings);
         }
         if config.em_region != before.em_region || config.tau_pct != before.tau_pct {
-            self.aims = aims(&self.problem, &self.regions, config.tau_pct);
+            self.aims = aims(&self.problem, &self.regions, config.tau_pct, self.precision);
         }
         self.anchor();
     }
@@ -154,7 +154,7 @@ impl Objective {
         bars.reset(forms.joints());
         // Stage by stage rather than view by view: each stage's instructions then stay at hand.
         let scenes: SmallVec<[Scene<'_>; 4]> =
-            problem.views.iter().map(|view| Scene::new(&problem.radar, view, config)).collect();
+            aims.iter().map(|aim| Scene::new(&problem.radar, &aim.laid.view, config)).collect();
         for (scene, workspace) in scenes.iter().zip(&mut *workspaces) {
             workspace.project(scene, (params, &*forms), *precision);
         }
@@ -181,8 +181,8 @@ impl Objective {
     pub fn em_loss(&self, params: &Pppr) -> f64 {
         let (mut workspace, mut forms) = (Workspace::default(), Forms::default());
         forms.fill(params, self.precision);
-        let losses = self.problem.views.iter().zip(&self.aims).map(|(view, aim)| {
-            let scene = Scene::new(&self.problem.radar, view, &self.config);
+        let losses = self.aims.iter().map(|aim| {
+            let scene = Scene::new(&self.problem.radar, &aim.laid.view, &self.config);
             workspace.project(&scene, (params, &forms), self.precision);
             workspace.compare(&scene, aim, None, self.precision).loss
         });
@@ -210,13 +210,13 @@ fn anchored(anchors: &[Vec3], params: &Pppr, weight: f64, gradient: &mut Pppr) -
 }
 
 /// B_ori over each region's cells.
-fn aims(problem: &Problem, regions: &[Region], tau_pct: f64) -> Vec<Aim> {
+fn aims(problem: &Problem, regions: &[Region], tau_pct: f64, precision: Precision) -> Vec<Aim> {
     let of_view = |(view, region): (usize, &Region)| {
         let map = problem.map(view);
         let cells: Vec<f64> = region.indices(&problem.views[view].shape()).iter().map(|&i| map[i]).collect();
         let threshold = percentile(&cells, 100.0 - tau_pct);
         let target: Vec<bool> = cells.iter().map(|&h| h > threshold).collect();
-        Aim { tiling: Tiling::new(&region.bins, &target), target, region: region.clone() }
+        Aim { laid: Laid::new(&problem.views[view], &region.bins, &target, precision), target }
     };
     regions.iter().enumerate().map(of_view).collect()
 }

@@ -23,7 +23,12 @@ fn lerp(a: f64, b: f64, t: f64) -> f64 {
 
 /// The percentile between two neighbouring order statistics, `t` the weight of the upper one.
 pub(super) fn between(a: f64, b: f64, t: f64) -> f64 {
-    if a == b { a } else { lerp(a, b, t) }
+    match a == b {
+        true => a,
+        // What numpy loses to an overflow: the two lie farther apart than the largest number.
+        false if !(b - a).is_finite() => a * (1.0 - t) + b * t,
+        false => lerp(a, b, t),
+    }
 }
 
 /// The `q_pct` percentile of `values` (q in 0 ..= 100); NaN where there are none.
@@ -85,6 +90,12 @@ mod tests {
         assert_eq!(percentile(&values, 50.0), 1e-30);
         assert_eq!(percentile(&values, 100.0), 0.05);
         assert!(percentile(&[], 50.0).is_nan());
+    }
+
+    #[test]
+    fn what_lies_between_the_ends_of_all_numbers_is_finite() {
+        assert_eq!(percentile(&[-1.6e308, 1.6e308], 50.0), 0.0);
+        assert_eq!(percentile(&[-1.6e308, 1.6e308], 100.0), 1.6e308);
     }
 
     #[test]

@@ -8,9 +8,9 @@
 //! Cells are asked on a grid of 0.1 m, so that a cluster has as many points as a body has area. Summed-area tables give
 //! every box in four look-ups.
 
-use super::change::{Cells, amplitudes_of, change, logarithms, smooth};
+use super::change::{Cells, amplitudes_of, change, logarithms, smooth, unit_of};
 use super::sight::Sight;
-use crate::radar::View;
+use crate::radar::{View, unravel};
 
 /// What the detector is told.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,22 +76,23 @@ pub struct Detection {
 /// in which nothing but people is. `None` where the view tells no place or the map is not the view's.
 pub fn detect(view: &View, map: &[f64], options: &CfarOptions) -> Option<Vec<Detection>> {
     let sight = Sight::new(view).filter(|_| map.len() == view.cells())?;
-    let amplitudes = amplitudes_of(map, view.quantity);
+    let amplitudes = amplitudes_of(map, view.quantity, unit_of([(map, view.quantity)]));
     Some(Planes::new(&sight, options).detect(&amplitudes, &[], options, &mut Tables::default()))
 }
 
 /// The cells of a view as planes of (depth, across), one a bin of the remaining axes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Planes {
+    sight: Sight,
     rows: usize,
     columns: usize,
-    /// Flat index of the first cell of each plane.
-    starts: Vec<usize>,
+    /// Bins of the remaining axes, and from one bin to the next, cells. What is a number a row or a plane is worked out where
+    /// it is asked for: declared axes may be as long as a map is large.
+    others: [Vec<usize>; 2],
     row_stride: usize,
     column_stride: usize,
-    /// Half widths in bins, (guard depth, reference depth), and by row (guard across, reference across).
+    /// Half widths in bins, (guard depth, reference depth).
     depth_half: [usize; 2],
-    across_half: Vec<[usize; 2]>,
     /// Half widths of the box that is averaged, in bins (depth, across).
     smooth_half: [usize; 2],
     /// From one cell that is asked to the next, bins (depth, across).
@@ -106,28 +107,22 @@ impl Planes {
         let stride = |k: usize| shape.iter().skip(k + 1).product::<usize>();
         let (rows, columns) =
             (shape.get(sight.depth).copied().unwrap_or(0), shape.get(sight.across).copied().unwrap_or(0));
-        let mut starts = vec![0];
-        for (k, &bins) in shape.iter().enumerate().filter(|&(k, _)| k != sight.depth && k != sight.across) {
-            starts = starts.iter().flat_map(|&start| (0..bins).map(move |bin| start + bin * stride(k))).collect();
-        }
-        let bins = |metres: f64, step: f64, most: usize| ((metres / step).round() as usize).clamp(1, most.max(1));
+        let others = (0..shape.len()).filter(|&k| k != sight.depth && k != sight.across);
+        let others = others.filter_map(|k| Some((*shape.get(k)?, stride(k)))).unzip();
         let depth = |k: f64| bins(k, sight.depth_step_m(), rows);
-        let across_half = (0..rows)
-            .map(|row| [options.guard_m[1], options.reference_m[1]].map(|m| bins(m, sight.across_step_m(row), columns)))
-            .collect();
         let near = |row: &usize| {
             sight.view.axes.get(sight.depth).is_some_and(|axis| axis.value_at(*row as f64).abs() >= options.nearest_m)
         };
         let first_row = (0..rows).find(near).unwrap_or(rows);
         let last_row = (0..rows).rev().find(near).map_or(0, |row| row + 1);
         Self {
+            sight: sight.clone(),
             rows,
             columns,
-            starts,
+            others: <[Vec<usize>; 2]>::from(others),
             row_stride: stride(sight.depth),
             column_stride: stride(sight.across),
             depth_half: [depth(options.guard_m[0]), depth(options.reference_m[0])],
-            across_half,
             smooth_half: [
                 ((options.smooth_m / sight.depth_step_m()).round() as usize).min(8),
                 ((options.smooth_m / sight.across_step_m(rows / 2)).round() as usize).min(8),
@@ -150,14 +145,14 @@ impl Planes {
         tables: &mut Tables,
     ) -> Vec<Detection> {
         let mut found = Vec::new();
-        for (k, &start) in self.starts.iter().enumerate() {
+        for start in self.starts() {
             let cells = Cells { start, row_stride: self.row_stride, column_stride: self.column_stride };
             change(now, before, [self.rows, self.columns], &cells, &mut tables.plane);
             smooth(&mut tables.plane, [self.rows, self.columns], self.smooth_half, &mut tables.scratch);
             logarithms(&mut tables.plane);
             tables.integrate(self.rows, self.columns);
             let first = found.len();
-            self.detect_plane(k, options, tables, &mut found);
+            self.detect_plane(start, options, tables, &mut found);
             for detection in found.iter_mut().skip(first) {
                 detection.level = self.level(now, start, detection.bin);
             }
@@ -167,15 +162,24 @@ impl Planes {
         found
     }
 
-    fn detect_plane(&self, k: usize, options: &CfarOptions, tables: &Tables, found: &mut Vec<Detection>) {
+    /// Flat index of the first cell of each plane.
+    fn starts(&self) -> impl Iterator<Item = usize> {
+        let [bins, strides] = &self.others;
+        let start =
+            move |plane: usize| unravel(plane, bins).iter().zip(strides).map(|(bin, stride)| bin * stride).sum();
+        (0..bins.iter().product()).map(start)
+    }
+
+    fn detect_plane(&self, start: usize, options: &CfarOptions, tables: &Tables, found: &mut Vec<Detection>) {
         for row in (self.first_row..self.last_row).step_by(self.step[0]) {
             let Some(line) = tables.plane.get(row * self.columns..(row + 1) * self.columns) else { return };
+            let across = [options.guard_m[1], options.reference_m[1]]
+                .map(|half_m| bins(half_m, self.sight.across_step_m(row), self.columns));
             for (column, &level) in line.iter().enumerate().step_by(self.step[1]) {
-                let (mean, deviation) = self.reference(row, column, tables);
+                let (mean, deviation) = self.reference(row, column, across, tables);
                 let excess = level - (mean + options.beta * deviation);
                 if excess > 0.0 {
-                    let cell =
-                        self.starts.get(k).copied().unwrap_or(0) + row * self.row_stride + column * self.column_stride;
+                    let cell = start + row * self.row_stride + column * self.column_stride;
                     found.push(Detection { cell, bin: [row, column], contrast: level - mean, excess, level: 0.0 });
                 }
             }
@@ -196,9 +200,8 @@ impl Planes {
         0.5 * f32::max(sum / f32::max(cells, 1.0), f32::MIN_POSITIVE).ln()
     }
 
-    /// Mean and standard deviation of the reference cells.
-    fn reference(&self, row: usize, column: usize, tables: &Tables) -> (f32, f32) {
-        let across = self.across_half.get(row).copied().unwrap_or([1, 1]);
+    /// Mean and standard deviation of the reference cells; `across` are the half widths across in bins, (guard, reference).
+    fn reference(&self, row: usize, column: usize, across: [usize; 2], tables: &Tables) -> (f32, f32) {
         let span = |at: usize, half: usize, most: usize| [at.saturating_sub(half), (at + half + 1).min(most)];
         let window = |k: usize| (span(row, self.depth_half[k], self.rows), span(column, across[k], self.columns));
         let (outer, inner) = (tables.sums(window(1)), tables.sums(window(0)));
@@ -206,6 +209,11 @@ impl Planes {
         let mean = (outer.1 - inner.1) / n;
         (mean, ((outer.2 - inner.2) / n - mean * mean).max(0.0).sqrt())
     }
+}
+
+/// `metres` in whole steps, at least one and at most as many as there are bins.
+fn bins(metres: f64, step_m: f64, most: usize) -> usize {
+    ((metres / step_m).round() as usize).clamp(1, most.max(1))
 }
 
 /// One plane's logarithms less their mean, and its summed-area tables. The mean goes first, so that single precision is

@@ -7,11 +7,34 @@
 
 use crate::radar::Quantity;
 
-/// Amplitudes of a map; what is no positive number is 0.
-pub(super) fn amplitudes_of(map: &[f64], quantity: Quantity) -> Vec<f32> {
-    match quantity {
-        Quantity::Amplitude => map.iter().map(|&x| (x as f32).max(0.0)).collect(),
-        Quantity::Power => map.iter().map(|&x| (x as f32).max(0.0).sqrt()).collect(),
+/// Amplitudes up to here, and down to one by it, are taken as they are: single precision holds sums of their squares.
+const HELD: i32 = 40;
+/// log₂ of the largest amplitude that is kept.
+const LARGEST: i32 = 50;
+
+/// log₂ of what 1 stands for among the amplitudes of these maps: 0, but where their largest leaves what single precision
+/// holds squared (a map of 10³⁰ is as good as any).
+pub(super) fn unit_of<'a>(maps: impl IntoIterator<Item = (&'a [f64], Quantity)>) -> i32 {
+    let largest = |(map, quantity): (&[f64], Quantity)| {
+        let largest = map.iter().copied().filter(|x| x.is_finite()).fold(0.0, f64::max);
+        if quantity == Quantity::Power { largest.sqrt() } else { largest }
+    };
+    let largest = maps.into_iter().map(largest).fold(0.0, f64::max);
+    let log2 = if largest > 0.0 { largest.log2().round() as i32 } else { 0 };
+    if log2.abs() > HELD { log2 } else { 0 }
+}
+
+/// Amplitudes of a map, in units of 2^`unit`; what is no positive number is 0.
+pub(super) fn amplitudes_of(map: &[f64], quantity: Quantity, unit: i32) -> Vec<f32> {
+    let squared = quantity == Quantity::Power;
+    // In two factors: one alone may lie beyond the largest number.
+    let by = if squared { 2 * unit } else { unit };
+    let factors = [by / 2, by - by / 2].map(|log2| f64::from(-log2).exp2());
+    let held = |x: f64| ((x * factors[0] * factors[1]) as f32).max(0.0);
+    let most = (LARGEST as f32).exp2();
+    match squared {
+        false => map.iter().map(|&x| held(x).min(most)).collect(),
+        true => map.iter().map(|&x| held(x).sqrt().min(most)).collect(),
     }
 }
 
@@ -107,6 +130,23 @@ mod tests {
                 assert!((fast_ln(x) - x.ln()).abs() < 2e-5 * x.ln().abs().max(1.0), "{x}");
             }
         }
+    }
+
+    #[test]
+    fn amplitudes_of_any_size_are_held() {
+        for size in [1e-320, 1e-300, 1e-20, 1.0, 1e19, 1e30, 1e300] {
+            for quantity in [Quantity::Amplitude, Quantity::Power] {
+                let map = [size, 0.25 * size, 0.0, -size];
+                let got = amplitudes_of(&map, quantity, unit_of([(&map[..], quantity)]));
+                let ratio = if quantity == Quantity::Power { 2.0 } else { 4.0 };
+                assert!((got[0] / got[1] - ratio).abs() < 1e-2, "{size} {quantity:?}: {got:?}");
+                assert!((got[0] * got[0]).is_normal() && got[2..] == [0.0, 0.0], "{size} {quantity:?}: {got:?}");
+            }
+        }
+        let ordinary = [3.5, 1e-9, 7e11];
+        assert_eq!(unit_of([(&ordinary[..], Quantity::Amplitude)]), 0);
+        assert_eq!(amplitudes_of(&ordinary, Quantity::Amplitude, 0), ordinary.map(|x| x as f32));
+        assert!(amplitudes_of(&[f64::MAX, f64::INFINITY], Quantity::Amplitude, 0).iter().all(|x| (x * x).is_finite()));
     }
 
     #[test]

@@ -93,6 +93,17 @@ pub(super) fn split(points: &[Point], groups: usize) -> Vec<Vec<Point>> {
     names.into_iter().map(of).collect()
 }
 
+/// As how many bodies, one to `most`, these points may be seen: cut into so many, all middles are as far apart as two bodies'.
+pub(super) fn bodies(points: &[Point], options: &ClusterOptions, most: usize) -> usize {
+    let apart = |&groups: &usize| {
+        let middles: Vec<Vec3> = split(points, groups).iter().map(|group| mean(group)).collect();
+        let far =
+            |(k, a): (usize, &Vec3)| middles.iter().skip(k + 1).all(|&b| flat_distance(*a, b) >= options.one_body_m);
+        middles.len() == groups && middles.iter().enumerate().all(far)
+    };
+    (2..=most).take_while(apart).last().unwrap_or(1)
+}
+
 /// Clusters of one body's size: those that are clearly several are cut, those too near to each other to be two are joined.
 pub(super) fn refined(clusters: Vec<Vec<Point>>, options: &ClusterOptions) -> Vec<Vec<Point>> {
     let mut parts: Vec<Vec<Point>> = Vec::new();
@@ -209,6 +220,17 @@ mod tests {
             Point { position, heights_m: None, contrast: 2.0, level: 0.0, range_m: x.hypot(y), age: 0 }
         };
         (0..n).map(point).collect()
+    }
+
+    #[test]
+    fn a_cluster_has_room_for_bodies_that_stand_apart() {
+        let options = ClusterOptions::default();
+        let room = |groups: &[Vec<Point>]| bodies(&groups.concat(), &options, 4);
+        assert_eq!(room(&[body(3.0, 0.0, 10)]), 1);
+        assert_eq!(room(&[body(3.0, 0.0, 10), body(3.0, 0.2, 10)]), 1, "0.2 m is no distance of two people");
+        assert_eq!(room(&[body(3.0, 0.0, 10), body(3.0, 0.6, 10)]), 2);
+        assert_eq!(room(&[body(3.0, 0.0, 10), body(3.0, 0.6, 10), body(3.6, 0.0, 10)]), 3);
+        assert_eq!(room(&[body(3.0, 0.0, 1)]), 1);
     }
 
     #[test]

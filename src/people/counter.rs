@@ -8,7 +8,7 @@
 //! people stays.
 
 use super::cfar::CfarOptions;
-use super::cluster::{Cluster, ClusterOptions, cluster, refined};
+use super::cluster::{Cluster, ClusterOptions, bodies, cluster, refined};
 use super::error::PeopleError;
 use super::features::{FEATURES, features};
 use super::network::{CLASSES, Network};
@@ -17,6 +17,9 @@ use crate::radar::View;
 
 /// Clusters that are asked, those of most points first; more are not people.
 pub(super) const MOST_CLUSTERS: usize = 8;
+
+/// A frame alone is believed from this probability on.
+const SURE: f64 = 0.9;
 
 /// A number that one frame excludes still has this probability.
 const DOUBT: f64 = 0.01;
@@ -55,6 +58,8 @@ pub struct Count {
     pub clusters: Vec<Counted>,
     /// Detections that belong to no cluster.
     pub loose: Vec<Point>,
+    /// Whether there was no other frame to compare it with: furniture and people look alike then.
+    pub alone: bool,
 }
 
 /// A cluster and how many people it is.
@@ -91,7 +96,9 @@ impl Counter {
     pub fn scan(&self, maps: &[&[f64]], before: &[&Scan]) -> Result<Scan, PeopleError> {
         let mut scan = self.scanner.scan(maps, before)?;
         let Described { clusters, loose, features } = self.describe(&scan, before);
-        let asked: Vec<[f64; CLASSES]> = features.iter().map(|x| self.network.probabilities(x)).collect();
+        let asked =
+            features.iter().zip(&clusters).map(|(x, cluster)| self.held(self.network.probabilities(x), cluster));
+        let asked: Vec<[f64; CLASSES]> = asked.collect();
         scan.said = asked.iter().fold(NOBODY, |sum, p| convolve(&sum, p));
         let counted = clusters.into_iter().zip(asked);
         scan.clusters = counted.map(|(cluster, probabilities)| Counted { cluster, probabilities }).collect();
@@ -99,11 +106,30 @@ impl Counter {
         Ok(scan)
     }
 
+    /// What the classifier says of a cluster, as far as it has room for so many: more bodies than stand
+    /// [`ClusterOptions::one_body_m`] apart in it are one seen twice.
+    fn held(&self, mut said: [f64; CLASSES], cluster: &Cluster) -> [f64; CLASSES] {
+        // What is below the doubt decides nothing, and most clusters are one body.
+        if said[2..].iter().sum::<f64>() < DOUBT {
+            return said;
+        }
+        let room = bodies(&cluster.points, &self.options.cluster, CLASSES - 1);
+        for n in room + 1..CLASSES {
+            said[room] += std::mem::take(&mut said[n]);
+        }
+        said
+    }
+
     /// The count of a scanned frame, given those before it, the latest first: what they agree on.
     pub fn count(&self, now: &Scan, before: &[&Scan]) -> Count {
         let alike = before.iter().take(HISTORY).filter(|scan| scan.moving == now.moving);
         let said: Vec<[f64; CLASSES]> = std::iter::once(now.said).chain(alike.map(|scan| scan.said)).collect();
-        Count { probabilities: agreed(&said), clusters: now.clusters.clone(), loose: now.loose.clone() }
+        Count {
+            probabilities: agreed(&said),
+            clusters: now.clusters.clone(),
+            loose: now.loose.clone(),
+            alone: !now.moving,
+        }
     }
 
     /// Clusters and what the classifier sees of them.
@@ -161,6 +187,11 @@ impl Count {
     /// The most probable number of people; 4 stands for 4 or more.
     pub fn people(&self) -> usize {
         (0..CLASSES).fold(0, |best, n| if self.probabilities[n] > self.probabilities[best] { n } else { best })
+    }
+
+    /// Whether the number may well be wrong: it is of a frame alone, and not clear.
+    pub fn is_uncertain(&self) -> bool {
+        self.alone && self.probability(self.people()) < SURE
     }
 
     /// The probability of a number of people; 4 and above share one.

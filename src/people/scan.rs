@@ -1,7 +1,7 @@
 //! One frame's detections in all its views, and what is kept of it for the frames after.
 
 use super::cfar::{CfarOptions, Detection, Planes, Tables};
-use super::change::amplitudes_of;
+use super::change::{amplitudes_of, unit_of};
 use super::counter::{Counted, NOBODY};
 use super::error::PeopleError;
 use super::network::CLASSES;
@@ -11,6 +11,8 @@ use crate::radar::{View, unravel};
 
 /// Echoes of two views are one body's where their ranges differ by no more, m.
 const SAME_RANGE_M: f64 = 0.12;
+/// No radar sees people farther away, m: what axes put there is no place, and its squares leave the range of numbers.
+const FARTHEST_M: f64 = 1e4;
 /// Frames before the present one that are looked at, two seconds of most radars: people stay as many, while one who hides
 /// another, and a body on its way down that looks like two, hardly do for so long.
 pub const HISTORY: usize = 19;
@@ -47,8 +49,9 @@ pub struct Scan {
     pub(super) loose: Vec<Point>,
     /// What the clusters say together of the number of people.
     pub(super) said: [f64; CLASSES],
-    /// The amplitudes of every view that tells places.
+    /// The amplitudes of every view that tells places, in units of 2^`unit`: those of the frame before, if there is one.
     amplitudes: Vec<Vec<f32>>,
+    unit: i32,
 }
 
 /// What turns maps into detections; made once for the views of a data set.
@@ -89,6 +92,8 @@ impl Scanner {
             return Err(PeopleError::WrongMaps { got: maps.len(), expected: self.views.len() });
         }
         let mut tables = Tables::default();
+        let of_sights = || self.sights.iter().filter_map(|(k, sight, _)| Some((*maps.get(*k)?, sight.view.quantity)));
+        let unit = before.first().map_or_else(|| unit_of(of_sights()), |scan| scan.unit);
         let (mut amplitudes, mut detections) = (Vec::new(), Vec::new());
         for (s, (k, sight, planes)) in self.sights.iter().enumerate() {
             let map = maps.get(*k).copied().unwrap_or_default();
@@ -99,7 +104,7 @@ impl Scanner {
             if !map.iter().any(|x| x.is_finite()) {
                 return Err(PeopleError::NoNumbers { array: array() });
             }
-            let now = amplitudes_of(map, sight.view.quantity);
+            let now = amplitudes_of(map, sight.view.quantity, unit);
             let earlier: Vec<&[f32]> =
                 before.iter().take(COMPARED).filter_map(|scan| scan.amplitudes.get(s)).map(Vec::as_slice).collect();
             detections.push(planes.detect(&now, &earlier, &self.options, &mut tables));
@@ -107,7 +112,7 @@ impl Scanner {
         }
         let points = thinned(self.points(&detections), &self.options);
         let (clusters, loose) = (Vec::new(), Vec::new());
-        Ok(Scan { points, moving: !before.is_empty(), clusters, loose, said: NOBODY, amplitudes })
+        Ok(Scan { points, moving: !before.is_empty(), clusters, loose, said: NOBODY, amplitudes, unit })
     }
 
     /// Places of the detections of views that tell where, with heights from those that tell how high. Without a view
@@ -125,6 +130,9 @@ impl Scanner {
                 let reading = sight.reading(&unravel(detection.cell, &sight.view.shape()));
                 let seen = if sight.role == Role::Plan { self.seen(s, reading.range_m, &heights) } else { None };
                 let position = sight.place(&reading, seen.map(|(middle, _)| middle));
+                if !position.iter().chain([&reading.range_m]).all(|x| x.abs() <= FARTHEST_M) {
+                    continue;
+                }
                 points.push(Point {
                     position,
                     heights_m: seen.map(|(_, extent)| extent),
@@ -148,7 +156,7 @@ impl Scanner {
                     let reading = sight.reading(&unravel(d.cell, &sight.view.shape()));
                     [reading.range_m, sight.place(&reading, None)[2], f64::from(d.contrast)]
                 };
-                (s, found.iter().map(reading).collect())
+                (s, found.iter().map(reading).filter(|told| told.iter().all(|x| x.abs() <= FARTHEST_M)).collect())
             })
             .collect()
     }

@@ -113,6 +113,7 @@ mod tests {
                 counted(clutter, [0.9, 0.1, 0.0, 0.0, 0.0]),
             ],
             loose: vec![point(5.0, 1.0)],
+            alone: true,
         }
     }
 
@@ -134,7 +135,7 @@ mod tests {
         for people in 0..7 {
             assert_eq!(scene().seeds(people).len(), people);
         }
-        let nothing = Count { probabilities: [1.0, 0.0, 0.0, 0.0, 0.0], clusters: vec![], loose: vec![] };
+        let nothing = Count { probabilities: [1.0, 0.0, 0.0, 0.0, 0.0], clusters: vec![], loose: vec![], alone: true };
         let places = nothing.seeds(3);
         assert_eq!(places.len(), 3);
         assert!(flat_distance(places[0], places[1]) > 0.5);

@@ -188,7 +188,7 @@ impl Chain {
         let range = Stage::new(self.range_window, adc.samples, self.range_fft, false);
         let doppler = Stage::new(self.doppler_window, adc.loops, self.doppler_fft, false);
         let range_step_m = fmcw.unambiguous_range_m() / range.plan.len() as f64;
-        let ranges = ((self.max_range_m / range_step_m).ceil() as usize + 2).min(range.plan.len());
+        let ranges = ((self.max_range_m / range_step_m).ceil() as usize).saturating_add(2).min(range.plan.len());
         let (channels, dopplers) = (adc.channels, doppler.plan.len());
         let mut lines = Vec::with_capacity(adc.loops * channels * ranges);
         let mut bench = range.bench();
@@ -273,10 +273,11 @@ impl PolarMap {
     /// angle FFT is.
     pub fn sample(&self, range_m: f64, sine: f64) -> f64 {
         let (r, s) = (range_m / self.range_step_m, sine / self.sine_step + (self.sines / 2) as f64);
-        if !(r >= 0.0 && r <= (self.ranges - 1) as f64 && s.is_finite()) {
+        let Some(last) = self.ranges.checked_sub(2).filter(|&last| r >= 0.0 && r <= (last + 1) as f64 && s.is_finite())
+        else {
             return f64::NAN;
-        }
-        let (i, a) = ((r as usize).min(self.ranges - 2), s.floor());
+        };
+        let (i, a) = ((r as usize).min(last), s.floor());
         let (r, s) = (r - i as f64, s - a);
         let column = |a: f64| (a as i64).rem_euclid(self.sines as i64) as usize;
         let (j, k) = (column(a), column(a + 1.0));

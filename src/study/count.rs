@@ -55,7 +55,8 @@ fn count_chunk(dataset: &Dataset, counter: &Counter, chunk: Range<usize>, done: 
     let earliest = chunk.start.saturating_sub(LEAD_IN);
     let first = (earliest..chunk.start).find(|&i| dataset.sequence(i) == sequence).unwrap_or(chunk.start);
     // Frames that fail here are told in their own row, where they were asked for.
-    for maps in dataset.maps(first..chunk.start) {
+    for (frame, maps) in (first..chunk.start).zip(dataset.maps(first..chunk.start)) {
+        window.look_ahead(dataset, frame);
         let _ = window.push(maps.map_err(|error| error.to_string()));
     }
     let mut rows = Vec::with_capacity(chunk.len());
@@ -64,6 +65,7 @@ fn count_chunk(dataset: &Dataset, counter: &Counter, chunk: Range<usize>, done: 
             window.scans.clear();
         }
         let (annotated, maps) = labelled(dataset.load(frame));
+        window.look_ahead(dataset, frame);
         let count = window.push(maps);
         rows.push(FrameCount { frame, count, annotated, places: Vec::new(), identities: Vec::new() });
         done();
@@ -78,21 +80,41 @@ fn labelled(frame: Result<Frame, DatasetError>) -> (Option<usize>, Result<Vec<He
     }
 }
 
-/// The scans before the present frame, the latest first.
+/// The scans before the present frame, the latest first. Where there are none, those after it, the next first: what stands
+/// still does so in both directions of time, and in one frame alone furniture is as good as people.
 pub(super) struct Window<'a> {
     counter: &'a Counter,
     scans: VecDeque<Scan>,
+    ahead: VecDeque<Scan>,
 }
 
 impl<'a> Window<'a> {
     /// Before the first frame.
     pub(super) fn new(counter: &'a Counter) -> Self {
-        Self { counter, scans: VecDeque::new() }
+        Self { counter, scans: VecDeque::new(), ahead: VecDeque::new() }
+    }
+
+    /// Reads the frames after `frame` in its sequence where none before it is known. One that cannot be read is left out: it
+    /// is told in its own row.
+    pub(super) fn look_ahead(&mut self, dataset: &Dataset, frame: usize) {
+        self.ahead.clear();
+        if !self.scans.is_empty() {
+            return;
+        }
+        let sequence = dataset.sequence(frame);
+        let after = (frame + 1)..(frame + 1 + COMPARED).min(dataset.len());
+        for other in after.rev().filter(|&other| dataset.sequence(other) == sequence) {
+            let Ok(maps) = dataset.recent_maps(other) else { continue };
+            if let Ok((scan, _)) = self.count(maps.to_vec(), &self.ahead) {
+                self.ahead.push_front(scan);
+            }
+        }
     }
 
     /// Counts the next frame; one that fails ends what is known of the frames before.
     pub(super) fn push(&mut self, maps: Result<Vec<Heatmap>, String>) -> Result<Count, String> {
-        let counted = maps.and_then(|maps| self.count(maps));
+        let known = if self.scans.is_empty() { &self.ahead } else { &self.scans };
+        let counted = maps.and_then(|maps| self.count(maps, known));
         match counted {
             Ok((scan, count)) => {
                 self.scans.push_front(scan);
@@ -107,13 +129,13 @@ impl<'a> Window<'a> {
         }
     }
 
-    fn count(&self, mut maps: Vec<Heatmap>) -> Result<(Scan, Count), String> {
+    fn count(&self, mut maps: Vec<Heatmap>, known: &VecDeque<Scan>) -> Result<(Scan, Count), String> {
         for map in &mut maps {
             // A map without any number is the counter's error: it names the array.
             let _ = fill_missing(&mut map.data, &map.shape);
         }
         let maps: Vec<&[f64]> = maps.iter().map(|map| map.data.as_slice()).collect();
-        let before: Vec<&Scan> = self.scans.iter().collect();
+        let before: Vec<&Scan> = known.iter().collect();
         let scan = self.counter.scan(&maps, &before).map_err(|error| error.to_string())?;
         let count = self.counter.count(&scan, &before);
         Ok((scan, count))

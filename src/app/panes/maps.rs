@@ -265,6 +265,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
             ),
             map: state.pictures.colormap(content),
             limits: state.pictures.limits(index, content),
+            floor: state.pictures.floor(content),
             unit: state.pictures.unit(content),
             name,
         };

@@ -12,6 +12,8 @@ pub(crate) struct ColorBar<'a> {
     pub(crate) map: Colormap,
     /// Limits, shown units.
     pub(crate) limits: (f64, f64),
+    /// What lies lower is shown as this.
+    pub(crate) floor: f64,
     /// Unit and reference, for example `dB re max`.
     pub(crate) unit: &'a str,
     /// Spoken name.
@@ -46,6 +48,7 @@ pub(crate) fn colorbar(ui: &mut Ui, bar: &ColorBar<'_>) -> Option<(f64, f64)> {
         let y = strip.max.y - strip.height() * t;
         painter.hline(strip.max.x..=strip.max.x + 3.0, y, Stroke::new(1.0, tokens.dim));
         let text = tick(value, hi - lo);
+        let text = if value <= bar.floor { format!("≤{text}") } else { text };
         painter.text(pos2(strip.max.x + 5.0, y), Align2::LEFT_CENTER, text, theme::mono(10.0), tokens.dim);
     }
     handles(ui, bar, strip, &tokens)

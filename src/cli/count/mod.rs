@@ -16,11 +16,12 @@ pub(super) const HELP: &str = "\
 What is done: what changed since the frames before (people never stand as still as a room), cells above mean + 2 standard
 deviations of the logarithms around, in metres with heights from the other view, DBSCAN (0.3 m, 3 points) over the
 detections of four frames, and a small network that says of each cluster how many people it is. What the last twenty frames
-agree on is the count. The first frames of a sequence have few or none before them and are counted less surely.
+agree on is the count. The first frame of a sequence is compared with those after it; a frame that is all there is shows
+furniture as well as people, and where its count is not clear a ? stands behind it.
 
 Columns of the CSV: frame, people, probability (of that number), p0 p1 p2 p3 p4 (4 and more), annotated (where the data
-set knows), persons: `identity:x:y:z` of each, metres, separated by spaces. The same identity is the same person within a
-sequence. What is unknown is empty (null in JSON).
+set knows), persons: `identity:x:y:z` of each, metres, separated by spaces, uncertain (true or false). The same identity is
+the same person within a sequence. What is unknown is empty (null in JSON).
 
 Exit codes: 0 every frame was counted; 1 some were not; 2 none was, or the input is bad.
 

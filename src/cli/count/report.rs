@@ -1,7 +1,7 @@
 //! What `count` prints and writes.
 
 use crate::dataset::Dataset;
-use crate::people::{CLASSES, Confusion};
+use crate::people::{CLASSES, Confusion, Count};
 use crate::study::count::{FrameCount, confusion};
 use anyhow::Context as _;
 use serde::Serialize;
@@ -16,15 +16,24 @@ pub(super) fn table(dataset: &Dataset, rows: &[FrameCount]) -> String {
     for row in rows {
         let annotated = row.annotated.map_or_else(|| "-".into(), |n| n.to_string());
         let (people, p) = match &row.count {
-            Ok(count) => (shown(count.people()), format!("{:.3}", count.probability(count.people()))),
+            Ok(count) => (told(count), format!("{:.3}", count.probability(count.people()))),
             Err(_) => ("-".into(), "-".into()),
         };
         let places: Vec<String> = row.places.iter().map(|[x, y, z]| format!("{x:.2} {y:.2} {z:.2}")).collect();
         let line = format!("{:<width$}  {people:>6}  {p:>5}  {annotated:>9}  {}", name(row), places.join("; "));
         let _ = writeln!(text, "{}", line.trim_end());
     }
+    if rows.iter().any(|row| row.count.as_ref().is_ok_and(Count::is_uncertain)) {
+        text +=
+            "\n? counted from one frame alone, and uncertain: without frames around it furniture looks like people\n";
+    }
     summary(&confusion(rows), &mut text);
     text
+}
+
+/// The number, with a question mark where it may well be wrong.
+fn told(count: &Count) -> String {
+    shown(count.people()) + if count.is_uncertain() { "?" } else { "" }
 }
 
 fn summary(confusion: &Confusion, text: &mut String) {
@@ -57,6 +66,8 @@ struct Row {
     people: Option<usize>,
     probability: Option<f64>,
     probabilities: Option<[f64; CLASSES]>,
+    /// Counted from this frame alone, and not clear.
+    uncertain: Option<bool>,
     annotated: Option<usize>,
     persons: Vec<Person>,
     error: Option<String>,
@@ -91,12 +102,13 @@ pub(super) fn json(dataset: &Dataset, rows: &[FrameCount]) -> anyhow::Result<Str
 
 fn of(dataset: &Dataset, row: &FrameCount) -> Row {
     let count = row.count.as_ref().ok();
-    let people = count.map(crate::people::Count::people);
+    let people = count.map(Count::people);
     Row {
         frame: dataset.frame_name(row.frame).to_owned(),
         people,
         probability: count.zip(people).map(|(count, people)| count.probability(people)),
         probabilities: count.map(|count| count.probabilities),
+        uncertain: count.map(Count::is_uncertain),
         annotated: row.annotated,
         persons: row
             .identities
@@ -115,7 +127,7 @@ fn of(dataset: &Dataset, row: &FrameCount) -> Row {
 pub(super) fn write_csv(file: &Path, dataset: &Dataset, rows: &[FrameCount]) -> anyhow::Result<()> {
     let cannot = || format!("{}: cannot be written", file.display());
     let mut csv = csv::Writer::from_path(file).with_context(cannot)?;
-    let head = ["frame", "people", "probability", "p0", "p1", "p2", "p3", "p4", "annotated", "persons"];
+    let head = ["frame", "people", "probability", "p0", "p1", "p2", "p3", "p4", "annotated", "persons", "uncertain"];
     csv.write_record(head).with_context(cannot)?;
     for row in rows.iter().map(|row| of(dataset, row)) {
         let number = |n: Option<usize>| n.map_or_else(String::new, |n| n.to_string());
@@ -126,6 +138,7 @@ pub(super) fn write_csv(file: &Path, dataset: &Dataset, rows: &[FrameCount]) -> 
         record.push(number(row.annotated));
         let person = |p: &Person| format!("{}:{:.3}:{:.3}:{:.3}", p.identity, p.place_m[0], p.place_m[1], p.place_m[2]);
         record.push(row.persons.iter().map(person).collect::<Vec<String>>().join(" "));
+        record.push(row.uncertain.map_or_else(String::new, |uncertain| uncertain.to_string()));
         csv.write_record(record).with_context(cannot)?;
     }
     csv.flush().with_context(cannot)

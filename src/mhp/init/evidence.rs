@@ -71,6 +71,11 @@ impl Evidence {
         Self { layout: Arc::clone(layout), value, source, largest, background: layout.unknown(), unrest: None }
     }
 
+    /// The largest value of its map.
+    pub(super) fn largest(&self) -> f64 {
+        self.largest
+    }
+
     /// Another map of the same view, a short time before or after, on the scale and with the stillness of this one. The
     /// background is its own: that of a ring rises with the sidelobes of whoever stands in it.
     pub(super) fn at_another_time(&self, map: &[f64]) -> Self {
@@ -162,7 +167,7 @@ impl Evidence {
         let p = self.layout.view.pose.view_from_world(p_world);
         self.layout.axes.iter().try_fold(0, |flat, (_, axis)| {
             let bin = axis.bin(axis.coordinate(p)).round();
-            (bin >= 0.0 && bin < axis.bins as f64).then_some(flat * axis.bins + bin as usize)
+            (bin >= 0.0 && bin < axis.bins as f64).then(|| flat * axis.bins + bin as usize)
         })
     }
 
@@ -326,24 +331,28 @@ impl Evidence {
     }
 }
 
-/// The coefficient of variation of each cell over `maps`, the same view at several times. The speckle of a person changes
-/// from frame to frame, for a chest that breathes moves by wavelengths; a wall's does not.
-pub(super) fn variation(maps: &[&[f64]]) -> Vec<f32> {
+/// The coefficient of variation of each cell over `maps`, the same view at several times, whose values are about as large as
+/// `largest`. The speckle of a person changes from frame to frame, for a chest that breathes moves by wavelengths; a wall's
+/// does not.
+pub(super) fn variation(maps: &[&[f64]], largest: f64) -> Vec<f32> {
     let Some((first, others)) = maps.split_first() else { return Vec::new() };
+    // A power of two, which costs no digit: squares of what is very large or very small leave the range of numbers.
+    let unit = (-largest.log2().round()).clamp(-1000.0, 1000.0).exp2();
     // Sums of differences to the first map: what stands still adds up to nothing, to the last digit.
     let (mut sums, mut squares) = (vec![0.0; first.len()], vec![0.0; first.len()]);
     for map in others {
         for ((sum, square), (then, now)) in sums.iter_mut().zip(&mut squares).zip(map.iter().zip(*first)) {
-            let difference = then - now;
+            let difference = unit * then - unit * now;
             *sum += difference;
             *square += difference * difference;
         }
     }
     let count = maps.len() as f64;
     let of_cell = |((&sum, square), now): ((&f64, f64), &f64)| {
-        let (mean, shift) = (now + sum / count, sum / count);
+        let (mean, shift) = (unit * now + sum / count, sum / count);
         let spread = (square / count - shift * shift).max(0.0).sqrt();
-        if mean > 0.0 { (spread / mean) as f32 } else { 0.0 }
+        let variation = (spread / mean) as f32;
+        if mean > 0.0 && variation.is_finite() { variation } else { 0.0 }
     };
     sums.iter().zip(squares).zip(*first).map(of_cell).collect()
 }

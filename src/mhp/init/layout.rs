@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 pub(super) const NEAREST_M: f64 = 0.5;
 /// A ring with fewer cells says nothing of the background.
 const SMALLEST_RING: usize = 8;
-/// Cells are held above this share of the map's largest.
+/// Cells are held above this share of the map's largest, and at one by it: a map of another time may be much stronger.
 const FAINTEST: f32 = 1e-12;
 
 /// A view as evidence sees it: its axes without Doppler, and the rings of cells at the same range.
@@ -31,8 +31,10 @@ pub(super) struct Layout {
 
 /// Layouts that were asked for last: frame after frame has the same views.
 static KNOWN: Mutex<VecDeque<Arc<Layout>>> = Mutex::new(VecDeque::new());
-/// So many are kept.
+/// So many are kept, and no more bytes of them: those of eight views of 1024 × 1024 cells. They are the whole process's,
+/// whatever data sets it has seen, and a layout grows with its map.
 const MOST_KNOWN: usize = 8;
+const MOST_BYTES: usize = 128 << 20;
 
 impl Layout {
     /// The layout of a view, as it is remembered or worked out.
@@ -44,9 +46,19 @@ impl Layout {
         }
         let layout = Arc::new(Self::new(index, view));
         let mut known = known();
-        known.truncate(MOST_KNOWN - 1);
         known.push_front(Arc::clone(&layout));
+        let fits = |bytes: &mut usize, layout: &Arc<Self>| {
+            *bytes += layout.bytes();
+            Some(*bytes <= MOST_BYTES)
+        };
+        let kept = known.iter().scan(0, fits).take(MOST_KNOWN).take_while(|&fits| fits).count();
+        known.truncate(kept);
         layout
+    }
+
+    /// What its lists take.
+    fn bytes(&self) -> usize {
+        (self.ring_of.len() + self.cells.len()) * size_of::<u32>() + self.rings.len() * size_of::<usize>()
     }
 
     fn new(index: usize, view: &View) -> Self {
@@ -58,9 +70,7 @@ impl Layout {
         let mut layout = Self { view: view.clone(), index, axes, shape, ring_of, cells, rings, deaf: 0 };
         if let Some(ranges) = layout.ranges_m() {
             let widths = layout.axes.iter().filter(|(_, a)| !a.kind.is_angular()).map(|(_, a)| a.step().abs());
-            let width_m = widths.fold(f64::INFINITY, f64::min);
-            layout.ring_of = ranges.iter().map(|range| (range / width_m).round() as u32).collect();
-            layout.deaf = (NEAREST_M / width_m).round() as usize;
+            (layout.ring_of, layout.deaf) = rings_at(&ranges, widths.fold(f64::INFINITY, f64::min));
         }
         // Counting sort: how many cells each ring has, where it begins, and each cell to its place.
         layout.rings = vec![0; layout.ring_of.iter().max().map_or(1, |&last| last as usize + 2)];
@@ -96,7 +106,9 @@ impl Layout {
             let own: Vec<f64> = (0..axis.bins).map(|bin| share * axis.value_at(bin as f64).powi(2)).collect();
             so_far.iter().flat_map(|before| own.iter().map(move |square| before + square)).collect()
         });
-        Some(squares.into_iter().map(f64::sqrt).collect())
+        let ranges: Vec<f64> = squares.into_iter().map(f64::sqrt).collect();
+        // Squares of what no radar sees leave the range of numbers, and then tell nothing.
+        ranges.iter().all(|range| range.is_finite()).then_some(ranges)
     }
 
     /// A place for the background of each ring, and one for that of the whole map.
@@ -123,7 +135,7 @@ impl Layout {
 
     /// H of each spatial cell in shares of `largest`, and the full cell each was taken from where that is another.
     pub(super) fn spatial(&self, map: &[f64], largest: f64) -> (Vec<f32>, Vec<u32>) {
-        let relative = |h: f64| ((h / largest) as f32).max(FAINTEST);
+        let relative = |h: f64| ((h / largest) as f32).max(FAINTEST).min(1.0 / FAINTEST);
         if self.axes.len() == self.view.axes.len() {
             return (map.iter().map(|&h| relative(h)).collect(), Vec::new());
         }
@@ -140,6 +152,21 @@ impl Layout {
     }
 }
 
+/// The ring of each cell at one of `ranges` (m, finite), for rings `width_m` wide and counted from the nearest; and how
+/// many of the first are too near to the radar to tell anything.
+///
+/// There are at most as many rings as cells, plus one: more could only be empty. Where axes are so far apart in scale that
+/// `width_m` asks for more (a depth axis to 10⁹ m beside steps of centimetres), rings are as much wider.
+fn rings_at(ranges: &[f64], width_m: f64) -> (Vec<u32>, usize) {
+    let (nearest, farthest) =
+        ranges.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), &range| (low.min(range), high.max(range)));
+    let most = ranges.len() as f64;
+    let width_m = width_m.max((farthest - nearest) / most).max(f64::MIN_POSITIVE);
+    let first = (nearest / width_m).round();
+    let ring = |range: f64| ((range / width_m).round() - first).clamp(0.0, most);
+    (ranges.iter().map(|&range| ring(range) as u32).collect(), ring(NEAREST_M) as usize)
+}
+
 /// The middle value of positive floats given as their bits, the upper one of two; they are reordered. 1 where there are
 /// none.
 fn median(bits: &mut [u32]) -> f32 {
@@ -148,4 +175,60 @@ fn median(bits: &mut [u32]) -> f32 {
     }
     let middle = bits.len() / 2;
     f32::from_bits(*bits.select_nth_unstable(middle).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::radar::{PointSpread, Quantity, Spacing};
+
+    fn view(array: &str, axes: [(AxisKind, usize, f64, f64); 2]) -> View {
+        let axis = |(kind, bins, lo, hi)| Axis { kind, bins, lo, hi, spacing: Spacing::Linear };
+        View {
+            array: array.into(),
+            quantity: Quantity::Amplitude,
+            psf: PointSpread::default(),
+            pose: crate::geometry::Pose::default(),
+            axes: axes.map(axis).to_vec(),
+            region: None,
+        }
+    }
+
+    fn depth_of(lo: f64, hi: f64) -> Layout {
+        Layout::new(0, &view("rings", [(AxisKind::DepthH, 16, lo, hi), (AxisKind::Y, 8, -1.0, 1.0)]))
+    }
+
+    #[test]
+    fn rings_are_bounded_by_the_cells_whatever_the_axes_say() {
+        for (lo, hi) in
+            [(0.0, 1e9), (0.0, 1e308), (1e308, 0.0), (1e-308, 2e-308), (1e308, 1.1e308), (-1e9, 1e9), (1e9, 2e9)]
+        {
+            let layout = depth_of(lo, hi);
+            assert!(layout.rings.len() <= layout.cells.len() + 3, "{lo} to {hi}: {} rings", layout.rings.len());
+            assert_eq!(layout.rings.last(), Some(&layout.cells.len()), "{lo} to {hi}");
+            let value = vec![1.0; layout.cells.len()];
+            assert!((0..layout.rings.len()).all(|place| layout.background(&value, place).is_finite()), "{lo} to {hi}");
+        }
+    }
+
+    #[test]
+    fn rings_are_as_wide_as_a_step_and_begin_at_the_nearest_cell() {
+        let layout = depth_of(2.0, 10.0);
+        // √(2² + 0²) m and √(2.5² + 0²) m lie two steps of a quarter metre apart.
+        assert_eq!((layout.ring_of[4], layout.ring_of[12]), (0, 2));
+        assert_eq!(layout.deaf, 0);
+        assert_eq!(depth_of(0.0, 8.0).deaf, 2);
+    }
+
+    #[test]
+    fn what_is_remembered_of_views_is_bounded() {
+        for k in 0..3 * MOST_KNOWN {
+            let large =
+                view(&format!("large {k}"), [(AxisKind::DepthH, 2048, 0.0, 8.0), (AxisKind::Y, 1024, -1.0, 1.0)]);
+            assert_eq!(Layout::of(0, &large).shape, [2048, 1024]);
+            let known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+            let bytes: usize = known.iter().map(|layout| layout.bytes()).sum();
+            assert!(known.len() <= MOST_KNOWN && bytes <= MOST_BYTES, "{} layouts of {bytes} bytes", known.len());
+        }
+    }
 }

@@ -51,7 +51,7 @@ fn moving(problem: &Problem, plain: &[Evidence]) -> Option<Views> {
     }
     let of_view = |k: usize| {
         let others = problem.neighbours().iter().map(|neighbour| neighbour.map(k));
-        evidence::variation(&std::iter::once(problem.map(k)).chain(others).collect::<Vec<_>>())
+        evidence::variation(&std::iter::once(problem.map(k)).chain(others).collect::<Vec<_>>(), plain[k].largest())
     };
     let variations: Vec<Vec<f32>> = (0..plain.len()).map(of_view).collect();
     VARIATIONS.into_iter().find_map(|limits| {

@@ -167,6 +167,12 @@ struct Block {
     column: usize,
 }
 
+/// Blocks of a box of these sizes, the last axis last.
+pub(super) fn blocks_of(sizes: impl DoubleEndedIterator<Item = usize>) -> usize {
+    let in_block = [BLOCK * ALONG_BINS, ACROSS_BINS, 1];
+    sizes.rev().zip(in_block).fold(1, |blocks, (size, bins)| blocks * size.div_ceil(bins))
+}
+
 impl Tiling {
     /// Cuts the box `bins` ([lo, hi) per axis), with B_ori in C order.
     pub(super) fn new(bins: &[[usize; 2]], ori: &[bool]) -> Self {

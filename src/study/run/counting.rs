@@ -33,6 +33,7 @@ pub(super) fn count(dataset: &Dataset, method: Method, frames: &[usize]) -> Vec<
             let begin =
                 (first.saturating_sub(LEAD_IN)..first).find(|&i| dataset.sequence(i) == sequence).unwrap_or(first);
             for before in begin..first {
+                window.look_ahead(dataset, before);
                 let _ = window.push(maps(dataset, before).map(|(maps, _)| maps));
             }
             frames.iter().map(|&frame| with_counter(dataset, &mut window, frame)).collect()
@@ -50,6 +51,7 @@ fn with_counter(dataset: &Dataset, window: &mut Window<'_>, frame: usize) -> Cou
         Ok((maps, annotated)) => (Ok(maps), annotated),
         Err(why) => (Err(why), None),
     };
+    window.look_ahead(dataset, frame);
     let began = Instant::now();
     let count = window.push(maps);
     let ms = milliseconds(began);

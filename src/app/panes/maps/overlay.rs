@@ -2,7 +2,7 @@
 
 use super::Window;
 use super::picture::{Content, Pictures};
-use crate::app::map_image::Orientation;
+use crate::app::map_image::{Orientation, level};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::tick;
 use crate::body::Skeleton;
@@ -99,7 +99,7 @@ fn ticks(axis: &Axis, from: f32, to: f32, forward: bool, wanted: f32) -> Vec<(f3
     let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * magnitude).into_iter().find(|s| *s >= raw).unwrap_or(raw);
     let first = (lo / step).ceil() as i64;
     let last = (hi / step).floor() as i64;
-    (first..=last.min(first + 40))
+    (first..=last.min(first.saturating_add(40)))
         .filter_map(|i| {
             let value = i as f64 * step;
             let native = if axis.kind.is_angular() { value.to_radians() } else { value };
@@ -294,7 +294,10 @@ pub(super) fn probe(
     for (name, value) in ["H_ori", "H_sim"].iter().zip(pictures.values(index, pixel)) {
         lines.push(match value {
             Some((stored, _)) if stored.is_nan() => format!("{name}  NaN (filled before the fit)"),
-            Some((stored, shown)) => format!("{name}  {stored:>11.4e}  {shown:>8.2} {unit_text}"),
+            Some((stored, shown)) => {
+                let shown = level(shown, pictures.floor(Content::Ori));
+                format!("{name}  {stored:>11.4e}  {shown:>8} {unit_text}")
+            }
             None => format!("{name}  —"),
         });
     }

@@ -1,6 +1,6 @@
 //! Textures of the maps, made again only when what they show changed.
 
-use crate::app::map_image::{Orientation, Shown, colorize, limits, shown};
+use crate::app::map_image::{Orientation, Shown, colorize, floor, limits, shown};
 use crate::app::theme;
 use crate::dataset::Frame;
 use crate::radar::View;
@@ -117,14 +117,16 @@ impl Pictures {
             pictures.size = orientation.size(view);
             if all && let Some(map) = frame.maps.get(i) {
                 pictures.ori_stored = orientation.picture(view, &map.data);
-                let ori = shown(&pictures.ori_stored, look.scale, view.quantity.db_factor());
+                let ori = shown(&pictures.ori_stored, look.scale, look.range, view.quantity.db_factor());
                 pictures.ori_limits = limits(&ori.values, look.range);
                 pictures.ori = Some(ori);
             }
             if all || new_baseline {
                 let map = baseline.as_ref().and_then(|base| base.h_sim.get(i)).filter(|map| map.len() == view.cells());
-                pictures.base =
-                    map.map(|map| shown(&orientation.picture(view, map), look.scale, view.quantity.db_factor()));
+                let shown = |map: &[f64]| {
+                    shown(&orientation.picture(view, map), look.scale, look.range, view.quantity.db_factor())
+                };
+                pictures.base = map.map(|map| shown(map));
             }
             if all || new_snapshot {
                 pictures.take_snapshot(session.fit.shown.as_deref(), i, view, &look);
@@ -206,6 +208,12 @@ impl Pictures {
         }
     }
 
+    /// What lies lower than this is shown as this.
+    pub(super) fn floor(&self, content: Content) -> f64 {
+        let look = self.look.as_ref().filter(|_| content != Content::Difference);
+        look.map_or(f64::NEG_INFINITY, |look| floor(look.scale, look.range))
+    }
+
     /// (stored, shown) value of H_ori and of H_sim at a pixel.
     pub(super) fn values(&self, view: usize, pixel: [usize; 2]) -> [Option<(f64, f64)>; 2] {
         let Some(p) = self.views.get(view) else { return [None, None] };
@@ -232,7 +240,7 @@ impl ViewPictures {
         let Some(snapshot) = snapshot else { return };
         if let Some(map) = snapshot.h_sim.get(index) {
             self.sim_stored = orientation.picture(view, map);
-            let sim = shown(&self.sim_stored, look.scale, view.quantity.db_factor());
+            let sim = shown(&self.sim_stored, look.scale, look.range, view.quantity.db_factor());
             let own = look.shared_range || matches!(look.range, ColorRange::Fixed { .. });
             self.sim_limits = if own { self.ori_limits } else { limits(&sim.values, look.range) };
             self.sim = Some(sim);
@@ -247,8 +255,7 @@ impl ViewPictures {
             .map(|masks| [&masks.ori, &masks.sim, &masks.inside].map(|mask| orientation.mask_picture(view, mask)));
     }
 
-    /// H_sim less what it is compared with, both clipped to the limits' floor, so that −400 dB of nothing does not hide the
-    /// rest.
+    /// H_sim less what it is compared with, both clipped to the lower limit, so that what is nothing does not hide the rest.
     fn difference(&self, reference: Content) -> Option<Vec<f64>> {
         let (ori, sim) =
             (if reference == Content::Base { &self.base } else { &self.ori }.as_ref()?, self.sim.as_ref()?);

@@ -80,7 +80,8 @@ pub(super) fn show(
     iso_lines(ui, &field, limits, &place, tokens);
     axes(ui, run, &field, area, &place, tokens);
     let bar = Rect::from_min_max(pos2(area.max.x + 10.0, area.min.y - 10.0), pos2(rect.max.x, area.max.y));
-    let bar = ColorBar { rect: bar, map, limits, unit: measure.unit(), name: format!("{} scale", measure.short()) };
+    let (floor, name) = (f64::NEG_INFINITY, format!("{} scale", measure.short()));
+    let bar = ColorBar { rect: bar, map, limits, floor, unit: measure.unit(), name };
     // The scale is the table's own: its handles ask for nothing.
     let _ = colorbar(ui, &bar);
     points(ui, run, &field, measure, &place, tokens)

@@ -1,0 +1,111 @@
+//! How a box of a view's cells is laid out for the sum over joints.
+//!
+//! Tiles are four bins along the last axis and eight along the one before, sixteen beside each other a block: made for maps
+//! that are wide both ways. On a grid of 100000 × 1 cells nearly all of every block would lie beyond the box, which costs its
+//! memory and its time sixty-four times. There the axes change places first, the longest last: a view is the same with its
+//! axes in any order. A grid that tiles fit is left as it is, and double precision, which has no tiles, always.
+
+use super::Precision;
+use super::tiles::{Tiling, blocks_of};
+use crate::radar::View;
+use smallvec::SmallVec;
+
+/// Axes change places where that leaves at most one of so many blocks,
+const SAVES: usize = 4;
+/// of at least so many: fewer cost nothing.
+const FEW_BLOCKS: usize = 64;
+
+/// A box of cells as it is summed.
+pub(super) struct Laid {
+    /// The view with its axes in the order of the sum.
+    pub view: View,
+    /// `[lo, hi)` along these axes.
+    pub bins: Vec<[usize; 2]>,
+    /// Marks of the cells, in C order of these axes.
+    pub marked: Vec<bool>,
+    /// The same in tiles; empty in double precision.
+    pub tiling: Tiling,
+    /// The place among the view's own axes of each.
+    order: SmallVec<[usize; 3]>,
+}
+
+impl Laid {
+    /// Of the box `bins` of `view` whose cells are `marked` (C order).
+    pub(super) fn new(view: &View, bins: &[[usize; 2]], marked: &[bool], precision: Precision) -> Self {
+        let order = match precision {
+            Precision::F64 => (0..bins.len()).collect(),
+            Precision::F32 => order_of(bins),
+        };
+        let axes = order.iter().filter_map(|&k| view.axes.get(k).cloned()).collect();
+        let laid: Vec<[usize; 2]> = order.iter().map(|&k| bins[k]).collect();
+        let marked = into_order(&order, bins, marked);
+        let tiling = match precision {
+            Precision::F64 => Tiling::new(&[], &[]),
+            Precision::F32 => Tiling::new(&laid, &marked),
+        };
+        Self { view: View { axes, region: None, ..view.clone() }, bins: laid, marked, tiling, order }
+    }
+
+    /// Values of the cells in C order of the view's own axes, from those in the order of the sum.
+    pub(super) fn in_order_of_view(&self, values: Vec<f64>) -> Vec<f64> {
+        if self.order.is_sorted() {
+            return values;
+        }
+        let own = (0..self.order.len()).map(|axis| self.order.iter().position(|&k| k == axis).unwrap_or(axis));
+        into_order(&own.collect::<SmallVec<[usize; 3]>>(), &self.bins, &values)
+    }
+}
+
+/// The order of the axes of a box: their own, or the one with the fewest blocks where that saves most of them.
+fn order_of(bins: &[[usize; 2]]) -> SmallVec<[usize; 3]> {
+    let own: SmallVec<[usize; 3]> = (0..bins.len()).collect();
+    let size = |k: usize| bins[k][1].saturating_sub(bins[k][0]);
+    let mut sorted = own.clone();
+    sorted.sort_by_key(|&k| size(k));
+    let blocks = |order: &[usize]| blocks_of(order.iter().map(|&k| size(k)));
+    let (now, least) = (blocks(&own), blocks(&sorted));
+    if now >= FEW_BLOCKS && least <= now / SAVES { sorted } else { own }
+}
+
+/// `values` of a box (C order) in C order of its axes `order`.
+fn into_order<T: Copy>(order: &[usize], bins: &[[usize; 2]], values: &[T]) -> Vec<T> {
+    if order.is_sorted() {
+        return values.to_vec();
+    }
+    let sizes: SmallVec<[usize; 3]> = bins.iter().map(|[lo, hi]| hi - lo).collect();
+    let stride = |k: usize| sizes[k + 1..].iter().product::<usize>();
+    let cells = order.iter().fold(vec![0], |cells: Vec<usize>, &k| {
+        cells.iter().flat_map(|&cell| (0..sizes[k]).map(move |bin| cell + bin * stride(k))).collect()
+    });
+    cells.into_iter().filter_map(|cell| values.get(cell).copied()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_grid_that_tiles_do_not_fit_is_turned() {
+        let order = |sizes: &[usize]| order_of(&sizes.iter().map(|&n| [3, 3 + n]).collect::<Vec<_>>()).to_vec();
+        for fits in
+            [&[256, 128][..], &[80, 64], &[128, 40], &[1, 100_000], &[1, 1], &[3, 2], &[64, 64, 32], &[1, 1, 50_000]]
+        {
+            assert!(order(fits).is_sorted(), "{fits:?}");
+        }
+        assert_eq!(order(&[100_000, 1]), [1, 0]);
+        assert_eq!(order(&[100_000, 3]), [1, 0]);
+        assert_eq!(order(&[50_000, 1, 1]), [1, 2, 0]);
+        assert_eq!(order(&[900, 1, 700]), [1, 2, 0]);
+    }
+
+    #[test]
+    fn cells_come_back_to_their_places() {
+        let bins = [[1, 5], [0, 3], [2, 4]];
+        let values: Vec<f64> = (0..24).map(f64::from).collect();
+        let turned = into_order(&[1, 2, 0], &bins, &values);
+        // The cell (2, 1, 0) of the box is number 14, and (1, 0, 2) of the turned one 10.
+        assert_eq!(turned[10], 14.0);
+        let laid: Vec<[usize; 2]> = [1, 2, 0].map(|k: usize| bins[k]).to_vec();
+        assert_eq!(into_order(&[2, 0, 1], &laid, &turned), values);
+    }
+}
