@@ -26,22 +26,22 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "study",
         &[
-            "digest", "geometry", "folders", "config", "radar", "body", "mhp", "people", "dataset", "start",
+            "digest", "input", "geometry", "folders", "config", "radar", "body", "mhp", "people", "dataset", "start",
             "diagnose", "labels",
         ],
     ),
     (
         "session",
         &[
-            "digest", "geometry", "folders", "config", "radar", "body", "mhp", "people", "dataset", "start",
+            "digest", "input", "geometry", "folders", "config", "radar", "body", "mhp", "people", "dataset", "start",
             "diagnose", "labels", "study", "worker",
         ],
     ),
     (
         "app",
         &[
-            "digest", "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels",
-            "study", "worker", "session", "render",
+            "digest", "input", "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose",
+            "labels", "study", "worker", "session", "render",
         ],
     ),
 ];

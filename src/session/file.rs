@@ -12,6 +12,7 @@ use super::view::ViewState;
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::npz::replace_file;
+use crate::input::read_bytes;
 use crate::mhp::{FitState, Precision};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -232,11 +233,7 @@ impl SessionFile {
     pub fn read(path: &Path) -> Result<Self, SessionFileError> {
         let failed = |reason| SessionFileError::Read { reason, path: path.to_owned() };
         let wrong = |reason: String| SessionFileError::Content { reason, path: path.to_owned() };
-        let bytes = std::fs::metadata(path).map_err(failed)?.len();
-        if bytes > MOST_BYTES {
-            return Err(wrong(format!("it has {bytes} bytes; expected at most {MOST_BYTES}")));
-        }
-        let text = std::fs::read(path).map_err(failed)?;
+        let text = read_bytes(path, "a session file", MOST_BYTES).map_err(failed)?;
         let head: Head = serde_json::from_slice(&text).map_err(|error| wrong(error.to_string()))?;
         if head.format != FORMAT {
             return Err(wrong(format!("`format` is {:?}; expected \"{FORMAT}\"", head.format)));

@@ -4,6 +4,7 @@
 //! is unknown. The IoU is the mean over the columns `iou_<array>`, as in the window.
 
 use super::StudyError;
+use crate::input::open_file;
 use std::path::Path;
 
 /// What a table says of one frame.
@@ -32,7 +33,7 @@ pub struct SummaryRow {
 /// naming file, line and column.
 pub fn read_summary(path: &Path) -> Result<Vec<SummaryRow>, StudyError> {
     let failed = |reason| StudyError::Read { reason, path: path.to_owned() };
-    let file = std::fs::File::open(path).map_err(failed)?;
+    let file = open_file(path, "a table of results (CSV)").map_err(failed)?;
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
     let head = reader.byte_headers().map_err(|error| broken(&error, path))?.clone();
     let columns = Columns::of(&head, path)?;

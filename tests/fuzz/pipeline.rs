@@ -54,6 +54,9 @@ pub(crate) fn whole(random: &mut StdRng, folder: &Path) {
     let _ = compute(&dataset, &ComplexityOptions::default(), None, &Progress::new());
 }
 
+/// Cells of a map: what takes long because it is large is no hang.
+const MOST_CELLS: usize = 60_000;
+
 struct Axis {
     kind: &'static str,
     bins: usize,
@@ -66,6 +69,7 @@ struct Axis {
 fn view(random: &mut StdRng) -> Vec<Axis> {
     const KINDS: [&str; 10] = ["range", "azimuth", "elevation", "doppler", "cone", "x", "y", "z", "depth_h", "depth_v"];
     let long = random.random_range(0..12);
+    let mut room = MOST_CELLS;
     (0..random.random_range(2..=3))
         .map(|k| {
             let kind = KINDS.choose(random).copied().unwrap_or("range");
@@ -85,6 +89,8 @@ fn view(random: &mut StdRng) -> Vec<Axis> {
                 _ => (random.random_range(-most..most), random.random_range(-most..most)),
             };
             let bins = if k == long { random.random_range(1000..20_000) } else { random.random_range(1..14) };
+            let bins: usize = bins.min(room);
+            room = (room / bins).max(1);
             Axis { kind, bins, lo, hi, sine }
         })
         .collect()

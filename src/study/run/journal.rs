@@ -7,6 +7,7 @@ use super::error::RunError;
 use super::row::RunRow;
 use super::spec::RunSpec;
 use crate::dataset::npz::replace_file;
+use crate::input::read_bytes;
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::Write as _;
@@ -81,9 +82,12 @@ fn line(row: &RunRow) -> std::io::Result<String> {
     Ok(serde_json::to_string(row)? + "\n")
 }
 
+/// Bytes of a journal that are read: some 400 a row.
+const MOST_BYTES: u64 = 4 << 30;
+
 /// The rows, and whether every line was whole.
 fn read_lines(path: &Path, spec: &RunSpec) -> Result<(Rows, bool), RunError> {
-    let bytes = std::fs::read(path).map_err(RunError::reading(path))?;
+    let bytes = read_bytes(path, "the journal of a run", MOST_BYTES).map_err(RunError::reading(path))?;
     let whole = bytes.is_empty() || bytes.ends_with(b"\n");
     let mut lines = bytes.split(|&byte| byte == b'\n').filter(|line| !line.is_empty());
     let Some(head) = lines.next() else { return Ok((Rows::new(), false)) };

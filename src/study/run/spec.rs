@@ -6,6 +6,7 @@ use super::kind::StudyKind;
 use super::variant::Variant;
 use crate::dataset::npz::replace_file;
 use crate::digest;
+use crate::input::{MOST_TEXT, read_text};
 use crate::mhp::Precision;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -115,7 +116,7 @@ impl RunSpec {
     /// Where it cannot be read or is not one.
     pub fn read(folder: &Path) -> Result<Self, RunError> {
         let file = folder.join(RUN_FILE);
-        let text = std::fs::read_to_string(&file).map_err(RunError::reading(&file))?;
+        let text = read_text(&file, "what a run is (TOML)", MOST_TEXT).map_err(RunError::reading(&file))?;
         let wrong = |message: String| RunError::Damaged { message, path: file.clone() };
         let spec: Self = toml::from_str(&text).map_err(|error| wrong(error.message().replace('\n', "; ")))?;
         let lengths = spec.variants.iter().all(|variant| variant.labels.len() == spec.columns.len());
