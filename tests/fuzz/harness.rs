@@ -13,6 +13,9 @@ const SLOWEST: Duration = Duration::from_secs(2);
 /// An input that is not done after this ends the process, with its name.
 const GIVEN_UP: Duration = Duration::from_secs(120);
 
+/// The number of the one input that is to be tried.
+const ONLY: &str = "MHP_FUZZ_INPUT";
+
 /// What is done with one input: random numbers, and an empty folder.
 pub(crate) type Target = fn(&mut StdRng, &Path);
 
@@ -34,7 +37,8 @@ pub(crate) fn run(name: &'static str, inputs: u64, target: Target) {
     let home = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() }.unwrap();
     let mut faults = Vec::new();
     let (mut slowest, mut slow_input) = (Duration::ZERO, 0);
-    for input in 0..inputs {
+    let only = std::env::var(ONLY).ok().and_then(|number| number.parse::<u64>().ok());
+    for input in only.map_or(0..inputs, |one| one..one + 1) {
         under_way.1.store(input, Ordering::Relaxed);
         under_way.0.store(began.elapsed().as_millis() as u64 + 1, Ordering::Relaxed);
         let mut took = once(home.path(), name, input, target, &mut faults);
