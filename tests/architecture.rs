@@ -9,6 +9,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("digest", &[]),
     ("geometry", &[]),
     ("folders", &[]),
+    ("output", &["digest"]),
     ("labels", &["folders"]),
     ("config", &[]),
     ("radar", &["geometry", "config"]),
@@ -18,37 +19,37 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("people", &["geometry", "config", "radar", "simulate"]),
     ("mhp", &["geometry", "config", "radar", "body"]),
     ("diagnose", &["geometry", "config", "radar", "body", "mhp", "labels"]),
-    ("dataset", &["digest", "geometry", "folders", "config", "radar", "body"]),
+    ("dataset", &["digest", "geometry", "folders", "output", "config", "radar", "body"]),
     ("render", &["geometry"]),
     ("start", &["geometry", "config", "radar", "body", "mhp", "people", "dataset"]),
     ("worker", &["geometry", "config", "radar", "body", "mhp", "dataset", "start"]),
     (
         "study",
         &[
-            "digest", "geometry", "folders", "config", "radar", "body", "mhp", "people", "dataset", "start",
+            "digest", "geometry", "folders", "output", "config", "radar", "body", "mhp", "people", "dataset", "start",
             "diagnose", "labels",
         ],
     ),
     (
         "session",
         &[
-            "digest", "geometry", "folders", "config", "radar", "body", "mhp", "people", "dataset", "start",
+            "digest", "geometry", "folders", "output", "config", "radar", "body", "mhp", "people", "dataset", "start",
             "diagnose", "labels", "study", "worker",
         ],
     ),
     (
         "app",
         &[
-            "digest", "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels",
-            "study", "worker", "session", "render",
+            "digest", "geometry", "folders", "output", "config", "radar", "body", "mhp", "dataset", "diagnose",
+            "labels", "study", "worker", "session", "render",
         ],
     ),
 ];
 
 /// Rooms that know no window and no GPU.
 const WINDOWLESS: &[&str] = &[
-    "digest", "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels", "worker",
-    "session", "study", "simulate", "people", "start",
+    "digest", "geometry", "folders", "output", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels",
+    "worker", "session", "study", "simulate", "people", "start",
 ];
 
 fn files(folder: &Path) -> Vec<PathBuf> {
