@@ -48,12 +48,13 @@ impl FolderLock {
         let path = folder.join(NAME);
         loop {
             match OpenOptions::new().create_new(true).write(true).open(&path) {
-                Ok(mut file) => {
+                Ok(file) => {
                     if !hold(&file, folder, &path)? {
                         continue;
                     }
-                    writeln!(file, "{}", std::process::id()).map_err(OutputError::writing(&path))?;
-                    return Ok(Self { file, path });
+                    let lock = Self { file, path: path.clone() };
+                    writeln!(&lock.file, "{}", std::process::id()).map_err(OutputError::writing(&path))?;
+                    return Ok(lock);
                 }
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => remove_left(folder, &path)?,
                 Err(error) => return Err(OutputError::writing(&path)(error)),

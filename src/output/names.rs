@@ -37,6 +37,8 @@ impl FileNames {
         }
         let shared = |(own, frames): (&String, &Vec<usize>)| (frames.len() > 1).then(|| own.clone());
         let mut shared: Vec<String> = taken.iter().filter_map(shared).collect();
+        // Sorted, because a map has no order and the names must not depend on one.
+        shared.sort();
         // A name with a digest may be that of another frame, made to look so: both go on to the next digest.
         while let Some(own) = shared.pop() {
             for index in taken.remove(&own).unwrap_or_default() {
@@ -93,9 +95,9 @@ fn flat(name: &str) -> Cow<'_, str> {
 /// What can be a file's name of a name that cannot, and the digest that makes it the frame's alone; at most [`MOST_BYTES`].
 fn hashed(name: &str, digest: &str) -> String {
     let plain = |c: char| if is_plain(c) && !is_combining(c) { c } else { '_' };
-    let plain: String = name.chars().map(plain).collect();
+    let plain: String = name.chars().map(plain).collect::<String>().replace("..", "__");
     let plain = plain.trim_matches(['.', ' ']);
-    let room = MOST_BYTES - 1 - digest.len();
+    let room = MOST_BYTES - 2 - digest.len();
     let end = (0..=room.min(plain.len())).rev().find(|&end| plain.is_char_boundary(end)).unwrap_or(0);
     let stem = plain.get(..end).unwrap_or_default().trim_end_matches(['.', ' ']);
     // The digest behind a device's name does not help where a dot follows it: `con.x-0123` is the device still.
