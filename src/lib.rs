@@ -43,6 +43,7 @@
 //! | [`body`] | skeleton topologies, the PPPR parameters, bodies that move |
 //! | [`radar`] | chirp, axes, views, point-spread functions, FMCW synthesis of a MIMO array and the FFT chain |
 //! | [`config`] | `FitConfig`: defaults, ranges, help text; the only source for files, command line and sliders |
+//! | [`output`] | where results are written: safe names, guarded and locked folders, files whole or not at all |
 //! | [`folders`] | where the user's settings, labels and caches lie |
 //! | [`input`] | opening what others made: regular files only, bounded |
 //! | [`geometry`] | 3-vectors, 3×3 matrices, quaternions, the spherical triad |
@@ -58,6 +59,7 @@ pub mod geometry;
 pub mod input;
 pub mod labels;
 pub mod mhp;
+pub mod output;
 pub mod people;
 pub mod radar;
 pub mod study;

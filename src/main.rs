@@ -4,6 +4,7 @@ use cap::Cap;
 use clap::Parser;
 use mhp_inspector::cli::bench::{Meter, count_bytes_with};
 use mhp_inspector::cli::{Cli, EXIT_BAD_INPUT, WindowArgs, begin_again, run};
+use mhp_inspector::output;
 use std::alloc::System;
 use std::io::IsTerminal as _;
 use std::process::ExitCode;
@@ -23,8 +24,12 @@ fn main() -> ExitCode {
         .with_target(false)
         .init();
     count_bytes_with(Meter { total_bytes: || ALLOCATOR.total_allocated(), peak_bytes: || ALLOCATOR.max_allocated() });
+    if let Err(error) = output::survive_size_limit() {
+        tracing::warn!("a file that reaches the limit of its size will end the program: {error}");
+    }
     let cli = Cli::parse();
     begin_again(cli.command.as_ref());
+    output::allow_into_data(cli.into_data);
     let done = match cli.command {
         Some(command) => run(command),
         None => open_window(cli.window),

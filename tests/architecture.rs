@@ -10,6 +10,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("geometry", &[]),
     ("folders", &[]),
     ("input", &[]),
+    ("output", &["digest"]),
     ("labels", &["folders"]),
     ("config", &["input"]),
     ("radar", &["geometry", "config"]),
@@ -19,37 +20,37 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("people", &["geometry", "config", "radar", "simulate"]),
     ("mhp", &["geometry", "config", "radar", "body"]),
     ("diagnose", &["geometry", "config", "radar", "body", "mhp", "labels"]),
-    ("dataset", &["digest", "input", "geometry", "folders", "config", "radar", "body"]),
+    ("dataset", &["digest", "input", "geometry", "folders", "output", "config", "radar", "body"]),
     ("render", &["geometry"]),
     ("start", &["geometry", "config", "radar", "body", "mhp", "people", "dataset"]),
     ("worker", &["geometry", "config", "radar", "body", "mhp", "dataset", "start"]),
     (
         "study",
         &[
-            "digest", "input", "geometry", "folders", "config", "radar", "body", "mhp", "people", "dataset", "start",
-            "diagnose", "labels",
+            "digest", "input", "geometry", "folders", "output", "config", "radar", "body", "mhp", "people", "dataset",
+            "start", "diagnose", "labels",
         ],
     ),
     (
         "session",
         &[
-            "digest", "input", "geometry", "folders", "config", "radar", "body", "mhp", "people", "dataset", "start",
-            "diagnose", "labels", "study", "worker",
+            "digest", "input", "geometry", "folders", "output", "config", "radar", "body", "mhp", "people", "dataset",
+            "start", "diagnose", "labels", "study", "worker",
         ],
     ),
     (
         "app",
         &[
-            "digest", "input", "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose",
-            "labels", "study", "worker", "session", "render",
+            "digest", "input", "geometry", "folders", "output", "config", "radar", "body", "mhp", "dataset",
+            "diagnose", "labels", "study", "worker", "session", "render",
         ],
     ),
 ];
 
 /// Rooms that know no window and no GPU.
 const WINDOWLESS: &[&str] = &[
-    "digest", "geometry", "folders", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels", "worker",
-    "session", "study", "simulate", "people", "start",
+    "digest", "geometry", "folders", "output", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels",
+    "worker", "session", "study", "simulate", "people", "start",
 ];
 
 fn files(folder: &Path) -> Vec<PathBuf> {

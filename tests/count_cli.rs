@@ -102,7 +102,8 @@ fn a_lone_frame_says_whether_it_is_uncertain() {
 #[test]
 fn the_table_of_frames_is_written() {
     let folder = data_set(3);
-    let file = folder.path().join("counts.csv");
+    let out = tempfile::tempdir().unwrap();
+    let file = out.path().join("counts.csv");
     assert!(count(folder.path(), &["--csv", file.to_str().unwrap()]).status.success());
     let mut csv = csv::Reader::from_path(&file).unwrap();
     let head: Vec<String> = csv.headers().unwrap().iter().map(str::to_owned).collect();
@@ -145,4 +146,41 @@ fn bad_input_is_one_line_and_exit_code_2() {
         assert_eq!(told.trim().lines().count(), 1, "{told}");
     }
     assert!(text(&count(Path::new("/no/such/place"), &[]).stderr).contains("/no/such/place"));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_table_that_cannot_be_written_leaves_the_older_one_and_no_input_is_replaced() {
+    let (folder, out) = (data_set(2), tempfile::tempdir().unwrap());
+    let table = out.path().join("counts.csv");
+    std::fs::write(&table, "older").unwrap();
+    let mut command = Command::new("bash");
+    command.args(["-c", "ulimit -f 0; exec \"$@\"", "bash", env!("CARGO_BIN_EXE_mhp-inspector"), "count"]);
+    let output = command.arg(folder.path()).arg("--csv").arg(&table).output().unwrap();
+    let told = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{told}");
+    assert!(told.contains("counts.csv: cannot be written: File too large"), "{told}");
+    assert_eq!(std::fs::read(&table).unwrap(), b"older");
+    assert_eq!(std::fs::read_dir(out.path()).unwrap().count(), 1, "nothing else is left");
+
+    let input = folder.path().join("frames/000.npz");
+    let (before, link) = (std::fs::read(&input).unwrap(), out.path().join("link.csv"));
+    std::fs::hard_link(&input, &link).unwrap();
+    for (file, expected) in [
+        (&link, "is an input, which is never replaced"),
+        (&input, "lies in the data set"),
+        (&folder.path().join("new.csv"), "lies in the data set"),
+    ] {
+        let output = count(folder.path(), &["--csv", file.to_str().unwrap()]);
+        let told = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains(expected), "{told}");
+    }
+    let flagged = count(folder.path(), &["--into-data", "--csv", input.to_str().unwrap()]);
+    assert!(text(&flagged.stderr).contains("is an input"), "{}", text(&flagged.stderr));
+    assert_eq!(std::fs::read(&input).unwrap(), before);
+    // Devices are written to, not replaced; this one says that it is full.
+    let full = count(folder.path(), &["--csv", "/dev/full"]);
+    assert!(text(&full.stderr).contains("/dev/full: cannot be written: No space left"), "{}", text(&full.stderr));
+    assert!(!std::fs::metadata("/dev/full").unwrap().is_file());
 }

@@ -110,7 +110,8 @@ fn parameters_given_are_those_judged() {
 fn cards_are_read_by_people_and_the_table_by_programs() {
     let folder = blob(6);
     spoil(folder.path(), 1);
-    let table = folder.path().join("evidence.csv");
+    let out = tempfile::tempdir().unwrap();
+    let table = out.path().join("evidence.csv");
     let output = evidence(folder.path(), &["--iterations", "2", "--csv", table.to_str().unwrap()]);
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
     assert!(text(&output.stderr).starts_with("warning: 1 of 6 frames could not be judged; the first: "));

@@ -176,7 +176,8 @@ fn a_file_that_cannot_be_written_leaves_the_old_one() {
 fn fit_writes_both_beside_the_parameters() {
     let folder = tempfile::tempdir().unwrap();
     blob::write_dataset(folder.path(), 2);
-    let out = folder.path().join("out");
+    let out = tempfile::tempdir().unwrap();
+    let out = out.path().join("out");
     let fit = |args: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"));
         command.arg("fit").arg(folder.path()).args(["--iterations", "3"]).args(args).output().unwrap()

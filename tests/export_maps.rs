@@ -8,11 +8,15 @@ mod blob;
 use half::f16;
 use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::npz::{NpzArchive, read_array};
-use mhp_inspector::dataset::{Dataset, Progress, read_pppr};
+use mhp_inspector::dataset::{Dataset, Layout, Progress, read_pppr};
 use mhp_inspector::mhp::{Precision, Problem, simulate};
+use mhp_inspector::start::problem_of;
+use mhp_inspector::study::{MapScale, scaled_maps};
+use std::collections::BTreeMap;
 use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::Arc;
 
 /// How a map lies in a file.
 #[derive(Clone, Copy, PartialEq)]
@@ -227,4 +231,206 @@ fn a_stacked_file_holds_the_chosen_frames() {
     assert_eq!((copy.shape, copy.dtype.as_str()), (vec![2, 48, 32], ">f8"));
     assert!(out.path().join("heatmap/dataset.toml").is_file(), "the manifest that says what it is");
     assert!(copy.data[..1536].iter().zip(&copy.data[1536..]).any(|(a, b)| a != b), "the frames differ");
+}
+
+/// Every file below a folder with its bytes.
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(files(&path));
+        } else {
+            found.insert(path.clone(), std::fs::read(&path).unwrap());
+        }
+    }
+    found
+}
+
+/// The complex numbers of a cube of complex64.
+fn cube(file: &Path) -> Vec<[f32; 2]> {
+    let bytes = NpzArchive::open(file).unwrap().bytes("array").unwrap();
+    let number = |bytes: &[u8]| f32::from_le_bytes(bytes.try_into().unwrap());
+    bytes.chunks_exact(8).map(|pair| [number(&pair[..4]), number(&pair[4..])]).collect()
+}
+
+#[test]
+fn every_sample_is_exported_and_reads_back_as_a_data_set() {
+    let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples");
+    let folders = std::fs::read_dir(samples).unwrap().map(|entry| entry.unwrap().path());
+    let mut folders: Vec<PathBuf> = folders.filter(|path| path.is_dir()).collect();
+    folders.sort();
+    assert_eq!(folders.len(), 10);
+    for folder in folders {
+        let out = tempfile::tempdir().unwrap();
+        exported(&folder, out.path(), &["--iterations", "1", "--what", "pppr,heatmap,pc", "--format", "npz"]);
+        let [before, after] =
+            [folder.clone(), out.path().join("heatmap")].map(|path| Dataset::open(&path, &Progress::new()).unwrap());
+        assert_eq!((before.len(), before.info().layout), (after.len(), after.info().layout), "{}", folder.display());
+        assert_eq!(before.info().views, after.info().views);
+        let names = before.file_names();
+        for index in 0..before.len() {
+            let name = before.frame_name(index);
+            assert_eq!(name, after.frame_name(index));
+            let (old, new) = (before.load(index).unwrap(), after.load(index).unwrap());
+            assert_eq!(
+                (&old.truth, &old.image, old.person_count),
+                (&new.truth, &new.image, new.person_count),
+                "{name}"
+            );
+            assert_eq!((&old.notes, &old.map_boxes), (&new.notes, &new.map_boxes), "{name}");
+            let file = |kind: &str| out.path().join(kind).join(format!("{}.npz", names.of(index, name)));
+            let params = read_pppr(&file("pppr"), None).unwrap();
+            assert!(file("pc").is_file());
+            let problem = Arc::new(problem_of(&before, &old).unwrap());
+            let config = FitConfig::default();
+            let wanted = scaled_maps(&problem, &config, Precision::F32, &params, MapScale::Match).unwrap();
+            for (map, wanted) in new.maps.iter().zip(&wanted) {
+                let most = wanted.iter().copied().fold(0.0, f64::max);
+                let tolerance = if map.dtype == "<f2" { 1e-3 } else { 1e-6 } * most;
+                let worst = map.data.iter().zip(wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(most > 0.0 && worst <= tolerance, "{name} {}: {worst} of {most}", map.dtype);
+            }
+        }
+        if before.info().layout == Layout::Hupr {
+            let inside = "single_1/hori/000000000.npy";
+            let (old, new) = (cube(&folder.join(inside)), cube(&out.path().join("heatmap").join(inside)));
+            assert_eq!(old.len(), new.len());
+            for (row, ([a, b], [x, y])) in old.iter().zip(&new).enumerate().filter(|(k, _)| k % 8 == 3) {
+                let turned = (a * y - b * x).abs() / (a.hypot(*b) * x.hypot(*y));
+                assert!(turned < 1e-4 && a * x + b * y > 0.0, "{row}: the phase is the input's");
+            }
+            let loudest = |row: &[[f32; 2]]| row.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f32::max);
+            for row in new.chunks_exact(8) {
+                assert!(loudest(row) <= row[3][0].hypot(row[3][1]) * 1.001, "no bin beyond the map's");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_manifest_that_leaves_its_folder_makes_nothing_written_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mine, theirs) = (folder.path().join("mine"), folder.path().join("theirs"));
+    for at in [&mine, &theirs] {
+        std::fs::create_dir_all(at).unwrap();
+    }
+    for index in 0..2 {
+        blob::write_frame(&mine.join(format!("{index:03}.npz")), index, &|_, _| 0.0);
+    }
+    let absolute = format!("{}/*.npz", mine.display());
+    for pattern in ["../mine/*.npz", "../theirs/../mine/*.npz", absolute.as_str()] {
+        let manifest = blob::MANIFEST.replace("frames/*.npz", pattern);
+        std::fs::write(theirs.join("dataset.toml"), manifest).unwrap();
+        let before = (files(&mine), files(&theirs));
+        for out in [&theirs, &mine, &mine.join("deep/er")] {
+            let refused = export(&theirs, out, &["--iterations", "1", "--what", "heatmap"]);
+            let told = String::from_utf8_lossy(&refused.stderr).into_owned();
+            assert_eq!(refused.status.code(), Some(2), "{pattern}: {told}");
+            assert!(told.contains("lies in the data set") && told.contains("--into-data"), "{told}");
+        }
+        assert!((files(&mine), files(&theirs)) == before, "{pattern}: nothing was touched");
+        // Beside the two, where `../mine` from the heatmaps' folder would be a place of its own.
+        let out = folder.path().join("out");
+        std::fs::create_dir_all(out.join("mine")).unwrap();
+        exported(&theirs, &out, &["--iterations", "1", "--what", "heatmap,pppr"]);
+        assert!((files(&mine), files(&theirs)) == before, "{pattern}: nothing was touched");
+        assert_eq!(files(&out.join("mine")).len(), 0);
+        let copy = Dataset::open(&out.join("heatmap"), &Progress::new()).unwrap();
+        assert_eq!(copy.len(), 2);
+        assert!(copy.load(0).unwrap().maps[0].data != copy.load(1).unwrap().maps[0].data);
+        std::fs::remove_dir_all(out).unwrap();
+    }
+}
+
+#[test]
+fn an_export_that_lacks_a_frame_has_no_manifest() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir_all(folder.path().join("frames")).unwrap();
+    std::fs::write(folder.path().join("dataset.toml"), blob::MANIFEST).unwrap();
+    let frame = |index: usize| folder.path().join(format!("frames/{index:03}.npz"));
+    for index in 0..2 {
+        blob::write_frame(&frame(index), index, &|_, _| 0.0);
+    }
+    let out = tempfile::tempdir().unwrap();
+    let manifest = out.path().join("heatmap/dataset.toml");
+    exported(folder.path(), out.path(), &["--iterations", "1", "--what", "heatmap"]);
+    assert!(manifest.is_file());
+    std::fs::write(frame(1), "no archive").unwrap();
+    let output = export(folder.path(), out.path(), &["--iterations", "1", "--what", "heatmap"]);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("heatmap is not complete: it has 1 of 2 frames and gets no dataset.toml"), "{told}");
+    assert!(!manifest.exists(), "not even that of the export before");
+}
+
+#[test]
+fn what_cannot_be_exported_is_refused_before_anything_is_made() {
+    let stacks = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/xrf55-stack");
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let refused = |words: &[&str], path: &Path, expected: &str| {
+        let output = export(path, &out, words);
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains(expected), "{told}");
+        assert!(!out.exists(), "{expected}: nothing was made");
+    };
+    refused(&["--frames", "0..5"], &stacks, "its files hold 17 frames each");
+    let params = stacks.join("mmWave");
+    refused(&["--params", params.to_str().unwrap()], &folder.path().join("none"), "none: no such file or folder");
+}
+
+#[test]
+fn params_are_not_replaced_by_what_is_made_of_them() {
+    let (folder, _) = one_frame([PLAIN, PLAIN], 1.0, zip::CompressionMethod::Stored);
+    let out = tempfile::tempdir().unwrap();
+    exported(folder.path(), out.path(), &["--iterations", "1", "--what", "pppr"]);
+    let params = out.path().join("pppr");
+    let before = files(&params);
+    let again = export(folder.path(), out.path(), &["--params", params.to_str().unwrap()]);
+    let told = String::from_utf8_lossy(&again.stderr).into_owned();
+    assert_eq!(again.status.code(), Some(2), "{told}");
+    assert!(told.contains("which is never replaced"), "{told}");
+    assert!(files(&params) == before);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_of_results_that_is_a_link_elsewhere_is_refused() {
+    let (folder, file) = one_frame([PLAIN, PLAIN], 1.0, zip::CompressionMethod::Stored);
+    let (out, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let before = std::fs::read(&file).unwrap();
+    for target in [folder.path(), elsewhere.path()] {
+        let link = out.path().join("heatmap");
+        std::os::unix::fs::symlink(target, &link).unwrap();
+        let output = export(folder.path(), out.path(), &["--iterations", "1", "--what", "heatmap", "--into-data"]);
+        assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
+        std::fs::remove_file(link).unwrap();
+    }
+    // A link further down leads out too.
+    std::fs::create_dir_all(out.path().join("heatmap")).unwrap();
+    std::os::unix::fs::symlink(folder.path().join("frames"), out.path().join("heatmap/frames")).unwrap();
+    let output = export(folder.path(), out.path(), &["--iterations", "1", "--what", "heatmap"]);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("outside the folder of results"), "{told}");
+    assert_eq!(output.status.code(), Some(2), "{told}");
+    assert!(std::fs::read(&file).unwrap() == before);
+    assert_eq!(files(elsewhere.path()).len(), 0);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_disk_that_is_full_is_one_message_and_leaves_no_half_file() {
+    let (folder, _) = one_frame([PLAIN, PLAIN], 1.0, zip::CompressionMethod::Stored);
+    let out = tempfile::tempdir().unwrap();
+    let program = env!("CARGO_BIN_EXE_mhp-inspector");
+    // Files of 2 KiB at most: neither parameters nor maps fit.
+    let mut command = Command::new("bash");
+    command.args(["-c", "ulimit -f 2; exec \"$@\"", "bash", program, "export"]).arg(folder.path());
+    let output = command.args(["--iterations", "1", "--out"]).arg(out.path()).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "ended by itself: {told}");
+    assert!(told.contains("File too large") && told.lines().count() == 1, "{told}");
+    assert_eq!(files(out.path()).into_keys().collect::<Vec<_>>(), Vec::<PathBuf>::new());
 }

@@ -9,6 +9,7 @@ use mhp_inspector::dataset::npz::{ArrayView, write};
 use mhp_inspector::dataset::{Dataset, Manifest, Progress, read_pppr};
 use mhp_inspector::diagnose::joint_errors;
 use mhp_inspector::mhp::{Fitter, Precision, Problem, predict, simulate};
+use mhp_inspector::output::{FolderLock, Inputs};
 use mhp_inspector::radar::RadarConfig;
 use mhp_inspector::start::{begin, problem_of};
 use mhp_inspector::study::{BatchOptions, StudyError, run_batch};
@@ -60,13 +61,14 @@ fn body(forward_m: f64, left_m: f64) -> Pppr {
 /// A data set of the bodies' own maps over a little background, with their joints as truth.
 struct Small {
     folder: tempfile::TempDir,
+    results: tempfile::TempDir,
 }
 
 impl Small {
     fn new(frames: &[(&str, f64)]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("dataset.toml"), MANIFEST).unwrap();
-        let small = Self { folder };
+        let small = Self { folder, results: tempfile::tempdir().unwrap() };
         for &(name, left_m) in frames {
             small.add(name, left_m);
         }
@@ -75,6 +77,11 @@ impl Small {
 
     fn path(&self) -> &Path {
         self.folder.path()
+    }
+
+    /// A place for results, which do not go into the data set.
+    fn out(&self, name: &str) -> PathBuf {
+        self.results.path().join(name)
     }
 
     fn file(&self, name: &str) -> PathBuf {
@@ -159,7 +166,7 @@ fn by_hand(dataset: &Dataset, index: usize, config: &FitConfig, start: Option<Pp
 fn a_batch_writes_rows_in_order_and_goes_on_after_a_bad_frame() {
     let small = Small::new(&[("a/000", 0.0), ("a/001", 0.1), ("a/003", 0.2), ("b/000", -0.3)]);
     small.spoil("a/002");
-    let out = small.path().join("deep/out");
+    let out = small.out("deep/out");
     let output = fit(small.path(), &["--iterations", "6", "--out", out.to_str().unwrap()]);
     assert_eq!(code(&output), 1, "{}", text(&output.stderr));
     let stderr = text(&output.stderr);
@@ -202,7 +209,7 @@ fn a_batch_writes_rows_in_order_and_goes_on_after_a_bad_frame() {
 fn a_warm_start_follows_a_sequence_and_no_further() {
     let small = Small::new(&[("a/000", 0.0), ("a/001", 0.05), ("a/003", 0.1), ("b/000", -0.3)]);
     small.spoil("a/002");
-    let out = small.path().join("out");
+    let out = small.out("out");
     let output = fit(small.path(), &["--iterations", "5", "--warm-start", "--out", out.to_str().unwrap()]);
     assert_eq!(code(&output), 1);
     let rows = summary(&out);
@@ -277,10 +284,11 @@ fn the_table_shows_twenty_rows_and_the_means_of_all() {
 #[test]
 fn frames_of_one_flat_name_do_not_overwrite_each_other() {
     let small = Small::new(&[("a/b_c", 0.0), ("a_b/c", 0.1)]);
-    let out = small.path().join("out");
+    let out = small.out("out");
     let output = fit(small.path(), &["--iterations", "1", "--out", out.to_str().unwrap()]);
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-    let files = [out.join("pppr/a_b_c.npz"), out.join("pppr/a_b_c_1.npz")];
+    // The first digits of the SHA-256 of `a/b_c` and `a_b/c`.
+    let files = ["a_b_c-ab14be7080849174.npz", "a_b_c-02d7306b94c0342a.npz"].map(|name| out.join("pppr").join(name));
     let [first, second] = files.map(|file| read_pppr(&file, None).unwrap());
     assert_ne!(first, second);
 }
@@ -328,7 +336,7 @@ fn where_no_frame_can_be_fitted_the_code_is_two_and_the_table_still_valid() {
     let small = Small::new(&[]);
     small.spoil("a/000");
     small.spoil("a/001");
-    let out = small.path().join("out");
+    let out = small.out("out");
     let output = fit(small.path(), &["--out", out.to_str().unwrap()]);
     assert_eq!(code(&output), 2);
     let stderr = text(&output.stderr);
@@ -387,4 +395,190 @@ fn the_real_mmvr_frame_reaches_the_asked_iou() {
     let [hori, vert] = run("data/mmvr/00383_radar.npz", &["--config", config.to_str().unwrap()]);
     println!("learning_rate 3e-3: IoU {hori:.3} {vert:.3}");
     assert!(hori >= 0.60 && vert >= 0.55, "{hori} {vert}");
+}
+
+fn lines(out: &Path) -> Vec<String> {
+    std::fs::read_to_string(out.join("summary.csv")).unwrap().lines().map(str::to_owned).collect()
+}
+
+/// Names in a folder that begin with a dot.
+fn hidden(folder: &Path) -> Vec<String> {
+    let names = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    names.filter(|name| name.starts_with('.')).collect()
+}
+
+/// A data set of many frames that are all alike.
+fn many(frames: usize) -> Small {
+    let small = Small::new(&[("a/000", 0.0)]);
+    for k in 1..frames {
+        std::fs::copy(small.file("a/000"), small.file(&format!("a/{k:03}"))).unwrap();
+    }
+    small
+}
+
+fn started(path: &Path, args: &[&str]) -> std::process::Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"));
+    command.arg("fit").arg(path).args(args).env("MHP_INSPECTOR_HOME", "/nonexistent");
+    command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap()
+}
+
+#[test]
+fn three_at_once_leave_one_whole_table() {
+    let small = many(30);
+    let out = small.out("out");
+    let words = ["--iterations", "100", "--out", out.to_str().unwrap()];
+    let three: Vec<_> = (0..3).map(|_| started(small.path(), &words)).collect();
+    let mut done = 0;
+    for child in three {
+        let output = child.wait_with_output().unwrap();
+        match output.status.code() {
+            Some(0) => done += 1,
+            _ => assert!(text(&output.stderr).contains("another process"), "{}", text(&output.stderr)),
+        }
+    }
+    assert!(done >= 1);
+    let rows = summary(&out);
+    let wanted: Vec<String> = (0..30).map(|k| format!("a/{k:03}")).collect();
+    assert_eq!(column(&rows, "frame"), wanted);
+    assert_eq!((hidden(&out), lines(&out).len()), (Vec::new(), 31), "no lock and no half file stays");
+
+    // Deterministically: while this process holds the folder, no other writes it, and is told who does.
+    let lock = FolderLock::claim(&out, &[], &Inputs::default()).unwrap();
+    let output = fit(small.path(), &words);
+    let wanted = format!("out: another process ({}) is writing here", std::process::id());
+    assert_eq!(code(&output), 2);
+    assert!(text(&output.stderr).contains(&wanted), "{}", text(&output.stderr));
+    drop(lock);
+    assert_eq!(code(&fit(small.path(), &["--iterations", "1", "--out", out.to_str().unwrap()])), 0);
+}
+
+#[test]
+fn a_killed_fit_leaves_a_whole_table_and_the_next_one_cleans_up() {
+    let small = many(40);
+    let out = small.out("out");
+    let mut child = started(small.path(), &["--iterations", "3000", "--out", out.to_str().unwrap()]);
+    let rows = || std::fs::read_to_string(out.join("summary.csv")).unwrap_or_default().matches('\n').count();
+    while rows() < 3 {
+        assert_eq!(child.try_wait().unwrap(), None, "there was time to kill it");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let left = summary(&out);
+    assert!((2..40).contains(&left.len()));
+    assert!(left.iter().all(|row| row["reason"] == "iterations" && row["loss"].parse::<f64>().is_ok()));
+    assert!(hidden(&out).iter().any(|name| name.ends_with(".tmp")), "{:?}", hidden(&out));
+    assert_eq!(code(&fit(small.path(), &["--iterations", "1", "--out", out.to_str().unwrap()])), 0);
+    assert_eq!((hidden(&out), summary(&out).len()), (Vec::new(), 40));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_limit_of_file_size_is_an_error_and_leaves_what_was_there() {
+    let small = many(12);
+    let out = small.out("out");
+    assert_eq!(code(&fit(small.path(), &["--iterations", "1", "--out", out.to_str().unwrap()])), 0);
+    let before = lines(&out);
+    let mut command = Command::new("bash");
+    command.args(["-c", "ulimit -f 0; exec \"$@\"", "bash", env!("CARGO_BIN_EXE_mhp-inspector"), "fit"]);
+    let output = command.arg(small.path()).args(["--iterations", "2", "--out"]).arg(&out).output().unwrap();
+    assert_eq!(code(&output), 2, "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("File too large"), "{}", text(&output.stderr));
+    assert_eq!((lines(&out), hidden(&out)), (before, Vec::new()));
+}
+
+#[test]
+fn results_do_not_go_into_the_data_set_and_never_replace_an_input() {
+    let small = Small::new(&[("a/000", 0.0), ("a/001", 0.1)]);
+    let before = std::fs::read(small.file("a/000")).unwrap();
+    let names = || std::fs::read_dir(small.path()).unwrap().count();
+    let count = names();
+    let run = |out: &Path, more: &[&str]| {
+        let output = fit(small.path(), &[&["--iterations", "1", "--out", out.to_str().unwrap()], more].concat());
+        (code(&output), text(&output.stderr))
+    };
+    let (inside, round) = (small.path().join("not/yet"), small.out("none/../link/deep"));
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(small.path(), small.out("link")).unwrap();
+    let places = if cfg!(unix) { vec![small.path(), &inside, &round] } else { vec![small.path(), &inside] };
+    for place in places {
+        let (code, told) = run(place, &[]);
+        assert!(code == 2 && told.contains("lies in the data set") && told.contains("or --into-data"), "{told}");
+        assert_eq!(names(), count, "nothing was made");
+    }
+    let (code, told) = run(&inside, &["--into-data"]);
+    assert_eq!(code, 0, "{told}");
+    assert!(inside.join("summary.csv").is_file());
+
+    // A result's place that is an input's, under another name: refused with the flag or without.
+    let out = small.out("out");
+    std::fs::create_dir_all(out.join("pppr")).unwrap();
+    let place = out.join("pppr/a_001.npz");
+    std::fs::hard_link(small.file("a/000"), &place).unwrap();
+    for words in [&[][..], &["--into-data"]] {
+        let (code, told) = run(&out, words);
+        assert!(code == 1 && told.contains("a_001.npz: is an input, which is never replaced"), "{told}");
+    }
+    std::fs::remove_file(&place).unwrap();
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(small.file("a/000"), &place).unwrap();
+        let (code, told) = run(&out, &[]);
+        assert!(code == 1 && told.contains("is an input"), "{told}");
+        // A link to what is no input is replaced, not followed.
+        let elsewhere = small.out("elsewhere.npz");
+        std::fs::write(&elsewhere, "kept").unwrap();
+        std::fs::remove_file(&place).unwrap();
+        std::os::unix::fs::symlink(&elsewhere, &place).unwrap();
+        assert_eq!(run(&out, &[]).0, 0);
+        assert_eq!(std::fs::read(&elsewhere).unwrap(), b"kept");
+        assert!(!place.is_symlink() && read_pppr(&place, None).is_ok());
+        // Nor is a lock that leads elsewhere written to.
+        std::os::unix::fs::symlink(&elsewhere, out.join(".lock")).unwrap();
+        let (code, told) = run(&out, &[]);
+        assert!(code == 2 && told.contains(".lock: is no lock of this program"), "{told}");
+        std::fs::remove_file(out.join(".lock")).unwrap();
+    }
+    // The settings that a fit is told are an input too.
+    let settings = out.join("fit.toml");
+    let text = std::fs::read_to_string(&settings).unwrap();
+    let (code, told) = run(&out, &["--config", settings.to_str().unwrap()]);
+    assert!(code == 2 && told.contains("fit.toml: is an input"), "{told}");
+    assert_eq!(std::fs::read_to_string(&settings).unwrap(), text);
+    assert!(std::fs::read(small.file("a/000")).unwrap() == before);
+    // A file, or what nobody may write, in the folder's place.
+    let (code, told) = run(&small.out("elsewhere.npz"), &[]);
+    assert!(code == 2 && told.contains("elsewhere.npz: cannot be written"), "{told}");
+}
+
+#[cfg(unix)]
+#[test]
+fn frames_of_strange_names_have_a_file_each_inside_the_folder() {
+    let long = format!("a/{}", "n".repeat(240));
+    let names = ["a/CON", "a/x", "A/x", "a/two\nlines", "a/dot.", &long];
+    let small = Small::new(&names.map(|name| (name, 0.0)));
+    let manifest = small.path().join("dataset.toml");
+    let text = std::fs::read_to_string(&manifest).unwrap();
+    assert!(text.contains("frames = \"*/*.npz\""), "{text}");
+    let out = small.out("out");
+    let words = ["--iterations", "1", "--out", out.to_str().unwrap(), "--ply", "--curves"];
+    let output = fit(small.path(), &words);
+    assert_eq!(code(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
+    for (folder, ending) in [("pppr", "npz"), ("pppr", "ply"), ("curves", "csv")] {
+        let made = std::fs::read_dir(out.join(folder)).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+        let made: Vec<String> = made.filter(|name| name.ends_with(ending)).collect();
+        let lower: std::collections::BTreeSet<String> = made.iter().map(|name| name.to_lowercase()).collect();
+        assert_eq!((made.len(), lower.len()), (6, 6), "{made:?}");
+        assert!(made.iter().all(|name| name.len() < 160 && !name.contains('\n')), "{made:?}");
+    }
+    assert!(out.join("pppr/a_CON.npz").is_file(), "no device once the folder is in its name");
+    // Whichever frames are chosen, a frame's file is the same, and `export` finds it.
+    let part = small.out("part");
+    assert_eq!(code(&fit(small.path(), &["--frames", "1", "--iterations", "1", "--out", part.to_str().unwrap()])), 0);
+    let first = std::fs::read_dir(part.join("pppr")).unwrap().next().unwrap().unwrap().file_name();
+    assert!(out.join("pppr").join(first).is_file());
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"));
+    command.arg("export").arg(small.path()).arg("--out").arg(small.out("taken")).args(["--what", "pppr", "--params"]);
+    let output = command.arg(out.join("pppr")).output().unwrap();
+    assert_eq!(code(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
 }

@@ -128,7 +128,8 @@ fn from_the_hard_frames_to_the_labels_at_home() {
     assert!(!window.is_on("Tag F1") && window.value("Note").is_empty());
 
     // And home.
-    let table = window.folder.path().join("labels.csv");
+    let out = tempfile::tempdir().unwrap();
+    let table = out.path().join("labels.csv");
     window.save_as("Export labels as CSV…", &table);
     let dataset = window.session().data.dataset.as_ref().unwrap().fingerprint().to_owned();
     let (index, score) = (frame.to_string(), score.to_string());

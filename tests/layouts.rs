@@ -237,8 +237,8 @@ fn info_fit_and_complexity_work_on_every_layout() {
             String::from_utf8(done.stdout).unwrap()
         };
         assert!(run(&["info", "."]).contains("truth       joints in metres"), "{layout:?}");
-        run(&["complexity", ".", "--csv", "complexity.csv"]);
-        run(&["fit", ".", "--frames", "0", "--iterations", "2", "--out", "results"]);
+        run(&["complexity", ".", "--csv", "complexity.csv", "--into-data"]);
+        run(&["fit", ".", "--frames", "0", "--iterations", "2", "--out", "results", "--into-data"]);
     }
 }
 

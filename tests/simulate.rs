@@ -4,6 +4,7 @@
 use mhp_inspector::cli::simulate::{Style, write_data_set};
 use mhp_inspector::dataset::{Dataset, Progress};
 use mhp_inspector::geometry::{norm, sub};
+use mhp_inspector::output::{FolderLock, Inputs};
 use mhp_inspector::simulate::{Action, Layout, Options, Preset, Recording};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -191,4 +192,24 @@ fn numbers_without_sense_are_refused() {
         let told = Recording::new(&options).unwrap_err().to_string();
         assert!(told.contains(word), "{told}");
     }
+}
+
+#[test]
+fn another_data_set_and_a_folder_in_use_are_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let manifest = folder.path().join("dataset.toml");
+    std::fs::write(&manifest, "name = \"measured\"\nlayout = \"mmvr\"\n").unwrap();
+    let write = || {
+        write_data_set(folder.path(), &recording(&Options { frames: 1, ..Options::default() }), Style::default(), || ())
+    };
+    let told = write().unwrap_err().to_string();
+    assert!(told.contains("lies in the data set") && told.contains("--into-data"), "{told}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    std::fs::remove_file(&manifest).unwrap();
+    let lock = FolderLock::claim(folder.path(), &[], &Inputs::default()).unwrap();
+    assert!(write().unwrap_err().to_string().contains("another process"));
+    drop(lock);
+    write().unwrap();
+    write().unwrap();
+    assert!(manifest.is_file() && !folder.path().join(".lock").exists());
 }

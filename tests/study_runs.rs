@@ -7,6 +7,7 @@ mod blob;
 #[path = "common/scenes.rs"]
 mod scenes;
 
+use mhp_inspector::output::{FolderLock, Inputs};
 use mhp_inspector::study::run::{JOURNAL_FILE, Run, TABLE_FILE};
 use scenes::{Scene, write_scenes};
 use serde_json::Value;
@@ -380,4 +381,20 @@ fn bad_requests_say_what_is_wrong() {
     assert!(refusal(&["init", "--frames", "5..99"]).contains("the data set has 6"));
     assert!(refusal(&["init", "--preset", "best"]).contains("expected one of paper, recommended"));
     assert!(refusal(&["init", "--seed", "9999999999"]).contains("init.seed is 9999999999; expected"));
+}
+
+#[test]
+fn a_run_that_another_process_works_on_or_that_lies_in_the_data_is_left_alone() {
+    let case = Case::new();
+    let lock = FolderLock::claim(&case.run("run"), &[], &Inputs::default()).unwrap();
+    let output = case.study(&["threshold", "--iterations", "1"], "run");
+    let wanted = format!("another process ({}) is writing here", std::process::id());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains(&wanted), "{}", text(&output.stderr));
+    drop(lock);
+    assert_eq!(std::fs::read_dir(case.run("run")).unwrap().count(), 0, "nothing was written");
+    let output = case.study(&["threshold", "--iterations", "1"], "data/runs/one");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("lies in the data set"), "{}", text(&output.stderr));
+    assert!(!case.run("data/runs").exists());
 }

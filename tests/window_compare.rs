@@ -137,8 +137,8 @@ fn read(path: &Path) -> Value {
 
 #[test]
 fn a_session_file_opens_to_the_same_state_without_running() {
-    let mut window = busy();
-    let path = window.folder.path().join("kept.mhp-session");
+    let (mut window, out) = (busy(), tempfile::tempdir().unwrap());
+    let path = out.path().join("kept.mhp-session");
     window.key_with(CTRL, Key::S);
     window.answer_path("Save to", &path);
     window.until("the file", |w| w.told("session saved to"));
@@ -202,9 +202,9 @@ fn broken(kept: &Value, change: impl Fn(&mut Value)) -> Vec<u8> {
 
 #[test]
 fn a_bad_session_file_is_one_error_and_changes_nothing() {
-    let mut window = run_ten(2, 1);
+    let (mut window, out) = (run_ten(2, 1), tempfile::tempdir().unwrap());
     window.key(Key::P);
-    let good = window.folder.path().join("good.mhp-session");
+    let good = out.path().join("good.mhp-session");
     window.save_as("Save session as…", &good);
     let (kept, text) = (read(&good), std::fs::read(&good).unwrap());
     let gone = json!("/nowhere/at/all");
@@ -232,7 +232,7 @@ fn a_bad_session_file_is_one_error_and_changes_nothing() {
         let view = (session.view.clone(), session.queue.text.clone(), session.session_path.clone());
         ((dataset, w.frame(), session.fit.job, w.fit().head(), session.pins.list().len(), view), errors)
     };
-    let bad = window.folder.path().join("bad.mhp-session");
+    let bad = out.path().join("bad.mhp-session");
     for (words, content) in cases {
         std::fs::write(&bad, content).unwrap();
         refuse(&mut window, &bad, words, &state);
@@ -261,8 +261,8 @@ fn refuse<S: PartialEq + std::fmt::Debug>(
 
 #[test]
 fn a_session_whose_fit_is_not_whole_still_opens() {
-    let mut window = run_ten(2, 1);
-    let path = window.folder.path().join("kept.mhp-session");
+    let (mut window, out) = (run_ten(2, 1), tempfile::tempdir().unwrap());
+    let path = out.path().join("kept.mhp-session");
     window.save_as("Save session as…", &path);
     let kept = read(&path);
     let hurt = broken(&kept, |v| {
@@ -280,9 +280,9 @@ fn a_session_whose_fit_is_not_whole_still_opens() {
 
 #[test]
 fn what_is_exported_reads_back() {
-    let mut window = run_ten(2, 0);
-    let file = |w: &Window, name: &str| w.folder.path().join(name);
-    let curves = file(&window, "curves.csv");
+    let (mut window, out) = (run_ten(2, 0), tempfile::tempdir().unwrap());
+    let file = |name: &str| out.path().join(name);
+    let curves = file("curves.csv");
     window.save_as("Export curves as CSV…", &curves);
     let mut table = csv::Reader::from_path(&curves).unwrap();
     let column = table.headers().unwrap().iter().position(|name| name == "loss").unwrap();
@@ -290,28 +290,39 @@ fn what_is_exported_reads_back() {
     let known: Vec<f64> = window.fit().branch().unwrap().rows.iter().map(|row| row.report.loss).collect();
     assert_eq!(losses, known, "to the bit");
 
-    let npz = file(&window, "params.npz");
+    let npz = file("params.npz");
     window.save_as("Export parameters as npz…", &npz);
     let shown = window.fit().shown.as_ref().unwrap().params.clone();
     assert_eq!(read_pppr(&npz, Some(shown.shape())).unwrap(), shown);
 
-    let ply = file(&window, "gaussians.ply");
+    let ply = file("gaussians.ply");
     window.save_as("Export Gaussians as PLY…", &ply);
     let bytes = std::fs::read(&ply).unwrap();
     let header = String::from_utf8_lossy(&bytes[..bytes.len().min(1500)]).into_owned();
     assert!(header.starts_with("ply\n") && header.contains("element vertex 17"), "{header}");
 
     window.at_rest();
-    let strata = file(&window, "strata.csv");
+    let strata = file("strata.csv");
     window.save_as("Export strata as CSV…", &strata);
     assert_eq!(csv::Reader::from_path(&strata).unwrap().records().count(), 2);
 
     // Where nothing can be written, that is told and no file is left.
-    let nowhere = file(&window, "no such folder/curves.csv");
+    let nowhere = file("no such folder/curves.csv");
     window.choose("File", "Export curves as CSV…");
     window.answer_path("Save to", &nowhere);
     window.until("the error", |w| w.told("no such folder"));
     assert!(window.says("curves.csv") && !nowhere.exists());
+
+    // Neither an input nor its folder is written.
+    let frame = window.folder.path().join("frames/000.npz");
+    let (before, inside) = (std::fs::read(&frame).unwrap(), window.folder.path().join("curves.csv"));
+    for place in [&frame, &inside] {
+        window.choose("File", "Export curves as CSV…");
+        window.answer_path("Save to", place);
+        window.until("the refusal", |w| w.told("lies in the data set"));
+        window.dismiss_all();
+    }
+    assert!(std::fs::read(&frame).unwrap() == before && !inside.exists());
 }
 
 #[test]
@@ -358,7 +369,8 @@ fn pictures_have_the_size_of_what_they_show() {
         .build_eframe(|cc| InspectorApp::new(cc, &paths));
     let mut window = Window { harness, folder };
     window.ready(0);
-    let whole = window.folder.path().join("window.png");
+    let out = tempfile::tempdir().unwrap();
+    let whole = out.path().join("window.png");
     window.key_with(CTRL | Modifiers::SHIFT, Key::S);
     window.answer_path("Save to", &whole);
     window.until("the picture", |w| w.told("picture of 1000 × 640 pixels written to"));
@@ -367,7 +379,7 @@ fn pictures_have_the_size_of_what_they_show() {
     let first = *picture.get_pixel(0, 0);
     assert!(picture.pixels().any(|pixel| *pixel != first), "something was drawn");
 
-    let pane = window.folder.path().join("pane.png");
+    let pane = out.path().join("pane.png");
     let map = window.node("Masks map of hori").rect();
     window.node("Masks").click_secondary();
     window.harness.run_steps(2);

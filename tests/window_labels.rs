@@ -250,7 +250,8 @@ fn labelling_for_agreement_hides_what_could_sway() {
     assert_eq!(record.frame.path, "frames/001");
     assert!(window.named("F1 card"), "shown once it is judged");
     assert!(window.value("Frame frames/001").ends_with("tagged F2") && !window.says("bob: F3"));
-    let table = window.folder.path().join("mine.csv");
+    let out = tempfile::tempdir().unwrap();
+    let table = out.path().join("mine.csv");
     window.save_as("Export labels as CSV…", &table);
     let names: Vec<String> = read_table(&table).unwrap().rows.into_iter().map(|row| row.record.annotator).collect();
     assert_eq!(names, ["ada"], "nothing hidden leaves by the back door");

@@ -20,6 +20,8 @@ use window::Window;
 /// Runs a small study of the window's data set.
 fn run(window: &Window, study: StudyKind, grid: &[&str]) -> PathBuf {
     let dataset = Dataset::open(window.folder.path(), &Progress::new()).unwrap();
+    // As with --into-data: the folder lives as long as the window.
+    mhp_inspector::output::allow_into_data(true);
     let out = window.folder.path().join(format!("run-{study}-{}", grid.len()));
     run_of(&dataset, &out, study, grid);
     out

@@ -4,7 +4,8 @@ use super::InspectorApp;
 use super::commands::SaveKind;
 use super::layout::{Layout, PaneKind};
 use super::panes::PaneStates;
-use crate::session::{Command, Export, LogLevel, Session, Task};
+use crate::output::{Sink, portable, replace_file};
+use crate::session::{Command, Export, LogLevel, OutputCheck, Session, Task};
 use egui::{ColorImage, Context, Rect};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -56,13 +57,16 @@ fn cropped(image: &ColorImage, rect: Option<Rect>, scale: f32) -> ColorImage {
     rect.map_or_else(|| image.clone(), |rect| image.region(&rect, Some(scale)))
 }
 
-fn write_png(image: &ColorImage, path: &Path) -> Result<String, String> {
+fn write_png(image: &ColorImage, path: &Path, check: &OutputCheck) -> Result<String, String> {
+    check.file(path)?;
     let [width, height] = image.size;
     let bytes: Vec<u8> = image.pixels.iter().flat_map(egui::Color32::to_array).collect();
     let failed = |reason: String| format!("{}: cannot be written: {reason}", path.display());
     let picture = image::RgbaImage::from_raw(width as u32, height as u32, bytes);
     let picture = picture.ok_or_else(|| failed("the picture is empty".into()))?;
-    picture.save_with_format(path, image::ImageFormat::Png).map_err(|error| failed(error.to_string()))?;
+    let write =
+        |mut out: &mut dyn Sink| picture.write_to(&mut out, image::ImageFormat::Png).map_err(std::io::Error::other);
+    replace_file(path, write).map_err(|error| failed(error.to_string()))?;
     Ok(format!("picture of {width} × {height} pixels written to {}", path.display()))
 }
 
@@ -86,7 +90,9 @@ fn suggestion(session: &Session, kind: SaveKind) -> PathBuf {
         SaveKind::Export(what) => of_frame(what.ending()),
     };
     let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' };
-    folder.join(name.chars().map(plain).collect::<String>())
+    let name: String = name.chars().map(plain).collect();
+    let (stem, ending) = name.rsplit_once('.').unwrap_or((name.as_str(), ""));
+    folder.join(format!("{}.{ending}", portable(stem)))
 }
 
 impl InspectorApp {
@@ -145,7 +151,8 @@ impl InspectorApp {
             match wanted {
                 Wanted::File(path, rect) => {
                     let image = cropped(&image, rect, scale);
-                    self.apply(Command::RunTask(Task::new(move || write_png(&image, &path))));
+                    let check = self.session.output_check();
+                    self.apply(Command::RunTask(Task::new(move || write_png(&image, &path, &check))));
                 }
                 Wanted::Clipboard(rect) => {
                     ctx.copy_image(cropped(&image, rect, scale));

@@ -3,6 +3,7 @@
 use crate::config::{FitConfig, Preset};
 use crate::dataset::{Dataset, Manifest, OpenOptions, Progress};
 use crate::mhp::Precision;
+use crate::output::Inputs;
 use anyhow::Context as _;
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -45,6 +46,11 @@ pub(super) fn open(path: &Path, manifest: Option<&Path>) -> anyhow::Result<Datas
     let manifest = manifest.map(Manifest::from_file).transpose()?;
     let options = OpenOptions { manifest: manifest.as_ref(), allow_outside: false };
     Ok(Dataset::open_with(path, options, &progress)?)
+}
+
+/// What must not be written: the data set that `path` opened, and the files that flags `named`.
+pub(super) fn inputs<'a>(dataset: &'a Dataset, path: &Path, named: &[Option<&Path>]) -> Inputs<'a> {
+    dataset.inputs().with_folder(path).with_named([Some(path)]).with_named(named.iter().copied())
 }
 
 /// The fit configuration of a file, or the defaults.

@@ -2,7 +2,7 @@
 
 mod report;
 
-use super::common::{open, print};
+use super::common::{inputs, open, print};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::dataset::{Dataset, Progress};
 use crate::study::StudyError;
@@ -73,10 +73,10 @@ pub struct ComplexityArgs {
 pub(super) fn run(args: &ComplexityArgs) -> anyhow::Result<ExitCode> {
     let options = ComplexityOptions { kappa_pct: args.kappa, window: args.window, tau_pct: args.tau };
     let options = options.validated().map_err(|error| anyhow::anyhow!("--{error}"))?;
-    if let Some(file) = &args.csv {
-        report::check_writable(file)?;
-    }
     let dataset = Arc::new(open(&args.path, args.manifest.as_deref())?);
+    if let Some(file) = &args.csv {
+        inputs(&dataset, &args.path, &[args.manifest.as_deref()]).check_file(file)?;
+    }
     let cache = if args.no_cache { None } else { cache_folder() };
     let complexity = compute(&dataset, options, cache)?;
     if let Some(file) = &args.csv {

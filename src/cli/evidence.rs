@@ -1,15 +1,15 @@
 //! `evidence`: what speaks for each failure mode of a fit, as cards, JSON or CSV.
 
-use super::common::{PrecisionArg, open, print, progress_bar, settings};
+use super::common::{PrecisionArg, inputs, open, print, progress_bar, settings};
 use super::frames::{FrameRange, chosen};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::body::Pppr;
 use crate::config::Preset;
-use crate::dataset::npz::replace_file;
 use crate::dataset::{Dataset, read_pppr};
 use crate::diagnose::{Evidence, Finding, Place};
 use crate::labels::Tag;
 use crate::mhp::Problem;
+use crate::output::replace_file;
 use crate::radar::View;
 use crate::study::{BatchOptions, FrameEvidence, frame_evidence};
 use anyhow::Context as _;
@@ -82,6 +82,10 @@ pub(super) fn run(args: &EvidenceArgs) -> anyhow::Result<ExitCode> {
     let config = settings(args.config.as_deref(), Preset::Paper, args.iterations)?;
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
+    if let Some(file) = &args.csv {
+        let named = [args.params.as_deref(), args.config.as_deref(), args.manifest.as_deref()];
+        inputs(&dataset, &args.path, &named).check_file(file)?;
+    }
     let params = args.params.as_deref().map(|path| params(path, &dataset, &frames)).transpose()?;
     let options = BatchOptions {
         config,

@@ -2,11 +2,12 @@
 
 mod table;
 
-use super::common::{PrecisionArg, open, preset, print, progress_bar, settings};
+use super::common::{PrecisionArg, inputs, open, preset, print, progress_bar, settings};
 use super::frames::{FrameRange, chosen};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::config::{FitConfig, Preset};
 use crate::dataset::Dataset;
+use crate::output::{FolderLock, replace_file};
 use crate::study::{BatchOptions, FrameRow, Means, Summary, columns, run_batch};
 use anyhow::Context as _;
 use clap::Args;
@@ -30,6 +31,10 @@ Examples:
       A minute of MMVR, each frame from the one before; writes results/summary.csv, fit.toml, pppr/*.npz.
   mhp-inspector fit data/walk --frames 7 --out results --ply --curves
       Also the Gaussians of the end as pppr/*.ply and every iteration as curves/*.csv.";
+
+/// The folders of parameters and of iterations.
+const PARAMS: &str = "pppr";
+const CURVES: &str = "curves";
 
 /// What `fit` is told.
 #[derive(Debug, Args)]
@@ -56,7 +61,7 @@ pub struct FitArgs {
     #[arg(long, value_enum, default_value = "f32")]
     precision: PrecisionArg,
     /// Folder for summary.csv, fit.toml (the settings in force) and pppr/NAME.npz (the parameters of each frame, `_` for
-    /// `/` in its name). Without it nothing is written.
+    /// `/` in its name, and a digest where that is no file's name or another frame's). Without it nothing is written.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// With --out, also pppr/NAME.ply: the Gaussians for viewers of 3-D Gaussian splats, with velocity, person and joint.
@@ -87,14 +92,15 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
     let arrays: Vec<String> = dataset.info().views.iter().map(|view| view.array.clone()).collect();
-    let mut summary = args.out.as_deref().map(|out| prepare(out, args, &dataset, &config, &arrays)).transpose()?;
+    let prepared = args.out.as_deref().map(|out| prepare(out, args, &dataset, &config, &arrays)).transpose()?;
+    let (_lock, mut summary) = prepared.unzip();
     let options = BatchOptions {
         config,
         precision: args.precision.into(),
         warm_start: args.warm_start,
-        params_folder: args.out.as_deref().map(params_folder),
+        params_folder: args.out.as_ref().map(|out| out.join(PARAMS)),
         ply: args.ply,
-        curves_folder: args.out.as_deref().filter(|_| args.curves).map(curves_folder),
+        curves_folder: args.out.as_ref().filter(|_| args.curves).map(|out| out.join(CURVES)),
     };
     let bar = progress_bar(frames.len());
     let mut report = Report::new(arrays, args.json);
@@ -105,29 +111,25 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
         Ok(())
     });
     bar.finish_and_clear();
-    done?;
+    let closed = summary.map_or(Ok(()), Summary::finish);
+    done.and(closed)?;
     report.tell()
 }
 
-fn params_folder(out: &Path) -> PathBuf {
-    out.join("pppr")
-}
-
-fn curves_folder(out: &Path) -> PathBuf {
-    out.join("curves")
-}
-
-/// Makes the folders, writes the settings, and opens the table: what cannot be written is told before anything is fitted.
+/// Makes and holds the folders, writes the settings, and begins the table: what cannot be written is told before anything is
+/// fitted.
 fn prepare(
     out: &Path,
     args: &FitArgs,
     dataset: &Dataset,
     config: &FitConfig,
     arrays: &[String],
-) -> anyhow::Result<Summary> {
-    for folder in std::iter::once(params_folder(out)).chain(args.curves.then(|| curves_folder(out))) {
-        std::fs::create_dir_all(&folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
-    }
+) -> anyhow::Result<(FolderLock, Summary)> {
+    let inputs = inputs(dataset, &args.path, &[args.config.as_deref(), args.manifest.as_deref()]);
+    let below = if args.curves { &[PARAMS, CURVES][..] } else { &[PARAMS] };
+    let lock = FolderLock::claim(out, below, &inputs)?;
+    let [settings, table] = ["fit.toml", "summary.csv"].map(|name| out.join(name));
+    [&settings, &table].into_iter().try_for_each(|file| inputs.check_replaced(file))?;
     let precision = match args.precision {
         PrecisionArg::F64 => "f64",
         PrecisionArg::F32 => "f32",
@@ -138,10 +140,10 @@ fn prepare(
         dataset.info().root.display().to_string().escape_debug(),
         if args.warm_start { "warm start" } else { "every frame from its own peaks" },
     );
-    let file = out.join("fit.toml");
-    std::fs::write(&file, head + &config.to_toml())
-        .with_context(|| format!("{}: cannot be written", file.display()))?;
-    Ok(Summary::create(&out.join("summary.csv"), arrays)?)
+    let text = head + &config.to_toml();
+    let written = replace_file(&settings, |out| out.write_all(text.as_bytes()));
+    written.with_context(|| format!("{}: cannot be written", settings.display()))?;
+    Ok((lock, Summary::create(&table, arrays)?))
 }
 
 /// What is printed at the end.

@@ -55,6 +55,9 @@ Examples:
 #[derive(Debug, Parser)]
 #[command(version, about, args_conflicts_with_subcommands = true, after_help = HELP)]
 pub struct Cli {
+    /// Let results be written into the data set's own folder, which is refused otherwise. Inputs are never replaced.
+    #[arg(long, global = true)]
+    pub into_data: bool,
     /// What to do; without a subcommand the window opens.
     #[command(subcommand)]
     pub command: Option<Command>,

@@ -1,6 +1,6 @@
 //! `score`: the objective at given parameters, with maps and gradients; SPEC section 7.
 
-use super::common::{PrecisionArg, config, open, print};
+use super::common::{PrecisionArg, config, inputs, open, print};
 use crate::body::{Group, Pppr};
 use crate::dataset::npz::{ArrayView, write};
 use crate::dataset::read_pppr;
@@ -56,6 +56,8 @@ pub struct ScoreArgs {
 pub(super) fn run(args: &ScoreArgs) -> anyhow::Result<ExitCode> {
     let config = config(args.config.as_deref())?;
     let dataset = open(&args.dataset, args.manifest.as_deref())?;
+    let named = [Some(args.params.as_path()), args.config.as_deref(), args.manifest.as_deref()];
+    inputs(&dataset, &args.dataset, &named).check_file(&args.out)?;
     let frame = dataset.load(args.frame)?;
     let params = read_pppr(&args.params, None)?;
     let info = dataset.info();

@@ -2,6 +2,7 @@
 
 use super::common::config;
 use crate::app::{Begin, InspectorApp, PaneKind};
+use crate::output::{Sink, replace_file};
 use crate::session::{Command, FitStatus, LabelStatus, StrataStatus, ThemeChoice};
 use anyhow::{Context as _, bail};
 use clap::{Args, ValueEnum};
@@ -137,6 +138,10 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
         .wgpu()
         .build_eframe(|cc| InspectorApp::begin(cc, &begin));
     set_up(&mut harness, args)?;
+    if let Some(dataset) = &harness.state().session().data.dataset {
+        let named = [args.path.as_deref(), args.session.as_deref(), args.config.as_deref()];
+        dataset.inputs().with_named(named).check_file(&args.out)?;
+    }
     if let Some(pane) = pane {
         harness.state_mut().show_pane(pane);
     }
@@ -148,7 +153,10 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
         let (x, y, width, height) = (px(rect.min.x), px(rect.min.y), px(rect.width()), px(rect.height()));
         picture = image::imageops::crop_imm(&picture, x, y, width, height).to_image();
     }
-    picture.save(&args.out).with_context(|| format!("{}: cannot be written", args.out.display()))?;
+    let cannot = || format!("{}: cannot be written", args.out.display());
+    let format = image::ImageFormat::from_path(&args.out).with_context(cannot)?;
+    let write = |mut out: &mut dyn Sink| picture.write_to(&mut out, format).map_err(std::io::Error::other);
+    replace_file(&args.out, write).with_context(cannot)?;
     Ok(ExitCode::SUCCESS)
 }
 

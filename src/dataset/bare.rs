@@ -1,11 +1,12 @@
 //! Files of maps that say nothing of their axes: what is in them, a first guess, and the memory of what a person chose.
 
 use super::manifest::{ViewText, cells_fault, view_fault};
-use super::npz::{Entry, NpzArchive, replace_file, shape_text};
+use super::npz::{Entry, NpzArchive, shape_text};
 use super::{DatasetError, words};
 use crate::body::Skeleton;
 use crate::geometry::Pose;
 use crate::input::{MOST_TEXT, read_text};
+use crate::output::replace_file;
 use crate::radar::{Axis, AxisKind, PointSpread, Quantity, Spacing, View};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

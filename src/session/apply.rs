@@ -16,6 +16,7 @@ mod restore;
 mod results;
 mod study;
 
+pub use export::OutputCheck;
 pub(super) use reports::mean_known;
 
 use super::command::{Command, Effect};

@@ -31,6 +31,7 @@ mod study;
 mod view;
 
 pub use acts::{Act, ActKind, Asked, Changes, Done};
+pub use apply::OutputCheck;
 pub use command::{Aim, Command, Commit, Effect, Export, OpenedLabels, PickKind, PinRequest, Task, Trash, Written};
 pub use evidence::EvidenceRequest;
 pub use file::{SavedChange, SavedDataset, SavedFit, SavedFrame, SavedPin, SessionFile, SessionFileError};

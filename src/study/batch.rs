@@ -10,9 +10,10 @@ use crate::config::FitConfig;
 use crate::dataset::{Dataset, Truth, panic_text, write_pppr};
 use crate::diagnose::{JointErrors, joint_errors};
 use crate::mhp::{FitError, Fitter, Precision, StepReport, StopReason, predict};
+use crate::output::{FileNames, Inputs};
 use crate::start::{begin, problem_of};
 use crossbeam_channel::Sender;
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -120,7 +121,8 @@ pub fn run_batch(
     let batch = Batch {
         dataset,
         options,
-        files: Files::new(dataset, frames.clone()),
+        names: dataset.file_names(),
+        inputs: dataset.inputs(),
         next: AtomicUsize::new(frames.start),
         end: frames.end,
     };
@@ -152,7 +154,8 @@ pub fn run_batch(
 struct Batch<'a> {
     dataset: &'a Dataset,
     options: &'a BatchOptions,
-    files: Files,
+    names: FileNames,
+    inputs: Inputs<'a>,
     next: AtomicUsize,
     end: usize,
 }
@@ -189,19 +192,23 @@ impl Batch<'_> {
                 rows.push((report, majpe_mm));
             }
         })?;
-        let file = |folder: &Path, ending: &str| folder.join(self.files.name(dataset, index) + ending);
+        let name = self.names.of(index, dataset.frame_name(index));
+        let file = |folder: &Path, ending: &str| {
+            let file = folder.join(format!("{name}.{ending}"));
+            self.inputs.check_replaced(&file).map_err(|error| error.to_string()).map(|()| file)
+        };
         if let Some(folder) = &options.params_folder {
-            write_pppr(&file(folder, ".npz"), &fit.params).map_err(|error| error.to_string())?;
+            write_pppr(&file(folder, "npz")?, &fit.params).map_err(|error| error.to_string())?;
         }
         if let Some(folder) = options.params_folder.as_ref().filter(|_| options.ply) {
-            let written = write_ply(&file(folder, ".ply"), &fit.params, &dataset.info().skeleton);
+            let written = write_ply(&file(folder, "ply")?, &fit.params, &dataset.info().skeleton);
             written.map_err(|error| error.to_string())?;
         }
         if let Some(folder) = &options.curves_folder {
             let arrays: Vec<String> = dataset.info().views.iter().map(|view| view.array.clone()).collect();
             let rows =
                 rows.iter().map(|(report, majpe_mm)| CurveRow { branch: 0, report, majpe_mm: *majpe_mm, flag: None });
-            write_curves(&file(folder, ".csv"), &arrays, rows).map_err(|error| error.to_string())?;
+            write_curves(&file(folder, "csv")?, &arrays, rows).map_err(|error| error.to_string())?;
         }
         Ok(fit)
     }
@@ -211,26 +218,4 @@ impl Batch<'_> {
 fn caught<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(work))
         .unwrap_or_else(|panic| Err(format!("internal error: {}", panic_text(panic.as_ref()))))
-}
-
-/// The files of a frame: its name with `_` for `/`, and with its index where two names would become one.
-struct Files {
-    ambiguous: HashSet<usize>,
-}
-
-impl Files {
-    fn new(dataset: &Dataset, frames: Range<usize>) -> Self {
-        let mut seen = HashSet::new();
-        Self { ambiguous: frames.filter(|&index| !seen.insert(flat(dataset.frame_name(index)))).collect() }
-    }
-
-    /// Without an ending.
-    fn name(&self, dataset: &Dataset, index: usize) -> String {
-        let name = flat(dataset.frame_name(index));
-        if self.ambiguous.contains(&index) { format!("{name}_{index}") } else { name }
-    }
-}
-
-fn flat(name: &str) -> String {
-    name.replace(['/', '\\'], "_")
 }

@@ -1,7 +1,7 @@
-//! `summary.csv`: a row is on disk as soon as its frame is done, so that an interrupted run leaves a valid table.
+//! `summary.csv`: a row a frame; an interrupted run leaves a valid table of what it did ([`Growing`]).
 
 use super::FrameRow;
-use std::fs::File;
+use crate::output::Growing;
 use std::path::{Path, PathBuf};
 
 /// The columns before the numbers.
@@ -78,37 +78,43 @@ pub fn columns(arrays: &[String]) -> Vec<String> {
 /// An open `summary.csv`.
 #[derive(Debug)]
 pub struct Summary {
-    writer: csv::Writer<File>,
+    table: Growing,
     views: usize,
     path: PathBuf,
 }
 
 impl Summary {
-    /// Creates the table (an older one is replaced) and writes its head.
+    /// Begins the table with its head. An older one stays until there are rows to take its place.
     ///
     /// # Errors
     /// Where the file cannot be written.
     pub fn create(path: &Path, arrays: &[String]) -> Result<Self, StudyError> {
         let failed = |reason| StudyError::Write { reason, path: path.to_owned() };
-        // A row is flushed by itself and is shorter than the buffer, hence reaches the file in one piece.
-        let writer =
-            csv::WriterBuilder::new().buffer_capacity(1 << 16).from_writer(File::create(path).map_err(failed)?);
-        let mut summary = Self { writer, views: arrays.len(), path: path.to_owned() };
-        summary.record(&columns(arrays))?;
-        Ok(summary)
+        let table = line(&columns(arrays)).and_then(|head| Growing::create(path, &head)).map_err(failed)?;
+        Ok(Self { table, views: arrays.len(), path: path.to_owned() })
     }
 
-    /// Appends a row and flushes it.
+    /// Appends a row.
     ///
     /// # Errors
-    /// Where the file cannot be written.
+    /// Where the file cannot be written; what is in its place stays whole.
     pub fn add(&mut self, row: &FrameRow) -> Result<(), StudyError> {
-        self.record(&row.cells(self.views))
+        let added = line(&row.cells(self.views)).and_then(|row| self.table.add(&row));
+        added.map_err(|reason| StudyError::Write { reason, path: self.path.clone() })
     }
 
-    fn record(&mut self, cells: &[String]) -> Result<(), StudyError> {
-        let written = self.writer.write_record(cells).map_err(std::io::Error::other);
-        let flushed = written.and_then(|()| self.writer.flush());
-        flushed.map_err(|reason| StudyError::Write { reason, path: self.path.clone() })
+    /// Puts the whole table in its place.
+    ///
+    /// # Errors
+    /// Where that cannot be done.
+    pub fn finish(self) -> Result<(), StudyError> {
+        let Self { table, path, .. } = self;
+        table.finish().map_err(|reason| StudyError::Write { reason, path })
     }
+}
+
+fn line(cells: &[String]) -> std::io::Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(cells).map_err(std::io::Error::other)?;
+    writer.into_inner().map_err(|error| std::io::Error::other(error.to_string()))
 }

@@ -3,21 +3,12 @@
 use crate::dataset::Dataset;
 use crate::study::complexity::{Complexity, FrameComplexity, Stratum};
 use std::fmt::Write as _;
-use std::path::Path;
 
 /// Frames in the list of the hardest.
 const HARDEST: usize = 10;
 
 /// A number of a frame.
 type Column = fn(&FrameComplexity) -> Option<f64>;
-
-/// Refuses a file in a folder that does not exist before anything is measured.
-pub(super) fn check_writable(file: &Path) -> anyhow::Result<()> {
-    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    anyhow::ensure!(folder.is_dir(), "{}: cannot be written: no folder {}", file.display(), folder.display());
-    anyhow::ensure!(!file.is_dir(), "{}: cannot be written: it is a folder", file.display());
-    Ok(())
-}
 
 /// Counts, quantiles and the hardest frames, for people.
 pub(super) fn summary(dataset: &Dataset, complexity: &Complexity) -> String {

@@ -2,7 +2,7 @@
 
 mod report;
 
-use super::common::{open, print, progress_bar};
+use super::common::{inputs, open, print, progress_bar};
 use super::frames::{FrameRange, chosen};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::study::count::{FrameCount, count_frames};
@@ -57,6 +57,9 @@ pub struct CountArgs {
 pub(super) fn run(args: &CountArgs) -> anyhow::Result<ExitCode> {
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
+    if let Some(file) = &args.csv {
+        inputs(&dataset, &args.path, &[args.manifest.as_deref()]).check_file(file)?;
+    }
     let bar = progress_bar(frames.len());
     let rows = count_frames(&dataset, frames, || bar.inc(1)).with_context(|| args.path.display().to_string())?;
     bar.finish_and_clear();

@@ -1,6 +1,7 @@
 //! What `count` prints and writes.
 
 use crate::dataset::Dataset;
+use crate::output::{Sink, replace_file};
 use crate::people::{CLASSES, Confusion, Count};
 use crate::study::count::{FrameCount, confusion};
 use anyhow::Context as _;
@@ -125,10 +126,25 @@ fn of(dataset: &Dataset, row: &FrameCount) -> Row {
 /// # Errors
 /// Where the file cannot be written.
 pub(super) fn write_csv(file: &Path, dataset: &Dataset, rows: &[FrameCount]) -> anyhow::Result<()> {
-    let cannot = || format!("{}: cannot be written", file.display());
-    let mut csv = csv::Writer::from_path(file).with_context(cannot)?;
-    let head = ["frame", "people", "probability", "p0", "p1", "p2", "p3", "p4", "annotated", "persons", "uncertain"];
-    csv.write_record(head).with_context(cannot)?;
+    let written = replace_file(file, |out| table_csv(out, dataset, rows).map_err(std::io::Error::other));
+    written.with_context(|| format!("{}: cannot be written", file.display()))
+}
+
+fn table_csv(out: &mut dyn Sink, dataset: &Dataset, rows: &[FrameCount]) -> csv::Result<()> {
+    let mut csv = csv::Writer::from_writer(out);
+    csv.write_record([
+        "frame",
+        "people",
+        "probability",
+        "p0",
+        "p1",
+        "p2",
+        "p3",
+        "p4",
+        "annotated",
+        "persons",
+        "uncertain",
+    ])?;
     for row in rows.iter().map(|row| of(dataset, row)) {
         let number = |n: Option<usize>| n.map_or_else(String::new, |n| n.to_string());
         let mut record =
@@ -139,7 +155,7 @@ pub(super) fn write_csv(file: &Path, dataset: &Dataset, rows: &[FrameCount]) -> 
         let person = |p: &Person| format!("{}:{:.3}:{:.3}:{:.3}", p.identity, p.place_m[0], p.place_m[1], p.place_m[2]);
         record.push(row.persons.iter().map(person).collect::<Vec<String>>().join(" "));
         record.push(row.uncertain.map_or_else(String::new, |uncertain| uncertain.to_string()));
-        csv.write_record(record).with_context(cannot)?;
+        csv.write_record(record)?;
     }
-    csv.flush().with_context(cannot)
+    Ok(csv.flush()?)
 }

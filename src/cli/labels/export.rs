@@ -1,9 +1,9 @@
 //! `labels export`: labels as CSV or JSON, to take home.
 
-use super::source::{acts, annotators, counted, listed, only};
-use crate::cli::common::print;
-use crate::dataset::npz::replace_file;
+use super::source::{acts, annotators, counted, is_table, listed, only};
+use crate::cli::common::{inputs, open, print};
 use crate::labels::{Record, standing, write_csv, write_json};
+use crate::output::{Inputs, replace_file};
 use anyhow::{Context as _, bail};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -50,6 +50,9 @@ pub struct Args {
 /// # Errors
 /// Where PATH cannot be read, the annotator has no labels, or a file cannot be written.
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    for file in [&args.csv, &args.json].into_iter().flatten().filter(|file| !is_stdout(file)) {
+        check(args, file)?;
+    }
     let acts = only(acts(&args.path, args.manifest.as_deref())?, args.annotator.as_deref(), &args.path)?;
     let records: Vec<&Record> = annotators(&acts).into_iter().flat_map(|name| standing(said_by(name, &acts))).collect();
     let names: Vec<&str> = annotators(&acts);
@@ -63,12 +66,26 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Refuses what would replace an input, or lie in the data set.
+fn check(args: &Args, file: &Path) -> anyhow::Result<()> {
+    let named = [Some(args.path.as_path()), args.manifest.as_deref()];
+    if is_table(&args.path) {
+        return Ok(Inputs::default().with_named(named).check_file(file)?);
+    }
+    let dataset = open(&args.path, args.manifest.as_deref())?;
+    Ok(inputs(&dataset, &args.path, &named).check_file(file)?)
+}
+
+fn is_stdout(file: &Path) -> bool {
+    file == Path::new("-")
+}
+
 fn said_by<'a>(name: &'a str, acts: &'a [Record]) -> impl Iterator<Item = &'a Record> {
     acts.iter().filter(move |record| record.annotator == name)
 }
 
 fn save(path: &Path, what: &str, fill: impl Fn(&mut dyn Write) -> std::io::Result<()>) -> anyhow::Result<()> {
-    if path == Path::new("-") {
+    if is_stdout(path) {
         let mut text = Vec::new();
         fill(&mut text).context("writing labels")?;
         return print(&String::from_utf8_lossy(&text));

@@ -6,6 +6,7 @@ use super::npz_frames::Truth;
 use super::plan::{Place, hupr_path};
 use crate::dataset::npz::{ArrayView, write_deflated, write_npy};
 use crate::geometry::{Vec3, add, scale, sub};
+use crate::output::replace_file;
 use crate::simulate::{Device, HUPR_SHAPE, RawFrame, SimulatedFrame, hupr_cube};
 use anyhow::Context as _;
 use num_complex::Complex32;
@@ -69,5 +70,6 @@ fn fourteen(coco: &[Vec3]) -> Vec<Vec3> {
 pub(super) fn write_annotations(out: &Path, sequences: &[Labels]) -> anyhow::Result<()> {
     let path = out.join("hrnet_annot_train.json");
     let text = serde_json::to_string(sequences)?;
-    std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+    let written = replace_file(&path, |out| out.write_all(text.as_bytes()));
+    written.with_context(|| format!("{}: cannot be written", path.display()))
 }

@@ -8,6 +8,9 @@ use crate::simulate::{Layout, Recording};
 use serde::Serialize;
 use std::fmt::Write as _;
 
+/// What the manifest of a simulated data set begins with.
+pub(super) const FIRST_WORDS: &str = "# Simulated people before a simulated radar";
+
 #[derive(Serialize)]
 struct Manifest {
     name: String,
@@ -70,7 +73,7 @@ pub(super) fn comment(recording: &Recording, command: &str) -> String {
     let options = recording.options();
     let device = recording.device();
     let mut text = format!(
-        "# Simulated people before a simulated radar: made by `{command}`\n# {} frames a sequence, {} in all; truth: joints \
+        "{FIRST_WORDS}: made by `{command}`\n# {} frames a sequence, {} in all; truth: joints \
          and velocities at the middle of each frame, m and m/s.\n",
         options.sequence_length,
         recording.len()

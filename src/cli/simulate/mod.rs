@@ -15,6 +15,7 @@ mod stacks;
 pub use args::{Args, HELP};
 
 use crate::dataset::MANIFEST_NAME;
+use crate::output::{FolderLock, Inputs, replace_file};
 use crate::simulate::{Layout, Recording, Sequence};
 use anyhow::Context as _;
 use rayon::prelude::*;
@@ -52,14 +53,15 @@ pub struct Style<'a> {
 /// Writes a recording into `out`; `done` hears of every frame.
 ///
 /// # Errors
-/// Where the folder cannot be written, or holds frames that would not be overwritten.
+/// Where the folder cannot be written, holds frames that would not be overwritten, or another data set, or another process writes it.
 pub fn write_data_set(
     out: &Path,
     recording: &Recording,
     style: Style<'_>,
     done: impl Fn() + Sync,
 ) -> anyhow::Result<()> {
-    std::fs::create_dir_all(out).with_context(|| format!("cannot make {}", out.display()))?;
+    refuse_another(out)?;
+    let _lock = FolderLock::claim(out, &[], &Inputs::default())?;
     plan::prepare(out, recording)?;
     let sequences: Vec<usize> = (0..recording.sequences()).collect();
     let labels = sequences
@@ -69,8 +71,19 @@ pub fn write_data_set(
     if recording.options().layout == Layout::Hupr {
         hupr_tree::write_annotations(out, &labels)?;
     }
-    let path = out.join(MANIFEST_NAME);
-    std::fs::write(&path, manifest::text(recording, style)?).with_context(|| format!("cannot write {}", path.display()))
+    let (path, text) = (out.join(MANIFEST_NAME), manifest::text(recording, style)?);
+    let written = replace_file(&path, |out| out.write_all(text.as_bytes()));
+    written.with_context(|| format!("{}: cannot be written", path.display()))
+}
+
+/// Refuses the folder of a data set that was not simulated.
+fn refuse_another(out: &Path) -> anyhow::Result<()> {
+    match std::fs::read_to_string(out.join(MANIFEST_NAME)) {
+        Ok(text) if !text.starts_with(manifest::FIRST_WORDS) => {
+            Ok(Inputs::default().with_folder(out).check_folder(out)?)
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Writes the frames of a sequence; the labels are those of HuPR's annotation file, else empty.

@@ -1,13 +1,13 @@
 //! One study: arguments to a plan, the plan to a run, the run to its table.
 
-use crate::cli::common::{PrecisionArg, open, preset, print};
+use crate::cli::common::{PrecisionArg, inputs, open, preset, print};
 use crate::cli::complexity::compute;
 use crate::cli::frames::{FrameRange, chosen};
 use crate::cli::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::config::{FitConfig, Preset};
 use crate::dataset::{Dataset, Progress};
 use crate::study::complexity::{ComplexityOptions, cache_folder};
-use crate::study::run::{GridAxis, Run, RunPlan, RunRequest, Shard, StudyKind, Subset, execute_run};
+use crate::study::run::{GridAxis, Run, RunPlan, RunRequest, Shard, StudyKind, Subset, check_run_folder, execute_run};
 use clap::Args;
 use crossbeam_channel::{RecvTimeoutError, bounded};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -89,6 +89,8 @@ pub struct SweepArgs {
 pub(super) fn run(kind: StudyKind, args: &RunArgs, all: Option<bool>, grid: &[GridAxis]) -> anyhow::Result<ExitCode> {
     let (base, base_name) = base(args)?;
     let dataset = Arc::new(open(&args.path, args.manifest.as_deref())?);
+    let named = [args.config.as_deref(), args.manifest.as_deref()];
+    check_run_folder(&args.out, &inputs(&dataset, &args.path, &named))?;
     let request = RunRequest {
         study: kind,
         base,

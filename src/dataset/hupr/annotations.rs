@@ -69,6 +69,11 @@ impl Annotations {
         Self { files: SPLITS.iter().filter_map(found).collect(), folders, read: OnceLock::new() }
     }
 
+    /// The label files.
+    pub(in crate::dataset) fn paths(&self) -> impl Iterator<Item = &Path> {
+        self.files.iter().map(|(_, path)| path.as_path())
+    }
+
     /// The labels of a frame; what is wrong with the files goes to `notes`.
     pub(in crate::dataset) fn of(
         &self,

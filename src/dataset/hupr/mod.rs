@@ -18,8 +18,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Bins of the last axis, and the one that is taken.
-const LEVELS: usize = 8;
-const LEVEL: usize = 3;
+pub(crate) const LEVELS: usize = 8;
+pub(crate) const LEVEL: usize = 3;
 /// The folders of the two cubes of a frame.
 pub(super) const RADARS: [&str; 2] = ["hori", "vert"];
 /// Folders inside each other that are looked into: those of the two radars included.

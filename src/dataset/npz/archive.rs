@@ -163,6 +163,14 @@ impl NpzArchive {
         })
     }
 
+    /// The data of one array as they lie in the file, without its header, to their end.
+    ///
+    /// # Errors
+    /// As [`Self::read`], of any dtype but objects.
+    pub fn bytes(&mut self, key: &str) -> Result<Vec<u8>, NpzError> {
+        Ok(self.read_bytes(key)?.0)
+    }
+
     /// Reads an array of real numbers to its end, checksum included.
     ///
     /// # Errors
@@ -309,7 +317,7 @@ pub fn read_array(path: &Path, key: &str) -> Result<Array, NpzError> {
 }
 
 /// Four or eight bytes as a float; NaN for any other number of them.
-fn real(bytes: &[u8], big_endian: bool) -> f64 {
+pub(super) fn real(bytes: &[u8], big_endian: bool) -> f64 {
     if let Ok(four) = <[u8; 4]>::try_from(bytes) {
         f64::from(if big_endian { f32::from_be_bytes(four) } else { f32::from_le_bytes(four) })
     } else if let Ok(eight) = <[u8; 8]>::try_from(bytes) {

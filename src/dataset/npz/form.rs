@@ -1,10 +1,11 @@
 //! Writing an array in the form of another: the same dtype, byte order, memory order and shape, in a copy of its archive.
 
 use super::header::{Header, Scalar};
-use super::write::{Sink, replace_file};
 use super::{NPY_KEY, NpzError, shape_text};
 use crate::input::open_file;
+use crate::output::{Sink, replace_file};
 use half::f16;
+use num_complex::Complex;
 use std::io::{Read as _, Write as _};
 use std::path::Path;
 use zip::write::FileOptions;
@@ -30,29 +31,95 @@ impl Form {
         &self.header.dtype
     }
 
-    /// The same with another length of the first axis.
-    pub fn with_first_axis(&self, length: usize) -> Self {
+    /// The axis along which it holds maps of `axes` axes: its first, or its second where the first has a length of one.
+    pub fn stack_axis(&self, axes: usize) -> Option<usize> {
+        let shape = self.shape();
+        let batched = shape.len() == axes + 2 && shape.first() == Some(&1);
+        (shape.len() == axes + 1 || batched).then_some(usize::from(batched))
+    }
+
+    /// The same with another length of an axis.
+    pub fn with_axis(&self, axis: usize, length: usize) -> Self {
         let mut header = self.header.clone();
-        if let Some(first) = header.shape.first_mut() {
-            *first = length;
+        if let Some(size) = header.shape.get_mut(axis) {
+            *size = length;
         }
         Self { header }
     }
 
+    /// Whether [`Self::encode`] takes so many cells.
+    ///
+    /// # Errors
+    /// As it.
+    pub fn fits(&self, cells: usize) -> Result<(), String> {
+        if cells != self.header.len() {
+            let shape = shape_text(self.shape());
+            return Err(format!("{cells} cells; the shape {shape} holds {}", self.header.len()));
+        }
+        push(&mut Vec::new(), 0.0, &self.header)
+    }
+
+    /// Whether [`Self::with_amplitudes`] takes so many.
+    ///
+    /// # Errors
+    /// As it.
+    pub fn fits_amplitudes(&self, amplitudes: usize, levels: usize) -> Result<(), String> {
+        let Header { scalar, width, fortran, .. } = &self.header;
+        if *scalar != Scalar::Complex || !matches!(width, 8 | 16) || *fortran {
+            return Err("expected complex64 or complex128 in C order".into());
+        }
+        let (got, shape) = (self.header.len(), shape_text(self.shape()));
+        let expected = amplitudes.saturating_mul(levels);
+        if got == expected {
+            Ok(())
+        } else {
+            Err(format!("the shape {shape} holds {got} elements; expected {expected}"))
+        }
+    }
+
+    /// The npy file, header included, of an array of complex numbers whose last axis has `levels` elements, with the amplitude of
+    /// element `level` of each row as given, and every phase as in `measured` (the data of the array as it is). The other
+    /// elements of a row keep their ratio to it, but none becomes larger: where it is the sum of all antennas in phase, no
+    /// echo has a larger one. Without a phase the amplitude is a real number, and the rest of the row nothing.
+    ///
+    /// # Errors
+    /// In words: where the array is another, or has no such row.
+    pub fn with_amplitudes(
+        &self,
+        measured: &[u8],
+        amplitudes: &[f64],
+        levels: usize,
+        level: usize,
+    ) -> Result<Vec<u8>, String> {
+        self.fits_amplitudes(amplitudes.len(), levels)?;
+        let numbers = complex_numbers(measured, &self.header);
+        let width = self.header.width / 2;
+        let part = Header { scalar: Scalar::Float(width), width, ..self.header.clone() };
+        let mut bytes = self.head();
+        bytes.reserve(measured.len());
+        for (row, &amplitude) in numbers.chunks_exact(levels.max(1)).zip(amplitudes) {
+            let strongest = row.get(level).map_or(0.0, |x| x.norm());
+            for (k, x) in row.iter().enumerate() {
+                let scale = amplitude / strongest.max(x.norm());
+                let scaled = match (strongest > 0.0 && strongest.is_finite(), k == level) {
+                    (true, _) if scale.is_finite() && x.is_finite() => x * scale,
+                    (false, true) => Complex::new(amplitude, 0.0),
+                    _ => Complex::default(),
+                };
+                push(&mut bytes, scaled.re, &part)?;
+                push(&mut bytes, scaled.im, &part)?;
+            }
+        }
+        Ok(bytes)
+    }
+
     /// The npy file, header included, of `data` in C order. What is beyond the dtype becomes its nearest finite number; whole
-    /// numbers are rounded; complex numbers get no imaginary part.
+    /// numbers are rounded.
     ///
     /// # Errors
     /// In words: where the shape does not hold `data`, or the dtype holds no numbers.
     pub fn encode(&self, data: &[f64]) -> Result<Vec<u8>, String> {
-        if data.len() != self.header.len() {
-            return Err(format!(
-                "{} cells; the shape {} holds {}",
-                data.len(),
-                shape_text(self.shape()),
-                self.header.len()
-            ));
-        }
+        self.fits(data.len())?;
         let mut bytes = self.head();
         bytes.reserve(data.len() * self.header.width);
         let in_order = in_file_order(data, &self.header);
@@ -103,6 +170,16 @@ fn in_file_order(data: &[f64], header: &Header) -> Option<Vec<f64>> {
     Some(turned)
 }
 
+/// The elements of an array of complex numbers, in the order of the file.
+fn complex_numbers(bytes: &[u8], header: &Header) -> Vec<Complex<f64>> {
+    let part = |bytes: &[u8]| super::archive::real(bytes, header.big_endian);
+    let number = |bytes: &[u8]| {
+        let (re, im) = bytes.split_at(bytes.len() / 2);
+        Complex::new(part(re), part(im))
+    };
+    bytes.chunks_exact(header.width.max(1)).map(number).collect()
+}
+
 fn push(bytes: &mut Vec<u8>, x: f64, header: &Header) -> Result<(), String> {
     macro_rules! put {
         ($value:expr) => {{
@@ -126,14 +203,6 @@ fn push(bytes: &mut Vec<u8>, x: f64, header: &Header) -> Result<(), String> {
         (Scalar::Uint(2), _) => put!(whole as u16),
         (Scalar::Uint(4), _) => put!(whole as u32),
         (Scalar::Uint(8), _) => put!(whole as u64),
-        (Scalar::Complex, 8) => {
-            put!(finite(f64::from(f32::MAX)) as f32);
-            put!(0.0_f32);
-        }
-        (Scalar::Complex, 16) => {
-            put!(x);
-            put!(0.0_f64);
-        }
         _ => return Err(format!("dtype {} holds no numbers that can be written", header.dtype)),
     }
     Ok(())

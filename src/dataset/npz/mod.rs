@@ -17,5 +17,4 @@ pub use decode::Array;
 pub use error::NpzError;
 pub(crate) use error::{shape_text, shown};
 pub use form::{Form, copy_with};
-pub(crate) use write::replace_file;
 pub use write::{ArrayView, write, write_deflated, write_npy};

@@ -1,10 +1,10 @@
-//! Writing: stored, not deflated (20 to 40 times faster) unless asked for, and atomic: a new file takes the old one's place when it is
-//! complete, so that a crash or a full disk never leaves half a file behind.
+//! Writing: stored, not deflated (20 to 40 times faster) unless asked for, and atomic ([`replace_file`]).
 
 use super::NpzError;
+use crate::output::replace_file;
 use npyz::WriterBuilder;
 use num_complex::Complex;
-use std::io::{Seek, Write};
+use std::io::Write;
 use std::path::Path;
 use zip::write::FileOptions;
 
@@ -154,25 +154,4 @@ fn write_with(path: &Path, arrays: &[(&str, ArrayView<'_>)], method: zip::Compre
 /// As [`write()`].
 pub fn write_npy(path: &Path, array: &ArrayView<'_>) -> Result<(), NpzError> {
     replace_file(path, |out| array.write_to(out)).map_err(|reason| NpzError::Write { reason, path: path.to_owned() })
-}
-
-/// What a file is written through.
-pub(crate) trait Sink: Write + Seek {}
-impl<T: Write + Seek> Sink for T {}
-
-/// Writes a file beside `path` and moves it into place; on failure the temporary file is removed.
-pub(crate) fn replace_file(
-    path: &Path,
-    fill: impl FnOnce(&mut dyn Sink) -> std::io::Result<()>,
-) -> std::io::Result<()> {
-    let name = path.file_name().ok_or_else(|| std::io::Error::other("it is not a file name"))?;
-    let temporary = path.with_file_name(format!(".{}.{}.tmp", name.to_string_lossy(), std::process::id()));
-    let written = std::fs::File::create(&temporary).and_then(|file| {
-        let mut out = std::io::BufWriter::new(file);
-        fill(&mut out)?;
-        out.flush()
-    });
-    written.and_then(|()| std::fs::rename(&temporary, path)).inspect_err(|_| {
-        let _ = std::fs::remove_file(&temporary);
-    })
 }

@@ -1,9 +1,9 @@
 //! Taking things home: curves, Gaussians, parameters, labels, strata, the session itself. What is to be written is gathered
 //! here; a thread of the runtime writes it.
 
-use crate::dataset::npz::replace_file;
-use crate::dataset::write_pppr;
+use crate::dataset::{Dataset, write_pppr};
 use crate::labels::{Record, write_csv, write_json};
+use crate::output::replace_file;
 use crate::session::command::{Effect, Export, Task};
 use crate::session::file::SessionFile;
 use crate::session::state::{LogLevel, Session};
@@ -27,11 +27,17 @@ impl Session {
         task.map(Effect::Run).into_iter().collect()
     }
 
+    /// What looks whether a file may be written: no input, and not in the data set that is open.
+    pub fn output_check(&self) -> OutputCheck {
+        OutputCheck { dataset: self.data.dataset.clone() }
+    }
+
     /// Every branch of the fit on screen, iteration by iteration.
     fn curves_task(&self, path: PathBuf) -> Option<Task> {
-        let history = self.fit.history.clone();
+        let (history, check) = (self.fit.history.clone(), self.output_check());
         let arrays: Vec<String> = self.fit.problem.as_ref()?.views.iter().map(|view| view.array.clone()).collect();
         Some(Task::new(move || {
+            check.file(&path)?;
             let rows = history.branches().iter().flat_map(|branch| {
                 branch.rows.iter().map(move |row| CurveRow {
                     branch: branch.id,
@@ -47,7 +53,9 @@ impl Session {
 
     fn gaussians_task(&self, path: PathBuf) -> Option<Task> {
         let (shown, problem) = (Arc::clone(self.fit.shown.as_ref()?), Arc::clone(self.fit.problem.as_ref()?));
+        let check = self.output_check();
         Some(Task::new(move || {
+            check.file(&path)?;
             write_ply(&path, &shown.params, &problem.skeleton).map_err(|error| error.to_string())?;
             Ok(written(&path))
         }))
@@ -55,7 +63,9 @@ impl Session {
 
     fn parameters_task(&self, path: PathBuf) -> Option<Task> {
         let shown = Arc::clone(self.fit.shown.as_ref()?);
+        let check = self.output_check();
         Some(Task::new(move || {
+            check.file(&path)?;
             write_pppr(&path, &shown.params).map_err(|error| error.to_string())?;
             Ok(written(&path))
         }))
@@ -68,7 +78,9 @@ impl Session {
         for (_, records) in self.labels.seen(self.view.label_mode) {
             shared.extend(records.said().map(|(_, record)| Arc::clone(record)));
         }
+        let check = self.output_check();
         Some(Task::new(move || {
+            check.file(&path)?;
             let mut records: Vec<Record> = shared.into_iter().map(Arc::unwrap_or_clone).collect();
             records.sort_by(|a, b| {
                 (a.frame.index, &a.frame.path, &a.annotator).cmp(&(b.frame.index, &b.frame.path, &b.annotator))
@@ -83,7 +95,9 @@ impl Session {
 
     fn strata_task(&self, path: PathBuf) -> Option<Task> {
         let (dataset, strata) = (Arc::clone(self.data.dataset.as_ref()?), Arc::clone(self.strata.result()?));
+        let check = self.output_check();
         Some(Task::new(move || {
+            check.file(&path)?;
             complexity::write_csv(&path, &dataset, &strata).map_err(|error| error.to_string())?;
             Ok(written(&path))
         }))
@@ -94,8 +108,10 @@ impl Session {
             self.note(LogLevel::Error, "there is no session to save: no data set is open".into());
             return Vec::new();
         };
+        let check = self.output_check();
         self.session_path = Some(path.clone());
         vec![Effect::Run(Task::new(move || {
+            check.file(&path)?;
             file.write(&path).map_err(|error| error.to_string())?;
             Ok(format!("session saved to {}", path.display()))
         }))]
@@ -112,4 +128,21 @@ impl Session {
 
 fn written(path: &Path) -> String {
     format!("written to {}", path.display())
+}
+
+/// Looks, in a thread that may wait for the disk, whether a file may be written.
+#[derive(Debug, Clone)]
+pub struct OutputCheck {
+    dataset: Option<Arc<Dataset>>,
+}
+
+impl OutputCheck {
+    /// Refuses an input, and what lies in the data set.
+    ///
+    /// # Errors
+    /// Why, in words.
+    pub fn file(&self, path: &Path) -> Result<(), String> {
+        let Some(dataset) = &self.dataset else { return Ok(()) };
+        dataset.inputs().check_file(path).map_err(|error| error.to_string())
+    }
 }

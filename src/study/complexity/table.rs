@@ -3,7 +3,7 @@
 use super::super::StudyError;
 use super::{Complexity, FrameComplexity, Stratum};
 use crate::dataset::Dataset;
-use crate::dataset::npz::replace_file;
+use crate::output::replace_file;
 use serde::Serialize;
 use std::path::Path;
 

@@ -2,7 +2,8 @@
 //! `v_r` (m/s), `intensity`; and `view`, the map that it was found in.
 
 use super::{CloudPoint, ExportError};
-use crate::dataset::npz::{ArrayView, replace_file, write};
+use crate::dataset::npz::{ArrayView, write};
+use crate::output::replace_file;
 use std::path::Path;
 
 const FIELDS: [&str; 5] = ["x", "y", "z", "v_r", "intensity"];

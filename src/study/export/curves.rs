@@ -1,7 +1,7 @@
 //! Curves as CSV (RFC 4180 by the csv crate, numbers that read back exactly): one row an iteration.
 
-use crate::dataset::npz::replace_file;
 use crate::mhp::StepReport;
+use crate::output::replace_file;
 use crate::study::StudyError;
 use std::path::Path;
 

@@ -1,16 +1,20 @@
 //! PPPR-Heatmap: H_sim in the place of H_ori, file by file, so that a model made for the data set reads it unchanged.
 //!
-//! A file keeps its name, its keys, each map's shape, dtype, byte and memory order; arrays that are no maps are copied, and so
-//! are labels beside it. H_sim is in units of its own: [`MapScale::Match`] brings it to the input's.
+//! A file keeps its place in the tree, its keys, each map's shape, dtype, byte and memory order; arrays that are no maps are copied,
+//! and so are labels beside it. Of HuPR's complex cubes the amplitude that is its map becomes H_sim, and the phases stay. H_sim is
+//! in units of its own: [`MapScale::Match`] brings it to the input's. The manifest comes last: where it is missing the copy is
+//! not complete.
 
 use super::ExportError;
-use super::layout::{MapFile, inside, map_files};
+use super::layout::{MapArray, MapFile, STRANGERS_PATTERN, Slot, Tree};
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::npz::{Form, NpzArchive, copy_with, shape_text};
-use crate::dataset::{Dataset, MANIFEST_NAME};
+use crate::dataset::{Dataset, HUPR_LEVEL, HUPR_LEVELS, Layout, MANIFEST_NAME, XRF55_STEPS};
 use crate::mhp::{Objective, Precision, Problem, masks, simulate};
+use crate::output::{FolderGuard, Inputs, replace_file, resolved};
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -62,11 +66,15 @@ fn masked_mean(map: &[f64], mask: &[bool]) -> f64 {
 
 /// Writes maps into a copy of a data set, frame by frame.
 ///
-/// A stacked file (frames along the first axis of its arrays) is written by [`Self::finish`], with the frames that were added
-/// and no others.
+/// A stacked file (frames along the first axis of its arrays) is written once it is full, or by [`Self::finish`] with the frames
+/// that were added and no others.
 #[derive(Debug)]
-pub struct HeatmapExport {
-    folder: PathBuf,
+pub struct HeatmapExport<'a> {
+    dataset: &'a Dataset,
+    inputs: &'a Inputs<'a>,
+    tree: Tree<'a>,
+    folder: FolderGuard,
+    manifest: Option<PathBuf>,
     stacked: BTreeMap<PathBuf, Stack>,
 }
 
@@ -79,98 +87,198 @@ struct Stack {
     frames: BTreeMap<usize, Vec<Vec<f64>>>,
 }
 
-impl HeatmapExport {
-    /// Into `folder`, which is made; the data set's manifest, or `manifest` where it was opened with another, goes with it.
+impl<'a> HeatmapExport<'a> {
+    /// Of `frames` into `folder`; the data set's manifest, or `manifest` where it was opened with another, goes with it. Nothing
+    /// is written yet.
     ///
     /// # Errors
-    /// Where the folder cannot be written, or is the data set's own.
-    pub fn create(dataset: &Dataset, folder: &Path, manifest: Option<&Path>) -> Result<Self, ExportError> {
-        std::fs::create_dir_all(folder).map_err(ExportError::writing(folder))?;
+    /// Where the folder is the data set's own, or the files are such that no maps can be written in their form.
+    pub fn new(
+        dataset: &'a Dataset,
+        inputs: &'a Inputs<'a>,
+        folder: &Path,
+        manifest: Option<&Path>,
+        frames: &Range<usize>,
+    ) -> Result<Self, ExportError> {
         let root = &dataset.info().root;
-        let home = if root.is_dir() { root.clone() } else { root.parent().unwrap_or(Path::new(".")).to_owned() };
-        let same = |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
-        if same(&home, folder) {
+        let home = if root.is_dir() { root.as_path() } else { root.parent().unwrap_or(Path::new("")) };
+        if matches!((resolved(home), resolved(folder)), (Ok(home), Ok(folder)) if home == folder) {
             return Err(ExportError::Itself { path: folder.to_owned() });
         }
         let own = home.join(MANIFEST_NAME);
         let manifest = manifest.map(Path::to_owned).or_else(|| (root.is_dir() && own.is_file()).then_some(own));
-        if let Some(manifest) = manifest {
-            let to = folder.join(MANIFEST_NAME);
-            std::fs::copy(&manifest, &to).map_err(ExportError::writing(&to))?;
+        let folder = FolderGuard::new(folder);
+        let export = Self { dataset, inputs, tree: Tree::new(dataset), folder, manifest, stacked: BTreeMap::new() };
+        export.check_whole_stacks(frames)?;
+        export.check_forms(frames.start)?;
+        Ok(export)
+    }
+
+    /// Readers of XRF55 expect all maps of a file.
+    fn check_whole_stacks(&self, frames: &Range<usize>) -> Result<(), ExportError> {
+        let part = self.stack_length().is_some_and(|n| frames.start % n != 0 || frames.end % n != 0);
+        let (steps, root) = (XRF55_STEPS, self.dataset.info().root.clone());
+        if part { Err(ExportError::Part { steps, frames: frames.clone(), path: root }) } else { Ok(()) }
+    }
+
+    /// Frames of a file, where every file must have so many.
+    fn stack_length(&self) -> Option<usize> {
+        let info = self.dataset.info();
+        (info.layout == Layout::Xrf55 && info.views.iter().all(|view| view.axes.len() == 2)).then_some(XRF55_STEPS)
+    }
+
+    /// Whether maps can be written as the arrays of the first frame are. A frame that cannot be read is told of later.
+    fn check_forms(&self, index: usize) -> Result<(), ExportError> {
+        for file in self.tree.map_files(index) {
+            let Ok(forms) = forms_of(&file) else { continue };
+            for (array, form) in file.arrays.iter().zip(&forms) {
+                let Some(view) = self.dataset.info().views.get(array.view) else { continue };
+                let form =
+                    form.stack_axis(view.axes.len()).map_or_else(|| form.clone(), |axis| form.with_axis(axis, 1));
+                let fits = match array.slot {
+                    Slot::Numbers => form.fits(view.cells()),
+                    Slot::Amplitude => form.fits_amplitudes(view.cells(), HUPR_LEVELS),
+                };
+                fits.map_err(|reason| wrong(&file, array, &form, reason))?;
+            }
         }
-        Ok(Self { folder: folder.to_owned(), stacked: BTreeMap::new() })
+        Ok(())
+    }
+
+    /// Takes the manifest of an earlier export away: from here on the folder is not complete.
+    ///
+    /// # Errors
+    /// Where it is an input, or cannot be removed.
+    pub fn begin(&self) -> Result<(), ExportError> {
+        let old = self.folder.path().join(MANIFEST_NAME);
+        self.inputs.check_replaced(&old)?;
+        match std::fs::remove_file(&old) {
+            Err(reason) if reason.kind() != std::io::ErrorKind::NotFound => Err(ExportError::writing(&old)(reason)),
+            _ => Ok(()),
+        }
     }
 
     /// Adds the maps of a frame, one a view, C order.
     ///
     /// # Errors
     /// Where the frame's file cannot be read, is no longer what it was, or the copy cannot be written.
-    pub fn add(&mut self, dataset: &Dataset, index: usize, maps: &[Vec<f64>]) -> Result<Vec<PathBuf>, ExportError> {
-        let mut written = Vec::new();
-        for file in map_files(dataset, index) {
-            let mut archive = NpzArchive::open(&file.from)?;
-            let forms = file.arrays.iter().map(|(key, _)| archive.form(key)).collect::<Result<Vec<_>, _>>()?;
-            drop(archive);
-            let maps: Vec<&Vec<f64>> = file.arrays.iter().filter_map(|&(_, view)| maps.get(view)).collect();
-            let axes = |k: &(String, usize)| dataset.info().views.get(k.1).map_or(0, |view| view.axes.len());
-            let is_stacked = forms.iter().zip(&file.arrays).all(|(form, array)| form.shape().len() == axes(array) + 1);
-            if is_stacked {
-                let cells = maps.into_iter().cloned().collect();
-                let stack = self.stacked.entry(file.from.clone());
-                let stack = stack.or_insert_with(|| Stack { file, forms, frames: BTreeMap::new() });
-                stack.frames.insert(index, cells);
+    pub fn add(&mut self, index: usize, maps: &[Vec<f64>]) -> Result<(), ExportError> {
+        for file in self.tree.map_files(index) {
+            let forms = forms_of(&file)?;
+            let maps: Vec<&Vec<f64>> = file.arrays.iter().filter_map(|array| maps.get(array.view)).collect();
+            let axes = |array: &MapArray| self.dataset.info().views.get(array.view).map_or(0, |view| view.axes.len());
+            let numbers = file.arrays.iter().all(|array| array.slot == Slot::Numbers);
+            let mut arrays = forms.iter().zip(&file.arrays);
+            if numbers && arrays.all(|(form, array)| form.stack_axis(axes(array)).is_some()) {
+                self.stack(index, file, forms, maps)?;
             } else {
                 let arrays = encoded(&file, &forms, maps.into_iter().map(Vec::as_slice))?;
-                written.push(self.copy(&file, &arrays)?);
+                self.copy(&file, &arrays)?;
             }
         }
-        Ok(written)
+        self.tree.companions(index).iter().try_for_each(|(from, to)| self.copy_labels(from, to))
     }
 
-    /// Writes what is stacked; the files.
+    fn stack(
+        &mut self,
+        index: usize,
+        file: MapFile,
+        forms: Vec<Form>,
+        maps: Vec<&Vec<f64>>,
+    ) -> Result<(), ExportError> {
+        let from = file.from.clone();
+        let stack = self.stacked.entry(from.clone()).or_insert_with(|| Stack { file, forms, frames: BTreeMap::new() });
+        stack.frames.insert(index, maps.into_iter().cloned().collect());
+        if self.stack_length() != self.stacked.get(&from).map(|stack| stack.frames.len()) {
+            return Ok(());
+        }
+        self.stacked.remove(&from).map_or(Ok(()), |full| self.write_stack(&full))
+    }
+
+    /// Writes what is stacked, labels of many frames, and where the export is `complete` the manifest.
     ///
     /// # Errors
     /// As [`Self::add`].
-    pub fn finish(self) -> Result<Vec<PathBuf>, ExportError> {
-        self.stacked.values().map(|stack| self.write_stack(stack)).collect()
+    pub fn finish(mut self, complete: bool) -> Result<(), ExportError> {
+        if self.stack_length().is_none() {
+            let stacks = std::mem::take(&mut self.stacked);
+            stacks.values().try_for_each(|stack| self.write_stack(stack))?;
+        }
+        self.tree.labels().iter().try_for_each(|(from, to)| self.copy_labels(from, to))?;
+        match self.manifest.clone().filter(|_| complete) {
+            Some(manifest) => self.write_manifest(&manifest),
+            None => Ok(()),
+        }
     }
 
-    fn write_stack(&self, stack: &Stack) -> Result<PathBuf, ExportError> {
-        let forms: Vec<Form> = stack.forms.iter().map(|form| form.with_first_axis(stack.frames.len())).collect();
+    fn write_stack(&mut self, stack: &Stack) -> Result<(), ExportError> {
+        let views = &self.dataset.info().views;
+        let resized = |(form, array): (&Form, &MapArray)| {
+            let axis = form.stack_axis(views.get(array.view).map_or(0, |view| view.axes.len()));
+            axis.map_or_else(|| form.clone(), |axis| form.with_axis(axis, stack.frames.len()))
+        };
+        let forms: Vec<Form> = stack.forms.iter().zip(&stack.file.arrays).map(resized).collect();
         let whole: Vec<Vec<f64>> = (0..forms.len())
             .map(|k| stack.frames.values().filter_map(|arrays| arrays.get(k)).flatten().copied().collect())
             .collect();
-        self.copy(&stack.file, &encoded(&stack.file, &forms, whole.iter().map(Vec::as_slice))?)
+        let arrays = encoded(&stack.file, &forms, whole.iter().map(Vec::as_slice))?;
+        self.copy(&stack.file, &arrays)
     }
 
-    fn copy(&self, file: &MapFile, arrays: &[(String, Vec<u8>)]) -> Result<PathBuf, ExportError> {
-        let to = self.folder.join(&file.inside);
-        let home = to.parent().unwrap_or(&self.folder);
-        std::fs::create_dir_all(home).map_err(ExportError::writing(home))?;
-        copy_with(&file.from, &to, arrays)?;
-        for companion in &file.companions {
-            let beside = home.join(inside(file.from.parent().unwrap_or(Path::new("")), companion));
-            std::fs::copy(companion, &beside).map_err(ExportError::writing(&beside))?;
+    fn copy(&mut self, file: &MapFile, arrays: &[(String, Vec<u8>)]) -> Result<(), ExportError> {
+        let to = self.folder.place(&file.inside, self.inputs)?;
+        Ok(copy_with(&file.from, &to, arrays)?)
+    }
+
+    fn copy_labels(&mut self, from: &Path, inside: &Path) -> Result<(), ExportError> {
+        let to = self.folder.place(inside, self.inputs)?;
+        let mut file = std::fs::File::open(from).map_err(ExportError::reading(from))?;
+        replace_file(&to, |out| std::io::copy(&mut file, out).map(drop)).map_err(ExportError::writing(&to))
+    }
+
+    fn write_manifest(&mut self, from: &Path) -> Result<(), ExportError> {
+        let mut text = std::fs::read_to_string(from).map_err(ExportError::reading(from))?;
+        if self.tree.has_strangers() {
+            let reading = |why: String| ExportError::reading(from)(std::io::Error::other(why));
+            let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| reading(error.to_string()))?;
+            table.insert("frames".into(), STRANGERS_PATTERN.into());
+            text = toml::to_string(&table).map_err(|error| reading(error.to_string()))?;
         }
-        Ok(to)
+        let to = self.folder.place(Path::new(MANIFEST_NAME), self.inputs)?;
+        replace_file(&to, |out| out.write_all(text.as_bytes())).map_err(ExportError::writing(&to))
     }
 }
 
-fn encoded<'a>(
+fn forms_of(file: &MapFile) -> Result<Vec<Form>, ExportError> {
+    let mut archive = NpzArchive::open(&file.from)?;
+    file.arrays.iter().map(|array| Ok(archive.form(&array.key)?)).collect()
+}
+
+fn wrong(file: &MapFile, array: &MapArray, form: &Form, reason: String) -> ExportError {
+    ExportError::Form {
+        key: array.key.clone(),
+        form: format!("{} {}", form.dtype(), shape_text(form.shape())),
+        reason,
+        path: file.from.clone(),
+    }
+}
+
+fn encoded<'m>(
     file: &MapFile,
     forms: &[Form],
-    maps: impl Iterator<Item = &'a [f64]>,
+    maps: impl Iterator<Item = &'m [f64]>,
 ) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
     let arrays = file.arrays.iter().zip(forms).zip(maps);
     arrays
-        .map(|(((key, _), form), cells)| {
-            let wrong = |reason: String| ExportError::Form {
-                key: key.clone(),
-                form: format!("{} {}", form.dtype(), shape_text(form.shape())),
-                reason,
-                path: file.from.clone(),
+        .map(|((array, form), cells)| {
+            let bytes = match array.slot {
+                Slot::Numbers => form.encode(cells),
+                Slot::Amplitude => {
+                    let measured = NpzArchive::open(&file.from)?.bytes(&array.key)?;
+                    form.with_amplitudes(&measured, cells, HUPR_LEVELS, HUPR_LEVEL)
+                }
             };
-            Ok((key.clone(), form.encode(cells).map_err(wrong)?))
+            Ok((array.key.clone(), bytes.map_err(|reason| wrong(file, array, form, reason))?))
         })
         .collect()
 }

@@ -7,7 +7,7 @@
 //! `vx vy vz` (m/s), and `person`, `joint` (int32, from 0). Units and joint names stand in the header's comments.
 
 use crate::body::{Group, Pppr, Side, Skeleton};
-use crate::dataset::npz::replace_file;
+use crate::output::replace_file;
 use crate::study::StudyError;
 use std::fmt::Write as _;
 use std::path::Path;

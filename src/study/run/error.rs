@@ -1,6 +1,7 @@
 //! What can go wrong with a run as a whole. What goes wrong with one frame is a row.
 
 use super::super::StudyError;
+use crate::output::OutputError;
 use std::path::PathBuf;
 
 /// Why a run cannot begin, go on, be merged or be read.
@@ -45,12 +46,9 @@ pub enum RunError {
         /// The folder.
         path: PathBuf,
     },
-    /// Another process writes the folder.
-    #[error("{path}: another process works on this run", path = path.display())]
-    Busy {
-        /// The folder.
-        path: PathBuf,
-    },
+    /// The folder must not be written, or another process writes it.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// Runs that do not make one.
     #[error("{path}: {message}", path = path.display())]
     Merge {

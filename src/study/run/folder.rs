@@ -10,6 +10,7 @@ use super::row::RunRow;
 use super::spec::{RUN_FILE, RunSpec};
 use super::table::{TableRow, table};
 use crate::dataset::{Dataset, Progress};
+use crate::output::{FolderLock, Inputs};
 use std::path::Path;
 
 /// A run as it lies on disk, finished or not.
@@ -67,7 +68,8 @@ pub fn is_run_folder(folder: &Path) -> bool {
 /// counts rows.
 ///
 /// # Errors
-/// Where the folder holds another run or cannot be written, another process works on it, there is no thread, or on cancel.
+/// Where the folder holds another run, lies in the data set or cannot be written, another process works on it, there is no thread,
+/// or on cancel.
 pub fn execute_run(
     dataset: &Dataset,
     plan: &RunPlan,
@@ -75,7 +77,7 @@ pub fn execute_run(
     threads: usize,
     progress: &Progress,
 ) -> Result<Run, RunError> {
-    std::fs::create_dir_all(folder).map_err(RunError::writing(folder))?;
+    let _lock = claim(folder, &dataset.inputs())?;
     if is_run_folder(folder) {
         let there = RunSpec::read(folder)?;
         if let Some((what, there, here)) = there.difference(&plan.spec) {
@@ -90,6 +92,22 @@ pub fn execute_run(
     let rows = execute(dataset, plan, Journal::open(folder, &plan.spec)?, folder, threads, progress)?;
     output::write(folder, &plan.spec, &rows)?;
     Ok(Run::of(plan.spec.clone(), &rows, true))
+}
+
+/// Refuses a folder for a run that lies in the data set, or whose files are inputs. It need not be there.
+///
+/// # Errors
+/// As told.
+pub fn check_run_folder(folder: &Path, inputs: &Inputs<'_>) -> Result<(), RunError> {
+    inputs.check_folder(folder)?;
+    let files = output::FILES.into_iter().chain([RUN_FILE, JOURNAL_FILE]);
+    Ok(files.map(|file| folder.join(file)).try_for_each(|file| inputs.check_replaced(&file))?)
+}
+
+/// Makes and holds the folder of a run.
+fn claim(folder: &Path, inputs: &Inputs<'_>) -> Result<FolderLock, RunError> {
+    check_run_folder(folder, inputs)?;
+    Ok(FolderLock::claim(folder, &[], inputs)?)
 }
 
 /// Makes one run of its shards, in `out`.
@@ -129,7 +147,7 @@ pub fn merge_runs(folders: &[impl AsRef<Path>], out: &Path) -> Result<Run, RunEr
         let message = format!("shard {missing}/{count} is missing");
         return Err(RunError::Merge { message, path: out.to_owned() });
     }
-    std::fs::create_dir_all(out).map_err(RunError::writing(out))?;
+    let _lock = claim(out, &Inputs::default().with_folder(&spec.data.root))?;
     if is_run_folder(out) {
         let there = RunSpec::read(out)?;
         if let Some((what, there, here)) = there.difference(&spec) {

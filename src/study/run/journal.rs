@@ -1,15 +1,15 @@
 //! `journal.jsonl`: a line a finished row, appended as soon as it is known, so that a killed run loses nothing that was done.
 //!
-//! The first line names the run. A torn or damaged line is dropped, its row is done again. The file is locked while a
-//! process writes it.
+//! The first line names the run. A torn or damaged line is dropped, its row is done again. One process writes it: whoever holds
+//! the folder ([`crate::output::FolderLock`]).
 
 use super::error::RunError;
 use super::row::RunRow;
 use super::spec::RunSpec;
-use crate::dataset::npz::replace_file;
 use crate::input::read_bytes;
+use crate::output::replace_file;
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, OpenOptions};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -24,8 +24,6 @@ pub(super) type Rows = BTreeMap<(usize, usize), RunRow>;
 pub(super) struct Journal {
     file: File,
     path: PathBuf,
-    /// Held until the journal is closed.
-    _lock: File,
 }
 
 #[derive(serde::Serialize, serde::Deserialize)]
@@ -37,16 +35,15 @@ impl Journal {
     /// Opens the journal of a run folder, or begins it, and gives the rows that are in it.
     ///
     /// # Errors
-    /// Where it cannot be read or written, another process holds it, or it is of another run.
+    /// Where it cannot be read or written, or it is of another run.
     pub(super) fn open(folder: &Path, spec: &RunSpec) -> Result<(Self, Rows), RunError> {
         let path = folder.join(JOURNAL_FILE);
-        let lock = lock(folder)?;
         let (rows, sound) = if path.exists() { read_lines(&path, spec)? } else { (Rows::new(), false) };
         if !sound {
             rewrite(&path, spec, &rows)?;
         }
         let file = OpenOptions::new().append(true).open(&path).map_err(RunError::writing(&path))?;
-        Ok((Self { file, path, _lock: lock }, rows))
+        Ok((Self { file, path }, rows))
     }
 
     /// Appends a row in one piece.
@@ -116,19 +113,4 @@ fn read_lines(path: &Path, spec: &RunSpec) -> Result<(Rows, bool), RunError> {
         tracing::warn!("{}: a torn line is dropped, its row is done again", path.display());
     }
     Ok((rows, sound))
-}
-
-/// Holds the folder for this process.
-fn lock(folder: &Path) -> Result<File, RunError> {
-    let path = folder.join(".lock");
-    let file = OpenOptions::new().create(true).append(true).open(&path).map_err(RunError::writing(&path))?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(RunError::Busy { path: folder.to_owned() }),
-        Err(TryLockError::Error(reason)) => {
-            // Some network file systems know no locks; a run there is the user's to keep single.
-            tracing::warn!("{}: cannot be locked: {reason}", path.display());
-            Ok(file)
-        }
-    }
 }

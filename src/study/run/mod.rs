@@ -30,7 +30,7 @@ mod table;
 mod variant;
 
 pub use error::RunError;
-pub use folder::{Run, execute_run, is_run_folder, merge_runs};
+pub use folder::{Run, check_run_folder, execute_run, is_run_folder, merge_runs};
 pub use grid::GridAxis;
 pub use journal::JOURNAL_FILE;
 pub use kind::StudyKind;

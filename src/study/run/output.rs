@@ -6,12 +6,15 @@ use super::row::{Cell, RunRow, cells};
 use super::spec::RunSpec;
 use super::table::{TableRow, table};
 use super::{markdown, parquet_rows};
-use crate::dataset::npz::replace_file;
+use crate::output::replace_file;
 use serde_json::json;
 use std::path::Path;
 
 /// The table for programs; it is there once the run is complete.
 pub const TABLE_FILE: &str = "table.json";
+
+/// Everything that [`write()`] writes.
+pub(super) const FILES: [&str; 6] = ["rows.csv", "rows.parquet", "table.md", "timing.csv", "timing.md", TABLE_FILE];
 
 /// Writes `rows.csv`, `rows.parquet`, `table.md`, `timing.csv`, `timing.md` and last `table.json`, which says that the run
 /// is complete. All but the times are the same bytes for the same specification.

@@ -4,10 +4,10 @@
 use super::error::RunError;
 use super::kind::StudyKind;
 use super::variant::Variant;
-use crate::dataset::npz::replace_file;
 use crate::digest;
 use crate::input::{MOST_TEXT, read_text};
 use crate::mhp::Precision;
+use crate::output::replace_file;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use std::path::{Path, PathBuf};
