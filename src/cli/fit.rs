@@ -17,9 +17,10 @@ use table::Table;
 
 /// Shown under the options of `fit --help`.
 pub(super) const HELP: &str = "\
-Columns: frame iterations converged reason loss em bone rigid joint sep coll iou_<array>... majpe_mm pa_majpe_mm init_ms \
-fit_ms. What is unknown is empty (null in JSON): the errors in mm where the data set has no joints in metres, init_ms \
-where the frame before was the start. A frame that cannot be fitted has the reason `error: ...`, and the run goes on.
+Columns: frame iterations converged reason people annotated loss em bone rigid joint sep coll iou_<array>... majpe_mm \
+pa_majpe_mm init_ms fit_ms. What is unknown is empty (null in JSON): the errors in mm where the data set has no joints in \
+metres, init_ms where the frame before was the start. Errors are of the smaller of the two numbers of people, paired best; \
+their means leave out the frames where another number is annotated than was fitted, and say how many. A frame that cannot be fitted has the reason `error: ...`, and the run goes on.
 
 Exit codes: 0 every frame was fitted; 1 some were not; 2 none was, or the input is bad.
 

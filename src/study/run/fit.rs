@@ -11,6 +11,7 @@ use crate::diagnose::{Camera, Reprojection, joint_errors, map_box_coverage, repr
 use crate::geometry::Vec3;
 use crate::mhp::{Fitter, Precision, Problem, StopReason, predict};
 use crate::start::{begin, problem_of};
+use crate::study::row::annotated;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -150,7 +151,7 @@ impl<'a> Loaded<'a> {
             majpe_mm: errors.map(|errors| errors.majpe_mm),
             pa_majpe_mm: errors.map(|errors| errors.pa_majpe_mm),
             persons: params.shape().persons,
-            annotated: frame.person_count.or_else(|| frame.truth.as_ref().map(|truth| truth.persons)),
+            annotated: annotated(frame),
             reprojection_px: image.reprojection_px,
             box_coverage: image.box_coverage,
             map_box_coverage: self.map_box_coverage(joints, a_person),
