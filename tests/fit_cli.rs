@@ -159,7 +159,7 @@ fn column<'a>(rows: &'a [BTreeMap<String, String>], key: &str) -> Vec<&'a str> {
 fn by_hand(dataset: &Dataset, index: usize, config: &FitConfig, start: Option<Pppr>) -> (f64, Pppr) {
     let problem = Arc::new(problem_of(dataset, &dataset.load(index).unwrap()).unwrap());
     let start = match start {
-        Some(before) => predict(&problem, &before),
+        Some(before) => predict(&problem, config, &before),
         None => begin(&problem, config).unwrap().initialisation.params,
     };
     let mut fitter = Fitter::new(problem, *config, Precision::default(), start).unwrap();

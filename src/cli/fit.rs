@@ -2,7 +2,7 @@
 
 mod table;
 
-use super::common::{PrecisionArg, open, preset, print, progress_bar, settings};
+use super::common::{PrecisionArg, open, presets, print, progress_bar, settings};
 use super::frames::{FrameRange, chosen};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::config::{FitConfig, Preset};
@@ -44,8 +44,8 @@ pub struct FitArgs {
     /// Fit configuration; without it the preset.
     #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
     config: Option<PathBuf>,
-    /// Settings with a name: `paper`, or `recommended`, which fits synthetic data with truth best.
-    #[arg(long, value_name = "NAME", default_value = "paper", value_parser = preset)]
+    /// Settings with a name.
+    #[arg(long, value_name = "NAME", default_value = "default", value_parser = presets())]
     preset: Preset,
     /// Persons that are fitted at once, instead of the configuration's; 0 fits as many as are counted.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=8))]

@@ -65,7 +65,7 @@ fn fit_watched(
     let problem = Arc::new(problem_of(dataset, &frame).map_err(|error| in_file(&error))?);
     let began = Instant::now();
     let (initial, init_ms) = if let Some(params) = start {
-        (predict(&problem, &params), None)
+        (predict(&problem, &options.config, &params), None)
     } else {
         let found = begin(&problem, &options.config).map_err(|error| in_file(&error))?.initialisation;
         (found.params, Some(milliseconds(began)))
