@@ -35,14 +35,14 @@
 //! | [`study`] | batch runs; studies, their tables and run folders; exports; which frames are hard |
 //! | [`labels`] | tags, notes, verdicts, the journal that keeps them, agreement |
 //! | [`diagnose`] | metrics: MAJPE, PA-MAJPE; evidence for each failure mode |
-//! | [`start`] | where a frame's fit begins: frames around, count, start poses |
-//! | [`mhp`] | initialisation, forward model, objective, Adam, convergence, the fitter's one `step` |
-//! | [`dataset`] | frames, the generic manifest, MMVR, npz; lazy loading and a cache with a byte budget |
+//! | [`start`] | where a frame's fit begins: the problem with the frames around it, and for how many people a start is asked |
+//! | [`mhp`] | start poses, forward model, objective, Adam, convergence, the fitter's one `step` |
+//! | [`dataset`] | frames, the generic manifest, MMVR, HuPR, XRF55, npz; lazy loading and a cache with a byte budget |
 //! | [`simulate`] | the synthetic source: people and rooms before a radar, as frames with truth |
 //! | [`people`] | counting, places and identities of several people |
 //! | [`body`] | skeleton topologies, the PPPR parameters, bodies that move |
 //! | [`radar`] | chirp, axes, views, point-spread functions, FMCW synthesis of a MIMO array and the FFT chain |
-//! | [`config`] | `FitConfig`: defaults, ranges, help text; the only source for files, command line and sliders |
+//! | [`config`] | `FitConfig`: defaults, ranges, help text; the only source for files, command line and sliders; [where the program differs from the paper](config::deviations) |
 //! | [`output`] | where results are written: safe names, guarded and locked folders, files whole or not at all |
 //! | [`folders`] | where the user's settings, labels and caches lie |
 //! | [`input`] | opening what others made: regular files only, bounded |

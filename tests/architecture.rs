@@ -155,3 +155,48 @@ fn rooms_below_the_window_know_neither_egui_nor_wgpu() {
     }
     assert_eq!(wrong, Vec::<String>::new());
 }
+
+/// What a text names that looks like a file or folder of this repository: `kernel.rs`, `mhp/init`, `assets/limbs.json`, `train/`.
+fn named_paths(text: &str) -> Vec<String> {
+    const ENDINGS: [&str; 5] = ["rs", "wgsl", "json", "toml", "md"];
+    let part_of = |c: char| c.is_ascii_alphanumeric() || "_/.-".contains(c);
+    let words = text.split(|c: char| !part_of(c)).map(|word| word.trim_matches(['.', '-']));
+    let is_path = |word: &&str| {
+        let source =
+            word.rsplit_once('.').is_some_and(|(stem, ending)| !stem.is_empty() && ENDINGS[..2].contains(&ending));
+        let first = word.split('/').next().unwrap_or_default();
+        let room = MAY_USE.iter().any(|(room, _)| *room == first)
+            || ["src", "tests", "assets", "samples", "cli"].contains(&first);
+        let folder = word.contains('/') && room && !word.ends_with("//");
+        source || folder
+    };
+    words.filter(is_path).map(str::to_owned).collect()
+}
+
+#[test]
+fn paths_are_found_in_a_text() {
+    let text = "in `splat.rs` (f64), `tiles/mod.rs` and assets/limbs.json. Weighs and/or m/s, a 3/4 share, mhp/init too; n.rs.";
+    assert_eq!(named_paths(text), ["splat.rs", "tiles/mod.rs", "assets/limbs.json", "mhp/init", "n.rs"]);
+}
+
+/// A file that moved takes its mention in the documentation along.
+#[test]
+fn every_path_that_a_module_names_exists() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (mut wrong, mut seen) = (Vec::new(), 0);
+    for (_, file) in sources() {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let docs: Vec<&str> = text.lines().filter_map(|line| line.trim_start().strip_prefix("//!")).collect();
+        let folder = file.parent().unwrap();
+        let places = [folder.to_owned(), file.with_extension(""), root.join("src"), root.to_owned()];
+        for path in named_paths(&docs.join("\n")) {
+            seen += 1;
+            let there = |place: &PathBuf| place.join(&path).exists() || place.join(format!("{path}.rs")).exists();
+            if !places.iter().any(there) {
+                wrong.push(format!("{} names {path}", file.strip_prefix(root).unwrap().display()));
+            }
+        }
+    }
+    assert!(seen > 50, "{seen} paths are named");
+    assert_eq!(wrong, Vec::<String>::new());
+}

@@ -121,3 +121,19 @@ fn a_bare_file_needs_axes_once() {
     let (code, _, err) = info(&path, &["--manifest", manifest.to_str().unwrap()], folder.path());
     assert_eq!((code, err.contains("axes.toml.txt:5: unknown key `pfs`; expected one of")), (2, true), "{err}");
 }
+
+/// A folder may have any bytes as its name; JSON has text.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_folder_whose_name_is_no_text_is_told() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join(std::ffi::OsStr::from_bytes(b"data \xff"));
+    std::fs::create_dir(&data).unwrap();
+    mmvr_frame(&data);
+    for more in [&[][..], &["--json"]] {
+        let (code, out, err) = info(&data, more, folder.path());
+        assert_eq!((code, err.as_str()), (0, ""), "{more:?}");
+        assert!(out.contains("data \u{fffd}"), "{out}");
+    }
+}

@@ -36,7 +36,7 @@ psf = { range_m = 0.06, azimuth_rad = 0.0, elevation_rad = 0.03, doppler_mps = 0
 axes = [ { kind = "depth_v", bins = 64, lo = 5.0, hi = 1.0 }, { kind = "z", bins = 48, lo = -1.5, hi = 1.5 } ]
 "#;
 
-const COLUMNS: &str = "frame,iterations,converged,reason,loss,em,bone,rigid,joint,sep,coll,iou_hm_hori,iou_hm_vert,\
+const COLUMNS: &str = "frame,iterations,converged,reason,people,annotated,loss,em,bone,rigid,joint,sep,coll,iou_hm_hori,iou_hm_vert,\
                        majpe_mm,pa_majpe_mm,init_ms,fit_ms";
 
 /// A standing body in front of the radar, coco17, by (forward, to the left, up) of each joint.
@@ -107,11 +107,25 @@ impl Small {
         self.write(name, &maps, truth.group(Group::Position));
     }
 
+    /// The same frame with `people` annotated, each where the one person is.
+    fn annotate(&self, name: &str, people: usize) {
+        let dataset = self.open();
+        let index = (0..dataset.len()).find(|&index| dataset.frame_name(index) == name).unwrap();
+        let frame = dataset.load(index).unwrap();
+        let maps: Vec<Vec<f64>> = frame.maps.iter().map(|map| map.data.clone()).collect();
+        let joints: Vec<f64> = frame.truth.unwrap().joints.into_iter().flatten().collect();
+        self.write_people(name, &maps, &joints.repeat(people), people);
+    }
+
     fn write(&self, name: &str, maps: &[Vec<f64>], joints: &[f64]) {
+        self.write_people(name, maps, joints, 1);
+    }
+
+    fn write_people(&self, name: &str, maps: &[Vec<f64>], joints: &[f64], people: usize) {
         let file = self.file(name);
         std::fs::create_dir_all(file.parent().unwrap()).unwrap();
         let map = |k: usize| ArrayView::f64(&[64, 48], &maps[k]);
-        let joints = ArrayView::f64(&[1, 17, 3], joints);
+        let joints = ArrayView::f64(&[people, 17, 3], joints);
         write(&file, &[("hm_hori", map(0)), ("hm_vert", map(1)), ("joints", joints)]).unwrap();
     }
 
@@ -152,7 +166,7 @@ fn column<'a>(rows: &'a [BTreeMap<String, String>], key: &str) -> Vec<&'a str> {
 fn by_hand(dataset: &Dataset, index: usize, config: &FitConfig, start: Option<Pppr>) -> (f64, Pppr) {
     let problem = Arc::new(problem_of(dataset, &dataset.load(index).unwrap()).unwrap());
     let start = match start {
-        Some(before) => predict(&problem, &before),
+        Some(before) => predict(&problem, config, &before),
         None => begin(&problem, config).unwrap().initialisation.params,
     };
     let mut fitter = Fitter::new(problem, *config, Precision::default(), start).unwrap();
@@ -279,6 +293,31 @@ fn the_table_shows_twenty_rows_and_the_means_of_all() {
     assert!(lines[22].starts_with("mean ") && lines[22].ends_with("23 of 23 frames fitted"), "{table}");
     let right_edge = |line: &str, word: &str| line.find(word).map(|at| at + word.len());
     assert_eq!(right_edge(lines[0], "iterations"), right_edge(lines[1], " 1"), "numbers stand under their head");
+}
+
+/// Two people are annotated and one is fitted: the row has an error, the mean leaves it out and says so.
+#[test]
+fn frames_with_other_people_than_annotated_are_told_and_left_out_of_the_errors() {
+    let small = Small::new(&[("a/000", 0.0), ("a/001", 0.1), ("a/002", 0.2)]);
+    small.annotate("a/001", 2);
+    let out = small.path().join("out");
+    let output = fit(small.path(), &["--iterations", "3", "--people", "1", "--out", out.to_str().unwrap()]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let last = text(&output.stdout).lines().last().unwrap().to_owned();
+    let told = "3 of 3 frames fitted; errors over 2, 1 left out: another number of people is annotated";
+    assert!(last.ends_with(told), "{last}");
+    let rows = summary(&out);
+    assert_eq!(column(&rows, "people"), ["1", "1", "1"]);
+    assert_eq!(column(&rows, "annotated"), ["1", "2", "1"]);
+    let errors: Vec<f64> = column(&rows, "majpe_mm").iter().map(|cell| cell.parse().unwrap()).collect();
+    let json = fit(small.path(), &["--iterations", "3", "--people", "1", "--json"]);
+    let mean = &serde_json::from_slice::<Value>(&json.stdout).unwrap()["mean"];
+    assert_eq!((&mean["errors_over"], &mean["count_mismatched"]), (&Value::from(2), &Value::from(1)));
+    let expected = f64::midpoint(errors[0], errors[2]);
+    assert!((mean["majpe_mm"].as_f64().unwrap() - expected).abs() < 1e-9, "{mean}: {errors:?}");
+    let read = mhp_inspector::study::read_summary(&out.join("summary.csv")).unwrap();
+    let counts: Vec<_> = read.iter().map(|row| (row.people, row.annotated)).collect();
+    assert_eq!(counts, [(Some(1), Some(1)), (Some(1), Some(2)), (Some(1), Some(1))]);
 }
 
 #[test]

@@ -11,10 +11,12 @@ mod reading;
 use cases::Case;
 use mhp_inspector::body::Skeleton;
 use mhp_inspector::body::{Group, Pppr, PpprShape};
-use mhp_inspector::config::{FitConfig, Place, Preset};
+use mhp_inspector::config::{FitConfig, FramesAround, Place, Preset, WarmStart};
 use mhp_inspector::diagnose::{Annotated, EarlierFrame, EvidenceInput, evidence};
 use mhp_inspector::geometry::{Pose, norm, sub};
-use mhp_inspector::mhp::{FitError, Fitter, Precision, Problem, initialise, initialise_people, masks, simulate};
+use mhp_inspector::mhp::{
+    FitError, Fitter, Precision, Problem, initialise, initialise_people, masks, predict, simulate,
+};
 use mhp_inspector::people::{Counter, Scan};
 use mhp_inspector::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
 use mhp_inspector::start::begin;
@@ -112,6 +114,91 @@ fn counting_tells_where_the_peaks_alone_are_wrong() {
     // What counting finds nearby is less exact than the peaks.
     let agreed = begun(&[[shelf[0] + 0.5, shelf[1], 0.0]]);
     assert_eq!(agreed.params, alone.params);
+}
+
+/// The reference case with itself as the frame before: nothing has moved.
+fn twice() -> (Arc<Problem>, FitConfig) {
+    let folder = case_folders().into_iter().find(|f| f.ends_with("mmvr-size")).unwrap();
+    let case = Case::open(&folder);
+    let mut problem = case.problem.clone();
+    let maps: Vec<&[f64]> = (0..2).map(|view| case.problem.map(view)).collect();
+    problem.add_neighbour(-0.1, &maps).unwrap();
+    (Arc::new(problem), case.config)
+}
+
+/// Noise of positions acts on a start from the frame before as on one from the frame's own peaks.
+#[test]
+fn a_warm_start_is_spoiled_like_a_cold_one() {
+    let (problem, plain) = twice();
+    let before = initialise(&problem, &plain).unwrap().params;
+    let unspoiled = predict(&problem, &plain, &before);
+    let mut config = plain;
+    config.init.position_noise_m = 0.05;
+    let spoiled = predict(&problem, &config, &before);
+    let off = |k: usize| norm(sub(spoiled.position(k), unspoiled.position(k)));
+    let joints = before.shape().joints;
+    let square = (0..joints).map(|k| off(k) * off(k)).sum::<f64>() / (3 * joints) as f64;
+    assert!((0.03..0.07).contains(&square.sqrt()), "the deviation of a coordinate is {:.3} m", square.sqrt());
+    config.init.position_noise_m = 0.0;
+    config.init.position_bias_m = 0.1;
+    let shifted = predict(&problem, &config, &before);
+    for joint in 0..joints {
+        assert!((norm(sub(shifted.position(joint), unspoiled.position(joint))) - 0.1).abs() < 1e-9);
+    }
+    let left = predict(&problem, &FitConfig { warm_start: WarmStart::AsLeft, ..plain }, &before);
+    assert_eq!(left, before, "the paper's warm start is the result of the frame before as it is");
+}
+
+/// Missed peaks take their hills along: the place that is read from what is lit around a person changes too.
+#[test]
+fn missed_peaks_move_a_start() {
+    let (problem, plain) = twice();
+    let found = initialise(&problem, &plain).unwrap();
+    for peak_dropout in [0.2, 0.4] {
+        let mut config = plain;
+        config.init.peak_dropout = peak_dropout;
+        let missed = initialise(&problem, &config).unwrap();
+        assert!(missed.peaks.len() < found.peaks.len() && missed.peaks.iter().all(|peak| found.peaks.contains(peak)));
+        let moved = norm(sub(missed.params.position(0), found.params.position(0)));
+        assert!((1e-4..1.0).contains(&moved), "{peak_dropout}: {moved} m");
+    }
+}
+
+/// To the letter of the paper a start reads its own frame alone, and its velocity has no sign.
+#[test]
+fn to_the_letter_a_start_knows_no_other_frame() {
+    let (with_before, _) = twice();
+    let folder = case_folders().into_iter().find(|f| f.ends_with("mmvr-size")).unwrap();
+    let alone = Arc::new(Case::open(&folder).problem);
+    let paper = Preset::Paper.config();
+    let start = initialise(&alone, &paper).unwrap();
+    assert_eq!(start.params, initialise(&with_before, &paper).unwrap().params);
+    let radial = |params: &Pppr| {
+        let ([x, y, z], [vx, vy, vz]) = (centroid(params.group(Group::Position)), params.velocity(0));
+        (x * vx + y * vy + z * vz) / norm([x, y, z])
+    };
+    let speed = radial(&start.params);
+    assert!((0.0..=0.5).contains(&speed) && speed > 0.0, "γ·g ≤ 0.5 m/s, away: {speed}");
+    let plain = initialise(&alone, &FitConfig::default()).unwrap().params;
+    assert_eq!(plain.velocity(0), [0.0; 3], "by default nothing tells the sign");
+    assert!(start.notes.iter().any(|note| note.contains("the middle of the strongest")), "{:?}", start.notes);
+}
+
+/// What comes after a frame tells nothing of it where only the frames before may be looked at.
+#[test]
+fn past_frames_are_those_before() {
+    let (problem, _) = twice();
+    let mut both = Problem::clone(&problem);
+    let dark: Vec<Vec<f64>> = (0..2).map(|view| problem.map(view).iter().map(|x| 0.5 * x).collect()).collect();
+    let dark: Vec<&[f64]> = dark.iter().map(Vec::as_slice).collect();
+    for offset_s in [0.1, 0.2] {
+        both.add_neighbour(offset_s, &dark).unwrap();
+    }
+    let count = |frames: FramesAround| both.neighbours_in(frames).len();
+    assert_eq!([FramesAround::Both, FramesAround::Past, FramesAround::None].map(count), [3, 1, 0]);
+    let past = FitConfig { frames_around: FramesAround::Past, ..FitConfig::default() };
+    let start = |problem: &Problem| initialise(&Arc::new(problem.clone()), &past).unwrap().params;
+    assert_eq!(start(&both), start(&problem));
 }
 
 #[test]

@@ -8,7 +8,7 @@ mod blob;
 mod scenes;
 
 use mhp_inspector::output::{FolderLock, Inputs};
-use mhp_inspector::study::run::{JOURNAL_FILE, Run, TABLE_FILE};
+use mhp_inspector::study::run::{JOURNAL_FILE, Run, RunNumbers, TABLE_FILE};
 use scenes::{Scene, write_scenes};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -379,7 +379,7 @@ fn bad_requests_say_what_is_wrong() {
     assert!(refusal(&["sweep", "--grid", "tau_pct=101"]).contains("expected a number in 0.1 ..= 100"));
     assert!(refusal(&["init", "--shard", "3/2"]).contains("expected i/n"));
     assert!(refusal(&["init", "--frames", "5..99"]).contains("the data set has 6"));
-    assert!(refusal(&["init", "--preset", "best"]).contains("expected one of paper, recommended"));
+    assert!(refusal(&["init", "--preset", "best"]).contains("[possible values: default, paper, recommended]"));
     assert!(refusal(&["init", "--seed", "9999999999"]).contains("init.seed is 9999999999; expected"));
 }
 
@@ -397,4 +397,113 @@ fn a_run_that_another_process_works_on_or_that_lies_in_the_data_is_left_alone() 
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("lies in the data set"), "{}", text(&output.stderr));
     assert!(!case.run("data/runs").exists());
+}
+
+/// What a study spoils acts where its row says, or the row says why it cannot.
+#[test]
+fn a_perturbation_acts_or_its_row_says_why_not() {
+    let case = Case::new();
+    let words: &[&str] = &["robustness", "--all", "--iterations", "3"];
+    for preset in ["default", "recommended", "paper"] {
+        case.done(&[words, &["--preset", preset]].concat(), preset);
+        let run = Run::read(&case.run(preset)).unwrap();
+        let fits = |variant: usize| -> Vec<_> {
+            run.rows.iter().filter(|row| row.variant == variant).map(|row| row.fit.as_ref().unwrap()).collect()
+        };
+        let errors = |variant: usize| -> Vec<f64> {
+            let of = |fit: &RunNumbers| [fit.majpe_mm, fit.pa_majpe_mm, fit.init_majpe_mm].map(Option::unwrap);
+            fits(variant).into_iter().flat_map(of).collect()
+        };
+        for row in &run.table[1..] {
+            // The rounding of a sum that is 0 may differ, and no more.
+            let acts = errors(row.variant).iter().zip(errors(0)).any(|(spoiled, plain)| (spoiled - plain).abs() > 1e-6);
+            assert_eq!(acts, row.note.is_none(), "{preset}, {:?}: {:?}", row.labels, row.note);
+            if row.labels[0] == "v corruption" {
+                assert_eq!(row.note.is_some(), preset == "recommended", "{:?}", row.note);
+            }
+        }
+        // Every frame of the chain begins with joints that are 5 cm off in each coordinate, not its first alone.
+        let warm = fits(run.table.len() - 1);
+        let plain = fits(0);
+        for (spoiled, plain) in warm.iter().zip(plain) {
+            let (spoiled, plain) = (spoiled.init_pa_majpe_mm.unwrap(), plain.init_pa_majpe_mm.unwrap());
+            assert!((spoiled * spoiled - plain * plain).max(0.0).sqrt() > 40.0, "{preset}: {spoiled} and {plain} mm");
+        }
+        let table = std::fs::read_to_string(case.run(preset).join("table.md")).unwrap();
+        let told = "[1] cannot move a joint: velocities reach none, for powers add, and no map has a Doppler axis, and the body";
+        assert_eq!(table.contains(told), preset == "recommended", "{table}");
+        assert_eq!(table.matches("[1] |").count(), if preset == "recommended" { 3 } else { 0 }, "{table}");
+        let json: Value = serde_json::from_slice(&std::fs::read(case.run(preset).join("table.json")).unwrap()).unwrap();
+        let noted = json["rows"].as_array().unwrap().iter().filter(|row| row["note"].is_string()).count();
+        assert_eq!(noted, if preset == "recommended" { 3 } else { 0 });
+    }
+}
+
+/// The paper's columns are of MMVR, HuPR and XRF55: beside other data they are left out, and the table says so.
+#[test]
+fn the_papers_figures_stand_beside_their_own_data_alone() {
+    let case = Case::new();
+    for study in ["operators", "threshold", "init", "complexity", "counting"] {
+        let table = case.done(&[study, "--iterations", "1", "--frames", "0..3"], study);
+        let why = "and not shown: the layout here is npz.";
+        assert!(!table.contains("paper MAJPE") && !table.contains("paper weighted") && table.contains(why), "{table}");
+        let json: Value = serde_json::from_slice(&std::fs::read(case.run(study).join("table.json")).unwrap()).unwrap();
+        assert!(json["paper"].is_null() && json["paper_missing"].as_str().unwrap().ends_with(why));
+        assert!(json["rows"].as_array().unwrap().iter().all(|row| row["paper"].is_null()), "{study}");
+    }
+    let table = case.done(&["budget", "--iterations", "1", "--frames", "0..2"], "budget");
+    assert!(!table.contains("paper"), "the paper has no such table: {table}");
+    let hupr = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/hupr");
+    let study = |name: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"));
+        command.args(["study", name, "--iterations", "1", "--frames", "0"]).arg(&hupr).arg("--out");
+        let output = command.arg(case.run(&format!("hupr {name}"))).output().unwrap();
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let table = study("threshold");
+    assert!(table.contains("paper MAJPE") && table.contains("73.7") && table.contains("RETR on single-person HuPR"));
+    assert!(!table.contains("71.1"), "MMVR's figure: {table}");
+    let table = study("operators");
+    assert!(table.contains("are of MMVR and not shown: the layout here is hupr."), "{table}");
+}
+
+/// A folder may have any bytes as its name.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_data_set_in_a_folder_that_is_no_text_is_studied() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let case = Case::new();
+    let folder = case.folder.path().join(std::ffi::OsStr::from_bytes(b"data \xff\xfe"));
+    std::fs::rename(case.data(), &folder).unwrap();
+    let runs = case.folder.path().join(std::ffi::OsStr::from_bytes(b"runs \xff"));
+    let study = |more: &[&str], out: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"));
+        command.args(["study", "init", "--iterations", "2", "--frames", "0..2"]).args(more).arg(&folder);
+        command.arg("--out").arg(runs.join(out)).env("MHP_INSPECTOR_HOME", case.run("home"));
+        command.output().unwrap()
+    };
+    let output = study(&[], "whole");
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(study(&[], "whole").status.success(), "the same command goes on with it");
+    let run = Run::read(&runs.join("whole")).unwrap();
+    assert_eq!(run.spec.data.root, std::path::absolute(&folder).unwrap(), "the window can open its data");
+    for k in 1..=2 {
+        assert!(study(&["--shard", &format!("{k}/2")], &format!("part{k}")).status.success());
+    }
+    let mut merge = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"));
+    merge.args(["study", "merge"]).args(["part1", "part2"].map(|part| runs.join(part)));
+    let merged = merge.arg("--out").arg(runs.join("merged")).output().unwrap();
+    assert!(merged.status.success(), "{}", text(&merged.stderr));
+    for file in REPRODUCIBLE {
+        let bytes = |run: &str| std::fs::read(runs.join(run).join(file)).unwrap();
+        assert!(bytes("whole") == bytes("merged"), "{file}");
+    }
+    // A data set that cannot be opened there is told, in text.
+    std::fs::remove_dir_all(&folder).unwrap();
+    let refused = study(&[], "none");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        String::from_utf8(refused.stderr).is_ok_and(|told| told.starts_with("error: ") && told.lines().count() == 1)
+    );
 }

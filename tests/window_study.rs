@@ -13,7 +13,7 @@ use mhp_inspector::dataset::{Dataset, Progress};
 use mhp_inspector::session::{Command, LogLevel};
 use mhp_inspector::study::complexity::{ComplexityOptions, compute};
 use mhp_inspector::study::run::{RunPlan, RunRequest, StudyKind, Subset, execute_run};
-use mhp_inspector::{config::FitConfig, mhp::Precision};
+use mhp_inspector::{config::Preset, mhp::Precision};
 use std::path::{Path, PathBuf};
 use window::Window;
 
@@ -28,10 +28,14 @@ fn run(window: &Window, study: StudyKind, grid: &[&str]) -> PathBuf {
 }
 
 fn run_of(dataset: &Dataset, out: &Path, study: StudyKind, grid: &[&str]) {
+    run_with(dataset, out, study, grid, Preset::Default);
+}
+
+fn run_with(dataset: &Dataset, out: &Path, study: StudyKind, grid: &[&str], preset: Preset) {
     let request = RunRequest {
         study,
-        base: FitConfig::default(),
-        base_name: "paper".into(),
+        base: preset.config(),
+        base_name: preset.name().into(),
         precision: Precision::F32,
         frames: 0..dataset.len().min(4),
         subset: Subset::All,
@@ -69,13 +73,27 @@ fn a_dropped_run_folder_shows_its_table_and_bars() {
         assert!(window.named(name), "{name}: {:#?}", window.names());
     }
     let bar = window.names().into_iter().find(|name| name.starts_with("Bar without range: ")).unwrap();
-    assert!(bar.contains("mm") && bar.contains("paper 90.3"), "{bar}");
+    assert!(bar.contains("mm") && !bar.contains("paper"), "the paper's figures are of MMVR: {bar}");
+    assert!(window.says("are of MMVR and not shown: the layout here is npz."));
     window.click("Plotted quantity");
     window.harness.run_steps(2);
     window.click("PA-MAJPE, mm");
     window.harness.run_steps(2);
     let bar = window.names().into_iter().find(|name| name.starts_with("Bar without range: ")).unwrap();
-    assert!(bar.contains("paper 84.2"), "{bar}");
+    assert!(bar.contains("mm"), "{bar}");
+}
+
+#[test]
+fn a_row_that_cannot_differ_says_why() {
+    let mut window = Window::open(3);
+    let dataset = Dataset::open(window.folder.path(), &Progress::new()).unwrap();
+    let folder = window.folder.path().join("run-robustness");
+    run_with(&dataset, &folder, StudyKind::Robustness, &[], Preset::Recommended);
+    window.apply(Command::OpenRun(folder));
+    window.harness.state_mut().show_pane(PaneKind::Study);
+    shown(&mut window, StudyKind::Robustness);
+    let why = "[1] cannot move a joint: velocities reach none, for powers add, and no map has a Doppler axis";
+    assert!(window.says(why), "{:#?}", window.names());
 }
 
 #[test]

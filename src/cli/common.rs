@@ -6,6 +6,7 @@ use crate::mhp::Precision;
 use crate::output::Inputs;
 use anyhow::Context as _;
 use clap::ValueEnum;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{ErrorKind, IsTerminal as _, Write as _};
 use std::path::Path;
@@ -28,13 +29,10 @@ impl From<PrecisionArg> for Precision {
     }
 }
 
-/// A preset as typed.
-///
-/// # Errors
-/// Names those that there are.
-pub(super) fn preset(name: &str) -> Result<Preset, String> {
-    let known = || Preset::ALL.map(Preset::name).join(", ");
-    Preset::named(name).ok_or_else(|| format!("unknown preset; expected one of {}", known()))
+/// Reads a preset as typed; `--help` lists them with a line each.
+pub(super) fn presets() -> impl TypedValueParser<Value = Preset> {
+    let named = Preset::ALL.map(|preset| PossibleValue::new(preset.name()).help(preset.help()));
+    PossibleValuesParser::new(named).try_map(|name| Preset::named(&name).ok_or("no such preset"))
 }
 
 /// Opens `path` as it says itself, or as `manifest` says.

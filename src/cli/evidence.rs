@@ -79,7 +79,7 @@ pub struct EvidenceArgs {
 /// # Errors
 /// Where the configuration, the data set, the range of frames or the parameters are bad, or the table cannot be written.
 pub(super) fn run(args: &EvidenceArgs) -> anyhow::Result<ExitCode> {
-    let config = settings(args.config.as_deref(), Preset::Paper, args.iterations)?;
+    let config = settings(args.config.as_deref(), Preset::Default, args.iterations)?;
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
     if let Some(file) = &args.csv {

@@ -106,10 +106,10 @@ pub struct ExportArgs {
     /// Scale of maps and intensities.
     #[arg(long, value_enum, default_value = "match")]
     scale: ScaleArg,
-    /// The settings of the fits and of the simulation: paper or recommended.
-    #[arg(long, value_name = "NAME", default_value = "paper", value_parser = super::common::preset)]
+    /// The settings of the fits and of the simulation.
+    #[arg(long, value_name = "NAME", default_value = "default", value_parser = super::common::presets())]
     preset: Preset,
-    /// A fit configuration instead of a preset; keys that it lacks are the paper's.
+    /// A fit configuration instead of a preset; keys that it lacks are those of `default`.
     #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
     config: Option<PathBuf>,
     /// Adam steps of a frame, instead of the configuration's.

@@ -2,7 +2,7 @@
 
 mod table;
 
-use super::common::{PrecisionArg, inputs, open, preset, print, progress_bar, settings};
+use super::common::{PrecisionArg, inputs, open, presets, print, progress_bar, settings};
 use super::frames::{FrameRange, chosen};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::config::{FitConfig, Preset};
@@ -18,9 +18,10 @@ use table::Table;
 
 /// Shown under the options of `fit --help`.
 pub(super) const HELP: &str = "\
-Columns: frame iterations converged reason loss em bone rigid joint sep coll iou_<array>... majpe_mm pa_majpe_mm init_ms \
-fit_ms. What is unknown is empty (null in JSON): the errors in mm where the data set has no joints in metres, init_ms \
-where the frame before was the start. A frame that cannot be fitted has the reason `error: ...`, and the run goes on.
+Columns: frame iterations converged reason people annotated loss em bone rigid joint sep coll iou_<array>... majpe_mm \
+pa_majpe_mm init_ms fit_ms. What is unknown is empty (null in JSON): the errors in mm where the data set has no joints in \
+metres, init_ms where the frame before was the start. Errors are of the smaller of the two numbers of people, paired best; \
+their means leave out the frames where another number is annotated than was fitted, and say how many. A frame that cannot be fitted has the reason `error: ...`, and the run goes on.
 
 Exit codes: 0 every frame was fitted; 1 some were not; 2 none was, or the input is bad.
 
@@ -48,8 +49,8 @@ pub struct FitArgs {
     /// Fit configuration; without it the preset.
     #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
     config: Option<PathBuf>,
-    /// Settings with a name: `paper`, or `recommended`, which fits synthetic data with truth best.
-    #[arg(long, value_name = "NAME", default_value = "paper", value_parser = preset)]
+    /// Settings with a name.
+    #[arg(long, value_name = "NAME", default_value = "default", value_parser = presets())]
     preset: Preset,
     /// Persons that are fitted at once, instead of the configuration's; 0 fits as many as are counted.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=8))]

@@ -88,7 +88,7 @@ fn as_json(dataset: &Dataset, frame: &Frame) -> Value {
     json!({
         "name": info.name,
         "layout": info.layout.word(),
-        "root": info.root,
+        "root": info.root.display().to_string(),
         "frames": dataset.len(),
         "sequences": dataset.sequences(),
         "frame_rate_hz": info.frame_rate_hz,

@@ -130,6 +130,17 @@ pub const FIELDS: &[Field] = &[
         set: |c, x| c.theta_max_deg = x,
     },
     Field {
+        key: "bone_tolerance_m",
+        group: FieldGroup::Limits,
+        label: "Bone tolerance",
+        help: "How far a bone may be from its reference length at no cost: L_bone = Σ ψ(max(0, |l − ℓ| − tolerance)). The paper's formula has none (4.3), its list of settings has 5 cm (appendix D).",
+        unit: "m",
+        range: (0.0, 0.5),
+        logarithmic: false,
+        get: |c| c.bone_tolerance_m,
+        set: |c, x| c.bone_tolerance_m = x,
+    },
+    Field {
         key: "surface_offset_m",
         group: FieldGroup::Radar,
         label: "δ (skin)",

@@ -1,5 +1,7 @@
-//! How a fit starts and what it moves: the switches beside the paper's setting. Every default is the paper.
+//! How a fit starts and what it moves. Every default is the paper's word, or says what the paper leaves open, except where
+//! [`super::deviations`] tells otherwise.
 
+use super::{Background, GradientVelocity, Still};
 use serde::{Deserialize, Serialize};
 
 /// What Adam moves.
@@ -31,7 +33,9 @@ pub enum Place {
     /// Where the views' peaks agree best, in the frame alone.
     #[default]
     Peaks,
-    /// There, unless counting people over the frames around finds that person elsewhere.
+    /// In the middle of the strongest cluster of peaks, as it is; the paper.
+    Cluster,
+    /// As `peaks`, unless counting people over the frames around finds that person elsewhere.
     Counted,
 }
 
@@ -120,6 +124,12 @@ pub struct InitConfig {
     pub position: bool,
     /// V: velocities from the Doppler axis or the intensity gradients. Off: 0.
     pub velocity: bool,
+    /// What becomes of what stands still.
+    pub still: Still,
+    /// What a cell is compared with.
+    pub background: Background,
+    /// How an intensity gradient becomes a velocity.
+    pub gradient: GradientVelocity,
     /// γ of appendix A, m/s.
     pub velocity_gain_mps: f64,
     /// Standard deviation of the noise on every coordinate of every joint, m.
@@ -139,6 +149,9 @@ impl Default for InitConfig {
         Self {
             position: true,
             velocity: true,
+            still: Still::default(),
+            background: Background::default(),
+            gradient: GradientVelocity::default(),
             velocity_gain_mps: 0.5,
             position_noise_m: 0.0,
             position_bias_m: 0.0,

@@ -1,15 +1,21 @@
 //! `FitConfig`: every number that steers a fit, with its default, range and explanation.
 //!
-//! This is the only source: the command line, the sliders, their tooltips and `FIT.toml` all read [`FIELDS`]. The default is the
-//! paper's setting; [`Preset`] names it and the recommended one.
+//! This is the only source: the command line, the sliders, their tooltips and `FIT.toml` all read [`FIELDS`] and [`CHOICES`]. The
+//! default is what SPEC fixes of the paper; [`Preset`] names it, the paper to the letter and the recommended setting, and
+//! [`deviations`] tells how they differ and why.
 
+mod choices;
+pub mod deviations;
 mod fields;
 mod init;
 mod preset;
+mod reading;
 
+pub use choices::{Answer, CHOICES, Choice, ChoiceGroup};
 pub use fields::{FIELDS, Field, FieldGroup};
 pub use init::{Height, InitConfig, LearningRates, Limbs, Parameterization, Place, Scatterers, Yaw};
 pub use preset::Preset;
+pub use reading::{Background, Convergence, FramesAround, GradientVelocity, Still, WarmStart};
 
 use crate::input::{MOST_TEXT, read_text};
 use serde::{Deserialize, Serialize};
@@ -124,6 +130,10 @@ pub struct FitConfig {
     pub learning_rate: f64,
     /// Stop the run as soon as the convergence criterion holds.
     pub stop_when_converged: bool,
+    /// When five iterations count as no more progress.
+    pub convergence: Convergence,
+    /// How far a bone may be from its reference length at no cost, m.
+    pub bone_tolerance_m: f64,
     /// What Adam moves: every joint by itself, or a root and the bones' directions.
     pub parameterization: Parameterization,
     /// What the start's Gaussians look like.
@@ -134,6 +144,10 @@ pub struct FitConfig {
     pub yaw: Yaw,
     /// Persons that are fitted; 0: as many as are counted.
     pub people: usize,
+    /// Which frames beside its own a start may look at.
+    pub frames_around: FramesAround,
+    /// Where a warm start begins.
+    pub warm_start: WarmStart,
     /// Start poses that are tried.
     pub starts: usize,
     /// Weight of the temporal term.
@@ -167,11 +181,15 @@ impl Default for FitConfig {
             iterations: 100,
             learning_rate: 1e-3,
             stop_when_converged: false,
+            convergence: Convergence::default(),
+            bone_tolerance_m: 0.0,
             parameterization: Parameterization::default(),
             scatterers: Scatterers::default(),
             place: Place::default(),
             yaw: Yaw::default(),
             people: 1,
+            frames_around: FramesAround::default(),
+            warm_start: WarmStart::default(),
             starts: 1,
             w_time: 0.0,
             height: Height::default(),
@@ -240,7 +258,8 @@ impl FitConfig {
 
     /// Whether a start is found in the same way, as far as switches decide; a slider that is moved asks for no new start.
     pub fn starts_as(&self, other: &Self) -> bool {
-        let switches = |c: &Self| (c.scatterers, c.place, c.yaw, c.people, c.starts, c.height, c.limbs);
+        let switches =
+            |c: &Self| (c.scatterers, c.place, c.yaw, c.people, c.starts, c.height, c.limbs, c.frames_around);
         switches(self) == switches(other) && self.init == other.init
     }
 

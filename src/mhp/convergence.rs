@@ -1,7 +1,8 @@
-//! The convergence criterion of SPEC section 4.
+//! The convergence criterion of SPEC section 4, or of the paper's section 5.5.4 to the letter.
 
 use super::kinematic::bone_length_sq;
 use crate::body::{Pppr, Skeleton};
+use crate::config::Convergence;
 
 /// How far back the loss is compared.
 pub(super) const LOOK_BACK: usize = 5;
@@ -9,12 +10,17 @@ const SMALL_LOSS: f64 = 1.0;
 const SMALL_CHANGE: f64 = 0.005;
 const BONE_RATIO: [f64; 2] = [0.5, 1.5];
 
-/// (L < 1, or the loss of five iterations ago differs by under half a percent) and every joint finite and every bone
-/// within 0.5 to 1.5 of its reference. `losses` ends with the current one.
-pub(super) fn converged(skeleton: &Skeleton, params: &Pppr, losses: &[f64]) -> bool {
+/// (L < 1, or the loss of five iterations ago differs by under half a percent, or with [`Convergence::Improvement`] is not
+/// half a percent larger) and every joint finite and every bone within 0.5 to 1.5 of its reference. `losses` ends with the
+/// current one.
+pub(super) fn converged(criterion: Convergence, skeleton: &Skeleton, params: &Pppr, losses: &[f64]) -> bool {
     let Some(&now) = losses.last() else { return false };
     let before = losses.len().checked_sub(LOOK_BACK + 1).and_then(|i| losses.get(i));
-    let settled = before.is_some_and(|&before| (before - now).abs() < SMALL_CHANGE * before.abs());
+    let progress = |before: f64| match criterion {
+        Convergence::Change => (before - now).abs(),
+        Convergence::Improvement => before - now,
+    };
+    let settled = before.is_some_and(|&before| progress(before) < SMALL_CHANGE * before.abs());
     (now < SMALL_LOSS || settled) && params.is_finite() && bones_plausible(skeleton, params)
 }
 
@@ -50,18 +56,30 @@ mod tests {
     #[test]
     fn needs_a_small_or_settled_loss() {
         let (skeleton, params) = two_joints(0.4);
-        assert!(converged(&skeleton, &params, &[0.99]));
-        assert!(!converged(&skeleton, &params, &[1.0]));
-        assert!(!converged(&skeleton, &params, &[3.0, 3.0, 3.0, 3.0, 3.0]), "five losses look back four");
-        assert!(converged(&skeleton, &params, &[3.0, 9.0, 9.0, 9.0, 9.0, 2.99]));
-        assert!(!converged(&skeleton, &params, &[3.0, 9.0, 9.0, 9.0, 9.0, 2.98]));
+        let converged = |losses: &[f64]| converged(Convergence::Change, &skeleton, &params, losses);
+        assert!(converged(&[0.99]));
+        assert!(!converged(&[1.0]));
+        assert!(!converged(&[3.0, 3.0, 3.0, 3.0, 3.0]), "five losses look back four");
+        assert!(converged(&[3.0, 9.0, 9.0, 9.0, 9.0, 2.99]));
+        assert!(!converged(&[3.0, 9.0, 9.0, 9.0, 9.0, 2.98]));
+    }
+
+    #[test]
+    fn a_loss_that_rises_has_not_improved_but_changed() {
+        let (skeleton, params) = two_joints(0.4);
+        let converged = |criterion, losses: &[f64]| converged(criterion, &skeleton, &params, losses);
+        let rising = [2.0, 2.2, 2.4, 2.6, 2.8, 3.0];
+        assert!(!converged(Convergence::Change, &rising));
+        assert!(converged(Convergence::Improvement, &rising), "the paper's words count it");
+        let falling = [3.0, 2.8, 2.6, 2.4, 2.2, 2.0];
+        assert!(!converged(Convergence::Change, &falling) && !converged(Convergence::Improvement, &falling));
     }
 
     #[test]
     fn needs_finite_joints_and_plausible_bones() {
         for (distance_m, want) in [(0.19, false), (0.21, true), (0.59, true), (0.61, false), (f64::NAN, false)] {
             let (skeleton, params) = two_joints(distance_m);
-            assert_eq!(converged(&skeleton, &params, &[0.5]), want, "{distance_m}");
+            assert_eq!(converged(Convergence::Change, &skeleton, &params, &[0.5]), want, "{distance_m}");
         }
     }
 }

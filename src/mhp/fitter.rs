@@ -86,13 +86,13 @@ impl Fitter {
 
     /// What is known of the current parameters; also at iteration 0.
     pub fn report(&self) -> StepReport {
-        let skeleton = &self.objective.problem().skeleton;
+        let (skeleton, criterion) = (&self.objective.problem().skeleton, self.objective.config().convergence);
         StepReport {
             iteration: self.state.iteration,
             loss: self.evaluation.loss,
             terms: self.evaluation.terms,
             iou: self.evaluation.iou.clone(),
-            converged: converged(skeleton, &self.state.params, &self.state.losses),
+            converged: converged(criterion, skeleton, &self.state.params, &self.state.losses),
         }
     }
 

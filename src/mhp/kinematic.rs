@@ -19,6 +19,11 @@ fn pseudo_huber(x: f64) -> (f64, f64) {
     (x * root * by_both, beyond * by_both)
 }
 
+/// How far `x` lies outside ± `tolerance`, with its sign.
+fn beyond(x: f64, tolerance: f64) -> f64 {
+    x - x.max(-tolerance).min(tolerance)
+}
+
 fn length(e: Vec3) -> f64 {
     (dot(e, e) + LENGTH_FLOOR_SQ).sqrt()
 }
@@ -62,7 +67,7 @@ pub(super) fn evaluate(skeleton: &Skeleton, config: &FitConfig, params: &Pppr, g
     for person in 0..params.shape().persons {
         let first = person * joints.count;
         for (&[m, n], &reference) in skeleton.bones.iter().zip(&skeleton.bone_lengths_m) {
-            let (bone, rigid) = joints.bone([first + m, first + n], reference);
+            let (bone, rigid) = joints.bone([first + m, first + n], reference, config.bone_tolerance_m);
             terms.bone += bone;
             terms.rigid += rigid;
         }
@@ -77,11 +82,11 @@ pub(super) fn evaluate(skeleton: &Skeleton, config: &FitConfig, params: &Pppr, g
 
 impl Joints<'_> {
     /// L_bone and L_rigid of one bone.
-    fn bone(&mut self, [m, n]: [usize; 2], reference: f64) -> (f64, f64) {
+    fn bone(&mut self, [m, n]: [usize; 2], reference: f64, tolerance: f64) -> (f64, f64) {
         let e = sub(self.positions[m], self.positions[n]);
         let l = length(e);
         let unit = scale(e, 1.0 / l);
-        let (stretch, stretch_slope) = pseudo_huber(l - reference);
+        let (stretch, stretch_slope) = pseudo_huber(beyond(l - reference, tolerance));
 
         let dv = sub(self.velocities[m], self.velocities[n]);
         let along = dot(dv, unit);
@@ -169,4 +174,42 @@ fn repulsion(e: Vec3, limit: f64) -> Option<(f64, Vec3)> {
 pub(super) fn bone_length_sq(params: &Pppr, [m, n]: [usize; 2]) -> f64 {
     let e = sub(params.position(m), params.position(n));
     dot(e, e)
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+    use crate::body::{Group, PpprShape};
+
+    /// L_bone of a bone of 0.4 m that is `length_m` long, and its slope by the length.
+    fn bone(length_m: f64, bone_tolerance_m: f64) -> (f64, f64) {
+        let skeleton = Skeleton {
+            joints: vec!["a".into(), "b".into()],
+            bones: vec![[0, 1]],
+            bone_lengths_m: vec![0.4],
+            angles: vec![],
+        };
+        let mut params = Pppr::zeros(PpprShape { persons: 1, joints: 2, doppler_features: 1 });
+        params.set_vec3(Group::Position, 1, [length_m, 0.0, 0.0]);
+        let mut gradient = Pppr::zeros(params.shape());
+        let config = FitConfig { bone_tolerance_m, ..FitConfig::default() };
+        let terms = evaluate(&skeleton, &config, &params, &mut gradient);
+        (terms.bone, *gradient.joint(Group::Position, 1).first().unwrap())
+    }
+
+    #[test]
+    fn a_bone_within_its_tolerance_costs_nothing() {
+        for length_m in [0.36, 0.4, 0.44] {
+            assert_eq!(bone(length_m, 0.05), (0.0, 0.0), "{length_m}");
+            assert!(length_m == 0.4 || bone(length_m, 0.0).0 > 0.03, "without one it does: {length_m}");
+        }
+        for length_m in [0.2, 0.345, 0.455, 0.9] {
+            let (loss, slope) = bone(length_m, 0.05);
+            assert!((loss - pseudo_huber((length_m - 0.4_f64).abs() - 0.05).0).abs() < 1e-9, "{length_m}");
+            let difference = (bone(length_m + 1e-6, 0.05).0 - bone(length_m - 1e-6, 0.05).0) / 2e-6;
+            assert!((slope - difference).abs() < 1e-5, "{length_m}: {slope}, not {difference}");
+        }
+    }
 }

@@ -1,8 +1,9 @@
 //! MHP, the fit: initialisation, forward model, objective with hand-written gradients, Adam, convergence, one `step`.
 //!
 //! [`Problem`] is one frame; [`Objective`] answers loss and gradient for parameters; [`Fitter`] takes Adam steps. The
-//! forward model goes from joints to cells in two files, `splat.rs` (a joint in a view, f64) and `kernel.rs` (cells,
-//! plainly) or `tiles.rs` (cells, f32, fast), and back in the same (moments) and `adjoint.rs`.
+//! forward model goes from joints to cells in two steps, `splat.rs` (a joint in a view, f64; in `batch.rs` several at once)
+//! and `kernel.rs` (cells, plainly) or `tiles/mod.rs` (cells, f32, fast), and back in the same (moments) and
+//! `adjoint.rs`. `em.rs` compares the masks, `kinematic.rs` has the other terms, `objective.rs` adds them up.
 
 mod adam;
 mod adjoint;

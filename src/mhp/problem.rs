@@ -1,8 +1,9 @@
 //! One frame's worth of optimisation problem: radar, skeleton, views and their maps, checked and filled.
 
-use super::init::{Cached, Surroundings};
+use super::init::{Cached, Reading, Surroundings};
 use super::{FitError, fill_missing};
 use crate::body::{Pppr, Skeleton};
+use crate::config::FramesAround;
 use crate::radar::{RadarConfig, View};
 
 /// The maps of a frame shortly before or after.
@@ -69,9 +70,20 @@ impl Problem {
         Ok(())
     }
 
-    /// What the maps show, worked out when first asked for; views must not be changed afterwards.
-    pub(super) fn surroundings(&self) -> &Surroundings {
-        self.surroundings.of(self)
+    /// What the maps show to who reads them like this, worked out when first asked for; views must not be changed
+    /// afterwards.
+    pub(super) fn surroundings(&self, reading: impl Into<Reading>) -> &Surroundings {
+        self.surroundings.of(self, reading.into())
+    }
+
+    /// Those of [`Self::neighbours`] that a start may look at.
+    pub fn neighbours_in(&self, frames: FramesAround) -> &[Neighbour] {
+        let past = self.neighbours.partition_point(|neighbour| neighbour.offset_s < 0.0);
+        match frames {
+            FramesAround::Both => &self.neighbours,
+            FramesAround::Past => &self.neighbours[..past],
+            FramesAround::None => &[],
+        }
     }
 
     /// The frames shortly before and after, in the order of time.

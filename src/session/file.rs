@@ -101,8 +101,9 @@ pub struct SessionFile {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SavedDataset {
     /// From the root.
+    #[serde(with = "crate::folders::portable_path")]
     pub absolute: PathBuf,
-    /// From the session file's folder, where there is a way.
+    /// From the session file's folder, where there is a way that is text.
     pub relative: Option<PathBuf>,
     /// What it must be.
     pub fingerprint: String,
@@ -221,7 +222,8 @@ impl SessionFile {
     pub fn write(mut self, path: &Path) -> Result<(), SessionFileError> {
         let failed = |reason| SessionFileError::Write { reason, path: path.to_owned() };
         let absolute = std::path::absolute(path).map_err(failed)?;
-        self.dataset.relative = absolute.parent().and_then(|folder| way(folder, &self.dataset.absolute));
+        let relative = absolute.parent().and_then(|folder| way(folder, &self.dataset.absolute));
+        self.dataset.relative = relative.filter(|way| way.to_str().is_some());
         let text = serde_json::to_vec(&self).map_err(|error| failed(error.into()))?;
         replace_file(path, |out| out.write_all(&text)).map_err(failed)
     }

@@ -1,6 +1,6 @@
 //! Every step of a fit: reports for the curves, states to go back to, branches that began at an earlier state.
 
-use crate::config::{FIELDS, FitConfig};
+use crate::config::{CHOICES, FIELDS, FitConfig};
 use crate::mhp::{FitState, StepReport};
 use std::sync::Arc;
 
@@ -336,8 +336,12 @@ pub fn difference(old: &FitConfig, new: &FitConfig) -> String {
         .filter(|field| (field.get)(old) != (field.get)(new))
         .map(|field| format!("{} {} → {}", field.label, short((field.get)(old)), short((field.get)(new))))
         .collect();
-    if old.summation != new.summation {
-        parts.push(format!("sum {:?} → {:?}", old.summation, new.summation).to_lowercase());
+    for choice in CHOICES {
+        if let (Some(was), Some(is)) = (choice.answer(old), choice.answer(new))
+            && was.word != is.word
+        {
+            parts.push(format!("{} {} → {}", choice.label.to_lowercase(), was.label, is.label));
+        }
     }
     if old.em_region != new.em_region {
         parts.push("EM region changed".into());
@@ -354,6 +358,15 @@ pub fn difference(old: &FitConfig, new: &FitConfig) -> String {
                 parts.push(format!("{name} {}", if is { "on" } else { "off" }));
             }
         }
+    }
+    let starts = [("P", old.init.position, new.init.position), ("V", old.init.velocity, new.init.velocity)];
+    for (name, was, is) in starts {
+        if was != is {
+            parts.push(format!("{name} {}", if is { "on" } else { "off" }));
+        }
+    }
+    if old.learning_rates != new.learning_rates {
+        parts.push("step sizes changed".into());
     }
     if old.stop_when_converged != new.stop_when_converged {
         parts.push(format!("stop when converged {}", if new.stop_when_converged { "on" } else { "off" }));

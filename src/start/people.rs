@@ -23,12 +23,12 @@ pub struct Begun {
 pub fn begin(problem: &Arc<Problem>, config: &FitConfig) -> Result<Begun, FitError> {
     if config.people == 1 {
         // The paper looks for one person without a count, and so it goes where nothing can be counted, or nobody is.
-        let asked = config.place == Place::Counted && !problem.neighbours().is_empty();
-        let counted = asked.then(|| count(problem).ok()).flatten().filter(|count| count.people() > 0);
+        let asked = config.place == Place::Counted && !problem.neighbours_in(config.frames_around).is_empty();
+        let counted = asked.then(|| count(problem, config).ok()).flatten().filter(|count| count.people() > 0);
         let seeds = counted.map_or_else(Vec::new, |count| count.seeds(1));
         return Ok(Begun { initialisation: initialise_people(problem, config, &seeds)?, count: None });
     }
-    let count = count(problem)?;
+    let count = count(problem, config)?;
     let people = if config.people == 0 { count.people() } else { config.people };
     if people == 0 {
         let reason = format!("nobody is counted (p = {:.2})", count.probability(0));
@@ -42,12 +42,12 @@ pub fn begin(problem: &Arc<Problem>, config: &FitConfig) -> Result<Begun, FitErr
     Ok(Begun { initialisation, count: Some(count) })
 }
 
-/// Counts the people of a frame, with the frames around it that the problem knows: those after it tell as much as those
-/// before. The nearest in time are scanned last.
-fn count(problem: &Problem) -> Result<Count, FitError> {
+/// Counts the people of a frame, with those of the frames around it that a start may look at: those after it tell as much as
+/// those before. The nearest in time are scanned last.
+fn count(problem: &Problem, config: &FitConfig) -> Result<Count, FitError> {
     let told = |error: crate::people::PeopleError| FitError::NoStart { reason: error.to_string() };
     let counter = Counter::new(&problem.views).map_err(told)?;
-    let mut around: Vec<&Neighbour> = problem.neighbours().iter().collect();
+    let mut around: Vec<&Neighbour> = problem.neighbours_in(config.frames_around).iter().collect();
     around.sort_by(|a, b| b.offset_s.abs().total_cmp(&a.offset_s.abs()));
     let views = 0..problem.views.len();
     let others = around.into_iter().map(|neighbour| views.clone().map(|k| neighbour.map(k)).collect());

@@ -4,6 +4,7 @@
 //! are in memory than there are threads. Plain threads and not rayon's: a thread of rayon's that waits inside one fit
 //! may begin another meanwhile, and the times of both would be wrong.
 
+use super::row::annotated;
 use super::{CurveRow, FitNumbers, FrameFit, FrameRow, StudyError, write_curves, write_ply};
 use crate::body::Pppr;
 use crate::config::FitConfig;
@@ -65,7 +66,7 @@ fn fit_watched(
     let problem = Arc::new(problem_of(dataset, &frame).map_err(|error| in_file(&error))?);
     let began = Instant::now();
     let (initial, init_ms) = if let Some(params) = start {
-        (predict(&problem, &params), None)
+        (predict(&problem, &options.config, &params), None)
     } else {
         let found = begin(&problem, &options.config).map_err(|error| in_file(&error))?.initialisation;
         (found.params, Some(milliseconds(began)))
@@ -80,7 +81,9 @@ fn fit_watched(
     let (report, params) = (fitter.report(), fitter.params().clone());
     let errors = errors(&params);
     let (majpe_mm, pa_majpe_mm) = (errors.map(|e| e.majpe_mm), errors.map(|e| e.pa_majpe_mm));
-    Ok(FrameFit { numbers: FitNumbers { report, reason, majpe_mm, pa_majpe_mm, init_ms, fit_ms }, initial, params })
+    let (people, annotated) = (params.shape().persons, annotated(&frame));
+    let numbers = FitNumbers { report, reason, people, annotated, majpe_mm, pa_majpe_mm, init_ms, fit_ms };
+    Ok(FrameFit { numbers, initial, params })
 }
 
 fn errors(params: &Pppr, truth: &Truth, joints: usize) -> Option<JointErrors> {

@@ -18,6 +18,10 @@ pub struct SummaryRow {
     pub converged: Option<bool>,
     /// Why the run ended: `iterations`, `converged`, `error: …`.
     pub reason: Option<String>,
+    /// Persons fitted.
+    pub people: Option<usize>,
+    /// Persons annotated.
+    pub annotated: Option<usize>,
     /// L.
     pub loss: Option<f64>,
     /// Mean forward-consistency IoU over the views where it is known, 0..1.
@@ -64,6 +68,8 @@ struct Columns {
     iterations: Option<usize>,
     converged: Option<usize>,
     reason: Option<usize>,
+    people: Option<usize>,
+    annotated: Option<usize>,
     loss: Option<usize>,
     ious: Vec<usize>,
     majpe_mm: Option<usize>,
@@ -91,6 +97,8 @@ impl Columns {
             iterations: place("iterations"),
             converged: place("converged"),
             reason: place("reason"),
+            people: place("people"),
+            annotated: place("annotated"),
             loss: place("loss"),
             ious: ious.map(|(k, _)| k).collect(),
             majpe_mm: place("majpe_mm"),
@@ -118,6 +126,8 @@ impl Columns {
             iterations: line.parsed(self.iterations, "iterations", "a whole number")?,
             converged: line.parsed(self.converged, "converged", "true or false")?,
             reason: reason.filter(|reason| !reason.is_empty()).map(str::to_owned),
+            people: line.parsed(self.people, "people", "a whole number")?,
+            annotated: line.parsed(self.annotated, "annotated", "a whole number")?,
             loss: line.number(self.loss, "loss", f64::MIN..=f64::MAX)?,
             iou,
             majpe_mm: line.number(self.majpe_mm, "majpe_mm", 0.0..=f64::MAX)?,

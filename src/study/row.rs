@@ -1,7 +1,8 @@
 //! What is known of one fitted frame, and the means over many.
 
-use super::summary::{FIRST, NUMBERS};
+use super::summary::{ERRORS, FIRST, LOSSES, NUMBERS};
 use crate::body::Pppr;
+use crate::dataset::Frame;
 use crate::mhp::{StepReport, StopReason};
 use serde_json::{Map, Value};
 
@@ -12,7 +13,11 @@ pub struct FitNumbers {
     pub report: StepReport,
     /// Why the run ended.
     pub reason: StopReason,
-    /// Mean joint error against the data set's own joints, mm.
+    /// Persons fitted.
+    pub people: usize,
+    /// Persons annotated, where the data set says.
+    pub annotated: Option<usize>,
+    /// Mean joint error against the data set's own joints, mm; of the smaller number of persons, paired best.
     pub majpe_mm: Option<f64>,
     /// The same after alignment of each person.
     pub pa_majpe_mm: Option<f64>,
@@ -20,6 +25,18 @@ pub struct FitNumbers {
     pub init_ms: Option<f64>,
     /// Time of all Adam steps, ms.
     pub fit_ms: f64,
+}
+
+impl FitNumbers {
+    /// Whether as many persons were fitted as are annotated; true where nobody says.
+    pub fn count_matched(&self) -> bool {
+        self.annotated.is_none_or(|annotated| annotated == self.people)
+    }
+}
+
+/// How many people a frame shows, as its data set says.
+pub(super) fn annotated(frame: &Frame) -> Option<usize> {
+    frame.person_count.or_else(|| frame.truth.as_ref().map(|truth| truth.persons))
 }
 
 /// A fit that worked: its numbers and the parameters it ended with.
@@ -45,7 +62,7 @@ pub struct FrameRow {
 }
 
 impl FrameRow {
-    /// The numbers, in the order of the columns between `reason` and the end: loss, six terms, the IoU of `views`
+    /// The numbers, in the order of the columns between `annotated` and the end: loss, six terms, the IoU of `views`
     /// views, two joint errors, two times. `None` where unknown.
     pub fn values(&self, views: usize) -> Vec<Option<f64>> {
         let Ok(fit) = &self.fit else { return vec![None; views + NUMBERS] };
@@ -73,6 +90,8 @@ impl FrameRow {
             text(fit.map(|fit| fit.report.iteration.to_string())),
             text(fit.map(|fit| fit.report.converged.to_string())),
             self.reason(),
+            text(fit.map(|fit| fit.people.to_string())),
+            text(fit.and_then(|fit| fit.annotated).map(|n| n.to_string())),
         ];
         first.into_iter().chain(self.values(views).into_iter().map(|x| text(x.map(|x| x.to_string())))).collect()
     }
@@ -86,19 +105,25 @@ impl FrameRow {
             Value::from(fit.map(|fit| fit.report.iteration)),
             Value::from(fit.map(|fit| fit.report.converged)),
             Value::from(self.reason()),
+            Value::from(fit.map(|fit| fit.people)),
+            Value::from(fit.and_then(|fit| fit.annotated)),
         ];
         let values = first.into_iter().chain(self.values(views).into_iter().map(Value::from));
         Value::Object(columns.iter().cloned().zip(values).collect())
     }
 }
 
-/// Running means over the frames that could be fitted; each value over the frames where it is known.
+/// Running means over the frames that could be fitted; each value over the frames where it is known, and joint errors over those
+/// alone where as many persons were fitted as are annotated: of three people, the error of the one that was fitted says
+/// nothing of the other two.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Means {
     /// Frames seen, failed ones included.
     pub frames: usize,
     /// Frames without a fit.
     pub failed: usize,
+    /// Frames left out of the joint errors: another number of persons was fitted than is annotated.
+    pub count_mismatched: usize,
     converged: usize,
     iterations: usize,
     sums: Vec<(f64, usize)>,
@@ -107,7 +132,8 @@ pub struct Means {
 impl Means {
     /// No frame yet, of a data set with `views` views.
     pub fn new(views: usize) -> Self {
-        Self { frames: 0, failed: 0, converged: 0, iterations: 0, sums: vec![(0.0, 0); views + NUMBERS] }
+        let sums = vec![(0.0, 0); views + NUMBERS];
+        Self { frames: 0, failed: 0, count_mismatched: 0, converged: 0, iterations: 0, sums }
     }
 
     /// Counts a row.
@@ -121,12 +147,22 @@ impl Means {
             Err(_) => self.failed += 1,
         }
         let views = self.sums.len() - NUMBERS;
-        for ((sum, count), value) in self.sums.iter_mut().zip(row.values(views)) {
+        let mut values = row.values(views);
+        if row.fit.as_ref().is_ok_and(|fit| !fit.count_matched()) {
+            self.count_mismatched += 1;
+            values.iter_mut().skip(LOSSES.len() + views).take(ERRORS).for_each(|error| *error = None);
+        }
+        for ((sum, count), value) in self.sums.iter_mut().zip(values) {
             if let Some(value) = value {
                 *sum += value;
                 *count += 1;
             }
         }
+    }
+
+    /// Frames over which the mean joint error is.
+    pub fn errors_over(&self) -> usize {
+        self.sums.iter().rev().nth(NUMBERS - LOSSES.len() - 1).map_or(0, |&(_, count)| count)
     }
 
     /// Frames with a fit.
@@ -153,11 +189,14 @@ impl Means {
         self.sums.iter().map(|&(sum, count)| (count > 0).then(|| sum / count as f64)).collect()
     }
 
-    /// `frames`, `failed`, `converged_share`, `iterations` and the mean of every number column; null where unknown.
+    /// `frames`, `failed`, `errors_over` (frames that the joint errors are the mean of), `count_mismatched` (frames left out of
+    /// them), `converged_share`, `iterations` and the mean of every number column; null where unknown.
     pub fn json(&self, columns: &[String]) -> Value {
         let mut object = Map::new();
         object.insert("frames".into(), self.frames.into());
         object.insert("failed".into(), self.failed.into());
+        object.insert("errors_over".into(), self.errors_over().into());
+        object.insert("count_mismatched".into(), self.count_mismatched.into());
         object.insert("converged_share".into(), self.converged_share().into());
         object.insert("iterations".into(), self.iterations().into());
         let numbers = columns.iter().skip(FIRST.len()).cloned();
@@ -168,6 +207,8 @@ impl Means {
 
 #[cfg(test)]
 mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+
     use super::*;
     use crate::mhp::Terms;
 
@@ -177,6 +218,8 @@ mod tests {
         let fit = FitNumbers {
             report,
             reason: StopReason::Iterations,
+            people: 1,
+            annotated: None,
             majpe_mm: None,
             pa_majpe_mm: None,
             init_ms: Some(2.0),
@@ -201,17 +244,37 @@ mod tests {
         assert_eq!(json["iterations"], 10.0);
     }
 
+    /// Frames whose number of persons is not the annotated one are counted, and no part of the mean error.
+    #[test]
+    fn joint_errors_are_means_over_the_frames_whose_people_are_the_annotated_ones() {
+        let counted = |majpe_mm: f64, annotated: Option<usize>| {
+            let mut row = row(majpe_mm / 100.0, Some(0.5), true);
+            let fit = row.fit.as_mut().unwrap();
+            (fit.majpe_mm, fit.pa_majpe_mm, fit.annotated) = (Some(majpe_mm), Some(majpe_mm / 2.0), annotated);
+            row
+        };
+        let mut means = Means::new(1);
+        for row in [counted(100.0, Some(1)), counted(900.0, Some(2)), counted(200.0, None), row(3.0, None, true)] {
+            means.add(&row);
+        }
+        assert_eq!((means.errors_over(), means.count_mismatched), (2, 1));
+        let json = means.json(&super::super::columns(&["hm".to_owned()]));
+        assert_eq!((&json["majpe_mm"], &json["pa_majpe_mm"]), (&150.0.into(), &75.0.into()));
+        assert_eq!((&json["errors_over"], &json["count_mismatched"]), (&2.into(), &1.into()));
+        assert_eq!(json["loss"], (1.0 + 9.0 + 2.0 + 3.0) / 4.0, "the loss knows no annotation");
+    }
+
     #[test]
     fn unknown_cells_are_empty_and_numbers_read_back_exactly() {
         let columns = super::super::columns(&["hm".to_owned()]);
         let cells = row(0.1 + 0.2, None, true).cells(1);
         assert_eq!(cells.len(), columns.len());
-        assert_eq!(cells[..4], ["a/0", "10", "true", "iterations"]);
-        assert_eq!(cells[4].parse(), Ok(0.1 + 0.2));
-        assert_eq!(cells[11], "", "an undefined IoU");
-        assert_eq!(cells[12..], ["", "", "2", "5"]);
+        assert_eq!(cells[..6], ["a/0", "10", "true", "iterations", "1", ""]);
+        assert_eq!(cells[6].parse(), Ok(0.1 + 0.2));
+        assert_eq!(cells[13], "", "an undefined IoU");
+        assert_eq!(cells[14..], ["", "", "2", "5"]);
         let failed = FrameRow { index: 0, frame: "b".into(), fit: Err("why".into()) };
-        assert_eq!(failed.cells(1)[1..5], ["", "", "error: why", ""]);
+        assert_eq!(failed.cells(1)[1..7], ["", "", "error: why", "", "", ""]);
         assert_eq!(failed.json(&columns)["loss"], Value::Null);
     }
 }

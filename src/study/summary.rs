@@ -5,9 +5,11 @@ use crate::output::Growing;
 use std::path::{Path, PathBuf};
 
 /// The columns before the numbers.
-pub(super) const FIRST: [&str; 4] = ["frame", "iterations", "converged", "reason"];
-const LOSSES: [&str; 7] = ["loss", "em", "bone", "rigid", "joint", "sep", "coll"];
+pub(super) const FIRST: [&str; 6] = ["frame", "iterations", "converged", "reason", "people", "annotated"];
+pub(super) const LOSSES: [&str; 7] = ["loss", "em", "bone", "rigid", "joint", "sep", "coll"];
 const LAST: [&str; 4] = ["majpe_mm", "pa_majpe_mm", "init_ms", "fit_ms"];
+/// Joint errors: the first of [`LAST`].
+pub(super) const ERRORS: usize = 2;
 /// Columns of numbers, besides one for the IoU of each view.
 pub(super) const NUMBERS: usize = LOSSES.len() + LAST.len();
 
@@ -67,7 +69,7 @@ pub enum StudyError {
     },
 }
 
-/// The columns of a batch, in order: `frame iterations converged reason loss em bone rigid joint sep coll iou_<array>…
+/// The columns of a batch, in order: `frame iterations converged reason people annotated loss em bone rigid joint sep coll iou_<array>…
 /// majpe_mm pa_majpe_mm init_ms fit_ms`, an IoU for each of `arrays`.
 pub fn columns(arrays: &[String]) -> Vec<String> {
     let plain = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();

@@ -231,7 +231,7 @@ impl Job {
                 let initial = begun.initialisation.params.clone();
                 (Some(begun), initial, None)
             }
-            Start::Warm(params) => (None, predict(&problem, &params), None),
+            Start::Warm(params) => (None, predict(&problem, &config, &params), None),
             Start::Resume { initial, state } => (None, initial, Some(state)),
         };
         let init_ms = began.elapsed().as_secs_f64() * 1e3;

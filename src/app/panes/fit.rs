@@ -3,9 +3,7 @@
 use super::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, chip, icon_button, iou_color, value_row};
-use crate::config::{
-    EmRegion, Field, FieldGroup, FitConfig, Height, Limbs, Parameterization, Place, Preset, Scatterers, Summation, Yaw,
-};
+use crate::config::{ChoiceGroup, Convergence, EmRegion, Field, FieldGroup, FitConfig, Preset};
 use crate::mhp::Precision;
 use crate::session::{Command, FitStatus};
 use egui::{RichText, Ui};
@@ -77,9 +75,13 @@ fn status(ui: &mut Ui, shared: &mut Shared<'_>) {
         chip(ui, word, color);
         if let Some(row) = fit.shown_row() {
             if row.report.converged && row.report.iteration > 0 && !fit.is_running() {
-                chip(ui, "✓ converged", tokens.ok).on_hover_text(
-                    "The criterion holds: L < 1, or L changed by less than 0.5 % over five iterations; every joint finite and every bone within 0.5–1.5 of its reference.",
-                );
+                let settled = match shared.session.config.convergence {
+                    Convergence::Change => "L changed",
+                    Convergence::Improvement => "L fell",
+                };
+                chip(ui, "✓ converged", tokens.ok).on_hover_text(format!(
+                    "The criterion holds: L < 1, or {settled} by less than 0.5 % over five iterations; every joint finite and every bone within 0.5–1.5 of its reference.",
+                ));
             }
             if let Some(reason) = fit.reason {
                 ui.label(RichText::new(reason).small().color(tokens.dim));
@@ -196,6 +198,7 @@ fn settings(ui: &mut Ui, shared: &mut Shared<'_>, config: &mut FitConfig) {
         }
         ui.checkbox(&mut config.stop_when_converged, "Stop when converged")
             .on_hover_text("End a run as soon as the convergence criterion holds.");
+        choices(ui, ChoiceGroup::Optimiser, config);
         let mut warm = shared.session.warm_start;
         if ui
             .checkbox(&mut warm, "Warm start")
@@ -226,13 +229,7 @@ fn settings(ui: &mut Ui, shared: &mut Shared<'_>, config: &mut FitConfig) {
     });
     egui::CollapsingHeader::new("Radar simulation").default_open(true).show(ui, |ui| {
         operators(ui, config);
-        ui.horizontal(|ui| {
-            ui.label("Sum");
-            ui.selectable_value(&mut config.summation, Summation::Coherent, "coherent")
-                .on_hover_text("H_sim = |Σ A K e^{iψ}|: joints interfere.");
-            ui.selectable_value(&mut config.summation, Summation::Incoherent, "incoherent")
-                .on_hover_text("H_sim = √Σ (A K)²: powers add.");
-        });
+        choices(ui, ChoiceGroup::Radar, config);
         region(ui, config);
         for field in FieldGroup::Radar.fields() {
             slider(ui, field, config);
@@ -250,6 +247,7 @@ fn settings(ui: &mut Ui, shared: &mut Shared<'_>, config: &mut FitConfig) {
             .on_hover_text("Off: the body stands in the middle of what the views cover.");
         ui.checkbox(&mut config.init.velocity, "V: velocities from the maps")
             .on_hover_text("From the Doppler axis, or from the intensity gradients of consecutive maps. Off: 0.");
+        choices(ui, ChoiceGroup::Start, config);
         for field in FieldGroup::Start.fields() {
             slider(ui, field, config);
         }
@@ -272,53 +270,27 @@ fn settings(ui: &mut Ui, shared: &mut Shared<'_>, config: &mut FitConfig) {
 
 /// What is moved, what the Gaussians look like, where the start looks, and the terms that the paper's objective lacks.
 fn model(ui: &mut Ui, config: &mut FitConfig) {
-    ui.horizontal(|ui| {
-        ui.label("Moves");
-        ui.selectable_value(&mut config.parameterization, Parameterization::Joints, "joints")
-            .on_hover_text("Every joint by itself: the paper.");
-        ui.selectable_value(&mut config.parameterization, Parameterization::Bones, "root and bones")
-            .on_hover_text("The root moves and turns, bones turn about their inner joint: lengths stay.");
-    });
-    ui.horizontal(|ui| {
-        ui.label("Gaussians");
-        ui.selectable_value(&mut config.scatterers, Scatterers::Equal, "equal")
-            .on_hover_text("Round, all alike: the paper. Takes effect when a start is found.");
-        ui.selectable_value(&mut config.scatterers, Scatterers::BodyParts, "by body part")
-            .on_hover_text("Along the bones, as wide and bright as the part. Takes effect when a start is found.");
-    });
-    ui.horizontal(|ui| {
-        ui.label("Looks");
-        ui.selectable_value(&mut config.yaw, Yaw::Radar, "at the radar").on_hover_text("The paper.");
-        ui.selectable_value(&mut config.yaw, Yaw::Motion, "where it goes")
-            .on_hover_text("From its places in the frames around. Takes effect when a start is found.");
-    });
-    ui.horizontal(|ui| {
-        ui.label("Place");
-        ui.selectable_value(&mut config.place, Place::Peaks, "peaks")
-            .on_hover_text("The strongest of this frame: the paper.");
-        ui.selectable_value(&mut config.place, Place::Counted, "frames around").on_hover_text(
-            "One person stands where counting over the frames around finds it, if the peaks alone show somebody \
-             elsewhere. Takes effect when a start is found.",
-        );
-    });
-    ui.horizontal(|ui| {
-        ui.label("Height");
-        ui.selectable_value(&mut config.height, Height::Echo, "echo")
-            .on_hover_text("The middle of the echo: the paper.");
-        ui.selectable_value(&mut config.height, Height::Floor, "floor and head").on_hover_text(
-            "Where the data set tells the radar's height (height_m). Takes effect when a start is found.",
-        );
-    });
-    ui.horizontal(|ui| {
-        ui.label("Limbs");
-        ui.selectable_value(&mut config.limbs, Limbs::Posture, "of the posture").on_hover_text("The paper.");
-        ui.selectable_value(&mut config.limbs, Limbs::Learned, "learned").on_hover_text(
-            "Moved as what is lit around the person says; learned from simulated people. Takes effect when a start is \
-             found.",
-        );
-    });
+    choices(ui, ChoiceGroup::Model, config);
     for field in FieldGroup::Regularisation.fields() {
         slider(ui, field, config);
+    }
+}
+
+/// The switches of a group: label and answers, one a line.
+fn choices(ui: &mut Ui, group: ChoiceGroup, config: &mut FitConfig) {
+    for choice in group.choices() {
+        ui.horizontal_wrapped(|ui| {
+            let given = (choice.get)(config);
+            let tip = format!("Default: {}. FIT.toml: {}", choice.answers[0].label, choice.key);
+            ui.label(choice.label).on_hover_text(tip);
+            for (k, answer) in choice.answers.iter().enumerate() {
+                let at_start = if choice.starts() { " Takes effect when a start is found." } else { "" };
+                let tip = format!("{}{at_start}\nFIT.toml: {} = \"{}\"", answer.help, choice.key, answer.word);
+                if ui.selectable_label(given == k, answer.label).on_hover_text(tip).clicked() {
+                    (choice.set)(config, k);
+                }
+            }
+        });
     }
 }
 

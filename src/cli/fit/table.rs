@@ -31,17 +31,17 @@ impl Table {
         lines.extend(self.rows.iter().map(|row| {
             let fit = row.fit.as_ref().ok();
             let converged = fit.map(|fit| if fit.report.converged { "yes" } else { "no" });
-            let iterations = fit.map(|fit| fit.report.iteration.to_string());
-            line(&row.frame, iterations, converged.map(Into::into), &row.values(views), views, row.reason())
+            let first = [
+                fit.map(|fit| fit.report.iteration.to_string()),
+                converged.map(Into::into),
+                fit.map(|fit| fit.people.to_string()),
+                fit.and_then(|fit| fit.annotated).map(|n| n.to_string()),
+            ];
+            line(&row.frame, first, &row.values(views), views, row.reason())
         }));
-        let mean = line(
-            "mean",
-            means.iterations().map(|n| format!("{n:.0}")),
-            means.converged_share().map(|share| format!("{:.0} %", 100.0 * share)),
-            &means.values(),
-            views,
-            format!("{} of {} frames fitted", means.fitted(), means.frames),
-        );
+        let share = means.converged_share().map(|share| format!("{:.0} %", 100.0 * share));
+        let first = [means.iterations().map(|n| format!("{n:.0}")), share, None, None];
+        let mean = line("mean", first, &means.values(), views, told(means));
         lines.push(mean);
         let more = means.frames - self.rows.len();
         aligned(&lines, (more > 0).then(|| format!("... and {more} more frames")))
@@ -49,25 +49,32 @@ impl Table {
 
     fn head(&self) -> Vec<String> {
         let ious = self.arrays.iter().map(|array| format!("iou_{array}"));
-        let first = ["frame", "iterations", "converged", "loss", "em"].map(String::from);
+        let first = ["frame", "iterations", "converged", "people", "annotated", "loss", "em"].map(String::from);
         let last = ["majpe_mm", "pa_majpe_mm", "init_ms", "fit_ms", "reason"].map(String::from);
         first.into_iter().chain(ious).chain(last).collect()
     }
 }
 
-/// One line's cells. `values` are loss, six terms, the IoUs, two errors and two times.
-fn line(
-    frame: &str,
-    iterations: Option<String>,
-    converged: Option<String>,
-    values: &[Option<f64>],
-    views: usize,
-    reason: String,
-) -> Vec<String> {
+/// What the means are over.
+fn told(means: &Means) -> String {
+    let fitted = format!("{} of {} frames fitted", means.fitted(), means.frames);
+    match means.count_mismatched {
+        0 => fitted,
+        left_out => format!(
+            "{fitted}; errors over {}, {left_out} left out: another number of people is annotated",
+            means.errors_over()
+        ),
+    }
+}
+
+/// One line's cells. `first` are iterations, convergence and people, fitted and annotated; `values` are loss, six terms, the IoUs, two errors and two times.
+fn line(frame: &str, first: [Option<String>; 4], values: &[Option<f64>], views: usize, reason: String) -> Vec<String> {
     let text = |x: Option<String>| x.unwrap_or_else(|| UNKNOWN.into());
     let number =
         |k: usize, digits: usize| text(values.get(k).copied().flatten().map(|value| format!("{value:.digits$}")));
-    let mut cells = vec![frame.to_owned(), text(iterations), text(converged), number(0, 4), number(1, 4)];
+    let mut cells = vec![frame.to_owned()];
+    cells.extend(first.map(text));
+    cells.extend([number(0, 4), number(1, 4)]);
     cells.extend((7..7 + views).map(|k| number(k, 3)));
     cells.extend([(7, 1), (8, 1), (9, 0), (10, 0)].map(|(k, digits)| number(views + k, digits)));
     cells.push(reason);

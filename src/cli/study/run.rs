@@ -1,6 +1,6 @@
 //! One study: arguments to a plan, the plan to a run, the run to its table.
 
-use crate::cli::common::{PrecisionArg, inputs, open, preset, print};
+use crate::cli::common::{PrecisionArg, inputs, open, presets, print};
 use crate::cli::complexity::compute;
 use crate::cli::frames::{FrameRange, chosen};
 use crate::cli::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
@@ -31,10 +31,10 @@ pub struct RunArgs {
     /// Frames to study, counted from 0, as in Rust: 5..12 (12 not included), 5..=11, 5.., ..12, or 7 alone. Default: all.
     #[arg(long, value_name = "A..B")]
     frames: Option<FrameRange>,
-    /// The settings that the study varies: paper or recommended.
-    #[arg(long, value_name = "NAME", default_value = "paper", value_parser = preset)]
+    /// The settings that the study varies.
+    #[arg(long, value_name = "NAME", default_value = "default", value_parser = presets())]
     preset: Preset,
-    /// A fit configuration instead of a preset; keys that it lacks are the paper's.
+    /// A fit configuration instead of a preset; keys that it lacks are those of `default`.
     #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
     config: Option<PathBuf>,
     /// Adam steps of every fit, instead of the study's own.

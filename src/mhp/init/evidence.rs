@@ -8,12 +8,14 @@
 
 use super::layout::{Layout, NEAREST_M};
 use super::locate::Mark;
+use crate::config::Background;
 use crate::geometry::{Vec3, dot, mat_t_vec};
 use crate::mhp::fill::all_neighbours;
 use crate::mhp::for_neighbours;
 use crate::mhp::seen::Seen;
 use crate::radar::{AxisKind, unravel};
 use smallvec::SmallVec;
+use std::collections::HashSet;
 use std::sync::{Arc, OnceLock};
 
 /// Spread of speckle, ln: a Rayleigh amplitude has 0.64. What rises less over the background is not counted.
@@ -58,6 +60,8 @@ pub(super) struct Evidence {
     value: Vec<f32>,
     source: Vec<u32>,
     largest: f64,
+    /// What a cell is compared with.
+    compared_with: Background,
     /// One over the background of each ring, worked out where it is asked for.
     background: Vec<OnceLock<f32>>,
     /// How restless each spatial cell is, 0 to 1: what stands still is no evidence. `None` where nothing tells.
@@ -65,10 +69,11 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    pub(super) fn new(layout: &Arc<Layout>, map: &[f64]) -> Self {
+    pub(super) fn new(layout: &Arc<Layout>, map: &[f64], compared_with: Background) -> Self {
         let largest = map.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
         let (value, source) = layout.spatial(map, largest);
-        Self { layout: Arc::clone(layout), value, source, largest, background: layout.unknown(), unrest: None }
+        let (layout, background) = (Arc::clone(layout), layout.unknown());
+        Self { layout, value, source, largest, compared_with, background, unrest: None }
     }
 
     /// The largest value of its map.
@@ -92,6 +97,35 @@ impl Evidence {
         Self { unrest: Some(Arc::new(of_spatial)), ..self }
     }
 
+    /// The same map where some of its `peaks` were missed: with each goes its hill, the cells from which the steepest way up
+    /// leads to it.
+    pub(super) fn without<'a>(&self, peaks: impl Iterator<Item = &'a Peak>) -> Self {
+        let missed: HashSet<usize> = peaks.map(|peak| self.spatial_of(peak)).collect();
+        let mut top_of: Vec<usize> = (0..self.value.len()).map(|cell| self.upward(cell)).collect();
+        for cell in 0..top_of.len() {
+            let (mut at, mut way) = (cell, Vec::new());
+            while top_of[at] != at {
+                way.push(at);
+                at = top_of[at];
+            }
+            way.into_iter().for_each(|passed| top_of[passed] = at);
+        }
+        let unrest = |cell: usize| self.unrest.as_ref().map_or(1.0, |unrest| unrest[cell]);
+        let left = |(cell, top): (usize, usize)| if missed.contains(&top) { 0.0 } else { unrest(cell) };
+        Self { unrest: Some(Arc::new(top_of.into_iter().enumerate().map(left).collect())), ..self.clone() }
+    }
+
+    /// The highest neighbour of a cell, or itself where none is higher.
+    fn upward(&self, cell: usize) -> usize {
+        let mut highest = cell;
+        for_neighbours(&self.layout.shape, cell, |other| {
+            if self.value[other] > self.value[highest] {
+                highest = other;
+            }
+        });
+        highest
+    }
+
     /// The cell of the whole map that a spatial cell was taken from.
     fn source(&self, spatial: usize) -> usize {
         self.source.get(spatial).map_or(spatial, |&cell| cell as usize)
@@ -103,7 +137,7 @@ impl Evidence {
 
     /// H over the background.
     fn over_background(&self, cell: usize) -> f32 {
-        let place = self.layout.place(cell);
+        let place = self.layout.place(cell, self.compared_with);
         self.value[cell] * self.background[place].get_or_init(|| self.layout.background(&self.value, place))
     }
 
@@ -199,14 +233,22 @@ impl Evidence {
         cells.map(|cell| self.salience(cell)).fold(0.0, f64::max)
     }
 
+    /// The spatial cell of a peak of this view.
+    fn spatial_of(&self, peak: &Peak) -> usize {
+        let bin = |k: usize| peak.bin.get(k).copied().unwrap_or(0);
+        self.layout.axes.iter().fold(0, |flat, (k, axis)| flat * axis.bins + bin(*k))
+    }
+
     /// H over the background at a peak of this view, of the map's largest.
     pub(super) fn excess_of(&self, peak: &Peak) -> f64 {
-        let spatial = self
-            .layout
-            .axes
-            .iter()
-            .fold(0, |flat, (k, axis)| flat * axis.bins + peak.bin.get(*k).copied().unwrap_or(0));
+        let spatial = self.spatial_of(peak);
         if spatial < self.value.len() { self.excess(spatial) } else { 0.0 }
+    }
+
+    /// How steep the map is at a world point, of its steepest; `None` outside the map or where nothing changes.
+    pub(super) fn steepness(&self, p_world: Vec3) -> Option<f64> {
+        let (cell, steepest) = (self.cell(p_world)?, self.steepest());
+        (steepest > 0.0).then(|| self.gradient(cell).1 / steepest)
     }
 
     /// How steep the map is at a world point, and which way its echo goes from this map to `then`; `None` outside the map

@@ -6,6 +6,7 @@ use super::locate::{Mark, locate};
 use super::place::{self, Place};
 use super::template::Template;
 use super::towards_radar;
+use crate::config;
 use crate::geometry::{Vec3, add, flat_distance, norm, scale};
 use crate::mhp::{FitError, Problem};
 use crate::radar::{AxisKind, View};
@@ -29,24 +30,32 @@ const SEED_SHARE: f64 = 0.25;
 /// Share of the way to the nearest other person within which what is lit belongs to this one.
 const OWN_SHARE: f64 = 0.6;
 
-/// The strongest place where somebody stands.
+/// The strongest place where somebody stands; with [`config::Place::Cluster`] the strongest cluster of peaks, whatever stands there.
 pub(super) fn find_one(
     problem: &Problem,
+    how: config::Place,
     evidence: &[Evidence],
     template: &Template,
     peaks: &[Peak],
     notes: &mut Vec<String>,
 ) -> Result<(Vec3, Expectation), FitError> {
     let places = place::places(problem, evidence, peaks);
+    if how == config::Place::Cluster {
+        let strongest = places.first().map(|place| place.at).ok_or_else(|| dark(peaks))?;
+        notes.push(format!("{} peaks in {} clusters: the middle of the strongest", peaks.len(), places.len()));
+        return Ok((strongest, Expectation { middle_m: strongest[2], ..Expectation::new(evidence, strongest) }));
+    }
     notes.push(format!("{} peaks, {} places tried", peaks.len(), places.len()));
     let mut ranked = rank(&places, template, |body| shared_excess(evidence, body));
     if ranked.is_empty() {
         notes.push("the views agree on no place: the strongest echo of one view was taken".to_owned());
         ranked = rank(&places, template, |body| evidence.iter().map(|e| e.mean_excess(body)).sum());
     }
-    most_bodily(problem, evidence, &ranked).ok_or_else(|| FitError::NoStart {
-        reason: format!("none of {} peaks stands above its background", peaks.len()),
-    })
+    most_bodily(problem, evidence, &ranked).ok_or_else(|| dark(peaks))
+}
+
+fn dark(peaks: &[Peak]) -> FitError {
+    FitError::NoStart { reason: format!("none of {} peaks stands above its background", peaks.len()) }
 }
 
 /// How far the nearest of the other `places` is from the `k`-th on the floor, m; infinite where there is no other.

@@ -1,6 +1,7 @@
 //! What the axes of a view alone decide for its evidence, worked out once for all its maps: which cells lie at the same
 //! range, and how a map with a Doppler axis becomes one without.
 
+use crate::config::Background;
 use crate::radar::{Axis, AxisKind, View, unravel};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -116,8 +117,11 @@ impl Layout {
         vec![OnceLock::new(); self.rings.len()]
     }
 
-    /// Whose background a cell has: its ring's, or the whole map's where the ring is small.
-    pub(super) fn place(&self, cell: usize) -> usize {
+    /// Whose background a cell has: its ring's, or the whole map's where the ring is small or `background` asks for it.
+    pub(super) fn place(&self, cell: usize, background: Background) -> usize {
+        if background == Background::Map {
+            return self.rings.len() - 1;
+        }
         let ring = self.ring_of[cell] as usize;
         let small = self.rings[ring + 1] - self.rings[ring] < SMALLEST_RING;
         if small && ring >= self.deaf { self.rings.len() - 1 } else { ring }

@@ -1,10 +1,12 @@
 //! Initialisation from the maps alone; paper section 4.1, and for several people 4.4.
 //!
-//! 1. Background off, and where frames around are known all that stands still; local maxima above an adaptive percentile ([`evidence`]).
+//! 1. Background off, and where frames around are known all that stands still, unless the settings keep them; local maxima
+//!    above an adaptive percentile ([`evidence`]).
 //! 2. P: peaks of different views are paired where their coordinates agree on one point in space, and the points are
 //!    grouped by hierarchical clustering ([`place`]).
 //! 3. A standing body is tried at every group, at several heights and depths. The place where all views show
-//!    the most echo over their background wins: a wall arc has none, a strong echo in one view only has little.
+//!    the most echo over their background wins: a wall arc has none, a strong echo in one view only has little. To the letter
+//!    of the paper the strongest group wins as it is, and the next step is left out.
 //! 4. The body's middle is that of what all views show lit around the place; its height that of feet and head.
 //! 5. V: velocities from the Doppler axis or the intensity gradients ([`velocity`]); heading, where asked for, from the
 //!    places in the frames around ([`motion`]).
@@ -37,17 +39,19 @@ pub use evidence::Peak;
 pub use learned::LimbMap;
 #[cfg(feature = "train")]
 pub use learned::{Lesson as LimbLesson, learn as learn_limbs};
-pub(super) use surroundings::{Cached, Surroundings};
+pub(super) use surroundings::{Cached, Reading, Surroundings};
 
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
-use crate::config::{FitConfig, Height, Limbs, Place, Summation, Yaw};
+use crate::config::{FitConfig, GradientVelocity, Height, Limbs, Place, Summation, WarmStart, Yaw};
 use crate::geometry::{Vec3, add, flat_distance, norm, scale, sub};
+use evidence::Evidence;
 use find::{apart_m, centre, find_one, middle_of_views, near};
 use height::{Expectation, Stature};
 use motion::{Sighting, Track};
 use pose::Posture;
 use scatterers::Dress;
+use std::borrow::Cow;
 use std::sync::Arc;
 use template::Template;
 use velocity::{Radial, Source};
@@ -123,7 +127,7 @@ impl Person {
     fn joints(&self, problem: &Problem, config: &FitConfig) -> Vec<Vec3> {
         let posed = self.posed(problem, config);
         let learned = config.limbs == Limbs::Learned && self.apart_m > ALONE_M;
-        learned.then(|| learned::moved(problem, &posed)).flatten().unwrap_or(posed)
+        learned.then(|| learned::moved(problem, config.into(), &posed)).flatten().unwrap_or(posed)
     }
 
     /// Its joints in its posture.
@@ -176,9 +180,8 @@ pub fn initialise_people(
     config: &FitConfig,
     seeds: &[Vec3],
 ) -> Result<Initialisation, FitError> {
-    let evidence = &problem.surroundings().now;
-    let peaks: Vec<Peak> = evidence.iter().flat_map(evidence::Evidence::peaks).collect();
-    let peaks = perturb::drop_some(problem, &config.init, peaks);
+    let (evidence, peaks) = shown(problem, config);
+    let evidence = evidence.as_ref();
     let template = Arc::new(Template::new(&problem.skeleton));
     let mut notes: Vec<String> = (0..problem.views.len())
         .filter(|&k| problem.filled_cells(k) > 0)
@@ -186,7 +189,7 @@ pub fn initialise_people(
         .collect();
     let seen = |(at, expected): (Vec3, Expectation)| (at, Some(expected));
     let nearby = |k: usize| seen(near(problem, evidence, seeds, k));
-    let mut alone = || find_one(problem, evidence, &template, &peaks, &mut notes).map(seen);
+    let mut alone = || find_one(problem, config.place, evidence, &template, &peaks, &mut notes).map(seen);
     let found = match seeds {
         _ if !config.init.position => vec![(middle_of_views(problem), None)],
         [] => vec![alone()?],
@@ -196,8 +199,8 @@ pub fn initialise_people(
     let places: Vec<Vec3> = found.iter().map(|(at, _)| *at).collect();
     let person = |at: Vec3, expected: Option<Expectation>, apart_m: f64| {
         let here = Sighting { t_s: 0.0, at, lit_m: expected.and_then(|expected| expected.lit) };
-        let track = followed(config).then(|| motion::track(problem, here, apart_m)).flatten();
-        let radial = velocity::radial(problem, at, config.init.velocity_gain_mps);
+        let track = followed(config).then(|| motion::track(problem, config, here, apart_m)).flatten();
+        let radial = velocity::radial(problem, config, at);
         Person { at, expected, track, radial, apart_m, posture: Posture::Standing, body: Arc::clone(&template) }
     };
     let own: Vec<Person> =
@@ -280,15 +283,38 @@ fn postures(
     upright.chain([(pose::bent(template, &problem.skeleton, top_m), height::bent_if_below(top_m, speeds))]).collect()
 }
 
-/// A warm start: the persons of the frame before, moved as the maps of the two frames say that each of them moved.
-/// Without that frame among those around they stay where they are.
-pub fn predict(problem: &Problem, before: &Pppr) -> Pppr {
+/// What a start sees of its frame: the evidence and its peaks, less what the settings ask to miss.
+fn shown<'a>(problem: &'a Problem, config: &FitConfig) -> (Cow<'a, [Evidence]>, Vec<Peak>) {
+    let evidence = problem.surroundings(config).now.as_slice();
+    let peaks: Vec<Peak> = evidence.iter().flat_map(Evidence::peaks).collect();
+    let (kept, missed) = perturb::missed(problem, &config.init, peaks);
+    if missed.is_empty() {
+        return (Cow::Borrowed(evidence), kept);
+    }
+    let of_view = |(k, view): (usize, &Evidence)| view.without(missed.iter().filter(|peak| peak.view == k));
+    (Cow::Owned(evidence.iter().enumerate().map(of_view).collect()), kept)
+}
+
+/// A warm start: the persons of the frame before, moved as the maps of the two frames say that each of them moved, and
+/// spoiled where the settings ask for it. Without that frame among those around, or with [`WarmStart::AsLeft`], they stay
+/// where they are.
+pub fn predict(problem: &Problem, config: &FitConfig, before: &Pppr) -> Pppr {
     let mut params = before.clone();
-    let surroundings = problem.surroundings();
-    let Some((t_s, then)) = surroundings.around(problem).rev().find(|(t_s, _)| *t_s < 0.0) else { return params };
-    let (now, then) = (surroundings.now.as_slice(), then());
+    if config.warm_start == WarmStart::Moved {
+        follow(problem, config, &mut params);
+    }
+    perturb::spoil(problem, &config.init, &mut params);
+    params
+}
+
+/// Moves the persons of the frame before as the maps of the two frames say.
+fn follow(problem: &Problem, config: &FitConfig, params: &mut Pppr) {
+    let surroundings = problem.surroundings(config);
+    let Some((t_s, then)) = surroundings.around(problem).rev().find(|(t_s, _)| *t_s < 0.0) else { return };
+    let ((now, _), then) = (shown(problem, config), then());
+    let now = now.as_ref();
     let joints = params.shape().joints;
-    let places = super::region::centres(before);
+    let places = super::region::centres(params);
     for (person, &at) in places.iter().enumerate() {
         let apart_m = apart_m(&places, person);
         let (from, _) = centre(problem, then, at, apart_m);
@@ -303,13 +329,12 @@ pub fn predict(problem: &Problem, before: &Pppr) -> Pppr {
             params.set_vec3(Group::Position, joint, moved);
         }
     }
-    params
 }
 
 /// Where a line through each person's places in this frame and those around says that the mean of its joints is, world
 /// frame, m; a person whom no frame around shows stays where it is. Empty without frames around.
 pub(super) fn anchors(problem: &Problem, config: &FitConfig, params: &Pppr) -> Vec<Vec3> {
-    if problem.neighbours().is_empty() {
+    if problem.neighbours_in(config.frames_around).is_empty() {
         return Vec::new();
     }
     let (joints, template) = (params.shape().joints.max(1), Template::new(&problem.skeleton));
@@ -317,9 +342,9 @@ pub(super) fn anchors(problem: &Problem, config: &FitConfig, params: &Pppr) -> V
     let of_person = |person: usize| {
         let own: Vec<Vec3> = (person * joints..(person + 1) * joints).map(|joint| params.position(joint)).collect();
         let mean = scale(own.iter().fold([0.0; 3], |sum, &p| add(sum, p)), 1.0 / joints as f64);
-        let (lit, expected) = near(problem, &problem.surroundings().now, &middles, person);
+        let (lit, expected) = near(problem, &problem.surroundings(config).now, &middles, person);
         let here = Sighting { t_s: 0.0, at: lit, lit_m: expected.lit };
-        let Some(track) = motion::track(problem, here, apart_m(&middles, person)) else { return mean };
+        let Some(track) = motion::track(problem, config, here, apart_m(&middles, person)) else { return mean };
         let at = if template.is_bent(&own) { track.at } else { behind_skin(config, track.at) };
         // Where the floor is known, the start stands as high as it should.
         let floor = problem.radar.height_m.filter(|_| config.height == Height::Floor);
@@ -417,9 +442,12 @@ fn tell(person: &Person, config: &FitConfig, moved_m: f64) -> Vec<String> {
         Some(Radial { mps, source: Source::Doppler, .. }) => {
             format!("radial velocity {mps:.2} m/s from the Doppler axis")
         }
-        Some(Radial { mps, source: Source::Gradient, .. }) if walking.is_none() => {
-            format!("radial velocity {mps:.2} m/s from the intensity gradient")
-        }
+        Some(Radial { mps, source: Source::Gradient, .. }) if walking.is_none() => match config.init.gradient {
+            GradientVelocity::Flow => format!("radial velocity {mps:.2} m/s from the intensity gradient"),
+            GradientVelocity::Magnitude => {
+                format!("radial velocity {mps:.2} m/s, the magnitude of the intensity gradient: it has no sign")
+            }
+        },
         _ if walking.is_some() => "velocity from the frames around".to_owned(),
         _ => "velocity 0: no Doppler axis and no frame around".to_owned(),
     });

@@ -5,6 +5,7 @@
 
 use super::evidence::Evidence;
 use super::find::centre;
+use crate::config::FitConfig;
 use crate::geometry::{Vec3, add_scaled, scale, sub};
 use crate::mhp::{Problem, percentile};
 
@@ -83,8 +84,8 @@ fn rises_mps(sightings: &[Sighting]) -> f64 {
 
 /// Follows the person who was found at `here`, `apart_m` from the nearest other, through the frames around; `None` where
 /// there are none.
-pub(super) fn track(problem: &Problem, here: Sighting, apart_m: f64) -> Option<Track> {
-    let surroundings = problem.surroundings();
+pub(super) fn track(problem: &Problem, config: &FitConfig, here: Sighting, apart_m: f64) -> Option<Track> {
+    let surroundings = problem.surroundings(config);
     let mut sightings = vec![here];
     for forwards in [true, false] {
         let side = surroundings.around(problem).filter(|(t_s, _)| (*t_s > 0.0) == forwards && *t_s != 0.0);

@@ -1,5 +1,9 @@
 //! A start spoiled on purpose: the perturbations of the paper's robustness table.
 //!
+//! Positions and velocities are spoiled last, of a start from the frame's own peaks and of one from the frame before alike. A
+//! peak that is missed takes its hill of the map with it: a start looks at all that is lit around a person, and would not
+//! notice the loss of a few maxima.
+//!
 //! Every frame draws its own numbers, from the seed and from the maps themselves: the draw depends neither on the order
 //! in which frames are fitted nor on how many.
 
@@ -27,10 +31,11 @@ pub(super) fn generator(problem: &Problem, seed: u64, purpose: Purpose) -> StdRn
     StdRng::seed_from_u64(frame ^ seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(purpose as u64))
 }
 
-/// Drops each of `items` with probability `init.peak_dropout`, but never all of them.
-pub(super) fn drop_some<T>(problem: &Problem, init: &InitConfig, items: Vec<T>) -> Vec<T> {
+/// Parts `items` into those that are seen and those that are missed, each with probability `init.peak_dropout`, but never
+/// all of them.
+pub(super) fn missed<T>(problem: &Problem, init: &InitConfig, items: Vec<T>) -> (Vec<T>, Vec<T>) {
     if init.peak_dropout <= 0.0 || items.is_empty() {
-        return items;
+        return (items, Vec::new());
     }
     let mut rng = generator(problem, init.seed, Purpose::Dropout);
     let mut keep: Vec<bool> = items.iter().map(|_| rng.random_range(0.0..1.0) >= init.peak_dropout).collect();
@@ -38,7 +43,9 @@ pub(super) fn drop_some<T>(problem: &Problem, init: &InitConfig, items: Vec<T>) 
         let survivor = rng.random_range(0..keep.len());
         keep[survivor] = true;
     }
-    items.into_iter().zip(keep).filter(|(_, keep)| *keep).map(|(item, _)| item).collect()
+    let (kept, missed): (Vec<_>, Vec<_>) = items.into_iter().zip(keep).partition(|(_, keep)| *keep);
+    let items = |parted: Vec<(T, bool)>| parted.into_iter().map(|(item, _)| item).collect();
+    (items(kept), items(missed))
 }
 
 /// Adds bias and noise to positions and velocities.

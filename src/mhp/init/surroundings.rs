@@ -1,8 +1,9 @@
-//! The evidence of a frame and of those around it, worked out once for a problem.
+//! The evidence of a frame and of those around it, worked out once for a problem and a way of reading it.
 
 use super::evidence::{self, Evidence};
 use super::layout::Layout;
-use crate::mhp::Problem;
+use crate::config::{Background, FitConfig, FramesAround, Still};
+use crate::mhp::{Neighbour, Problem};
 use std::sync::{Arc, OnceLock};
 
 /// Coefficients of variation over time: below the first of a pair a cell stands still, above the second it does not (a
@@ -10,6 +11,21 @@ use std::sync::{Arc, OnceLock};
 const VARIATIONS: [[f32; 2]; 2] = [[0.05, 0.25], [0.015, 0.075]];
 /// The largest of 30,000 Rayleigh amplitudes over their median, ln: a peak above it is no noise.
 const NOISE: f64 = 1.4;
+
+/// How maps are read: what decides what they are evidence of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(in crate::mhp) struct Reading {
+    /// Which frames beside this one are looked at.
+    pub(super) frames: FramesAround,
+    still: Still,
+    background: Background,
+}
+
+impl From<&FitConfig> for Reading {
+    fn from(config: &FitConfig) -> Self {
+        Self { frames: config.frames_around, still: config.init.still, background: config.init.background }
+    }
+}
 
 /// One view's evidence each.
 type Views = Vec<Evidence>;
@@ -19,17 +35,21 @@ type Views = Vec<Evidence>;
 pub(in crate::mhp) struct Surroundings {
     /// The frame itself.
     pub(super) now: Views,
+    /// Which frames are around.
+    frames: FramesAround,
     /// What each frame around shows, when it is first asked for: most starts look at one of them, or at none.
     around: Vec<OnceLock<Views>>,
 }
 
 impl Surroundings {
-    fn new(problem: &Problem) -> Self {
+    fn new(problem: &Problem, reading: Reading) -> Self {
         let layouts: Vec<Arc<Layout>> = problem.views.iter().enumerate().map(|(k, view)| Layout::of(k, view)).collect();
-        let plain: Views =
-            layouts.iter().enumerate().map(|(k, layout)| Evidence::new(layout, problem.map(k))).collect();
-        let now = moving(problem, &plain).unwrap_or(plain);
-        Self { now, around: problem.neighbours().iter().map(|_| OnceLock::new()).collect() }
+        let of_view = |(k, layout)| Evidence::new(layout, problem.map(k), reading.background);
+        let plain: Views = layouts.iter().enumerate().map(of_view).collect();
+        let around = problem.neighbours_in(reading.frames);
+        let moving = (reading.still == Still::LeftOut).then(|| moving(problem, around, &plain)).flatten();
+        let around = around.iter().map(|_| OnceLock::new()).collect();
+        Self { now: moving.unwrap_or(plain), frames: reading.frames, around }
     }
 
     /// The frames around with their times after this one, s, in the order of time, each worked out when it is taken.
@@ -37,7 +57,7 @@ impl Surroundings {
         &'a self,
         problem: &'a Problem,
     ) -> impl DoubleEndedIterator<Item = (f64, impl FnOnce() -> &'a [Evidence])> {
-        self.around.iter().zip(problem.neighbours()).map(move |(known, neighbour)| {
+        self.around.iter().zip(problem.neighbours_in(self.frames)).map(move |(known, neighbour)| {
             let views = || self.now.iter().enumerate().map(|(k, now)| now.at_another_time(neighbour.map(k))).collect();
             (neighbour.offset_s, move || known.get_or_init(views).as_slice())
         })
@@ -45,12 +65,12 @@ impl Surroundings {
 }
 
 /// The evidence of what moves; `None` where nothing does, for then stillness tells nobody from the room.
-fn moving(problem: &Problem, plain: &[Evidence]) -> Option<Views> {
-    if problem.neighbours().len() < 2 {
+fn moving(problem: &Problem, around: &[Neighbour], plain: &[Evidence]) -> Option<Views> {
+    if around.len() < 2 {
         return None;
     }
     let of_view = |k: usize| {
-        let others = problem.neighbours().iter().map(|neighbour| neighbour.map(k));
+        let others = around.iter().map(|neighbour| neighbour.map(k));
         evidence::variation(&std::iter::once(problem.map(k)).chain(others).collect::<Vec<_>>(), plain[k].largest())
     };
     let variations: Vec<Vec<f32>> = (0..plain.len()).map(of_view).collect();
@@ -64,9 +84,13 @@ fn moving(problem: &Problem, plain: &[Evidence]) -> Option<Views> {
     })
 }
 
-/// A problem's surroundings, worked out when first asked for. Equal to any other: it follows from the problem.
+/// Ways of reading a problem.
+const READINGS: usize = 3 * 2 * 2;
+
+/// A problem's surroundings for each way of reading it, worked out when first asked for. Equal to any other: they follow from
+/// the problem.
 #[derive(Debug, Clone, Default)]
-pub(in crate::mhp) struct Cached(OnceLock<Arc<Surroundings>>);
+pub(in crate::mhp) struct Cached([OnceLock<Arc<Surroundings>>; READINGS]);
 
 impl PartialEq for Cached {
     fn eq(&self, _: &Self) -> bool {
@@ -75,7 +99,9 @@ impl PartialEq for Cached {
 }
 
 impl Cached {
-    pub(in crate::mhp) fn of<'a>(&'a self, problem: &Problem) -> &'a Surroundings {
-        self.0.get_or_init(|| Arc::new(Surroundings::new(problem)))
+    pub(in crate::mhp) fn of<'a>(&'a self, problem: &Problem, reading: Reading) -> &'a Surroundings {
+        let Reading { frames, still, background } = reading;
+        let place = 4 * frames as usize + 2 * still as usize + background as usize;
+        self.0[place].get_or_init(|| Arc::new(Surroundings::new(problem, reading)))
     }
 }

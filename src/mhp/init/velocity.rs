@@ -2,8 +2,11 @@
 //!
 //! With a Doppler axis the strongest bin says it. Without one, γ times the magnitude of the intensity gradient at the place,
 //! in units of the steepest gradient of the map. A magnitude has no sign; the sign is that of the optical flow: where the
-//! map brightens on the far side of the slope, the echo goes away.
+//! map brightens on the far side of the slope, the echo goes away. The paper gives it none, which is a choice
+//! ([`GradientVelocity::Magnitude`]).
 
+use super::evidence::Evidence;
+use crate::config::{FitConfig, GradientVelocity};
 use crate::geometry::{Vec3, norm, scale, sub};
 use crate::mhp::Problem;
 
@@ -25,8 +28,8 @@ pub(super) enum Source {
 }
 
 /// The radial velocity at `at` from the first view that tells it.
-pub(super) fn radial(problem: &Problem, at: Vec3, gain_mps: f64) -> Option<Radial> {
-    let surroundings = problem.surroundings();
+pub(super) fn radial(problem: &Problem, config: &FitConfig, at: Vec3) -> Option<Radial> {
+    let (surroundings, gain_mps) = (problem.surroundings(config), config.init.velocity_gain_mps);
     let now = &surroundings.now;
     let along = |k: usize, mps: f64, source: Source| {
         let from_radar = sub(at, problem.views[k].pose.world_from_view([0.0; 3]));
@@ -34,6 +37,11 @@ pub(super) fn radial(problem: &Problem, at: Vec3, gain_mps: f64) -> Option<Radia
     };
     let doppler = now.iter().enumerate().find_map(|(k, e)| Some(along(k, e.radial_mps(at)?, Source::Doppler)));
     doppler.or_else(|| {
+        if config.init.gradient == GradientVelocity::Magnitude {
+            let steepness = |(k, e): (usize, &Evidence)| Some((k, e.steepness(at)?));
+            let (k, steepness) = now.iter().enumerate().find_map(steepness)?;
+            return Some(along(k, gain_mps * steepness, Source::Gradient));
+        }
         // The nearest frame in time tells the change best.
         let (offset_s, near) = surroundings.around(problem).min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))?;
         now.iter().zip(near()).enumerate().find_map(|(k, (now, then))| {

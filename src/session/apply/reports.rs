@@ -1,7 +1,7 @@
 //! What the worker reports: rows, events, snapshots.
 
 use super::diagnosis::hashes;
-use crate::diagnose::majpe_mm;
+use crate::diagnose::joint_errors;
 use crate::session::command::Effect;
 use crate::session::fit::FitStatus;
 use crate::session::history::Row;
@@ -26,7 +26,10 @@ impl Session {
 
     pub(super) fn push_row(&mut self, row: HistoryRow) {
         let truth = self.data.frame.as_ref().and_then(|frame| frame.truth.as_ref());
-        let majpe_mm = truth.and_then(|truth| majpe_mm(row.kept.positions(), &truth.joints));
+        let a_person = self.data.dataset.as_ref().map_or(0, |dataset| dataset.info().skeleton.joints.len());
+        // As `fit` has it: persons carry no identity.
+        let errors = truth.and_then(|truth| joint_errors(row.kept.positions(), &truth.joints, a_person));
+        let majpe_mm = errors.map(|errors| errors.majpe_mm);
         let state = row.kept.state().cloned();
         self.fit.history.push(row.branch, Row { report: row.report, state, majpe_mm });
     }

@@ -6,6 +6,7 @@ use crate::dataset::{Dataset, Heatmap};
 use crate::mhp::fill_missing;
 use crate::people::{CLASSES, Counter, Network, map_statistics};
 use crate::study::count::{LEAD_IN, Window};
+use crate::study::row::annotated;
 use std::time::Instant;
 
 /// Frames of a unit: short enough for all cores, long against the frames that are read before it.
@@ -77,7 +78,7 @@ fn alone(dataset: &Dataset, network: &Network, frame: usize) -> Counted {
 
 fn maps(dataset: &Dataset, frame: usize) -> Result<(Vec<Heatmap>, Option<usize>), String> {
     let frame = dataset.load(frame).map_err(|error| error.to_string())?;
-    let annotated = frame.person_count.or_else(|| frame.truth.as_ref().map(|truth| truth.persons));
+    let annotated = annotated(&frame);
     Ok((frame.maps, annotated))
 }
 

@@ -216,7 +216,7 @@ impl Engine<'_> {
         let mut init_ms = None;
         let answer = caught(|| {
             let loaded = Loaded::read(self.dataset, frame)?;
-            let start = before.map_or_else(|| loaded.cold(config), |before| Ok(loaded.warm(before)))?;
+            let start = before.map_or_else(|| loaded.cold(config), |before| Ok(loaded.warm(config, before)))?;
             init_ms = start.init_ms;
             let mut answers = loaded.fit(config, spec.precision, &start, &[config.iterations]);
             answers.pop().unwrap_or_else(|| Err("internal error: a fit without an answer".into()))

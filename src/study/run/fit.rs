@@ -11,26 +11,28 @@ use crate::diagnose::{Camera, Reprojection, joint_errors, map_box_coverage, repr
 use crate::geometry::Vec3;
 use crate::mhp::{Fitter, Precision, Problem, StopReason, predict};
 use crate::start::{begin, problem_of};
+use crate::study::row::annotated;
 use std::sync::Arc;
 use std::time::Instant;
 
 /// A configuration with everything at its default that a start does not depend on: two variants with the same key start from
-/// the same pose. Where several starts are tried, a short fit decides between them, hence everything counts but its length.
+/// the same pose. Where several postures are tried, the unweighted L_EM alone decides between them.
 pub(super) fn start_key(config: &FitConfig) -> FitConfig {
     let plain = FitConfig::default();
-    let key = FitConfig { iterations: plain.iterations, stop_when_converged: plain.stop_when_converged, ..*config };
-    if config.starts > 1 {
-        return key;
-    }
     FitConfig {
+        iterations: plain.iterations,
+        stop_when_converged: plain.stop_when_converged,
+        convergence: plain.convergence,
+        warm_start: plain.warm_start,
         w_em: plain.w_em,
         w_kine: plain.w_kine,
         theta_max_deg: plain.theta_max_deg,
+        bone_tolerance_m: plain.bone_tolerance_m,
         d_sep_m: plain.d_sep_m,
         d_joint_m: plain.d_joint_m,
         learning_rate: plain.learning_rate,
         learning_rates: LearningRates::default(),
-        ..key
+        ..*config
     }
 }
 
@@ -84,9 +86,9 @@ impl<'a> Loaded<'a> {
         Ok(Start { params: found.params, unrefined: found.unrefined, init_ms: Some(milliseconds(began)) })
     }
 
-    /// A start from what the frame before ended with, moved as its people moved.
-    pub(super) fn warm(&self, before: &Pppr) -> Start {
-        let params = predict(&self.problem, before);
+    /// A start from what the frame before ended with, moved as its people moved and spoiled as a cold one is.
+    pub(super) fn warm(&self, config: &FitConfig, before: &Pppr) -> Start {
+        let params = predict(&self.problem, config, before);
         Start { unrefined: params.clone(), params, init_ms: None }
     }
 
@@ -150,7 +152,7 @@ impl<'a> Loaded<'a> {
             majpe_mm: errors.map(|errors| errors.majpe_mm),
             pa_majpe_mm: errors.map(|errors| errors.pa_majpe_mm),
             persons: params.shape().persons,
-            annotated: frame.person_count.or_else(|| frame.truth.as_ref().map(|truth| truth.persons)),
+            annotated: annotated(frame),
             reprojection_px: image.reprojection_px,
             box_coverage: image.box_coverage,
             map_box_coverage: self.map_box_coverage(joints, a_person),
@@ -207,6 +209,7 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
     use super::*;
     use crate::body::{Group, PpprShape, Skeleton};
+    use crate::config::{Background, Convergence, InitConfig, Place, WarmStart};
     use crate::geometry::Pose;
     use crate::mhp::simulate;
     use crate::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
@@ -262,6 +265,8 @@ mod tests {
             FitConfig { theta_max_deg: 90.0, d_sep_m: 1.0, d_joint_m: 0.5, ..base },
             FitConfig { learning_rate: 0.1, learning_rates: rates, ..base },
             FitConfig { iterations: 3, stop_when_converged: true, ..base },
+            FitConfig { convergence: Convergence::Improvement, warm_start: WarmStart::AsLeft, ..base },
+            FitConfig { bone_tolerance_m: 0.05, ..base },
         ];
         for variant in variants {
             assert_eq!(start_key(&variant), start_key(&base));
@@ -271,11 +276,14 @@ mod tests {
             FitConfig { tau_pct: 40.0, ..base },
             FitConfig { surface_offset_m: 0.1, ..base },
             FitConfig { w_time: 3.0, ..base },
+            FitConfig { place: Place::Cluster, ..base },
+            FitConfig { init: InitConfig { background: Background::Map, ..base.init }, ..base },
         ];
         for other in others {
             assert_ne!(start_key(&other), start_key(&base));
         }
-        let several = |w_em| FitConfig { starts: 3, w_em, ..base };
-        assert_ne!(start_key(&several(0.1)), start_key(&several(1.0)), "a short fit decides between several starts");
+        let several = |w_em, learning_rate| FitConfig { starts: 3, w_em, learning_rate, ..base };
+        assert_eq!(start_key(&several(0.1, 1e-3)), start_key(&several(1.0, 0.1)));
+        assert_eq!(start(&several(0.1, 1e-3)), start(&several(1.0, 0.1)), "L_EM decides between postures, no fit");
     }
 }

@@ -20,7 +20,7 @@ pub enum StudyKind {
     Init,
     /// Iterations against error, IoU and time.
     Budget,
-    /// Each switch beside the paper's setting.
+    /// Each switch in which the presets differ.
     Switches,
     /// How often the number of people is right.
     Counting,
@@ -69,23 +69,9 @@ impl StudyKind {
             Self::Weights => "Weights of electromagnetic and kinematic constraints",
             Self::Init => "Initialisation modules",
             Self::Budget => "Iteration budget",
-            Self::Switches => "Switches beside the paper's setting",
+            Self::Switches => "Switches of the presets",
             Self::Counting => "Counting people",
             Self::Sweep => "Sweep over the configuration",
-        }
-    }
-
-    /// What the paper's figures beside ours are; `None` where the paper has no such table.
-    pub fn paper(self) -> Option<&'static str> {
-        match self {
-            Self::Complexity => {
-                Some("RETR with PPPR on MMVR scenes 2 to 5; IoU and convergence are of the optimisation itself")
-            }
-            Self::Robustness => Some("RETR on the hard subset of MMVR, 80 iterations"),
-            Self::Operators | Self::Threshold | Self::Weights => Some("RETR on single-person MMVR"),
-            Self::Init => Some("RETR on MMVR"),
-            Self::Counting => Some("cleaned MMVR; 850 and 1200 frames a second"),
-            Self::Budget | Self::Switches | Self::Sweep => None,
         }
     }
 

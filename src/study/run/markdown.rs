@@ -3,7 +3,7 @@
 use super::StudyKind;
 use super::journal::Rows;
 use super::spec::{RunSpec, Subset};
-use super::table::{Spread, TableRow};
+use super::table::{self, Spread, TableRow};
 use crate::mhp::Precision;
 use crate::people::CLASSES;
 use std::fmt::Write as _;
@@ -86,6 +86,9 @@ fn columns<'a>(spec: &'a RunSpec, rows: &[TableRow]) -> Vec<Column<'a>> {
     add("paper PA-MAJPE", true, Box::new(|row| row.paper?.pa_majpe_mm.map(|x| format!("{x:.1}"))));
     add("paper IoU", true, Box::new(|row| row.paper?.iou.map(|x| format!("{x:.2}"))));
     add("paper converged", true, Box::new(|row| percent(row.paper?.converged_share)));
+    let remarks: Vec<String> = table::notes(rows).into_iter().map(str::to_owned).collect();
+    let mark = move |row: &TableRow| table::mark(&remarks.iter().map(String::as_str).collect::<Vec<_>>(), row);
+    add("note", true, Box::new(mark));
     columns.retain(|column| !column.optional || rows.iter().any(|row| (column.cell)(row).is_some()));
     columns
 }
@@ -116,22 +119,26 @@ fn grid(columns: &[Column<'_>], rows: &[TableRow]) -> String {
 
 fn notes(spec: &RunSpec, rows: &[TableRow]) -> String {
     if spec.study == StudyKind::Counting {
-        let paper = spec.study.paper().unwrap_or_default();
+        let paper = spec.paper().map(|paper| format!("The paper's figures: {paper}.")).or_else(|| spec.paper_missing());
         return format!(
-            "\nShares of frames whose number of people is the annotated one. The paper's figures: {paper}.\n"
+            "\nShares of frames whose number of people is the annotated one. {}\n",
+            paper.unwrap_or_default()
         );
     }
     let mut notes = vec!["Means over the frames that were fitted with the annotated number of persons.".to_owned()];
     if rows.iter().any(|row| row.reprojection_px.is_some() || row.box_coverage.is_some()) {
         notes.push("Image labels: pixels under an uncertain camera calibration, no joint error.".into());
     }
-    if let Some(paper) = spec.study.paper() {
+    if let Some(paper) = spec.paper() {
         notes.push(format!(
             "The paper's figures: {paper}. Its errors are of a network that reads PPPR, ours of the fit itself: compare \
              trends, not sizes."
         ));
     }
-    format!("\n{}\n", notes.join(" "))
+    notes.extend(spec.paper_missing());
+    let remarks: String =
+        table::notes(rows).iter().enumerate().map(|(k, note)| format!("\n[{}] {}.\n", k + 1, escaped(note))).collect();
+    format!("\n{}\n{remarks}", notes.join(" "))
 }
 
 /// Times by variant: a table of its own, because no two runs have the same.

@@ -2,9 +2,11 @@
 //!
 //! A [`RunPlan`] says what is compared and in which units it is done; [`execute_run`] does it on all cores and goes on where a
 //! killed run stopped; [`merge_runs`] makes one run of its shards; [`Run`] reads it back. From the inside out: `variant.rs` is one
-//! configuration, `plans.rs` the studies' rows, `grid.rs` and `switches.rs` two ways to make them, `spec.rs` the file that
-//! says what a run is, `plan.rs` its units of work, `fit.rs` one frame, `journal.rs` what is done, `engine.rs` the threads,
-//! `table.rs` the sums, `output.rs`, `markdown.rs` and `parquet_rows.rs` the files.
+//! configuration, `plans.rs` the studies' rows, `grid.rs` and `switches.rs` two ways to make them, `kind.rs` their names,
+//! `paper.rs` the paper's figures beside them and `reach.rs` whether what they spoil can act; `spec.rs` is the file that says
+//! what a run is, `stamp.rs` what its data are known by, `plan.rs` its units of work, `fit.rs` one frame, `counting.rs` the
+//! people of a frame, `row.rs` what is known of either, `journal.rs` what is done, `engine.rs` the threads, `table.rs` the sums,
+//! `output.rs`, `markdown.rs` and `parquet_rows.rs` the files, `folder.rs` all of them together.
 //!
 //! A run folder: `run.toml` (the specification), `journal.jsonl` (rows as they were done), `rows.csv` and `rows.parquet` (the same,
 //! sorted), `table.md` and `table.json`; `timing.csv` and `timing.md`, which alone differ from run to run.
@@ -19,9 +21,11 @@ mod journal;
 mod kind;
 mod markdown;
 mod output;
+mod paper;
 mod parquet_rows;
 mod plan;
 mod plans;
+mod reach;
 mod row;
 mod spec;
 mod stamp;
@@ -39,5 +43,5 @@ pub use plan::{RunPlan, RunRequest};
 pub use row::{RunNumbers, RunRow};
 pub use spec::{DataSpec, RUN_FILE, RunSpec, Shard, Subset};
 pub use switches::{SWITCHES, Switch};
-pub use table::{CountShares, Spread, TableRow};
+pub use table::{CountShares, Spread, TableRow, mark, notes};
 pub use variant::{Method, PaperRow, StartFrom, Variant};

@@ -41,10 +41,12 @@ pub(super) fn json_text(spec: &RunSpec, table: &[TableRow]) -> String {
         "base": spec.base,
         "seed": spec.seed,
         "shard": spec.shard.map(|shard| shard.to_string()),
-        "data": { "name": data.name, "fingerprint": data.fingerprint, "content": data.content, "frames": data.frames,
+        "data": { "name": data.name, "fingerprint": data.fingerprint, "content": data.content, "layout": data.layout,
+                  "frames": data.frames,
                   "first": data.first, "end": data.end, "subset": data.subset },
         "columns": spec.columns,
-        "paper": spec.study.paper(),
+        "paper": spec.paper(),
+        "paper_missing": spec.paper_missing(),
         "rows": table,
     });
     serde_json::to_string_pretty(&object).unwrap_or_default() + "\n"

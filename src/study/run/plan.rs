@@ -85,7 +85,9 @@ impl RunPlan {
     /// # Errors
     /// Where the range is empty or a grid makes no sense.
     pub fn new(dataset: &Dataset, request: &RunRequest, complexity: Option<&Complexity>) -> Result<Self, RunError> {
-        let mut compared = plans::compared(request.study, &request.base, &request.grid)?;
+        let info = dataset.info();
+        let layout = info.layout.word();
+        let mut compared = plans::compared(request.study, &request.base, &request.grid, &info.views, layout)?;
         if let Some(iterations) = request.iterations.filter(|_| !compared.columns.iter().any(|c| c == "iterations")) {
             compared.variants.iter_mut().for_each(|variant| variant.config.iterations = iterations);
         }
@@ -102,10 +104,10 @@ impl RunPlan {
             let Range { start, end } = request.frames;
             return Err(RunError::NoFrames { message: format!("{start}..{end} holds no frame to study") });
         }
-        let info = dataset.info();
         let data = DataSpec {
             name: info.name.clone(),
             root: std::path::absolute(&info.root).unwrap_or_else(|_| info.root.clone()),
+            layout: layout.to_owned(),
             fingerprint: dataset.fingerprint().to_owned(),
             content: stamp::content(dataset, &request.frames),
             arrays: info.views.iter().map(|view| view.array.clone()).collect(),

@@ -1,13 +1,13 @@
-//! What each study compares: its label columns and its variants, with the paper's figures beside them.
-//!
-//! The figures are those of RETR on MMVR: errors of a network that reads PPPR, not of the fit. They are shown so that trends
-//! can be compared, never to be reached.
+//! What each study compares: its label columns and its variants, with the paper's figures beside them where it has any for
+//! such data.
 
 use super::kind::StudyKind;
+use super::paper::{self, PaperSet};
+use super::reach;
 use super::variant::{Method, PaperRow, Variant};
 use super::{GridAxis, RunError, grid, switches};
 use crate::config::{FitConfig, InitConfig, Operators};
-use crate::study::complexity::Stratum;
+use crate::radar::View;
 
 /// Iterations of the paper's robustness table.
 const ROBUSTNESS_ITERATIONS: usize = 80;
@@ -20,23 +20,31 @@ pub(super) struct Compared {
     pub(super) variants: Vec<Variant>,
 }
 
-/// What `kind` compares on top of `base`; `axes` are those of a sweep.
+/// What `kind` compares on top of `base` on data with these views and this layout ([`crate::dataset::Layout::word`]); `axes`
+/// are those of a sweep.
 ///
 /// # Errors
 /// Where the grid of a sweep makes no sense.
-pub(super) fn compared(kind: StudyKind, base: &FitConfig, axes: &[GridAxis]) -> Result<Compared, RunError> {
+pub(super) fn compared(
+    kind: StudyKind,
+    base: &FitConfig,
+    axes: &[GridAxis],
+    views: &[View],
+    layout: &str,
+) -> Result<Compared, RunError> {
+    let set = PaperSet::beside(kind, layout);
     let named =
         |columns: &[&str], variants| Compared { columns: columns.iter().map(ToString::to_string).collect(), variants };
     Ok(match kind {
         StudyKind::Complexity => named(&["subset"], vec![Variant::cold(["all"], base)]),
-        StudyKind::Robustness => named(&["perturbation", "level"], robustness(base)),
-        StudyKind::Operators => named(&["configuration"], operators(base)),
-        StudyKind::Threshold => named(&["tau"], threshold(base)),
-        StudyKind::Weights => named(&["w_em / w_kine"], weights(base)),
-        StudyKind::Init => named(&["configuration"], init(base)),
+        StudyKind::Robustness => named(&["perturbation", "level"], robustness(base, set, views)),
+        StudyKind::Operators => named(&["configuration"], operators(base, set)),
+        StudyKind::Threshold => named(&["tau"], threshold(base, set)),
+        StudyKind::Weights => named(&["w_em / w_kine"], weights(base, set)),
+        StudyKind::Init => named(&["configuration"], init(base, set)),
         StudyKind::Budget => named(&["start", "iterations"], budget(base)),
         StudyKind::Switches => named(&["preset", "change"], switches::variants(base)),
-        StudyKind::Counting => named(&["method"], counting(base)),
+        StudyKind::Counting => named(&["method"], counting(base, set)),
         StudyKind::Sweep => Compared {
             columns: axes.iter().map(|axis| axis.key.clone()).collect(),
             variants: grid::variants(base, axes)?,
@@ -44,24 +52,13 @@ pub(super) fn compared(kind: StudyKind, base: &FitConfig, axes: &[GridAxis]) -> 
     })
 }
 
-/// The paper's figures for a stratum; `None` stands for the mean of all.
-pub(super) fn paper_of_stratum(stratum: Option<Stratum>) -> PaperRow {
-    let (majpe, iou, converged) = match stratum {
-        Some(Stratum::Easy) => (69.0, 0.72, 0.964),
-        Some(Stratum::Medium) => (72.2, 0.71, 0.960),
-        Some(Stratum::Hard) => (81.5, 0.69, 0.948),
-        None => (73.9, 0.71, 0.957),
-    };
-    PaperRow { majpe_mm: Some(majpe), iou: Some(iou), converged_share: Some(converged), ..PaperRow::default() }
-}
-
-fn robustness(base: &FitConfig) -> Vec<Variant> {
+fn robustness(base: &FitConfig, set: Option<PaperSet>, views: &[View]) -> Vec<Variant> {
     let row = |what: &str, level: &str, paper: [f64; 3], change: &dyn Fn(&mut InitConfig)| {
         let mut config = FitConfig { iterations: ROBUSTNESS_ITERATIONS, ..*base };
         change(&mut config.init);
         let [majpe, pa_majpe, converged] = paper;
         let paper = PaperRow { converged_share: Some(converged), ..PaperRow::errors(majpe, pa_majpe) };
-        Variant::cold([what, level], &config).beside(paper)
+        Variant::cold([what, level], &config).beside(set.map(|_| paper))
     };
     let position = |noise: f64, bias: f64| {
         move |init: &mut InitConfig| (init.position_noise_m, init.position_bias_m) = (noise, bias)
@@ -69,7 +66,7 @@ fn robustness(base: &FitConfig) -> Vec<Variant> {
     let velocity = |noise: f64| move |init: &mut InitConfig| init.velocity_noise_mps = noise;
     let dropout = |share: f64| move |init: &mut InitConfig| init.peak_dropout = share;
     let unspoiled = FitConfig { iterations: ROBUSTNESS_ITERATIONS, ..*base };
-    vec![
+    let rows = vec![
         Variant::cold(["none", "as found"], &unspoiled),
         row("p noise/bias", "σ_p = 0.02 m, Δp = 0 m", [80.2, 73.1, 0.942], &position(0.02, 0.0)),
         row("p noise/bias", "σ_p = 0.05 m, Δp = 0.05 m", [82.8, 75.4, 0.921], &position(0.05, 0.05)),
@@ -84,12 +81,15 @@ fn robustness(base: &FitConfig) -> Vec<Variant> {
             (init.position_noise_m, init.peak_dropout) = (0.05, 0.20);
         })
         .warm(),
-    ]
+    ];
+    let noted = |row: Variant| Variant { note: reach::silent(&row.config, &unspoiled, row.start, views), ..row };
+    rows.into_iter().map(noted).collect()
 }
 
-fn operators(base: &FitConfig) -> Vec<Variant> {
+fn operators(base: &FitConfig, set: Option<PaperSet>) -> Vec<Variant> {
     let row = |name: &str, operators: Operators, majpe: f64, pa_majpe: f64| {
-        Variant::cold([name], &FitConfig { operators, ..*base }).beside(PaperRow::errors(majpe, pa_majpe))
+        let paper = set.map(|_| PaperRow::errors(majpe, pa_majpe));
+        Variant::cold([name], &FitConfig { operators, ..*base }).beside(paper)
     };
     let full = base.operators;
     vec![
@@ -101,48 +101,50 @@ fn operators(base: &FitConfig) -> Vec<Variant> {
     ]
 }
 
-fn threshold(base: &FitConfig) -> Vec<Variant> {
-    let row = |tau_pct: f64, name: &str, majpe: f64, pa_majpe: f64| {
-        Variant::cold([name], &FitConfig { tau_pct, ..*base }).beside(PaperRow::errors(majpe, pa_majpe))
+fn threshold(base: &FitConfig, set: Option<PaperSet>) -> Vec<Variant> {
+    let row = |k: usize, tau_pct: f64, name: &str| {
+        let paper = set.map(|set| PaperRow::of_pair(paper::threshold(set)[k]));
+        Variant::cold([name], &FitConfig { tau_pct, ..*base }).beside(paper)
     };
     vec![
-        row(5.0, "5 %", 76.82, 70.45),
-        row(10.0, "10 %", 71.08, 65.17),
-        row(30.0, "30 %", 80.08, 74.86),
-        row(70.0, "70 %", 80.09, 74.90),
-        row(100.0, "100 % (no masking)", 80.51, 75.47),
+        row(0, 5.0, "5 %"),
+        row(1, 10.0, "10 %"),
+        row(2, 30.0, "30 %"),
+        row(3, 70.0, "70 %"),
+        row(4, 100.0, "100 % (no masking)"),
     ]
 }
 
-fn weights(base: &FitConfig) -> Vec<Variant> {
-    let row = |w_em: f64, w_kine: f64, name: &str, majpe: f64, pa_majpe: f64| {
-        Variant::cold([name], &FitConfig { w_em, w_kine, ..*base }).beside(PaperRow::errors(majpe, pa_majpe))
+fn weights(base: &FitConfig, set: Option<PaperSet>) -> Vec<Variant> {
+    let row = |k: usize, w_em: f64, w_kine: f64, name: &str| {
+        let paper = set.map(|set| PaperRow::of_pair(paper::weights(set)[k]));
+        Variant::cold([name], &FitConfig { w_em, w_kine, ..*base }).beside(paper)
     };
     vec![
-        row(0.3, 0.7, "0.3 / 0.7", 71.08, 65.17),
-        row(0.5, 0.5, "0.5 / 0.5", 64.71, 58.91),
-        row(0.7, 0.3, "0.7 / 0.3", 75.08, 72.33),
-        row(0.0, 1.0, "0 / 1 (pure kinematic)", 80.51, 75.47),
-        row(1.0, 0.0, "1 / 0 (pure electromagnetic)", 78.73, 74.11),
+        row(0, 0.3, 0.7, "0.3 / 0.7"),
+        row(1, 0.5, 0.5, "0.5 / 0.5"),
+        row(2, 0.7, 0.3, "0.7 / 0.3"),
+        row(3, 0.0, 1.0, "0 / 1 (pure kinematic)"),
+        row(4, 1.0, 0.0, "1 / 0 (pure electromagnetic)"),
     ]
 }
 
-fn init(base: &FitConfig) -> Vec<Variant> {
-    let row = |name: &str, position: bool, velocity: bool, majpe: f64| {
+fn init(base: &FitConfig, set: Option<PaperSet>) -> Vec<Variant> {
+    let row = |k: usize, name: &str, position: bool, velocity: bool| {
         let init = InitConfig { position, velocity, ..base.init };
-        let paper = PaperRow { majpe_mm: Some(majpe), ..PaperRow::default() };
+        let paper = set.map(|set| PaperRow { majpe_mm: Some(paper::init(set)[k]), ..PaperRow::default() });
         Variant::cold([name], &FitConfig { init, ..*base }).beside(paper)
     };
     vec![
-        row("full (P + V)", true, true, 69.30),
-        row("without position (P)", false, true, 89.74),
-        row("without velocity (V)", true, false, 71.92),
+        row(0, "full (P + V)", true, true),
+        row(1, "without position (P)", false, true),
+        row(2, "without velocity (V)", true, false),
     ]
 }
 
-fn counting(base: &FitConfig) -> Vec<Variant> {
+fn counting(base: &FitConfig, set: Option<PaperSet>) -> Vec<Variant> {
     let row = |name: &str, method: Method, accuracy: f64| {
-        let paper = PaperRow { count_accuracy: Some(accuracy), ..PaperRow::default() };
+        let paper = set.map(|_| PaperRow { count_accuracy: Some(accuracy), ..PaperRow::default() });
         Variant::cold([name], base).counting(method).beside(paper)
     };
     vec![row("CFAR + DBSCAN + MLP", Method::Counter, 0.994), row("MLP alone", Method::Alone, 0.946)]
@@ -163,7 +165,7 @@ mod tests {
     use super::*;
 
     fn rows(kind: StudyKind) -> Vec<Variant> {
-        compared(kind, &FitConfig::default(), &[]).unwrap().variants
+        compared(kind, &FitConfig::default(), &[], &[], "mmvr").unwrap().variants
     }
 
     #[test]
@@ -184,12 +186,22 @@ mod tests {
             assert_eq!(rows.iter().filter(|row| row.paper.is_some()).count(), of_paper, "{kind}");
         }
         for kind in StudyKind::ALL.into_iter().filter(|kind| *kind != StudyKind::Sweep) {
-            let compared = compared(kind, &FitConfig::default(), &[]).unwrap();
+            let compared = compared(kind, &FitConfig::default(), &[], &[], "mmvr").unwrap();
             for variant in compared.variants {
                 assert_eq!(variant.labels.len(), compared.columns.len(), "{kind}: {}", variant.name());
                 assert!(variant.config.validated().is_ok(), "{kind}: {}", variant.name());
             }
         }
+    }
+
+    #[test]
+    fn other_data_have_no_figures_of_the_paper() {
+        for kind in StudyKind::ALL.into_iter().filter(|kind| *kind != StudyKind::Sweep) {
+            let rows = compared(kind, &FitConfig::default(), &[], &[], "npz").unwrap().variants;
+            assert!(rows.iter().all(|row| row.paper.is_none()), "{kind}");
+        }
+        let hupr = compared(StudyKind::Threshold, &FitConfig::default(), &[], &[], "hupr").unwrap().variants;
+        assert_eq!(hupr[1].paper.and_then(|paper| paper.majpe_mm), Some(73.74), "HuPR's own column");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 
 use super::error::RunError;
 use super::kind::StudyKind;
+use super::paper;
 use super::variant::Variant;
 use crate::digest;
 use crate::input::{MOST_TEXT, read_text};
@@ -61,7 +62,11 @@ pub struct DataSpec {
     /// Name of the data set.
     pub name: String,
     /// Where it lay; the only part that may differ between shards.
+    #[serde(with = "crate::folders::portable_path")]
     pub root: PathBuf,
+    /// How it lies on disk, as [`crate::dataset::Layout::word`] says it; "" in a run of an older program.
+    #[serde(default)]
+    pub layout: String,
     /// [`crate::dataset::Dataset::fingerprint`]: layout, arrays, shapes, names.
     pub fingerprint: String,
     /// Of the files' sizes and of the maps of three frames.
@@ -143,6 +148,16 @@ impl RunSpec {
         spec.id = String::new();
         spec.data.root = PathBuf::new();
         digest::short(Sha256::new_with_prefix(serde_json::to_string(&spec).unwrap_or_default()))
+    }
+
+    /// What the paper's figures beside ours are of; `None` where there are none.
+    pub fn paper(&self) -> Option<String> {
+        paper::told(self.study, &self.data.layout)
+    }
+
+    /// Why there are none, where the paper has such a table.
+    pub fn paper_missing(&self) -> Option<String> {
+        paper::missing(self.study, &self.data.layout)
     }
 
     /// The whole that this is a shard of.

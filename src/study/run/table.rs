@@ -5,13 +5,17 @@
 //! same rows give the same bytes.
 
 use super::journal::Rows;
-use super::plans::paper_of_stratum;
+use super::kind::StudyKind;
+use super::paper::{self, PaperSet};
 use super::row::{RunNumbers, RunRow};
 use super::spec::RunSpec;
 use super::variant::{Method, PaperRow};
 use crate::people::{CLASSES, Confusion};
 use crate::study::complexity::Stratum;
 use serde::Serialize;
+
+/// The variant of the study `robustness` that nothing spoils: its first.
+const UNSPOILED: usize = 0;
 
 /// Mean, spread and number of a quantity over frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -101,17 +105,38 @@ pub struct TableRow {
     /// The paper's figures for the same.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub paper: Option<PaperRow>,
+    /// Why it does not differ from the row that it is compared with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
+}
+
+/// The different notes of a table, in the order of the rows that bear them: a row's mark is the place of its own, from 1.
+pub fn notes(rows: &[TableRow]) -> Vec<&str> {
+    let mut notes: Vec<&str> = Vec::new();
+    for note in rows.iter().filter_map(|row| row.note.as_deref()) {
+        if !notes.contains(&note) {
+            notes.push(note);
+        }
+    }
+    notes
+}
+
+/// The mark of a row's note among `notes`.
+pub fn mark(notes: &[&str], row: &TableRow) -> Option<String> {
+    let own = row.note.as_deref()?;
+    notes.iter().position(|note| *note == own).map(|k| format!("[{}]", k + 1))
 }
 
 /// The table of a run.
-pub(super) fn table(spec: &RunSpec, rows: &Rows) -> Vec<TableRow> {
-    let counted = || rows.values().filter(|row| !row.passing);
+pub(super) fn table(spec: &RunSpec, all_rows: &Rows) -> Vec<TableRow> {
+    let counted = || all_rows.values().filter(|row| !row.passing);
     if !spec.study.by_stratum() {
         let of_variant = |(k, variant): (usize, &super::Variant)| {
             let rows: Vec<&RunRow> = counted().filter(|row| row.variant == k).collect();
             let paper = variant.paper;
             if variant.method == Method::Fit {
-                TableRow { paper, ..summed(variant.labels.clone(), k, &rows) }
+                let note = variant.note.clone().or_else(|| unmoved(spec, &rows, all_rows));
+                TableRow { paper, note, ..summed(variant.labels.clone(), k, &rows) }
             } else {
                 TableRow { paper, ..counted_right(variant.labels.clone(), k, &rows) }
             }
@@ -125,11 +150,21 @@ pub(super) fn table(spec: &RunSpec, rows: &Rows) -> Vec<TableRow> {
         let label = stratum.map_or("mean", Stratum::word).to_owned();
         TableRow {
             stratum: stratum.map(Stratum::word),
-            paper: Some(paper_of_stratum(stratum)),
+            paper: PaperSet::beside(spec.study, &spec.data.layout).map(|_| paper::stratum(stratum)),
             ..summed(vec![label], 0, &rows)
         }
     });
     of_stratum.collect()
+}
+
+/// Where a spoiled start, against the settings, left every frame exactly as it is without.
+fn unmoved(spec: &RunSpec, rows: &[&RunRow], all_rows: &Rows) -> Option<String> {
+    let of_another = |row: &&RunRow| row.variant != UNSPOILED;
+    if spec.study != StudyKind::Robustness || rows.is_empty() || !rows.iter().all(of_another) {
+        return None;
+    }
+    let same = |row: &&RunRow| all_rows.get(&(UNSPOILED, row.frame)).is_some_and(|plain| plain.fit == row.fit);
+    rows.iter().all(same).then(|| "acted on nothing: every frame is as without it".to_owned())
 }
 
 fn summed(labels: Vec<String>, variant: usize, rows: &[&RunRow]) -> TableRow {
@@ -160,6 +195,7 @@ fn summed(labels: Vec<String>, variant: usize, rows: &[&RunRow]) -> TableRow {
         map_box_coverage: spread(|fit| fit.map_box_coverage),
         counts: None,
         paper: None,
+        note: None,
     }
 }
 

@@ -61,6 +61,11 @@ impl PaperRow {
     pub(super) fn errors(majpe_mm: f64, pa_majpe_mm: f64) -> Self {
         Self { majpe_mm: Some(majpe_mm), pa_majpe_mm: Some(pa_majpe_mm), ..Self::default() }
     }
+
+    /// The same of a pair.
+    pub(super) fn of_pair([majpe_mm, pa_majpe_mm]: [f64; 2]) -> Self {
+        Self::errors(majpe_mm, pa_majpe_mm)
+    }
 }
 
 /// One configuration of a study; written to `run.toml` as it is.
@@ -78,6 +83,9 @@ pub struct Variant {
     /// The paper's figures for the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub paper: Option<PaperRow>,
+    /// Why it cannot differ from the row that it is compared with, where that follows from the settings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
     /// Every setting of its fits.
     pub config: FitConfig,
 }
@@ -86,7 +94,7 @@ impl Variant {
     /// From its frames' own peaks.
     pub(super) fn cold(labels: impl IntoIterator<Item = impl Into<String>>, config: &FitConfig) -> Self {
         let labels = labels.into_iter().map(Into::into).collect();
-        Self { labels, start: StartFrom::Cold, method: Method::Fit, paper: None, config: *config }
+        Self { labels, start: StartFrom::Cold, method: Method::Fit, paper: None, note: None, config: *config }
     }
 
     /// Counts instead of fitting.
@@ -99,9 +107,9 @@ impl Variant {
         Self { start: StartFrom::Warm, ..self }
     }
 
-    /// With the paper's figures.
-    pub(super) fn beside(self, paper: PaperRow) -> Self {
-        Self { paper: Some(paper), ..self }
+    /// With the paper's figures, where it has any.
+    pub(super) fn beside(self, paper: Option<PaperRow>) -> Self {
+        Self { paper, ..self }
     }
 
     /// Its labels in one line.

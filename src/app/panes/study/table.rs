@@ -2,7 +2,7 @@
 
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
-use crate::study::run::{Run, Spread, TableRow};
+use crate::study::run::{Run, Spread, TableRow, mark, notes};
 use egui::{Align, Layout, RichText, Role, Ui};
 
 type Cell = fn(&TableRow) -> Option<String>;
@@ -57,13 +57,21 @@ fn percent(share: Option<f64>) -> Option<String> {
 
 /// Draws the table; answers the row whose frames are asked for.
 pub(super) fn show(ui: &mut Ui, run: &Run, chosen: Option<usize>, tokens: &Tokens) -> Option<usize> {
+    let notes = notes(&run.table);
     let shown: Vec<_> = COLUMNS.iter().filter(|(.., cell)| run.table.iter().any(|row| cell(row).is_some())).collect();
     let mut asked = None;
-    let grid = egui::Grid::new("study table").num_columns(1 + shown.len()).spacing([12.0, 2.0]).striped(true);
+    let grid = egui::Grid::new("study table")
+        .num_columns(1 + shown.len() + usize::from(!notes.is_empty()))
+        .spacing([12.0, 2.0])
+        .striped(true);
     grid.show(ui, |ui| {
         ui.label(RichText::new(run.spec.columns.join(", ")).small().color(tokens.dim));
         for (head, tip, _) in &shown {
             right(ui, |ui| ui.label(RichText::new(*head).small().color(tokens.dim)).on_hover_text(*tip));
+        }
+        if !notes.is_empty() {
+            let tip = "Why a row does not differ from the one it is compared with; told below.";
+            ui.label(RichText::new("note").small().color(tokens.dim)).on_hover_text(tip);
         }
         ui.end_row();
         for (k, row) in run.table.iter().enumerate() {
@@ -79,9 +87,18 @@ pub(super) fn show(ui: &mut Ui, run: &Run, chosen: Option<usize>, tokens: &Token
                 let text = RichText::new(text.unwrap_or_else(|| "–".into())).font(theme::mono(theme::CAPTION));
                 right(ui, |ui| ui.label(text.color(color)));
             }
+            if let Some(mark) = mark(&notes, row) {
+                ui.label(RichText::new(mark).small()).on_hover_text(row.note.as_deref().unwrap_or_default());
+            }
             ui.end_row();
         }
     });
+    for (k, note) in notes.iter().enumerate() {
+        ui.label(RichText::new(format!("[{}] {note}.", k + 1)).small().color(tokens.dim));
+    }
+    if let Some(why) = run.spec.paper_missing() {
+        ui.label(RichText::new(why).small().color(tokens.dim));
+    }
     asked
 }
 

@@ -14,6 +14,7 @@ mod train;
 #[cfg(feature = "train")]
 pub use train::{Lesson, learn};
 
+use super::Reading;
 use super::evidence::Evidence;
 use super::template::relax;
 use crate::geometry::{Vec3, add, norm, scale, sub};
@@ -96,11 +97,11 @@ impl LimbMap {
 
 /// The joints (world frame, m) of a start moved to where what is lit around them says; `None` where the views do not tell
 /// both sides and heights, or the skeleton lacks a part that was learned.
-pub(super) fn moved(problem: &Problem, joints: &[Vec3]) -> Option<Vec<Vec3>> {
+pub(super) fn moved(problem: &Problem, reading: Reading, joints: &[Vec3]) -> Option<Vec<Vec3>> {
     let map = LimbMap::bundled()?;
     let parts = Parts::of(&problem.skeleton)?;
     let frame = Frame::around(&parts.places(joints), joints);
-    let by_part = map.apply(&inputs(problem, &frame, &parts, joints)?);
+    let by_part = map.apply(&inputs(problem, reading, &frame, &parts, joints)?);
     let by_part = by_part.map(|way| scale(way, (FARTHEST_M / norm(way).max(f64::MIN_POSITIVE)).min(1.0)));
     let ways = parts.of_joints(&by_part);
     let mut moved: Vec<Vec3> = joints.iter().zip(ways).map(|(&joint, way)| add(joint, frame.turned(way))).collect();
@@ -144,9 +145,9 @@ impl Frame {
 }
 
 /// What the linear map is given; `None` where no view tells sides, or none heights.
-fn inputs(problem: &Problem, frame: &Frame, parts: &Parts, joints: &[Vec3]) -> Option<Vec<f32>> {
-    let now = &problem.surroundings().now;
-    let around: Vec<&[Evidence]> = problem.surroundings().around(problem).map(|(_, views)| views()).collect();
+fn inputs(problem: &Problem, reading: Reading, frame: &Frame, parts: &Parts, joints: &[Vec3]) -> Option<Vec<f32>> {
+    let now = &problem.surroundings(reading).now;
+    let around: Vec<&[Evidence]> = problem.surroundings(reading).around(problem).map(|(_, views)| views()).collect();
     let times = || std::iter::once(now.as_slice()).chain(around.iter().copied());
     let middle = frame.world([0.0, 0.0, MIDDLE_M]);
     let left = frame.turned([0.0, 1.0, 0.0]);

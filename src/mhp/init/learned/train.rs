@@ -1,6 +1,6 @@
 //! Ridge regression of the limbs over people with truth.
 
-use super::{ACROSS, AWAY, Frame, INPUTS, LimbMap, PARTS, Parts, UP, inputs};
+use super::{ACROSS, AWAY, Frame, INPUTS, LimbMap, PARTS, Parts, Reading, UP, inputs};
 use crate::body::Pppr;
 use crate::geometry::{Vec3, add, norm, sub};
 use crate::mhp::Problem;
@@ -34,7 +34,7 @@ impl Lesson {
         if norm(whole) > ELSEWHERE_M * PARTS as f64 {
             return None;
         }
-        Some(Self { inputs: inputs(problem, &frame, &parts, &joints)?, ways })
+        Some(Self { inputs: inputs(problem, Reading::default(), &frame, &parts, &joints)?, ways })
     }
 
     /// The same scene left and right exchanged: a radar does not care, and what is learned must not either.
