@@ -43,6 +43,7 @@
 //! | [`body`] | skeleton topologies, the PPPR parameters, bodies that move |
 //! | [`radar`] | chirp, axes, views, point-spread functions, FMCW synthesis of a MIMO array and the FFT chain |
 //! | [`config`] | `FitConfig`: defaults, ranges, help text; the only source for files, command line and sliders |
+//! | [`escape`] | text from data on its way to a terminal or a table |
 //! | [`folders`] | where the user's settings, labels and caches lie |
 //! | [`geometry`] | 3-vectors, 3×3 matrices, quaternions, the spherical triad |
 
@@ -52,6 +53,7 @@ pub mod config;
 pub mod dataset;
 pub mod diagnose;
 mod digest;
+pub mod escape;
 pub mod folders;
 pub mod geometry;
 pub mod labels;

@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 const MAY_USE: &[(&str, &[&str])] = &[
     ("digest", &[]),
     ("geometry", &[]),
+    ("escape", &[]),
     ("folders", &[]),
-    ("labels", &["folders"]),
+    ("labels", &["escape", "folders"]),
     ("config", &[]),
     ("radar", &["geometry", "config"]),
     ("body", &["geometry", "radar"]),
@@ -25,14 +26,14 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "study",
         &[
-            "digest", "geometry", "folders", "config", "radar", "body", "mhp", "people", "dataset", "start",
+            "digest", "geometry", "escape", "folders", "config", "radar", "body", "mhp", "people", "dataset", "start",
             "diagnose", "labels",
         ],
     ),
     (
         "session",
         &[
-            "digest", "geometry", "folders", "config", "radar", "body", "mhp", "people", "dataset", "start",
+            "digest", "geometry", "escape", "folders", "config", "radar", "body", "mhp", "people", "dataset", "start",
             "diagnose", "labels", "study", "worker",
         ],
     ),

@@ -2,11 +2,12 @@
 
 mod frame;
 
-use super::common::{PrecisionArg, open, print, progress_bar};
+use super::common::{PrecisionArg, complain, open, print, progress_bar};
 use super::frames::{FrameRange, chosen};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::config::{FitConfig, Preset};
 use crate::dataset::Dataset;
+use crate::escape::one_line;
 use crate::study::{HeatmapExport, MapScale};
 use anyhow::Context as _;
 use clap::{Args, ValueEnum};
@@ -205,13 +206,15 @@ fn all(
 fn end(failures: &BTreeMap<usize, String>, frames: usize, out: &Path) -> anyhow::Result<ExitCode> {
     let done = frames - failures.len();
     if done > 0 {
-        print(&format!("{done} of {frames} frames written to {}\n", out.display()))?;
+        print(&format!("{done} of {frames} frames written to {}\n", one_line(&out.display().to_string())))?;
     }
     let Some(why) = failures.values().next() else { return Ok(ExitCode::SUCCESS) };
     match frames {
-        1 => eprintln!("error: {why}"),
-        _ if done == 0 => eprintln!("error: none of {frames} frames could be exported; the first: {why}"),
-        _ => eprintln!("warning: {} of {frames} frames could not be exported; the first: {why}", failures.len()),
+        1 => complain(&format!("error: {why}")),
+        _ if done == 0 => complain(&format!("error: none of {frames} frames could be exported; the first: {why}")),
+        _ => {
+            complain(&format!("warning: {} of {frames} frames could not be exported; the first: {why}", failures.len()))
+        }
     }
     Ok(ExitCode::from(if done == 0 { EXIT_BAD_INPUT } else { EXIT_SOME_FAILED }))
 }

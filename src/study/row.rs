@@ -2,6 +2,7 @@
 
 use super::summary::{FIRST, NUMBERS};
 use crate::body::Pppr;
+use crate::escape::to_cell;
 use crate::mhp::{StepReport, StopReason};
 use serde_json::{Map, Value};
 
@@ -69,10 +70,10 @@ impl FrameRow {
         let fit = self.fit.as_ref().ok();
         let text = |x: Option<String>| x.unwrap_or_default();
         let first = [
-            self.frame.clone(),
+            to_cell(&self.frame).into_owned(),
             text(fit.map(|fit| fit.report.iteration.to_string())),
             text(fit.map(|fit| fit.report.converged.to_string())),
-            self.reason(),
+            to_cell(&self.reason()).into_owned(),
         ];
         first.into_iter().chain(self.values(views).into_iter().map(|x| text(x.map(|x| x.to_string())))).collect()
     }

@@ -1,6 +1,7 @@
 //! What `count` prints and writes.
 
 use crate::dataset::Dataset;
+use crate::escape::{one_line, to_cell};
 use crate::people::{CLASSES, Confusion};
 use crate::study::count::{FrameCount, confusion};
 use anyhow::Context as _;
@@ -10,7 +11,7 @@ use std::path::Path;
 
 /// A line a frame, then how often the count is the annotated one.
 pub(super) fn table(dataset: &Dataset, rows: &[FrameCount]) -> String {
-    let name = |row: &FrameCount| dataset.frame_name(row.frame).to_owned();
+    let name = |row: &FrameCount| one_line(&dataset.frame_name(row.frame)).into_owned();
     let width = rows.iter().map(|row| name(row).chars().count()).max().unwrap_or(0).max("frame".len());
     let mut text = format!("{:<width$}  people      p  annotated  places (x y z, m)\n", "frame");
     for row in rows {
@@ -119,8 +120,11 @@ pub(super) fn write_csv(file: &Path, dataset: &Dataset, rows: &[FrameCount]) -> 
     csv.write_record(head).with_context(cannot)?;
     for row in rows.iter().map(|row| of(dataset, row)) {
         let number = |n: Option<usize>| n.map_or_else(String::new, |n| n.to_string());
-        let mut record =
-            vec![row.frame, number(row.people), row.probability.map_or_else(String::new, |p| p.to_string())];
+        let mut record = vec![
+            to_cell(&row.frame).into_owned(),
+            number(row.people),
+            row.probability.map_or_else(String::new, |p| p.to_string()),
+        ];
         let each = |k: usize| row.probabilities.map_or_else(String::new, |p| p[k].to_string());
         record.extend((0..CLASSES).map(each));
         record.push(number(row.annotated));
