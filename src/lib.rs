@@ -44,6 +44,7 @@
 //! | [`radar`] | chirp, axes, views, point-spread functions, FMCW synthesis of a MIMO array and the FFT chain |
 //! | [`config`] | `FitConfig`: defaults, ranges, help text; the only source for files, command line and sliders; [where the program differs from the paper](config::deviations) |
 //! | [`output`] | where results are written: safe names, guarded and locked folders, files whole or not at all |
+//! | [`escape`] | text from data on its way to a terminal or a table |
 //! | [`folders`] | where the user's settings, labels and caches lie |
 //! | [`input`] | opening what others made: regular files only, bounded |
 //! | [`geometry`] | 3-vectors, 3×3 matrices, quaternions, the spherical triad |
@@ -54,6 +55,7 @@ pub mod config;
 pub mod dataset;
 pub mod diagnose;
 mod digest;
+pub mod escape;
 pub mod folders;
 pub mod geometry;
 pub mod input;

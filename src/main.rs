@@ -4,10 +4,13 @@ use cap::Cap;
 use clap::Parser;
 use mhp_inspector::cli::bench::{Meter, count_bytes_with};
 use mhp_inspector::cli::{Cli, EXIT_BAD_INPUT, WindowArgs, begin_again, run};
-use mhp_inspector::output;
+use mhp_inspector::{escape, output};
 use std::alloc::System;
 use std::io::IsTerminal as _;
 use std::process::ExitCode;
+use tracing_subscriber::field::MakeExt as _;
+use tracing_subscriber::fmt::FormatFields;
+use tracing_subscriber::fmt::format::debug_fn;
 
 /// Counts bytes for `bench`, and limits nothing.
 #[global_allocator]
@@ -22,12 +25,16 @@ fn main() -> ExitCode {
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
         .with_target(false)
+        .fmt_fields(fields())
         .init();
     count_bytes_with(Meter { total_bytes: || ALLOCATOR.total_allocated(), peak_bytes: || ALLOCATOR.max_allocated() });
     if let Err(error) = output::survive_size_limit() {
         tracing::warn!("a file that reaches the limit of its size will end the program: {error}");
     }
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return refuse(error),
+    };
     begin_again(cli.command.as_ref());
     output::allow_into_data(cli.into_data);
     let done = match cli.command {
@@ -35,9 +42,31 @@ fn main() -> ExitCode {
         None => open_window(cli.window),
     };
     done.unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
+        eprintln!("{}", escape::one_line(&format!("error: {error:#}")));
         ExitCode::from(EXIT_BAD_INPUT)
     })
+}
+
+/// Messages and fields of the log, each in one line: they tell names from data.
+fn fields() -> impl for<'w> FormatFields<'w> + 'static {
+    debug_fn(|out, field, value| {
+        let value = format!("{value:?}");
+        let text = escape::one_line(&value);
+        if field.name() == "message" { write!(out, "{text}") } else { write!(out, "{field}={text}") }
+    })
+    .delimited(" ")
+}
+
+/// Help and version as clap shows them. What is wrong repeats what was typed, perhaps names that a shell found: it is what
+/// clap says of the same words with everything hidden shown.
+fn refuse(error: clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        error.exit();
+    }
+    let shown = std::env::args_os().map(|word| escape::one_line(&word.to_string_lossy()).into_owned());
+    let error = Cli::try_parse_from(shown).err().unwrap_or(error);
+    eprint!("{}", escape::lines(&error.render().to_string()));
+    ExitCode::from(EXIT_BAD_INPUT)
 }
 
 #[cfg(feature = "viewer")]

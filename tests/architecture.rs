@@ -8,10 +8,11 @@ use std::path::{Path, PathBuf};
 const MAY_USE: &[(&str, &[&str])] = &[
     ("digest", &[]),
     ("geometry", &[]),
+    ("escape", &[]),
     ("folders", &[]),
     ("input", &[]),
     ("output", &["digest"]),
-    ("labels", &["folders"]),
+    ("labels", &["escape", "folders"]),
     ("config", &["input"]),
     ("radar", &["geometry", "config"]),
     ("body", &["geometry", "radar"]),
@@ -27,15 +28,15 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "study",
         &[
-            "digest", "input", "geometry", "folders", "output", "config", "radar", "body", "mhp", "people", "dataset",
-            "start", "diagnose", "labels",
+            "digest", "input", "geometry", "escape", "folders", "output", "config", "radar", "body", "mhp", "people",
+            "dataset", "start", "diagnose", "labels",
         ],
     ),
     (
         "session",
         &[
-            "digest", "input", "geometry", "folders", "output", "config", "radar", "body", "mhp", "people", "dataset",
-            "start", "diagnose", "labels", "study", "worker",
+            "digest", "input", "geometry", "escape", "folders", "output", "config", "radar", "body", "mhp", "people",
+            "dataset", "start", "diagnose", "labels", "study", "worker",
         ],
     ),
     (

@@ -9,7 +9,7 @@
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
 use mhp_inspector::labels::{
-    Agreement, FrameId, Judged, Label, Record, Tag, TagAgreement, Tags, against_machine, agreement, judged,
+    Agreement, FrameId, Judged, Label, Record, Tag, TagAgreement, Tags, Verdict, against_machine, agreement, judged,
     judged_in_acts, read_table,
 };
 use serde_json::Value;
@@ -97,6 +97,7 @@ fn record(frame: &str, label: Label) -> Record {
         label,
         annotator: "ann".into(),
         time: "2025-03-01T12:00:00.000Z".into(),
+        after: None,
         act: "tag".into(),
         program: "0.1.0".into(),
         judged: Judged::default(),
@@ -122,10 +123,48 @@ fn a_frame_is_judged_by_what_is_said_of_it_last() {
     ];
     let told = |record: &Record| format!("{}: {}", record.frame.path, record.label.tags);
     let found: Vec<String> = judged_in_acts(&acts).map(told).collect();
-    assert_eq!(found, ["a verdict: ", "changed: F3 unsure", "stated as nothing: "]);
+    assert_eq!(found, ["changed: F3 unsure", "stated as nothing: "]);
     // Of newest records alone nobody knows what an empty one took back.
     let newest: Vec<String> = judged(&acts[2..]).map(told).collect();
-    assert_eq!(newest, ["a verdict: ", "changed: F3 unsure"]);
+    assert_eq!(newest, ["changed: F3 unsure"]);
+}
+
+/// F1 on ten frames that both tagged: both on 2, only a on 3, only b on 3, neither on 2. p_o = 4/10 and p_e = (5·5 + 5·5)/100,
+/// hence κ = (0.4 − 0.5)/(1 − 0.5) = −0.2. Twenty frames of which both only said whose count is wrong would make it
+/// p_o = 24/30, p_e = (5·5 + 25·25)/900, κ = (0.8 − 0.7222)/0.2778 = 0.28: agreement on something else.
+#[test]
+fn a_verdict_alone_is_no_judgement_of_tags() {
+    let of = |which: &dyn Fn(usize) -> bool, verdict: &str| -> Vec<Record> {
+        let tags = (0..10).map(|k| tagged(&format!("tagged {k}"), if which(k) { "F1" } else { "clean" }));
+        let review = Label { verdict: Some(verdict.parse().unwrap()), ..Label::default() };
+        let noted = Label { note: "by the door".into(), ..review.clone() };
+        let labels = [review, noted];
+        let reviewed = (0..20).map(|k| record(&format!("reviewed {k}"), labels[k % 2].clone()));
+        tags.chain(reviewed).collect()
+    };
+    let a = of(&|k| k < 5, "true-negative");
+    let b = of(&|k| k < 2 || (5..8).contains(&k), "detection-error");
+    let found = agreement(judged_in_acts(&a), judged_in_acts(&b));
+    assert_eq!((found.frames, found.only_in_a, found.only_in_b), (10, 0, 0));
+    let f1 = &found.tags[0].1;
+    assert_eq!([f1.both, f1.only_a, f1.only_b, f1.neither], [2, 3, 3, 2]);
+    assert!((f1.kappa.unwrap() + 0.2).abs() < 1e-12, "{:?}", f1.kappa);
+    // `clean` is the complement, the other tags were never given: of them κ is undefined.
+    let kappas: Vec<Option<f64>> = found.tags.iter().map(|(_, table)| table.kappa).collect();
+    assert_eq!(kappas[1..4], [None; 3]);
+    assert!((kappas[4].unwrap() + 0.2).abs() < 1e-12 && kappas[5].is_none());
+    // All decisions: 4 of both yes, 6 + 6 disputed, 44 neither; κ = (48/60 − (10·10 + 50·50)/3600)/(1 − …) = 0.28.
+    let pooled = &found.pooled;
+    assert_eq!([pooled.both, pooled.only_a, pooled.only_b, pooled.neither], [4, 6, 6, 44]);
+    assert!((pooled.kappa.unwrap() - 0.28).abs() < 1e-12, "{:?}", pooled.kappa);
+}
+
+#[test]
+fn the_verdicts_say_what_the_paper_says() {
+    let words = Verdict::ALL.map(Verdict::words);
+    assert!(words[0].contains("annotation is wrong") && words[1].contains("detection is wrong"));
+    assert!(words[2].contains("Both are wrong"));
+    assert!(words[3].contains("Both are right") && words[3].contains("tracking that passes"), "{}", words[3]);
 }
 
 #[test]

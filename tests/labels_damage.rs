@@ -1,12 +1,12 @@
 //! What a crash, a full disk or another program leaves in a journal costs nothing but itself.
-#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "tests fail by panicking")]
 
 #[path = "common/labels.rs"]
 mod labels;
 
 use labels::{Case, commit, frame, name, tags};
 use mhp_inspector::folders::HOME_VARIABLE;
-use mhp_inspector::labels::{Change, Journal, Judged, LabelStore, Tag, Tags, read_journal};
+use mhp_inspector::labels::{Change, Journal, Judged, LabelStore, Tag, Tags, read_acts, read_journal};
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -173,25 +173,71 @@ fn what_is_no_journal_is_refused_and_not_written_to() {
     assert_eq!(read_journal(&case.file("empty")).unwrap(), []);
 }
 
+/// A limit on the size of files stands for a full disk.
 #[cfg(unix)]
 #[test]
 fn a_full_disk_is_an_error_and_nothing_is_acknowledged() {
-    if !Path::new("/dev/full").exists() {
-        println!("skipped: no /dev/full on this machine");
-        return;
-    }
     let case = Case::new(2);
-    std::fs::create_dir_all(case.labels()).unwrap();
-    std::os::unix::fs::symlink("/dev/full", case.file("anna")).unwrap();
-    let error = case.journal("anna").commit("tag", &[(frame(0), Change::adding(Tag::F1))], &Judged::default());
-    let error = error.unwrap_err().to_string();
-    assert!(error.starts_with(&format!("{}: labels cannot be written: ", case.file("anna").display())), "{error}");
-    let requests = "{\"frame\":0,\"add\":[\"F1\"]}\n{\"frame\":1,\"add\":[\"F1\"]}\n";
-    let mut child = case.program(&["tag", "--annotator", "anna", "--from-stdin"]);
-    let mut child = child.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    child.stdin.take().unwrap().write_all(requests.as_bytes()).unwrap();
+    let script = "trap '' XFSZ; ulimit -f 0; exec \"$@\"";
+    let program = case.program(&["tag", "--annotator", "anna", "--from-stdin"]);
+    let mut limited = Command::new("sh");
+    limited.args(["-c", script, "sh"]).arg(program.get_program()).args(program.get_args());
+    // Where not even the trial finds room, it is the place that is refused; a journal that is there is not.
+    commit(&mut case.journal("anna"), 1, Change::adding(Tag::F2));
+    let before = std::fs::read(case.file("anna")).unwrap();
+    limited.env(HOME_VARIABLE, case.home());
+    let mut child = limited.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let _ = child.stdin.take().unwrap().write_all(b"{\"frame\":0,\"add\":[\"F1\"]}\n");
     let output = child.wait_with_output().unwrap();
     assert_eq!((output.status.code(), output.stdout.as_slice()), (Some(2), &b""[..]));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("File too large"), "{output:?}");
+    assert_eq!(std::fs::read(case.file("anna")).unwrap(), before);
+}
+
+/// Within ten seconds: what waits for a pipe's other end waits for ever.
+#[cfg(unix)]
+#[test]
+fn pipes_devices_and_links_to_nothing_are_refused_at_once() {
+    let case = Case::new(2);
+    std::fs::create_dir_all(case.labels()).unwrap();
+    let made = Command::new("mkfifo").arg(case.file("pipe")).arg(case.file("anna")).status();
+    assert!(made.is_ok_and(|status| status.success()), "mkfifo");
+    std::os::unix::fs::symlink("/dev/null", case.file("device")).unwrap();
+    std::os::unix::fs::symlink(case.folder.path().join("elsewhere"), case.file("link")).unwrap();
+    let (send, answer) = std::sync::mpsc::channel();
+    let place = case.place();
+    let pipe = case.file("pipe");
+    std::thread::spawn(move || {
+        let refused = |name: &str| {
+            let commit = |mut journal: Journal| {
+                journal.commit("tag", &[(frame(0), Change::adding(Tag::F1))], &Judged::default()).map(|_| ())
+            };
+            Journal::open(&place, name, "f00d").and_then(commit).unwrap_err().to_string()
+        };
+        let names = ["anna", "device", "link"].map(refused);
+        let store = LabelStore::read(&place).unwrap();
+        let read = [read_journal(&pipe).unwrap_err().to_string(), read_acts(&pipe).unwrap_err().to_string()];
+        let _ = send.send((names, store.warnings().to_vec(), read));
+    });
+    let (names, warnings, read) = answer.recv_timeout(std::time::Duration::from_secs(10)).expect("no answer: it hangs");
+    let said = |name: &str, what: &str| {
+        format!("{}: no journal of labels: it is {what}; expected a file", case.file(name).display())
+    };
+    assert_eq!(names[0], said("anna", "a named pipe"));
+    assert_eq!(names[1], said("device", "a device"));
+    assert!(names[2].ends_with("it is a link to a file that is not there; expected a file"), "{}", names[2]);
+    assert!(!case.folder.path().join("elsewhere").exists(), "nothing is made at the other end of a link");
+    assert_eq!(warnings, [said("anna", "a named pipe"), said("device", "a device"), said("pipe", "a named pipe")]);
+    assert_eq!(read, [said("pipe", "a named pipe"), said("pipe", "a named pipe")]);
+    // What is refused hides nobody else, also in the program.
+    commit(&mut case.journal("berta"), 0, Change::adding(Tag::F1));
+    let (shown, warned) = case.told(&["show"]);
+    assert_eq!(shown, "berta  frames/0000  F1\n");
+    assert_eq!(warned.matches("it is a named pipe; expected a file").count(), 2, "{warned}");
+    assert_eq!(
+        case.refusal(&["tag", "--annotator", "anna", "--frame", "0", "--add", "F1"], ""),
+        format!("error: {}", said("anna", "a named pipe"))
+    );
 }
 
 /// A limit on the size of files stands for a disk that takes the first half of an act.

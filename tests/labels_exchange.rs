@@ -277,6 +277,18 @@ fn one_bad_row_and_nothing_is_imported() {
         assert!(message.starts_with(wanted), "{message}");
         assert_eq!(folder(&desk), before, "{row}");
     }
+    // Cells that no map of the data set has, in either form.
+    for region in ["hori[0..=99, 0..=3]", "hori[0..=3]", "side[0..=3, 0..=3]"] {
+        let row = format!("frames/004,anna,1,0,0,0,0,0,\"{region}\"");
+        desk.table("bad.csv", "frame,annotator,F1,F2,F3,F4,clean,unsure,region", &[&row]);
+        let message = desk.refused(&["import", "data", "good.csv", "bad.csv"]);
+        let wanted = format!("`{region}` is in no map; expected cells of hori of 48 × 32 bins or vert of 48 × 32 bins");
+        assert_eq!(message, format!("bad.csv: line 2: column `region`: {wanted}"));
+        desk.done(&["export", "bad.csv", "--json", "bad.json"]);
+        let message = desk.refused(&["import", "data", "good.csv", "bad.json"]);
+        assert_eq!(message, format!("bad.json: line 1: column `region`: {wanted}"));
+        assert_eq!(folder(&desk), before, "{region}");
+    }
     desk.table("bad.csv", HEAD, &["frames/099,dee,,1,0,0,0,0,0,"]);
     desk.done(&["import", "data", "bad.csv", "--keep-unknown"]);
     assert_eq!(labels_of(read_journal(&desk.journal("dee")).unwrap())[0].0, "frames/099");

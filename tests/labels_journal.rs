@@ -333,3 +333,118 @@ fn names_of_annotators_that_look_alike_have_files_of_their_own() {
         assert!(case.refusal(&["tag", "--annotator", nobody, "--frame", "0", "--add", "F1"], "").contains("is empty"));
     }
 }
+
+/// A line of a journal: `who` gives a frame tags at a time.
+fn line(who: &str, index: usize, tags: &[&str], time: &str) -> String {
+    let record = json!({
+        "dataset": "f00d", "frame": { "path": name(index), "index": index }, "label": { "tags": tags },
+        "annotator": who, "time": time, "act": "tag", "program": "0"
+    });
+    format!("{record}\n")
+}
+
+const LATEST: &str = "9999-12-31T23:59:59.999Z";
+
+/// Everything that shows labels shows these tags of the frame, and nobody else's.
+fn is_shown(case: &Case, who: &str, index: usize, wanted: &str) {
+    assert_eq!(tags(&case.place(), who, index), wanted);
+    let (shown, _) = case.told(&["show", "--annotator", who, "--json"]);
+    let records: Vec<Record> = serde_json::from_str(&shown).unwrap();
+    let find = |records: &[Record]| {
+        let found: Vec<String> = records
+            .iter()
+            .filter(|record| record.frame.index == index)
+            .map(|record| record.label.tags.to_string())
+            .collect();
+        found.join("; ")
+    };
+    assert_eq!(find(&records), wanted, "labels show");
+    let (exported, _) = case.told(&["export", "--annotator", who, "--json", "-"]);
+    assert_eq!(find(&serde_json::from_str::<Vec<Record>>(&exported).unwrap()), wanted, "labels export");
+}
+
+#[test]
+fn an_acknowledged_act_is_shown_whatever_other_files_and_clocks_say() {
+    let case = Case::new(4);
+    std::fs::create_dir_all(case.labels()).unwrap();
+    // A copy beside the journal whose clock was ahead, and somebody else's file with records by ada, of the last moment.
+    let copy = line("ada", 0, &["F4"], "2999-01-01T00:00:00.000Z") + &line("ada", 1, &["F4"], LATEST);
+    std::fs::write(case.labels().join("ada copy.labels.jsonl"), copy).unwrap();
+    std::fs::write(case.file("eve"), line("ada", 0, &["F3"], LATEST) + &line("eve", 0, &["clean"], LATEST)).unwrap();
+    is_shown(&case, "ada", 0, "F3");
+    let (_, warned) = case.told(&["tag", "--annotator", "ada", "--frame", "0", "--add", "F1"]);
+    is_shown(&case, "ada", 0, "F1 F3");
+    case.told(&["tag", "--annotator", "ada", "--frame", "0", "--remove", "F3"]);
+    is_shown(&case, "ada", 0, "F1");
+    // What only the copy says stands until ada says something.
+    is_shown(&case, "ada", 1, "F4");
+    // A window that has been open all the while, and its undo.
+    let (mut window, mut store) = (case.journal("ada"), LabelStore::read(&case.place()).unwrap());
+    let act = commit(&mut window, 1, Change::adding(Tag::F2));
+    is_shown(&case, "ada", 1, "F2 F4");
+    let undone = commit(&mut window, 1, Change::between(&act[0].after.label, &act[0].before));
+    assert_eq!(undone[0].after.label, act[0].before);
+    is_shown(&case, "ada", 1, "F4");
+    std::fs::write(case.labels().join("late.labels.jsonl"), line("ada", 1, &["unsure"], LATEST)).unwrap();
+    commit(&mut window, 1, Change::removing(Tag::F4));
+    assert!(store.refresh().unwrap());
+    assert_eq!(store.label("ada", &name(1)).unwrap().label, Label::default());
+    // The times are those of the clock, not of whoever was ahead.
+    let own = read_journal(&case.file("ada")).unwrap();
+    assert!(own.iter().all(|record| record.time.as_str() < "2999"), "{own:?}");
+    // eve's own file speaks for eve, whatever its time, and what she says next is seen.
+    case.told(&["tag", "--annotator", "eve", "--frame", "0", "--add", "F2"]);
+    is_shown(&case, "eve", 0, "F2");
+    assert!(!warned.contains("eve.labels.jsonl"), "a file that only speaks for others is told to who reads: {warned}");
+}
+
+#[test]
+fn files_that_speak_for_others_and_times_to_come_are_told() {
+    let case = Case::new(3);
+    std::fs::create_dir_all(case.labels()).unwrap();
+    std::fs::write(case.file("eve"), line("ada", 0, &["F3"], LATEST) + &line("eve", 1, &["F1"], LATEST)).unwrap();
+    let eve = case.file("eve").display().to_string();
+    let others = format!(
+        "{eve}: 1 record by `ada`, for whom only ada.labels.jsonl speaks: they count where that file says nothing of a frame"
+    );
+    let ahead =
+        |who: &str| format!("{eve}: 1 label by `{who}` dated in the future, as late as {LATEST}: a clock was wrong");
+    let unknown = "1 label of frames that are not in this data set, for example frames/0077; they are kept";
+    std::fs::write(case.file("zoe"), line("zoe", 77, &["F1"], "2020-01-01T00:00:00Z")).unwrap();
+    for arguments in [&["show"][..], &["stats"], &["export", "--csv", "-"]] {
+        let (_, told) = case.told(arguments);
+        for wanted in [&others, &ahead("ada"), &ahead("eve"), unknown] {
+            assert!(told.contains(wanted), "{arguments:?}: {wanted}\nis not in\n{told}");
+        }
+    }
+    let store = LabelStore::read(&case.place()).unwrap();
+    assert!(store.warnings().contains(&others), "{:?}", store.warnings());
+    // Once ada has spoken herself, her label is not of the future any more; the stranger's file is still told.
+    case.told(&["tag", "--annotator", "ada", "--frame", "0", "--add", "F1"]);
+    let (_, told) = case.told(&["show"]);
+    assert!(told.contains(&others) && !told.contains(&ahead("ada")), "{told}");
+    commit(&mut case.journal("ADA"), 0, Change::adding(Tag::F1));
+    let (_, told) = case.told(&["show"]);
+    assert!(told.contains("`ADA` and `ada` are different annotators, though only the case differs"), "{told}");
+}
+
+#[test]
+fn an_import_from_a_clock_that_is_ahead_does_not_hide_what_is_tagged_afterwards() {
+    let case = Case::new(2);
+    let sheet = case.folder.path().join("sheet.csv");
+    let rows = format!("frame,annotator,time,F1,F2,F3,F4,clean,unsure\n{},ada,{LATEST},1,0,0,0,0,0\n", name(0));
+    std::fs::write(&sheet, rows).unwrap();
+    let (_, warned) = case.told(&["import", sheet.to_str().unwrap()]);
+    assert!(warned.contains(&format!("line 2: dated in the future, {LATEST}; it counts as said now")), "{warned}");
+    is_shown(&case, "ada", 0, "F1");
+    assert!(read_journal(&case.file("ada")).unwrap()[0].time.as_str() < "2999");
+    case.told(&["tag", "--annotator", "ada", "--frame", "0", "--add", "F2"]);
+    is_shown(&case, "ada", 0, "F1 F2");
+    // What a stranger's file says of the last moment keeps no row of ada's out.
+    std::fs::write(case.file("eve"), line("ada", 1, &["F3"], LATEST)).unwrap();
+    let rows =
+        format!("frame,annotator,time,F1,F2,F3,F4,clean,unsure\n{},ada,2026-01-01T00:00:00Z,0,1,0,0,0,0\n", name(1));
+    std::fs::write(&sheet, rows).unwrap();
+    assert!(case.told(&["import", sheet.to_str().unwrap()]).0.starts_with("ada: 1 label imported, 0 the same; in "));
+    is_shown(&case, "ada", 1, "F2");
+}

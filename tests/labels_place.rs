@@ -1,12 +1,16 @@
 //! Where labels lie, whose file is whose, and what the program says of them.
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
+#[path = "common/blob.rs"]
+mod blob;
 #[path = "common/labels.rs"]
 mod labels;
 
 use labels::{Case, commit, frame, name, tags};
-use mhp_inspector::labels::{Change, Journal, LabelPlace, LabelStore, Tag};
-use std::path::Path;
+use mhp_inspector::labels::{Change, Journal, LabelPlace, LabelStore, Tag, place_acts};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::SystemTime;
 
 #[test]
 fn where_nothing_can_be_written_beside_the_data_the_users_folder_is_taken_and_said() {
@@ -60,6 +64,107 @@ fn labels_of_a_time_when_the_data_could_not_be_written_stay_in_sight() {
         let acts: Vec<String> = history.iter().map(|record| record.label.tags.to_string()).collect();
         assert_eq!(acts, ["F1", "F1 F3", "F3"]);
         assert_eq!(store.last_edited("anna").unwrap().frame, frame(0));
+    }
+}
+
+/// Two machines whose clocks differ by centuries write one after the other, one beside the data, one in its own folder.
+#[test]
+fn two_folders_with_clocks_that_differ_keep_the_order_of_the_acts() {
+    let case = Case::new(2);
+    let (beside, home) = (case.place().folder, case.home().join("labels/f00d"));
+    let place =
+        |folder: &Path, also: &Path| LabelPlace { also: vec![also.to_owned()], ..LabelPlace::in_folder(folder) };
+    let (here, there) = (place(&beside, &home), place(&home, &beside));
+    commit(&mut Journal::open(&there, "anna", "f00d").unwrap(), 0, Change::adding(Tag::F1));
+    // The clock there was at the end of time; what it wrote stays as it is.
+    let file = home.join("anna.labels.jsonl");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let time = text.lines().nth(1).unwrap().split("\"time\":\"").nth(1).unwrap().split('"').next().unwrap();
+    std::fs::write(&file, text.replace(time, "9999-12-31T23:59:59.999Z")).unwrap();
+    let mut wanted = vec!["F1".to_owned()];
+    let changes =
+        [Change::adding(Tag::F2), Change::removing(Tag::F1), Change::adding(Tag::F3), Change::adding(Tag::Clean)];
+    for (k, change) in changes.into_iter().enumerate() {
+        let writer = if k % 2 == 0 { &here } else { &there };
+        let mut journal = Journal::open(writer, "anna", "f00d").unwrap();
+        let done = commit(&mut journal, 0, change);
+        assert_eq!(done[0].before.tags.to_string(), *wanted.last().unwrap());
+        wanted.push(done[0].after.label.tags.to_string());
+        for reader in [&here, &there] {
+            assert_eq!(&tags(reader, "anna", 0), wanted.last().unwrap(), "act {k}");
+            let (acts, _) = place_acts(reader).unwrap();
+            assert_eq!(acts.last().unwrap().label, done[0].after.label, "act {k}");
+            let history = LabelStore::read(reader).unwrap().history("anna", &name(0)).unwrap();
+            assert_eq!(history.iter().map(|record| record.label.tags.to_string()).collect::<Vec<_>>(), wanted);
+        }
+    }
+    assert!(std::fs::read_to_string(&file).unwrap().contains("9999-12-31"), "nothing is rewritten");
+}
+
+/// Every file and folder below, with its bytes and its time.
+fn state(folder: &Path) -> Vec<(PathBuf, SystemTime, Vec<u8>)> {
+    let mut all = vec![(folder.to_owned(), std::fs::metadata(folder).unwrap().modified().unwrap(), Vec::new())];
+    let mut entries: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    entries.sort();
+    for path in entries {
+        if path.is_dir() {
+            all.extend(state(&path));
+        } else {
+            let modified = std::fs::metadata(&path).unwrap().modified().unwrap();
+            all.push((path.clone(), modified, std::fs::read(&path).unwrap()));
+        }
+    }
+    all
+}
+
+#[test]
+fn who_only_reads_leaves_the_data_set_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    blob::write_dataset(&data, 4);
+    let program = |arguments: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"))
+            .args(arguments)
+            .current_dir(folder.path())
+            .env("MHP_INSPECTOR_HOME", folder.path().join("home"))
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    };
+    std::fs::write(
+        folder.path().join("s.csv"),
+        "frame,annotator,F1,F2,F3,F4,clean,unsure\nframes/000,bo,1,0,0,0,0,0\n",
+    )
+    .unwrap();
+    for labelled in [false, true] {
+        if labelled {
+            program(&["labels", "tag", "data", "--annotator", "ada", "--frame", "0", "--add", "F1"]);
+        }
+        let before = state(&data);
+        let reads: [&[&str]; 12] = [
+            &["labels", "show", "data"],
+            &["labels", "show", "data", "--json"],
+            &["labels", "stats", "data"],
+            &["labels", "stats", "data", "--by", "stratum"],
+            &["labels", "agreement", "data", "data"],
+            &["labels", "agreement", "data", "--machine"],
+            &["labels", "export", "data", "--csv", "out.csv", "--json", "out.json"],
+            &["labels", "import", "data", "s.csv", "--dry-run"],
+            &["info", "data"],
+            &["complexity", "data"],
+            &["evidence", "data", "--frames", "1", "--iterations", "3"],
+            &["count", "data"],
+        ];
+        for arguments in reads {
+            program(arguments);
+            assert!(state(&data) == before, "{arguments:?} changed the data set");
+        }
+        // The window: what it reads when it opens.
+        let place = LabelPlace::to_read(&data, "f00d");
+        let (journal, store) = (Journal::open(&place, "ada", "f00d").unwrap(), LabelStore::read(&place).unwrap());
+        assert_eq!(journal.label("frames/000").is_some(), labelled);
+        assert_eq!(store.annotators().count(), usize::from(labelled));
+        assert!(state(&data) == before, "opening changed the data set");
     }
 }
 

@@ -80,7 +80,8 @@ prop_compose! {
         (dataset, program) in ("[0-9a-f]{16}", "[0-9.]{1,8}"),
     ) -> Record {
         let time = format!("2025-03-01T12:00:00.{millis:03}Z");
-        Record { dataset, frame: FrameId { path, index }, label, annotator, time, act, program, judged }
+        let after = None;
+        Record { dataset, frame: FrameId { path, index }, label, annotator, time, after, act, program, judged }
     }
 }
 
@@ -241,6 +242,7 @@ fn an_import_writes_what_is_new_or_newer() {
         label: Label { tags: tags.parse().unwrap(), ..Label::default() },
         annotator: "ann".into(),
         time: time.into(),
+        after: None,
         act: String::new(),
         program: String::new(),
         judged: Judged::default(),
@@ -269,4 +271,69 @@ fn an_import_writes_what_is_new_or_newer() {
     assert_eq!(frames(&plan.write), ["newer", "taken back", "unknown"]);
     let replacing = plan_import(&rows, true, find);
     assert_eq!((replacing.same, replacing.kept, replacing.write.len()), (2, 0, 7));
+}
+
+#[test]
+fn both_forms_check_the_same_and_say_the_same() {
+    let head = format!("{HEAD},region,machine_F2,time");
+    let record = |frame: &str, label: &str, machine: &str, time: &str| {
+        format!(
+            r#"{{"frame":{{"path":"{frame}"}},"label":{{"tags":["F1"]{label}}},"annotator":"","time":"{time}","judged":{{"machine":{{{machine}}}}}}}"#
+        )
+    };
+    let region = |lo: &str, hi: &str| format!(r#","region":{{"view":"hm","lo":{lo},"hi":{hi}}}"#);
+    let same = [
+        (
+            "a,1,0,0,0,0,0,,7.5,",
+            record("a", "", r#""F2":7.5"#, ""),
+            "column `machine_F2`: is 7.5; expected a score from 0 to 1",
+        ),
+        ("a,1,0,0,0,0,0,,-0.1,", record("a", "", r#""F2":-0.1"#, ""), "column `machine_F2`: is -0.1; expected a score"),
+        (
+            "a,1,0,0,0,0,0,hm[9..=3],,",
+            record("a", &region("[9]", "[3]"), "", ""),
+            "column `region`: `hm[9..=3]` is no region; expected a view and the bins of its axes",
+        ),
+        ("a,1,0,0,0,0,0,,,noon", record("a", "", "", "noon"), "column `time`: `noon`; expected a time such as"),
+        (",1,0,0,0,0,0,,,", record("", "", "", ""), "column `frame`: is empty; expected a frame's name"),
+    ];
+    for (row, json, wanted) in same {
+        let csv = File::of(format!("{head}\n{row}\n").as_bytes()).refusal();
+        let json = File::of(format!("[{json}]").as_bytes()).refusal();
+        assert!(csv.starts_with(&format!("line 2, {wanted}")), "{csv}");
+        assert_eq!(json.strip_prefix("line 1, "), csv.strip_prefix("line 2, "), "{row}");
+    }
+    // What a CSV cannot say at all.
+    let uneven = File::of(format!("[{}]", record("a", &region("[1,2]", "[3]"), "", "")).as_bytes()).refusal();
+    assert_eq!(uneven, "line 1, column `region`: has 2 first and 1 last bins; expected one of each for each axis");
+    let clean = File::of(format!("[{}]", record("a", "", r#""clean":0.5"#, "")).as_bytes()).refusal();
+    assert!(clean.starts_with("line 1, column `machine_clean`: is 0.5; expected scores of F1"), "{clean}");
+    let fine = record("a", &region("[3]", "[9]"), r#""F2":1.0"#, "2025-03-01T12:30:00Z");
+    assert_eq!(File::of(format!("[{fine}]").as_bytes()).records()[0].label.region.as_ref().unwrap().hi, [9]);
+}
+
+#[test]
+fn what_a_spreadsheet_would_compute_is_kept_from_it_and_comes_back() {
+    for text in ["=HYPERLINK(1)", "+1", "-1", "@x", "\t=1", "\r=1", "'=1", "''-1", "'quoted'", "plain"] {
+        let said = Record {
+            dataset: text.into(),
+            frame: FrameId { path: text.into(), index: 0 },
+            label: Label { note: text.into(), ..Label::default() },
+            annotator: text.into(),
+            time: String::new(),
+            after: None,
+            act: text.into(),
+            program: text.into(),
+            judged: Judged { machine: [(Tag::F1, 0.5)].into(), ..Judged::default() },
+        };
+        let mut bytes = Vec::new();
+        write_csv(&mut bytes, [&said]).unwrap();
+        let mut reader = csv::Reader::from_reader(bytes.as_slice());
+        let cells: Vec<String> = reader.records().next().unwrap().unwrap().iter().map(str::to_owned).collect();
+        for cell in &cells {
+            assert!(!cell.starts_with(['=', '+', '-', '@', '\t', '\r']), "{text:?}: {cell:?}");
+        }
+        assert_eq!(cells[17], "0.5", "numbers are as they are");
+        assert_eq!(File::of(&bytes).records(), [said]);
+    }
 }

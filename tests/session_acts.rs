@@ -80,6 +80,7 @@ fn record(index: usize, label: &Label) -> Record {
         label: label.clone(),
         annotator: "ada".into(),
         time: "2026-03-01T09:31:12.345Z".into(),
+        after: None,
         act: String::new(),
         program: String::new(),
         judged: Judged::default(),

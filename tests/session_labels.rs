@@ -189,6 +189,7 @@ fn record(annotator: &str, index: usize, label: Label, judged: Judged) -> Record
         label,
         annotator: annotator.into(),
         time: "2026-01-01T00:00:00.000Z".into(),
+        after: None,
         act: "test".into(),
         program: "0".into(),
         judged,

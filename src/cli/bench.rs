@@ -1,6 +1,6 @@
 //! `bench`: what an iteration, a simulation and a whole frame cost here.
 
-use super::common::{PrecisionArg, open, print};
+use super::common::{PrecisionArg, open, print, print_json};
 use crate::body::Pppr;
 use crate::config::{EmRegion, FitConfig};
 use crate::dataset::{Dataset, read_pppr};
@@ -112,7 +112,7 @@ struct Figures {
 pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
     let figures = measure(args)?;
     if args.json {
-        print(&format!("{}\n", serde_json::to_string(&figures)?))?;
+        print_json(&format!("{}\n", serde_json::to_string(&figures)?))?;
     } else {
         let table = serde_json::to_value(&figures)?;
         let rows = table.as_object().into_iter().flatten().map(|(key, value)| format!("{key:<24} {value}\n"));

@@ -2,6 +2,7 @@
 
 use crate::config::{FitConfig, Preset};
 use crate::dataset::{Dataset, Manifest, OpenOptions, Progress};
+use crate::escape;
 use crate::mhp::Precision;
 use crate::output::Inputs;
 use anyhow::Context as _;
@@ -71,6 +72,24 @@ pub(super) fn settings(file: Option<&Path>, preset: Preset, iterations: Option<u
     }
 }
 
+/// How text stands in the CSV files of a command.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct CsvArgs {
+    /// Write and read text cells of CSV as they are. Without it, text that a spreadsheet would compute (it begins with = + - @,
+    /// tab or line break) has an apostrophe before it, which this program takes away again when it reads the file.
+    #[arg(long)]
+    csv_plain: bool,
+}
+
+impl CsvArgs {
+    /// Before anything is read or written.
+    pub(super) fn apply(self) {
+        if self.csv_plain {
+            escape::plain_cells();
+        }
+    }
+}
+
 /// On standard error, and only where somebody can see it move.
 pub(super) fn progress_bar(frames: usize) -> ProgressBar {
     if !std::io::stderr().is_terminal() {
@@ -82,14 +101,40 @@ pub(super) fn progress_bar(frames: usize) -> ProgressBar {
     bar
 }
 
-/// Writes to standard output. That nobody reads on (`info … | head`) is no error.
+/// Writes text to standard output, what a terminal would obey as it is spelt. Parts that come from data are in one line
+/// each before they are here. That nobody reads on (`info … | head`) is no error.
 ///
 /// # Errors
 /// Where it cannot be written for another reason.
 pub(super) fn print(text: &str) -> anyhow::Result<()> {
+    write_out(escape::lines(text).as_bytes())
+}
+
+/// As [`print()`], of JSON, which stays the same JSON.
+///
+/// # Errors
+/// As [`print()`].
+pub(super) fn print_json(text: &str) -> anyhow::Result<()> {
+    write_out(escape::json(text).as_bytes())
+}
+
+/// Writes a table for another program, byte by byte; on a terminal as [`print()`] does.
+///
+/// # Errors
+/// As [`print()`].
+pub(super) fn print_table(text: &str) -> anyhow::Result<()> {
+    if std::io::stdout().is_terminal() { print(text) } else { write_out(text.as_bytes()) }
+}
+
+fn write_out(bytes: &[u8]) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(bytes).and_then(|()| out.flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         done => done.context("writing to standard output"),
     }
+}
+
+/// Tells something in one line on standard error.
+pub(super) fn complain(text: &str) {
+    eprintln!("{}", escape::one_line(text));
 }

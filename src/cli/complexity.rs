@@ -2,7 +2,7 @@
 
 mod report;
 
-use super::common::{inputs, open, print};
+use super::common::{CsvArgs, complain, inputs, open, print, print_json};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::dataset::{Dataset, Progress};
 use crate::study::StudyError;
@@ -49,6 +49,8 @@ pub struct ComplexityArgs {
     /// Write a row a frame.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    cells: CsvArgs,
     /// One JSON array, an object a frame, instead of the summary.
     #[arg(long)]
     json: bool,
@@ -71,6 +73,7 @@ pub struct ComplexityArgs {
 /// # Errors
 /// Where an option or the data set is bad, FILE cannot be written, or no frame at all could be read.
 pub(super) fn run(args: &ComplexityArgs) -> anyhow::Result<ExitCode> {
+    args.cells.apply();
     let options = ComplexityOptions { kappa_pct: args.kappa, window: args.window, tau_pct: args.tau };
     let options = options.validated().map_err(|error| anyhow::anyhow!("--{error}"))?;
     let dataset = Arc::new(open(&args.path, args.manifest.as_deref())?);
@@ -83,7 +86,7 @@ pub(super) fn run(args: &ComplexityArgs) -> anyhow::Result<ExitCode> {
         write_csv(file, &dataset, &complexity)?;
     }
     if args.json {
-        print(&json(&dataset, &complexity)?)?;
+        print_json(&json(&dataset, &complexity)?)?;
     } else if complexity.counts.failed < dataset.len() {
         print(&report::summary(&dataset, &complexity))?;
     }
@@ -138,12 +141,12 @@ fn tell_failures(dataset: &Dataset, complexity: &Complexity) -> ExitCode {
         return ExitCode::SUCCESS;
     }
     for (_, why) in complexity.failures.iter().take(TOLD) {
-        eprintln!("warning: {why}");
+        complain(&format!("warning: {why}"));
     }
     if failed == frames {
-        eprintln!("error: none of {frames} frames could be read");
+        complain(&format!("error: none of {frames} frames could be read"));
         return ExitCode::from(EXIT_BAD_INPUT);
     }
-    eprintln!("warning: {failed} of {frames} frames could not be read");
+    complain(&format!("warning: {failed} of {frames} frames could not be read"));
     ExitCode::from(EXIT_SOME_FAILED)
 }

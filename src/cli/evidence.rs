@@ -1,12 +1,13 @@
 //! `evidence`: what speaks for each failure mode of a fit, as cards, JSON or CSV.
 
-use super::common::{PrecisionArg, inputs, open, print, progress_bar, settings};
+use super::common::{CsvArgs, PrecisionArg, complain, inputs, open, print, print_json, progress_bar, settings};
 use super::frames::{FrameRange, chosen};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::body::Pppr;
 use crate::config::Preset;
 use crate::dataset::{Dataset, read_pppr};
 use crate::diagnose::{Evidence, Finding, Place};
+use crate::escape::{one_line, to_cell};
 use crate::labels::Tag;
 use crate::mhp::Problem;
 use crate::output::replace_file;
@@ -69,6 +70,8 @@ pub struct EvidenceArgs {
     /// Also write a table: frame, index, F1 to F4, their summaries, error.
     #[arg(long, value_name = "F")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    cells: CsvArgs,
     /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
     #[arg(long, value_name = "FILE")]
     manifest: Option<PathBuf>,
@@ -79,6 +82,7 @@ pub struct EvidenceArgs {
 /// # Errors
 /// Where the configuration, the data set, the range of frames or the parameters are bad, or the table cannot be written.
 pub(super) fn run(args: &EvidenceArgs) -> anyhow::Result<ExitCode> {
+    args.cells.apply();
     let config = settings(args.config.as_deref(), Preset::Default, args.iterations)?;
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
@@ -110,7 +114,7 @@ pub(super) fn run(args: &EvidenceArgs) -> anyhow::Result<ExitCode> {
     }
     if args.json {
         let rows: Vec<Value> = judged.iter().map(json_row).collect();
-        print(&(serde_json::to_string_pretty(&rows).context("writing JSON")? + "\n"))?;
+        print_json(&(serde_json::to_string_pretty(&rows).context("writing JSON")? + "\n"))?;
     } else {
         print(&cards(&judged, &dataset.info().views))?;
     }
@@ -139,9 +143,9 @@ fn end(judged: &[FrameEvidence]) -> ExitCode {
     let Some(first) = errors.next() else { return ExitCode::SUCCESS };
     let (failed, count) = (1 + errors.count(), judged.len());
     match count {
-        1 => eprintln!("error: {first}"),
-        _ if failed == count => eprintln!("error: none of {count} frames could be judged; the first: {first}"),
-        _ => eprintln!("warning: {failed} of {count} frames could not be judged; the first: {first}"),
+        1 => complain(&format!("error: {first}")),
+        _ if failed == count => complain(&format!("error: none of {count} frames could be judged; the first: {first}")),
+        _ => complain(&format!("warning: {failed} of {count} frames could not be judged; the first: {first}")),
     }
     ExitCode::from(if failed == count { EXIT_BAD_INPUT } else { EXIT_SOME_FAILED })
 }
@@ -173,10 +177,11 @@ fn table(judged: &[FrameEvidence]) -> Result<Vec<u8>, csv::Error> {
         let modes: &[Evidence] = frame.evidence.as_ref().map_or(&[], Vec::as_slice);
         let find = |tag: Tag| modes.iter().find(|mode| mode.mode == tag);
         let score = |tag| find(tag).and_then(|mode| mode.score).map(|score| score.to_string()).unwrap_or_default();
-        let summary = |tag| find(tag).map(|mode| mode.summary.clone()).unwrap_or_default();
-        let first = [frame.frame.clone(), frame.index.to_string()];
+        let summary = |tag| find(tag).map(|mode| to_cell(&mode.summary).into_owned()).unwrap_or_default();
+        let first = [to_cell(&frame.frame).into_owned(), frame.index.to_string()];
         let cells = first.into_iter().chain(Tag::MODES.map(score)).chain(Tag::MODES.map(summary));
-        writer.write_record(cells.chain([frame.evidence.as_ref().err().cloned().unwrap_or_default()]))?;
+        let error = frame.evidence.as_ref().map_or_else(|why| to_cell(why).into_owned(), |_| String::new());
+        writer.write_record(cells.chain([error]))?;
     }
     writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
 }
@@ -188,10 +193,10 @@ fn cards(judged: &[FrameEvidence], views: &[View]) -> String {
         if !text.is_empty() {
             text.push('\n');
         }
-        let _ = writeln!(text, "frame {}  {}", frame.index, frame.frame);
+        let _ = writeln!(text, "frame {}  {}", frame.index, one_line(&frame.frame));
         match &frame.evidence {
             Err(why) => {
-                let _ = writeln!(text, "  cannot be judged: {why}");
+                let _ = writeln!(text, "  cannot be judged: {}", one_line(why));
             }
             Ok(modes) => modes.iter().for_each(|mode| card(&mut text, mode, views)),
         }
@@ -202,9 +207,9 @@ fn cards(judged: &[FrameEvidence], views: &[View]) -> String {
 fn card(text: &mut String, mode: &Evidence, views: &[View]) {
     let score = mode.score.map_or_else(|| "-".to_owned(), |score| format!("{score:.2}"));
     let title = format!("{} {}", mode.mode, mode.mode.words());
-    let _ = writeln!(text, "  {title:<36} {score:>4}  {}", mode.summary);
+    let _ = writeln!(text, "  {title:<36} {score:>4}  {}", one_line(&mode.summary));
     for finding in &mode.findings {
-        let _ = writeln!(text, "    · {}{}", finding.text, place(finding, views));
+        let _ = writeln!(text, "    · {}", one_line(&(finding.text.clone() + &place(finding, views))));
     }
 }
 

@@ -2,11 +2,12 @@
 
 mod frame;
 
-use super::common::{PrecisionArg, inputs, open, print, progress_bar};
+use super::common::{PrecisionArg, complain, inputs, open, print, progress_bar};
 use super::frames::{FrameRange, chosen};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::config::{FitConfig, Preset};
 use crate::dataset::Dataset;
+use crate::escape::one_line;
 use crate::output::{FileNames, FolderLock, Inputs};
 use crate::study::{HeatmapExport, MapScale};
 use anyhow::Context as _;
@@ -232,20 +233,22 @@ impl Job<'_> {
 
 fn end(failures: &BTreeMap<usize, String>, frames: usize, args: &ExportArgs) -> anyhow::Result<ExitCode> {
     let done = frames - failures.len();
-    let out = args.out.display();
+    let out = one_line(&args.out.display().to_string()).into_owned();
     if done > 0 {
         print(&format!("{done} of {frames} frames written to {out}\n"))?;
     }
     let Some(why) = failures.values().next() else { return Ok(ExitCode::SUCCESS) };
     match frames {
-        1 => eprintln!("error: {why}"),
-        _ if done == 0 => eprintln!("error: none of {frames} frames could be exported; the first: {why}"),
-        _ => eprintln!("warning: {} of {frames} frames could not be exported; the first: {why}", failures.len()),
+        1 => complain(&format!("error: {why}")),
+        _ if done == 0 => complain(&format!("error: none of {frames} frames could be exported; the first: {why}")),
+        _ => {
+            complain(&format!("warning: {} of {frames} frames could not be exported; the first: {why}", failures.len()))
+        }
     }
     if done > 0 && args.wants(What::Heatmap) {
-        eprintln!(
+        complain(&format!(
             "warning: {out}/{HEATMAPS} is not complete: it has {done} of {frames} frames and gets no dataset.toml"
-        );
+        ));
     }
     Ok(ExitCode::from(if done == 0 { EXIT_BAD_INPUT } else { EXIT_SOME_FAILED }))
 }

@@ -2,7 +2,9 @@
 
 mod table;
 
-use super::common::{PrecisionArg, inputs, open, presets, print, progress_bar, settings};
+use super::common::{
+    CsvArgs, PrecisionArg, complain, inputs, open, presets, print, print_json, progress_bar, settings,
+};
 use super::frames::{FrameRange, chosen};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::config::{FitConfig, Preset};
@@ -71,6 +73,8 @@ pub struct FitArgs {
     /// With --out, also curves/NAME.csv: loss, terms, IoU and joint error of every iteration.
     #[arg(long, requires = "out")]
     curves: bool,
+    #[command(flatten)]
+    cells: CsvArgs,
     /// Start each frame from the result of the one before in its sequence; one frame at a time then.
     #[arg(long)]
     warm_start: bool,
@@ -88,6 +92,7 @@ pub struct FitArgs {
 /// Where the configuration, the data set or the range of frames is bad, DIR cannot be written, or no frame at all could
 /// be fitted.
 pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
+    args.cells.apply();
     let mut config = settings(args.config.as_deref(), args.preset, args.iterations)?;
     config.people = args.people.map_or(config.people, usize::from);
     let dataset = open(&args.path, args.manifest.as_deref())?;
@@ -184,15 +189,15 @@ impl Report {
         let nothing = failed == frames;
         if let Some(rows) = self.json {
             let object = json!({ "frames": rows, "mean": self.means.json(&self.columns) });
-            print(&(serde_json::to_string_pretty(&object).context("writing JSON")? + "\n"))?;
+            print_json(&(serde_json::to_string_pretty(&object).context("writing JSON")? + "\n"))?;
         } else if !nothing {
             print(&self.table.text(&self.means))?;
         }
         let Some(why) = self.first_error else { return Ok(ExitCode::SUCCESS) };
         match frames {
-            1 => eprintln!("error: {why}"),
-            _ if nothing => eprintln!("error: none of {frames} frames could be fitted; the first: {why}"),
-            _ => eprintln!("warning: {failed} of {frames} frames could not be fitted; the first: {why}"),
+            1 => complain(&format!("error: {why}")),
+            _ if nothing => complain(&format!("error: none of {frames} frames could be fitted; the first: {why}")),
+            _ => complain(&format!("warning: {failed} of {frames} frames could not be fitted; the first: {why}")),
         }
         Ok(ExitCode::from(if nothing { EXIT_BAD_INPUT } else { EXIT_SOME_FAILED }))
     }

@@ -1,7 +1,9 @@
 //! `info`: what a data set is and what its first frame holds, as text for people or JSON for programs.
 
-use super::common::{open, print};
+use super::common::{open, print, print_json};
 use crate::dataset::{Dataset, DatasetInfo, Frame, Heatmap, view_words};
+use crate::escape::one_line;
+use crate::labels::{LabelPlace, LabelStore};
 use crate::radar::View;
 use anyhow::Context as _;
 use serde_json::{Value, json};
@@ -72,16 +74,24 @@ impl Values {
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frame = dataset.load(args.frame.unwrap_or(dataset.start_index()))?;
-    let text = if args.json {
-        serde_json::to_string_pretty(&as_json(&dataset, &frame)).context("writing JSON")? + "\n"
+    let notes = label_notes(&dataset);
+    if args.json {
+        print_json(
+            &(serde_json::to_string_pretty(&as_json(&dataset, &frame, &notes)).context("writing JSON")? + "\n"),
+        )?;
     } else {
-        as_text(&dataset, &frame)
-    };
-    print(&text)?;
+        print(&as_text(&dataset, &frame, &notes))?;
+    }
     Ok(ExitCode::SUCCESS)
 }
 
-fn as_json(dataset: &Dataset, frame: &Frame) -> Value {
+/// What is to be told of the journals of labels; they are read, and nothing is touched.
+fn label_notes(dataset: &Dataset) -> Vec<String> {
+    let place = LabelPlace::to_read(&dataset.info().root, dataset.fingerprint());
+    LabelStore::read(&place).map_or_else(|error| vec![error.to_string()], |store| store.warnings().to_vec())
+}
+
+fn as_json(dataset: &Dataset, frame: &Frame, label_notes: &[String]) -> Value {
     let info = dataset.info();
     let views: Vec<Value> = info.views.iter().zip(&frame.maps).map(|(view, map)| view_json(view, map)).collect();
     let skeleton = &info.skeleton;
@@ -115,6 +125,7 @@ fn as_json(dataset: &Dataset, frame: &Frame) -> Value {
         },
         "assumptions": info.assumptions,
         "notes": info.notes,
+        "label_notes": label_notes,
     })
 }
 
@@ -161,11 +172,11 @@ fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 
-fn as_text(dataset: &Dataset, frame: &Frame) -> String {
+fn as_text(dataset: &Dataset, frame: &Frame, label_notes: &[String]) -> String {
     let info = dataset.info();
     let mut out = String::new();
     let mut line = |key: &str, value: &str| {
-        let _ = writeln!(out, "{key:<12}{value}");
+        let _ = writeln!(out, "{key:<12}{}", one_line(value));
     };
     line("data set", &info.name);
     line("path", &info.root.display().to_string());
@@ -185,6 +196,9 @@ fn as_text(dataset: &Dataset, frame: &Frame) -> String {
     }
     for text in &info.notes {
         line("note", text);
+    }
+    for text in label_notes {
+        line("labels note", text);
     }
     line("", "");
     line("frame", &format!("{} ({})", frame.index, frame.name));

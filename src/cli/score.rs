@@ -1,6 +1,6 @@
 //! `score`: the objective at given parameters, with maps and gradients; SPEC section 7.
 
-use super::common::{PrecisionArg, config, inputs, open, print};
+use super::common::{PrecisionArg, config, inputs, open, print_json};
 use crate::body::{Group, Pppr};
 use crate::dataset::npz::{ArrayView, write};
 use crate::dataset::read_pppr;
@@ -76,7 +76,7 @@ pub(super) fn run(args: &ScoreArgs) -> anyhow::Result<ExitCode> {
     let scalars = scalars(&problem, &evaluation);
     write_answer(args, &problem, &evaluation, &maps, &scalars)?;
     let json: Map<String, Value> = scalars.into_iter().map(|(key, x)| (key, Value::from(x))).collect();
-    print(&format!("{}\n", Value::Object(json)))?;
+    print_json(&format!("{}\n", Value::Object(json)))?;
     Ok(ExitCode::SUCCESS)
 }
 

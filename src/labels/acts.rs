@@ -1,11 +1,10 @@
 //! All that was said, not only what stands: every record of journals and tables, in the order of the acts.
 
-use super::stamp::Stamp;
-use super::store::journals_in;
+use super::file::open_to_read;
+use super::stamp::{Stamp, in_lines_order};
 use super::table::{TableError, first_sign, read_bytes, table_of};
 use super::tail::Tail;
-use super::{LabelError, LabelPlace, Record, format};
-use std::fs::File;
+use super::{LabelError, LabelPlace, LabelStore, Record};
 use std::path::Path;
 
 /// Reads labels from a journal, or from a table of either kind; which of them is told by the first sign, `{` for a
@@ -16,7 +15,11 @@ use std::path::Path;
 pub fn read_labels(path: &Path) -> Result<Vec<Record>, TableError> {
     let bytes = read_bytes(path)?;
     if first_sign(&bytes) == Some(b'{') {
-        return Ok(read_acts(path)?);
+        // From memory: what is read once, as a pipe, is not there a second time.
+        let (mut tail, mut records) = (Tail::new(path.to_owned()), Vec::new());
+        tail.read(&bytes, |_, record| records.push(*record))?;
+        tail.warnings().for_each(|warning| tracing::warn!("{warning}"));
+        return Ok(records);
     }
     let table = table_of(&bytes, path)?;
     for note in &table.notes {
@@ -30,43 +33,23 @@ pub fn read_labels(path: &Path) -> Result<Vec<Record>, TableError> {
 /// # Errors
 /// Where the file cannot be read, is of a newer version or is no journal.
 pub fn read_acts(path: &Path) -> Result<Vec<Record>, LabelError> {
-    let file = File::open(path).map_err(|reason| LabelError::Read { reason, path: path.to_owned() })?;
+    let file = open_to_read(path)?;
     let (mut tail, mut records) = (Tail::new(path.to_owned()), Vec::new());
     tail.look_in(&file, |_, record| records.push(*record))?;
     tail.warnings().for_each(|warning| tracing::warn!("{warning}"));
     Ok(records)
 }
 
-/// Every record of all journals of a place. In a file the order of lines holds, between files the time. A journal that
-/// cannot be read is logged, as by [`LabelStore`](super::LabelStore): it must not hide the others.
+/// Every record of all journals of a place, and what is to be told of them ([`LabelStore::warnings`]). The last record of a
+/// frame and annotator is the one that a [`LabelStore`] shows: those of files that do not speak for their annotator come
+/// first, then the order decides, in a file that of the lines.
 ///
 /// # Errors
 /// Where the folder is there and cannot be listed.
-pub fn place_acts(place: &LabelPlace) -> Result<Vec<Record>, LabelError> {
+pub fn place_acts(place: &LabelPlace) -> Result<(Vec<Record>, Vec<String>), LabelError> {
     let mut acts: Vec<(Stamp, Record)> = Vec::new();
-    let mut file = 0;
-    for (folder, path) in place.folders().enumerate() {
-        let journals = match journals_in(path) {
-            Err(reason) if folder == 0 => return Err(LabelError::Read { reason, path: path.to_owned() }),
-            journals => journals.unwrap_or_default(),
-        };
-        for journal in journals {
-            let records = read_acts(&journal).unwrap_or_else(|error| {
-                tracing::warn!("{error}");
-                Vec::new()
-            });
-            acts.extend(stamped(records, folder, file));
-            file += 1;
-        }
-    }
-    acts.sort_by_key(|(stamp, _)| (stamp.time_ms, std::cmp::Reverse((stamp.folder, stamp.file))));
-    Ok(acts.into_iter().map(|(_, record)| record).collect())
-}
-
-/// The records of one file, none earlier than those before it: a clock that was set back does not reorder them.
-fn stamped(records: Vec<Record>, folder: usize, file: usize) -> impl Iterator<Item = (Stamp, Record)> {
-    records.into_iter().scan(i64::MIN, move |time_ms, record| {
-        *time_ms = (*time_ms).max(format::time_ms(&record.time));
-        Some((Stamp { time_ms: *time_ms, folder, file }, record))
-    })
+    let store = LabelStore::read_with(place, &mut acts)?;
+    in_lines_order(&mut acts);
+    acts.sort_by_key(|(stamp, _)| stamp.rank());
+    Ok((acts.into_iter().map(|(_, record)| record).collect(), store.warnings().to_vec()))
 }

@@ -1,8 +1,9 @@
 //! How far two annotators agree, tag by tag, on the frames that both judged; and one annotator with the machine.
 //!
-//! A frame is judged where its label has a tag or a verdict. A remark alone (note, person, region) is no judgement, nor
-//! is a label that was taken back. A frame of which the first and only word is nothing at all, such as a table's row of
-//! zeros, is judged to have none of the tags. Only frames judged by both count: each is one decision for every tag.
+//! A frame is judged where its label has a tag. What says nothing of the fit is no judgement of it: a remark alone (note,
+//! person, region), a verdict on the count alone; nor is a label that was taken back. A frame of which the first and only
+//! word is nothing at all, such as a table's row of zeros, is judged to have none of the tags. Only frames judged by both
+//! count: each is one decision for every tag.
 
 use super::{Record, Tag, TagAgreement, Tags};
 use serde::Serialize;
@@ -118,7 +119,7 @@ fn tags_by_frame<'a>(records: impl IntoIterator<Item = &'a Record>) -> BTreeMap<
 
 /// Those of one annotator's newest records, one a frame, that are judgements. An empty label is one taken back.
 pub fn judged<'a>(newest: impl IntoIterator<Item = &'a Record>) -> impl Iterator<Item = &'a Record> {
-    newest.into_iter().filter(|Record { label, .. }| !label.tags.is_empty() || label.verdict.is_some())
+    newest.into_iter().filter(|record| !record.label.tags.is_empty())
 }
 
 /// The records of the frames that one annotator judged, by name; `acts` is all they said, in order. Here an empty label

@@ -51,6 +51,14 @@ pub enum LabelError {
         /// The journal.
         path: PathBuf,
     },
+    /// Something that would be waited for, or would act on what is written.
+    #[error("{path}: no journal of labels: it is {found}; expected a file", path = path.display())]
+    NotAFile {
+        /// What it is.
+        found: &'static str,
+        /// The journal.
+        path: PathBuf,
+    },
     /// A file in which no line is a header or a record.
     #[error("{path}: no journal of labels: {found}; expected JSON lines that begin with {{\"format\":\"mhp-labels\"", path = path.display())]
     NotAJournal {

@@ -31,19 +31,29 @@
 //! | `label.note` | free text; left out where empty |
 //! | `label.person` | the person meant, from 0; left out where none |
 //! | `label.region` | the cells meant: a view's array, first and last bin of each axis, both inside; left out where none |
-//! | `label.verdict` | `annotation-error`, `detection-error`, `both-incorrect` or `true-negative`; left out where none |
+//! | `label.verdict` | whose count is wrong: `annotation-error`, `detection-error`, `both-incorrect`, or `true-negative` (both are right, the mismatch passes); left out where none |
 //! | `annotator` | who, as typed |
 //! | `time` | when: RFC 3339, UTC, milliseconds |
+//! | `after` | the order of the record that this one replaces, milliseconds since 1970; left out where `time` is later than that |
 //! | `act` | the act in words, for people |
 //! | `program` | version of the program that wrote the line |
 //! | `judged` | the fit on screen: hash of its parameters and of its configuration, iteration, the machine's own scores in 0..1 and whether they were shown; each left out where unknown |
 //!
-//! **Reading.** The label of a frame is that of its last record in the file. Where an annotator has files in two folders,
-//! the later `time` wins; a writer makes the time of an act later than every label in the other folder that it changes.
+//! **Whose file speaks for whom.** `<slug of X>.labels.jsonl` speaks for X, in the data set's folder and in the user's.
+//! Records by X in any other file (a copy, files that were joined, another annotator's file) are read, told as such, and
+//! count only for frames of which X's own files have no record: nobody's label is changed by a file that is not theirs.
+//!
+//! **Reading.** A record's order is its `time`, or one millisecond after `after` where that is later; in a file it is never
+//! less than that of an earlier record of the same frame and annotator. The label of a frame is that of its record of the
+//! greatest order in the annotator's own files, and only where these have none, in the others; hence of the last line where
+//! there is one file. A writer gives an act an `after` wherever a record of that frame in another file would not be
+//! earlier than it, so that what was acknowledged is what is read, whatever the clocks said; `time` stays that of the
+//! writer's clock. Times more than five minutes ahead of the reader's clock are told.
 //! Fields that a reader does not know are left alone. A line that is no JSON object of either kind is skipped with a
 //! warning; so are a last line without its newline, unless it is whole, and NUL bytes, which a crash leaves on some file
 //! systems. A header may come again (files joined end to end are a journal). A file with a header of a newer version is
-//! neither read nor written. New values of `tags` or `verdict` make a new version.
+//! neither read nor written. What is no regular file (a pipe, a device) is not opened. New values of `tags` or `verdict`
+//! make a new version.
 //!
 //! **Writing.** Lines are appended and never changed. A writer holds the exclusive lock of the file (`flock`, on Windows
 //! `LockFileEx`) while it reads what others appended, applies its change to that, and appends all records of an act in one
@@ -172,6 +182,19 @@ pub(super) fn time_text(ms: i64) -> String {
     let format = format_description!("[year]-[month]-[day]T[hour]:[minute]:[second].[subsecond digits:3]Z");
     let time = OffsetDateTime::from_unix_timestamp_nanos(i128::from(ms) * 1_000_000);
     time.ok().and_then(|time| time.format(format).ok()).unwrap_or_default()
+}
+
+/// What a clock may be ahead of this one without a word, ms.
+const AHEAD_MS: i64 = 5 * 60 * 1000;
+
+/// True for a time that has not come yet, by more than clocks differ.
+pub(super) fn is_ahead(time_ms: i64, now_ms: i64) -> bool {
+    time_ms > now_ms.saturating_add(AHEAD_MS)
+}
+
+/// The order of a record among those of its frame and annotator, as the head of this file tells; ms since 1970.
+pub(super) fn order_ms(record: &Record) -> i64 {
+    time_ms(&record.time).max(record.after.map_or(i64::MIN, |after| after.saturating_add(1)))
 }
 
 /// Milliseconds since 1970 of an RFC 3339 time; what is none is before all that are.

@@ -1,5 +1,6 @@
 //! Which rows of a table an import writes: it adds what is new, and never takes away what somebody said later.
 
+use super::format::{is_ahead, now_ms, time_ms};
 use super::{Record, Row};
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
@@ -41,4 +42,9 @@ pub fn plan_import<'r, 'c>(
 fn newer(row: &Record, known: &Record) -> bool {
     let time = |record: &Record| OffsetDateTime::parse(&record.time, &Rfc3339).ok();
     time(row).zip(time(known)).is_some_and(|(row, known)| row > known)
+}
+
+/// True where a record's time has not come yet, by more than clocks differ.
+pub fn is_dated_ahead(record: &Record) -> bool {
+    is_ahead(time_ms(&record.time), now_ms())
 }

@@ -4,14 +4,19 @@
 //! to that, and the records are on disk before anybody is told. A process that is killed at any moment leaves at worst a
 //! line without its end, which the next one closes. The file is opened anew for each act, because one that was replaced
 //! meanwhile would swallow what is written to the old.
+//!
+//! What a reader sees of the annotator is what is changed: all files of the place are read, as by a
+//! [`LabelStore`](super::LabelStore), and an act comes after everything in them, whatever their clocks said.
 
-use super::format::{PROGRAM, now_ms, time_ms, time_text, write_header, write_record};
+use super::file::open_to_append;
+use super::format::{PROGRAM, is_ahead, now_ms, order_ms, time_ms, time_text, write_header, write_record};
 use super::place::file_name;
 use super::stamp::Stamp;
+use super::store::journals_in;
 use super::tail::{Found, Tail, is_named};
 use super::{Change, FrameId, Judged, Label, LabelError, LabelPlace, Record};
 use std::collections::HashMap;
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{ErrorKind, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::Path;
 
@@ -38,7 +43,7 @@ pub struct SaidElsewhere {
     pub change: Change,
     /// What was judged.
     pub judged: Judged,
-    /// When it was said, RFC 3339; what is no time is now.
+    /// When it was said, RFC 3339; what is no time, or has not come yet, is now.
     pub time: String,
 }
 
@@ -59,13 +64,23 @@ struct Held {
     stamp: Stamp,
 }
 
+/// A file in which the annotator may have records.
+#[derive(Debug)]
+struct Source {
+    tail: Tail,
+    folder: usize,
+    /// True where it speaks for the annotator.
+    own: bool,
+}
+
 /// The journal of one annotator in one place.
 #[derive(Debug)]
 pub struct Journal {
     annotator: String,
     dataset: String,
-    /// The file that is written, then those of the same name in the folders that are only read.
-    tails: Vec<Tail>,
+    place: LabelPlace,
+    /// The file that is written, then all others of the place.
+    sources: Vec<Source>,
     held: HashMap<String, Held>,
     unlocked: Option<String>,
 }
@@ -80,11 +95,12 @@ impl Journal {
         if annotator.is_empty() {
             return Err(LabelError::NoAnnotator { path: place.folder.clone() });
         }
-        let name = file_name(annotator);
+        let home = Tail::new(place.folder.join(file_name(annotator)));
         let mut journal = Self {
             annotator: annotator.to_owned(),
             dataset: dataset.to_owned(),
-            tails: place.folders().map(|folder| Tail::new(folder.join(&name))).collect(),
+            place: place.clone(),
+            sources: vec![Source { tail: home, folder: 0, own: true }],
             held: HashMap::new(),
             unlocked: None,
         };
@@ -99,7 +115,7 @@ impl Journal {
 
     /// The file that is written.
     pub fn path(&self) -> &Path {
-        self.tails.first().map_or(Path::new(""), Tail::path)
+        self.sources.first().map_or(Path::new(""), |home| home.tail.path())
     }
 
     /// The label of the frame of this name, as of the last act of this journal.
@@ -107,13 +123,14 @@ impl Journal {
         self.held.get(frame).map(|held| &held.label)
     }
 
-    /// What is wrong with the files without being an error: damaged lines, a file system without locks.
+    /// What is wrong with the annotator's own files without being an error: damaged lines, a file system without locks.
     pub fn warnings(&self) -> Vec<String> {
-        self.tails.iter().flat_map(Tail::warnings).chain(self.unlocked.clone()).collect()
+        let own = self.sources.iter().filter(|source| source.own);
+        own.flat_map(|source| source.tail.warnings()).chain(self.unlocked.clone()).collect()
     }
 
     /// Applies each change to the newest label of its frame, and returns when the records are on disk. Frames whose label
-    /// does not change get no record and no outcome.
+    /// does not change get no record and no outcome, unless only another annotator's file says it.
     ///
     /// # Errors
     /// Where the file cannot be read or written. Nothing of the act is then to be shown as done; what was written of it is
@@ -146,8 +163,9 @@ impl Journal {
     /// # Errors
     /// As [`Self::commit`].
     pub fn bring(&mut self, act: &str, said: &[SaidElsewhere]) -> Result<Vec<Outcome>, LabelError> {
+        let now = now_ms();
         let parts = said.iter().map(|SaidElsewhere { frame, change, judged, time }| {
-            let time_ms = Some(time_ms(time)).filter(|&time| time > i64::MIN);
+            let time_ms = Some(time_ms(time)).filter(|&time| time > i64::MIN && !is_ahead(time, now));
             Part { frame, change, judged, time_ms }
         });
         self.commit_parts(act, &parts.collect::<Vec<_>>())
@@ -171,7 +189,7 @@ impl Journal {
         let path = self.path().to_owned();
         let failed = |reason| LabelError::Write { reason, path: path.clone() };
         for _ in 0..TRIES {
-            let file = open_append(&path).map_err(failed)?;
+            let file = open_to_append(&path)?;
             if let Err(reason) = wait_for_lock(&file) {
                 self.without_locks(&reason);
             }
@@ -203,27 +221,43 @@ impl Journal {
             }
             tracing::warn!("{}: another file lies there now; it is read anew", self.path().display());
             self.held.clear();
-            self.tails.iter_mut().for_each(Tail::reset);
+            self.sources.iter_mut().for_each(|source| source.tail.reset());
         }
         let reason = std::io::Error::other("another program replaces it again and again");
         Err(LabelError::Read { reason, path: self.path().to_owned() })
     }
 
+    /// Finds files that are new. A folder that cannot be listed must not keep anybody from labelling; who reads the labels
+    /// is told of it.
+    fn find(&mut self) {
+        let name = file_name(&self.annotator);
+        for (folder, path) in self.place.folders().enumerate() {
+            for file in journals_in(path).unwrap_or_default() {
+                if !self.sources.iter().any(|source| source.tail.path() == file) {
+                    let own = file.file_name().is_some_and(|found| *found == *name);
+                    self.sources.push(Source { tail: Tail::new(file), folder, own });
+                }
+            }
+        }
+    }
+
     /// True where a file was replaced.
     fn look(&mut self, home: Option<&File>) -> Result<bool, LabelError> {
-        let Self { tails, held, annotator, .. } = self;
-        for (k, tail) in tails.iter_mut().enumerate() {
+        self.find();
+        let Self { sources, held, annotator, .. } = self;
+        for (file, Source { tail, folder, own }) in sources.iter_mut().enumerate() {
             let sink = |_, record: Box<Record>| {
                 if record.annotator == *annotator {
-                    fold(held, k, *record);
+                    let stamp = Stamp { own: *own, order_ms: order_ms(&record), folder: *folder, file };
+                    fold(held, stamp, *record);
                 }
             };
             let found = match home {
-                Some(file) if k == 0 => tail.look_in(file, sink),
-                Some(_) | None if k == 0 => tail.look(sink),
+                Some(home) if file == 0 => tail.look_in(home, sink),
+                Some(_) | None if file == 0 => tail.look(sink),
                 // What lies where nothing is written, and cannot be read, must not keep anybody from labelling.
                 _ => tail.look(sink).or_else(|error| match error {
-                    LabelError::Newer { .. } => Err(error),
+                    LabelError::Newer { .. } if *own => Err(error),
                     _ => Ok(Found::Same),
                 }),
             };
@@ -236,7 +270,7 @@ impl Journal {
 
     fn outcomes(&self, act: &str, parts: &[Part<'_>]) -> Vec<Outcome> {
         // One time for all of an act; what was said elsewhere keeps its own.
-        let now = now_ms().max(self.later_than(parts));
+        let now = now_ms();
         let mut latest: HashMap<&str, Label> = HashMap::new();
         let mut outcomes = Vec::with_capacity(parts.len());
         for part in parts {
@@ -244,20 +278,23 @@ impl Journal {
             let held = || self.label(&frame.path).cloned().unwrap_or_default();
             let before = latest.get(frame.path.as_str()).cloned().unwrap_or_else(held);
             let label = change.applied(&before);
-            if label == before {
+            // What only a file of somebody else says is written here too: that file may go.
+            let ours = self.held.get(&frame.path).is_none_or(|held| held.stamp.own);
+            if label == before && ours {
                 continue;
             }
             latest.insert(&frame.path, label.clone());
             let mut judged = judged.clone();
             // JSON has no other numbers.
             judged.machine.retain(|_, score| score.is_finite());
-            let time = time_ms.map_or(now, |said| said.max(self.later_than(std::slice::from_ref(part))));
+            let time_ms = time_ms.unwrap_or(now);
             let after = Record {
                 dataset: self.dataset.clone(),
                 frame: frame.clone(),
                 label,
                 annotator: self.annotator.clone(),
-                time: time_text(time),
+                time: time_text(time_ms),
+                after: self.order_elsewhere(frame).filter(|&order| order >= time_ms),
                 act: act.to_owned(),
                 program: PROGRAM.to_owned(),
                 judged,
@@ -267,11 +304,10 @@ impl Journal {
         outcomes
     }
 
-    /// Just after the newest label from another folder that is changed, for between files the time decides.
-    fn later_than(&self, parts: &[Part<'_>]) -> i64 {
-        let stamps = parts.iter().filter_map(|part| self.held.get(&part.frame.path)).map(|held| held.stamp);
-        let foreign = stamps.filter(|stamp| stamp.file != 0).map(|stamp| stamp.time_ms.saturating_add(1)).max();
-        foreign.unwrap_or(i64::MIN)
+    /// The order of a frame's newest record where that lies in another file; in this one the lines decide.
+    fn order_elsewhere(&self, frame: &FrameId) -> Option<i64> {
+        let stamp = self.held.get(&frame.path)?.stamp;
+        (stamp.file != 0).then_some(stamp.order_ms)
     }
 
     fn append(&self, mut file: &File, outcomes: &[Outcome]) -> Result<(), LabelError> {
@@ -302,7 +338,7 @@ impl Journal {
         if len > 0 && last_byte(file, len)? != b'\n' {
             bytes.push(b'\n');
         }
-        if !self.tails.first().is_some_and(Tail::has_header) {
+        if !self.sources.first().is_some_and(|home| home.tail.has_header()) {
             write_header(&mut bytes, &self.annotator, &self.dataset)?;
         }
         outcomes.iter().try_for_each(|outcome| write_record(&mut bytes, &outcome.after))?;
@@ -310,22 +346,10 @@ impl Journal {
     }
 }
 
-fn fold(held: &mut HashMap<String, Held>, file: usize, record: Record) {
-    let stamp = Stamp { time_ms: time_ms(&record.time), folder: file, file };
+fn fold(held: &mut HashMap<String, Held>, stamp: Stamp, record: Record) {
     let newest = held.get(&record.frame.path).map(|held| held.stamp);
     if let Some(stamp) = stamp.newer_than(newest) {
         held.insert(record.frame.path, Held { label: record.label, stamp });
-    }
-}
-
-fn open_append(path: &Path) -> std::io::Result<File> {
-    let open = || OpenOptions::new().read(true).append(true).create(true).open(path);
-    match open() {
-        Err(reason) if reason.kind() == ErrorKind::NotFound => {
-            path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
-            open()
-        }
-        done => done,
     }
 }
 

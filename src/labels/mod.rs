@@ -10,6 +10,7 @@
 mod acts;
 mod agreement;
 mod error;
+mod file;
 mod format;
 mod import;
 mod journal;
@@ -29,7 +30,7 @@ pub use agreement::{
     judged_in_acts, standing,
 };
 pub use error::LabelError;
-pub use import::{ImportPlan, plan_import};
+pub use import::{ImportPlan, is_dated_ahead, plan_import};
 pub use journal::{Journal, Outcome, SaidElsewhere};
 pub use kappa::{RELIABLE_FRAMES, TagAgreement};
 pub use place::LabelPlace;

@@ -2,8 +2,9 @@
 //! the user's data folder where nothing can be written there.
 //!
 //! Whether something can be written is tried, not asked: permission bits say nothing to the superuser, and nothing of a
-//! read-only mount or a full disk. The place that is not written to is read all the same, so that labels made while a
-//! disk was read-only are not hidden once it no longer is, nor the other way round.
+//! read-only mount or a full disk. Hence nothing is tried before something is to be written: who only reads takes
+//! [`LabelPlace::to_read`], which touches nothing. The place that is not written to is read all the same, so that labels
+//! made while a disk was read-only are not hidden once it no longer is, nor the other way round.
 
 use super::LabelError;
 use crate::folders;
@@ -34,8 +35,22 @@ pub struct LabelPlace {
 }
 
 impl LabelPlace {
+    /// Where the labels of the data set at `root`, a folder or a bare file, are read; nothing is tried, nothing is touched.
+    /// What is written goes to [`Self::of`], which reads the same folders.
+    pub fn to_read(root: &Path, fingerprint: &str) -> Self {
+        let user = folders::user_data().map(|folder| folder.join("labels").join(fingerprint));
+        let beside = beside(root);
+        match user {
+            // Something else in the place of the folder: that is why labels would lie elsewhere.
+            Some(user) if beside.symlink_metadata().is_ok() && !beside.is_dir() => {
+                Self { folder: user, also: vec![beside], beside_data: false, reason: None }
+            }
+            user => Self { folder: beside, also: user.into_iter().collect(), beside_data: true, reason: None },
+        }
+    }
+
     /// The place for the data set at `root`, a folder or a bare file, with this fingerprint. Tries whether it can be
-    /// written, and leaves nothing behind.
+    /// written, and leaves nothing behind but a new time of the folder: for whoever is about to write.
     ///
     /// # Errors
     /// Where neither beside the data nor in the user's data folder anything can be written.

@@ -188,6 +188,10 @@ pub struct Record {
     pub annotator: String,
     /// When, RFC 3339 in UTC with milliseconds.
     pub time: String,
+    /// The order, in milliseconds since 1970, of the record that this one replaces, where `time` alone is not later: the
+    /// other was written by a clock that is ahead.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub after: Option<i64>,
     /// The act in words: `tag F2 on 12 frames`, `undo: tag F2`.
     #[serde(default)]
     pub act: String,

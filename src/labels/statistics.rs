@@ -1,7 +1,7 @@
 //! Counts of labels: by annotator, by group of frames (scene, stratum, day), over time, and how long one takes.
 
 use super::{Record, Tag, Verdict};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use time::format_description::well_known::Rfc3339;
 use time::{OffsetDateTime, UtcOffset};
 
@@ -99,9 +99,8 @@ pub fn day(record: &Record) -> Option<String> {
 
 /// Over the acts: records with the same time and words are one. A time that cannot be read is an act without one.
 fn pace(records: &[&Record]) -> Pace {
-    let mut acts: Vec<(&str, &str)> =
+    let acts: BTreeSet<(&str, &str)> =
         records.iter().map(|record| (record.time.as_str(), record.act.as_str())).collect();
-    acts.dedup();
     let mut pace = Pace { acts: acts.len(), ..Pace::default() };
     let mut times: Vec<(OffsetDateTime, &str)> = Vec::new();
     for (text, _) in acts {
@@ -141,6 +140,7 @@ mod tests {
             label: Change { add: tags, ..Change::default() }.applied(&Label::default()),
             annotator: annotator.into(),
             time: format!("2025-03-01T{time}Z"),
+            after: None,
             act: "tag".into(),
             program: String::new(),
             judged: Judged::default(),

@@ -1,10 +1,11 @@
 //! Labels as a table, to take them home and to bring them back: CSV (RFC 4180, UTF-8) and JSON.
 //!
 //! A row is what one annotator says of one frame; [`COLUMNS`] says which cell is what. Tags are `1` or `0`; what is
-//! unknown is empty. Notes and names are quoted, never changed: what is written is what is read, also with line breaks,
-//! quotes, or an `=` in front. The JSON is an array of records as in a journal, without its header. Rows lie in the order
+//! unknown is empty. Text is quoted, never lost: what is written is what is read, also with line breaks or quotes. Before
+//! text that a spreadsheet would compute, as `=1+1`, the CSV has an apostrophe, which reading takes away again. The JSON is an array of records as in a journal, without its header. Rows lie in the order
 //! of the frames' indices, then names, then annotators.
 
+mod check;
 mod csv_read;
 mod csv_write;
 mod json;

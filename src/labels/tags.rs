@@ -165,17 +165,18 @@ impl FromStr for Tags {
     }
 }
 
-/// The paper's second review protocol: whose error a count mismatch is (appendix, count-matched evaluation).
+/// The paper's second review protocol: whose error it is that a frame is annotated with another number of people than is
+/// counted (appendix A.3, count-matched evaluation).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// The annotation has the wrong number of people.
+    /// The annotation is wrong: another number of people, or joints given to the wrong one.
     AnnotationError,
-    /// The program counted wrongly.
+    /// The number of people that was counted is wrong.
     DetectionError,
     /// Both are wrong.
     BothIncorrect,
-    /// The mismatch is none: nobody is there and nobody was found.
+    /// Neither is: both systems are right, and the mismatch is a variation of the tracking that passes.
     TrueNegative,
 }
 
@@ -190,6 +191,20 @@ impl Verdict {
             Self::DetectionError => "detection-error",
             Self::BothIncorrect => "both-incorrect",
             Self::TrueNegative => "true-negative",
+        }
+    }
+
+    /// What it means, in a sentence.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::AnnotationError => {
+                "The annotation is wrong: another number of people, or joints given to the wrong person."
+            }
+            Self::DetectionError => {
+                "The detection is wrong: the program counted another number of people than are there."
+            }
+            Self::BothIncorrect => "Both are wrong, the annotation and the detection.",
+            Self::TrueNegative => "Both are right: the numbers differ only by a variation of the tracking that passes.",
         }
     }
 }

@@ -1,9 +1,10 @@
 //! Follows one journal: each look reads what was appended since the last, and notices a file that was replaced.
 
+use super::file::regular;
 use super::format::{Line, is_torn_header, parse};
 use super::{LabelError, Record};
 use std::fs::{File, Metadata};
-use std::io::{BufRead as _, BufReader, ErrorKind, Read as _, Seek as _, SeekFrom};
+use std::io::{BufRead as _, BufReader, ErrorKind, Read, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -117,7 +118,8 @@ impl Tail {
         match std::fs::metadata(&self.path) {
             Err(reason) if reason.kind() == ErrorKind::NotFound => return Ok(missing),
             Ok(meta) if self.seen.as_ref() == Some(&Seen::of(&meta)) => return Ok(Found::Same),
-            _ => {}
+            Ok(meta) => regular(&meta, &self.path)?,
+            Err(_) => {}
         }
         match File::open(&self.path) {
             Ok(file) => self.look_in(&file, sink),
@@ -132,9 +134,7 @@ impl Tail {
     /// As [`Self::look`].
     pub(super) fn look_in(&mut self, file: &File, sink: impl FnMut(Span, Box<Record>)) -> Result<Found, LabelError> {
         let meta = file.metadata().map_err(|reason| self.unreadable(reason))?;
-        if meta.is_dir() {
-            return Err(self.unreadable(ErrorKind::IsADirectory.into()));
-        }
+        regular(&meta, &self.path)?;
         let now = Seen::of(&meta);
         match &self.seen {
             Some(seen) if *seen == now => return Ok(Found::Same),
@@ -144,12 +144,18 @@ impl Tail {
         if now.len < self.offset || !self.continues(file).map_err(|reason| self.unreadable(reason))? {
             return Ok(Found::Replaced);
         }
-        self.read_lines(file, now.len, sink)?;
-        if let Some(found) = &self.foreign {
-            return Err(LabelError::NotAJournal { found: found.clone(), path: self.path.clone() });
-        }
+        self.read_lines(file.take(now.len - self.offset), sink)?;
         self.seen = Some(now);
         Ok(Found::More)
+    }
+
+    /// Reads a journal that is in memory already, from its beginning.
+    ///
+    /// # Errors
+    /// As [`Self::look`].
+    pub(super) fn read(&mut self, bytes: &[u8], sink: impl FnMut(Span, Box<Record>)) -> Result<(), LabelError> {
+        self.reset();
+        self.read_lines(bytes, sink)
     }
 
     fn unreadable(&self, reason: std::io::Error) -> LabelError {
@@ -164,9 +170,10 @@ impl Tail {
         Ok(bytes == self.last)
     }
 
-    /// Reads from the place of reading, where the file stands, up to `end`: bytes that come later may be half a line.
-    fn read_lines(&mut self, file: &File, end: u64, mut sink: impl FnMut(Span, Box<Record>)) -> Result<(), LabelError> {
-        let mut reader = BufReader::with_capacity(1 << 18, file.take(end - self.offset));
+    /// Reads all of `rest`, which begins at the place of reading and ends where the file did when it was asked: bytes that
+    /// come later may be half a line.
+    fn read_lines(&mut self, rest: impl Read, mut sink: impl FnMut(Span, Box<Record>)) -> Result<(), LabelError> {
+        let mut reader = BufReader::with_capacity(1 << 18, rest);
         let mut line = Vec::new();
         self.torn = None;
         loop {
@@ -174,7 +181,10 @@ impl Tail {
             let read = (&mut reader).take(MAX_LINE).read_until(b'\n', &mut line);
             let read = read.map_err(|reason| self.unreadable(reason))? as u64;
             if read == 0 {
-                return Ok(());
+                return match self.foreign.clone() {
+                    Some(found) => Err(LabelError::NotAJournal { found, path: self.path.clone() }),
+                    None => Ok(()),
+                };
             }
             if read == MAX_LINE && !line.ends_with(b"\n") {
                 let found = format!("line {} has more than {MAX_LINE} bytes", self.newlines + 1);

@@ -99,6 +99,8 @@ impl Session {
             Command::LabelsOpened(id, result) => self.labels_opened(id, result),
             Command::LabelsWritten(written) => self.labels_written(written),
             Command::LabelsRefreshed(table) => self.labels_refreshed(table),
+            Command::LabelsWarned(warnings) => self.labels_warned(warnings),
+            Command::LabelsPlaced(place) => self.labels_placed(place),
             Command::RefreshLabels => vec![Effect::RefreshLabels],
             Command::ComputeStrata => self.compute_strata(),
             Command::CancelStrata => vec![Effect::CancelStrata],

@@ -112,6 +112,10 @@ pub enum Command {
     LabelsWritten(Written),
     /// Report: others wrote.
     LabelsRefreshed(LabelTable),
+    /// Report: something of the journals is not as it should be.
+    LabelsWarned(Vec<String>),
+    /// Report: acts are written there, as was found before the first of them.
+    LabelsPlaced(LabelPlace),
     /// Read what others wrote.
     RefreshLabels,
     /// Compute strata.

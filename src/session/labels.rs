@@ -50,8 +50,8 @@ impl LabelMode {
                  agreement measures independent judgements."
             }
             Self::CountReview => {
-                "For frames whose number of people is disputed: say whether the annotation, the detection, both or \
-                 neither is wrong."
+                "For frames that are annotated with another number of people than is counted: say whether the annotation, \
+                 the detection, both or neither is wrong."
             }
         }
     }
@@ -137,7 +137,7 @@ impl Labels {
         frames.iter().fold(all, |common, &frame| common.minus(all.minus(own.tags(frame as usize).unwrap_or_default())))
     }
 
-    /// True where this annotator said something of a frame's fit or count.
+    /// True where this annotator tagged a frame or gave a verdict on its count: there is nothing left to be asked of it.
     pub fn is_judged(&self, frame: usize) -> bool {
         !self.tags(frame).is_empty() || self.mine(frame).is_some_and(|record| record.label.verdict.is_some())
     }

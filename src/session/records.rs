@@ -54,10 +54,9 @@ impl Records {
         self.marks.iter().enumerate().filter(|(_, mark)| mark.said).map(|(frame, mark)| (frame, mark.tags))
     }
 
-    /// Frame and tags of each frame that is judged, with a tag or a verdict, in the order of the data set.
+    /// Frame and tags of each frame that is judged, hence tagged, in the order of the data set.
     pub fn judged(&self) -> impl Iterator<Item = (usize, Tags)> {
-        let verdict = |frame| self.get(frame).is_some_and(|record| record.label.verdict.is_some());
-        self.said_tags().filter(move |&(frame, tags)| !tags.is_empty() || verdict(frame))
+        self.said_tags().filter(|(_, tags)| !tags.is_empty())
     }
 
     /// True where the machine's own scores were recorded with the label.

@@ -30,7 +30,8 @@ impl FoundResults {
         let names: HashMap<&str, usize> = (0..dataset.len()).map(|index| (dataset.frame_name(index), index)).collect();
         let (mut summaries, mut unknown, mut first_unknown) = (BTreeMap::new(), 0, None);
         for row in rows {
-            if let Some(&index) = names.get(row.frame.as_str()) {
+            // Another program may have put spaces around its commas.
+            if let Some(&index) = names.get(row.frame.as_str()).or_else(|| names.get(row.frame.trim())) {
                 summaries.insert(index, summary(row));
             } else {
                 unknown += 1;

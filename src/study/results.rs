@@ -4,6 +4,7 @@
 //! is unknown. The IoU is the mean over the columns `iou_<array>`, as in the window.
 
 use super::StudyError;
+use crate::escape::from_cell;
 use crate::input::open_file;
 use std::path::Path;
 
@@ -38,7 +39,7 @@ pub struct SummaryRow {
 pub fn read_summary(path: &Path) -> Result<Vec<SummaryRow>, StudyError> {
     let failed = |reason| StudyError::Read { reason, path: path.to_owned() };
     let file = open_file(path, "a table of results (CSV)").map_err(failed)?;
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::Headers).from_reader(file);
     let head = reader.byte_headers().map_err(|error| broken(&error, path))?.clone();
     let columns = Columns::of(&head, path)?;
     let mut rows = Vec::new();
@@ -112,7 +113,7 @@ impl Columns {
 
     fn row(&self, line: &Line<'_>) -> Result<SummaryRow, StudyError> {
         let frame = line.text(self.frame, "frame")?.to_owned();
-        if frame.is_empty() {
+        if frame.trim().is_empty() {
             return Err(line.wrong("frame", "is empty; expected the name of a frame"));
         }
         let mut known = Vec::with_capacity(self.ious.len());
@@ -120,7 +121,7 @@ impl Columns {
             known.extend(line.number(Some(column), "iou", 0.0..=1.0)?);
         }
         let iou = (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64);
-        let reason = self.reason.map(|column| line.text(column, "reason")).transpose()?;
+        let reason = self.reason.map(|column| line.text(column, "reason").map(str::trim)).transpose()?;
         Ok(SummaryRow {
             frame,
             iterations: line.parsed(self.iterations, "iterations", "a whole number")?,
@@ -143,9 +144,10 @@ struct Line<'a> {
 }
 
 impl Line<'_> {
+    /// The cell as it was written: a frame's name may begin or end with a space.
     fn text(&self, column: usize, name: &str) -> Result<&str, StudyError> {
         let bytes = self.record.get(column).unwrap_or_default();
-        std::str::from_utf8(bytes).map_err(|_| self.wrong(name, "is not UTF-8 text"))
+        std::str::from_utf8(bytes).map(from_cell).map_err(|_| self.wrong(name, "is not UTF-8 text"))
     }
 
     fn parsed<T: std::str::FromStr>(
@@ -155,7 +157,7 @@ impl Line<'_> {
         expected: &str,
     ) -> Result<Option<T>, StudyError> {
         let Some(column) = column else { return Ok(None) };
-        let text = self.text(column, name)?;
+        let text = self.text(column, name)?.trim();
         let wrong = |_| self.wrong(name, &format!("is `{}`; expected {expected}, or nothing", shortened(text)));
         if text.is_empty() { Ok(None) } else { text.parse().map(Some).map_err(wrong) }
     }

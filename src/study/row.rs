@@ -3,6 +3,7 @@
 use super::summary::{ERRORS, FIRST, LOSSES, NUMBERS};
 use crate::body::Pppr;
 use crate::dataset::Frame;
+use crate::escape::to_cell;
 use crate::mhp::{StepReport, StopReason};
 use serde_json::{Map, Value};
 
@@ -86,10 +87,10 @@ impl FrameRow {
         let fit = self.fit.as_ref().ok();
         let text = |x: Option<String>| x.unwrap_or_default();
         let first = [
-            self.frame.clone(),
+            to_cell(&self.frame).into_owned(),
             text(fit.map(|fit| fit.report.iteration.to_string())),
             text(fit.map(|fit| fit.report.converged.to_string())),
-            self.reason(),
+            to_cell(&self.reason()).into_owned(),
             text(fit.map(|fit| fit.people.to_string())),
             text(fit.and_then(|fit| fit.annotated).map(|n| n.to_string())),
         ];

@@ -181,7 +181,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
     UserCommand {
         label: "Verdict: annotation error",
         title: None,
-        tooltip: "In count review: the annotation has the wrong number of people.",
+        tooltip: Verdict::AnnotationError.words(),
         menu: Menu::Labels,
         keys: &[(NONE, Key::Num6)],
         enabled: reviewing,
@@ -190,7 +190,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
     UserCommand {
         label: "Verdict: detection error",
         title: None,
-        tooltip: "In count review: the fit has the wrong number of people.",
+        tooltip: Verdict::DetectionError.words(),
         menu: Menu::Labels,
         keys: &[(NONE, Key::Num7)],
         enabled: reviewing,
@@ -199,7 +199,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
     UserCommand {
         label: "Verdict: both incorrect",
         title: None,
-        tooltip: "In count review: annotation and fit are both wrong.",
+        tooltip: Verdict::BothIncorrect.words(),
         menu: Menu::Labels,
         keys: &[(NONE, Key::Num8)],
         enabled: reviewing,
@@ -208,7 +208,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
     UserCommand {
         label: "Verdict: true negative",
         title: None,
-        tooltip: "In count review: nobody is there and nobody was found.",
+        tooltip: Verdict::TrueNegative.words(),
         menu: Menu::Labels,
         keys: &[(NONE, Key::Num9)],
         enabled: reviewing,

@@ -1,6 +1,7 @@
 //! What `complexity` prints and writes.
 
 use crate::dataset::Dataset;
+use crate::escape::one_line;
 use crate::study::complexity::{Complexity, FrameComplexity, Stratum};
 use std::fmt::Write as _;
 
@@ -15,7 +16,7 @@ pub(super) fn summary(dataset: &Dataset, complexity: &Complexity) -> String {
     let counts = &complexity.counts;
     let counted = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
     let (frames, sequences) = (counted(dataset.len(), "frame"), counted(dataset.sequences(), "sequence"));
-    let mut text = format!("{}: {frames} in {sequences}\n", dataset.info().name);
+    let mut text = format!("{}: {frames} in {sequences}\n", one_line(&dataset.info().name));
     for stratum in Stratum::ALL {
         let _ = writeln!(text, "  {:<12}{:>8}", stratum.word(), counts.in_stratum(stratum));
     }
@@ -48,7 +49,7 @@ fn hardest(dataset: &Dataset, complexity: &Complexity, text: &mut String) {
     let lines: Vec<(String, &FrameComplexity)> = order
         .iter()
         .take(HARDEST)
-        .filter_map(|&(_, i)| Some((dataset.frame_name(i).to_owned(), complexity.frame(i)?)))
+        .filter_map(|&(_, i)| Some((one_line(&dataset.frame_name(i)).into_owned(), complexity.frame(i)?)))
         .collect();
     let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).max("the hardest".len());
     let head = ["hardness", "peaks", "static", "human"].map(right).concat();

@@ -2,7 +2,7 @@
 
 mod report;
 
-use super::common::{inputs, open, print, progress_bar};
+use super::common::{CsvArgs, complain, inputs, open, print, print_json, progress_bar};
 use super::frames::{FrameRange, chosen};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::study::count::{FrameCount, count_frames};
@@ -45,6 +45,8 @@ pub struct CountArgs {
     /// Write a row a frame.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    cells: CsvArgs,
     /// One JSON object instead of the table: an array `frames`, and `confusion` where counts are annotated.
     #[arg(long)]
     json: bool,
@@ -55,6 +57,7 @@ pub struct CountArgs {
 /// # Errors
 /// Where an option or the data set is bad, its views tell no place, or FILE cannot be written.
 pub(super) fn run(args: &CountArgs) -> anyhow::Result<ExitCode> {
+    args.cells.apply();
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
     if let Some(file) = &args.csv {
@@ -66,7 +69,11 @@ pub(super) fn run(args: &CountArgs) -> anyhow::Result<ExitCode> {
     if let Some(file) = &args.csv {
         report::write_csv(file, &dataset, &rows)?;
     }
-    print(&if args.json { report::json(&dataset, &rows)? } else { report::table(&dataset, &rows) })?;
+    if args.json {
+        print_json(&report::json(&dataset, &rows)?)?;
+    } else {
+        print(&report::table(&dataset, &rows))?;
+    }
     Ok(tell_failures(&rows))
 }
 
@@ -79,12 +86,12 @@ fn tell_failures(rows: &[FrameCount]) -> ExitCode {
         return ExitCode::SUCCESS;
     }
     for why in failed.iter().take(TOLD) {
-        eprintln!("warning: {why}");
+        complain(&format!("warning: {why}"));
     }
     if failed.len() == rows.len() {
-        eprintln!("error: none of {} frames could be counted", rows.len());
+        complain(&format!("error: none of {} frames could be counted", rows.len()));
         return ExitCode::from(EXIT_BAD_INPUT);
     }
-    eprintln!("warning: {} of {} frames could not be counted", failed.len(), rows.len());
+    complain(&format!("warning: {} of {} frames could not be counted", failed.len(), rows.len()));
     ExitCode::from(EXIT_SOME_FAILED)
 }

@@ -1,6 +1,7 @@
 //! What `count` prints and writes.
 
 use crate::dataset::Dataset;
+use crate::escape::{one_line, to_cell};
 use crate::output::{Sink, replace_file};
 use crate::people::{CLASSES, Confusion, Count};
 use crate::study::count::{FrameCount, confusion};
@@ -11,7 +12,7 @@ use std::path::Path;
 
 /// A line a frame, then how often the count is the annotated one.
 pub(super) fn table(dataset: &Dataset, rows: &[FrameCount]) -> String {
-    let name = |row: &FrameCount| dataset.frame_name(row.frame).to_owned();
+    let name = |row: &FrameCount| one_line(&dataset.frame_name(row.frame)).into_owned();
     let width = rows.iter().map(|row| name(row).chars().count()).max().unwrap_or(0).max("frame".len());
     let mut text = format!("{:<width$}  people      p  annotated  places (x y z, m)\n", "frame");
     for row in rows {
@@ -147,8 +148,11 @@ fn table_csv(out: &mut dyn Sink, dataset: &Dataset, rows: &[FrameCount]) -> csv:
     ])?;
     for row in rows.iter().map(|row| of(dataset, row)) {
         let number = |n: Option<usize>| n.map_or_else(String::new, |n| n.to_string());
-        let mut record =
-            vec![row.frame, number(row.people), row.probability.map_or_else(String::new, |p| p.to_string())];
+        let mut record = vec![
+            to_cell(&row.frame).into_owned(),
+            number(row.people),
+            row.probability.map_or_else(String::new, |p| p.to_string()),
+        ];
         let each = |k: usize| row.probabilities.map_or_else(String::new, |p| p[k].to_string());
         record.extend((0..CLASSES).map(each));
         record.push(number(row.annotated));

@@ -1,5 +1,6 @@
 //! The table for people: the first rows, and the means of all.
 
+use crate::escape::one_line;
 use crate::study::{FrameRow, Means};
 
 /// Rows that are shown; the rest is in the means and in summary.csv.
@@ -83,6 +84,9 @@ fn line(frame: &str, first: [Option<String>; 4], values: &[Option<f64>], views: 
 
 /// Columns two spaces apart; the first and the last to the left, numbers to the right. `before_last` is a line by itself.
 fn aligned(lines: &[Vec<String>], before_last: Option<String>) -> String {
+    // Names and reasons come from data; a row is a line.
+    let one_line = |line: &Vec<String>| line.iter().map(|cell| one_line(cell).into_owned()).collect();
+    let lines: Vec<Vec<String>> = lines.iter().map(one_line).collect();
     let count = lines.first().map_or(0, Vec::len);
     let width = |k: usize| lines.iter().filter_map(|line| line.get(k)).map(|cell| cell.chars().count()).max();
     let widths: Vec<usize> = (0..count).map(|k| width(k).unwrap_or(0)).collect();

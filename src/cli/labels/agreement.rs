@@ -1,7 +1,8 @@
 //! `labels agreement`: Cohen's kappa of two annotators, or of one and the machine.
 
 use super::source::{acts, annotators, counted, listed, only};
-use crate::cli::common::print;
+use crate::cli::common::{print, print_json};
+use crate::escape::one_line;
 use crate::labels::{
     Agreement, MACHINE_THRESHOLD, MachineAgreement, Record, TagAgreement, against_machine, agreement as compare,
     judged_in_acts,
@@ -14,8 +15,9 @@ use std::process::ExitCode;
 
 /// Shown under the options of `labels agreement --help`.
 pub(super) const HELP: &str = "\
-Compared are the frames that both judged: a frame is judged where it has a tag or a verdict, or a table has a row for it \
-that says nothing at all (none of the tags). A note alone is no judgement, nor is a label that was taken back.
+Compared are the frames that both judged: a frame is judged where it has a tag, or a table has a row for it that \
+says nothing at all (none of the tags). A note or a verdict on the count alone is no judgement of tags, nor is a label that \
+was taken back.
 
 JSON: {\"F1\": {\"kappa\", \"raw\", \"both\", \"only_a\", \"only_b\", \"neither\", ...}, ..., \"pooled\": {...}} for F1 F2 F3 F4 \
 clean unsure. kappa is Cohen's, null where undefined: no frame in common, or the same one answer by both everywhere. raw \
@@ -70,16 +72,23 @@ pub struct Args {
 /// Where a file cannot be read, or has several annotators and none is named.
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let a = of_one(&args.a, args.annotator_a.as_deref(), "--annotator-a")?;
-    let text = if let Some(path) = &args.b {
+    if let Some(path) = &args.b {
         let b = of_one(path, args.annotator_b.as_deref(), "--annotator-b")?;
         let found = compare(judged_in_acts(&a), judged_in_acts(&b));
-        if args.json { two_as_json(&found, args.disputes)? } else { two_as_text(args, &found, &a, &b) }
+        tell(args, || two_as_json(&found, args.disputes), || two_as_text(args, &found, &a, &b))?;
     } else {
         let found = against_machine(judged_in_acts(&a), args.threshold);
-        if args.json { machine_as_json(&found, args.disputes)? } else { machine_as_text(args, &found, &a) }
-    };
-    print(&text)?;
+        tell(args, || machine_as_json(&found, args.disputes), || machine_as_text(args, &found, &a))?;
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+fn tell(
+    args: &Args,
+    json: impl FnOnce() -> anyhow::Result<String>,
+    text: impl FnOnce() -> String,
+) -> anyhow::Result<()> {
+    if args.json { print_json(&json()?) } else { print(&text()) }
 }
 
 fn threshold(text: &str) -> Result<f64, String> {
@@ -156,7 +165,7 @@ fn machine_as_text(args: &Args, found: &MachineAgreement, a: &[Record]) -> Strin
 }
 
 fn side(name: &str, acts: &[Record], path: &Path) -> String {
-    format!("{name}  {}  {}\n", listed(&annotators(acts)), path.display())
+    one_line(&format!("{name}  {}  {}", listed(&annotators(acts)), path.display())).into_owned() + "\n"
 }
 
 /// A line a tag, remarks on those that are not to be trusted, and perhaps the disputes.
@@ -177,7 +186,7 @@ fn table(found: &Agreement, disputes: bool) -> String {
     }
     for dispute in found.disputes.iter().filter(|_| disputes) {
         let who = if dispute.a { "A" } else { "B" };
-        let _ = writeln!(text, "{}  {} only by {who}", dispute.frame, dispute.tag);
+        let _ = writeln!(text, "{}  {} only by {who}", one_line(&dispute.frame), dispute.tag);
     }
     text
 }

@@ -1,7 +1,8 @@
 //! `labels export`: labels as CSV or JSON, to take home.
 
 use super::source::{acts, annotators, counted, is_table, listed, only};
-use crate::cli::common::{inputs, open, print};
+use crate::cli::common::{CsvArgs, inputs, open, print, print_table};
+use crate::escape::one_line;
 use crate::labels::{Record, standing, write_csv, write_json};
 use crate::output::{Inputs, replace_file};
 use anyhow::{Context as _, bail};
@@ -14,8 +15,9 @@ pub(super) const HELP: &str = "\
 Columns: frame index annotator time F1 F2 F3 F4 clean unsure verdict person region note judged_fit judged_config \
 judged_iteration machine_F1 machine_F2 machine_F3 machine_F4 machine_shown act dataset program. Tags are 1 or 0, what is \
 unknown is empty; region is view[first..=last, first..=last]. A row is what one annotator says of one frame now, by index, \
-name and annotator; labels that were taken back have none. Text is quoted as RFC 4180 asks and never changed. The JSON is \
-an array of records as in the journal. F is replaced whole or not at all; `-` is standard output.
+name and annotator; labels that were taken back have none. Text is quoted as RFC 4180 asks; text that a spreadsheet would \
+compute has an apostrophe before it (--csv-plain leaves it out), which `labels import` and `labels agreement` take away \
+again. The JSON is an array of records as in the journal. F is replaced whole or not at all; `-` is standard output.
 
 Exit codes: 0 written; 2 bad input, or F cannot be written.
 
@@ -34,6 +36,8 @@ pub struct Args {
     /// Write CSV; without F to standard output.
     #[arg(long, value_name = "F", group = "out", num_args = 0..=1, default_missing_value = "-")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    cells: CsvArgs,
     /// Write a JSON array; without F to standard output.
     #[arg(long, value_name = "F", group = "out", num_args = 0..=1, default_missing_value = "-")]
     json: Option<PathBuf>,
@@ -50,6 +54,7 @@ pub struct Args {
 /// # Errors
 /// Where PATH cannot be read, the annotator has no labels, or a file cannot be written.
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    args.cells.apply();
     for file in [&args.csv, &args.json].into_iter().flatten().filter(|file| !is_stdout(file)) {
         check(args, file)?;
     }
@@ -88,11 +93,11 @@ fn save(path: &Path, what: &str, fill: impl Fn(&mut dyn Write) -> std::io::Resul
     if is_stdout(path) {
         let mut text = Vec::new();
         fill(&mut text).context("writing labels")?;
-        return print(&String::from_utf8_lossy(&text));
+        return print_table(&String::from_utf8_lossy(&text));
     }
     if path.to_string_lossy().to_lowercase().ends_with(".jsonl") {
         bail!("{}: is named like a journal, which is never replaced; expected another name", path.display());
     }
     replace_file(path, |mut out| fill(&mut out)).with_context(|| format!("{}: cannot be written", path.display()))?;
-    print(&format!("{what}, in {}\n", path.display()))
+    print(&(one_line(&format!("{what}, in {}", path.display())).into_owned() + "\n"))
 }

@@ -2,10 +2,13 @@
 
 use super::request::Frames;
 use super::source::counted;
-use crate::cli::common::{open, print};
+use crate::cli::common::{CsvArgs, open, print};
+use crate::escape::one_line;
 use crate::labels::{
-    Change, FrameId, Journal, LabelPlace, LabelStore, Row, SaidElsewhere, Table, plan_import, read_table,
+    CellRegion, Change, FrameId, Journal, LabelPlace, LabelStore, Record, Row, SaidElsewhere, Table, is_dated_ahead,
+    plan_import, read_table,
 };
+use crate::radar::View;
 use anyhow::{Context as _, anyhow, bail};
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
@@ -16,12 +19,12 @@ use std::process::ExitCode;
 pub(super) const HELP: &str = "\
 CSV with a header; `frame` and the tags F1 F2 F3 F4 clean unsure must be there, in any order, tags as 1/0, true/false, \
 yes/no or nothing. `labels export --help` lists the columns that may be there too; others are passed over with a note. A \
-JSON array of records is read as well.
+JSON array of records is read as well, and checked alike. The apostrophe that `labels export` puts before text that a \
+spreadsheet would compute is taken away (--csv-plain leaves it).
 
 Each row is an act of its annotator, `import from FILE`, and replaces the label of its frame: where there is none, and \
-where the row's time is later than the label's; other labels are kept and counted. Rows that say what the label says \
-already write nothing. Nothing is ever deleted: the journal keeps what was there. Where one row is wrong nothing is \
-imported.
+where the row's time is later than the label's; other labels are kept and counted. A row of a time that has \
+not come yet is told, and is kept as said now. Rows that say what the label says already write nothing. Nothing is ever deleted: the journal keeps what was there. Where one row is wrong nothing is imported.
 
 Exit codes: 0 on disk; 2 bad input, or a journal cannot be written.
 
@@ -48,6 +51,8 @@ pub struct Args {
     /// Take rows of frames that the data set does not have.
     #[arg(long)]
     keep_unknown: bool,
+    #[command(flatten)]
+    cells: CsvArgs,
     /// Tell what would be done, and do nothing.
     #[arg(long)]
     dry_run: bool,
@@ -64,16 +69,21 @@ type Sheets = BTreeMap<String, Vec<(String, Vec<Row>)>>;
 /// # Errors
 /// Where a file, a row, the data set or a journal is bad: then nothing is written. Where writing fails.
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    args.cells.apply();
     let dataset = open(&args.path, args.manifest.as_deref())?;
-    let place = LabelPlace::of(&dataset.info().root, dataset.fingerprint())?;
-    let sheets = sheets(args, &Frames::new(&dataset))?;
+    let sheets = sheets(args, &Frames::new(&dataset), &dataset.info().views)?;
+    let (root, fingerprint) = (&dataset.info().root, dataset.fingerprint());
+    let place = if args.dry_run { LabelPlace::to_read(root, fingerprint) } else { LabelPlace::of(root, fingerprint)? };
     let store = LabelStore::read(&place)?;
     let open = |name: &String| Journal::open(&place, name, dataset.fingerprint());
     let journals = sheets.keys().map(open).collect::<Result<Vec<_>, _>>()?;
     for ((name, files), mut journal) in sheets.iter().zip(journals) {
         let (mut written, mut same, mut kept) = (0, 0, 0);
         for (act, rows) in files {
-            let plan = plan_import(rows, args.replace, |row| store.label(name, &row.frame.path));
+            // What only files of others say keeps no row out.
+            let known =
+                |row: &Record| store.label(name, &row.frame.path).filter(|known| store.is_own(name, &known.frame.path));
+            let plan = plan_import(rows, args.replace, known);
             (same, kept) = (same + plan.same, kept + plan.kept);
             let said: Vec<SaidElsewhere> = plan.write.iter().map(|row| said(row, &journal)).collect();
             written += if args.dry_run { said.len() } else { journal.bring(act, &said)?.len() };
@@ -89,7 +99,7 @@ fn told(args: &Args, name: &str, [written, same, kept]: [usize; 3], path: &Path)
     if kept > 0 {
         let _ = write!(text, ", {kept} kept because the row is not newer (--replace takes the row)");
     }
-    format!("{text}; in {}\n", path.display())
+    one_line(&format!("{text}; in {}", path.display())).into_owned() + "\n"
 }
 
 /// The whole label, as a change of the one that is there.
@@ -105,9 +115,10 @@ fn said(row: &Row, journal: &Journal) -> SaidElsewhere {
 }
 
 /// Reads all files and gives each row its annotator and its frame.
-fn sheets(args: &Args, frames: &Frames<'_>) -> anyhow::Result<Sheets> {
+fn sheets(args: &Args, frames: &Frames<'_>, views: &[View]) -> anyhow::Result<Sheets> {
     let mut sheets = Sheets::new();
     let mut seen: HashMap<(String, String), (PathBuf, u64)> = HashMap::new();
+    let mut ahead = Vec::new();
     for path in &args.files {
         let act = format!("import from {}", path.file_name().unwrap_or_default().to_string_lossy());
         let Table { rows, notes } = read_table(path)?;
@@ -124,6 +135,12 @@ fn sheets(args: &Args, frames: &Frames<'_>) -> anyhow::Result<Sheets> {
                 bail!("{}: frame `{frame}` of `{name}` is also on line {line} of {first}; expected one row", place());
             }
             row.record.frame = frame;
+            if is_dated_ahead(&row.record) {
+                ahead.push(format!("{}: dated in the future, {}; it counts as said now", place(), row.record.time));
+            }
+            if let Some(region) = &row.record.label.region {
+                within(region, views).map_err(|why| anyhow!("column `region`: {why}")).with_context(place)?;
+            }
             let files = sheets.entry(name).or_default();
             match files.last_mut() {
                 Some((last, rows)) if *last == act => rows.push(row),
@@ -131,7 +148,21 @@ fn sheets(args: &Args, frames: &Frames<'_>) -> anyhow::Result<Sheets> {
             }
         }
     }
+    ahead.iter().for_each(|warning| tracing::warn!("{warning}"));
     Ok(sheets)
+}
+
+/// Refuses cells that no map of the data set has.
+fn within(region: &CellRegion, views: &[View]) -> Result<(), String> {
+    let shape = views.iter().find(|view| view.array == region.view).map(View::shape);
+    if shape.is_some_and(|shape| shape.len() == region.hi.len() && region.hi.iter().zip(&shape).all(|(k, n)| k < n)) {
+        return Ok(());
+    }
+    let map = |view: &View| {
+        format!("{} of {} bins", view.array, view.shape().iter().map(usize::to_string).collect::<Vec<_>>().join(" × "))
+    };
+    let maps: Vec<String> = views.iter().map(map).collect();
+    Err(format!("`{region}` is in no map; expected cells of {}", maps.join(" or ")))
 }
 
 fn annotator(args: &Args, row: &Row) -> anyhow::Result<String> {

@@ -1,6 +1,8 @@
 //! `labels show`: everybody's labels as they are now.
 
-use crate::cli::common::{open, print};
+use super::source::{listed, warn_of_unknown};
+use crate::cli::common::{open, print, print_json};
+use crate::escape::one_line;
 use crate::labels::{LabelPlace, LabelStore, Record};
 use anyhow::{Context as _, bail};
 use std::fmt::Write as _;
@@ -9,7 +11,12 @@ use std::process::ExitCode;
 
 /// Shown under the options of `labels show --help`.
 pub(super) const HELP: &str = "\
-Exit codes: 0 told; 2 bad input. Damaged lines of a journal are told on standard error and skipped.
+Told on standard error: damaged lines of a journal, which are skipped; labels dated in the future; labels of frames that the
+data set does not have; and files that speak for others. Only X's own journal says what X says: records by X in any other
+file (a copy, a joined file, another annotator's) count where that journal says nothing of a frame. Nothing is written.
+What is not ordinary text in names and notes (control characters, marks that turn the direction) is shown as \\u{1b}.
+
+Exit codes: 0 told; 2 bad input.
 
 Examples:
   mhp-inspector labels show data/mmvr --annotator anna
@@ -39,7 +46,7 @@ pub struct Args {
 /// Where the data set or the folder of labels cannot be read, or the annotator has no labels there.
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let dataset = open(&args.path, args.manifest.as_deref())?;
-    let place = LabelPlace::of(&dataset.info().root, dataset.fingerprint())?;
+    let place = LabelPlace::to_read(&dataset.info().root, dataset.fingerprint());
     let store = LabelStore::read(&place)?;
     store.warnings().iter().for_each(|warning| tracing::warn!("{warning}"));
     let everybody: Vec<&str> = store.annotators().collect();
@@ -50,16 +57,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let names = everybody.iter().filter(|name| wanted.is_none_or(|wanted| **name == wanted));
     let records = names.flat_map(|name| store.records(name)).filter(|record| !record.label.is_empty());
     let records: Vec<&Record> = records.collect();
-    print(&if args.json {
-        serde_json::to_string_pretty(&records).context("writing JSON")? + "\n"
+    warn_of_unknown(&dataset, records.iter().map(|record| record.frame.path.as_str()));
+    if args.json {
+        print_json(&(serde_json::to_string_pretty(&records).context("writing JSON")? + "\n"))?;
     } else {
-        as_text(&records)
-    })?;
+        print(&as_text(&records))?;
+    }
     Ok(ExitCode::SUCCESS)
-}
-
-fn listed(names: &[&str]) -> String {
-    if names.is_empty() { "nobody".into() } else { names.join(", ") }
 }
 
 /// A line a record; columns are as wide as their widest entry.
@@ -80,7 +84,8 @@ fn row(record: &Record) -> [String; 4] {
     rest.extend(label.person.map(|person| format!("person {person}")));
     rest.extend(label.verdict.map(|verdict| verdict.to_string()));
     rest.extend(label.region.as_ref().map(ToString::to_string));
+    rest.extend((!label.note.is_empty()).then(|| format!("\"{}\"", label.note.replace('"', "\\\""))));
     // A note may have several lines; a record has one.
-    rest.extend((!label.note.is_empty()).then(|| format!("{:?}", label.note)));
-    [record.annotator.clone(), record.frame.path.clone(), label.tags.to_string(), rest.join("  ")]
+    let cells = [&record.annotator, &record.frame.path, &label.tags.to_string(), &rest.join("  ")];
+    cells.map(|cell| one_line(cell).into_owned())
 }

@@ -1,5 +1,6 @@
 //! Where labels come from as typed: a data set, a journal, or a table that was exported.
 
+use super::request::Frames;
 use crate::cli::common::open;
 use crate::dataset::Dataset;
 use crate::labels::{LabelPlace, Record, place_acts, read_labels};
@@ -28,12 +29,27 @@ pub(super) fn is_table(path: &Path) -> bool {
     !path.is_dir() && !DATA.iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
-/// Every record of a data set, in the order of the acts.
+/// Every record of a data set, in the order of the acts; tells what is not as it should be, and touches nothing.
 ///
 /// # Errors
 /// Where the journals cannot be read.
 pub(super) fn acts_of(dataset: &Dataset) -> anyhow::Result<Vec<Record>> {
-    Ok(place_acts(&LabelPlace::of(&dataset.info().root, dataset.fingerprint())?)?)
+    let (acts, warnings) = place_acts(&LabelPlace::to_read(&dataset.info().root, dataset.fingerprint()))?;
+    warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
+    let labels: BTreeSet<(&str, &str)> =
+        acts.iter().map(|record| (record.annotator.as_str(), record.frame.path.as_str())).collect();
+    warn_of_unknown(dataset, labels.into_iter().map(|(_, frame)| frame));
+    Ok(acts)
+}
+
+/// Tells how many of these labels, each given by its frame, are of frames that the data set does not have.
+pub(super) fn warn_of_unknown<'a>(dataset: &Dataset, labels: impl IntoIterator<Item = &'a str>) {
+    let known = Frames::new(dataset);
+    let mut unknown = labels.into_iter().filter(|frame| known.named(frame).is_none());
+    if let Some(first) = unknown.next() {
+        let (count, root) = (counted(1 + unknown.count(), "label"), dataset.info().root.display());
+        tracing::warn!("{root}: {count} of frames that are not in this data set, for example {first}; they are kept");
+    }
 }
 
 /// The annotators, in the order of their names.

@@ -1,13 +1,15 @@
 //! `labels stats`: how many labels there are, of what, where, when, and how long one took.
 
 use super::source::{acts, acts_of, counted, is_table, only};
-use crate::cli::common::{open, print};
+use crate::cli::common::{open, print, print_json};
 use crate::cli::complexity;
+use crate::escape::one_line;
 use crate::labels::{AnnotatorStatistics, LabelCounts, PAUSE_S, Pace, Record, Tag, Verdict, day, statistics};
 use crate::study::complexity::{ComplexityOptions, Stratum, cache_folder};
 use anyhow::{Context as _, bail};
 use clap::ValueEnum;
 use serde_json::{Map, Value, json};
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -18,7 +20,8 @@ use std::sync::Arc;
 pub(super) const HELP: &str = "\
 JSON: an object an annotator with frames, tags, verdicts, notes, groups (the same counts by what --by says), acts, first, last, \
 days, hours, median_s. Days and hours are UTC. median_s is the median time from one act to the next, gaps of more than \
-ten minutes left out. Labels that were taken back do not count, the acts do.
+ten minutes left out. Labels that were taken back do not count, the acts do. Labels dated in the future, of frames that the
+data set does not have, and in files that do not speak for their annotator are told on standard error. Nothing is written.
 
 --by stratum grades the frames as `complexity` does, which reads all of them the first time; what was measured is kept.
 
@@ -83,15 +86,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let (acts, group) = read(args)?;
     let acts = only(acts, args.annotator.as_deref(), &args.path)?;
     let found = statistics(&acts, &group);
-    let text = if args.json {
+    if args.json {
         let object: Map<String, Value> = found.iter().map(|(name, one)| (name.clone(), as_json(one))).collect();
-        serde_json::to_string_pretty(&Value::Object(object)).context("writing JSON")? + "\n"
+        print_json(&(serde_json::to_string_pretty(&Value::Object(object)).context("writing JSON")? + "\n"))?;
     } else if found.is_empty() {
-        format!("{}: no labels yet\n", args.path.display())
+        print(&format!("{}: no labels yet\n", one_line(&args.path.display().to_string())))?;
     } else {
-        found.iter().map(|(name, one)| as_text(name, one)).collect::<Vec<_>>().join("\n")
-    };
-    print(&text)?;
+        print(&found.iter().map(|(name, one)| as_text(name, one)).collect::<Vec<_>>().join("\n"))?;
+    }
     Ok(ExitCode::SUCCESS)
 }
 
@@ -155,11 +157,12 @@ fn counts_json(counts: &LabelCounts) -> Value {
 }
 
 fn as_text(name: &str, one: &AnnotatorStatistics) -> String {
-    let mut text = format!("{name}\n");
-    let mut rows: Vec<(&str, &LabelCounts)> = one.groups.iter().map(|(name, counts)| (name.as_str(), counts)).collect();
+    let mut text = format!("{}\n", one_line(name));
+    let mut rows: Vec<(Cow<'_, str>, &LabelCounts)> =
+        one.groups.iter().map(|(name, counts)| (one_line(name), counts)).collect();
     // Strata from easy to hard; any other group stays in the order of names.
-    rows.sort_by_key(|(name, _)| name.parse::<Stratum>().ok().filter(|stratum| stratum.word() == *name));
-    rows.push(("all", &one.all));
+    rows.sort_by_key(|(name, _)| name.parse::<Stratum>().ok().filter(|stratum| stratum.word() == name));
+    rows.push(("all".into(), &one.all));
     let width = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
     let heads = Tag::ALL.map(|tag| format!("{:>7}", tag.code())).concat();
     let _ = writeln!(text, "  {:<width$} {:>7}{heads} {:>7}", "", "frames", "notes");
@@ -178,6 +181,7 @@ fn as_text(name: &str, one: &AnnotatorStatistics) -> String {
 fn pace_text(pace: &Pace) -> String {
     let mut text = format!("  {}", counted(pace.acts, "act"));
     if let Some((first, last)) = &pace.span {
+        let (first, last) = (one_line(first), one_line(last));
         let _ = write!(text, " on {}, {first} to {last}", counted(pace.days.len(), "day"));
     }
     if let Some(median) = pace.median_s {

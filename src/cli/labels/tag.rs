@@ -1,8 +1,10 @@
 //! `labels tag`: the journal that the window writes, from a command line or from a script that reads acknowledgements.
 
 use super::request::{Frames, Request};
-use crate::cli::common::{open, print};
+use crate::cli::common::{open, print, print_json};
 use crate::cli::frames::FrameRange;
+use crate::dataset::Dataset;
+use crate::escape::one_line;
 use crate::labels::{Change, FrameId, Journal, Judged, LabelPlace, Tag, Verdict};
 use anyhow::{Context as _, anyhow, bail};
 use serde_json::json;
@@ -18,6 +20,10 @@ pub(super) const HELP: &str = "\
 With --from-stdin each line is a JSON object {\"frame\": name or index, \"add\": [tags], \"remove\": [tags], \"note\": text,
 \"person\": number or null, \"verdict\": verdict or null}; all but `frame` may be left out. After each, when it is on disk,
 one line {\"frame\": name, \"tags\": [tags], \"ack\": line} is written to standard output.
+
+A verdict says why a frame is annotated with another number of people than is counted: annotation-error (the annotation is
+wrong: another number of people, or joints given to the wrong person), detection-error (the count is), both-incorrect,
+true-negative (both are right: the numbers differ only by a variation of the tracking that passes).
 
 Exit codes: 0 on disk; 2 bad input, or it cannot be written.
 
@@ -88,15 +94,9 @@ pub struct Args {
 /// written. What was acknowledged before stays.
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let dataset = open(&args.path, args.manifest.as_deref())?;
-    let place = LabelPlace::of(&dataset.info().root, dataset.fingerprint())?;
-    if let Some(reason) = &place.reason {
-        tracing::warn!("labels are kept in {}, because {reason}", place.folder.display());
-    }
-    let mut journal = Journal::open(&place, &args.annotator, dataset.fingerprint())?;
-    journal.warnings().iter().for_each(|warning| tracing::warn!("{warning}"));
     let frames = Frames::new(&dataset);
     if args.from_stdin {
-        return from_stdin(&mut journal, &frames);
+        return from_stdin(&mut journal(args, &dataset)?, &frames);
     }
     let change = args.request().change().map_err(|why| anyhow!("{why}"))?;
     if change == Change::default() {
@@ -107,10 +107,23 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         bail!("no frame; expected --frame, --frames or --from-stdin");
     }
     let act = act_words(&change, &chosen);
+    let mut journal = journal(args, &dataset)?;
     let changes: Vec<_> = chosen.into_iter().map(|frame| (frame, change.clone())).collect();
     let outcomes = journal.commit(&act, &changes, &Judged::default())?;
-    print(&format!("{act}: {} changed, in {}\n", counted(outcomes.len()), journal.path().display()))?;
+    let done = format!("{act}: {} changed, in {}", counted(outcomes.len()), journal.path().display());
+    print(&(one_line(&done).into_owned() + "\n"))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The journal that is written.
+fn journal(args: &Args, dataset: &Dataset) -> anyhow::Result<Journal> {
+    let place = LabelPlace::of(&dataset.info().root, dataset.fingerprint())?;
+    if let Some(reason) = &place.reason {
+        tracing::warn!("labels are kept in {}, because {reason}", place.folder.display());
+    }
+    let journal = Journal::open(&place, &args.annotator, dataset.fingerprint())?;
+    journal.warnings().iter().for_each(|warning| tracing::warn!("{warning}"));
+    Ok(journal)
 }
 
 impl Args {
@@ -177,7 +190,7 @@ fn from_stdin(journal: &mut Journal, frames: &Frames<'_>) -> anyhow::Result<Exit
         let path = frame.path.clone();
         journal.commit(&act, &[(frame, change)], &Judged::default())?;
         let tags = journal.label(&path).map(|label| label.tags).unwrap_or_default();
-        print(&format!("{}\n", json!({ "frame": path, "tags": tags, "ack": k + 1 })))?;
+        print_json(&format!("{}\n", json!({ "frame": path, "tags": tags, "ack": k + 1 })))?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -35,7 +35,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     bar.finish_and_clear();
     let (frames, sequences) = (recording.len(), recording.sequences());
     let word = if sequences == 1 { "sequence" } else { "sequences" };
-    eprintln!("{frames} frames in {sequences} {word} in {}", args.out.display());
+    super::common::complain(&format!("{frames} frames in {sequences} {word} in {}", args.out.display()));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -1,6 +1,7 @@
 //! `study merge`: shards to one run.
 
 use super::run::tell;
+use crate::cli::common::CsvArgs;
 use crate::study::run::merge_runs;
 use clap::Args;
 use std::path::PathBuf;
@@ -15,6 +16,8 @@ pub struct MergeArgs {
     /// The folder of the whole.
     #[arg(long, value_name = "RUN")]
     out: PathBuf,
+    #[command(flatten)]
+    cells: CsvArgs,
     /// Print the table as JSON instead of Markdown.
     #[arg(long)]
     json: bool,
@@ -25,5 +28,6 @@ pub struct MergeArgs {
 /// # Errors
 /// As [`merge_runs`], or where no row was fitted.
 pub(super) fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
+    args.cells.apply();
     tell(&merge_runs(&args.runs, &args.out)?, args.json)
 }

@@ -1,6 +1,6 @@
 //! One study: arguments to a plan, the plan to a run, the run to its table.
 
-use crate::cli::common::{PrecisionArg, inputs, open, presets, print};
+use crate::cli::common::{CsvArgs, PrecisionArg, complain, inputs, open, presets, print, print_json};
 use crate::cli::complexity::compute;
 use crate::cli::frames::{FrameRange, chosen};
 use crate::cli::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
@@ -52,6 +52,8 @@ pub struct RunArgs {
     /// Threads; default: one for each core. The result is the same with any number.
     #[arg(long, value_name = "N")]
     threads: Option<std::num::NonZeroUsize>,
+    #[command(flatten)]
+    cells: CsvArgs,
     /// Print the table as JSON instead of Markdown.
     #[arg(long)]
     json: bool,
@@ -87,6 +89,7 @@ pub struct SweepArgs {
 /// # Errors
 /// Where an argument, the data set or the folder is bad, or no row could be fitted.
 pub(super) fn run(kind: StudyKind, args: &RunArgs, all: Option<bool>, grid: &[GridAxis]) -> anyhow::Result<ExitCode> {
+    args.cells.apply();
     let (base, base_name) = base(args)?;
     let dataset = Arc::new(open(&args.path, args.manifest.as_deref())?);
     let named = [args.config.as_deref(), args.manifest.as_deref()];
@@ -176,7 +179,7 @@ fn watch<T>(progress: &Progress, answer: &crossbeam_channel::Receiver<T>) -> Opt
             told = Instant::now();
             let here = state.done.saturating_sub(first).max(1) as f64;
             let left = state.total.saturating_sub(state.done) as f64 * since.elapsed().as_secs_f64() / here;
-            eprintln!("{} of {} fits, about {left:.0} s to go", state.done, state.total);
+            complain(&format!("{} of {} fits, about {left:.0} s to go", state.done, state.total));
         }
     }
 }
@@ -189,15 +192,15 @@ pub(super) fn tell(run: &Run, json: bool) -> anyhow::Result<ExitCode> {
     let rows: Vec<_> = run.rows.iter().filter(|row| !row.passing).collect();
     let failed: Vec<_> = rows.iter().filter_map(|row| row.fit.as_ref().err()).collect();
     if json {
-        print(&run.json())?;
+        print_json(&run.json())?;
     } else if failed.len() < rows.len() || rows.is_empty() {
         print(&run.markdown())?;
     }
     let Some(why) = failed.first() else { return Ok(ExitCode::SUCCESS) };
     if failed.len() == rows.len() {
-        eprintln!("error: none of {} fits worked; the first: {why}", rows.len());
+        complain(&format!("error: none of {} fits worked; the first: {why}", rows.len()));
         return Ok(ExitCode::from(EXIT_BAD_INPUT));
     }
-    eprintln!("warning: {} of {} fits did not work; the first: {why}", failed.len(), rows.len());
+    complain(&format!("warning: {} of {} fits did not work; the first: {why}", failed.len(), rows.len()));
     Ok(ExitCode::from(EXIT_SOME_FAILED))
 }

@@ -1,12 +1,12 @@
 //! CSV as records.
 
+use super::check::check;
 use super::{COLUMNS, Row, Table, TableError, machine_column, shortened};
+use crate::escape::from_cell;
 use crate::labels::{CellRegion, FrameId, Judged, Label, Record, Tag, Tags, Verdict};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::str::FromStr;
-use time::OffsetDateTime;
-use time::format_description::well_known::Rfc3339;
 
 /// Characters of the longest region or verdict.
 const LONGEST: usize = 1000;
@@ -100,21 +100,21 @@ struct Cells<'r> {
 
 impl Cells<'_> {
     fn record(&self) -> Result<Record, TableError> {
-        let frame = self.text("frame")?.to_owned();
-        if frame.is_empty() {
-            return Err(self.wrong("frame", "is empty; expected a frame's name such as `d1s1/000/00383`".into()));
-        }
+        let path = self.text("frame")?.to_owned();
         let index = self.optional("index", "a whole number")?.unwrap_or(0);
-        Ok(Record {
+        let record = Record {
             dataset: self.text("dataset")?.to_owned(),
-            frame: FrameId { path: frame, index },
+            frame: FrameId { path, index },
             label: self.label()?,
             annotator: self.text("annotator")?.to_owned(),
-            time: self.time()?,
+            time: self.text("time")?.to_owned(),
+            after: None,
             act: self.text("act")?.to_owned(),
             program: self.text("program")?.to_owned(),
             judged: self.judged()?,
-        })
+        };
+        check(&record).map_err(|(column, message)| self.wrong(&column, message))?;
+        Ok(record)
     }
 
     fn label(&self) -> Result<Label, TableError> {
@@ -140,11 +140,7 @@ impl Cells<'_> {
         let mut machine = BTreeMap::new();
         for mode in Tag::MODES {
             let column = machine_column(mode);
-            let Some(score) = self.optional::<f64>(&column, "a score from 0 to 1")? else { continue };
-            if !(0.0..=1.0).contains(&score) {
-                return Err(self.wrong(&column, format!("is {score}; expected a score from 0 to 1")));
-            }
-            machine.insert(mode, score);
+            machine.extend(self.optional::<f64>(&column, "a score from 0 to 1")?.map(|score| (mode, score)));
         }
         Ok(Judged {
             fit: hash("judged_fit")?,
@@ -155,19 +151,11 @@ impl Cells<'_> {
         })
     }
 
-    fn time(&self) -> Result<String, TableError> {
-        let text = self.text("time")?;
-        if !text.is_empty() && OffsetDateTime::parse(text, &Rfc3339).is_err() {
-            let message = format!("`{}`; expected a time such as 2025-03-01T12:30:00.000Z", shortened(text));
-            return Err(self.wrong("time", message));
-        }
-        Ok(text.to_owned())
-    }
-
-    /// The cell as it is; empty where the table lacks the column.
+    /// What the cell says, without the sign that keeps spreadsheets from computing it; empty where the table lacks the
+    /// column.
     fn text(&self, column: &str) -> Result<&str, TableError> {
         let bytes = self.columns.get(column).and_then(|&place| self.row.get(place)).unwrap_or_default();
-        std::str::from_utf8(bytes).map_err(|_| self.wrong(column, "is not UTF-8 text".into()))
+        std::str::from_utf8(bytes).map(from_cell).map_err(|_| self.wrong(column, "is not UTF-8 text".into()))
     }
 
     fn yes(&self, column: &str) -> Result<bool, TableError> {

@@ -1,7 +1,9 @@
 //! Records as CSV.
 
 use super::{COLUMNS, machine_column};
+use crate::escape::to_cell;
 use crate::labels::{Record, Tag};
+use std::borrow::Cow;
 use std::io::Write;
 
 /// Header and rows.
@@ -10,31 +12,34 @@ pub(super) fn write(out: &mut dyn Write, records: &[&Record]) -> std::io::Result
     let mut writer = csv::WriterBuilder::new().terminator(csv::Terminator::CRLF).from_writer(out);
     writer.write_record(COLUMNS).map_err(std::io::Error::other)?;
     for record in records {
-        writer.write_record(COLUMNS.iter().map(|column| cell(record, column))).map_err(std::io::Error::other)?;
+        writer
+            .write_record(COLUMNS.iter().map(|column| cell(record, column).into_owned()))
+            .map_err(std::io::Error::other)?;
     }
     writer.flush()
 }
 
-fn cell(record: &Record, column: &str) -> String {
+/// A cell of the row; of text, as [`to_cell`] keeps it from being computed.
+fn cell<'r>(record: &'r Record, column: &str) -> Cow<'r, str> {
     let (label, judged) = (&record.label, &record.judged);
-    let yes = |yes: bool| if yes { "1" } else { "0" }.to_owned();
+    let yes = |yes: bool| Cow::Borrowed(if yes { "1" } else { "0" });
     match column {
-        "frame" => record.frame.path.clone(),
-        "index" => record.frame.index.to_string(),
-        "annotator" => record.annotator.clone(),
-        "time" => record.time.clone(),
-        "verdict" => optional(label.verdict),
-        "person" => optional(label.person),
-        "region" => optional(label.region.as_ref()),
-        "note" => label.note.clone(),
-        "judged_fit" => judged.fit.clone().unwrap_or_default(),
-        "judged_config" => judged.config.clone().unwrap_or_default(),
-        "judged_iteration" => optional(judged.iteration),
+        "frame" => to_cell(&record.frame.path),
+        "index" => record.frame.index.to_string().into(),
+        "annotator" => to_cell(&record.annotator),
+        "time" => to_cell(&record.time),
+        "verdict" => optional(label.verdict).into(),
+        "person" => optional(label.person).into(),
+        "region" => to_cell(&optional(label.region.as_ref())).into_owned().into(),
+        "note" => to_cell(&label.note),
+        "judged_fit" => to_cell(judged.fit.as_deref().unwrap_or_default()),
+        "judged_config" => to_cell(judged.config.as_deref().unwrap_or_default()),
+        "judged_iteration" => optional(judged.iteration).into(),
         "machine_shown" => yes(judged.machine_shown),
-        "act" => record.act.clone(),
-        "dataset" => record.dataset.clone(),
-        "program" => record.program.clone(),
-        _ => column.parse().map_or_else(|_| machine(record, column), |tag| yes(label.tags.contains(tag))),
+        "act" => to_cell(&record.act),
+        "dataset" => to_cell(&record.dataset),
+        "program" => to_cell(&record.program),
+        _ => column.parse().map_or_else(|_| machine(record, column).into(), |tag| yes(label.tags.contains(tag))),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Records as a JSON array.
 
+use super::check::check;
 use super::{Row, Table, TableError, at_most};
 use crate::labels::Record;
 use std::io::Write;
@@ -14,13 +15,11 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Table, TableError> {
     };
     let records: Vec<Record> = serde_json::from_slice(bytes).map_err(failed)?;
     let rows: Vec<Row> = (1..).zip(records).map(|(line, record)| Row { line, record }).collect();
-    match rows.iter().find(|row| row.record.frame.path.is_empty()) {
-        Some(row) => {
-            let message = "the frame has no name; expected one such as `d1s1/000/00383`".into();
-            Err(TableError::Row { line: row.line, message, path: path.to_owned() })
-        }
-        None => Ok(Table { rows, notes: Vec::new() }),
+    for Row { line, record } in &rows {
+        let wrong = |(column, message)| TableError::Cell { line: *line, column, message, path: path.to_owned() };
+        check(record).map_err(wrong)?;
     }
+    Ok(Table { rows, notes: Vec::new() })
 }
 
 /// One record a line, so that tools for text see what changed.

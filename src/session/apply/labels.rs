@@ -1,6 +1,6 @@
 //! Acts of labelling: what a key or a field asks for becomes a commit; what the journal acknowledges becomes visible.
 
-use crate::labels::{CellRegion, Change, Judged, Record, Tag, Verdict};
+use crate::labels::{CellRegion, Change, Judged, LabelPlace, Record, Tag, Verdict};
 use crate::session::acts::{ActKind, Asked};
 use crate::session::command::{Commit, Effect, OpenedLabels, Trash, Written};
 use crate::session::labels::{LabelMode, LabelStatus, LabelTable};
@@ -123,13 +123,14 @@ impl Session {
         Judged { machine, machine_shown, ..fit(shown) }
     }
 
-    /// True while the evidence of the frame on screen is hidden: in blind mode, until the annotator has judged it.
+    /// True while the evidence of the frame on screen is hidden: in blind mode, until the annotator has tagged it. A verdict
+    /// on the count is no judgement of the fit.
     pub fn evidence_hidden(&self) -> bool {
         self.evidence_hidden_of(self.data.frame_index)
     }
 
     fn evidence_hidden_of(&self, frame: usize) -> bool {
-        self.view.label_mode == LabelMode::Agreement && self.view.blind && !self.labels.is_judged(frame)
+        self.view.label_mode == LabelMode::Agreement && self.view.blind && self.labels.tags(frame).is_empty()
     }
 
     pub(super) fn undo(&mut self) -> Vec<Effect> {
@@ -169,17 +170,11 @@ impl Session {
         }
         match result {
             Ok(opened) => {
-                for warning in opened.warnings {
-                    self.note(LogLevel::Warning, warning);
-                }
-                if let Some(reason) = &opened.place.reason {
-                    let text = format!("labels are kept in {}: {reason}", opened.place.folder.display());
-                    self.note(LogLevel::Warning, text);
-                }
-                self.labels.last_edited = opened.last_edited;
-                self.labels.place = Some(opened.place);
-                self.labels.table = opened.table;
                 self.labels.status = LabelStatus::Ready;
+                self.labels_warned(opened.warnings);
+                self.labels_placed(opened.place);
+                self.labels.last_edited = opened.last_edited;
+                self.labels.table = opened.table;
             }
             Err(why) => {
                 self.note(LogLevel::Error, format!("labels cannot be kept: {why}"));
@@ -187,6 +182,26 @@ impl Session {
             }
         }
         self.labels_changed();
+        Vec::new()
+    }
+
+    pub(super) fn labels_warned(&mut self, warnings: Vec<String>) -> Vec<Effect> {
+        for warning in warnings {
+            self.note(LogLevel::Warning, warning);
+        }
+        Vec::new()
+    }
+
+    pub(super) fn labels_placed(&mut self, place: LabelPlace) -> Vec<Effect> {
+        // Perhaps that of a data set that was closed meanwhile.
+        if self.labels.status != LabelStatus::Ready {
+            return Vec::new();
+        }
+        if let Some(reason) = &place.reason {
+            let text = format!("labels are kept in {}: {reason}", place.folder.display());
+            self.note(LogLevel::Warning, text);
+        }
+        self.labels.place = Some(place);
         Vec::new()
     }
 

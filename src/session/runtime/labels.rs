@@ -3,13 +3,13 @@
 
 use super::Wake;
 use crate::dataset::Dataset;
-use crate::labels::{Change, FrameId, Journal, Judged, LabelPlace, LabelStore, Record};
+use crate::labels::{Change, FrameId, Journal, Judged, LabelError, LabelPlace, LabelStore, Record};
 use crate::session::acts::{Changes, Done};
 use crate::session::command::{Command, Commit, OpenedLabels, Written};
 use crate::session::labels::LabelTable;
 use crate::session::records::Records;
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
@@ -41,7 +41,7 @@ impl LabelKeeper {
         let spawned = std::thread::Builder::new().name("labels".into()).spawn(move || {
             let mut keeper = Keeper::default();
             while let Ok(request) = inbox.recv() {
-                if let Some(command) = keeper.answer(request) {
+                for command in keeper.answer(request) {
                     if answer.send(command).is_err() {
                         return;
                     }
@@ -109,8 +109,12 @@ struct Keeper {
 
 struct Open {
     dataset: Arc<Dataset>,
+    /// True once it was tried where can be written: a data set that is only looked at stays as it is.
+    tried: bool,
     journal: Journal,
     store: LabelStore,
+    /// What the window was told of the files.
+    warned: BTreeSet<String>,
     /// What others wrote came in with an act of our own and is still to be told.
     unseen: bool,
     /// Frames by name; made when a record's index is not that of its name.
@@ -118,40 +122,34 @@ struct Open {
 }
 
 impl Keeper {
-    fn answer(&mut self, request: Request) -> Option<Command> {
+    fn answer(&mut self, request: Request) -> Vec<Command> {
         match request {
             Request::Open(id, dataset, annotator) => {
                 self.open = None;
-                Some(Command::LabelsOpened(id, self.begin(dataset, &annotator)))
+                vec![Command::LabelsOpened(id, self.begin(dataset, &annotator))]
             }
             Request::Commit(commit) => {
+                let tried = self.open.as_ref().is_some_and(|open| open.tried);
                 let result = match &mut self.open {
                     Some(open) => open.commit(&commit),
                     None => Err("the journal is not open".into()),
                 };
                 let Commit { id, kind, act, .. } = commit;
-                Some(Command::LabelsWritten(Written { id, kind, act, result }))
+                let mut answers = vec![Command::LabelsWritten(Written { id, kind, act, result })];
+                let open = self.open.as_ref().filter(|open| open.tried && !tried);
+                answers.extend(open.map(|open| Command::LabelsPlaced(open.store.place().clone())));
+                answers
             }
-            Request::Refresh => {
-                let open = self.open.as_mut()?;
-                let news = open.store.refresh().map(|more| more | std::mem::take(&mut open.unseen));
-                match news {
-                    Ok(true) => Some(Command::LabelsRefreshed(open.table())),
-                    Ok(false) => None,
-                    Err(error) => {
-                        tracing::warn!("{error}");
-                        None
-                    }
-                }
-            }
+            Request::Refresh => self.open.as_mut().map_or_else(Vec::new, Open::refresh),
         }
     }
 
     fn begin(&mut self, dataset: Arc<Dataset>, annotator: &str) -> Result<Box<OpenedLabels>, String> {
-        let place = LabelPlace::of(&dataset.info().root, dataset.fingerprint()).map_err(|error| error.to_string())?;
+        let place = LabelPlace::to_read(&dataset.info().root, dataset.fingerprint());
         let journal = Journal::open(&place, annotator, dataset.fingerprint()).map_err(|error| error.to_string())?;
         let store = LabelStore::read(&place).map_err(|error| error.to_string())?;
-        let mut open = Open { dataset, journal, store, unseen: false, names: None };
+        let warned = store.warnings().iter().cloned().collect();
+        let mut open = Open { dataset, tried: false, journal, store, warned, unseen: false, names: None };
         let table = open.table();
         let last_edited = open.store.last_edited(annotator.trim()).map(|record| record.frame.clone());
         let last_edited = last_edited.and_then(|frame| open.index(&frame));
@@ -163,7 +161,37 @@ impl Keeper {
 }
 
 impl Open {
+    /// What others wrote, and what is to be told of it.
+    fn refresh(&mut self) -> Vec<Command> {
+        let news = self.store.refresh().map(|more| more | std::mem::take(&mut self.unseen));
+        let news = news.inspect_err(|error| tracing::warn!("{error}"));
+        if !news.is_ok_and(|news| news) {
+            return Vec::new();
+        }
+        let new: Vec<String> =
+            self.store.warnings().iter().filter(|warning| !self.warned.contains(*warning)).cloned().collect();
+        self.warned.extend(new.iter().cloned());
+        let warned = (!new.is_empty()).then_some(Command::LabelsWarned(new));
+        [Command::LabelsRefreshed(self.table())].into_iter().chain(warned).collect()
+    }
+
+    /// Before the first act: where can be written. The folders that are read are the same.
+    fn find_place(&mut self) -> Result<(), LabelError> {
+        if self.tried {
+            return Ok(());
+        }
+        let place = LabelPlace::of(&self.dataset.info().root, self.dataset.fingerprint())?;
+        if place != *self.store.place() {
+            self.journal = Journal::open(&place, self.journal.annotator(), self.dataset.fingerprint())?;
+            self.store = LabelStore::read(&place)?;
+            self.unseen = true;
+        }
+        self.tried = true;
+        Ok(())
+    }
+
     fn commit(&mut self, commit: &Commit) -> Result<Done, String> {
+        self.find_place().map_err(|error| error.to_string())?;
         let id = |index| FrameId { path: commit.dataset.frame_name(index).to_owned(), index };
         let judged = |index| commit.judged.get(&index).cloned().unwrap_or_default();
         let changes: Vec<(FrameId, Change, Judged)> =
@@ -229,5 +257,90 @@ impl Open {
             "{count} labels are of frames that are not in this data set, for example {}; they are kept",
             first.path
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::Progress;
+    use crate::labels::Tag;
+    use crate::session::acts::{ActKind, Asked};
+    use std::collections::BTreeMap;
+    use std::error::Error;
+    use std::path::Path;
+    use std::time::SystemTime;
+
+    const MANIFEST: &str = r#"name = "case"
+layout = "npz"
+frames = "frames/*.npz"
+skeleton = "coco17"
+
+[[view]]
+array = "hm"
+psf = { range_m = 0.05, azimuth_rad = 0.05, elevation_rad = 0.0, doppler_mps = 0.1 }
+axes = [ { kind = "range", bins = 16, lo = 0.5, hi = 6.0 }, { kind = "azimuth", bins = 8, lo = 0.96, hi = -1.04 } ]
+"#;
+
+    fn dataset(folder: &Path) -> Result<Arc<Dataset>, Box<dyn Error>> {
+        std::fs::create_dir(folder.join("frames"))?;
+        std::fs::write(folder.join("dataset.toml"), MANIFEST)?;
+        for name in ["0", "1"] {
+            std::fs::write(folder.join(format!("frames/{name}.npz")), b"")?;
+        }
+        Ok(Arc::new(Dataset::open(folder, &Progress::new())?))
+    }
+
+    fn state(folder: &Path) -> std::io::Result<(usize, SystemTime)> {
+        Ok((std::fs::read_dir(folder)?.count(), folder.metadata()?.modified()?))
+    }
+
+    fn tag(dataset: &Arc<Dataset>, id: u64) -> Request {
+        let asked = Asked::Same([0].into(), Change::adding(if id == 1 { Tag::F1 } else { Tag::F2 }));
+        let (kind, dataset) = (ActKind::Do, Arc::clone(dataset));
+        Request::Commit(Commit { id, kind, act: "tag".into(), dataset, asked, judged: BTreeMap::new() })
+    }
+
+    #[test]
+    fn a_data_set_that_is_only_looked_at_stays_as_it_is() -> Result<(), Box<dyn Error>> {
+        let folder = tempfile::tempdir()?;
+        let dataset = dataset(folder.path())?;
+        let before = state(folder.path())?;
+        let mut keeper = Keeper::default();
+        let opened = keeper.answer(Request::Open(1, Arc::clone(&dataset), "ada".into()));
+        assert!(matches!(opened[..], [Command::LabelsOpened(1, Ok(_))]), "{opened:?}");
+        assert!(keeper.answer(Request::Refresh).is_empty());
+        assert_eq!(state(folder.path())?, before);
+        // The first act finds the place and tells it, once.
+        let told = keeper.answer(tag(&dataset, 1));
+        let [Command::LabelsWritten(written), Command::LabelsPlaced(place)] = &told[..] else {
+            return Err(format!("{told:?}").into());
+        };
+        assert_eq!(written.result.as_ref().map(|done| done.changes.len()).ok(), Some(1));
+        assert_eq!(place.folder, folder.path().join("mhp-labels"));
+        let again = keeper.answer(tag(&dataset, 2));
+        assert!(matches!(again[..], [Command::LabelsWritten(_)]), "{again:?}");
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_file_that_comes_later_is_told_once() -> Result<(), Box<dyn Error>> {
+        let folder = tempfile::tempdir()?;
+        let dataset = dataset(folder.path())?;
+        let mut keeper = Keeper::default();
+        keeper.answer(Request::Open(1, Arc::clone(&dataset), "ada".into()));
+        keeper.answer(tag(&dataset, 1));
+        keeper.answer(Request::Refresh);
+        let labels = folder.path().join("mhp-labels");
+        let own = std::fs::read_to_string(labels.join("ada.labels.jsonl"))?;
+        std::fs::write(labels.join("copy.labels.jsonl"), own.replace("\"time\":\"2", "\"time\":\"9"))?;
+        let told = keeper.answer(Request::Refresh);
+        let [Command::LabelsRefreshed(table), Command::LabelsWarned(warnings)] = &told[..] else {
+            return Err(format!("{told:?}").into());
+        };
+        assert!(table["ada"].get(0).is_some_and(|record| record.time.starts_with('2')), "ada's own file counts");
+        assert!(warnings[0].contains("copy.labels.jsonl: 1 record by `ada`, for whom only ada.labels.jsonl speaks"));
+        assert!(keeper.answer(Request::Refresh).is_empty());
+        Ok(())
     }
 }

@@ -3,6 +3,7 @@
 use super::super::StudyError;
 use super::{Complexity, FrameComplexity, Stratum};
 use crate::dataset::Dataset;
+use crate::escape::to_cell;
 use crate::output::replace_file;
 use serde::Serialize;
 use std::path::Path;
@@ -51,6 +52,7 @@ pub fn write_csv(file: &Path, dataset: &Dataset, complexity: &Complexity) -> Res
     let written = replace_file(file, |out| {
         let mut table = csv::Writer::from_writer(out);
         for row in rows(dataset, complexity) {
+            let row = Row { frame: to_cell(&row.frame).into_owned(), ..row };
             table.serialize(row).map_err(std::io::Error::other)?;
         }
         table.flush()

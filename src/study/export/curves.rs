@@ -1,5 +1,6 @@
 //! Curves as CSV (RFC 4180 by the csv crate, numbers that read back exactly): one row an iteration.
 
+use crate::escape::to_cell;
 use crate::mhp::StepReport;
 use crate::output::replace_file;
 use crate::study::StudyError;
@@ -45,7 +46,7 @@ fn cells(views: usize, row: &CurveRow<'_>) -> Vec<String> {
     let ious = (0..views).map(|view| report.iou.get(view).copied().flatten());
     let number = |x: Option<f64>| x.filter(|x| x.is_finite()).map(|x| x.to_string()).unwrap_or_default();
     let first = [report.iteration.to_string(), row.branch.to_string()];
-    let last = [number(row.majpe_mm), report.converged.to_string(), row.flag.unwrap_or_default().to_owned()];
+    let last = [number(row.majpe_mm), report.converged.to_string(), to_cell(row.flag.unwrap_or_default()).into_owned()];
     first.into_iter().chain(losses.into_iter().chain(ious).map(number)).chain(last).collect()
 }
 

@@ -4,6 +4,7 @@ use super::StudyKind;
 use super::journal::Rows;
 use super::spec::{RunSpec, Subset};
 use super::table::{self, Spread, TableRow};
+use crate::escape::one_line;
 use crate::mhp::Precision;
 use crate::people::CLASSES;
 use std::fmt::Write as _;
@@ -196,5 +197,5 @@ fn percent(share: Option<f64>) -> Option<String> {
 }
 
 fn escaped(text: &str) -> String {
-    text.replace('|', "\\|").replace('\n', " ")
+    one_line(&text.replace('|', "\\|").replace('\n', " ")).into_owned()
 }

@@ -6,6 +6,7 @@ use super::row::{Cell, RunRow, cells};
 use super::spec::RunSpec;
 use super::table::{TableRow, table};
 use super::{markdown, parquet_rows};
+use crate::escape::to_cell;
 use crate::output::replace_file;
 use serde_json::json;
 use std::path::Path;
@@ -82,7 +83,13 @@ fn write_times(folder: &Path, spec: &RunSpec, rows: &[&RunRow]) -> Result<(), Ru
         for row in rows {
             let name = spec.variants.get(row.variant).map(super::Variant::name).unwrap_or_default();
             let number = |x: Option<f64>| x.map(|x| x.to_string()).unwrap_or_default();
-            let cells = [row.variant.to_string(), name, row.name.clone(), number(row.init_ms), number(row.fit_ms)];
+            let cells = [
+                row.variant.to_string(),
+                to_cell(&name).into_owned(),
+                to_cell(&row.name).into_owned(),
+                number(row.init_ms),
+                number(row.fit_ms),
+            ];
             table.write_record(cells).map_err(std::io::Error::other)?;
         }
         table.flush()

@@ -1,6 +1,7 @@
 //! One row of a run: one frame under one variant.
 
 use super::spec::RunSpec;
+use crate::escape::to_cell;
 use crate::study::complexity::Stratum;
 use serde::{Deserialize, Serialize};
 
@@ -120,6 +121,8 @@ impl Cell {
     /// In a CSV; numbers read back exactly, what is unknown is empty.
     pub(super) fn text(&self) -> String {
         match self {
+            // Labels of variants may be numbers.
+            Self::Text(Some(text)) if text.parse::<f64>().is_err() => to_cell(text).into_owned(),
             Self::Text(text) => text.clone().unwrap_or_default(),
             Self::Whole(n) => n.map(|n| n.to_string()).unwrap_or_default(),
             Self::Number(x) => x.map(|x| x.to_string()).unwrap_or_default(),

@@ -127,18 +127,13 @@ fn verdicts(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
     let words = format!("Annotated persons {} · fitted {}", count(annotated), count(fitted));
     ui.label(RichText::new(words).color(if mismatch { tokens.warn } else { tokens.text }));
     let now = session.labels.label(session.data.frame_index).verdict;
-    for (digit, verdict, words) in [
-        ('6', Verdict::AnnotationError, "the annotation has the wrong number of people"),
-        ('7', Verdict::DetectionError, "the fit has the wrong number of people"),
-        ('8', Verdict::BothIncorrect, "both have"),
-        ('9', Verdict::TrueNegative, "nobody is there and nobody was found"),
-    ] {
+    for (digit, verdict) in ('6'..='9').zip(Verdict::ALL) {
         let on = now == Some(verdict);
         let text = format!("{digit}  {}", verdict.code().replace('-', " "));
         let response = ui.add(egui::Button::selectable(on, text).min_size(vec2(150.0, 22.0)));
         let name = format!("Verdict {verdict}");
         response.widget_info(|| egui::WidgetInfo::selected(Role::CheckBox, true, on, &name));
-        if response.on_hover_text(format!("Verdict: {words}.\nKey: {digit}")).clicked() {
+        if response.on_hover_text(format!("{}\nKey: {digit}", verdict.words())).clicked() {
             shared.send(Command::SetVerdict((!on).then_some(verdict)));
         }
     }
