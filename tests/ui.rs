@@ -46,6 +46,17 @@ fn a_data_set_opens_runs_pauses_and_steps() {
     assert_eq!(window.fit().cursor, None);
 }
 
+#[test]
+fn presets_are_chosen_by_what_they_stand_for() {
+    let mut window = Window::open(2);
+    for preset in [Preset::Paper, Preset::Recommended, Preset::Default] {
+        window.click(&format!("Preset {}", preset.name()));
+        window.harness.run_steps(2);
+        assert_eq!(window.session().config, preset.config(), "{}", preset.name());
+        assert!(window.says(preset.help()), "{}", preset.name());
+    }
+}
+
 /// A start is found as soon as a data set is open: settings that come later would not be in it.
 #[test]
 fn settings_given_at_the_beginning_are_in_the_first_start() {
@@ -61,13 +72,13 @@ fn settings_given_at_the_beginning_are_in_the_first_start() {
     assert_eq!(window.session().config, config);
     assert_eq!(window.fit().initial.as_ref(), Some(&start));
     // Where nothing was fitted yet, another preset finds another start; a slider does not, nor a preset after a run.
-    let paper = FitConfig::default();
-    window.apply(Command::SetConfig(Box::new(paper)));
+    let plain = FitConfig::default();
+    window.apply(Command::SetConfig(Box::new(plain)));
     window.ready(0);
-    let other = begin_fit(&problem, &paper).unwrap().initialisation.params;
+    let other = begin_fit(&problem, &plain).unwrap().initialisation.params;
     assert!(window.fit().initial.as_ref() == Some(&other) && other != start);
     let job = window.fit().job;
-    window.apply(Command::SetConfig(Box::new(FitConfig { w_em: 0.7, ..paper })));
+    window.apply(Command::SetConfig(Box::new(FitConfig { w_em: 0.7, ..plain })));
     window.apply(Command::StepFit(2));
     window.paused_at(2);
     window.apply(Command::SetConfig(Box::new(config)));

@@ -257,15 +257,23 @@ fn settings(ui: &mut Ui, shared: &mut Shared<'_>, config: &mut FitConfig) {
         }
     });
     ui.add_space(4.0);
-    ui.horizontal(|ui| {
-        ui.label("Preset").on_hover_text("All settings at once.");
-        for preset in Preset::ALL {
-            let chosen = *config == preset.config();
-            if ui.selectable_label(chosen, preset.name()).on_hover_text(preset.help()).clicked() {
+    presets(ui, config);
+}
+
+/// Every setting at once, by name; what each name stands for beside it.
+fn presets(ui: &mut Ui, config: &mut FitConfig) {
+    let tokens = Tokens::of(ui);
+    ui.label("Preset").on_hover_text("All settings at once.");
+    for preset in Preset::ALL {
+        ui.horizontal_wrapped(|ui| {
+            let button = ui.selectable_label(*config == preset.config(), preset.name());
+            let button = button.named(egui::Role::Button, &format!("Preset {}", preset.name()));
+            if button.on_hover_text(preset.help()).clicked() {
                 *config = preset.config();
             }
-        }
-    });
+            ui.label(RichText::new(preset.help()).small().color(tokens.dim));
+        });
+    }
 }
 
 /// What is moved, what the Gaussians look like, where the start looks, and the terms that the paper's objective lacks.

@@ -133,7 +133,8 @@ pub(super) fn table(spec: &RunSpec, all_rows: &Rows) -> Vec<TableRow> {
     if !spec.study.by_stratum() {
         let of_variant = |(k, variant): (usize, &super::Variant)| {
             let rows: Vec<&RunRow> = counted().filter(|row| row.variant == k).collect();
-            let paper = variant.paper;
+            // A run of an older program does not say what its data were.
+            let paper = variant.paper.filter(|_| PaperSet::beside(spec.study, &spec.data.layout).is_some());
             if variant.method == Method::Fit {
                 let note = variant.note.clone().or_else(|| unmoved(spec, &rows, all_rows));
                 TableRow { paper, note, ..summed(variant.labels.clone(), k, &rows) }
