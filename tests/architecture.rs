@@ -17,16 +17,18 @@ const MAY_USE: &[(&str, &[&str])] = &[
     // The synthetic source is used by the training of the counter alone.
     ("people", &["geometry", "config", "radar", "simulate"]),
     ("mhp", &["geometry", "config", "radar", "body"]),
-    ("diagnose", &["geometry", "config", "radar", "body", "mhp", "labels"]),
+    // Diagnoses count people: two who stand close are a failure mode.
+    ("diagnose", &["geometry", "config", "radar", "body", "mhp", "people", "labels"]),
     ("dataset", &["digest", "geometry", "folders", "config", "radar", "body"]),
     ("render", &["geometry"]),
     ("start", &["geometry", "config", "radar", "body", "mhp", "people", "dataset"]),
     ("worker", &["geometry", "config", "radar", "body", "mhp", "dataset", "start"]),
+    // The synthetic source is used by the calibration of the evidence alone.
     (
         "study",
         &[
-            "digest", "geometry", "folders", "config", "radar", "body", "mhp", "people", "dataset", "start",
-            "diagnose", "labels",
+            "digest", "geometry", "folders", "config", "radar", "body", "simulate", "mhp", "people", "dataset",
+            "start", "diagnose", "labels",
         ],
     ),
     (
