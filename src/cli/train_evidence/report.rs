@@ -58,6 +58,7 @@ pub(super) fn diagram(table: &Calibration, held_out: &[Judged]) -> String {
     let height = MARGIN[0] + SIDE + 48.0;
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
+         style=\"max-width:100%;height:auto\" \
          font-family=\"sans-serif\" font-size=\"11\" fill=\"currentColor\" stroke=\"none\" role=\"img\">\n<title>Reliability: \
          observed share of frames with the mode by score, held-out seeds, with 95 % intervals and counts</title>\n"
     );
@@ -73,10 +74,7 @@ fn panel(svg: &mut String, left: f64, title: &str, bins: &[(f64, f64, usize)], f
     let (x, y) = (|p: f64| left + SIDE * p, |p: f64| bottom - SIDE * p);
     let line = |svg: &mut String, from: [f64; 2], to: [f64; 2], style: &str| {
         let [(x1, y1), (x2, y2)] = [from, to].map(|[px, py]| (x(px), y(py)));
-        let _ = writeln!(
-            svg,
-            "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"currentColor\" {style}></line>"
-        );
+        let _ = writeln!(svg, "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" {style}></line>");
     };
     let text = |svg: &mut String, at: [f64; 2], anchor: &str, words: &str| {
         let [x, y] = at;
@@ -87,8 +85,8 @@ fn panel(svg: &mut String, left: f64, title: &str, bins: &[(f64, f64, usize)], f
         "<rect x=\"{left}\" y=\"{top}\" width=\"{SIDE}\" height=\"{SIDE}\" fill=\"none\" stroke=\"currentColor\" \
          stroke-opacity=\"0.4\"></rect>"
     );
-    line(svg, [0.0, 0.0], [1.0, 1.0], "stroke-opacity=\"0.4\" stroke-dasharray=\"4 3\"");
-    line(svg, [0.5, 0.0], [0.5, 1.0], "stroke-opacity=\"0.15\"");
+    line(svg, [0.0, 0.0], [1.0, 1.0], "stroke=\"currentColor\" stroke-opacity=\"0.4\" stroke-dasharray=\"4 3\"");
+    line(svg, [0.5, 0.0], [0.5, 1.0], "stroke=\"currentColor\" stroke-opacity=\"0.15\"");
     for &(mean, observed, count) in bins {
         let [low, high] = interval(observed, count);
         line(svg, [mean, low], [mean, high], "stroke=\"#1769c2\" stroke-opacity=\"0.6\"");
