@@ -20,16 +20,18 @@ const MAY_USE: &[(&str, &[&str])] = &[
     // The synthetic source is used by the training of the counter alone.
     ("people", &["geometry", "config", "radar", "simulate"]),
     ("mhp", &["geometry", "config", "radar", "body"]),
-    ("diagnose", &["geometry", "config", "radar", "body", "mhp", "labels"]),
+    // Diagnoses count people: two who stand close are a failure mode.
+    ("diagnose", &["geometry", "config", "radar", "body", "mhp", "people", "labels"]),
     ("dataset", &["digest", "input", "geometry", "folders", "output", "config", "radar", "body"]),
     ("render", &["geometry"]),
     ("start", &["geometry", "config", "radar", "body", "mhp", "people", "dataset"]),
     ("worker", &["geometry", "config", "radar", "body", "mhp", "dataset", "start"]),
+    // The synthetic source is used by the calibration of the evidence alone.
     (
         "study",
         &[
-            "digest", "input", "geometry", "escape", "folders", "output", "config", "radar", "body", "mhp", "people",
-            "dataset", "start", "diagnose", "labels",
+            "digest", "input", "geometry", "escape", "folders", "output", "config", "radar", "body", "simulate", "mhp",
+            "people", "dataset", "start", "diagnose", "labels",
         ],
     ),
     (

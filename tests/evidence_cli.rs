@@ -51,6 +51,10 @@ fn json_has_a_card_a_mode_and_a_score_once_there_are_five_frames() {
             let card = &row[mode];
             let score = card["score"].as_f64();
             assert!(score.is_none_or(|score| (0.0..=1.0).contains(&score)), "{card}");
+            assert!(card["raw"].as_f64().is_none_or(|raw| (0.0..=1.0).contains(&raw)), "{card}");
+            let measured = card["measures"].as_array().unwrap();
+            assert!(measured.iter().all(|one| one["name"].is_string() && one["value"].is_f64()), "{card}");
+            assert!(score.is_none() || !measured.is_empty(), "{card}");
             assert!(!card["summary"].as_str().unwrap().is_empty());
             for finding in card["findings"].as_array().unwrap() {
                 let place = &finding["place"];
@@ -67,6 +71,17 @@ fn json_has_a_card_a_mode_and_a_score_once_there_are_five_frames() {
         assert!(frames.into_iter().all(|frame| frame == before));
         assert!(row["F4"]["score"].as_f64().is_some_and(|score| score < 0.5), "the person walks: {}", row["F4"]);
     }
+}
+
+#[test]
+fn help_and_cards_say_what_a_score_means() {
+    let help = text(&inspector(&["evidence", "--help"]).stdout);
+    assert!(help.contains("A score is the probability that the mode is there: 0.5 means even odds."), "{help}");
+    assert!(help.contains("odds' = odds * p/(1 - p) * (1 - P)/P"), "{help}");
+    let folder = blob(2);
+    let cards = text(&evidence(folder.path(), &["--frames", "1", "--iterations", "2"]).stdout);
+    // F1 has no score yet, and nothing to say of one.
+    assert_eq!(cards.matches("0.5 is even odds where").count(), 3, "{cards}");
 }
 
 #[test]

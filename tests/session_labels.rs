@@ -202,7 +202,14 @@ fn tagged(annotator: &str, index: usize, tag: Tag) -> (usize, Arc<Record>) {
 }
 
 fn evidence(score: f64) -> Vec<Evidence> {
-    vec![Evidence { mode: Tag::F1, score: Some(score), summary: String::new(), findings: Vec::new() }]
+    vec![Evidence {
+        mode: Tag::F1,
+        score: Some(score),
+        raw: None,
+        measures: Vec::new(),
+        summary: String::new(),
+        findings: Vec::new(),
+    }]
 }
 
 #[test]

@@ -24,15 +24,27 @@ use std::process::ExitCode;
 
 /// Shown under the options of `evidence --help`.
 pub(super) const HELP: &str = "\
-Scores go from 0 (nothing speaks for the mode) to 1; `-` (null in JSON, empty in CSV) where a frame cannot be judged, and the \
-text says why. They order frames for a person to judge; they are no probabilities.
+A score is the probability that the mode is there: 0.5 means even odds. The odds are those of data in which each mode has about
+one frame in eight (the card says the share). Where you expect the share p instead, with P the share on the card, read
+  odds' = odds * p/(1 - p) * (1 - P)/P,   odds = score/(1 - score)
+so that a score of 0.5 becomes 0.88 where half of the frames have the mode (P = 1/8), and 0.07 where one in a hundred has.
+Scores are learned from simulated frames; the last line of a card says how well they told the mode there on frames that were not
+learned from. A mode that cannot be told has scores near its share. `-` (null in JSON, empty in CSV) where a frame cannot be
+judged, and the text says why. `raw` in JSON is the value by these formulas, which orders frames but is no probability:
   F1  share of H_ori's mask that is bright in each of the last 5 frames, mean over the views.
   F2  1/(1 + (r/d_F)^2): r the nearest joint's range, d_F = 2D^2/lambda the array's Fraunhofer distance.
   F3  share of the simulated echo that two persons have in common, in the view that parts them best; 0 with one person.
   F4  1/(1 + u^2): u the joints' radial velocity in Doppler cells, or where no axis measures it how many times as
       much as the rest of the map the EM region changed since the frame before, less one.
+The scores rest on these measures (`measures` in JSON):
+  F1  persistence, static_level: how much of what lies beside the body lasts through 5 frames, and how strong it is.
+  F2  nearness: ln(d_F/r).
+  F3  close_pair: probability that the maps show two people or more, less the farther apart they are counted; whatever is fitted.
+  F4  quiet, steadiness: strongest change over 5 frames outside the EM region against inside, and how little the body's own echo
+      varies (over 2 frames: quiet_pair, steadiness_pair); in a single frame with a Doppler axis slowness, -ln u.
 
-JSON: an array of {frame, index, F1: {score, summary, findings: [{text, place}]}, F2, F3, F4}; place is null, {cells: {view, \
+JSON: an array of {frame, index, F1: {score, raw, measures: [{name, value}], summary, findings: [{text, place}]}, F2, F3, \
+F4}; place is null, {cells: {view, \
 lo, hi}}, {joint: N} or {frame: INDEX}. A frame that fails has `error` instead of F1 to F4.
 
 Exit codes: 0 every frame was judged; 1 some were not; 2 none was, or the input is bad.
@@ -156,7 +168,10 @@ fn json_row(frame: &FrameEvidence) -> Value {
     row.insert("index".into(), frame.index.into());
     match &frame.evidence {
         Ok(modes) => row.extend(modes.iter().map(|mode| {
-            let card = json!({ "score": mode.score, "summary": mode.summary, "findings": mode.findings });
+            let Evidence { score, raw, measures, summary, findings, .. } = mode;
+            let card = json!({
+                "score": score, "raw": raw, "measures": measures, "summary": summary, "findings": findings
+            });
             (mode.mode.code().to_owned(), card)
         })),
         Err(why) => {

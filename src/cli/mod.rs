@@ -18,6 +18,8 @@ mod study;
 #[cfg(feature = "train")]
 mod train_counter;
 #[cfg(feature = "train")]
+mod train_evidence;
+#[cfg(feature = "train")]
 mod train_limbs;
 
 use clap::{Args, Parser, Subcommand};
@@ -180,6 +182,10 @@ pub enum Command {
     #[cfg(feature = "train")]
     #[command(after_help = train_counter::HELP)]
     TrainCounter(train_counter::TrainCounterArgs),
+    /// Calibrate the scores of the failure modes anew on simulated frames.
+    #[cfg(feature = "train")]
+    #[command(after_help = train_evidence::HELP)]
+    TrainEvidence(train_evidence::TrainEvidenceArgs),
     /// Make the linear map of the limbs anew
     #[cfg(feature = "train")]
     #[command(after_help = train_limbs::HELP)]
@@ -218,6 +224,8 @@ pub fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Simulate(args) => simulate::run(&args),
         #[cfg(feature = "train")]
         Command::TrainCounter(args) => train_counter::run(&args),
+        #[cfg(feature = "train")]
+        Command::TrainEvidence(args) => train_evidence::run(&args),
         #[cfg(feature = "train")]
         Command::TrainLimbs(args) => train_limbs::run(&args),
     }

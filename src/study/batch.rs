@@ -91,7 +91,7 @@ fn errors(params: &Pppr, truth: &Truth, joints: usize) -> Option<JointErrors> {
 }
 
 /// Steps until the configuration says to stop; `watch` sees every iteration, the start included.
-fn run(fitter: &mut Fitter, mut watch: impl FnMut(StepReport, &Pppr)) -> Result<StopReason, FitError> {
+pub(super) fn run(fitter: &mut Fitter, mut watch: impl FnMut(StepReport, &Pppr)) -> Result<StopReason, FitError> {
     let config = *fitter.config();
     watch(fitter.report(), fitter.params());
     while fitter.iteration() < config.iterations {

@@ -5,7 +5,7 @@ use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::{Dataset, Frame};
 use crate::diagnose::{Annotated, EarlierFrame, Evidence, EvidenceInput, STATIC_FRAMES, evidence};
-use crate::mhp::{Masks, Objective, Problem, masks, simulate};
+use crate::mhp::{FitError, Masks, Objective, Precision, Problem, masks, simulate};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -49,11 +49,22 @@ fn judge(
         Some(params) => (params.clone(), params.clone()),
         None => fit_frame(dataset, index, options, None).map(|fit| (fit.initial, fit.params))?,
     };
-    let objective = Objective::new(Arc::clone(&problem), options.config, options.precision, &initial);
-    let objective = objective.map_err(|error| in_file(&error))?;
-    let simulated = simulate(&problem, &options.config, options.precision, &params);
-    let masks: Vec<_> = simulated.iter().enumerate().map(|(view, map)| masks(&objective, view, map)).collect();
+    let masks = masks_around(&problem, &initial, &params, &options.config, options.precision);
+    let masks = masks.map_err(|error| in_file(&error))?;
     Ok(state_evidence(dataset, &frame, &problem, &options.config, &params, &masks))
+}
+
+/// The masks of each view at `params`, over its whole map; the EM region lies around `initial`.
+pub(super) fn masks_around(
+    problem: &Arc<Problem>,
+    initial: &Pppr,
+    params: &Pppr,
+    config: &FitConfig,
+    precision: Precision,
+) -> Result<Vec<Masks>, FitError> {
+    let objective = Objective::new(Arc::clone(problem), *config, precision, initial)?;
+    let simulated = simulate(problem, config, precision, params);
+    Ok(simulated.iter().enumerate().map(|(view, map)| masks(&objective, view, map)).collect())
 }
 
 /// Judges a state of a fit of `frame`: its parameters and the masks of each view over its whole map. Reads the frames

@@ -5,6 +5,8 @@
 //! export a state. Nothing here knows a window or a terminal.
 
 mod batch;
+#[cfg(feature = "train")]
+pub mod calibrate;
 pub mod complexity;
 pub mod count;
 mod evidence;

@@ -4,7 +4,8 @@
 //! bin's step and the half-value width of the point spread. With u = √(mean of v_r²) / cell,
 //!
 //! ```text
-//! score = 1/(1 + u²),   ½ where the joints move by one cell
+//! raw = 1/(1 + u²),   ½ where the joints move by one cell
+//! slowness = −ln u
 //! ```
 //!
 //! **Elsewhere** the map must have changed since the frame before. With c the mean of |H − H'| over the cells inside the EM
@@ -12,17 +13,28 @@
 //! somebody else who walks there does not count as noise),
 //!
 //! ```text
-//! score = 1/(1 + x²),  x = max(0, c/c₀ − 1),   1 where the region changes no more than the rest, ½ at twice as much
+//! raw = 1/(1 + x²),  x = max(0, c/c₀ − 1),   1 where the region changes no more than the rest, ½ at twice as much
 //! ```
 //!
 //! Sums of relative changes would not do: where there is no echo all is noise, and noise changes by a third of itself.
 //!
-//! One view that shows motion is enough to tell a person: the lowest score of the views counts.
+//! One view that shows motion is enough to tell a person: the lowest value of the views counts.
+//!
+//! Neither tells a person who stands from one who moves as well as what the maps do over half a second. With s the standard
+//! deviation of a cell over the T frames and h̄ its mean,
+//!
+//! ```text
+//! quiet      = mean over views of ln(max s outside the EM region / max s inside)     what moves is somewhere else
+//! steadiness = − mean over views of Σ s/Σ h̄ within one resolution cell of a joint   the body's own echo stays
+//! ```
+//!
+//! The score rests on these; with fewer earlier frames on the same over this frame and the one before (`quiet_pair`,
+//! `steadiness_pair`); in a single frame with a Doppler axis on the slowness.
 
 use super::cells::{largest_patch, place};
-use super::resolution::{FWHM, radial_mps};
+use super::resolution::{FWHM, JointCells, radial_mps};
 use super::words::{cell_box, joint, percent};
-use super::{Evidence, EvidenceInput, Finding, Past, Place, falling, masks_of, mean};
+use super::{EvidenceInput, Finding, Found, Measure, Past, Place, STATIC_FRAMES, falling, masks_of, mean};
 use crate::labels::Tag;
 use crate::mhp::percentile;
 use crate::radar::{AxisKind, View};
@@ -30,22 +42,23 @@ use crate::radar::{AxisKind, View};
 /// Cells that changed by more than this share of the largest change are shown as the place of the change.
 const SHOWN_SHARE: f64 = 0.5;
 
-pub(super) fn judge(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Evidence {
-    let measured: Vec<Measured> = input.problem.views.iter().filter_map(|view| by_doppler(input, view)).collect();
+pub(super) fn judge(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Found {
+    let seen: Vec<Measured> = input.problem.views.iter().filter_map(|view| by_doppler(input, view)).collect();
     let change = by_change(input, past);
-    if let Some(clearest) = measured.iter().max_by(|a, b| a.cells.total_cmp(&b.cells)) {
+    let mut measures = measures(input, past);
+    if let Some(clearest) = seen.iter().max_by(|a, b| a.cells.total_cmp(&b.cells)) {
         let (rms_mps, cells) = (clearest.rms_mps, clearest.cells);
         let summary =
             format!("The joints' radial velocity is {rms_mps:.2} m/s (root mean square), {cells:.1} Doppler cells.");
-        let score = Some(falling(cells));
-        let findings =
-            measured.into_iter().map(|found| found.finding).chain(change.into_iter().flat_map(|c| c.findings));
-        return Evidence { mode: Tag::F4, score, summary, findings: findings.collect() };
+        measures.push(Measure { name: "slowness", value: -cells.max(f64::MIN_POSITIVE).ln() });
+        let findings = seen.into_iter().map(|found| found.finding).chain(change.into_iter().flat_map(|c| c.findings));
+        let findings = findings.chain(variation_told(&measures)).collect();
+        return Found { mode: Tag::F4, raw: Some(falling(cells)), measures, summary, findings };
     }
     let velocity = fitted_velocity(input);
     let Some(change) = change else {
-        let summary = "It needs a Doppler axis or the frame before this one in the sequence.".to_owned();
-        return Evidence { mode: Tag::F4, score: None, summary, findings: velocity.into_iter().collect() };
+        let unknown = Found::unknown(Tag::F4, "It needs a Doppler axis or the frame before this one in the sequence.");
+        return Found { findings: velocity.into_iter().collect(), ..unknown };
     };
     let summary = match change.ratio {
         Some(ratio) => {
@@ -53,9 +66,71 @@ pub(super) fn judge(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Evidence {
         }
         None => "The EM region is the whole map: there is no rest to compare its change with.".to_owned(),
     };
-    let score = change.ratio.map(|ratio| falling((ratio - 1.0).max(0.0)));
-    let findings = change.findings.into_iter().chain(velocity).collect();
-    Evidence { mode: Tag::F4, score, summary, findings }
+    let raw = change.ratio.map(|ratio| falling((ratio - 1.0).max(0.0)));
+    let findings = change.findings.into_iter().chain(variation_told(&measures)).chain(velocity).collect();
+    Found { mode: Tag::F4, raw, measures, summary, findings }
+}
+
+/// Quiet and steadiness over the T frames where there are as many, and over this frame and the one before.
+fn measures(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Vec<Measure> {
+    let newest = past.len().saturating_sub(1);
+    let all = (past.len() + 1 >= STATIC_FRAMES).then_some((past, ["quiet", "steadiness"]));
+    let pair = past.get(newest..).filter(|pair| !pair.is_empty()).map(|pair| (pair, ["quiet_pair", "steadiness_pair"]));
+    let of = |(frames, names): (&[Past<'_>], [&'static str; 2])| {
+        let views: Vec<[f64; 2]> =
+            (0..input.problem.views.len()).filter_map(|view| variation(input, frames, view)).collect();
+        let value = |k: usize| mean(views.iter().map(|view| view[k]));
+        names
+            .into_iter()
+            .enumerate()
+            .filter_map(|(k, name)| Some(Measure { name, value: value(k)? }))
+            .collect::<Vec<_>>()
+    };
+    all.into_iter().chain(pair).flat_map(of).collect()
+}
+
+/// Quiet and steadiness of one view; `None` where nothing changes, or nothing lies within the region or outside.
+fn variation(input: &EvidenceInput<'_>, past: &[Past<'_>], index: usize) -> Option<[f64; 2]> {
+    let masks = masks_of(input, index)?;
+    let joints = JointCells::new(input.problem.views.get(index)?, input.config, input.params);
+    let maps: Vec<&[f64]> = past.iter().filter_map(|frame| frame.maps.get(index).map(AsRef::as_ref)).collect();
+    let mut maps = maps;
+    maps.push(input.problem.map(index));
+    // Every number is divided by the largest: squares of huge numbers may overflow.
+    let largest = maps.iter().flat_map(|map| map.iter()).fold(0.0_f64, |most, h| most.max(h.abs()));
+    let (mut inside, mut outside, mut varying, mut level) = (0.0_f64, 0.0_f64, 0.0, 0.0);
+    for (cell, &within) in masks.inside.iter().enumerate() {
+        let h = || maps.iter().filter_map(|map| map.get(cell)).map(|h| h / largest);
+        let usual = mean(h())?;
+        let spread = mean(h().map(|h| (h - usual).powi(2)))?.sqrt();
+        if !within {
+            outside = outside.max(spread);
+            continue;
+        }
+        inside = inside.max(spread);
+        if joints.distance(cell).is_some_and(|distance| distance <= 1.0) {
+            varying += spread;
+            level += usual;
+        }
+    }
+    let (quiet, steadiness) = ((outside / inside).ln(), -varying / level);
+    (quiet.is_finite() && steadiness.is_finite()).then_some([quiet, steadiness])
+}
+
+/// The same in words.
+fn variation_told(measures: &[Measure]) -> Option<Finding> {
+    let of = |name: &str| measures.iter().find(|measure| measure.name == name).map(|measure| measure.value);
+    let (frames, quiet, steadiness) = match (of("quiet"), of("steadiness")) {
+        (Some(quiet), Some(steadiness)) => (STATIC_FRAMES, quiet, steadiness),
+        _ => (2, of("quiet_pair")?, of("steadiness_pair")?),
+    };
+    let text = format!(
+        "Over {frames} frames the strongest change outside the EM region is {:.2} times the strongest inside; the body's own \
+         echo varies by {} of its level.",
+        quiet.exp(),
+        percent(-steadiness)
+    );
+    Some(Finding::new(text, None))
 }
 
 /// What a view with a Doppler axis says.

@@ -2,19 +2,21 @@
 //!
 //! The forward model's angles are those of plane waves. A wave from range r deviates from one by π/8 · d_F/r at the edge
 //! of an array of width D, where d_F = 2D²/λ is the Fraunhofer distance. The main lobe loses the square of that deviation,
-//! hence the score compares its square with the customary limit, π/8:
+//! hence the raw value compares its square with the customary limit, π/8:
 //!
 //! ```text
-//! score = φ²/(φ² + (π/8)²) = 1/(1 + (r/d_F)²),   ½ at d_F, 0.8 at half of it, 0.06 at four times of it
+//! raw = φ²/(φ² + (π/8)²) = 1/(1 + (r/d_F)²),   ½ at d_F, 0.8 at half of it, 0.06 at four times of it
+//! nearness = ln(d_F/r)
 //! ```
 //!
 //! Nobody publishes D; the point spread tells it. The main lobe of an evenly weighted array has the standard deviation
-//! σ_θ = 0.488 λ/D (`radar::main_lobe_sigma_bins`), and a tapered array with the same lobe is wider, so that D, d_F and the score
-//! are lower bounds. Each view is judged by its finer angle and its own range; the view with the highest score counts.
+//! σ_θ = 0.488 λ/D (`radar::main_lobe_sigma_bins`), and a tapered array with the same lobe is wider, so that D, d_F and the
+//! raw value are lower bounds. Each view is judged by its finer angle and its own range; the view with the highest value counts.
+//! The score rests on the nearness, which is the raw value's own order.
 
 use super::resolution::{FWHM, Resolution, echo};
 use super::words::{joint, length};
-use super::{Evidence, EvidenceInput, Finding, Place, falling};
+use super::{EvidenceInput, Finding, Found, Measure, Place, falling};
 use crate::body::{Group, Pppr};
 use crate::geometry::{Mat3, Vec3, dot, mat_t_vec, norm, rotation_from_quaternion};
 use crate::labels::Tag;
@@ -22,6 +24,8 @@ use crate::radar::View;
 
 /// σ_θ D/λ of an evenly weighted array: `radar::main_lobe_sigma_bins` of a rectangular window.
 const EVEN_SIGMA_BINS: f64 = 0.487_66;
+/// Distances are held above this, m.
+const NEAREST_M: f64 = 0.01;
 /// The deviation from a plane wave at the array's edge at the Fraunhofer distance, degrees: π/8.
 const EDGE_PHASE_DEG: f64 = 22.5;
 
@@ -38,17 +42,16 @@ struct Seen<'a> {
     joint: usize,
     /// Its distance, m.
     range_m: f64,
-    score: f64,
+    raw: f64,
 }
 
-pub(super) fn judge(input: &EvidenceInput<'_>) -> Evidence {
+pub(super) fn judge(input: &EvidenceInput<'_>) -> Found {
     let wavelength_m = input.problem.radar.wavelength_m();
     let views = input.problem.views.iter();
     let seen: Vec<Seen<'_>> = views.filter_map(|view| look(view, wavelength_m, input.params)).collect();
     // Reversed, because the last of equals would be taken.
-    let Some(worst) = seen.iter().rev().max_by(|a, b| a.score.total_cmp(&b.score)) else {
-        let summary = "The array's width is unknown: no view has an angular point spread.".to_owned();
-        return Evidence { mode: Tag::F2, score: None, summary, findings: Vec::new() };
+    let Some(worst) = seen.iter().rev().max_by(|a, b| a.raw.total_cmp(&b.raw)) else {
+        return Found::unknown(Tag::F2, "The array's width is unknown: no view has an angular point spread.");
     };
     let summary = format!(
         "The nearest joint is {} from the radar of {}, {:.2} times the Fraunhofer distance ({}) where the far field begins.",
@@ -59,7 +62,9 @@ pub(super) fn judge(input: &EvidenceInput<'_>) -> Evidence {
     );
     let mut findings: Vec<Finding> = seen.iter().flat_map(|seen| [nearest(input, seen), smear(input, seen)]).collect();
     findings.extend(widths(&seen, wavelength_m));
-    Evidence { mode: Tag::F2, score: Some(worst.score), summary, findings }
+    let nearness = (worst.fraunhofer_m / worst.range_m.max(NEAREST_M)).ln();
+    let measures = vec![Measure { name: "nearness", value: nearness }];
+    Found { mode: Tag::F2, raw: Some(worst.raw), measures, summary, findings }
 }
 
 fn look<'a>(view: &'a View, wavelength_m: f64, params: &Pppr) -> Option<Seen<'a>> {
@@ -69,8 +74,8 @@ fn look<'a>(view: &'a View, wavelength_m: f64, params: &Pppr) -> Option<Seen<'a>
     let fraunhofer_m = 2.0 * aperture_m * aperture_m / wavelength_m;
     let ranges = params.positions().iter().map(|&p| norm(view.pose.view_from_world(p))).enumerate();
     let (joint, range_m) = ranges.filter(|(_, r)| r.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let score = falling(range_m / fraunhofer_m);
-    score.is_finite().then_some(Seen { view, sigma_rad, aperture_m, fraunhofer_m, joint, range_m, score })
+    let raw = falling(range_m / fraunhofer_m);
+    raw.is_finite().then_some(Seen { view, sigma_rad, aperture_m, fraunhofer_m, joint, range_m, raw })
 }
 
 fn nearest(input: &EvidenceInput<'_>, seen: &Seen<'_>) -> Finding {
@@ -81,7 +86,7 @@ fn nearest(input: &EvidenceInput<'_>, seen: &Seen<'_>) -> Finding {
         joint(input.problem, input.params, seen.joint),
         length(seen.range_m),
         length(seen.fraunhofer_m),
-        EDGE_PHASE_DEG * seen.fraunhofer_m / seen.range_m.max(0.01)
+        EDGE_PHASE_DEG * seen.fraunhofer_m / seen.range_m.max(NEAREST_M)
     );
     Finding::new(text, Some(Place::Joint(seen.joint)))
 }

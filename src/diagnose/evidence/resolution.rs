@@ -6,7 +6,7 @@
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::geometry::{Vec3, add, dot, mat_vec, norm, scale};
-use crate::radar::{AxisKind, View};
+use crate::radar::{Axis, AxisKind, View};
 
 /// Full width at half maximum of a Gaussian of standard deviation 1.
 pub(super) const FWHM: f64 = 2.354_820_045_030_949_3;
@@ -65,7 +65,7 @@ impl Resolution {
     }
 
     fn widths(&self, view: &View, along: &[usize]) -> Vec<f64> {
-        let width = |axis: &crate::radar::Axis| {
+        let width = |axis: &Axis| {
             let bin = |p: Vec3| axis.bin(axis.coordinate(p));
             let sigma = if axis.kind == AxisKind::Doppler {
                 view.psf.doppler_mps / axis.step()
@@ -107,11 +107,42 @@ pub(super) fn joint_bins(view: &View, config: &FitConfig, params: &Pppr, joint: 
     view.axes.iter().map(|axis| axis.bin(coordinate(axis))).collect()
 }
 
+/// The joints on the map of a view, each with its resolution cell.
+pub(super) struct JointCells {
+    shape: Vec<usize>,
+    /// Bin and width in bins along each axis.
+    joints: Vec<Vec<(f64, f64)>>,
+}
+
+impl JointCells {
+    pub(super) fn new(view: &View, config: &FitConfig, params: &Pppr) -> Self {
+        let of_joint = |joint: usize| {
+            let at = joint_bins(view, config, params, joint);
+            let widths = Resolution::new(view, echo(view, config, params, joint)).cells(view);
+            // A place has every velocity: what a joint's own is, a fit hardly knows.
+            let placed =
+                |(axis, width): (&Axis, f64)| if axis.kind == AxisKind::Doppler { f64::INFINITY } else { width };
+            at.into_iter().zip(view.axes.iter().zip(widths).map(placed)).collect()
+        };
+        Self { shape: view.shape(), joints: (0..params.shape().total_joints()).map(of_joint).collect() }
+    }
+
+    /// How far a flat cell is from the nearest joint, in resolution cells; `None` where no joint is on a finite bin.
+    pub(super) fn distance(&self, cell: usize) -> Option<f64> {
+        let at = super::cells::index(&self.shape, cell);
+        let square = |joint: &Vec<(f64, f64)>| {
+            at.iter().zip(joint).map(|(&at, (bin, width))| ((at as f64 - bin) / width).powi(2)).sum::<f64>()
+        };
+        let nearest = self.joints.iter().map(square).fold(f64::INFINITY, f64::min);
+        nearest.is_finite().then(|| nearest.sqrt())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::Pose;
-    use crate::radar::{Axis, PointSpread, Quantity, Spacing};
+    use crate::radar::{PointSpread, Quantity, Spacing};
 
     fn view(axes: Vec<Axis>) -> View {
         let psf = PointSpread { range_m: 0.1, azimuth_rad: 0.05, elevation_rad: 0.0, doppler_mps: 0.2 };

@@ -2,19 +2,28 @@
 //!
 //! A cell is bright in a frame where it exceeds that frame's percentile 100 − κ, or lies in that frame's mask (above the
 //! percentile 100 − τ of the EM region's cells). It is static where it is bright in every one of the last T frames, this
-//! one included. The score is the share of B_ori's cells that are static, averaged over the views:
+//! one included. The raw value is the share of B_ori's cells that are static, averaged over the views:
 //!
 //! ```text
-//! score = mean over views of |static ∩ B_ori| / |B_ori|
+//! raw = mean over views of |static ∩ B_ori| / |B_ori|
 //! ```
 //!
-//! A person who stands still is static too. Therefore the findings say how much of the static part lies on the fitted
-//! joints, and the score does not decide between the two.
+//! A person who stands still is static too, and of one who moves most cells stay bright for half a second. Therefore the
+//! findings say how much of the static part lies on the fitted joints, and the score rests on what is *beside* the body:
+//! the cells of the EM region farther than two resolution cells from every joint, set B. With h_t the maps of the T frames,
+//!
+//! ```text
+//! persistence  = mean over views of Σ_B min_t h_t / Σ_B mean_t h_t       1 where nothing beside the body ever fades
+//! static_level = mean over views of ln(max_B min_t h_t / max h_T within one resolution cell of a joint)
+//! ```
+//!
+//! Noise and sidelobes of who moves fade within five frames (for noise alone it is about 0.3); an echo that was not removed
+//! does not. The second is how much stronger than the body the strongest such echo is.
 
 use super::cells::{largest_patch, members, place};
-use super::resolution::{Resolution, echo, joint_bins};
+use super::resolution::JointCells;
 use super::words::{cell_box, cells, percent};
-use super::{Evidence, EvidenceInput, Finding, Past, Place, STATIC_FRAMES, STATIC_KAPPA_PCT, masks_of, mean};
+use super::{EvidenceInput, Finding, Found, Measure, Past, Place, STATIC_FRAMES, STATIC_KAPPA_PCT, masks_of, mean};
 use crate::labels::Tag;
 use crate::mhp::{Masks, percentile};
 use crate::radar::View;
@@ -30,9 +39,14 @@ struct Seen<'a> {
     counts: [usize; 2],
     /// The largest connected part of the static ones, ascending.
     patch: Vec<usize>,
+    /// Persistence and static level; `None` where nothing lies beside the body, or nothing at all on it.
+    beside: Option<[f64; 2]>,
 }
 
-pub(super) fn judge(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Evidence {
+/// Cells farther than so many resolution cells from every joint are beside the body.
+const BESIDE: f64 = 2.0;
+
+pub(super) fn judge(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Found {
     let frames = past.len() + 1;
     let seen: Vec<Seen<'_>> = (0..input.problem.views.len()).filter_map(|view| look(input, past, view)).collect();
     let share = mean(seen.iter().filter_map(Seen::share));
@@ -45,7 +59,16 @@ pub(super) fn judge(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Evidence {
         }
         Some(share) => format!("{} of the mask is static over {frames} frames{}.", percent(share), mostly_at(&seen)),
     };
-    Evidence { mode: Tag::F1, score: share.filter(|_| enough), summary, findings }
+    let raw = share.filter(|_| enough);
+    let measures = if raw.is_some() { measures(&seen) } else { Vec::new() };
+    Found { mode: Tag::F1, raw, measures, summary, findings }
+}
+
+/// Means over the views that have something beside the body.
+fn measures(seen: &[Seen<'_>]) -> Vec<Measure> {
+    let names = ["persistence", "static_level"].into_iter().enumerate();
+    let of = |k: usize| mean(seen.iter().filter_map(|seen| seen.beside).map(|beside| beside[k]));
+    names.filter_map(|(k, name)| Some(Measure { name, value: of(k)? })).collect()
 }
 
 /// `, most of it at …`: the largest patch of all views.
@@ -68,7 +91,33 @@ fn look<'a>(input: &EvidenceInput<'a>, past: &[Past<'_>], index: usize) -> Optio
     }
     let counts = [&masks.ori, &still].map(|mask| members(mask).len());
     let patch = largest_patch(&view.shape(), &still);
-    Some(Seen { index, view, masks, still, counts, patch })
+    let beside = beside(input, past, index, masks);
+    Some(Seen { index, view, masks, still, counts, patch, beside })
+}
+
+/// Persistence and static level of one view.
+fn beside(input: &EvidenceInput<'_>, past: &[Past<'_>], index: usize, masks: &Masks) -> Option<[f64; 2]> {
+    let now = input.problem.map(index);
+    let maps: Vec<&[f64]> =
+        past.iter().filter_map(|frame| Some(frame.maps.get(index)?.as_ref())).chain(std::iter::once(now)).collect();
+    let joints = JointCells::new(input.problem.views.get(index)?, input.config, input.params);
+    // The least, the mean, and the largest of the least; half of each, because the sum of huge numbers may overflow.
+    let (mut least, mut usual, mut strongest, mut body) = (0.0, 0.0, 0.0_f64, 0.0_f64);
+    for cell in members(&masks.inside) {
+        let Some(distance) = joints.distance(cell) else { continue };
+        let h = || maps.iter().filter_map(|map| map.get(cell)).map(|h| h.max(0.0));
+        if distance <= 1.0 {
+            body = body.max(now.get(cell).copied().unwrap_or(0.0));
+        } else if distance > BESIDE {
+            let low = h().fold(f64::INFINITY, f64::min);
+            least += low / 2.0 / masks.inside.len() as f64;
+            usual += mean(h())? / 2.0 / masks.inside.len() as f64;
+            strongest = strongest.max(low);
+        }
+    }
+    let persistence = least / usual;
+    let level = strongest.max(f64::MIN_POSITIVE).ln() - body.max(f64::MIN_POSITIVE).ln();
+    (persistence.is_finite() && body > 0.0 && level.is_finite()).then_some([persistence, level])
 }
 
 /// The bright cells of a map.
@@ -112,12 +161,25 @@ fn findings(input: &EvidenceInput<'_>, seen: &[Seen<'_>], frames: usize) -> Vec<
             percent(share)
         );
         findings.push(Finding::new(text, seen.place_of(&members(&seen.still))));
+        findings.extend(seen.beside.filter(|_| frames >= STATIC_FRAMES).map(|beside| beside_body(seen.view, beside)));
         if still > 0 {
             findings.extend(patch(seen));
             findings.push(on_joints(input, seen));
         }
     }
     findings
+}
+
+/// How lasting and how strong what lies beside the body is.
+fn beside_body(view: &View, [persistence, level]: [f64; 2]) -> Finding {
+    let db = view.quantity.db_factor() / std::f64::consts::LN_10 * level;
+    let (size, than) = (db.abs(), if db < 0.0 { "below" } else { "above" });
+    let text = format!(
+        "{}: beside the body {} of the echo lasts through {STATIC_FRAMES} frames, at most {size:.0} dB {than} the body's own.",
+        view.array,
+        percent(persistence)
+    );
+    Finding::new(text, None)
 }
 
 /// Where the largest static patch is, and how much of it H_sim leaves unexplained.
@@ -136,21 +198,8 @@ fn patch(seen: &Seen<'_>) -> Option<Finding> {
 
 /// How much of the static part lies within a resolution cell of a joint.
 fn on_joints(input: &EvidenceInput<'_>, seen: &Seen<'_>) -> Finding {
-    let shape = seen.view.shape();
-    let joints: Vec<(Vec<f64>, Vec<f64>)> = (0..input.params.shape().total_joints())
-        .map(|joint| {
-            let at = joint_bins(seen.view, input.config, input.params, joint);
-            let p = echo(seen.view, input.config, input.params, joint);
-            (at, Resolution::new(seen.view, p).cells(seen.view))
-        })
-        .collect();
-    let near = |cell: &usize| {
-        let cell = super::cells::index(&shape, *cell);
-        joints.iter().any(|(at, width)| {
-            let offsets = cell.iter().zip(at).zip(width);
-            offsets.map(|((&cell, at), width)| ((cell as f64 - at) / width).powi(2)).sum::<f64>() <= 1.0
-        })
-    };
+    let joints = JointCells::new(seen.view, input.config, input.params);
+    let near = |cell: &usize| joints.distance(*cell).is_some_and(|distance| distance <= 1.0);
     let still = members(&seen.still);
     let covered: Vec<usize> = still.iter().copied().filter(near).collect();
     let share = covered.len() as f64 / still.len().max(1) as f64;

@@ -4,23 +4,36 @@
 //! they are. With p and q the two maps, each divided by its sum (a near person must not hide that a far one is covered):
 //!
 //! ```text
-//! score = the highest, over pairs of persons, of the lowest, over views that show both, of Σ min(p, q)
+//! raw = the highest, over pairs of persons, of the lowest, over views that show both, of Σ min(p, q)
 //! ```
 //!
 //! The lowest, because one view that keeps two people apart is enough to tell them apart; the findings have every view.
 //! Σ min(p, q) is 1 for equal maps, 0 for maps with no common cell, and one minus their total variation distance; it falls
 //! as the two part. Where the data set annotates more people than are fitted, the labelled boxes on the maps stand in, with
-//! the common part of two boxes as a share of the smaller one. One person alone scores 0.
+//! the common part of two boxes as a share of the smaller one. One person alone has 0.
+//!
+//! **The score does not rest on what is fitted**: who fits one person where three stand has the mode all the more. It rests on
+//! what `people` counts in this frame and those before it, with P the probability of two or more and d the distance on the
+//! floor of the two nearest of the counted places:
+//!
+//! ```text
+//! close_pair = P/(1 + (d/0.5 m)²)
+//! ```
+//!
+//! Arrays that do not part two people half a metre from each other at 3 m (half-value width of the finest azimuth, HuPR's for
+//! example) have a curve of their own (`close_pair_coarse`): their scores stay near the share of the frames with the mode.
 
 use super::cells::{members, place};
+use super::counted::count;
 use super::resolution::{FWHM, Resolution};
 use super::words::{cell_box, length, percent};
-use super::{Evidence, EvidenceInput, Finding, Place};
+use super::{EvidenceInput, Finding, Found, Measure, Past, Place, falling};
 use crate::body::{Group, Pppr, PpprShape};
 use crate::config::{FitConfig, Summation};
-use crate::geometry::{Vec3, add, norm, scale, sub};
+use crate::geometry::{Vec3, add, flat_distance, norm, scale, sub};
 use crate::labels::Tag;
 use crate::mhp::{Precision, simulate};
+use crate::people::Count;
 use crate::radar::View;
 
 /// ε of H_sim (SPEC section 3): what a cell without any echo holds.
@@ -28,16 +41,54 @@ const FLOOR: f64 = 1e-30;
 /// Cells of the common echo above this share of its largest are shown as its place.
 const SHOWN_SHARE: f64 = 0.25;
 
-pub(super) fn judge(input: &EvidenceInput<'_>) -> Evidence {
+/// Two people at this distance are half as close as at none, m.
+const CLOSE_M: f64 = 0.5;
+/// How far away people usually are, m.
+const USUAL_M: f64 = 3.0;
+
+pub(super) fn judge(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Found {
     let persons = input.params.shape().persons;
     let (told, annotated) = annotations(input);
-    let (score, summary, mut findings) = match (persons, annotated) {
+    let (raw, summary, mut findings) = match (persons, annotated) {
         (0 | 1, Some(count)) if count > persons => by_boxes(input, persons, count),
-        (0 | 1, _) => (Some(0.0), "One person is fitted: nobody's echo can cover another's.".to_owned(), Vec::new()),
+        (0 | 1, _) => {
+            (Some(0.0), "One person is fitted: nobody's fitted echo covers another's.".to_owned(), Vec::new())
+        }
         _ => by_maps(input),
     };
+    let (measures, counted) = counted(count(input, past).as_ref(), parts_neighbours(&input.problem.views));
+    let summary = format!("{summary} {}", counted.text);
+    findings.push(counted);
     findings.extend(told);
-    Evidence { mode: Tag::F3, score, summary, findings }
+    Found { mode: Tag::F3, raw, measures, summary, findings }
+}
+
+/// P of two people or more, and the distance of the nearest two places that they could have, m.
+fn nearest_pair(count: &Count) -> Option<(f64, f64)> {
+    let several: f64 = count.probabilities.iter().skip(2).sum();
+    let places = count.seeds(count.people().max(2));
+    let pairs = places.iter().enumerate().flat_map(|(k, a)| places.iter().skip(k + 1).map(move |b| (a, b)));
+    let apart_m = pairs.map(|(a, b)| flat_distance(*a, *b)).fold(f64::INFINITY, f64::min);
+    (several.is_finite() && apart_m.is_finite()).then_some((several, apart_m))
+}
+
+/// Whether a view parts two people [`CLOSE_M`] apart, side by side at [`USUAL_M`].
+fn parts_neighbours(views: &[View]) -> bool {
+    let widths = views.iter().map(|view| view.psf.azimuth_rad).filter(|&sigma| sigma.is_finite() && sigma > 0.0);
+    widths.fold(f64::INFINITY, f64::min) * FWHM * USUAL_M <= CLOSE_M
+}
+
+/// What counting says of several people and of how close they are.
+fn counted(count: Option<&Count>, fine: bool) -> (Vec<Measure>, Finding) {
+    let Some((several, apart_m)) = count.and_then(nearest_pair) else {
+        let text = "How many people these maps show cannot be counted: there is no score.";
+        return (Vec::new(), Finding::new(text, None));
+    };
+    let name = if fine { "close_pair" } else { "close_pair_coarse" };
+    let measures = vec![Measure { name, value: several * falling(apart_m / CLOSE_M) }];
+    let text =
+        format!("Two people or more are counted with probability {several:.2}, the nearest {} apart.", length(apart_m));
+    (measures, Finding::new(text, None))
 }
 
 /// What the labels say of how many there are, and the number that counts.
@@ -67,11 +118,11 @@ fn by_boxes(input: &EvidenceInput<'_>, fitted: usize, annotated: usize) -> Judge
     let views = input.problem.views.iter().zip(input.annotated.map_boxes).enumerate();
     let pairs: Vec<(f64, Finding)> = views.filter_map(|(k, (view, boxes))| closest_boxes(k, view, boxes)).collect();
     let count = format!("{annotated} people are annotated and {fitted} fitted");
-    let Some(score) = pairs.iter().map(|pair| pair.0).min_by(f64::total_cmp) else {
+    let Some(share) = pairs.iter().map(|pair| pair.0).min_by(f64::total_cmp) else {
         return (None, format!("{count}: how much their echoes overlap is unknown."), Vec::new());
     };
-    let summary = format!("{count}: in the view that parts them best, two labelled boxes share {}.", percent(score));
-    (Some(score), summary, pairs.into_iter().map(|pair| pair.1).collect())
+    let summary = format!("{count}: in the view that parts them best, two labelled boxes share {}.", percent(share));
+    (Some(share), summary, pairs.into_iter().map(|pair| pair.1).collect())
 }
 
 /// The two boxes of a view that share most.
@@ -108,12 +159,12 @@ fn by_maps(input: &EvidenceInput<'_>) -> Judged {
             alone[a].iter().zip(&alone[b]).map(|(p, q)| common(p.as_ref()?, q.as_ref()?)).collect();
         Some((shares.iter().copied().flatten().min_by(f64::total_cmp)?, a, b, shares))
     });
-    let Some((score, a, b, shares)) = judged.max_by(|x, y| x.0.total_cmp(&y.0)) else {
+    let Some((share, a, b, shares)) = judged.max_by(|x, y| x.0.total_cmp(&y.0)) else {
         return (None, "No view shows the echoes of two of the fitted people.".to_owned(), Vec::new());
     };
     let apart_m = norm(sub(centre(input.params, a), centre(input.params, b)));
     let pair = format!("Persons {} and {}, {} apart,", a + 1, b + 1, length(apart_m));
-    let summary = format!("{pair} share {} of their echo in the view that parts them best.", percent(score));
+    let summary = format!("{pair} share {} of their echo in the view that parts them best.", percent(share));
     let views = input.problem.views.iter().enumerate().zip(shares);
     let findings = views.map(|((k, view), share)| {
         let apart = apart(view, input.params, a, b);
@@ -127,7 +178,7 @@ fn by_maps(input: &EvidenceInput<'_>) -> Judged {
         };
         Finding::new(format!("{}: they share {} of their echo{at}; {apart}.", view.array, percent(share)), overlap)
     });
-    (Some(score), summary, findings.collect())
+    (Some(share), summary, findings.collect())
 }
 
 /// The map of one person alone in each view, divided by its sum; `None` where the view does not show them.

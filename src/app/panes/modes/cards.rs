@@ -11,8 +11,9 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
     let session = shared.session;
     ui.horizontal(|ui| {
         ui.label(RichText::new("Evidence").font(theme::strong(12.0))).on_hover_text(
-            "What the numbers say for each failure mode: 0 nothing speaks for it, 1 everything does. Evidence, not a \
-             verdict: the tag is yours.",
+            "The probability of each failure mode, learned from simulated frames: 0.5 is even odds where about one frame \
+             in eight has the mode. The last finding of a card says how well it is told. Evidence, not a verdict: the tag is \
+             yours.",
         );
         if session.fit.is_running() || session.evidence_is_stale() {
             let text = if session.fit.is_running() { "of the last pause" } else { "gathering…" };
