@@ -166,6 +166,14 @@ fn who_only_reads_leaves_the_data_set_as_it_is() {
         assert_eq!(store.annotators().count(), usize::from(labelled));
         assert!(state(&data) == before, "opening changed the data set");
     }
+    // `info` tells what is wrong with the journals, and touches them as little.
+    let own = std::fs::read_to_string(data.join("mhp-labels/ada.labels.jsonl")).unwrap();
+    std::fs::write(data.join("mhp-labels/eve.labels.jsonl"), own).unwrap();
+    let before = state(&data);
+    let told = Command::new(env!("CARGO_BIN_EXE_mhp-inspector")).arg("info").arg(&data).output().unwrap().stdout;
+    let told = String::from_utf8(told).unwrap();
+    assert!(told.contains("labels note ") && told.contains("only ada.labels.jsonl speaks"), "{told}");
+    assert!(state(&data) == before);
 }
 
 #[test]

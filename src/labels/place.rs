@@ -9,7 +9,7 @@
 use super::LabelError;
 use crate::folders;
 use sha2::{Digest as _, Sha256};
-use std::io::Write as _;
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -40,11 +40,10 @@ impl LabelPlace {
     pub fn to_read(root: &Path, fingerprint: &str) -> Self {
         let user = folders::user_data().map(|folder| folder.join("labels").join(fingerprint));
         let beside = beside(root);
+        let unlisted = std::fs::read_dir(&beside).is_err_and(|reason| reason.kind() != ErrorKind::NotFound);
         match user {
-            // Something else in the place of the folder: that is why labels would lie elsewhere.
-            Some(user) if beside.symlink_metadata().is_ok() && !beside.is_dir() => {
-                Self { folder: user, also: vec![beside], beside_data: false, reason: None }
-            }
+            // Something else in the place of the folder, or one that is closed: that is why labels would lie elsewhere.
+            Some(user) if unlisted => Self { folder: user, also: vec![beside], beside_data: false, reason: None },
             user => Self { folder: beside, also: user.into_iter().collect(), beside_data: true, reason: None },
         }
     }

@@ -69,8 +69,8 @@ pub enum TableError {
     },
     /// It is a journal where a table was expected.
     #[error(
-        "{path}: is a journal, not a table: it counts as soon as it lies in the data set's folder of labels; or make a \
-         table of it with `labels export`",
+        "{path}: is a journal, not a table: it counts as soon as it lies in the data set's folder of labels under its \
+         own name; or make a table of it with `labels export`",
         path = path.display()
     )]
     IsJournal {

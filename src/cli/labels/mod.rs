@@ -14,7 +14,8 @@ use std::process::ExitCode;
 /// Shown under the options of `labels --help`.
 pub(super) const HELP: &str = "\
 Labels lie beside the data, in mhp-labels/ of a folder or <file>.mhp-labels/ of a file, one journal an annotator; in the
-user's data folder where nothing can be written beside the data.
+user's data folder where nothing can be written beside the data. Only X's own journal speaks for X: what other files say in
+X's name counts where that journal says nothing of a frame, and is told.
 
 Examples:
   mhp-inspector labels tag data/mmvr --annotator anna --frame d1s1/000/00383 --add F2
