@@ -344,20 +344,19 @@ fn radars() -> impl Strategy<Value = RadarConfig> {
 }
 
 /// Start, three steps, maps, masks and evidence of a problem: finite, or an error that says something.
-fn fitted(problem: &Arc<Problem>, config: FitConfig, precision: Precision, earlier: &[&[f64]]) -> Result<(), String> {
-    let start = begin(problem, &config).map_err(|error| error.to_string())?.initialisation.params;
+fn fitted(problem: &Arc<Problem>, config: &FitConfig, precision: Precision, earlier: &[&[f64]]) -> Result<(), String> {
+    let start = begin(problem, config).map_err(|error| error.to_string())?.initialisation.params;
     assert!(start.is_finite(), "{start:?}");
-    let mut fitter = Fitter::new(Arc::clone(problem), config, precision, start).map_err(|error| error.to_string())?;
+    let mut fitter = Fitter::new(Arc::clone(problem), *config, precision, start).map_err(|error| error.to_string())?;
     for _ in 0..3 {
         let report = fitter.step().map_err(|error| error.to_string())?;
         assert!(report.loss.is_finite() && report.iou.iter().flatten().all(|iou| (0.0..=1.0).contains(iou)));
     }
-    let simulated = simulate(problem, &config, precision, fitter.params());
+    let simulated = simulate(problem, config, precision, fitter.params());
     let masks: Vec<_> = simulated.iter().enumerate().map(|(k, map)| masks(fitter.objective(), k, map)).collect();
     let before = [EarlierFrame { index: 0, maps: earlier.to_vec() }];
     let annotated = Annotated::default();
-    let input =
-        EvidenceInput { problem, config: &config, params: fitter.params(), masks: &masks, before: &before, annotated };
+    let input = EvidenceInput { problem, config, params: fitter.params(), masks: &masks, before: &before, annotated };
     for mode in evidence(&input) {
         assert!(mode.score.is_none_or(|score| (0.0..=1.0).contains(&score)), "{mode:?}");
     }
@@ -409,7 +408,7 @@ proptest! {
                 let problem = Arc::new(problem);
                 let preset = if recommended { Preset::Recommended } else { Preset::Paper };
                 for precision in [Precision::F64, Precision::F32] {
-                    told.push(fitted(&problem, preset.config(), precision, &of(1)));
+                    told.push(fitted(&problem, &preset.config(), precision, &of(1)));
                 }
                 let filled: Vec<&[f64]> = (0..views.len()).map(|k| problem.map(k)).collect();
                 told.push(counted(&views, [&filled, &of(0)]));

@@ -32,10 +32,8 @@ pub(super) fn amplitudes_of(map: &[f64], quantity: Quantity, unit: i32) -> Vec<f
     let factors = [by / 2, by - by / 2].map(|log2| f64::from(-log2).exp2());
     let held = |x: f64| ((x * factors[0] * factors[1]) as f32).max(0.0);
     let most = (LARGEST as f32).exp2();
-    match squared {
-        false => map.iter().map(|&x| held(x).min(most)).collect(),
-        true => map.iter().map(|&x| held(x).sqrt().min(most)).collect(),
-    }
+    let amplitude = |x: f64| if squared { held(x).sqrt() } else { held(x) };
+    map.iter().map(|&x| amplitude(x).min(most)).collect()
 }
 
 /// Where a plane lies in a map.

@@ -41,7 +41,7 @@ pub struct Point {
 pub struct Scan {
     /// Detections in metres, strongest excess first.
     pub points: Vec<Point>,
-    /// Whether they are of what changed, not of the map itself: false for the first frame of a sequence.
+    /// Whether they are of what changed, not of the map itself: false where there was no other frame to compare with.
     pub moving: bool,
     /// The clusters of its points and of those of the frames before, and how many people each is.
     pub(super) clusters: Vec<Counted>,

@@ -105,7 +105,7 @@ impl<'a> Window<'a> {
         let after = (frame + 1)..(frame + 1 + COMPARED).min(dataset.len());
         for other in after.rev().filter(|&other| dataset.sequence(other) == sequence) {
             let Ok(maps) = dataset.recent_maps(other) else { continue };
-            if let Ok((scan, _)) = self.count(maps.to_vec(), &self.ahead) {
+            if let Ok((scan, _)) = self.count(&filled(maps.to_vec()), &self.ahead) {
                 self.ahead.push_front(scan);
             }
         }
@@ -113,8 +113,13 @@ impl<'a> Window<'a> {
 
     /// Counts the next frame; one that fails ends what is known of the frames before.
     pub(super) fn push(&mut self, maps: Result<Vec<Heatmap>, String>) -> Result<Count, String> {
-        let known = if self.scans.is_empty() { &self.ahead } else { &self.scans };
-        let counted = maps.and_then(|maps| self.count(maps, known));
+        let counted = maps.and_then(|maps| {
+            let maps = filled(maps);
+            let (scan, alone) = self.count(&maps, &self.scans)?;
+            // Only its own count knows the frames after it: those that follow are told of it what the counter was taught with.
+            let ahead = self.scans.is_empty() && !self.ahead.is_empty();
+            Ok((scan, if ahead { self.count(&maps, &self.ahead)?.1 } else { alone }))
+        });
         match counted {
             Ok((scan, count)) => {
                 self.scans.push_front(scan);
@@ -129,17 +134,22 @@ impl<'a> Window<'a> {
         }
     }
 
-    fn count(&self, mut maps: Vec<Heatmap>, known: &VecDeque<Scan>) -> Result<(Scan, Count), String> {
-        for map in &mut maps {
-            // A map without any number is the counter's error: it names the array.
-            let _ = fill_missing(&mut map.data, &map.shape);
-        }
+    fn count(&self, maps: &[Heatmap], known: &VecDeque<Scan>) -> Result<(Scan, Count), String> {
         let maps: Vec<&[f64]> = maps.iter().map(|map| map.data.as_slice()).collect();
         let before: Vec<&Scan> = known.iter().collect();
         let scan = self.counter.scan(&maps, &before).map_err(|error| error.to_string())?;
         let count = self.counter.count(&scan, &before);
         Ok((scan, count))
     }
+}
+
+/// The maps without missing cells.
+fn filled(mut maps: Vec<Heatmap>) -> Vec<Heatmap> {
+    for map in &mut maps {
+        // A map without any number is the counter's error: it names the array.
+        let _ = fill_missing(&mut map.data, &map.shape);
+    }
+    maps
 }
 
 /// Places, and who is who, in the order of the frames.

@@ -139,7 +139,7 @@ impl Layout {
 
     /// H of each spatial cell in shares of `largest`, and the full cell each was taken from where that is another.
     pub(super) fn spatial(&self, map: &[f64], largest: f64) -> (Vec<f32>, Vec<u32>) {
-        let relative = |h: f64| ((h / largest) as f32).max(FAINTEST).min(1.0 / FAINTEST);
+        let relative = |h: f64| ((h / largest) as f32).clamp(FAINTEST, 1.0 / FAINTEST);
         if self.axes.len() == self.view.axes.len() {
             return (map.iter().map(|&h| relative(h)).collect(), Vec::new());
         }
