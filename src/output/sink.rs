@@ -65,6 +65,7 @@ impl<W: Write + Seek> Seek for Swallowing<W> {
 
 #[cfg(test)]
 mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests")]
     use super::*;
     use std::io::Cursor;
 
