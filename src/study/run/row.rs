@@ -121,9 +121,7 @@ impl Cell {
     /// In a CSV; numbers read back exactly, what is unknown is empty.
     pub(super) fn text(&self) -> String {
         match self {
-            // Labels of variants may be numbers.
-            Self::Text(Some(text)) if text.parse::<f64>().is_err() => to_cell(text).into_owned(),
-            Self::Text(text) => text.clone().unwrap_or_default(),
+            Self::Text(text) => to_cell(text.as_deref().unwrap_or_default()).into_owned(),
             Self::Whole(n) => n.map(|n| n.to_string()).unwrap_or_default(),
             Self::Number(x) => x.map(|x| x.to_string()).unwrap_or_default(),
             Self::Flag(flag) => flag.map(|flag| flag.to_string()).unwrap_or_default(),
