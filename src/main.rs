@@ -3,7 +3,7 @@
 use cap::Cap;
 use clap::Parser;
 use mhp_inspector::cli::bench::{Meter, count_bytes_with};
-use mhp_inspector::cli::{Cli, EXIT_BAD_INPUT, WindowArgs, begin_again, run};
+use mhp_inspector::cli::{Cli, EXIT_BAD_INPUT, WindowArgs, allow_outside, begin_again, run};
 use mhp_inspector::{escape, output};
 use std::alloc::System;
 use std::io::IsTerminal as _;
@@ -37,6 +37,7 @@ fn main() -> ExitCode {
     };
     begin_again(cli.command.as_ref());
     output::allow_into_data(cli.into_data);
+    allow_outside(cli.allow_outside);
     let done = match cli.command {
         Some(command) => run(command),
         None => open_window(cli.window),

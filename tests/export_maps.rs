@@ -324,16 +324,20 @@ fn a_manifest_that_leaves_its_folder_makes_nothing_written_there() {
         std::fs::write(theirs.join("dataset.toml"), manifest).unwrap();
         let before = (files(&mine), files(&theirs));
         for out in [&theirs, &mine, &mine.join("deep/er")] {
-            let refused = export(&theirs, out, &["--iterations", "1", "--what", "heatmap"]);
+            let refused = export(&theirs, out, &["--iterations", "1", "--what", "heatmap", "--allow-outside"]);
             let told = String::from_utf8_lossy(&refused.stderr).into_owned();
             assert_eq!(refused.status.code(), Some(2), "{pattern}: {told}");
             assert!(told.contains("lies in the data set") && told.contains("--into-data"), "{told}");
         }
         assert!((files(&mine), files(&theirs)) == before, "{pattern}: nothing was touched");
+        let refused = export(&theirs, &folder.path().join("out"), &["--iterations", "1"]);
+        let told = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(2), "{pattern}: {told}");
+        assert!(told.contains("leads out of the data set's folder") && told.contains("--allow-outside"), "{told}");
         // Beside the two, where `../mine` from the heatmaps' folder would be a place of its own.
         let out = folder.path().join("out");
         std::fs::create_dir_all(out.join("mine")).unwrap();
-        exported(&theirs, &out, &["--iterations", "1", "--what", "heatmap,pppr"]);
+        exported(&theirs, &out, &["--iterations", "1", "--what", "heatmap,pppr", "--allow-outside"]);
         assert!((files(&mine), files(&theirs)) == before, "{pattern}: nothing was touched");
         assert_eq!(files(&out.join("mine")).len(), 0);
         let copy = Dataset::open(&out.join("heatmap"), &Progress::new()).unwrap();

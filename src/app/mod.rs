@@ -48,6 +48,8 @@ pub struct Begin {
     pub config: Option<FitConfig>,
     /// A session file, instead of all that.
     pub session: Option<PathBuf>,
+    /// Whether manifests may name frames outside their own folder.
+    pub allow_outside: bool,
 }
 
 /// The application behind the window.
@@ -86,7 +88,8 @@ impl InspectorApp {
         }
         session.apply(Command::SetAnnotator(annotator));
         let ctx = cc.egui_ctx.clone();
-        let runtime = Runtime::new(Arc::new(move || ctx.request_repaint()), Some(Arc::new(overlay::pick)));
+        let runtime = Runtime::new(Arc::new(move || ctx.request_repaint()), Some(Arc::new(overlay::pick)))
+            .allow_outside(begin.allow_outside);
         let mut app = Self {
             session,
             runtime,

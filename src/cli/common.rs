@@ -11,6 +11,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{ErrorKind, IsTerminal as _, Write as _};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The two precisions as typed.
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -36,6 +37,19 @@ pub(super) fn presets() -> impl TypedValueParser<Value = Preset> {
     PossibleValuesParser::new(named).try_map(|name| Preset::named(&name).ok_or("no such preset"))
 }
 
+/// Whether manifests may name frames outside their own folder.
+static ALLOW_OUTSIDE: AtomicBool = AtomicBool::new(false);
+
+/// Says for the whole process whether manifests may name frames outside their own folder.
+pub fn allow_outside(allowed: bool) {
+    ALLOW_OUTSIDE.store(allowed, Ordering::Relaxed);
+}
+
+/// What [`allow_outside`] said.
+pub(super) fn outside_allowed() -> bool {
+    ALLOW_OUTSIDE.load(Ordering::Relaxed)
+}
+
 /// Opens `path` as it says itself, or as `manifest` says.
 ///
 /// # Errors
@@ -43,7 +57,7 @@ pub(super) fn presets() -> impl TypedValueParser<Value = Preset> {
 pub(super) fn open(path: &Path, manifest: Option<&Path>) -> anyhow::Result<Dataset> {
     let progress = Progress::new();
     let manifest = manifest.map(Manifest::from_file).transpose()?;
-    let options = OpenOptions { manifest: manifest.as_ref(), allow_outside: false };
+    let options = OpenOptions { manifest: manifest.as_ref(), allow_outside: outside_allowed() };
     Ok(Dataset::open_with(path, options, &progress)?)
 }
 

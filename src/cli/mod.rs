@@ -22,6 +22,8 @@ mod train_evidence;
 #[cfg(feature = "train")]
 mod train_limbs;
 
+pub use common::allow_outside;
+
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -60,6 +62,9 @@ pub struct Cli {
     /// Let results be written into the data set's own folder, which is refused otherwise. Inputs are never replaced.
     #[arg(long, global = true)]
     pub into_data: bool,
+    /// Open data sets whose manifest names frames outside its own folder.
+    #[arg(long, global = true)]
+    pub allow_outside: bool,
     /// What to do; without a subcommand the window opens.
     #[command(subcommand)]
     pub command: Option<Command>,
@@ -121,6 +126,7 @@ impl WindowArgs {
             study: self.study,
             config: self.config.as_deref().map(crate::config::FitConfig::from_file).transpose()?,
             session: self.session,
+            allow_outside: common::outside_allowed(),
         })
     }
 }

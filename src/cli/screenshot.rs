@@ -1,6 +1,6 @@
 //! `screenshot`: the real window, drawn offscreen after a number of iterations.
 
-use super::common::config;
+use super::common::{config, outside_allowed};
 use crate::app::{Begin, InspectorApp, PaneKind};
 use crate::output::{Sink, replace_file};
 use crate::session::{Command, FitStatus, LabelStatus, StrataStatus, ThemeChoice};
@@ -126,6 +126,7 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
         study: args.study.clone(),
         config: Some(config(args.config.as_deref())?),
         session: args.session.clone(),
+        allow_outside: outside_allowed(),
         ..Begin::default()
     };
     let pane = args.pane.as_deref().map(pane_called).transpose()?;
