@@ -708,10 +708,10 @@ fn a_score_rises_with_every_measure_and_stays_within_bounds() {
             let scores: Vec<f64> = (-5..=25).map(at).collect();
             assert!(scores.windows(2).all(|pair| pair[0] <= pair[1]), "{}: {scores:?}", curve.mode);
             assert!(scores.iter().all(|score| *score > 0.0 && *score < 1.0), "{}: {scores:?}", curve.mode);
-            assert_eq!(
-                (scores[0], scores[30]),
-                (scores[5], scores[25]),
-                "nothing is claimed beyond what was learned from"
+            let beyond = [(scores[0] - scores[5]).abs(), (scores[30] - scores[25]).abs()];
+            assert!(
+                beyond.iter().all(|change| *change < 1e-9),
+                "nothing is claimed beyond what was learned from: {scores:?}"
             );
         }
         assert_eq!(curve.probability(&[]), None, "what is not known has no score");

@@ -10,6 +10,6 @@ pub use evidence::{
     Input, Measure, Place, STATIC_FRAMES, STATIC_KAPPA_PCT, evidence, with_share,
 };
 #[cfg(feature = "train")]
-pub use evidence::{Example, chosen_examples, learn_curves};
+pub use evidence::{Example, Measured, chosen_examples, learn_curves};
 pub use metrics::{JointErrors, joint_errors, majpe_mm, pa_majpe_mm};
 pub use reprojection::{Camera, Reprojection, map_box_coverage, reprojection};

@@ -9,7 +9,7 @@ use super::batch::run;
 use super::evidence::masks_around;
 use crate::body::Skeleton;
 use crate::config::{FitConfig, Preset as Settings};
-use crate::diagnose::{Annotated, EarlierFrame, EvidenceInput, Example, Measure, STATIC_FRAMES, evidence};
+use crate::diagnose::{Annotated, EarlierFrame, EvidenceInput, Example, Measured, STATIC_FRAMES, evidence};
 use crate::labels::Tag;
 use crate::mhp::{FitError, Fitter, Precision, Problem};
 use crate::simulate::{Layout, Options, Preset, Recording, SimulateError};
@@ -146,11 +146,7 @@ fn problem(recording: &Recording, skeleton: Skeleton, frames: &[Vec<Vec<f64>>]) 
 }
 
 /// Fits a problem and measures what speaks for each mode.
-fn measured(
-    problem: &Arc<Problem>,
-    frames: &[Vec<Vec<f64>>],
-    config: &FitConfig,
-) -> Result<[Option<(f64, Vec<Measure>)>; 4], FitError> {
+fn measured(problem: &Arc<Problem>, frames: &[Vec<Vec<f64>>], config: &FitConfig) -> Result<Measured, FitError> {
     let initial = begin(problem, config)?.initialisation.params;
     let mut fitter = Fitter::new(Arc::clone(problem), *config, Precision::F32, initial.clone())?;
     run(&mut fitter, |_, _| {})?;

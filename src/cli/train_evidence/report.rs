@@ -2,6 +2,7 @@
 
 use crate::diagnose::{Calibration, Curve, Figures, chosen_examples};
 use crate::labels::Tag;
+use crate::simulate::Layout;
 use crate::study::calibrate::{FITS, Judged, LAYOUTS, SCENARIOS};
 use std::fmt::Write as _;
 
@@ -134,7 +135,7 @@ pub(super) fn tables(table: &Calibration, held_out: &[Judged]) -> String {
         let _ = writeln!(text, "| | | | after | {}", figures(&curve.after));
     }
     text += "\nAUC after, by layout and by fit:\n\n| mode |";
-    let columns = LAYOUTS.map(|layout| layout.word()).into_iter().chain(FITS);
+    let columns = LAYOUTS.map(Layout::word).into_iter().chain(FITS);
     let columns: Vec<&str> = columns.collect();
     let _ = writeln!(text, " {} |\n|---|{}", columns.join(" | "), "---|".repeat(columns.len()));
     for curve in &table.curves {

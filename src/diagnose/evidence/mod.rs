@@ -32,7 +32,7 @@ mod words;
 
 pub use calibration::{Calibration, CalibrationError, Curve, Figures, FrameSet, Input, with_share};
 #[cfg(feature = "train")]
-pub use train::{Example, chosen as chosen_examples, learn as learn_curves};
+pub use train::{Example, Measured, chosen as chosen_examples, learn as learn_curves};
 
 use crate::body::Pppr;
 use crate::config::FitConfig;

@@ -20,6 +20,9 @@ const STILL: f64 = 1e-9;
 /// Frames that a step of an isotonic curve has at least.
 const STEP_FRAMES: f64 = 20.0;
 
+/// The uncalibrated score and the measures of F1 to F4; `None` where the mode cannot be judged.
+pub type Measured = [Option<(f64, Vec<Measure>)>; 4];
+
 /// A judged fit whose modes are known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Example {
@@ -27,8 +30,8 @@ pub struct Example {
     pub seed: u64,
     /// The mode that it was made with.
     pub made_with: Option<Tag>,
-    /// F1 to F4: the uncalibrated score and the measures; `None` where the mode cannot be judged.
-    pub judged: [Option<(f64, Vec<Measure>)>; 4],
+    /// What was measured.
+    pub judged: Measured,
 }
 
 impl Example {
