@@ -133,13 +133,14 @@ impl<'a> HeatmapExport<'a> {
             let Ok(forms) = forms_of(&file) else { continue };
             for (array, form) in file.arrays.iter().zip(&forms) {
                 let Some(view) = self.dataset.info().views.get(array.view) else { continue };
-                let form =
-                    form.stack_axis(view.axes.len()).map_or_else(|| form.clone(), |axis| form.with_axis(axis, 1));
+                let one = |axis| form.with_axis(axis, 1);
                 let fits = match array.slot {
-                    Slot::Numbers => form.fits(view.cells()),
+                    Slot::Numbers => {
+                        form.stack_axis(view.axes.len()).map_or_else(|| form.clone(), one).fits(view.cells())
+                    }
                     Slot::Amplitude => form.fits_amplitudes(view.cells(), HUPR_LEVELS),
                 };
-                fits.map_err(|reason| wrong(&file, array, &form, reason))?;
+                fits.map_err(|reason| wrong(&file, array, form, reason))?;
             }
         }
         Ok(())
