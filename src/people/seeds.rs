@@ -3,7 +3,7 @@
 //! Which cluster stands for how many people is the most probable way to share the number among them; a cluster of several
 //! is cut by hierarchical clustering (Ward). Where there are not enough clusters, detections that belong to none fill up.
 
-use super::cluster::split;
+use super::cluster::{ClusterOptions, split};
 use super::counter::{Count, Counted};
 use super::network::CLASSES;
 use super::scan::Point;
@@ -13,6 +13,8 @@ use crate::geometry::{Vec3, add, flat_distance};
 const SKIN_M: f64 = 0.10;
 /// Two people's middles are not nearer, m.
 const APART_M: f64 = 0.45;
+/// Rounds in which places that are too near to each other are moved: one would do for two people.
+const PASSES: usize = 8;
 /// What a share that the classifier excludes still counts.
 const LEAST: f64 = 1e-6;
 /// Where somebody is looked for when nothing at all was detected, m.
@@ -44,6 +46,7 @@ impl Count {
         while places.len() < people {
             places.push(places.last().map_or(NOWHERE, |last| add(*last, [0.0, BESIDE_M, 0.0])));
         }
+        stand_apart(&mut places);
         places
     }
 
@@ -65,6 +68,36 @@ impl Count {
             best = next;
         }
         best.into_iter().rev().flatten().next().map_or_else(Vec::new, |(_, shares)| shares)
+    }
+}
+
+/// Moves places that are nearer to each other than two bodies can stand apart about their middle, along the line between them:
+/// the halves of a cluster that is cut in two may be a hand's breadth apart.
+fn stand_apart(places: &mut [Vec3]) {
+    let least = ClusterOptions::default().one_body_m;
+    for _ in 0..PASSES {
+        let mut moved = false;
+        for a in 0..places.len() {
+            for b in 0..a {
+                let (one, other) = (places[a], places[b]);
+                let apart = flat_distance(one, other);
+                if apart >= least * (1.0 - 1e-9) {
+                    continue;
+                }
+                // Across, where nothing says which way.
+                let way =
+                    if apart > 1e-6 { [(one[0] - other[0]) / apart, (one[1] - other[1]) / apart] } else { [0.0, 1.0] };
+                let step = 0.5 * (least - apart);
+                (0..2).for_each(|k| {
+                    places[a][k] += step * way[k];
+                    places[b][k] -= step * way[k];
+                });
+                moved = true;
+            }
+        }
+        if !moved {
+            return;
+        }
     }
 }
 
@@ -128,6 +161,23 @@ mod tests {
         assert!(near(&three, 3.1, 0.05) && near(&three, 3.1, 0.65) && near(&three, 2.1, -1.05), "{three:?}");
         let two = scene().seeds(2);
         assert!(near(&two, 2.1, -1.05) && near(&two, 3.1, 0.35), "one each: {two:?}");
+    }
+
+    #[test]
+    fn nobody_stands_in_another() {
+        let crowd = vec![point(3.0, 0.0), point(3.0, 0.05), point(3.0, 0.2), point(3.05, 0.25)];
+        let count = Count {
+            probabilities: [0.0, 0.0, 1.0, 0.0, 0.0],
+            clusters: vec![counted(crowd.clone(), [0.0, 0.1, 0.9, 0.0, 0.0])],
+            loose: Vec::new(),
+        };
+        let places = count.seeds(2);
+        assert!(flat_distance(places[0], places[1]) > 0.2999, "{places:?}");
+        let mean = 0.5 * (places[0][1] + places[1][1]);
+        assert!((mean - 0.125).abs() < 0.03, "about where the cluster is: {places:?}");
+        for (k, a) in count.seeds(4).iter().enumerate() {
+            assert!(count.seeds(4).iter().skip(k + 1).all(|b| flat_distance(*a, *b) > 0.29));
+        }
     }
 
     #[test]
