@@ -24,7 +24,7 @@ impl<W: Write + Seek> Swallowing<W> {
 
     /// Everything is written; the first failure.
     pub(super) fn finish(mut self) -> Result<W> {
-        self.keep(|inner| inner.flush());
+        self.keep(Write::flush);
         self.failed.map_or(Ok(self.inner), Err)
     }
 

@@ -116,7 +116,8 @@ impl<'a> HeatmapExport<'a> {
 
     /// Readers of XRF55 expect all maps of a file.
     fn check_whole_stacks(&self, frames: &Range<usize>) -> Result<(), ExportError> {
-        let part = self.stack_length().is_some_and(|n| frames.start % n != 0 || frames.end % n != 0);
+        let part =
+            self.stack_length().is_some_and(|n| !(frames.start.is_multiple_of(n) && frames.end.is_multiple_of(n)));
         let (steps, root) = (XRF55_STEPS, self.dataset.info().root.clone());
         if part { Err(ExportError::Part { steps, frames: frames.clone(), path: root }) } else { Ok(()) }
     }
