@@ -242,7 +242,10 @@ fn end(failures: &BTreeMap<usize, String>, frames: usize, args: &ExportArgs) -> 
         1 => complain(&format!("error: {why}")),
         _ if done == 0 => complain(&format!("error: none of {frames} frames could be exported; the first: {why}")),
         _ => {
-            complain(&format!("warning: {} of {frames} frames could not be exported; the first: {why}", failures.len()))
+            complain(&format!(
+                "warning: {} of {frames} frames could not be exported; the first: {why}",
+                failures.len()
+            ));
         }
     }
     if done > 0 && args.wants(What::Heatmap) {

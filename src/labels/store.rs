@@ -269,7 +269,7 @@ impl LabelStore {
                 if let Some(acts) = &mut acts {
                     acts.push((stamp, (*record).clone()));
                 }
-                fold(people, lines, Place { span, stamp, now }, record);
+                fold(people, lines, &Place { span, stamp, now }, record);
             });
             *refused = found.as_ref().err().map(ToString::to_string);
             match found {
@@ -351,8 +351,8 @@ struct Place {
     now: i64,
 }
 
-fn fold(people: &mut BTreeMap<String, Person>, lines: &mut Vec<LineAt>, place: Place, record: Box<Record>) {
-    let Place { span, stamp, now } = place;
+fn fold(people: &mut BTreeMap<String, Person>, lines: &mut Vec<LineAt>, place: &Place, record: Box<Record>) {
+    let &Place { span, stamp, now } = place;
     if !people.contains_key(&record.annotator) {
         people.insert(record.annotator.clone(), Person::default());
     }
@@ -405,7 +405,7 @@ pub fn read_journal(path: &Path) -> Result<Vec<Record>, LabelError> {
     let file = open_to_read(path)?;
     tail.look_in(&file, |span, record| {
         let stamp = Stamp { own: true, order_ms: order_ms(&record), folder: 0, file: 0 };
-        fold(&mut people, &mut lines, Place { span, stamp, now }, record);
+        fold(&mut people, &mut lines, &Place { span, stamp, now }, record);
     })?;
     tail.warnings().for_each(|warning| tracing::warn!("{warning}"));
     let people: BTreeMap<String, Person> = people;

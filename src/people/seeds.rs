@@ -170,6 +170,7 @@ mod tests {
             probabilities: [0.0, 0.0, 1.0, 0.0, 0.0],
             clusters: vec![counted(crowd.clone(), [0.0, 0.1, 0.9, 0.0, 0.0])],
             loose: Vec::new(),
+            alone: false,
         };
         let places = count.seeds(2);
         assert!(flat_distance(places[0], places[1]) > 0.2999, "{places:?}");

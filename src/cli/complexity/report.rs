@@ -49,7 +49,7 @@ fn hardest(dataset: &Dataset, complexity: &Complexity, text: &mut String) {
     let lines: Vec<(String, &FrameComplexity)> = order
         .iter()
         .take(HARDEST)
-        .filter_map(|&(_, i)| Some((one_line(&dataset.frame_name(i)).into_owned(), complexity.frame(i)?)))
+        .filter_map(|&(_, i)| Some((one_line(dataset.frame_name(i)).into_owned(), complexity.frame(i)?)))
         .collect();
     let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).max("the hardest".len());
     let head = ["hardness", "peaks", "static", "human"].map(right).concat();

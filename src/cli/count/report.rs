@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// A line a frame, then how often the count is the annotated one.
 pub(super) fn table(dataset: &Dataset, rows: &[FrameCount]) -> String {
-    let name = |row: &FrameCount| one_line(&dataset.frame_name(row.frame)).into_owned();
+    let name = |row: &FrameCount| one_line(dataset.frame_name(row.frame)).into_owned();
     let width = rows.iter().map(|row| name(row).chars().count()).max().unwrap_or(0).max("frame".len());
     let mut text = format!("{:<width$}  people      p  annotated  places (x y z, m)\n", "frame");
     for row in rows {

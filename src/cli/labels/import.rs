@@ -148,7 +148,9 @@ fn sheets(args: &Args, frames: &Frames<'_>, views: &[View]) -> anyhow::Result<Sh
             }
         }
     }
-    ahead.iter().for_each(|warning| tracing::warn!("{warning}"));
+    for warning in &ahead {
+        tracing::warn!("{warning}");
+    }
     Ok(sheets)
 }
 

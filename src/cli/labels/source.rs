@@ -35,7 +35,9 @@ pub(super) fn is_table(path: &Path) -> bool {
 /// Where the journals cannot be read.
 pub(super) fn acts_of(dataset: &Dataset) -> anyhow::Result<Vec<Record>> {
     let (acts, warnings) = place_acts(&LabelPlace::to_read(&dataset.info().root, dataset.fingerprint()))?;
-    warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
+    for warning in warnings {
+        tracing::warn!("{warning}");
+    }
     let labels: BTreeSet<(&str, &str)> =
         acts.iter().map(|record| (record.annotator.as_str(), record.frame.path.as_str())).collect();
     warn_of_unknown(dataset, labels.into_iter().map(|(_, frame)| frame));

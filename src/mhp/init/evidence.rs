@@ -108,7 +108,9 @@ impl Evidence {
                 way.push(at);
                 at = top_of[at];
             }
-            way.into_iter().for_each(|passed| top_of[passed] = at);
+            for passed in way {
+                top_of[passed] = at;
+            }
         }
         let unrest = |cell: usize| self.unrest.as_ref().map_or(1.0, |unrest| unrest[cell]);
         let left = |(cell, top): (usize, usize)| if missed.contains(&top) { 0.0 } else { unrest(cell) };

@@ -137,9 +137,9 @@ fn notes(spec: &RunSpec, rows: &[TableRow]) -> String {
         ));
     }
     notes.extend(spec.paper_missing());
-    let remarks: String =
-        table::notes(rows).iter().enumerate().map(|(k, note)| format!("\n[{}] {}.\n", k + 1, escaped(note))).collect();
-    format!("\n{}\n{remarks}", notes.join(" "))
+    let remarks = table::notes(rows);
+    let remarks = remarks.iter().enumerate().map(|(k, note)| format!("\n[{}] {}.\n", k + 1, escaped(note)));
+    format!("\n{}\n{}", notes.join(" "), remarks.collect::<Vec<_>>().concat())
 }
 
 /// Times by variant: a table of its own, because no two runs have the same.
