@@ -300,7 +300,7 @@ fn the_table_shows_twenty_rows_and_the_means_of_all() {
 fn frames_with_other_people_than_annotated_are_told_and_left_out_of_the_errors() {
     let small = Small::new(&[("a/000", 0.0), ("a/001", 0.1), ("a/002", 0.2)]);
     small.annotate("a/001", 2);
-    let out = small.path().join("out");
+    let out = small.out("out");
     let output = fit(small.path(), &["--iterations", "3", "--people", "1", "--out", out.to_str().unwrap()]);
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     let last = text(&output.stdout).lines().last().unwrap().to_owned();
@@ -336,7 +336,7 @@ fn frames_of_one_flat_name_do_not_overwrite_each_other() {
 #[test]
 fn hostile_settings_are_refused_or_end() {
     let small = Small::new(&[("a/000", 0.0)]);
-    let (file, out) = (small.path().join("FIT.toml"), small.path().join("out"));
+    let (file, out) = (small.out("FIT.toml"), small.out("out"));
     let run = |settings: &str| {
         std::fs::write(&file, settings).unwrap();
         fit(small.path(), &["--frames", "0..1", "--config", file.to_str().unwrap(), "--out", out.to_str().unwrap()])

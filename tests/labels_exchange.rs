@@ -320,7 +320,8 @@ fn what_cannot_be_read_or_written_is_told_in_one_line() {
         }
     }
     let bytes = std::fs::read(&journal).unwrap();
-    let message = desk.refused(&["export", "data", "--json", &journal]);
+    assert!(desk.refused(&["export", "data", "--json", &journal]).contains("lies in the data set"));
+    let message = desk.refused(&["export", "data", "--json", &journal, "--into-data"]);
     assert!(message.ends_with("is named like a journal, which is never replaced; expected another name"), "{message}");
     assert_eq!(std::fs::read(&journal).unwrap(), bytes);
     assert!(

@@ -487,11 +487,12 @@ fn the_default_layout_in_the_light() {
 fn a_picture_without_a_session_is_drawn_in_silence() {
     let folder = tempfile::tempdir().unwrap();
     blob::write_dataset(folder.path(), 1);
-    let picture = folder.path().join("window.png");
+    let home = tempfile::tempdir().unwrap();
+    let picture = home.path().join("window.png");
     let drawn = std::process::Command::new(env!("CARGO_BIN_EXE_mhp-inspector"))
         .args(["screenshot", folder.path().to_str().unwrap(), "--iterations", "2", "--size", "640x400"])
         .args(["--out", picture.to_str().unwrap()])
-        .env("MHP_INSPECTOR_HOME", folder.path().join("home"))
+        .env("MHP_INSPECTOR_HOME", home.path().join("home"))
         .env_remove("XDG_RUNTIME_DIR")
         .env_remove("NODEVICE_SELECT")
         .output()

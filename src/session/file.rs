@@ -16,7 +16,7 @@ use crate::mhp::{FitState, Precision};
 use crate::output::replace_file;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 const FORMAT: &str = "mhp-session";
 const VERSION: u32 = 1;
@@ -261,8 +261,12 @@ impl SessionFile {
     /// # Errors
     /// Where it is at neither of its paths.
     pub fn dataset_path(&self, file: &Path) -> Result<PathBuf, SessionFileError> {
-        let beside =
-            self.dataset.relative.as_ref().and_then(|way| Some(file.parent()?.join(way).components().collect()));
+        let beside = self.dataset.relative.as_ref().and_then(|way| {
+            let joined: PathBuf = file.parent()?.join(way).components().collect();
+            // A way up and down again is kept by what it leads to: the next session file begins elsewhere.
+            let up = joined.components().any(|part| part == Component::ParentDir);
+            Some(if up { joined.canonicalize().unwrap_or(joined) } else { joined })
+        });
         let found = beside.into_iter().chain([self.dataset.absolute.clone()]).find(|path| path.exists());
         let gone = || SessionFileError::NoDataset { dataset: self.dataset.absolute.clone(), path: file.to_owned() };
         found.ok_or_else(gone)

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 /// Longer than this is a hang.
 const SLOWEST: Duration = Duration::from_secs(2);
 /// An input that is not done after this ends the process, with its name.
-const GIVEN_UP: Duration = Duration::from_secs(120);
+const GIVEN_UP: Duration = Duration::from_mins(2);
 
 /// The number of the one input that is to be tried.
 const ONLY: &str = "MHP_FUZZ_INPUT";

@@ -86,19 +86,19 @@ pub(crate) fn map() -> Vec<u8> {
     }))
 }
 
-fn array(descr: &str, shape: &str, data: Vec<u8>) -> Vec<u8> {
-    npy(descr, shape, false, &data)
+fn array(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+    npy(descr, shape, false, data)
 }
 
 /// The frame of the manifest above.
 pub(crate) fn frame() -> Vec<(&'static str, Vec<u8>)> {
     vec![
-        ("hori", array("<f4", "(12, 8)", map())),
-        ("vert", array("<f4", "(12, 8)", map())),
-        ("joints", array("<f4", "(1, 17, 3)", f4((0..51).map(|k| 2.0 + (k % 7) as f32 * 0.1)))),
-        ("velocities", array("<f4", "(1, 17, 3)", f4((0..51).map(|_| 0.1)))),
-        ("person_count", array("<i8", "()", 1_i64.to_le_bytes().to_vec())),
-        ("timestamp_s", array("<f8", "(1,)", 0.5_f64.to_le_bytes().to_vec())),
+        ("hori", array("<f4", "(12, 8)", &map())),
+        ("vert", array("<f4", "(12, 8)", &map())),
+        ("joints", array("<f4", "(1, 17, 3)", &f4((0..51).map(|k| 2.0 + (k % 7) as f32 * 0.1)))),
+        ("velocities", array("<f4", "(1, 17, 3)", &f4((0..51).map(|_| 0.1)))),
+        ("person_count", array("<i8", "()", &1_i64.to_le_bytes())),
+        ("timestamp_s", array("<f8", "(1,)", &0.5_f64.to_le_bytes())),
     ]
 }
 
@@ -186,22 +186,22 @@ pub(crate) fn mmvr() -> Vec<File> {
             "d1s1/000/00001_meta.npz",
             one(
                 "global_frame_id",
-                array("<U5", "()", "00476".chars().flat_map(|c| u32::from(c).to_le_bytes()).collect()),
+                array("<U5", "()", &"00476".chars().flat_map(|c| u32::from(c).to_le_bytes()).collect::<Vec<u8>>()),
             ),
         ),
         (
             "d1s1/000/00001_bbox.npz",
             npz(
                 &[
-                    ("bbox_i", array("<f4", "(1, 5)", f4([1.0, 2.0, 3.0, 4.0, 0.9]))),
-                    ("bbox_hori", array("<f4", "(1, 4)", f4([1.0, 2.0, 3.0, 4.0]))),
-                    ("bbox_vert", array("<f4", "(1, 4)", f4([1.0, 2.0, 3.0, 4.0]))),
+                    ("bbox_i", array("<f4", "(1, 5)", &f4([1.0, 2.0, 3.0, 4.0, 0.9]))),
+                    ("bbox_hori", array("<f4", "(1, 4)", &f4([1.0, 2.0, 3.0, 4.0]))),
+                    ("bbox_vert", array("<f4", "(1, 4)", &f4([1.0, 2.0, 3.0, 4.0]))),
                 ],
                 true,
             ),
         ),
-        ("d1s1/000/00001_pose.npz", one("kp", array("<f4", "(1, 17, 3)", f4((0..51).map(|k| k as f32))))),
-        ("d1s1/000/00001_mask.npz", one("mask", array("|b1", "(1, 6, 8)", vec![1; 48]))),
+        ("d1s1/000/00001_pose.npz", one("kp", array("<f4", "(1, 17, 3)", &f4((0..51).map(|k| k as f32))))),
+        ("d1s1/000/00001_mask.npz", one("mask", array("|b1", "(1, 6, 8)", &[1; 48]))),
         ("d1s1/000/00001_truth.npz", npz(&frame()[2..], true)),
         ("d1s1/000/00002_radar.npz", npz(&frame()[..2], false)),
     ]
@@ -237,7 +237,7 @@ pub(crate) fn hupr() -> Vec<File> {
 /// An XRF55 clip of 17 maps of 12 × 8.
 pub(crate) fn xrf55() -> Vec<File> {
     let manifest = MANIFEST.replace("layout = \"npz\"\nframes = \"frames/*.npz\"", "layout = \"xrf55\"");
-    let manifest = format!("{}", &manifest[..manifest.rfind("[[view]]").unwrap_or(0)]);
+    let manifest = manifest[..manifest.rfind("[[view]]").unwrap_or(0)].to_owned();
     let clip: Vec<u8> = (0..17).flat_map(|_| map()).collect();
     vec![
         ("dataset.toml", manifest.into_bytes()),

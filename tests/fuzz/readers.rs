@@ -98,7 +98,7 @@ fn changed(files: &[File], random: &mut StdRng, folder: &Path) {
     let chosen = random.random_range(0..files.len());
     let files = files.iter().enumerate().map(|(k, (name, bytes))| {
         let mut bytes = bytes.clone();
-        let text = name.ends_with(".toml") || name.ends_with(".json");
+        let text = Path::new(name).extension().is_some_and(|ending| ending == "toml" || ending == "json");
         if k == chosen && text {
             bytes = mutate::text(&String::from_utf8_lossy(&bytes), random);
         } else if k == chosen {
