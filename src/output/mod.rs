@@ -3,7 +3,7 @@
 //!
 //! Names of frames, patterns and keys come from data sets, which strangers make. Every command writes through this room, so that
 //! none of them can leave its folder ([`FileNames`]), touch the data that it reads ([`Inputs`]), share a folder with another
-//! process ([`FolderLock`]) or leave half a file behind ([`replace_file`]). It knows paths only: [`crate::dataset::Dataset::inputs`]
+//! process ([`FolderLock`]) or leave half a file behind (`replace_file`). It knows paths only: [`crate::dataset::Dataset::inputs`]
 //! tells it what a data set is.
 
 mod error;
