@@ -22,8 +22,9 @@ fn sweep(folder: &Path) {
     for entry in entries.flatten() {
         let name = entry.file_name();
         let process = name.to_str().and_then(process_of);
+        // A named pipe is not even opened.
         let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
-        if process.is_some_and(|pid| is_gone(pid, &entry.path())) && is_file {
+        if is_file && process.is_some_and(|pid| is_gone(pid, &entry.path())) {
             let _ = std::fs::remove_file(entry.path());
         }
     }
@@ -64,6 +65,10 @@ mod tests {
         for path in [&left, &used, &own, &foreign] {
             std::fs::write(path, "half").unwrap();
         }
+        #[cfg(unix)]
+        let pipe = folder.path().join(format!(".d.npz.{gone}.tmp"));
+        #[cfg(unix)]
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success(), "never waited for");
         let holder = File::open(&used).unwrap();
         holder.lock().unwrap();
         sweep(folder.path());
