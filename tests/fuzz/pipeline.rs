@@ -57,7 +57,7 @@ pub(crate) fn whole(random: &mut StdRng, folder: &Path) {
 
 /// Cells of a map; a tenth of them in double precision. What takes long because it is large is no hang: the oracle takes every cell
 /// by every joint of up to eight people, and nothing is fast without optimisation.
-const MOST_CELLS: usize = if cfg!(debug_assertions) { 8_000 } else { 30_000 };
+const MOST_CELLS: usize = if cfg!(debug_assertions) { 8_000 } else { 20_000 };
 
 struct Axis {
     kind: &'static str,
