@@ -13,7 +13,7 @@
 //! 6. Every joint gets its Gaussian ([`scatterers`]), and the start is spoiled where the settings ask for it
 //!    ([`perturb`]).
 //!
-//! Switches beside the paper's setting refine the start: where counting finds the one person, behind the skin, on the
+//! Switches beside the default setting refine the start: where counting finds the one person, behind the skin, on the
 //! line through the frames around, as high as floor and head say in all of them ([`height`]), in the posture that fits
 //! ([`pose`]), with the limbs where simulated people have them who look alike ([`learned`]). What it is without them is
 //! kept beside it. The evidence is worked out once for a problem ([`surroundings`]).
@@ -74,7 +74,7 @@ pub struct Initialisation {
     /// Where the fit begins: the persons on the problem's skeleton.
     pub params: Pppr,
     /// The same persons as this frame's peaks alone place them: standing, facing the radar, the middle of the body where the
-    /// echo is. The same as `params` where no switch beside the paper's setting refines a start.
+    /// echo is. The same as `params` where no switch beside the default setting refines a start.
     pub unrefined: Pppr,
     /// Local maxima of every view, strongest over the background first within a view.
     pub peaks: Vec<Peak>,
