@@ -3,7 +3,8 @@
 
 use mhp_inspector::body::{Pppr, PpprShape};
 use mhp_inspector::dataset::npz::{ArrayView, write};
-use mhp_inspector::dataset::{Dataset, Progress, write_pppr};
+use mhp_inspector::dataset::{Dataset, write_pppr};
+use mhp_inspector::task::Progress;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -2,7 +2,8 @@
 #![expect(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use mhp_inspector::dataset::npz::{ArrayView, write};
-use mhp_inspector::dataset::{Dataset, DatasetError, Manifest, OpenOptions, Progress};
+use mhp_inspector::dataset::{Dataset, DatasetError, Manifest, OpenOptions};
+use mhp_inspector::task::Progress;
 use std::path::Path;
 
 const MANIFEST: &str = r#"name = "case"

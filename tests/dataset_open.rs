@@ -4,9 +4,10 @@
 use mhp_inspector::body::Skeleton;
 use mhp_inspector::dataset::npz::{ArrayView, write, write_npy};
 use mhp_inspector::dataset::{
-    BareCatalog, BareChoice, Dataset, DatasetError, Layout, Manifest, OpenOptions, Progress, Remembered, read_pppr,
+    BareCatalog, BareChoice, Dataset, DatasetError, Layout, Manifest, OpenOptions, Remembered, read_pppr,
 };
 use mhp_inspector::radar::{AxisKind, PointSpread, RadarConfig};
+use mhp_inspector::task::Progress;
 use std::path::{Path, PathBuf};
 
 /// The documents and data beside the repository; `None`, with a printed reason, where they are not.

@@ -2,7 +2,8 @@
 #![expect(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use mhp_inspector::dataset::npz::{ArrayView, write};
-use mhp_inspector::dataset::{Dataset, DatasetError, Frame, FrameCache, Heatmap, Loader, OpenJob, Progress};
+use mhp_inspector::dataset::{Dataset, DatasetError, Frame, FrameCache, Heatmap, Loader, OpenJob};
+use mhp_inspector::task::Progress;
 use proptest::prelude::*;
 use std::collections::VecDeque;
 use std::sync::Arc;

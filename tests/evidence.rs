@@ -5,7 +5,7 @@ mod common;
 
 use mhp_inspector::body::{Group, Pppr, PpprShape, Skeleton};
 use mhp_inspector::config::{EmRegion, FitConfig};
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::diagnose::{
     Annotated, Calibration, EarlierFrame, Evidence, EvidenceInput, Finding, FindingPlace, Measure, STATIC_FRAMES,
     evidence, with_share,
@@ -17,6 +17,7 @@ use mhp_inspector::radar::{Axis, AxisKind, FftSetup, PointSpread, Quantity, Rada
 use mhp_inspector::simulate::{Options, Recording, ScenePreset, SimulatedLayout};
 use mhp_inspector::start::begin;
 use mhp_inspector::study::{BatchOptions, fit_frame, frame_evidence, frames_before};
+use mhp_inspector::task::Progress;
 use proptest::prelude::*;
 use rayon::prelude::*;
 use std::path::Path;

@@ -5,8 +5,9 @@
 mod blob;
 
 use mhp_inspector::dataset::npz::{ArrayView, write};
-use mhp_inspector::dataset::{Dataset, Progress, read_pppr, write_pppr};
+use mhp_inspector::dataset::{Dataset, read_pppr, write_pppr};
 use mhp_inspector::study::{BatchOptions, fit_frame};
+use mhp_inspector::task::Progress;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};

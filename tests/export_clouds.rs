@@ -6,10 +6,11 @@ mod blob;
 
 use mhp_inspector::body::{Group, Pppr, PpprShape, Skeleton};
 use mhp_inspector::config::FitConfig;
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::dataset::npz::{NpzArchive, read_array};
-use mhp_inspector::dataset::{Dataset, Progress};
 use mhp_inspector::mhp::Problem;
 use mhp_inspector::study::{CloudPoint, point_cloud};
+use mhp_inspector::task::Progress;
 use std::path::Path;
 use std::process::Command;
 

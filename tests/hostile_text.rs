@@ -6,9 +6,10 @@
 #[path = "common/blob.rs"]
 mod blob;
 
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::labels::read_table;
 use mhp_inspector::study::read_summary;
+use mhp_inspector::task::Progress;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::PathBuf;

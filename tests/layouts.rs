@@ -3,10 +3,11 @@
 
 use mhp_inspector::cli::simulate::{Style, write_data_set};
 use mhp_inspector::dataset::npz::{ArrayView, write_npy};
-use mhp_inspector::dataset::{Dataset, Layout, Manifest, Progress};
+use mhp_inspector::dataset::{Dataset, Layout, Manifest};
 use mhp_inspector::geometry::{norm, sub};
 use mhp_inspector::radar::{Axis, View};
 use mhp_inspector::simulate::{Device, Options, Recording, ScenePreset, SimulatedLayout};
+use mhp_inspector::task::Progress;
 use num_complex::{Complex32, Complex64};
 use std::path::Path;
 use std::process::Command;

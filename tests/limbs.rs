@@ -3,11 +3,12 @@
 
 use mhp_inspector::body::Pppr;
 use mhp_inspector::config::{FitConfig, Limbs, Preset};
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::diagnose::{majpe_mm, pa_majpe_mm};
 use mhp_inspector::geometry::{Vec3, norm, sub};
 use mhp_inspector::mhp::Problem;
 use mhp_inspector::start::{begin, problem_of};
+use mhp_inspector::task::Progress;
 use std::path::Path;
 use std::sync::Arc;
 

@@ -5,8 +5,9 @@ mod common;
 
 use mhp_inspector::body::{Group, Pppr};
 use mhp_inspector::config::FitConfig;
-use mhp_inspector::dataset::{Dataset, Frame, Progress};
+use mhp_inspector::dataset::{Dataset, Frame};
 use mhp_inspector::mhp::{Fitter, Initialisation, Precision, Problem, StepReport, initialise};
+use mhp_inspector::task::Progress;
 use std::sync::Arc;
 
 fn frame() -> Option<(Arc<Problem>, Frame)> {

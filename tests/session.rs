@@ -6,11 +6,12 @@ mod blob;
 
 use mhp_inspector::body::{Group, Pppr};
 use mhp_inspector::config::FitConfig;
-use mhp_inspector::dataset::{BareCatalog, BareChoice, Dataset, DatasetError, Progress};
+use mhp_inspector::dataset::{BareCatalog, BareChoice, Dataset, DatasetError};
 use mhp_inspector::mhp::{Adam, Evaluation, FitState, Problem, StepReport, StopReason, Terms, initialise};
 use mhp_inspector::session::{
     Command, Effect, FitStatus, History, IterationRow, LogLevel, PickKind, Session, ThemeChoice, ViewState,
 };
+use mhp_inspector::task::Progress;
 use mhp_inspector::worker::{
     HistoryRow, JobId, Kept, Prepare, PreparedFit, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
 };

@@ -4,11 +4,12 @@
 #[path = "common/blob.rs"]
 mod blob;
 
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::labels::{FrameId, Judged, Label, LabelPlace, Record, Tag, Tags};
 use mhp_inspector::session::{
     ActKind, Asked, Changes, Command, Commit, Done, Effect, LabelTable, OpenedLabels, Session, Written,
 };
+use mhp_inspector::task::Progress;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 

@@ -6,7 +6,7 @@ mod blob;
 
 use mhp_inspector::body::Pppr;
 use mhp_inspector::config::FitConfig;
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::diagnose::Evidence;
 use mhp_inspector::labels::{Change, FrameId, Judged, Label, LabelPlace, Record, Tag};
 use mhp_inspector::mhp::{Evaluation, Problem, Terms, initialise};
@@ -15,6 +15,7 @@ use mhp_inspector::session::{
     Session, SessionFile, StrataStatus, Written,
 };
 use mhp_inspector::study::complexity::Complexity;
+use mhp_inspector::task::Progress;
 use mhp_inspector::worker::{PreparedFit, Snapshot, WorkerCommand, WorkerEvent, WorkerMessage};
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;

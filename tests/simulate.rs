@@ -2,10 +2,11 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its input has failed")]
 
 use mhp_inspector::cli::simulate::{Style, write_data_set};
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::geometry::{norm, sub};
 use mhp_inspector::output::{FolderLock, Inputs};
 use mhp_inspector::simulate::{Action, Options, Recording, ScenePreset, SimulatedLayout};
+use mhp_inspector::task::Progress;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 

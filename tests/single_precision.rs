@@ -7,10 +7,11 @@ mod common;
 
 use mhp_inspector::body::{Group, Pppr, PpprShape, Skeleton};
 use mhp_inspector::config::{EmRegion, FitConfig, Operators, Summation};
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::geometry::{Pose, norm, rotation_from_quaternion, sub};
 use mhp_inspector::mhp::{Evaluation, Fitter, Objective, Precision, Problem, initialise, simulate};
 use mhp_inspector::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
+use mhp_inspector::task::Progress;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use std::ops::Range;

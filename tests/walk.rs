@@ -4,10 +4,11 @@
 
 use mhp_inspector::body::Group;
 use mhp_inspector::config::FitConfig;
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::diagnose::joint_errors;
 use mhp_inspector::geometry::{Vec3, add, scale, sub};
 use mhp_inspector::mhp::{Problem, initialise};
+use mhp_inspector::task::Progress;
 use std::path::Path;
 use std::sync::Arc;
 

@@ -9,10 +9,11 @@ mod blob;
 mod window;
 
 use mhp_inspector::app::PaneKind;
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::session::{Command, LogLevel};
 use mhp_inspector::study::complexity::{ComplexityOptions, compute};
 use mhp_inspector::study::run::{RunPlan, RunRequest, StudyKind, Subset, execute_run};
+use mhp_inspector::task::Progress;
 use mhp_inspector::{config::Preset, mhp::Precision};
 use std::path::{Path, PathBuf};
 use window::Window;

@@ -6,8 +6,9 @@ mod blob;
 
 use crossbeam_channel::{Receiver, unbounded};
 use mhp_inspector::config::FitConfig;
-use mhp_inspector::dataset::{Dataset, Frame, Progress};
+use mhp_inspector::dataset::{Dataset, Frame};
 use mhp_inspector::mhp::{FitState, Precision, StepReport, StopReason};
+use mhp_inspector::task::Progress;
 use mhp_inspector::worker::{
     HistoryRow, JobId, Prepare, PreparedFit, Snapshot, Start, Worker, WorkerCommand, WorkerEvent, WorkerMessage,
 };

@@ -4,10 +4,10 @@ use super::cache::CachedStatistics;
 use super::history::MaskHistory;
 use super::plan::Chunk;
 use super::{ComplexityOptions, Statistics};
-use crate::dataset::{Dataset, DatasetError, MapReader, NpzError, Progress, panic_text};
+use crate::dataset::{Dataset, DatasetError, MapReader, NpzError};
 use crate::study::StudyError;
+use crate::task::{Progress, catch_panic};
 use crossbeam_channel::{Sender, bounded};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Results that may wait to be taken: few, so that little is lost where the taker stops.
@@ -99,11 +99,9 @@ impl Work<'_> {
             if self.progress.is_cancelled() {
                 return None;
             }
-            let measured = catch_unwind(AssertUnwindSafe(|| self.measure(i, &mut maps, history)));
-            let measured = measured.unwrap_or_else(|panic| {
+            let measured = catch_panic(|| self.measure(i, &mut maps, history)).unwrap_or_else(|message| {
                 maps = self.dataset.maps(i + 1..end);
-                let path = self.dataset.frame_path(i);
-                Err(DatasetError::Internal { message: panic_text(panic.as_ref()), path }.into())
+                Err(DatasetError::Internal { message, path: self.dataset.frame_path(i) }.into())
             });
             if let Err(fault) = &measured {
                 history.forget();

@@ -7,6 +7,7 @@ use crate::mhp::fill_missing;
 use crate::people::{CLASSES, Counter, Network, map_statistics};
 use crate::study::count::{LEAD_IN, ScanWindow};
 use crate::study::row::annotated;
+use crate::task::milliseconds;
 use std::time::Instant;
 
 /// Frames of a unit: short enough for all cores, long against the frames that are read before it.
@@ -84,8 +85,4 @@ fn maps(dataset: &Dataset, frame: usize) -> Result<(Vec<Heatmap>, Option<usize>)
 
 fn numbers(people: usize, annotated: Option<usize>) -> RunNumbers {
     RunNumbers { persons: people, annotated, reason: "counted".to_owned(), ..RunNumbers::default() }
-}
-
-fn milliseconds(began: Instant) -> f64 {
-    (began.elapsed().as_secs_f64() * 1e6).round() / 1e3
 }

@@ -9,9 +9,9 @@ use super::journal::{Rows, RunJournal};
 use super::plan::{RunPlan, Unit};
 use super::row::{RunNumbers, RunRow};
 use crate::body::Pppr;
-use crate::dataset::{Dataset, Progress, panic_text, read_pppr, write_pppr};
+use crate::dataset::{Dataset, read_pppr, write_pppr};
+use crate::task::{Progress, panic_as_error};
 use std::collections::BTreeSet;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -110,7 +110,7 @@ impl Engine<'_> {
         self.halted()?;
         let missing: Vec<usize> = variants.iter().copied().filter(|&v| !self.done.contains(&(v, frame))).collect();
         let Some(&first) = missing.first() else { return Ok(()) };
-        let started = caught(|| {
+        let started = panic_as_error(|| {
             let loaded = LoadedFrame::read(self.dataset, frame)?;
             let start = loaded.cold(&self.plan.spec.variants[first].config)?;
             Ok((loaded, start))
@@ -144,7 +144,7 @@ impl Engine<'_> {
         let Some(&longest) = variants.last() else { return Ok(()) };
         let stops: Vec<usize> = variants.iter().map(|&v| spec.variants[v].config.iterations).collect();
         let config = &spec.variants[longest].config;
-        let answers = caught(|| Ok(loaded.fit(config, spec.precision, start, &stops)));
+        let answers = panic_as_error(|| Ok(loaded.fit(config, spec.precision, start, &stops)));
         let answers = answers.unwrap_or_else(|why| stops.iter().map(|_| Err(why.clone())).collect());
         for (&variant, answer) in variants.iter().zip(answers) {
             self.keep(variant, frame, start.init_ms, answer)?;
@@ -185,7 +185,7 @@ impl Engine<'_> {
             return Ok(());
         }
         let method = self.plan.spec.variants[variant].method;
-        let counted = caught(|| Ok(counting::count(self.dataset, method, frames)));
+        let counted = panic_as_error(|| Ok(counting::count(self.dataset, method, frames)));
         let counted = counted.unwrap_or_else(|why| frames.iter().map(|_| (Err(why.clone()), None)).collect());
         for (&frame, (numbers, ms)) in frames.iter().zip(counted).filter(|(frame, _)| missing(frame)) {
             self.keep_numbers(variant, frame, [None, ms], numbers)?;
@@ -214,7 +214,7 @@ impl Engine<'_> {
         let spec = &self.plan.spec;
         let config = &spec.variants[variant].config;
         let mut init_ms = None;
-        let answer = caught(|| {
+        let answer = panic_as_error(|| {
             let loaded = LoadedFrame::read(self.dataset, frame)?;
             let start = before.map_or_else(|| loaded.cold(config), |before| Ok(loaded.warm(config, before)))?;
             init_ms = start.init_ms;
@@ -279,10 +279,4 @@ impl Engine<'_> {
         self.progress.advance(1);
         Ok(())
     }
-}
-
-/// A panic is a defect in this program; one frame of thousands must not end the others.
-fn caught<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(work))
-        .unwrap_or_else(|panic| Err(format!("internal error: {}", panic_text(panic.as_ref()))))
 }

@@ -12,6 +12,7 @@ use crate::geometry::Vec3;
 use crate::mhp::{Fitter, Precision, Problem, StopReason, predict};
 use crate::start::{begin, problem_of};
 use crate::study::row::annotated;
+use crate::task::milliseconds;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -197,11 +198,6 @@ fn advance(fitter: &mut Fitter, stop: usize, ended: &mut bool) -> Result<(), cra
 /// An error text without the folder of the data set, which may lie elsewhere on another machine.
 pub(super) fn portable(dataset: &Dataset, text: &str) -> String {
     text.replace(&format!("{}{}", dataset.info().root.display(), std::path::MAIN_SEPARATOR), "")
-}
-
-fn milliseconds(began: Instant) -> f64 {
-    // A microsecond is all that such a time is worth.
-    (began.elapsed().as_secs_f64() * 1e6).round() / 1e3
 }
 
 #[cfg(test)]

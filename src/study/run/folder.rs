@@ -9,8 +9,9 @@ use super::plan::RunPlan;
 use super::row::RunRow;
 use super::spec::{RUN_FILE, RunSpec};
 use super::table::{TableRow, table};
-use crate::dataset::{Dataset, Progress};
+use crate::dataset::Dataset;
 use crate::output::{FolderLock, Inputs};
+use crate::task::Progress;
 use std::path::Path;
 
 /// A run as it lies on disk, finished or not.

@@ -1,6 +1,5 @@
 //! What long work tells of itself, and how it is told to stop.
 
-use super::DatasetError;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -11,6 +10,10 @@ struct Inner {
     total: AtomicU64,
     cancelled: AtomicBool,
 }
+
+/// Work was stopped because somebody asked for it ([`Progress::cancel`]).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cancelled;
 
 /// Progress of one piece of work: cheap to clone, every clone sees the same. The worker writes, the window reads.
 #[derive(Debug, Clone, Default)]
@@ -59,7 +62,7 @@ impl Progress {
         }
     }
 
-    /// Asks the work to stop; it answers [`DatasetError::Cancelled`] soon after.
+    /// Asks the work to stop; it answers [`Cancelled`] soon after.
     pub fn cancel(&self) {
         self.0.cancelled.store(true, Ordering::Relaxed);
     }
@@ -70,7 +73,7 @@ impl Progress {
     }
 
     /// To be asked between two units of work.
-    pub(crate) fn check(&self) -> Result<(), DatasetError> {
-        if self.is_cancelled() { Err(DatasetError::Cancelled) } else { Ok(()) }
+    pub(crate) fn check(&self) -> Result<(), Cancelled> {
+        if self.is_cancelled() { Err(Cancelled) } else { Ok(()) }
     }
 }
