@@ -5,7 +5,7 @@
 //! may begin another meanwhile, and the times of both would be wrong.
 
 use super::row::annotated;
-use super::{CurveRow, FitNumbers, FrameFit, FrameRow, StudyError, write_curves, write_ply};
+use super::{BatchRow, CurveRow, FitNumbers, FrameFit, StudyError, write_curves, write_ply};
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::{Dataset, Truth, panic_text, write_pppr};
@@ -119,7 +119,7 @@ pub fn run_batch(
     dataset: &Dataset,
     frames: Range<usize>,
     options: &BatchOptions,
-    mut sink: impl FnMut(FrameRow) -> Result<(), StudyError>,
+    mut sink: impl FnMut(BatchRow) -> Result<(), StudyError>,
 ) -> Result<(), StudyError> {
     let batch = Batch {
         dataset,
@@ -130,7 +130,7 @@ pub fn run_batch(
         end: frames.end,
     };
     let threads = if options.warm_start { 1 } else { rayon::current_num_threads().clamp(1, frames.len().max(1)) };
-    let (outbox, inbox) = crossbeam_channel::bounded::<FrameRow>(threads);
+    let (outbox, inbox) = crossbeam_channel::bounded::<BatchRow>(threads);
     std::thread::scope(|scope| {
         // The inbox goes with this closure: after an error the threads find nobody listening, and end.
         let inbox = inbox;
@@ -165,7 +165,7 @@ struct Batch<'a> {
 
 impl Batch<'_> {
     /// Takes frames until none is left or nobody listens.
-    fn work(&self, outbox: &Sender<FrameRow>) {
+    fn work(&self, outbox: &Sender<BatchRow>) {
         let mut before: Option<(usize, Pppr)> = None;
         loop {
             let index = self.next.fetch_add(1, Ordering::Relaxed);
@@ -177,7 +177,7 @@ impl Batch<'_> {
                 before = Some((index, fit.params));
                 fit.numbers
             });
-            if outbox.send(FrameRow { index, frame: self.dataset.frame_name(index).to_owned(), fit }).is_err() {
+            if outbox.send(BatchRow { index, frame: self.dataset.frame_name(index).to_owned(), fit }).is_err() {
                 return;
             }
         }

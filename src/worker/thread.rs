@@ -2,7 +2,7 @@
 
 use super::handle::Latest;
 use super::protocol::{
-    HistoryRow, JobId, Kept, Prepare, Prepared, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
+    HistoryRow, JobId, Kept, Prepare, PreparedFit, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
 };
 use crate::config::FitConfig;
 use crate::mhp::{
@@ -221,7 +221,7 @@ enum Reply {
 }
 
 impl Job {
-    fn new(prepare: Prepare) -> Result<(Self, Prepared), FitError> {
+    fn new(prepare: Prepare) -> Result<(Self, PreparedFit), FitError> {
         let Prepare { job, branch, dataset, frame, config, precision, start } = prepare;
         let problem = Arc::new(problem_of(&dataset, &frame)?);
         let began = Instant::now();
@@ -263,7 +263,7 @@ impl Job {
         if !resumed {
             new.push_row(new.fitter.report());
         }
-        Ok((new, Prepared { problem, begun, initial, warnings, init_ms }))
+        Ok((new, PreparedFit { problem, begun, initial, warnings, init_ms }))
     }
 
     fn iteration(&self) -> usize {

@@ -3,19 +3,19 @@
 
 use mhp_inspector::cli::simulate::{Style, write_data_set};
 use mhp_inspector::dataset::npz::{ArrayView, write_npy};
-use mhp_inspector::dataset::{Dataset, Layout as Files, Manifest, Progress};
+use mhp_inspector::dataset::{Dataset, Layout, Manifest, Progress};
 use mhp_inspector::geometry::{norm, sub};
 use mhp_inspector::radar::{Axis, View};
-use mhp_inspector::simulate::{Device, Layout, Options, Preset, Recording};
+use mhp_inspector::simulate::{Device, Options, Recording, ScenePreset, SimulatedLayout};
 use num_complex::{Complex32, Complex64};
 use std::path::Path;
 use std::process::Command;
 
-fn written(layout: Layout, frames: usize, people: usize, narrow: bool) -> (tempfile::TempDir, Recording) {
+fn written(layout: SimulatedLayout, frames: usize, people: usize, narrow: bool) -> (tempfile::TempDir, Recording) {
     let folder = tempfile::tempdir().unwrap();
     let options = Options {
         layout,
-        presets: vec![Preset::Easy],
+        presets: vec![ScenePreset::Easy],
         frames,
         sequence_length: frames,
         people: Some(people..=people),
@@ -60,20 +60,20 @@ fn same_axes(a: &[View], b: &[View]) {
 #[test]
 fn presets_have_the_axes_that_follow_from_the_processing() {
     let views = |layout| Device::new(layout).views;
-    same_axes(&Manifest::hupr().unwrap().views, &views(Layout::Hupr));
-    same_axes(&Manifest::xrf55().unwrap().views, &views(Layout::Xrf55Stack));
+    same_axes(&Manifest::hupr().unwrap().views, &views(SimulatedLayout::Hupr));
+    same_axes(&Manifest::xrf55().unwrap().views, &views(SimulatedLayout::Xrf55Stack));
 }
 
 #[test]
 fn hupr_is_read_with_its_labels_and_without_a_manifest() {
-    let (folder, recording) = written(Layout::Hupr, 2, 1, false);
+    let (folder, recording) = written(SimulatedLayout::Hupr, 2, 1, false);
     let path = folder.path().join("single_1/hori/000000001.npy");
     // Header and 16·64·64·8 numbers of sixteen bytes.
     assert_eq!(std::fs::metadata(&path).unwrap().len() - 8_388_608, 128);
     std::fs::remove_file(folder.path().join("dataset.toml")).unwrap();
     let dataset = open(folder.path());
     let info = dataset.info();
-    assert_eq!((info.layout, dataset.len(), dataset.sequences()), (Files::Hupr, 2, 1));
+    assert_eq!((info.layout, dataset.len(), dataset.sequences()), (Layout::Hupr, 2, 1));
     assert_eq!((info.frame_rate_hz, info.skeleton.joints.len()), (Some(10.0), 14));
     assert!(info.assumptions.iter().any(|text| text.contains("elevation")), "{:?}", info.assumptions);
     let (frame, exact) = (dataset.load(1).unwrap(), recording.frame(1));
@@ -99,7 +99,7 @@ fn hupr_is_read_with_its_labels_and_without_a_manifest() {
 
 #[test]
 fn damaged_hupr_frames_have_one_clear_error_and_damaged_labels_a_note() {
-    let (folder, _) = written(Layout::Hupr, 1, 1, true);
+    let (folder, _) = written(SimulatedLayout::Hupr, 1, 1, true);
     let (hori, vert) =
         (folder.path().join("single_1/hori/000000000.npy"), folder.path().join("single_1/vert/000000000.npy"));
     assert_eq!(open(folder.path()).load(0).unwrap().maps[0].dtype, "<c8");
@@ -138,10 +138,10 @@ fn damaged_hupr_frames_have_one_clear_error_and_damaged_labels_a_note() {
 
 #[test]
 fn xrf55_stacks_are_seventeen_frames_or_one() {
-    let (folder, recording) = written(Layout::Xrf55Stack, 17, 1, false);
+    let (folder, recording) = written(SimulatedLayout::Xrf55Stack, 17, 1, false);
     std::fs::remove_file(folder.path().join("dataset.toml")).unwrap();
     let dataset = open(folder.path());
-    assert_eq!((dataset.info().layout, dataset.len(), dataset.sequences()), (Files::Xrf55, 17, 1));
+    assert_eq!((dataset.info().layout, dataset.len(), dataset.sequences()), (Layout::Xrf55, 17, 1));
     assert!(dataset.info().assumptions.iter().any(|text| text.contains("does not publish")));
     assert_eq!((dataset.frame_name(3), dataset.sequence(3)), ("mmWave/01_01_01/03", "mmWave/01_01_01"));
     let (frame, exact) = (dataset.load(3).unwrap(), recording.frame(3));
@@ -180,7 +180,7 @@ fn xrf55_stacks_are_seventeen_frames_or_one() {
 
 #[test]
 fn half_floats_keep_three_digits() {
-    let (folder, recording) = written(Layout::Xrf55Stack, 17, 1, true);
+    let (folder, recording) = written(SimulatedLayout::Xrf55Stack, 17, 1, true);
     let frame = open(folder.path()).load(2).unwrap();
     assert_eq!(frame.maps[0].dtype, "<f2");
     assert!(difference(&frame.maps[0].data, &recording.frame(2).maps[0], 256.0) < 1e-3);
@@ -189,10 +189,10 @@ fn half_floats_keep_three_digits() {
 #[test]
 fn mmvr_folders_have_labels_in_pixels_and_truth_beside_them() {
     for people in [0, 2] {
-        let (folder, recording) = written(Layout::MmvrTree, 1, people, false);
+        let (folder, recording) = written(SimulatedLayout::MmvrTree, 1, people, false);
         std::fs::remove_file(folder.path().join("dataset.toml")).unwrap();
         let dataset = open(folder.path());
-        assert_eq!((dataset.info().layout, dataset.frame_name(0)), (Files::Mmvr, "d1s1/000/00000"));
+        assert_eq!((dataset.info().layout, dataset.frame_name(0)), (Layout::Mmvr, "d1s1/000/00000"));
         let (frame, exact) = (dataset.load(0).unwrap(), recording.frame(0));
         assert_eq!(frame.notes, ["00000_mask.npz is missing: no masks"]);
         assert_eq!((frame.person_count, frame.global_id.as_deref()), (Some(people), Some("00000")));
@@ -210,7 +210,7 @@ fn mmvr_folders_have_labels_in_pixels_and_truth_beside_them() {
 
 #[test]
 fn the_remaining_layouts_load_with_their_maps_and_nobody_in_them() {
-    for layout in [Layout::Generic, Layout::Xrf55, Layout::Hupr] {
+    for layout in [SimulatedLayout::Generic, SimulatedLayout::Xrf55, SimulatedLayout::Hupr] {
         let (folder, recording) = written(layout, 1, 0, true);
         let dataset = open(folder.path());
         same_axes(&dataset.info().views, &recording.views());
@@ -224,8 +224,8 @@ fn the_remaining_layouts_load_with_their_maps_and_nobody_in_them() {
 
 #[test]
 fn info_fit_and_complexity_work_on_every_layout() {
-    for layout in Layout::ALL {
-        let frames = if layout == Layout::Xrf55Stack { 17 } else { 2 };
+    for layout in SimulatedLayout::ALL {
+        let frames = if layout == SimulatedLayout::Xrf55Stack { 17 } else { 2 };
         let (folder, _) = written(layout, frames, 1, true);
         let run = |arguments: &[&str]| {
             let mut command = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"));
@@ -245,7 +245,7 @@ fn info_fit_and_complexity_work_on_every_layout() {
 #[test]
 fn stacks_want_whole_clips() {
     let folder = tempfile::tempdir().unwrap();
-    let options = Options { layout: Layout::Xrf55Stack, frames: 20, ..Options::default() };
+    let options = Options { layout: SimulatedLayout::Xrf55Stack, frames: 20, ..Options::default() };
     let recording = Recording::new(&options).unwrap();
     let text = write_data_set(folder.path(), &recording, Style::default(), || ()).unwrap_err().to_string();
     assert!(text.contains("17 maps a file"), "{text}");

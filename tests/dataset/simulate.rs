@@ -5,7 +5,7 @@ use mhp_inspector::cli::simulate::{Style, write_data_set};
 use mhp_inspector::dataset::{Dataset, Progress};
 use mhp_inspector::geometry::{norm, sub};
 use mhp_inspector::output::{FolderLock, Inputs};
-use mhp_inspector::simulate::{Action, Layout, Options, Preset, Recording};
+use mhp_inspector::simulate::{Action, Options, Recording, ScenePreset, SimulatedLayout};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -47,7 +47,7 @@ fn one_seed_gives_the_same_bytes_on_any_number_of_threads() {
 
 #[test]
 fn every_preset_loads_with_the_people_that_it_claims() {
-    for preset in Preset::ALL {
+    for preset in ScenePreset::ALL {
         let folder = tempfile::tempdir().unwrap();
         let options = Options { presets: vec![preset], frames: 2, sequence_length: 1, ..Options::default() };
         let made = recording(&options);
@@ -72,7 +72,7 @@ fn every_preset_loads_with_the_people_that_it_claims() {
 #[test]
 fn nobody_to_four_people_are_drawn_and_stored() {
     let options = |people| Options {
-        presets: vec![Preset::Medium],
+        presets: vec![ScenePreset::Medium],
         frames: 2,
         sequence_length: 1,
         people: Some(people),
@@ -93,7 +93,7 @@ fn nobody_to_four_people_are_drawn_and_stored() {
 
 #[test]
 fn neighbours_keep_the_distance_that_the_preset_says() {
-    for (preset, people) in [(Preset::Easy, 2), (Preset::Medium, 3)] {
+    for (preset, people) in [(ScenePreset::Easy, 2), (ScenePreset::Medium, 3)] {
         let options = Options {
             presets: vec![preset],
             frames: 30,
@@ -137,7 +137,7 @@ fn a_sequence_moves_on_as_its_velocities_say() {
 #[test]
 fn nothing_clips_and_maps_show_the_person_where_the_truth_says() {
     let options = Options {
-        presets: vec![Preset::Easy, Preset::Medium],
+        presets: vec![ScenePreset::Easy, ScenePreset::Medium],
         actions: vec![Action::Walk],
         frames: 6,
         sequence_length: 1,
@@ -187,7 +187,7 @@ fn numbers_without_sense_are_refused() {
         (Options { people: Some(2..=9), ..Options::default() }, "people is 2..=9"),
         (Options { sequence_length: 0, ..Options::default() }, "sequence length"),
         (Options { still_share: Some(f64::NAN), ..Options::default() }, "still share"),
-        (Options { presets: Vec::new(), layout: Layout::Hupr, ..Options::default() }, "presets"),
+        (Options { presets: Vec::new(), layout: SimulatedLayout::Hupr, ..Options::default() }, "presets"),
     ] {
         let told = Recording::new(&options).unwrap_err().to_string();
         assert!(told.contains(word), "{told}");

@@ -84,7 +84,8 @@ fn tables_of_another_program_are_read_as_it_reads_them() {
     let read = |name: &str| read_table(&Path::new(FOLDER).join(name)).unwrap();
     let (ann, bo) = (read("ann.csv"), read("bo.csv"));
     assert_eq!(ann.notes, ["column `colour` is passed over; it is none of a table of labels"]);
-    let records = |rows: Vec<mhp_inspector::labels::Row>| rows.into_iter().map(|row| row.record).collect::<Vec<_>>();
+    let records =
+        |rows: Vec<mhp_inspector::labels::LabelRow>| rows.into_iter().map(|row| row.record).collect::<Vec<_>>();
     let (ann, bo) = (records(ann.rows), records(bo.rows));
     assert!(ann.iter().any(|record| record.label.note == "two\r\nlines"), "notes keep their line ends");
     is_agreement("ann and bo", &agreement(judged_in_acts(&ann), judged_in_acts(&bo)), &json("ann-bo.json"));

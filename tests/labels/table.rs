@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
 use mhp_inspector::labels::{
-    COLUMNS, CellRegion, FrameId, Judged, Label, Record, Row, Tag, Verdict, plan_import, read_table, write_csv,
+    COLUMNS, CellRegion, FrameId, Judged, Label, LabelRow, Record, Tag, Verdict, plan_import, read_table, write_csv,
     write_json,
 };
 use proptest::prelude::*;
@@ -263,10 +263,10 @@ fn an_import_writes_what_is_new_or_newer() {
         record("unknown", "F2", ""),
         record("nothing said", "", ""),
     ];
-    let rows: Vec<Row> = (2..).zip(rows).map(|(line, record)| Row { line, record }).collect();
+    let rows: Vec<LabelRow> = (2..).zip(rows).map(|(line, record)| LabelRow { line, record }).collect();
     let find = |row: &Record| known.iter().find(|known| known.frame == row.frame).copied();
     let plan = plan_import(&rows, false, find);
-    let frames = |rows: &[&Row]| rows.iter().map(|row| row.record.frame.path.clone()).collect::<Vec<_>>();
+    let frames = |rows: &[&LabelRow]| rows.iter().map(|row| row.record.frame.path.clone()).collect::<Vec<_>>();
     assert_eq!((plan.same, plan.kept), (2, 4));
     assert_eq!(frames(&plan.write), ["newer", "taken back", "unknown"]);
     let replacing = plan_import(&rows, true, find);

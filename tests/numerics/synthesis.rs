@@ -2,17 +2,17 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its input has failed")]
 
 use mhp_inspector::radar::{
-    AdcCube, Axis, AxisKind, Chain, Echo, Fmcw, MimoArray, RadarCube, Receiver, SPEED_OF_LIGHT, Spacing, Track, Window,
-    main_lobe_sigma_bins, sine_sigma,
+    AdcCube, Axis, AxisKind, Chain, Echo, Fmcw, MimoArray, PointMotion, RadarCube, Receiver, SPEED_OF_LIGHT, Spacing,
+    Window, main_lobe_sigma_bins, sine_sigma,
 };
-use mhp_inspector::simulate::{Device, Layout, Radar};
+use mhp_inspector::simulate::{Device, Radar, SimulatedLayout};
 use num_complex::Complex64;
 use rand::{SeedableRng, rngs::StdRng};
 use std::f64::consts::TAU;
 
 /// The MMVR-like radar along y (0) or z (1).
 fn radar(index: usize) -> Radar {
-    Device::new(Layout::Mmvr).radars.swap_remove(index)
+    Device::new(SimulatedLayout::Mmvr).radars.swap_remove(index)
 }
 
 /// Everything kept, and fine bins.
@@ -166,7 +166,7 @@ fn measured_sigma(lobe: &[(f64, f64)]) -> f64 {
 
 #[test]
 fn manifest_widths_are_those_of_a_blob_in_the_cartesian_map() {
-    let device = Device::new(Layout::Mmvr);
+    let device = Device::new(SimulatedLayout::Mmvr);
     for (index, (radar, view)) in device.radars.iter().zip(&device.views).enumerate() {
         let [depth, lateral] = &view.axes[..] else { unreachable!("two axes") };
         // A cell's own centre on boresight, so that rows are range and columns are range · sine.
@@ -197,7 +197,7 @@ fn manifest_widths_are_those_of_a_blob_in_the_cartesian_map() {
 
 #[test]
 fn cartesian_maps_put_a_point_at_its_own_depth() {
-    let device = Device::new(Layout::Mmvr);
+    let device = Device::new(SimulatedLayout::Mmvr);
     let echo = Echo::moving([2.4, 0.6, -0.9], [1.5, 0.0, 0.0], 1.0);
     let cubes: Vec<AdcCube> = device.radars.iter().map(|radar| frame(&radar.fmcw, &[echo])).collect();
     let maps = device.maps(&cubes, 0.3);
@@ -227,8 +227,8 @@ fn what_stands_still_is_attenuated_by_the_stated_share() {
 fn an_echo_by_way_of_a_wall_lies_at_the_mean_of_the_two_ranges() {
     let radar = radar(0);
     let chain = Chain { max_range_m: 8.0, ..fine(&radar) };
-    let point = Track::still([3.0, 0.5, 0.0]);
-    let image = Track::still([3.0, 2.0 * 2.2 - 0.5, 0.0]);
+    let point = PointMotion::still([3.0, 0.5, 0.0]);
+    let image = PointMotion::still([3.0, 2.0 * 2.2 - 0.5, 0.0]);
     let (direct, mirrored) = (3f64.hypot(0.5), 3f64.hypot(3.9));
     for (out, back, range) in [(point, image, f64::midpoint(direct, mirrored)), (image, image, mirrored)] {
         let adc = frame(&radar.fmcw, &[Echo { out, back, reflectivity: Complex64::ONE }]);
@@ -242,7 +242,7 @@ fn an_echo_by_way_of_a_wall_lies_at_the_mean_of_the_two_ranges() {
 
 #[test]
 fn hupr_cubes_put_a_point_where_the_closed_form_says() {
-    let device = Device::new(Layout::Hupr);
+    let device = Device::new(SimulatedLayout::Hupr);
     let Radar { fmcw, .. } = &device.radars[0];
     let bin = fmcw.unambiguous_range_m() / 256.0;
     let mps = fmcw.radar.wavelength_m() / (2.0 * fmcw.radar.frame_s);
@@ -267,7 +267,7 @@ fn hupr_cubes_put_a_point_where_the_closed_form_says() {
 fn the_axes_of_every_layout_tell_where_a_point_is() {
     let point = [2.6f64, 0.5, 0.35];
     let range = point.iter().map(|x| x * x).sum::<f64>().sqrt();
-    for layout in Layout::ALL {
+    for layout in SimulatedLayout::ALL {
         let device = Device::new(layout);
         let echo = Echo::moving(point, point.map(|x| x * 0.6 / range), 1.0);
         let cubes: Vec<AdcCube> = device.radars.iter().map(|radar| frame(&radar.fmcw, &[echo])).collect();
@@ -283,7 +283,7 @@ fn the_axes_of_every_layout_tell_where_a_point_is() {
                     _ => (axis.at(bin), axis.coordinate(point)),
                 };
                 // HuPR leaves the Doppler phase between the turns in its angles.
-                let cells = if layout == Layout::Hupr { 4.0 } else { 1.5 };
+                let cells = if layout == SimulatedLayout::Hupr { 4.0 } else { 1.5 };
                 assert!((found - wanted).abs() < cells * axis.step().abs(), "{layout:?} {axis:?}: {found} {wanted}");
                 assert!(axis.spacing == Spacing::Linear || axis.kind.is_angular());
             }

@@ -4,7 +4,7 @@
 use mhp_inspector::geometry::{Pose, Vec3};
 use mhp_inspector::people::{CLASSES, Counter, FEATURES, Network, PeopleError, Scan, map_statistics};
 use mhp_inspector::radar::{Axis, AxisKind, PointSpread, Quantity, Spacing, View};
-use mhp_inspector::simulate::{Options, Preset, Recording};
+use mhp_inspector::simulate::{Options, Recording, ScenePreset};
 
 fn axis(kind: AxisKind, bins: usize, lo: f64, hi: f64) -> Axis {
     Axis { kind, bins, lo, hi, spacing: Spacing::Linear }
@@ -230,7 +230,7 @@ fn damaged_weights_are_told() {
 fn simulated_people_are_counted() {
     for people in 0..=2_usize {
         let options = Options {
-            presets: vec![Preset::Easy],
+            presets: vec![ScenePreset::Easy],
             frames: 5,
             sequence_length: 5,
             people: Some(people..=people),

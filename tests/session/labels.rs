@@ -13,7 +13,7 @@ use mhp_inspector::session::{
     Session, SessionFile, StrataStatus, Written,
 };
 use mhp_inspector::study::complexity::Complexity;
-use mhp_inspector::worker::{Prepared, Snapshot, WorkerCommand, WorkerEvent, WorkerMessage};
+use mhp_inspector::worker::{PreparedFit, Snapshot, WorkerCommand, WorkerEvent, WorkerMessage};
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 use std::sync::Arc;
@@ -123,7 +123,7 @@ impl Bench {
         let problem = Arc::new(Problem::new(radar, skeleton, views, &maps).unwrap());
         let params = initialise(&problem, &FitConfig::default()).unwrap().params;
         let initial = params.clone();
-        let prepared = Prepared { problem, begun: None, initial, warnings: Vec::new(), init_ms: 1.0 };
+        let prepared = PreparedFit { problem, begun: None, initial, warnings: Vec::new(), init_ms: 1.0 };
         let event = WorkerEvent::Prepared(Box::new(prepared));
         self.session.apply(Command::Worker(WorkerMessage::Event(prepare.job, event)));
         self.draw(params);

@@ -7,10 +7,10 @@ use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::{BareCatalog, BareChoice, Dataset, DatasetError, Progress};
 use mhp_inspector::mhp::{Adam, Evaluation, FitState, Problem, StepReport, StopReason, Terms, initialise};
 use mhp_inspector::session::{
-    Command, Effect, FitStatus, History, LogLevel, PickKind, Row, Session, ThemeChoice, ViewState,
+    Command, Effect, FitStatus, History, IterationRow, LogLevel, PickKind, Session, ThemeChoice, ViewState,
 };
 use mhp_inspector::worker::{
-    HistoryRow, JobId, Kept, Prepare, Prepared, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
+    HistoryRow, JobId, Kept, Prepare, PreparedFit, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -91,7 +91,7 @@ impl Bench {
         if !resumed {
             self.rows(job, branch, 0..=0);
         }
-        let prepared = Prepared { problem, begun: None, initial, warnings: Vec::new(), init_ms: 1.5 };
+        let prepared = PreparedFit { problem, begun: None, initial, warnings: Vec::new(), init_ms: 1.5 };
         self.event(job, WorkerEvent::Prepared(Box::new(prepared)));
         assert_eq!(self.session.fit.status, FitStatus::Paused);
     }
@@ -618,7 +618,7 @@ fn a_fit_that_was_left_is_found_again() {
     assert_eq!((fit.history.branches().len(), fit.head(), fit.status.clone()), (2, 8, FitStatus::Preparing));
     assert_eq!(fit.branch().unwrap().flags.last().unwrap().iteration, 8, "settings that changed meanwhile");
     let job = bench.job();
-    let prepared = Prepared {
+    let prepared = PreparedFit {
         problem: fit.problem.clone().unwrap(),
         begun: None,
         initial: bench.params.clone(),
@@ -693,7 +693,7 @@ fn a_run_begins_by_itself_only_where_asked() {
     let prepare = bench.goto(1);
     let job = prepare.job;
     bench.rows(job, 0, 0..=0);
-    let prepared = Prepared {
+    let prepared = PreparedFit {
         problem: Arc::new(
             Problem::new(
                 prepare.dataset.info().radar.clone(),
@@ -727,7 +727,7 @@ fn a_long_history_thins_its_states_and_keeps_every_row() {
     bench.apply(Command::Worker(WorkerMessage::Rows(job, rows)));
     let branch = bench.session.fit.branch().unwrap();
     assert_eq!((branch.rows.len(), branch.head()), (count + 1, count));
-    let kept = |row: &Row| row.state.is_some();
+    let kept = |row: &IterationRow| row.state.is_some();
     let states = branch.rows.iter().filter(|row| kept(row)).count();
     assert!(states * bytes <= 128 << 20 && states > count / 3, "{states} of {count}");
     assert!(kept(&branch.rows[0]) && kept(&branch.rows[count]));

@@ -7,7 +7,7 @@ use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::{Dataset, Frame, Progress};
 use mhp_inspector::mhp::{FitState, Precision, StepReport, StopReason};
 use mhp_inspector::worker::{
-    HistoryRow, JobId, Prepare, Prepared, Snapshot, Start, Worker, WorkerCommand, WorkerEvent, WorkerMessage,
+    HistoryRow, JobId, Prepare, PreparedFit, Snapshot, Start, Worker, WorkerCommand, WorkerEvent, WorkerMessage,
 };
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -59,7 +59,7 @@ impl Rig {
     }
 
     /// Prepares job 1 and answers its row 0 and what was prepared.
-    fn prepared(&mut self) -> (HistoryRow, Prepared) {
+    fn prepared(&mut self) -> (HistoryRow, PreparedFit) {
         self.prepare_with(1, &FitConfig::default(), Start::Initialise);
         let (mut rows, event) = self.rows_until(1, |event| matches!(event, WorkerEvent::Prepared(_)));
         let WorkerEvent::Prepared(prepared) = event else { panic!("{event:?}") };

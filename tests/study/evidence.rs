@@ -6,14 +6,14 @@ use mhp_inspector::body::{Group, Pppr, PpprShape, Skeleton};
 use mhp_inspector::config::{EmRegion, FitConfig};
 use mhp_inspector::dataset::{Dataset, Progress};
 use mhp_inspector::diagnose::{
-    Annotated, Calibration, EarlierFrame, Evidence, EvidenceInput, Finding, Measure, Place, STATIC_FRAMES, evidence,
-    with_share,
+    Annotated, Calibration, EarlierFrame, Evidence, EvidenceInput, Finding, FindingPlace, Measure, STATIC_FRAMES,
+    evidence, with_share,
 };
 use mhp_inspector::geometry::Pose;
 use mhp_inspector::labels::Tag;
 use mhp_inspector::mhp::{Fitter, Masks, Objective, Precision, Problem, masks, simulate};
 use mhp_inspector::radar::{Axis, AxisKind, FftSetup, PointSpread, Quantity, RadarConfig, Spacing, View, Window};
-use mhp_inspector::simulate::{Layout, Options, Preset, Recording};
+use mhp_inspector::simulate::{Options, Recording, ScenePreset, SimulatedLayout};
 use mhp_inspector::start::begin;
 use mhp_inspector::study::{BatchOptions, fit_frame, frame_evidence, frames_before};
 use proptest::prelude::*;
@@ -164,13 +164,13 @@ fn check(found: &[Evidence], views: &[View], joints: usize) {
         }
         for Finding { place, text } in &one.findings {
             match place {
-                Some(Place::Cells { view, lo, hi }) => {
+                Some(FindingPlace::Cells { view, lo, hi }) => {
                     let shape = views[*view].shape();
                     assert_eq!((lo.len(), hi.len()), (shape.len(), shape.len()));
                     assert!((0..shape.len()).all(|k| lo[k] <= hi[k] && hi[k] < shape[k]), "{text}: {lo:?} {hi:?}");
                 }
-                Some(Place::Joint(joint)) => assert!(*joint < joints, "{text}"),
-                Some(Place::Frame(_)) | None => {}
+                Some(FindingPlace::Joint(joint)) => assert!(*joint < joints, "{text}"),
+                Some(FindingPlace::Frame(_)) | None => {}
             }
         }
     }
@@ -217,7 +217,7 @@ fn f1_is_high_where_a_reflector_persists_and_low_where_all_moves() {
     assert!(score(&moving, 0) < 0.2 && found.score.unwrap() > 0.8, "{} {:?}", score(&moving, 0), found.score);
     // The patch is where the reflector is, and the fitted body does not explain it.
     let patch = found.findings.iter().find(|f| f.text.contains("hori: the largest static patch")).unwrap();
-    let Some(Place::Cells { view: 0, lo, hi }) = &patch.place else { unreachable!("{patch:?}") };
+    let Some(FindingPlace::Cells { view: 0, lo, hi }) = &patch.place else { unreachable!("{patch:?}") };
     let view = &persists.views[0];
     let (row, column) = (view.axes[0].bin(3.3).round() as usize, view.axes[1].bin(0.7).round() as usize);
     assert!((lo[0]..=hi[0]).contains(&row) && (lo[1]..=hi[1]).contains(&column), "{patch:?}");
@@ -329,7 +329,7 @@ fn f2_is_one_half_at_the_fraunhofer_distance_of_an_even_array() {
     }
     let found = &at(views, one).judge()[1];
     assert!((found.raw.unwrap() - 0.5).abs() < 2e-3, "{found:?}");
-    assert_eq!(found.findings[0].place, Some(Place::Joint(0)), "the nearest joint");
+    assert_eq!(found.findings[0].place, Some(FindingPlace::Joint(0)), "the nearest joint");
     assert!(found.summary.contains("1.00 times the Fraunhofer distance"), "{}", found.summary);
     // 22.5° at the Fraunhofer distance: rounded either way.
     assert!(has(found, "A wave from there is 22° off") || has(found, "A wave from there is 23° off"), "{found:?}");
@@ -375,7 +375,7 @@ fn f3_judges_the_closest_pair_and_tells_resolution_cells() {
     assert!(text.contains("range cells") && text.contains("azimuth cells"), "{text}");
     let cells: f64 = text.split("middles are ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!((cells - 0.8).abs() < 0.25, "{text}");
-    assert!(matches!(found.findings[0].place, Some(Place::Cells { view: 0, .. })));
+    assert!(matches!(found.findings[0].place, Some(FindingPlace::Cells { view: 0, .. })));
 }
 
 #[test]
@@ -395,7 +395,7 @@ fn f3_of_one_person_asks_the_labels() {
         "labels are no evidence: {scores:?}"
     );
     assert_eq!(boxed.raw, Some(0.5), "half of the smaller box is common");
-    let place = Place::Cells { view: 0, lo: vec![10, 10], hi: vec![25, 20] };
+    let place = FindingPlace::Cells { view: 0, lo: vec![10, 10], hi: vec![25, 20] };
     assert_eq!(boxed.findings[0].place, Some(place));
     assert!(has(boxed, "2 by its count of people, 2 by the boxes on hori, 1 by the boxes on vert, 2 in the camera"));
 }
@@ -420,7 +420,7 @@ fn f4_falls_with_the_radial_velocity() {
     let found = &moving(-0.125).judge()[3];
     assert!((found.raw.unwrap() - 0.5).abs() < 1e-9, "{found:?}");
     assert_eq!(found.summary, "The joints' radial velocity is 0.12 m/s (root mean square), 1.0 Doppler cells.");
-    assert!(matches!(found.findings[0].place, Some(Place::Joint(_))));
+    assert!(matches!(found.findings[0].place, Some(FindingPlace::Joint(_))));
 }
 
 #[test]
@@ -433,7 +433,7 @@ fn f4_without_doppler_looks_at_the_change_of_the_map() {
     assert!(scores.windows(2).all(|pair| pair[1] <= pair[0]), "{scores:?}");
     let change =
         moved.findings.iter().find(|f| f.text.contains("times as much a cell as the rest of the map")).unwrap();
-    assert_eq!(change.place, Some(Place::Frame(40)));
+    assert_eq!(change.place, Some(FindingPlace::Frame(40)));
     assert!(has(moved, "No axis of these maps measures velocity") && has(moved, "λ/(2 T_frame) = 0.15 m/s"));
     let alone = &walk(1, 0.0, 0.5).judge()[3];
     assert_eq!(alone.score, None);
@@ -574,7 +574,12 @@ fn the_real_mmvr_frame_says_what_it_lacks() {
 }
 
 /// The last of five frames of a simulated sequence, fitted as the paper does, and judged.
-fn simulated(preset: Preset, people: Option<usize>, layout: Layout, number: usize) -> Option<Vec<Evidence>> {
+fn simulated(
+    preset: ScenePreset,
+    people: Option<usize>,
+    layout: SimulatedLayout,
+    number: usize,
+) -> Option<Vec<Evidence>> {
     let options = Options {
         layout,
         presets: vec![preset],
@@ -632,25 +637,25 @@ fn surplus(of: &[(f64, bool)]) -> f64 {
 #[test]
 fn scores_are_probabilities_on_simulated_frames_of_a_new_seed() {
     let scenarios = [
-        (Preset::Easy, None, None),
-        (Preset::Medium, None, None),
-        (Preset::Hard, None, None),
-        (Preset::Medium, Some(2), None),
-        (Preset::F1, None, Some(Tag::F1)),
-        (Preset::F2, None, Some(Tag::F2)),
-        (Preset::F3, None, Some(Tag::F3)),
-        (Preset::F4, None, Some(Tag::F4)),
+        (ScenePreset::Easy, None, None),
+        (ScenePreset::Medium, None, None),
+        (ScenePreset::Hard, None, None),
+        (ScenePreset::Medium, Some(2), None),
+        (ScenePreset::F1, None, Some(Tag::F1)),
+        (ScenePreset::F2, None, Some(Tag::F2)),
+        (ScenePreset::F3, None, Some(Tag::F3)),
+        (ScenePreset::F4, None, Some(Tag::F4)),
     ];
     let jobs: Vec<_> = scenarios.iter().flat_map(|scenario| (0..6).map(move |number| (scenario, number))).collect();
-    let judge = |(scenario, number): &(&(Preset, Option<usize>, Option<Tag>), usize)| {
+    let judge = |(scenario, number): &(&(ScenePreset, Option<usize>, Option<Tag>), usize)| {
         let &&(preset, people, mode) = scenario;
-        let layout = if number % 2 == 0 { Layout::Mmvr } else { Layout::Generic };
+        let layout = if number % 2 == 0 { SimulatedLayout::Mmvr } else { SimulatedLayout::Generic };
         Some((preset, mode, simulated(preset, people, layout, *number)?))
     };
-    let judged: Vec<(Preset, Option<Tag>, Vec<Evidence>)> = jobs.par_iter().filter_map(judge).collect();
+    let judged: Vec<(ScenePreset, Option<Tag>, Vec<Evidence>)> = jobs.par_iter().filter_map(judge).collect();
     assert!(judged.len() >= 45, "{} of 48 frames show somebody", judged.len());
     let of = |mode: Tag, value: &dyn Fn(&Evidence) -> Option<f64>| -> Vec<(f64, bool)> {
-        let one = |(_, made_with, found): &(Preset, Option<Tag>, Vec<Evidence>)| {
+        let one = |(_, made_with, found): &(ScenePreset, Option<Tag>, Vec<Evidence>)| {
             let found = found.iter().find(|one| one.mode == mode).unwrap();
             (value(found).unwrap_or(0.0), *made_with == Some(mode))
         };
@@ -678,7 +683,7 @@ fn scores_are_probabilities_on_simulated_frames_of_a_new_seed() {
         assert!(side.len() > 10 && if above { share > 0.5 - error } else { share < 0.5 + error });
     }
     // What nobody provoked is not claimed: the raw value said F1 of most easy frames.
-    let easy = judged.iter().filter(|(preset, ..)| *preset == Preset::Easy).map(|(.., found)| &found[0]);
+    let easy = judged.iter().filter(|(preset, ..)| *preset == ScenePreset::Easy).map(|(.., found)| &found[0]);
     let [scored, raw] = [|one: &Evidence| one.score, |one: &Evidence| one.raw]
         .map(|value| easy.clone().filter(|one| value(one).unwrap() > 0.5).count());
     println!("F1 above 0.5 on easy frames: raw {raw}, score {scored}");

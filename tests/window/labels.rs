@@ -204,7 +204,7 @@ fn the_list_sorts_both_ways_with_the_undefined_last() {
     write(&folder.path().join("frames/002.npz"), &maps).unwrap();
     let mut window = Window::on(folder);
     window.at_rest();
-    let hardness = |w: &Window| rows(w).iter().map(|&row| w.session().facts(row).hardness).collect::<Vec<_>>();
+    let hardness = |w: &Window| rows(w).iter().map(|&row| w.session().frame_row(row).hardness).collect::<Vec<_>>();
     window.click("Sort by Hardness");
     let up = hardness(&window);
     assert!(window.is_on("Sort by Hardness") && !window.is_on("Sort by Index"));
@@ -219,7 +219,7 @@ fn the_list_sorts_both_ways_with_the_undefined_last() {
     window.ready(order[0]);
     window.key(Key::N);
     window.ready(order[1]);
-    let graded = window.session().facts(order[1]).stratum.unwrap().word();
+    let graded = window.session().frame_row(order[1]).stratum.unwrap().word();
     assert!(window.value(&format!("Frame frames/{:03}", order[1])).starts_with(graded));
 }
 

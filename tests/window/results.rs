@@ -41,9 +41,9 @@ fn a_table_that_is_dropped_fills_the_list() {
     let told = window.session().log.iter().rev().find(|line| line.text.contains("results of")).unwrap();
     assert!(told.text.contains("results of 3 of 6 frames; 1 rows are of frames that are not"), "{}", told.text);
     assert!(told.text.ends_with("elsewhere/7") && told.level == LogLevel::Info, "{}", told.text);
-    let facts = window.session().facts(0);
+    let facts = window.session().frame_row(0);
     assert_eq!((facts.iou, facts.majpe_mm, facts.converged), (Some(0.5), Some(120.5), Some(false)));
-    let second = window.session().facts(2);
+    let second = window.session().frame_row(2);
     assert_eq!((second.iou, second.iterations, second.reason), (Some(0.9), Some(12), Some("converged")));
     assert_eq!(filter(&mut window, "iou<0.6"), [0]);
     assert_eq!(filter(&mut window, "converged:yes"), [2]);
@@ -65,14 +65,14 @@ fn a_frame_that_was_fitted_here_keeps_its_own() {
     // To look at a frame of the table is not to fit it: what the table says stays.
     window.apply(Command::GotoFrame(2));
     until(&mut window, "frame 2", |s| s.fit.frame == 2 && s.fit.is_ready() && s.fit.shown.is_some());
-    assert_eq!(window.session().facts(2).iou, Some(0.9));
+    assert_eq!(window.session().frame_row(2).iou, Some(0.9));
     window.apply(Command::StepFit(1));
     until(&mut window, "a step", |s| s.fit.head() == 1 && !s.fit.is_running());
-    assert_eq!(window.session().facts(2).iterations, Some(1));
+    assert_eq!(window.session().frame_row(2).iterations, Some(1));
     let foreign = write_table(&window, "summary.csv", &ROWS[3..]);
     window.apply(Command::LoadResults(foreign));
     until(&mut window, "that nothing matches", |s| s.log.iter().any(|line| line.text.contains("results of 0 of 6")));
-    assert_eq!(window.session().facts(2).iterations, Some(1));
+    assert_eq!(window.session().frame_row(2).iterations, Some(1));
 }
 
 #[test]

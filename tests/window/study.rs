@@ -102,7 +102,7 @@ fn a_row_puts_its_frames_into_the_list() {
     assert_eq!(window.session().queue.rows(), [0, 1, 2, 3], "frame 4 was not studied");
     let run = window.session().study.shown().unwrap();
     let wanted: Vec<Option<f64>> = run.rows_of(&run.table[1]).map(|row| row.fit.as_ref().unwrap().majpe_mm).collect();
-    let listed: Vec<Option<f64>> = (0..4).map(|frame| window.session().facts(frame).majpe_mm).collect();
+    let listed: Vec<Option<f64>> = (0..4).map(|frame| window.session().frame_row(frame).majpe_mm).collect();
     assert_eq!(listed, wanted);
     assert_eq!(window.session().study.row, Some(1));
     // The other row's frames replace them.

@@ -4,8 +4,8 @@
 
 use super::counting;
 use super::error::RunError;
-use super::fit::{Loaded, Start, Stop, fit_key};
-use super::journal::{Journal, Rows};
+use super::fit::{LoadedFrame, Stop, TimedStart, fit_key};
+use super::journal::{Rows, RunJournal};
 use super::plan::{RunPlan, Unit};
 use super::row::{RunNumbers, RunRow};
 use crate::body::Pppr;
@@ -26,7 +26,7 @@ const CHAINS: &str = "chains";
 pub(super) fn execute(
     dataset: &Dataset,
     plan: &RunPlan,
-    (journal, rows): (Journal, Rows),
+    (journal, rows): (RunJournal, Rows),
     folder: &Path,
     threads: usize,
     progress: &Progress,
@@ -65,7 +65,7 @@ pub(super) fn execute(
 
 /// What the threads write.
 struct Kept {
-    journal: Journal,
+    journal: RunJournal,
     rows: Rows,
     fault: Option<RunError>,
 }
@@ -111,7 +111,7 @@ impl Engine<'_> {
         let missing: Vec<usize> = variants.iter().copied().filter(|&v| !self.done.contains(&(v, frame))).collect();
         let Some(&first) = missing.first() else { return Ok(()) };
         let started = caught(|| {
-            let loaded = Loaded::read(self.dataset, frame)?;
+            let loaded = LoadedFrame::read(self.dataset, frame)?;
             let start = loaded.cold(&self.plan.spec.variants[first].config)?;
             Ok((loaded, start))
         });
@@ -139,7 +139,7 @@ impl Engine<'_> {
         groups
     }
 
-    fn fits(&self, frame: usize, loaded: &Loaded<'_>, start: &Start, variants: &[usize]) -> Result<(), Halt> {
+    fn fits(&self, frame: usize, loaded: &LoadedFrame<'_>, start: &TimedStart, variants: &[usize]) -> Result<(), Halt> {
         let spec = &self.plan.spec;
         let Some(&longest) = variants.last() else { return Ok(()) };
         let stops: Vec<usize> = variants.iter().map(|&v| spec.variants[v].config.iterations).collect();
@@ -215,7 +215,7 @@ impl Engine<'_> {
         let config = &spec.variants[variant].config;
         let mut init_ms = None;
         let answer = caught(|| {
-            let loaded = Loaded::read(self.dataset, frame)?;
+            let loaded = LoadedFrame::read(self.dataset, frame)?;
             let start = before.map_or_else(|| loaded.cold(config), |before| Ok(loaded.warm(config, before)))?;
             init_ms = start.init_ms;
             let mut answers = loaded.fit(config, spec.precision, &start, &[config.iterations]);

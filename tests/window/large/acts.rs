@@ -6,7 +6,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use mhp_inspector::app::{InspectorApp, PaneKind};
 use mhp_inspector::labels::Tag;
-use mhp_inspector::session::{Command, LabelStatus, Session, Sort, SortKey, StrataStatus, Strip};
+use mhp_inspector::session::{Command, LabelStatus, Session, Sort, SortKey, StrataStatus, TimelineStrip};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -199,7 +199,7 @@ impl Window {
     }
 
     fn strips(&mut self) {
-        for strip in [Strip::Iou, Strip::Tags, Strip::Stratum] {
+        for strip in [TimelineStrip::Iou, TimelineStrip::Tags, TimelineStrip::Stratum] {
             self.repeat(&format!("strip of {strip:?}"), 30, |harness, k| {
                 if k == 0 {
                     let mut view = harness.state().session().view.clone();

@@ -5,7 +5,7 @@ use crate::study::complexity::Stratum;
 
 /// One frame's row.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Facts<'a> {
+pub struct FrameRow<'a> {
     /// Index in the data set.
     pub index: usize,
     /// Name.
@@ -48,7 +48,7 @@ pub struct Facts<'a> {
     pub annotators: Vec<&'a str>,
 }
 
-impl Default for Facts<'_> {
+impl Default for FrameRow<'_> {
     fn default() -> Self {
         Self {
             index: 0,
@@ -75,7 +75,7 @@ impl Default for Facts<'_> {
     }
 }
 
-/// Which facts are asked for. Of 100,000 frames, gathering those that nobody reads costs more than a pass may.
+/// What of a row is asked for. Of 100,000 frames, gathering those that nobody reads costs more than a pass may.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Reads {
     /// The name.
@@ -121,7 +121,7 @@ impl Reads {
 
 /// A number of a frame that can be compared and sorted by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Number {
+pub enum FrameNumber {
     /// Index in the data set.
     Index,
     /// Hardness.
@@ -142,7 +142,7 @@ pub enum Number {
     Majpe,
 }
 
-impl Number {
+impl FrameNumber {
     /// Every number.
     pub const ALL: [Self; 9] = [
         Self::Index,
@@ -189,19 +189,19 @@ impl Number {
     }
 }
 
-impl Facts<'_> {
+impl FrameRow<'_> {
     /// A number of this frame.
-    pub fn number(&self, number: Number) -> Option<f64> {
+    pub fn number(&self, number: FrameNumber) -> Option<f64> {
         match number {
-            Number::Index => Some(self.index as f64),
-            Number::Hardness => self.hardness,
-            Number::PeakDensity => self.peak_density,
-            Number::StaticDominance => self.static_dominance,
-            Number::HumanSaliency => self.human_saliency,
-            Number::Iou => self.iou,
-            Number::Loss => self.loss,
-            Number::Iterations => self.iterations.map(|n| n as f64),
-            Number::Majpe => self.majpe_mm,
+            FrameNumber::Index => Some(self.index as f64),
+            FrameNumber::Hardness => self.hardness,
+            FrameNumber::PeakDensity => self.peak_density,
+            FrameNumber::StaticDominance => self.static_dominance,
+            FrameNumber::HumanSaliency => self.human_saliency,
+            FrameNumber::Iou => self.iou,
+            FrameNumber::Loss => self.loss,
+            FrameNumber::Iterations => self.iterations.map(|n| n as f64),
+            FrameNumber::Majpe => self.majpe_mm,
         }
     }
 }

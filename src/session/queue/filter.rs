@@ -3,13 +3,13 @@
 //! Terms are separated by spaces and must all hold; a `-` before a term negates it; `a|b` after a colon means either.
 //! A bare word is looked for in the frame's name. What a frame has no value for satisfies no comparison.
 
-use super::facts::{Facts, Number, Reads};
+use super::row::{FrameNumber, FrameRow, Reads};
 use crate::labels::{Tag, Verdict};
 use crate::study::complexity::Stratum;
 
 /// A parsed filter. The empty text matches every frame.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Rule {
+pub struct FrameFilter {
     terms: Vec<Term>,
 }
 
@@ -28,7 +28,7 @@ enum Test {
     /// A tag, `None` for any or for none at all.
     Tags { any_of: Vec<Tag>, any: bool, none: bool },
     /// A number compared with a limit.
-    Compare(Number, Comparison, f64),
+    Compare(FrameNumber, Comparison, f64),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,7 +72,7 @@ pub const SYNTAX: &str = "Terms that must all hold, separated by spaces; - negat
     converged:no · fitted:yes · reason:diverged · verdict:detection-error · readable:no\n\
     A bare word is looked for in the frame's name.";
 
-impl Rule {
+impl FrameFilter {
     /// Parses a filter.
     ///
     /// # Errors
@@ -86,14 +86,14 @@ impl Rule {
         self.terms.is_empty()
     }
 
-    /// Which facts the answer depends on.
+    /// What of a row the answer depends on.
     pub fn reads(&self) -> Reads {
         self.terms.iter().fold(Reads::default(), |reads, term| reads.or(term.test.reads()))
     }
 
-    /// True where a frame with these facts matches.
-    pub fn matches(&self, facts: &Facts<'_>) -> bool {
-        self.terms.iter().all(|term| term.test.holds(facts) != term.negated)
+    /// True where a frame with this row matches.
+    pub fn matches(&self, row: &FrameRow<'_>) -> bool {
+        self.terms.iter().all(|term| term.test.holds(row) != term.negated)
     }
 }
 
@@ -114,36 +114,36 @@ impl Test {
         }
     }
 
-    fn holds(&self, facts: &Facts<'_>) -> bool {
+    fn holds(&self, row: &FrameRow<'_>) -> bool {
         match self {
-            Self::Name(part) => contains(facts.name, part),
+            Self::Name(part) => contains(row.name, part),
             Self::Tags { any_of, any, none } => {
-                any_of.iter().any(|&tag| facts.tags.contains(tag))
-                    || (*any && !facts.tags.is_empty())
-                    || (*none && facts.tags.is_empty())
+                any_of.iter().any(|&tag| row.tags.contains(tag))
+                    || (*any && !row.tags.is_empty())
+                    || (*none && row.tags.is_empty())
             }
             Self::Compare(number, comparison, limit) => {
-                facts.number(*number).is_some_and(|value| comparison.holds(value, *limit))
+                row.number(*number).is_some_and(|value| comparison.holds(value, *limit))
             }
-            Self::Word(word, values) => values.iter().any(|value| word.holds(facts, value)),
+            Self::Word(word, values) => values.iter().any(|value| word.holds(row, value)),
         }
     }
 }
 
 impl Word {
-    fn holds(self, facts: &Facts<'_>, value: &str) -> bool {
+    fn holds(self, row: &FrameRow<'_>, value: &str) -> bool {
         let is = |text: Option<&str>| text.is_some_and(|text| text.eq_ignore_ascii_case(value));
         let yes = matches!(value, "yes" | "true" | "1");
         match self {
-            Self::Stratum => is(facts.stratum.map(Stratum::word)),
-            Self::Scene => contains(facts.scene, value),
-            Self::Note => contains(facts.note, value),
-            Self::By => facts.annotators.iter().any(|name| contains(name, value)),
-            Self::Verdict => is(facts.verdict.map(Verdict::code)),
-            Self::Reason => facts.reason.is_some_and(|reason| contains(reason, value)),
-            Self::Converged => facts.converged == Some(yes),
-            Self::Fitted => facts.iterations.is_some() == yes,
-            Self::Readable => facts.readable == yes,
+            Self::Stratum => is(row.stratum.map(Stratum::word)),
+            Self::Scene => contains(row.scene, value),
+            Self::Note => contains(row.note, value),
+            Self::By => row.annotators.iter().any(|name| contains(name, value)),
+            Self::Verdict => is(row.verdict.map(Verdict::code)),
+            Self::Reason => row.reason.is_some_and(|reason| contains(reason, value)),
+            Self::Converged => row.converged == Some(yes),
+            Self::Fitted => row.iterations.is_some() == yes,
+            Self::Readable => row.readable == yes,
         }
     }
 }
@@ -206,7 +206,7 @@ fn test(text: &str) -> Result<Test, String> {
     }
     let Some((key, value)) = text.split_once(':') else { return Ok(Test::Name(text.to_lowercase())) };
     let key = key.to_lowercase();
-    if Number::of(&key).is_some() {
+    if FrameNumber::of(&key).is_some() {
         return Err(format!("`{text}`: {key} is a number; expected for example {key}<0.5"));
     }
     let values: Vec<String> = value.split('|').map(str::to_lowercase).filter(|v| !v.is_empty()).collect();
@@ -252,8 +252,8 @@ fn tags(values: &[String]) -> Result<Test, String> {
 }
 
 fn compare(key: &str, rest: &str) -> Result<Test, String> {
-    let number = Number::of(&key.to_lowercase()).ok_or_else(|| {
-        let names: Vec<&str> = Number::ALL.iter().map(|number| number.key()).collect();
+    let number = FrameNumber::of(&key.to_lowercase()).ok_or_else(|| {
+        let names: Vec<&str> = FrameNumber::ALL.iter().map(|number| number.key()).collect();
         format!("`{key}` is no number of a frame; expected {}", names.join(", "))
     })?;
     let (comparison, digits) = [
@@ -279,8 +279,8 @@ mod tests {
     use crate::labels::{Tags, Verdict};
     use crate::study::complexity::Stratum;
 
-    fn facts() -> Facts<'static> {
-        Facts {
+    fn row() -> FrameRow<'static> {
+        FrameRow {
             index: 12,
             name: "d5s1/003/00012",
             scene: "d5s1/003",
@@ -295,12 +295,12 @@ mod tests {
             note: "Two words, near the Wall",
             verdict: Some(Verdict::BothIncorrect),
             annotators: vec!["ada"],
-            ..Facts::default()
+            ..FrameRow::default()
         }
     }
 
     fn holds(text: &str) -> bool {
-        Rule::parse(text).unwrap().matches(&facts())
+        FrameFilter::parse(text).unwrap().matches(&row())
     }
 
     #[test]
@@ -319,8 +319,8 @@ mod tests {
     fn an_unknown_value_satisfies_no_comparison() {
         assert!(!holds("majpe>0") && !holds("majpe<=0"));
         assert!(holds("-majpe>0"));
-        let bare = Facts { name: "x", ..Facts::default() };
-        assert!(!Rule::parse("converged:no").unwrap().matches(&bare), "not fitted is not unconverged");
+        let bare = FrameRow { name: "x", ..FrameRow::default() };
+        assert!(!FrameFilter::parse("converged:no").unwrap().matches(&bare), "not fitted is not unconverged");
     }
 
     #[test]
@@ -336,22 +336,22 @@ mod tests {
             ("note:\"a", "quote"),
             ("-", "negates nothing"),
         ] {
-            let error = Rule::parse(text).unwrap_err();
+            let error = FrameFilter::parse(text).unwrap_err();
             assert!(error.contains(expected), "{text}: {error}");
         }
     }
 
     #[test]
     fn only_rules_about_fits_follow_a_run() {
-        assert!(Rule::parse("iou<0.5").unwrap().reads().fit);
-        assert!(!Rule::parse("stratum:hard tag:F1 hardness>0.5 00").unwrap().reads().fit);
+        assert!(FrameFilter::parse("iou<0.5").unwrap().reads().fit);
+        assert!(!FrameFilter::parse("stratum:hard tag:F1 hardness>0.5 00").unwrap().reads().fit);
     }
 
     #[test]
     fn only_rules_about_labels_follow_tags() {
         for text in ["-tag:none", "note:wall", "by:ada", "verdict:true-negative"] {
-            assert!(Rule::parse(text).unwrap().reads().labels(), "{text}");
+            assert!(FrameFilter::parse(text).unwrap().reads().labels(), "{text}");
         }
-        assert!(!Rule::parse("stratum:hard iou<0.5 00").unwrap().reads().labels());
+        assert!(!FrameFilter::parse("stratum:hard iou<0.5 00").unwrap().reads().labels());
     }
 }
