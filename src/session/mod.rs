@@ -5,7 +5,7 @@
 //! send commands; threads report back by commands too.
 //!
 //! **Time.** A pass of the window has 16 ms of its thread, also on 100,000 frames. What takes longer is an [`Effect`]: it
-//! is done by a thread of the [`Runtime`] and comes back as a command. `tests/large.rs` measures it.
+//! is done by a thread of the [`Runtime`] and comes back as a command. `tests/window/large` measures it.
 //!
 //! **Memory.** A window on 100,000 frames, all of them labelled, graded and with results, takes less than 1 GiB besides
 //! the pictures: frames that were read up to 512 MiB ([`crate::dataset::DEFAULT_BUDGET`]), the states of one fit up to
