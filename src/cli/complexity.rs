@@ -6,12 +6,13 @@ use super::common::{CsvArgs, complain, inputs, open, print, print_json};
 use super::merge::MergeArgs;
 use super::shards::{ShardArgs, end};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
-use crate::dataset::{Dataset, Job, Progress};
+use crate::dataset::Dataset;
 use crate::study::StudyError;
 use crate::study::complexity::{
     self, Complexity, ComplexityOptions, MeasuredFrame, cache_folder, measure, ranked, write_csv,
 };
 use crate::study::shard::{FrameCommand, ShardFolder, ShardSpec, Whole};
+use crate::task::{Job, Progress};
 use clap::Args;
 use crossbeam_channel::{RecvTimeoutError, bounded};
 use indicatif::{ProgressBar, ProgressStyle};

@@ -8,7 +8,7 @@ use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::body::Pppr;
 use crate::config::{FitConfig, Preset};
 use crate::dataset::{Dataset, read_pppr};
-use crate::diagnose::{Evidence, Finding, Place};
+use crate::diagnose::{Evidence, Finding, FindingPlace};
 use crate::escape::{one_line, to_cell};
 use crate::labels::Tag;
 use crate::mhp::{Precision, Problem};
@@ -275,9 +275,9 @@ fn card(text: &mut String, mode: &Evidence, arrays: &[String]) {
 fn place(finding: &Finding, arrays: &[String]) -> String {
     match &finding.place {
         None => String::new(),
-        Some(Place::Joint(joint)) => format!(" [joint {joint}]"),
-        Some(Place::Frame(index)) => format!(" [frame {index}]"),
-        Some(Place::Cells { view, lo, hi }) => {
+        Some(FindingPlace::Joint(joint)) => format!(" [joint {joint}]"),
+        Some(FindingPlace::Frame(index)) => format!(" [frame {index}]"),
+        Some(FindingPlace::Cells { view, lo, hi }) => {
             let array = arrays.get(*view).map_or("", String::as_str);
             let spans: Vec<String> = lo.iter().zip(hi).map(|(lo, hi)| format!("{lo}..={hi}")).collect();
             format!(" [{array}[{}]]", spans.join(", "))

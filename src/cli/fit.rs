@@ -14,7 +14,7 @@ use crate::dataset::Dataset;
 use crate::mhp::Precision;
 use crate::output::{FolderLock, Inputs, replace_file};
 use crate::study::shard::{FrameCommand, Shard, ShardFolder, ShardSpec, Whole};
-use crate::study::{BatchOptions, FrameRow, Means, Summary, columns, run_batch};
+use crate::study::{BatchOptions, BatchRow, Means, Summary, columns, run_batch};
 use anyhow::Context as _;
 use clap::Args;
 use serde::{Deserialize, Serialize};
@@ -178,7 +178,7 @@ fn part(
 /// # Errors
 /// Where they are not one whole, or the folder cannot be written.
 pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<ExitCode> {
-    let Whole { spec, rows, folders } = Whole::<FrameRow>::read(&args.shards)?;
+    let Whole { spec, rows, folders } = Whole::<BatchRow>::read(&args.shards)?;
     let settings: Settings = spec.settings()?;
     let whole = args.begin(&spec, &folders, shelves(settings.curves))?;
     whole.copy_one(SETTINGS)?;
@@ -265,7 +265,7 @@ impl Report {
         }
     }
 
-    fn add(&mut self, row: FrameRow) {
+    fn add(&mut self, row: BatchRow) {
         self.means.add(&row);
         if let (None, Err(why)) = (&self.first_error, &row.fit) {
             self.first_error = Some(why.clone());

@@ -1,12 +1,13 @@
 //! The whole answer: what is on disk, what has to be read, and the ranking.
 
 use super::super::StudyError;
-use super::cache::{CacheFile, Kept};
+use super::cache::{CacheFile, CachedStatistics};
 use super::plan::{Sequences, chunk_length, chunks};
 use super::scan::{Scanned, scan};
 use super::stamps::{Key, keys};
 use super::{Complexity, ComplexityOptions, MeasuredFrame, Statistics, rank};
-use crate::dataset::{Dataset, Progress};
+use crate::dataset::Dataset;
+use crate::task::Progress;
 use std::ops::Range;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -76,7 +77,7 @@ fn measure_telling(
     cache: Option<&Path>,
     progress: &Progress,
     mut told: impl FnMut(usize),
-) -> Result<(Vec<Kept>, usize), StudyError> {
+) -> Result<(Vec<CachedStatistics>, usize), StudyError> {
     let options = options.validated()?;
     let sequences = Sequences::of(dataset);
     let mut found = match cache {
