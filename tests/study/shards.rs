@@ -220,6 +220,9 @@ fn shards_of_other_settings_data_or_versions_are_refused() {
     assert!(merged("@s1").contains("comes twice"));
     case.ends(0, &["study", "init", "@data", "--iterations", "1", "--frames", "0", "--out", "@run"]);
     assert!(merged("@run").contains("expected the shards of one command"));
+    case.ends(0, &[fit, &["--out", "@results"]].concat());
+    let taken = case.refused(&[fit, &["--shard", "1/2", "--out", "@results"]].concat());
+    assert!(taken.contains("pppr: holds other results already"), "{taken}");
     assert!(case.refused(&["merge", "@run", "--out", "@whole"]).contains("is no shard: it was run without --shard"));
     assert!(case.refused(&["merge", "@data", "--out", "@whole"]).contains("nothing to merge"));
     assert!(case.refused(&["merge", "@s1", "@s2", "--out", "@s1"]).contains("give another --out"));

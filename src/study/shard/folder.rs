@@ -29,7 +29,8 @@ impl ShardFolder {
     /// Makes and holds `folder`, and the folders `below` it. Where it holds the same shard, that is done again.
     ///
     /// # Errors
-    /// Where the folder holds another shard, lies in the data set or cannot be written, or another process works on it.
+    /// Where the folder holds another shard, or other results `below`, lies in the data set or cannot be written, or another
+    /// process works on it.
     pub fn begin(folder: &Path, below: &[&str], spec: ShardSpec, inputs: &Inputs<'_>) -> Result<Self, ShardError> {
         let lock = FolderLock::claim(folder, below, inputs)?;
         let [file, rows] = [SHARD_FILE, ROWS_FILE].map(|name| folder.join(name));
@@ -38,6 +39,9 @@ impl ShardFolder {
             && let Some((what, there, here)) = ShardSpec::read(folder)?.difference(&spec)
         {
             return Err(ShardError::OtherShard { what, there, here, path: folder.to_owned() });
+        }
+        if !is_shard_folder(folder) {
+            below.iter().try_for_each(|name| check_empty(&folder.join(name)))?;
         }
         match std::fs::remove_file(&rows) {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(ShardError::writing(&rows)(error)),
@@ -58,4 +62,11 @@ impl ShardFolder {
     pub fn finish(self, rows: &[impl ShardRow]) -> Result<(), ShardError> {
         write_rows(&self.folder.join(ROWS_FILE), &self.spec, rows)
     }
+}
+
+/// Refuses a folder with files that a merge would take for the shard's.
+fn check_empty(folder: &Path) -> Result<(), ShardError> {
+    let mut entries = std::fs::read_dir(folder).map_err(ShardError::reading(folder))?;
+    let message = "holds other results already; give another --out, or remove it".to_owned();
+    entries.next().map_or(Ok(()), |_| Err(ShardError::Damaged { message, path: folder.to_owned() }))
 }
