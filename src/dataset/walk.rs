@@ -5,7 +5,7 @@
 //! (or of links, which are looked at) are told to the caller: a named pipe is never opened. Depth and number are bounded, and what
 //! was left out is said.
 
-use super::files::natural;
+use super::natural::natural;
 use super::{DatasetError, Progress};
 use rayon::prelude::*;
 use std::collections::HashSet;

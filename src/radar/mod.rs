@@ -3,6 +3,7 @@
 
 mod array;
 mod axis;
+mod camera;
 mod config;
 mod fft;
 mod fmcw;
@@ -13,6 +14,7 @@ mod window;
 
 pub use array::MimoArray;
 pub use axis::{Axis, AxisKind, Spacing};
+pub use camera::ImageCamera;
 pub use config::{RadarConfig, SPEED_OF_LIGHT};
 pub use fft::{Chain, PolarMap, RadarCube, RangeDoppler};
 pub use fmcw::{AdcCube, Echo, Fmcw, Receiver, Track, add_leakage, path_gain};

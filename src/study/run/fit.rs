@@ -6,8 +6,8 @@
 use super::row::RunNumbers;
 use crate::body::Pppr;
 use crate::config::{FitConfig, LearningRates};
-use crate::dataset::{Dataset, Frame, Layout};
-use crate::diagnose::{Camera, Reprojection, joint_errors, map_box_coverage, reprojection};
+use crate::dataset::{Dataset, Frame};
+use crate::diagnose::{Reprojection, joint_errors, map_box_coverage, reprojection};
 use crate::geometry::Vec3;
 use crate::mhp::{Fitter, Precision, Problem, StopReason, predict};
 use crate::start::{begin, problem_of};
@@ -160,16 +160,16 @@ impl<'a> Loaded<'a> {
         }
     }
 
-    /// Only MMVR publishes a camera; its key points count where the skeleton is theirs.
+    /// Only where the data set publishes a camera; its key points count where the skeleton is theirs.
     fn reprojection(&self, joints: &[Vec3], a_person: usize) -> Reprojection {
         let info = self.dataset.info();
-        let Some(image) = self.frame.image.as_ref().filter(|_| info.layout == Layout::Mmvr) else {
+        let (Some(image), Some(camera)) = (&self.frame.image, info.layout.camera()) else {
             return Reprojection::default();
         };
         let preset = crate::body::Skeleton::preset(&image.keypoint_skeleton);
         let same = preset.is_some_and(|preset| preset.joints == info.skeleton.joints);
         let keypoints = if same { image.keypoints.as_slice() } else { &[] };
-        reprojection(&Camera::MMVR, joints, a_person, keypoints, &image.boxes)
+        reprojection(&camera, joints, a_person, keypoints, &image.boxes)
     }
 
     fn map_box_coverage(&self, joints: &[Vec3], a_person: usize) -> Option<f64> {
