@@ -7,7 +7,7 @@
 
 use super::assign::assign;
 use crate::geometry::Vec3;
-use crate::radar::{ImageCamera, View};
+use crate::radar::{PinholeCamera, View};
 
 /// How joints lie on image labels.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -22,7 +22,7 @@ pub struct Reprojection {
 /// Compares joints (flat, person by person, m) with image labels: `keypoints` (u px, v px, score) a person in the order of
 /// the same joints, and `boxes` (u0, v0, u1, v1 px, score).
 pub fn reprojection(
-    camera: &ImageCamera,
+    camera: &PinholeCamera,
     joints: &[Vec3],
     joints_a_person: usize,
     keypoints: &[Vec<[f64; 3]>],
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     /// MMVR's.
-    const CAMERA: ImageCamera = ImageCamera { focal_px: [379.476, 379.476], centre_px: [322.457, 241.627] };
+    const CAMERA: PinholeCamera = PinholeCamera { focal_px: [379.476, 379.476], centre_px: [322.457, 241.627] };
 
     fn person(left_m: f64) -> Vec<Vec3> {
         vec![[3.0, left_m, 0.5], [3.0, left_m + 0.2, 0.0], [3.0, left_m - 0.2, -0.5]]

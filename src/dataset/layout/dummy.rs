@@ -6,8 +6,9 @@ use super::{FrameSource, Layout, Opened, Place, manifest_beside, no_single_file}
 use crate::dataset::manifest::Manifest;
 use crate::dataset::set::{DatasetInfo, parent};
 use crate::dataset::walk::Walk;
-use crate::dataset::{DatasetError, Frame, Heatmap, Progress};
-use crate::radar::ImageCamera;
+use crate::dataset::{DatasetError, Frame, Heatmap};
+use crate::radar::PinholeCamera;
+use crate::task::Progress;
 use std::fmt::{self, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -53,8 +54,8 @@ impl Layout for Dummy {
         open(&Place { root: parent(file), manifest: &manifest, allow_outside: false }, Some(stem), progress)
     }
 
-    fn camera(&self) -> Option<ImageCamera> {
-        Some(ImageCamera { focal_px: [1.0; 2], centre_px: [0.0; 2] })
+    fn camera(&self) -> Option<PinholeCamera> {
+        Some(PinholeCamera { focal_px: [1.0; 2], centre_px: [0.0; 2] })
     }
 }
 
@@ -121,7 +122,8 @@ impl FrameSource for Frames {
 #[cfg(test)]
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
-    use crate::dataset::{Dataset, DatasetError, LAYOUTS, Layout, Manifest, Progress};
+    use crate::dataset::{Dataset, DatasetError, LAYOUTS, Layout, Manifest};
+    use crate::task::Progress;
     use std::path::Path;
 
     fn open(path: &Path) -> Result<Dataset, DatasetError> {

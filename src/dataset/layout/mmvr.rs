@@ -10,8 +10,9 @@ use crate::dataset::manifest::Manifest;
 use crate::dataset::npz::{NpzArchive, NpzError, shape_text};
 use crate::dataset::set::{DatasetInfo, MANIFEST_NAME, parent};
 use crate::dataset::walk::Walk;
-use crate::dataset::{DatasetError, Frame, Heatmap, ImageAnnotations, MAX_PERSONS, Progress};
-use crate::radar::{ImageCamera, View};
+use crate::dataset::{DatasetError, Frame, Heatmap, ImageAnnotations, MAX_PERSONS};
+use crate::radar::{PinholeCamera, View};
+use crate::task::Progress;
 use rayon::prelude::*;
 use std::fmt::{self, Write};
 use std::ops::Range;
@@ -30,7 +31,7 @@ const MAX_SIDE: usize = 8192;
 /// Camera images, (width, height), px.
 const IMAGE_SIZE: [usize; 2] = [640, 480];
 /// The published intrinsics; lens distortion left out, as the code published with the data does.
-const CAMERA: ImageCamera = ImageCamera { focal_px: [379.476, 379.476], centre_px: [322.457, 241.627] };
+const CAMERA: PinholeCamera = PinholeCamera { focal_px: [379.476, 379.476], centre_px: [322.457, 241.627] };
 
 /// The layout.
 #[derive(Debug)]
@@ -63,7 +64,7 @@ impl Layout for Mmvr {
         open(&Place { root: parent(file), manifest: &manifest, allow_outside: false }, Some(stem), progress)
     }
 
-    fn camera(&self) -> Option<ImageCamera> {
+    fn camera(&self) -> Option<PinholeCamera> {
         Some(CAMERA)
     }
 }

@@ -22,12 +22,13 @@ pub use bare::{BareCatalog, BareChoice, Remembered};
 pub use frames::{FrameSource, MapArray, Stored};
 pub use xrf55::STEPS as XRF55_STEPS;
 
+use super::DatasetError;
 use super::axes_text::axes_badge;
 use super::manifest::Manifest;
 use super::set::{DatasetInfo, MANIFEST_NAME};
-use super::{DatasetError, Progress};
 use crate::body::Skeleton;
-use crate::radar::{ImageCamera, RadarConfig};
+use crate::radar::{PinholeCamera, RadarConfig};
+use crate::task::Progress;
 use std::fmt::{self, Debug, Display};
 use std::path::Path;
 
@@ -89,7 +90,7 @@ pub trait Layout: Debug + Sync {
     }
 
     /// The camera whose pixels its image labels are, where its calibration is published.
-    fn camera(&self) -> Option<ImageCamera> {
+    fn camera(&self) -> Option<PinholeCamera> {
         None
     }
 }

@@ -1,7 +1,8 @@
 //! The files that a manifest's pattern names, `frames/*.npz`: names only, nothing is opened.
 
+use crate::dataset::DatasetError;
 use crate::dataset::walk::is_special;
-use crate::dataset::{DatasetError, Progress};
+use crate::task::Progress;
 use std::path::{Component, Path, PathBuf};
 
 /// Files that match a pattern at most.
