@@ -6,10 +6,11 @@ use super::files::{RADAR_SUFFIX, Segment, leads_out, matching, radar_stem, segme
 use super::manifest::{Layout, Manifest};
 use super::source::{MAX_NAME_BYTES, Names, Source};
 use super::words::axes_badge;
-use super::{DatasetError, Frame, Heatmap, Progress, generic, hupr, mmvr, xrf55};
+use super::{DatasetError, Frame, Heatmap, generic, hupr, mmvr, xrf55};
 use crate::body::Skeleton;
 use crate::digest;
 use crate::radar::{RadarConfig, ViewSet};
+use crate::task::Progress;
 use sha2::{Digest as _, Sha256};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock};
