@@ -14,9 +14,8 @@
 //!
 //! A [`Counter`] is made once for the views of a data set; [`Counter::scan`] looks at a frame, [`Counter::count`] at a scanned
 //! frame and those before it. All of it is pure. `train/` (feature `train`) makes the weights in `assets/counter.json`;
-//! `alone.rs` is what the counter is compared with.
+//! `map_statistics.rs` is what the classifier that the counter is compared with sees.
 
-mod alone;
 mod cfar;
 mod change;
 mod cluster;
@@ -25,6 +24,7 @@ mod counter;
 mod error;
 mod features;
 mod identity;
+mod map_statistics;
 mod network;
 mod scan;
 mod seeds;
@@ -33,7 +33,6 @@ mod sight;
 #[cfg(feature = "train")]
 pub mod train;
 
-pub use alone::{STATISTICS, map_statistics};
 pub use cfar::{CfarOptions, Detection, detect};
 pub use cluster::{Cluster, ClusterOptions};
 pub use confusion::{Confusion, PREVALENCE};
@@ -41,5 +40,6 @@ pub use counter::{Count, Counted, Counter, CounterOptions};
 pub use error::PeopleError;
 pub use features::FEATURES;
 pub use identity::{Track, Tracker, TrackerOptions, match_people};
+pub use map_statistics::{STATISTICS, map_statistics};
 pub use network::{CLASSES, LAYERS, Layer, Network};
 pub use scan::{COMPARED, HISTORY, Point, Scan};
