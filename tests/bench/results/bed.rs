@@ -48,7 +48,8 @@ impl Bed {
 
     /// Runs the program and answers what it printed.
     pub(crate) fn program(&self, arguments: &[&str]) -> String {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"));
+        let program = std::env::var_os("MHP_PROGRAM").unwrap_or_else(|| env!("CARGO_BIN_EXE_mhp-inspector").into());
+        let mut command = Command::new(program);
         let output = command.args(arguments).current_dir(self.folder.path()).output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.code().is_some_and(|code| code < 2), "{arguments:?}: {said}");

@@ -3,7 +3,7 @@
 //! `cargo bench --no-default-features --bench results` measures all sections; `… --bench results -- fits speed` those that are
 //! named, and leaves the others as they stand. Data are simulated into a temporary folder; what the shared folder beside the
 //! checkout holds (real frames, another simulator, the peer for speed) is used where it is there, and said to be missing where
-//! not. `MHP_PEER` is a Python that has jax, for the peer.
+//! not. `MHP_PEER` is a Python that has jax, for the peer; `MHP_PROGRAM` another build of the program to be measured.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a measurement stops where its material cannot be made")]
 
 mod bed;

@@ -43,7 +43,12 @@ fn times(figures: &Value, [least, median]: [&str; 2]) -> Times {
 fn peer(region: &str) -> Option<Times> {
     let python = std::env::var("MHP_PEER").ok()?;
     let script = Bed::shared("reference/baseline_jax.py")?;
-    let output = Command::new(python).arg(script).arg(Bed::own("tests/reference/mmvr-size")).args([region, "200"]).output().ok()?;
+    let output = Command::new(python)
+        .arg(script)
+        .arg(Bed::own("tests/reference/mmvr-size"))
+        .args([region, "200"])
+        .output()
+        .ok()?;
     let text = String::from_utf8(output.stdout).ok()?;
     let figures: Value = text.lines().rev().find_map(|line| serde_json::from_str(line).ok())?;
     Some(times(&figures, ["us_min", "us_median"]))
