@@ -53,6 +53,7 @@
 //! | [`radar`] | chirp, axes, views, point-spread functions, FMCW synthesis of a MIMO array and the FFT chain |
 //! | [`config`] | `FitConfig`: defaults, ranges, help text; the only source for files, command line and sliders; [where the program differs from the paper](config::deviations) |
 //! | [`output`] | where results are written: safe names, guarded and locked folders, files whole or not at all |
+//! | [`task`] | work off the caller's thread: progress, cancelling, panics that become errors |
 //! | [`escape`] | text from data on its way to a terminal or a table |
 //! | [`folders`] | where the user's settings, labels and caches lie |
 //! | [`input`] | opening what others made: regular files only, bounded |
@@ -74,6 +75,7 @@ pub mod output;
 pub mod people;
 pub mod radar;
 pub mod study;
+pub mod task;
 pub mod worker;
 
 #[cfg(feature = "viewer")]

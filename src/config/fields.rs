@@ -85,6 +85,18 @@ pub const FIELDS: &[Field] = &[
         get: |c| c.tau_pct,
         set: |c, x| c.tau_pct = x,
     },
+    #[cfg(test)]
+    Field {
+        key: "w_dummy",
+        group: FieldGroup::Weights,
+        label: "w_dummy",
+        help: "Weight of a term that only tests know.",
+        unit: "",
+        range: (0.0, 1000.0),
+        logarithmic: true,
+        get: |c| c.w_dummy,
+        set: |c, x| c.w_dummy = x,
+    },
     Field {
         key: "softness",
         group: FieldGroup::Optimiser,

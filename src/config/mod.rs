@@ -152,6 +152,9 @@ pub struct FitConfig {
     pub starts: usize,
     /// Weight of the temporal term.
     pub w_time: f64,
+    /// Weight of a term that only tests know.
+    #[cfg(test)]
+    pub w_dummy: f64,
     /// What tells how high a start stands.
     pub height: Height,
     /// What tells where the limbs of a start are.
@@ -192,6 +195,8 @@ impl Default for FitConfig {
             warm_start: WarmStart::default(),
             starts: 1,
             w_time: 0.0,
+            #[cfg(test)]
+            w_dummy: 0.0,
             height: Height::default(),
             limbs: Limbs::default(),
             operators: Operators::default(),

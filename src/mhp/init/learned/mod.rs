@@ -18,13 +18,12 @@ mod parts;
 mod train;
 
 #[cfg(feature = "train")]
-pub use train::{Lesson, learn};
+pub use train::{LimbLesson, learn};
 
-use super::Reading;
-use super::evidence::Evidence;
-use super::template::relax;
 use crate::geometry::{Vec3, add, norm, scale, sub};
 use crate::mhp::Problem;
+use crate::mhp::context::{Reading, SaliencyMap};
+use crate::mhp::template::relax;
 use parts::{PARTS, Parts};
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
@@ -152,8 +151,8 @@ impl Frame {
 
 /// What the linear map is given; `None` where no view tells sides, or none heights.
 fn inputs(problem: &Problem, reading: Reading, frame: &Frame, parts: &Parts, joints: &[Vec3]) -> Option<Vec<f32>> {
-    let now = &problem.surroundings(reading).now;
-    let around: Vec<&[Evidence]> = problem.surroundings(reading).around(problem).map(|(_, views)| views()).collect();
+    let context = problem.context(reading);
+    let (now, around): (_, Vec<&[SaliencyMap]>) = (&context.now, context.around().map(|(_, maps)| maps()).collect());
     let times = || std::iter::once(now.as_slice()).chain(around.iter().copied());
     let middle = frame.world([0.0, 0.0, MIDDLE_M]);
     let left = frame.turned([0.0, 1.0, 0.0]);
@@ -210,7 +209,7 @@ impl Lattice {
     }
 
     /// The cells of a view around a point of the lattice; `whole` where the view tells sides and heights.
-    fn spot(self, view: &Evidence, frame: &Frame, [away, second]: [f64; 2], whole: bool) -> Spot {
+    fn spot(self, view: &SaliencyMap, frame: &Frame, [away, second]: [f64; 2], whole: bool) -> Spot {
         let beside = |k: usize| STEP_M / FINE as f64 * (k as f64 - 0.5 * (FINE - 1) as f64);
         let third: &[f64] = match (self, whole) {
             (Self::Floor, true) => &HEIGHTS_M,
