@@ -3,8 +3,9 @@
 use super::bed::{Bed, row, table};
 use super::studies::tables_of;
 use mhp_inspector::body::Pppr;
-use mhp_inspector::dataset::{Dataset, Progress, read_pppr};
+use mhp_inspector::dataset::{Dataset, read_pppr};
 use mhp_inspector::geometry::Vec3;
+use mhp_inspector::task::Progress;
 use std::path::Path;
 
 /// A body belongs to somebody when its middle is no farther from theirs over the floor, m.
