@@ -14,6 +14,12 @@
 //! 5. a frame: `problem.rs`, `simulate.rs`
 //! 6. the objective: `kinematic.rs`, `objective.rs`
 //! 7. the fit: `convergence.rs`, `articulation.rs`, `adam.rs`, `fitter.rs`; and the start of one: `init/mod.rs`
+//!
+//! **What it does not do.** The fit moves the body onto its echo; it does not find the pose: yaw and left/right are hardly visible
+//! in a single frame, and the echoes come from the skin, some centimetres before the joints. What error is left is of people
+//! who stand with their back to the radar, of tall people who sit, of arms and falls, and of people so still that they look like
+//! furniture. `sep` and `coll` matter where people are closer than 0.9 m. Single precision drops a gradient entry now and then
+//! where gradients are tiny: of 20,000 random scenes 4 to 7 are off by up to 8e-6, where 1e-6 is asked.
 
 mod adam;
 mod adjoint;

@@ -6,6 +6,12 @@
 //! the parts of its body, to how far from there each part is: ridge regression over simulated people with truth
 //! (`train-limbs`), committed in `assets/limbs.json`. Parts are named, so that the same map serves every skeleton; the
 //! bones are brought back to their lengths.
+//!
+//! Learned are 265 numbers in, 13 parts of the body out, from 13,762 starts in simulated frames, MMVR-like, HuPR-like and polar,
+//! with and without frames around. It is left out where no view tells heights, and for people with somebody else within 1.8 m. It
+//! has seen no real person: on the one real MMVR frame at hand, which has labels in the image only, reprojection falls from 68
+//! to 59 px and 85 % of the joints, for 76 %, lie in the boxes on the maps, while the vertical IoU falls from 0.45 to 0.36; poses of
+//! another simulator become worse (PA-MAJPE by 9 to 40 mm). It is a prior from simulation; `limbs = "posture"` switches it off.
 
 mod parts;
 #[cfg(feature = "train")]
