@@ -7,7 +7,7 @@ use super::names::Names;
 use super::{DatasetError, Frame, Heatmap};
 use crate::body::Skeleton;
 use crate::digest;
-use crate::radar::{RadarConfig, View};
+use crate::radar::{RadarConfig, ViewSet};
 use crate::task::Progress;
 use sha2::{Digest as _, Sha256};
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ pub struct DatasetInfo {
     /// Chirp and array.
     pub radar: RadarConfig,
     /// The maps of a frame, in the order of [`Frame::maps`].
-    pub views: Vec<View>,
+    pub views: ViewSet,
     /// The convention of the axes in words.
     pub axes_badge: String,
     /// What was assumed because the data set does not publish it.

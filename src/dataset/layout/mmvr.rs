@@ -86,7 +86,7 @@ fn open(place: &Place<'_>, named: Option<&str>, progress: &Progress) -> Result<O
     if info.frame_rate_hz == preset.frame_rate_hz {
         info.assumptions.push("frame rate: 900 frames a minute-long segment, hence 15 a second".into());
     }
-    if info.views == preset.views {
+    if *info.views == *preset.views {
         info.assumptions.push("point spread: 0.06 m and 0.03 rad are assumed; MMVR does not publish its own".into());
         info.assumptions.push("quantity: amplitudes are assumed, from the spread of the values".into());
     }

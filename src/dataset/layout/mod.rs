@@ -155,7 +155,7 @@ impl Place<'_> {
             skeleton,
             radar,
             axes_badge: axes_badge(views),
-            views: views.clone(),
+            views: views.clone().into(),
             assumptions,
             notes: Vec::new(),
         }

@@ -49,7 +49,7 @@ impl Layout for Xrf55 {
         let preset = place.manifest.layout.preset()?;
         let mut info = place.info(&preset);
         info.notes = notes;
-        if info.views == preset.views {
+        if *info.views == *preset.views {
             info.assumptions.extend(assumptions());
         }
         let steps = if info.views.iter().all(|view| view.axes.len() == 2) { STEPS } else { 1 };

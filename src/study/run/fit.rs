@@ -10,7 +10,7 @@ use crate::dataset::{Dataset, Frame};
 use crate::diagnose::{Reprojection, joint_errors, map_box_coverage, reprojection};
 use crate::geometry::Vec3;
 use crate::mhp::{Fitter, Precision, Problem, StopReason, predict};
-use crate::start::{begin, problem_of};
+use crate::start::{find_start, problem_of};
 use crate::study::row::annotated;
 use crate::task::milliseconds;
 use std::sync::Arc;
@@ -83,11 +83,11 @@ impl<'a> LoadedFrame<'a> {
     /// Where nobody is seen.
     pub(super) fn cold(&self, config: &FitConfig) -> Result<TimedStart, String> {
         let began = Instant::now();
-        let found = begin(&self.problem, config).map_err(|error| self.told(&error))?.initialisation;
+        let found = find_start(&self.problem, config).map_err(|error| self.told(&error))?.initialisation;
         Ok(TimedStart { params: found.params, unrefined: found.unrefined, init_ms: Some(milliseconds(began)) })
     }
 
-    /// A start from what the frame before ended with, moved as its people moved and spoiled as a cold one is.
+    /// A start from what the frame before ended with, moved as its people moved and perturbed as a cold one is.
     pub(super) fn warm(&self, config: &FitConfig, before: &Pppr) -> TimedStart {
         let params = predict(&self.problem, config, before);
         TimedStart { unrefined: params.clone(), params, init_ms: None }
@@ -253,7 +253,7 @@ mod tests {
     #[test]
     fn variants_with_one_key_have_one_start() {
         let (problem, base) = (Arc::new(problem()), FitConfig::default());
-        let start = |config: &FitConfig| begin(&problem, config).unwrap().initialisation.params;
+        let start = |config: &FitConfig| find_start(&problem, config).unwrap().initialisation.params;
         let same = start(&base);
         let rates = LearningRates { position: Some(0.01), bone: Some(0.02), ..LearningRates::default() };
         let variants = [

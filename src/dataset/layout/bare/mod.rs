@@ -97,7 +97,7 @@ fn open_chosen(catalog: &BareCatalog, choice: &BareChoice) -> Result<Opened, Dat
         radar: RadarConfig::default(),
         axes_badge: axes_badge(&choice.views),
         assumptions: assumptions(&choice.views),
-        views: choice.views.clone(),
+        views: choice.views.clone().into(),
         notes: Vec::new(),
     };
     opened(info, count, choice.first_axis_is_frame)
