@@ -23,6 +23,15 @@
 //! Every gradient is written by hand, [`mhp`] holds them; the forward model and its derivatives are checked against
 //! reference cases and central differences.
 //!
+//! ```text
+//! data set ── frame ──> problem (NaN filled, views, EM region)
+//!                          │
+//!         initialise ──> PPPR ──> forward model ──> H_sim ──> masks ──> L_EM ┐
+//!                          ▲      (each joint one Gaussian a view)           ├─> L and ∂L/∂Θ ──> Adam ──┐
+//!                          │                          bones, motion, angles ─┘                          │
+//!                          └───────────────────────────────────────────────────────────────────────────┘
+//! ```
+//!
 //! **The rooms**, dependencies pointing down only:
 //!
 //! | room | what is in it |

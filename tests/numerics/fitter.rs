@@ -6,6 +6,7 @@ use crate::reading::case_folders;
 use mhp_inspector::body::Group;
 use mhp_inspector::config::{EmRegion, FitConfig};
 use mhp_inspector::mhp::{FitError, Fitter, Objective, Precision, Problem, Region, masks, simulate};
+use mhp_inspector::radar::View;
 use std::sync::Arc;
 
 fn case(name: &str) -> Case {
@@ -147,17 +148,17 @@ fn wrong_sizes_are_refused_by_name() {
 fn problems_are_checked() {
     let Case { problem, .. } = case("polar-two-views");
     let maps: Vec<Vec<f64>> = (0..2).map(|view| problem.map(view).to_vec()).collect();
-    let with = |views, a: &[f64], b: &[f64]| {
+    let with = |views: Vec<View>, a: &[f64], b: &[f64]| {
         Problem::new(problem.radar.clone(), problem.skeleton.clone(), views, &[a, b]).unwrap_err().to_string()
     };
-    let text = with(problem.views.clone(), &maps[0][1..], &maps[1]);
+    let text = with(problem.views.to_vec(), &maps[0][1..], &maps[1]);
     assert!(text.contains(&problem.views[0].array) && text.contains(&maps[0].len().to_string()), "{text}");
-    let text = with(problem.views.clone(), &maps[0], &vec![f64::NAN; maps[1].len()]);
+    let text = with(problem.views.to_vec(), &maps[0], &vec![f64::NAN; maps[1].len()]);
     assert!(text.contains("no finite cell") && text.contains(&problem.views[1].array), "{text}");
-    let mut views = problem.views.clone();
+    let mut views = problem.views.to_vec();
     views[0].region = Some(vec![[0, 5], [7, 100_000]]);
     assert!(with(views, &maps[0], &maps[1]).contains("100000"));
-    let mut views = problem.views.clone();
+    let mut views = problem.views.to_vec();
     views[1].axes[0].hi = views[1].axes[0].lo;
     assert!(with(views, &maps[0], &maps[1]).contains("no extent"));
 }

@@ -1,6 +1,6 @@
 //! How high a body stands: the extent of what is lit above and below the place where it was found.
 
-use super::evidence::{DEPTH_LN, Evidence, SPECKLE};
+use super::saliency::{DEPTH_LN, SPECKLE, SaliencyMap};
 use crate::geometry::Vec3;
 use crate::mhp::percentile;
 
@@ -39,7 +39,7 @@ const BENT_LN_PER_MPS_ACROSS: f64 = 0.47;
 
 /// What the top of an echo says of somebody on the floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Stature {
+pub(in crate::mhp) struct Stature {
     /// Most likely stature of somebody who stands, m.
     pub standing_m: f64,
     /// Height of the head's top where feet and head are seen, m.
@@ -49,7 +49,7 @@ pub(super) struct Stature {
 impl Stature {
     /// From the lowest and highest lit heights (world frame, m) in the frames that show any, for a radar `radar_height_m`
     /// above the floor.
-    pub(super) fn new(lit_m: impl Iterator<Item = [f64; 2]>, radar_height_m: f64) -> Self {
+    pub(in crate::mhp) fn new(lit_m: impl Iterator<Item = [f64; 2]>, radar_height_m: f64) -> Self {
         let (lows, tops): (Vec<f64>, Vec<f64>) = lit_m.map(|[low, top]| (low, top)).unzip();
         let unknown = Self { standing_m: STATURE_M, top_m: None };
         if lows.is_empty() {
@@ -69,13 +69,13 @@ impl Stature {
 
 /// The share of an upright body's L_EM below which a bent one is believed of somebody whose head is seen at `top_m` and whose
 /// middle moves at these speeds along the line from the radar and across it, m/s.
-pub(super) fn bent_if_below(top_m: f64, [along, across]: [f64; 2]) -> f64 {
+pub(in crate::mhp) fn bent_if_below(top_m: f64, [along, across]: [f64; 2]) -> f64 {
     (BENT_LN - BENT_LN_PER_M * top_m + BENT_LN_PER_MPS_ALONG * along - BENT_LN_PER_MPS_ACROSS * across).exp()
 }
 
 /// Where the middle of the body is expected.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Expectation {
+pub(in crate::mhp) struct Expectation {
     /// Height of the middle, world frame, m.
     pub middle_m: f64,
     /// Lowest and highest lit height around the place, m.
@@ -86,8 +86,8 @@ pub(super) struct Expectation {
 
 impl Expectation {
     /// Looks for feet and head of a body found near `at`.
-    pub(super) fn new(evidence: &[Evidence], at: Vec3) -> Self {
-        let telling: Vec<&Evidence> = evidence.iter().filter(|e| e.resolves(at, [0.0, 0.0, 1.0])).collect();
+    pub(in crate::mhp) fn new(maps: &[SaliencyMap], at: Vec3) -> Self {
+        let telling: Vec<&SaliencyMap> = maps.iter().filter(|e| e.resolves(at, [0.0, 0.0, 1.0])).collect();
         let salience = |z: f64| {
             let sum: f64 = telling.iter().map(|e| e.salience_at_height(at, z, REACH_M)).sum();
             sum / telling.len().max(1) as f64

@@ -1,19 +1,18 @@
-//! One view's map as evidence for a body: background taken off, local maxima found, points looked up.
+//! How far each cell of a map rises above its background: local maxima found, points looked up.
 //!
 //! A strong echo smears along its own range (sidelobes of the angular transform), and so do walls that surround the
 //! radar: both are arcs about the radar. A person is compact. So each cell is compared with the median of the cells at
 //! the same range; where a view does not resolve range, with the median of the map.
 //!
-//! What the axes alone decide ([`Layout`]) is worked out once for all maps of a view. Cells are f32 of the map's largest.
+//! What the axes alone decide ([`SpatialGrid`]) is worked out once for all maps of a view. Cells are f32 of the map's largest.
 
-use super::layout::{Layout, NEAREST_M};
-use super::locate::Mark;
+use super::triangulate::Mark;
 use crate::config::Background;
 use crate::geometry::{Vec3, dot, mat_t_vec};
 use crate::mhp::fill::all_neighbours;
 use crate::mhp::for_neighbours;
 use crate::mhp::seen::Seen;
-use crate::radar::{AxisKind, unravel};
+use crate::radar::{AxisKind, NEAREST_M, SpatialGrid, unravel};
 use smallvec::SmallVec;
 use std::collections::HashSet;
 use std::sync::{Arc, OnceLock};
@@ -45,7 +44,7 @@ pub struct Peak {
 
 /// What the change from one map to another tells at a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Flow {
+pub(in crate::mhp) struct Flow {
     /// Magnitude of the intensity gradient, of the map's steepest.
     pub steepness: f64,
     /// 1 where the echo goes away from the radar, −1 where it comes, 0 where nothing tells.
@@ -54,8 +53,10 @@ pub(super) struct Flow {
 
 /// A view's map without its Doppler axes (the strongest Doppler bin stands for a cell).
 #[derive(Debug, Clone)]
-pub(super) struct Evidence {
-    layout: Arc<Layout>,
+pub(in crate::mhp) struct SaliencyMap {
+    /// Index of the view.
+    view: usize,
+    grid: Arc<SpatialGrid>,
     /// H of each spatial cell in shares of `largest`, and the full cell it was taken from where that is another.
     value: Vec<f32>,
     source: Vec<u32>,
@@ -64,16 +65,17 @@ pub(super) struct Evidence {
     compared_with: Background,
     /// One over the background of each ring, worked out where it is asked for.
     background: Vec<OnceLock<f32>>,
-    /// How restless each spatial cell is, 0 to 1: what stands still is no evidence. `None` where nothing tells.
-    unrest: Option<Arc<Vec<f32>>>,
+    /// How much each spatial cell changes with time, 0 to 1: what stands still does not count. `None` where nothing tells.
+    temporal_variation: Option<Arc<Vec<f32>>>,
 }
 
-impl Evidence {
-    pub(super) fn new(layout: &Arc<Layout>, map: &[f64], compared_with: Background) -> Self {
+impl SaliencyMap {
+    /// Of the map of view `view`, whose cells are `grid`.
+    pub(super) fn new(view: usize, grid: &Arc<SpatialGrid>, map: &[f64], compared_with: Background) -> Self {
         let largest = map.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-        let (value, source) = layout.spatial(map, largest);
-        let (layout, background) = (Arc::clone(layout), layout.unknown());
-        Self { layout, value, source, largest, compared_with, background, unrest: None }
+        let (value, source) = grid.spatial(map, largest);
+        let (grid, background) = (Arc::clone(grid), grid.unknown());
+        Self { view, grid, value, source, largest, compared_with, background, temporal_variation: None }
     }
 
     /// The largest value of its map.
@@ -84,22 +86,22 @@ impl Evidence {
     /// Another map of the same view, a short time before or after, on the scale and with the stillness of this one. The
     /// background is its own: that of a ring rises with the sidelobes of whoever stands in it.
     pub(super) fn at_another_time(&self, map: &[f64]) -> Self {
-        let (value, source) = self.layout.spatial(map, self.largest);
-        let background = self.layout.unknown();
-        Self { value, source, background, layout: Arc::clone(&self.layout), unrest: self.unrest.clone(), ..*self }
+        let (value, source) = self.grid.spatial(map, self.largest);
+        let (grid, background) = (Arc::clone(&self.grid), self.grid.unknown());
+        Self { value, source, background, grid, temporal_variation: self.temporal_variation.clone(), ..*self }
     }
 
-    /// The same map where what stands still is no evidence: cells whose coefficient of variation is below `still` do not
-    /// count, those above `restless` do.
-    pub(super) fn where_restless(self, variation: &[f32], [still, restless]: [f32; 2]) -> Self {
-        let unrest = |cell: usize| ((variation[self.source(cell)] - still) / (restless - still)).clamp(0.0, 1.0);
-        let of_spatial = (0..self.value.len()).map(unrest).collect();
-        Self { unrest: Some(Arc::new(of_spatial)), ..self }
+    /// The same map where what stands still does not count: cells whose coefficient of variation over time is below `still`
+    /// do not, those above `varying` do.
+    pub(super) fn where_varying(self, coefficients: &[f32], [still, varying]: [f32; 2]) -> Self {
+        let variation = |cell: usize| ((coefficients[self.source(cell)] - still) / (varying - still)).clamp(0.0, 1.0);
+        let of_spatial = (0..self.value.len()).map(variation).collect();
+        Self { temporal_variation: Some(Arc::new(of_spatial)), ..self }
     }
 
     /// The same map where some of its `peaks` were missed: with each goes its hill, the cells from which the steepest way up
     /// leads to it.
-    pub(super) fn without<'a>(&self, peaks: impl Iterator<Item = &'a Peak>) -> Self {
+    pub(in crate::mhp) fn without<'a>(&self, peaks: impl Iterator<Item = &'a Peak>) -> Self {
         let missed: HashSet<usize> = peaks.map(|peak| self.spatial_of(peak)).collect();
         let mut top_of: Vec<usize> = (0..self.value.len()).map(|cell| self.upward(cell)).collect();
         for cell in 0..top_of.len() {
@@ -112,15 +114,16 @@ impl Evidence {
                 top_of[passed] = at;
             }
         }
-        let unrest = |cell: usize| self.unrest.as_ref().map_or(1.0, |unrest| unrest[cell]);
-        let left = |(cell, top): (usize, usize)| if missed.contains(&top) { 0.0 } else { unrest(cell) };
-        Self { unrest: Some(Arc::new(top_of.into_iter().enumerate().map(left).collect())), ..self.clone() }
+        let variation = |cell: usize| self.temporal_variation.as_ref().map_or(1.0, |variation| variation[cell]);
+        let left = |(cell, top): (usize, usize)| if missed.contains(&top) { 0.0 } else { variation(cell) };
+        let left = top_of.into_iter().enumerate().map(left).collect();
+        Self { temporal_variation: Some(Arc::new(left)), ..self.clone() }
     }
 
     /// The highest neighbour of a cell, or itself where none is higher.
     fn upward(&self, cell: usize) -> usize {
         let mut highest = cell;
-        for_neighbours(&self.layout.shape, cell, |other| {
+        for_neighbours(&self.grid.shape, cell, |other| {
             if self.value[other] > self.value[highest] {
                 highest = other;
             }
@@ -133,29 +136,29 @@ impl Evidence {
         self.source.get(spatial).map_or(spatial, |&cell| cell as usize)
     }
 
-    fn unrest(&self, cell: usize) -> f64 {
-        self.unrest.as_ref().map_or(1.0, |unrest| f64::from(unrest[cell]))
+    fn temporal_variation(&self, cell: usize) -> f64 {
+        self.temporal_variation.as_ref().map_or(1.0, |variation| f64::from(variation[cell]))
     }
 
     /// H over the background.
     fn over_background(&self, cell: usize) -> f32 {
-        let place = self.layout.place(cell, self.compared_with);
-        self.value[cell] * self.background[place].get_or_init(|| self.layout.background(&self.value, place))
+        let place = self.grid.place(cell, self.compared_with);
+        self.value[cell] * self.background[place].get_or_init(|| self.grid.background(&self.value, place))
     }
 
     /// ln H over the background of what moves, ≥ 0.
     fn salience(&self, cell: usize) -> f64 {
-        f64::from(self.over_background(cell).max(1.0).ln()) * self.unrest(cell)
+        f64::from(self.over_background(cell).max(1.0).ln()) * self.temporal_variation(cell)
     }
 
     /// H over the background and what speckle rises above it, of what moves, of the map's largest.
     fn excess(&self, cell: usize) -> f64 {
         let over_speckle = (1.0 - SPECKLE_RATIO / f64::from(self.over_background(cell))).max(0.0);
-        f64::from(self.value[cell]) * over_speckle * self.unrest(cell)
+        f64::from(self.value[cell]) * over_speckle * self.temporal_variation(cell)
     }
 
     /// Local maxima above the strictest percentile that leaves enough of them, strongest excess first.
-    pub(super) fn peaks(&self) -> Vec<Peak> {
+    pub(in crate::mhp) fn peaks(&self) -> Vec<Peak> {
         let mut bits: Vec<u32> = self.value.iter().map(|x| x.to_bits()).collect();
         let last = bits.len().saturating_sub(1);
         let place = |q: f64| (last as f64 * q / 100.0).ceil() as usize;
@@ -186,44 +189,44 @@ impl Evidence {
 
     fn is_maximum(&self, cell: usize) -> bool {
         let highest = |other: usize| self.value[other] <= self.value[cell];
-        all_neighbours(&self.layout.shape, cell, highest) && self.excess(cell) > 0.0
+        all_neighbours(&self.grid.shape, cell, highest) && self.excess(cell) > 0.0
     }
 
     fn peak(&self, cell: usize) -> Peak {
         Peak {
-            view: self.layout.index,
-            bin: unravel(self.source(cell), &self.layout.view.shape()).to_vec(),
+            view: self.view,
+            bin: unravel(self.source(cell), &self.grid.view.shape()).to_vec(),
             value: self.largest * f64::from(self.value[cell]),
             salience: self.salience(cell),
         }
     }
 
     /// The spatial cell at a world point; `None` outside the map.
-    pub(super) fn cell(&self, p_world: Vec3) -> Option<usize> {
-        let p = self.layout.view.pose.view_from_world(p_world);
-        self.layout.axes.iter().try_fold(0, |flat, (_, axis)| {
+    pub(in crate::mhp) fn cell(&self, p_world: Vec3) -> Option<usize> {
+        let p = self.grid.view.pose.view_from_world(p_world);
+        self.grid.axes.iter().try_fold(0, |flat, (_, axis)| {
             let bin = axis.bin(axis.coordinate(p)).round();
             (bin >= 0.0 && bin < axis.bins as f64).then(|| flat * axis.bins + bin as usize)
         })
     }
 
     /// Mean over `points` of the amplitude over the background, of the map's largest.
-    pub(super) fn mean_excess(&self, points: &[Vec3]) -> f64 {
+    pub(in crate::mhp) fn mean_excess(&self, points: &[Vec3]) -> f64 {
         let sum: f64 = points.iter().filter_map(|&p| self.cell(p)).map(|cell| self.excess(cell)).sum();
         sum / points.len().max(1) as f64
     }
 
     /// Whether some axis of this view tells positions along `direction` (unit vector, world frame) near a world point.
-    pub(super) fn resolves(&self, p_world: Vec3, direction: Vec3) -> bool {
-        let seen = Seen::new(self.layout.view.pose.view_from_world(p_world));
-        self.layout.axes.iter().any(|(_, axis)| {
-            let along = mat_t_vec(&self.layout.view.pose.rotation, seen.direction_and_arm(axis.kind).0);
+    pub(in crate::mhp) fn resolves(&self, p_world: Vec3, direction: Vec3) -> bool {
+        let seen = Seen::new(self.grid.view.pose.view_from_world(p_world));
+        self.grid.axes.iter().any(|(_, axis)| {
+            let along = mat_t_vec(&self.grid.view.pose.rotation, seen.direction_and_arm(axis.kind).0);
             dot(along, direction).abs() > 0.7
         })
     }
 
     /// The largest salience of some cells, ln; 0 of none.
-    pub(super) fn brightest(&self, cells: &[usize]) -> f64 {
+    pub(in crate::mhp) fn brightest(&self, cells: &[usize]) -> f64 {
         cells.iter().map(|&cell| self.salience(cell)).fold(0.0, f64::max)
     }
 
@@ -238,32 +241,27 @@ impl Evidence {
     /// The spatial cell of a peak of this view.
     fn spatial_of(&self, peak: &Peak) -> usize {
         let bin = |k: usize| peak.bin.get(k).copied().unwrap_or(0);
-        self.layout.axes.iter().fold(0, |flat, (k, axis)| flat * axis.bins + bin(*k))
+        self.grid.axes.iter().fold(0, |flat, (k, axis)| flat * axis.bins + bin(*k))
     }
 
     /// H over the background at a peak of this view, of the map's largest.
-    pub(super) fn excess_of(&self, peak: &Peak) -> f64 {
+    pub(in crate::mhp) fn excess_of(&self, peak: &Peak) -> f64 {
         let spatial = self.spatial_of(peak);
         if spatial < self.value.len() { self.excess(spatial) } else { 0.0 }
     }
 
     /// How steep the map is at a world point, of its steepest; `None` outside the map or where nothing changes.
-    pub(super) fn steepness(&self, p_world: Vec3) -> Option<f64> {
+    pub(in crate::mhp) fn steepness(&self, p_world: Vec3) -> Option<f64> {
         let (cell, steepest) = (self.cell(p_world)?, self.steepest());
         (steepest > 0.0).then(|| self.gradient(cell).1 / steepest)
     }
 
     /// How steep the map is at a world point, and which way its echo goes from this map to `then`; `None` outside the map
     /// or where no axis tells a distance.
-    pub(super) fn flow(&self, then: &Self, p_world: Vec3) -> Option<Flow> {
+    pub(in crate::mhp) fn flow(&self, then: &Self, p_world: Vec3) -> Option<Flow> {
         let cell = self.cell(p_world)?;
-        let (k, axis) = self
-            .layout
-            .axes
-            .iter()
-            .enumerate()
-            .find(|(_, (_, axis))| axis.kind.is_depth())
-            .map(|(k, (_, a))| (k, a))?;
+        let (k, axis) =
+            self.grid.axes.iter().enumerate().find(|(_, (_, axis))| axis.kind.is_depth()).map(|(k, (_, a))| (k, a))?;
         let steepest = self.steepest();
         if steepest <= 0.0 {
             return None;
@@ -278,14 +276,14 @@ impl Evidence {
             slopes += outwards * outwards;
         };
         add(cell);
-        for_neighbours(&self.layout.shape, cell, &mut add);
+        for_neighbours(&self.grid.shape, cell, &mut add);
         let sign = if slopes > 0.0 { change.signum() } else { 0.0 };
         Some(Flow { steepness: self.gradient(cell).1 / steepest, sign })
     }
 
     /// Central differences of H along each spatial axis a bin, and their magnitude.
     fn gradient(&self, cell: usize) -> (SmallVec<[f64; 3]>, f64) {
-        let shape = &self.layout.shape;
+        let shape = &self.grid.shape;
         let mut stride = self.value.len();
         let along = |(bin, &count): (usize, &usize)| {
             stride /= count;
@@ -302,7 +300,7 @@ impl Evidence {
     fn steepest(&self) -> f64 {
         let mut squares = vec![0.0_f32; self.value.len()];
         let mut stride = self.value.len();
-        for &count in &self.layout.shape {
+        for &count in &self.grid.shape {
             let block = stride;
             stride /= count;
             for (squares, value) in squares.chunks_exact_mut(block).zip(self.value.chunks_exact(block)) {
@@ -321,23 +319,23 @@ impl Evidence {
     }
 
     /// A peak's place.
-    pub(super) fn mark(&self, peak: &Peak) -> Mark {
-        let bin = self.layout.axes.iter().map(|&(k, _)| peak.bin.get(k).map_or(0.0, |&bin| bin as f64));
-        Mark { view: self.layout.index, bin: bin.collect() }
+    pub(in crate::mhp) fn mark(&self, peak: &Peak) -> Mark {
+        let bin = self.grid.axes.iter().map(|&(k, _)| peak.bin.get(k).map_or(0.0, |&bin| bin as f64));
+        Mark { view: self.view, bin: bin.collect() }
     }
 
     /// The middle of what is lit around a world point, within `reach_m` along directions on the floor and up; weights
     /// are the salience's excess over [`DEPTH_LN`] below the strongest cell there, so that the whole body counts and not
     /// its brightest part, and the sidelobes do not. `None` where nothing is lit.
     pub(super) fn centroid(&self, p_world: Vec3, [floor_m, up_m]: [f64; 2]) -> Option<Mark> {
-        let seen = Seen::new(self.layout.view.pose.view_from_world(p_world));
+        let seen = Seen::new(self.grid.view.pose.view_from_world(p_world));
         let window: Vec<[usize; 2]> = self
-            .layout
+            .grid
             .axes
             .iter()
             .map(|(_, axis)| {
                 let (direction, arm) = seen.direction_and_arm(axis.kind);
-                let up = mat_t_vec(&self.layout.view.pose.rotation, direction)[2].abs();
+                let up = mat_t_vec(&self.grid.view.pose.rotation, direction)[2].abs();
                 let reach_m = floor_m + (up_m - floor_m) * up;
                 let half = reach_m * seen.slope(axis) / (arm * axis.step().abs());
                 let middle = axis.bin(seen.coordinate(axis, 0.0));
@@ -345,58 +343,31 @@ impl Evidence {
                 [clamp((middle - half).round()), clamp((middle + half).round() + 1.0)]
             })
             .collect();
-        let cells = window.iter().zip(&self.layout.shape).fold(vec![0], |cells: Vec<usize>, (&[lo, hi], &bins)| {
+        let cells = window.iter().zip(&self.grid.shape).fold(vec![0], |cells: Vec<usize>, (&[lo, hi], &bins)| {
             cells.iter().flat_map(|&cell| (lo..hi).map(move |bin| cell * bins + bin)).collect()
         });
         let lit: Vec<(usize, f64)> = cells.into_iter().map(|cell| (cell, self.salience(cell))).collect();
         let strongest = lit.iter().map(|(_, salience)| *salience).fold(0.0, f64::max);
         let floor = (strongest - DEPTH_LN).max(SPECKLE);
-        let (mut sum, mut weights): (SmallVec<[f64; 3]>, f64) = (SmallVec::from_elem(0.0, self.layout.axes.len()), 0.0);
+        let (mut sum, mut weights): (SmallVec<[f64; 3]>, f64) = (SmallVec::from_elem(0.0, self.grid.axes.len()), 0.0);
         for (cell, salience) in lit {
             let weight = salience - floor;
             if weight > 0.0 {
                 weights += weight;
                 let mut rest = cell;
-                for (sum, bins) in sum.iter_mut().zip(&self.layout.shape).rev() {
+                for (sum, bins) in sum.iter_mut().zip(&self.grid.shape).rev() {
                     *sum += weight * (rest % bins) as f64;
                     rest /= bins;
                 }
             }
         }
-        (weights > 0.0)
-            .then(|| Mark { view: self.layout.index, bin: sum.into_iter().map(|sum| sum / weights).collect() })
+        (weights > 0.0).then(|| Mark { view: self.view, bin: sum.into_iter().map(|sum| sum / weights).collect() })
     }
 
     /// Radial velocity (m/s) of the strongest Doppler bin at a world point, where the view has a Doppler axis.
-    pub(super) fn radial_mps(&self, p_world: Vec3) -> Option<f64> {
-        let (k, axis) = self.layout.view.axes.iter().enumerate().find(|(_, axis)| axis.kind == AxisKind::Doppler)?;
-        let bins = unravel(self.source(self.cell(p_world)?), &self.layout.view.shape());
+    pub(in crate::mhp) fn radial_mps(&self, p_world: Vec3) -> Option<f64> {
+        let (k, axis) = self.grid.view.axes.iter().enumerate().find(|(_, axis)| axis.kind == AxisKind::Doppler)?;
+        let bins = unravel(self.source(self.cell(p_world)?), &self.grid.view.shape());
         Some(axis.at(bins[k] as f64))
     }
-}
-
-/// The coefficient of variation of each cell over `maps`, the same view at several times, whose values are about as large as
-/// `largest`. The speckle of a person changes from frame to frame, for a chest that breathes moves by wavelengths; a wall's
-/// does not.
-pub(super) fn variation(maps: &[&[f64]], largest: f64) -> Vec<f32> {
-    let Some((first, others)) = maps.split_first() else { return Vec::new() };
-    // A power of two, which costs no digit: squares of what is very large or very small leave the range of numbers.
-    let unit = (-largest.log2().round()).clamp(-1000.0, 1000.0).exp2();
-    // Sums of differences to the first map: what stands still adds up to nothing, to the last digit.
-    let (mut sums, mut squares) = (vec![0.0; first.len()], vec![0.0; first.len()]);
-    for map in others {
-        for ((sum, square), (then, now)) in sums.iter_mut().zip(&mut squares).zip(map.iter().zip(*first)) {
-            let difference = unit * then - unit * now;
-            *sum += difference;
-            *square += difference * difference;
-        }
-    }
-    let count = maps.len() as f64;
-    let of_cell = |((&sum, square), now): ((&f64, f64), &f64)| {
-        let (mean, shift) = (unit * now + sum / count, sum / count);
-        let spread = (square / count - shift * shift).max(0.0).sqrt();
-        let variation = (spread / mean) as f32;
-        if mean > 0.0 && variation.is_finite() { variation } else { 0.0 }
-    };
-    sums.iter().zip(squares).zip(*first).map(of_cell).collect()
 }

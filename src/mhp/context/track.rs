@@ -3,11 +3,12 @@
 //! Left and right, front and back can hardly be told in one frame, but people walk forwards. Each neighbour's map is
 //! searched around the place of the frame before it on the way out, so that the track does not jump to somebody else.
 
-use super::evidence::Evidence;
-use super::find::centre;
-use crate::config::FitConfig;
+use super::middle::centre;
+use super::saliency::SaliencyMap;
+use super::temporal::TemporalContext;
 use crate::geometry::{Vec3, add_scaled, scale, sub};
-use crate::mhp::{Problem, percentile};
+use crate::mhp::percentile;
+use crate::radar::View;
 
 /// Slower than this, a person stands and the track's direction is its errors', m/s.
 const WALKING_MPS: f64 = 0.5;
@@ -24,7 +25,7 @@ const LEASH_SHARE: f64 = 0.3;
 
 /// A person in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Sighting {
+pub(in crate::mhp) struct Sighting {
     /// Seconds after the frame that is fitted.
     pub t_s: f64,
     /// Middle of the body, m.
@@ -35,7 +36,7 @@ pub(super) struct Sighting {
 
 /// A person through the frames around, and a line through its places.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Track {
+pub(in crate::mhp) struct Track {
     /// Place at the time of the frame, m.
     pub at: Vec3,
     /// m/s; heights do not move.
@@ -84,19 +85,18 @@ fn rises_mps(sightings: &[Sighting]) -> f64 {
 
 /// Follows the person who was found at `here`, `apart_m` from the nearest other, through the frames around; `None` where
 /// there are none.
-pub(super) fn track(problem: &Problem, config: &FitConfig, here: Sighting, apart_m: f64) -> Option<Track> {
-    let surroundings = problem.surroundings(config);
+pub(in crate::mhp) fn track(context: &TemporalContext, here: Sighting, apart_m: f64) -> Option<Track> {
     let mut sightings = vec![here];
     for forwards in [true, false] {
-        let side = surroundings.around(problem).filter(|(t_s, _)| (*t_s > 0.0) == forwards && *t_s != 0.0);
+        let side = context.around().filter(|(t_s, _)| (*t_s > 0.0) == forwards && *t_s != 0.0);
         let mut ordered: Vec<_> = side.collect();
         ordered.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
         let (mut last, mut velocity) = (here, [0.0; 3]);
-        for (t_s, evidence) in ordered {
+        for (t_s, maps) in ordered {
             let step_s = t_s - last.t_s;
             let mut expected = last.at;
             add_scaled(&mut expected, velocity, step_s);
-            let Some(found) = follow(problem, evidence(), t_s, expected, apart_m) else { break };
+            let Some(found) = follow(context.views(), maps(), t_s, expected, apart_m) else { break };
             velocity = scale(sub(found.at, last.at), 1.0 / step_s);
             last = found;
             sightings.push(found);
@@ -106,8 +106,8 @@ pub(super) fn track(problem: &Problem, config: &FitConfig, here: Sighting, apart
 }
 
 /// The middle of what is lit near `expected`; `None` where that is somebody else.
-fn follow(problem: &Problem, evidence: &[Evidence], t_s: f64, expected: Vec3, apart_m: f64) -> Option<Sighting> {
-    let (at, expectation) = centre(problem, evidence, expected, apart_m);
+fn follow(views: &[View], maps: &[SaliencyMap], t_s: f64, expected: Vec3, apart_m: f64) -> Option<Sighting> {
+    let (at, expectation) = centre(views, maps, expected, apart_m);
     let off = sub(at, expected);
     (off[0].hypot(off[1]) < LEASH_M.min(LEASH_SHARE * apart_m)).then_some(Sighting { t_s, at, lit_m: expectation.lit })
 }

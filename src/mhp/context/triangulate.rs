@@ -6,13 +6,13 @@ use crate::radar::{AxisKind, View};
 use smallvec::SmallVec;
 
 /// A step this short ends the search for the point that peaks agree on, m.
-const LOCATED_M: f64 = 1e-4;
+const CONVERGED_M: f64 = 1e-4;
 /// Where the search begins when nothing is known of the point: before the radar, m.
 const BEFORE_RADAR: Vec3 = [2.0, 0.0, 0.0];
 
 /// Where an echo lies in a view, in fractions of bins.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Mark {
+pub(in crate::mhp) struct Mark {
     pub view: usize,
     /// A bin a spatial axis, in the order of the view's axes without Doppler.
     pub bin: SmallVec<[f64; 3]>,
@@ -20,13 +20,13 @@ pub(super) struct Mark {
 
 /// The world point that best agrees with all `marks` at once, and the root mean square disagreement, m. What no axis
 /// tells stays at the radar's boresight.
-pub(super) fn locate(views: &[View], marks: &[&Mark]) -> (Vec3, f64) {
-    locate_from(BEFORE_RADAR, f64::INFINITY, views, marks)
+pub(in crate::mhp) fn triangulate(views: &[View], marks: &[&Mark]) -> (Vec3, f64) {
+    triangulate_from(BEFORE_RADAR, f64::INFINITY, views, marks)
 }
 
-/// As [`locate`], looking first at `p`: what no axis tells stays there. Where it is clear that the disagreement will stay
+/// As [`triangulate`], looking first at `p`: what no axis tells stays there. Where it is clear that the disagreement will stay
 /// above `tolerated_m`, any point with such a disagreement is the answer.
-pub(super) fn locate_from(mut p: Vec3, tolerated_m: f64, views: &[View], marks: &[&Mark]) -> (Vec3, f64) {
+pub(in crate::mhp) fn triangulate_from(mut p: Vec3, tolerated_m: f64, views: &[View], marks: &[&Mark]) -> (Vec3, f64) {
     let mut misfit = f64::INFINITY;
     for _ in 0..25 {
         let (mut normal, mut pull) = ([[0.0; 3]; 3], [0.0; 3]);
@@ -50,7 +50,7 @@ pub(super) fn locate_from(mut p: Vec3, tolerated_m: f64, views: &[View], marks: 
         let length = dot(step, step).sqrt();
         add_scaled(&mut p, step, if length > 1.0 { 1.0 / length } else { 1.0 });
         // No coordinate changes faster than the point moves, and steps more than halve.
-        if length < LOCATED_M || misfit - 2.0 * length > tolerated_m {
+        if length < CONVERGED_M || misfit - 2.0 * length > tolerated_m {
             break;
         }
     }

@@ -1,26 +1,25 @@
-//! What the axes of a view alone decide for its evidence, worked out once for all its maps: which cells lie at the same
-//! range, and how a map with a Doppler axis becomes one without.
+//! What the axes of a view alone decide of its maps: which cells lie at the same range, and how a map with a Doppler axis
+//! becomes one without.
 
+use super::{Axis, AxisKind, View, unravel};
 use crate::config::Background;
-use crate::radar::{Axis, AxisKind, View, unravel};
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::OnceLock;
 
 /// Echoes nearer than this are leakage from the radar itself, m.
-pub(super) const NEAREST_M: f64 = 0.5;
+pub(crate) const NEAREST_M: f64 = 0.5;
 /// A ring with fewer cells says nothing of the background.
 const SMALLEST_RING: usize = 8;
 /// Cells are held above this share of the map's largest, and at one by it: a map of another time may be much stronger.
 const FAINTEST: f32 = 1e-12;
 
-/// A view as evidence sees it: its axes without Doppler, and the rings of cells at the same range.
+/// The cells of a view without its Doppler axes, and the rings of those at the same range.
 #[derive(Debug)]
-pub(super) struct Layout {
-    pub(super) view: View,
-    pub(super) index: usize,
+pub(crate) struct SpatialGrid {
+    pub(crate) view: View,
     /// Spatial axes and their places among the view's axes.
-    pub(super) axes: Vec<(usize, Axis)>,
-    pub(super) shape: Vec<usize>,
+    pub(crate) axes: Vec<(usize, Axis)>,
+    /// Bins of each.
+    pub(crate) shape: Vec<usize>,
     /// The ring of each spatial cell.
     ring_of: Vec<u32>,
     /// Spatial cells ring by ring, and where each ring begins.
@@ -30,63 +29,32 @@ pub(super) struct Layout {
     deaf: usize,
 }
 
-/// Layouts that were asked for last: frame after frame has the same views.
-static KNOWN: Mutex<VecDeque<Arc<Layout>>> = Mutex::new(VecDeque::new());
-/// So many are kept, and no more bytes of them: those of eight views of 1024 × 1024 cells. They are the whole process's,
-/// whatever data sets it has seen, and a layout grows with its map.
-const MOST_KNOWN: usize = 8;
-const MOST_BYTES: usize = 128 << 20;
-
-impl Layout {
-    /// The layout of a view, as it is remembered or worked out.
-    pub(super) fn of(index: usize, view: &View) -> Arc<Self> {
-        let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-        let same = |layout: &&Arc<Self>| layout.index == index && layout.view == *view;
-        if let Some(layout) = known().iter().find(same) {
-            return Arc::clone(layout);
-        }
-        let layout = Arc::new(Self::new(index, view));
-        let mut known = known();
-        known.push_front(Arc::clone(&layout));
-        let fits = |bytes: &mut usize, layout: &Arc<Self>| {
-            *bytes += layout.bytes();
-            Some(*bytes <= MOST_BYTES)
-        };
-        let kept = known.iter().scan(0, fits).take(MOST_KNOWN).take_while(|&fits| fits).count();
-        known.truncate(kept);
-        layout
-    }
-
-    /// What its lists take.
-    fn bytes(&self) -> usize {
-        (self.ring_of.len() + self.cells.len()) * size_of::<u32>() + self.rings.len() * size_of::<usize>()
-    }
-
-    fn new(index: usize, view: &View) -> Self {
+impl SpatialGrid {
+    pub(super) fn new(view: &View) -> Self {
         let spatial = view.axes.iter().enumerate().filter(|(_, axis)| axis.kind != AxisKind::Doppler);
         let axes: Vec<(usize, Axis)> = spatial.map(|(k, axis)| (k, axis.clone())).collect();
         let shape: Vec<usize> = axes.iter().map(|(_, axis)| axis.bins).collect();
         let count: usize = shape.iter().product();
         let (ring_of, rings, cells) = (vec![0; count], vec![], vec![0; count]);
-        let mut layout = Self { view: view.clone(), index, axes, shape, ring_of, cells, rings, deaf: 0 };
-        if let Some(ranges) = layout.ranges_m() {
-            let widths = layout.axes.iter().filter(|(_, a)| !a.kind.is_angular()).map(|(_, a)| a.step().abs());
-            (layout.ring_of, layout.deaf) = rings_at(&ranges, widths.fold(f64::INFINITY, f64::min));
+        let mut grid = Self { view: view.clone(), axes, shape, ring_of, cells, rings, deaf: 0 };
+        if let Some(ranges) = grid.ranges_m() {
+            let widths = grid.axes.iter().filter(|(_, a)| !a.kind.is_angular()).map(|(_, a)| a.step().abs());
+            (grid.ring_of, grid.deaf) = rings_at(&ranges, widths.fold(f64::INFINITY, f64::min));
         }
         // Counting sort: how many cells each ring has, where it begins, and each cell to its place.
-        layout.rings = vec![0; layout.ring_of.iter().max().map_or(1, |&last| last as usize + 2)];
-        for &ring in &layout.ring_of {
-            layout.rings[ring as usize + 1] += 1;
+        grid.rings = vec![0; grid.ring_of.iter().max().map_or(1, |&last| last as usize + 2)];
+        for &ring in &grid.ring_of {
+            grid.rings[ring as usize + 1] += 1;
         }
-        for ring in 1..layout.rings.len() {
-            layout.rings[ring] += layout.rings[ring - 1];
+        for ring in 1..grid.rings.len() {
+            grid.rings[ring] += grid.rings[ring - 1];
         }
-        let mut next = layout.rings.clone();
-        for (cell, &ring) in layout.ring_of.iter().enumerate() {
-            layout.cells[next[ring as usize]] = cell as u32;
+        let mut next = grid.rings.clone();
+        for (cell, &ring) in grid.ring_of.iter().enumerate() {
+            grid.cells[next[ring as usize]] = cell as u32;
             next[ring as usize] += 1;
         }
-        layout
+        grid
     }
 
     /// Distance of each cell from the view's origin as far as the axes tell it, m; `None` where no axis tells any.
@@ -113,12 +81,12 @@ impl Layout {
     }
 
     /// A place for the background of each ring, and one for that of the whole map.
-    pub(super) fn unknown(&self) -> Vec<OnceLock<f32>> {
+    pub(crate) fn unknown(&self) -> Vec<OnceLock<f32>> {
         vec![OnceLock::new(); self.rings.len()]
     }
 
     /// Whose background a cell has: its ring's, or the whole map's where the ring is small or `background` asks for it.
-    pub(super) fn place(&self, cell: usize, background: Background) -> usize {
+    pub(crate) fn place(&self, cell: usize, background: Background) -> usize {
         if background == Background::Map {
             return self.rings.len() - 1;
         }
@@ -128,7 +96,7 @@ impl Layout {
     }
 
     /// One over the median at a place; 0 where nothing is told. `value` must be positive.
-    pub(super) fn background(&self, value: &[f32], place: usize) -> f32 {
+    pub(crate) fn background(&self, value: &[f32], place: usize) -> f32 {
         if place < self.deaf.min(self.rings.len() - 1) {
             return 0.0;
         }
@@ -138,7 +106,7 @@ impl Layout {
     }
 
     /// H of each spatial cell in shares of `largest`, and the full cell each was taken from where that is another.
-    pub(super) fn spatial(&self, map: &[f64], largest: f64) -> (Vec<f32>, Vec<u32>) {
+    pub(crate) fn spatial(&self, map: &[f64], largest: f64) -> (Vec<f32>, Vec<u32>) {
         let relative = |h: f64| ((h / largest) as f32).clamp(FAINTEST, 1.0 / FAINTEST);
         if self.axes.len() == self.view.axes.len() {
             return (map.iter().map(|&h| relative(h)).collect(), Vec::new());
@@ -186,10 +154,10 @@ mod tests {
     use super::*;
     use crate::radar::{PointSpread, Quantity, Spacing};
 
-    fn view(array: &str, axes: [(AxisKind, usize, f64, f64); 2]) -> View {
+    fn view(axes: [(AxisKind, usize, f64, f64); 2]) -> View {
         let axis = |(kind, bins, lo, hi)| Axis { kind, bins, lo, hi, spacing: Spacing::Linear };
         View {
-            array: array.into(),
+            array: "rings".into(),
             quantity: Quantity::Amplitude,
             psf: PointSpread::default(),
             pose: crate::geometry::Pose::default(),
@@ -198,8 +166,8 @@ mod tests {
         }
     }
 
-    fn depth_of(lo: f64, hi: f64) -> Layout {
-        Layout::new(0, &view("rings", [(AxisKind::DepthH, 16, lo, hi), (AxisKind::Y, 8, -1.0, 1.0)]))
+    fn depth_of(lo: f64, hi: f64) -> SpatialGrid {
+        SpatialGrid::new(&view([(AxisKind::DepthH, 16, lo, hi), (AxisKind::Y, 8, -1.0, 1.0)]))
     }
 
     #[test]
@@ -207,32 +175,20 @@ mod tests {
         for (lo, hi) in
             [(0.0, 1e9), (0.0, 1e308), (1e308, 0.0), (1e-308, 2e-308), (1e308, 1.1e308), (-1e9, 1e9), (1e9, 2e9)]
         {
-            let layout = depth_of(lo, hi);
-            assert!(layout.rings.len() <= layout.cells.len() + 3, "{lo} to {hi}: {} rings", layout.rings.len());
-            assert_eq!(layout.rings.last(), Some(&layout.cells.len()), "{lo} to {hi}");
-            let value = vec![1.0; layout.cells.len()];
-            assert!((0..layout.rings.len()).all(|place| layout.background(&value, place).is_finite()), "{lo} to {hi}");
+            let grid = depth_of(lo, hi);
+            assert!(grid.rings.len() <= grid.cells.len() + 3, "{lo} to {hi}: {} rings", grid.rings.len());
+            assert_eq!(grid.rings.last(), Some(&grid.cells.len()), "{lo} to {hi}");
+            let value = vec![1.0; grid.cells.len()];
+            assert!((0..grid.rings.len()).all(|place| grid.background(&value, place).is_finite()), "{lo} to {hi}");
         }
     }
 
     #[test]
     fn rings_are_as_wide_as_a_step_and_begin_at_the_nearest_cell() {
-        let layout = depth_of(2.0, 10.0);
+        let grid = depth_of(2.0, 10.0);
         // √(2² + 0²) m and √(2.5² + 0²) m lie two steps of a quarter metre apart.
-        assert_eq!((layout.ring_of[4], layout.ring_of[12]), (0, 2));
-        assert_eq!(layout.deaf, 0);
+        assert_eq!((grid.ring_of[4], grid.ring_of[12]), (0, 2));
+        assert_eq!(grid.deaf, 0);
         assert_eq!(depth_of(0.0, 8.0).deaf, 2);
-    }
-
-    #[test]
-    fn what_is_remembered_of_views_is_bounded() {
-        for k in 0..3 * MOST_KNOWN {
-            let large =
-                view(&format!("large {k}"), [(AxisKind::DepthH, 2048, 0.0, 8.0), (AxisKind::Y, 1024, -1.0, 1.0)]);
-            assert_eq!(Layout::of(0, &large).shape, [2048, 1024]);
-            let known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-            let bytes: usize = known.iter().map(|layout| layout.bytes()).sum();
-            assert!(known.len() <= MOST_KNOWN && bytes <= MOST_BYTES, "{} layouts of {bytes} bytes", known.len());
-        }
     }
 }
