@@ -36,7 +36,11 @@ impl ShardArgs {
 /// Tells on standard error what a finished shard holds, and of its failures how many and the first.
 pub(super) fn end(shard: Shard, out: &Path, rows: &[impl ShardRow]) -> ExitCode {
     let frames = rows.len();
-    complain(&format!("shard {shard}: {frames} frames in {}; `merge` makes the whole of all shards", out.display()));
+    let plural = if frames == 1 { "" } else { "s" };
+    complain(&format!(
+        "shard {shard}: {frames} frame{plural} in {}; `merge` makes the whole of all shards",
+        out.display()
+    ));
     let mut failures = rows.iter().filter_map(ShardRow::failure);
     let Some(first) = failures.next() else { return ExitCode::SUCCESS };
     let failed = 1 + failures.count();

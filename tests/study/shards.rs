@@ -268,7 +268,7 @@ fn what_is_no_shard_is_refused_in_words() {
     let mut array = asked("auto");
     array.envs([("SLURM_ARRAY_TASK_ID", "0"), ("SLURM_ARRAY_TASK_MIN", "0"), ("SLURM_ARRAY_TASK_COUNT", "4")]);
     let (code, why) = told(&mut array);
-    assert!(code == Some(0) && why.contains("shard 1/4: 1 frames"), "{why}");
+    assert!(code == Some(0) && why.contains("shard 1/4: 1 frame in"), "{why}");
     assert!(case.refused(&["count", "@data", "--shard", "1/2"]).contains("--out"));
     assert!(case.refused(&["fit", "@data", "--shard", "1/2"]).contains("--out"));
 }

@@ -33,12 +33,15 @@ pub(in crate::study) trait Part: Sized {
     fn difference(&self, other: &Self) -> Option<Difference>;
 }
 
+/// The whole, and its parts in order with their folders.
+type Gathered<P> = (P, Vec<(PathBuf, P)>);
+
 /// The whole, and its parts in order, from folders in any order. Folders without a finished shard are told where one is missing,
 /// and else left alone.
 ///
 /// # Errors
 /// Where a folder is no shard of the same whole as the first, one comes twice, or one is missing.
-pub(in crate::study) fn gather<P: Part>(folders: &[impl AsRef<Path>]) -> Result<(P, Vec<(PathBuf, P)>), P::Error> {
+pub(in crate::study) fn gather<P: Part>(folders: &[impl AsRef<Path>]) -> Result<Gathered<P>, P::Error> {
     let mut whole: Option<(P, usize)> = None;
     let mut parts: BTreeMap<usize, (PathBuf, P)> = BTreeMap::new();
     let mut unfinished = Vec::new();
