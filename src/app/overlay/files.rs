@@ -1,7 +1,7 @@
 //! Sheets that ask for a file: one to write, or a session file or a table of results to read.
 
 use super::{Overlay, modal};
-use crate::app::commands::{Act, SaveKind};
+use crate::app::commands::{SaveKind, UiAction};
 use crate::app::panes::Shared;
 use crate::app::theme::Tokens;
 use crate::session::Command;
@@ -93,7 +93,7 @@ impl Overlay {
                 ui.label(RichText::new("△ The file is there already and will be replaced.").small().color(tokens.warn));
             }
             if let Some(path) = chosen {
-                shared.acts.push(Act::Write(kind, path));
+                shared.acts.push(UiAction::Write(kind, path));
                 done = true;
             }
         });

@@ -1,11 +1,12 @@
 //! How far two annotators agree, or one and the machine: a row a tag, and the frames in dispute one click away.
 
-use super::{Shared, empty};
+use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
+use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::labels::{MACHINE_THRESHOLD, Record, Tag, TagAgreement, Tags, against_machine, compare_tags};
 use crate::session::{Command, LabelMode, Labels, Records};
-use egui::{RichText, Role, Ui};
+use egui::{Key, RichText, Role, Ui};
 use std::cmp::Ordering;
 use std::collections::HashMap;
 
@@ -14,16 +15,30 @@ const MACHINE: &str = "machine";
 /// Disputes that are listed at most.
 const LISTED: usize = 200;
 
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Agreement",
+    title: "Agreement",
+    help: "how far two annotators agree, or one and the machine",
+    dock: Dock::BottomRight,
+    keys: &[(CTRL, Key::Num3)],
+    margin: 8,
+    state: PaneStates::prepare::<State>,
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
+
 /// Whose labels are compared, what came out, and which disputes are listed.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     pair: [String; 2],
-    found: Option<(Key, Found)>,
+    found: Option<(MadeFrom, Found)>,
     listed: Option<Listed>,
 }
 
+impl PaneState for State {}
+
 /// What the comparison was made from.
-type Key = (u64, [String; 2]);
+type MadeFrom = (u64, [String; 2]);
 
 struct Found {
     /// Frames that both judged.
@@ -51,7 +66,7 @@ struct Listed {
     b: bool,
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let labels = &shared.session.labels;
     let names: Vec<&String> = labels.table().iter().filter(|(_, r)| !r.is_empty()).map(|(name, _)| name).collect();
     if names.is_empty() {

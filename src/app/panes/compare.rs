@@ -1,22 +1,37 @@
 //! Pinned fits in a table: the baseline, and how far each other one and the fit on screen is from it.
 
-use super::{Shared, empty};
+use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
+use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::config::FitConfig;
 use crate::session::{Command, Pin, difference, numbers};
-use egui::{Color32, RichText, Role, Ui};
+use egui::{Color32, Key, RichText, Role, Ui};
+
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Compare",
+    title: "Compare",
+    help: "pinned fits, and how far the others are from the baseline",
+    dock: Dock::BottomRight,
+    keys: &[(CTRL, Key::Num2)],
+    margin: 8,
+    state: PaneStates::prepare::<State>,
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
 
 /// What the pane remembers: a name while it is typed.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     renaming: Option<(u32, String)>,
 }
+
+impl PaneState for State {}
 
 /// Columns of numbers: title, digits, unit, and whether less is better.
 const NUMBERS: [(&str, usize, &str, bool); 3] = [("L", 4, "", true), ("IoU", 3, "", false), ("MAJPE", 1, "mm", true)];
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let pins = shared.session.pins.list();
     if pins.is_empty() {
         let how = "Press P to pin the fit on screen. Then change a setting, run again, and see here, in the curves, on the \

@@ -3,34 +3,47 @@
 mod series;
 mod thin;
 
-use super::{Shared, empty};
+use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
+use crate::app::commands::CTRL;
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
 use crate::session::{Branch, Command, FitStatus, PinRow, Row, numbers};
 use crate::worker::JobId;
-use egui::{Color32, Ui};
+use egui::{Color32, Key, Ui};
 use egui_plot::{GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, VLine, uniform_grid_spacer};
 use series::{SeriesCache, series};
-use thin::Window;
+use thin::VisibleSpan;
 
 /// Room on the right for half of the last number below the plot, points.
 const LAST_NUMBER: f32 = 12.0;
 
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Curves",
+    title: "Curves",
+    help: "loss, its terms, IoU and MAJPE over the iterations",
+    dock: Dock::BottomRight,
+    keys: &[(CTRL, Key::Num1)],
+    margin: 8,
+    state: PaneStates::prepare::<State>,
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
+
 /// What the plot remembers.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     reset: bool,
     tab: Tab,
     /// The shown iteration before the last click.
     before_click: usize,
     /// What was on screen in the pass before.
-    window: Option<Window>,
+    window: Option<VisibleSpan>,
     /// Values of the curves of a job's history, as it was built up.
     series: SeriesCache<(JobId, u64)>,
 }
 
-impl State {
-    pub(in crate::app) fn reset(&mut self) {
+impl PaneState for State {
+    fn reset_view(&mut self) {
         self.reset = true;
     }
 }
@@ -55,7 +68,7 @@ fn curve(key: &str, name: &str, width: f32, value: impl Fn(&Row) -> Option<f64> 
     Curve { key: key.into(), name: name.into(), value: Box::new(value), width }
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let fit = &shared.session.fit;
     let blank;
     let branch = match fit.branch().filter(|b| !b.rows.is_empty()) {
@@ -151,7 +164,8 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     });
     flag_texts(ui, &response, branch, &tokens);
     let [lo, hi] = response.transform.bounds().range_x().into_inner().into();
-    state.window = (hi > lo).then(|| Window::new(lo, hi, response.transform.frame().width() * ui.pixels_per_point()));
+    state.window =
+        (hi > lo).then(|| VisibleSpan::new(lo, hi, response.transform.frame().width() * ui.pixels_per_point()));
     let (pointer, inner) = response.inner;
     inner.widget_info(|| figure::spoken("Curves", caption.as_deref()));
     if inner.double_clicked() {
@@ -166,7 +180,12 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
 }
 
 /// The main curve of each pinned fit: L, or the mean IoU.
-fn pinned(shared: &Shared<'_>, tab: Tab, window: Option<&Window>, log: bool) -> Vec<(String, Vec<Vec<PlotPoint>>)> {
+fn pinned(
+    shared: &Shared<'_>,
+    tab: Tab,
+    window: Option<&VisibleSpan>,
+    log: bool,
+) -> Vec<(String, Vec<Vec<PlotPoint>>)> {
     let pins = shared.session.pins.list().iter();
     pins.map(|pin| {
         let value = |row: &PinRow| match tab {

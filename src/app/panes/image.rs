@@ -1,20 +1,35 @@
 //! The image plane: key points, boxes and mask in camera pixels. They are pixels, never metres, and are never compared
 //! with the fit.
 
-use super::{Shared, empty};
+use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
+use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::body::Skeleton;
 use crate::dataset::{Frame, ImageAnnotations};
-use egui::{Align2, Color32, ColorImage, FontId, Rect, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2};
+use egui::{Align2, Color32, ColorImage, FontId, Key, Rect, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2};
 use std::sync::Arc;
+
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Image",
+    title: "Image plane",
+    help: "key points, boxes and masks in camera pixels",
+    dock: Dock::BottomLeft,
+    keys: &[(CTRL, Key::Num9)],
+    margin: 0,
+    state: PaneStates::prepare::<State>,
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
 
 /// The mask's texture.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     mask: Option<(Arc<Frame>, TextureHandle)>,
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+impl PaneState for State {}
+
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let Some(frame) = &shared.session.data.frame else {
         return empty(ui, "No frame", "Labels in camera pixels appear here.");
     };

@@ -1,18 +1,33 @@
 //! The joint inspector: every parameter of the selected joint, its gradient split into the electromagnetic and the
 //! kinematic part, and fields to edit it by hand.
 
-use super::{Shared, empty};
+use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
+use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::body::{Group, Pppr};
 use crate::session::Command;
-use egui::{RichText, Ui};
+use egui::{Key, RichText, Ui};
+
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Joint",
+    title: "Joint",
+    help: "every parameter of the selected joint, and its gradient",
+    dock: Dock::RightTop,
+    keys: &[(CTRL, Key::Num7)],
+    margin: 8,
+    state: PaneStates::prepare::<State>,
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
 
 /// Values that are being edited.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     edit: Option<(u64, u32, usize, Pppr)>,
 }
+
+impl PaneState for State {}
 
 /// Names, units and step of a group's components.
 fn components(group: Group) -> (&'static str, &'static [&'static str], &'static str, f64) {
@@ -26,7 +41,7 @@ fn components(group: Group) -> (&'static str, &'static [&'static str], &'static 
     }
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let session = shared.session;
     let (Some(problem), Some(snapshot)) = (&session.fit.problem, &session.fit.shown) else {
         return empty(ui, "No joint", "The parameters of a joint appear here once a frame is fitted.");

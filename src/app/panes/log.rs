@@ -1,10 +1,24 @@
 //! The log: what was opened, assumed, repaired, refused.
 
-use super::{Shared, empty};
+use super::{Dock, Pane, PaneStates, Shared, empty};
+use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::session::{Command, LogLevel};
+use egui::Key;
 
-pub(super) fn show(ui: &mut egui::Ui, shared: &mut Shared<'_>) {
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Log",
+    title: "Log",
+    help: "what was opened, assumed, repaired and refused",
+    dock: Dock::BottomRight,
+    keys: &[(CTRL, Key::Num5)],
+    margin: 8,
+    state: PaneStates::prepare::<()>,
+    ui: |ui, shared, _| show(ui, shared),
+};
+
+fn show(ui: &mut egui::Ui, shared: &mut Shared<'_>) {
     if shared.session.log.is_empty() {
         empty(ui, "Nothing to tell", "Opened data sets, assumptions, warnings and errors appear here.");
         return;

@@ -1,12 +1,25 @@
 //! Counts of labels: tags by stratum, by scene or by day, for one annotator or all.
 
-use super::{Shared, empty};
+use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
+use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::labels::Tag;
 use crate::session::{LabelMode, Records, Session};
-use egui::{RichText, Role, Sense, Ui, vec2};
+use egui::{Key, RichText, Role, Sense, Ui, vec2};
 use std::collections::BTreeMap;
+
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Statistics",
+    title: "Statistics",
+    help: "how often each tag was given",
+    dock: Dock::BottomRight,
+    keys: &[(CTRL, Key::Num4)],
+    margin: 8,
+    state: PaneStates::prepare::<State>,
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
 
 /// What the rows are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -19,14 +32,16 @@ enum Group {
 
 /// How the counts are grouped, whose they are, and what they were made from.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     group: Group,
     /// `None` for everybody.
     annotator: Option<String>,
-    rows: Option<(Key, Vec<Row>)>,
+    rows: Option<(MadeFrom, Vec<Row>)>,
 }
 
-type Key = (u64, Group, Option<String>, bool, LabelMode);
+impl PaneState for State {}
+
+type MadeFrom = (u64, Group, Option<String>, bool, LabelMode);
 
 struct Row {
     name: String,
@@ -37,7 +52,7 @@ struct Row {
     tags: [usize; Tag::ALL.len()],
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let session = shared.session;
     if session.labels.table().values().all(Records::is_empty) {
         let how = "Tag frames with the keys 1 to 5 and 0. Here you then see how often each tag was given, by stratum, by \

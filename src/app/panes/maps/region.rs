@@ -1,6 +1,6 @@
 //! Boxes of cells: those that a label marks, drawn with the mouse, and those that a finding points at.
 
-use super::{State, Window, unit_at};
+use super::{MapExtent, State, unit_at};
 use crate::app::map_image::Orientation;
 use crate::app::theme::Tokens;
 use crate::labels::CellRegion;
@@ -16,7 +16,7 @@ pub(super) struct Highlight {
     lo: Vec<usize>,
     hi: Vec<usize>,
     /// What was seen of the view before.
-    before: Window,
+    before: MapExtent,
 }
 
 /// Whether the mouse marks cells.
@@ -25,14 +25,14 @@ pub(super) struct Marking {
     /// The next drag marks, with or without Ctrl.
     pub(super) armed: bool,
     /// Where the drag began.
-    pub(super) from: Option<Begun>,
+    pub(super) from: Option<DragStart>,
     /// Where the pointer is.
     to: [f64; 2],
 }
 
 /// Where a drag began. The three columns draw the same views: the drag is that of one of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Begun {
+pub(super) struct DragStart {
     column: egui::Id,
     view: usize,
     /// Picture coordinates.
@@ -41,12 +41,12 @@ pub(super) struct Begun {
 
 impl State {
     /// The next drag on a map marks cells; again to leave it.
-    pub(in crate::app) fn mark_cells(&mut self) {
+    pub(super) fn mark_cells(&mut self) {
         self.marking.armed = !self.marking.armed;
     }
 
     /// Points at cells and zooms the map to them.
-    pub(in crate::app) fn show_cells(&mut self, session: &Session, view: usize, lo: &[usize], hi: &[usize]) {
+    pub(super) fn show_cells(&mut self, session: &Session, view: usize, lo: &[usize], hi: &[usize]) {
         let Some(v) = session.data.dataset.as_ref().and_then(|dataset| dataset.info().views.get(view)) else { return };
         let Some([min, max]) = unit_box(v, lo, hi) else { return };
         let frame = session.data.frame_index;
@@ -111,12 +111,12 @@ impl State {
             && (self.marking.armed || ui.input(|i| i.modifiers.command))
             && let Some(origin) = ui.input(|i| i.pointer.press_origin())
         {
-            self.marking.from = Some(Begun { column: response.id, view: index, at: unit_at(plot, window, origin) });
+            self.marking.from = Some(DragStart { column: response.id, view: index, at: unit_at(plot, window, origin) });
         }
         if self.marking.armed && response.hovered() {
             ui.ctx().set_cursor_icon(egui::CursorIcon::Crosshair);
         }
-        let Some(Begun { at: from, .. }) = self.marking.from.filter(|begun| begun.column == response.id) else {
+        let Some(DragStart { at: from, .. }) = self.marking.from.filter(|begun| begun.column == response.id) else {
             return (false, None);
         };
         let to = pointer.map_or(from, |pointer| unit_at(plot, window, pointer));

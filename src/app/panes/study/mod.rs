@@ -7,24 +7,38 @@ mod measure;
 mod parallel;
 mod table;
 
-use super::{Shared, empty};
+use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
 use crate::app::commands::AppAct;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::session::Command;
 use crate::study::run::{Run, StudyKind, Subset};
 use egui::{RichText, Role, Ui};
-use measure::{Measure, Values};
+use measure::{StudyMeasure, Values};
 
 /// A pane of less than this width, points, has a list of quantities instead of a button for each.
 const NARROW: f32 = 460.0;
 
+/// The pane.
+pub(in crate::app) static PANE: Pane = Pane {
+    key: "Study",
+    title: "Study",
+    help: "a study's table and plot",
+    dock: Dock::BottomRight,
+    keys: &[],
+    margin: 8,
+    state: PaneStates::prepare::<State>,
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
+
 /// Which quantity is plotted, and the values that were made from the run.
 #[derive(Default)]
-pub(in crate::app) struct State {
-    measure: Measure,
-    values: Option<(u64, Vec<(Measure, Values)>)>,
+struct State {
+    measure: StudyMeasure,
+    values: Option<(u64, Vec<(StudyMeasure, Values)>)>,
 }
+
+impl PaneState for State {}
 
 /// How a study is plotted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,7 +49,7 @@ enum Picture {
     Parallel,
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let study = &shared.session.study;
     let Some((folder, run)) = study.run.clone() else {
         if study.reading.is_some() {
@@ -153,7 +167,7 @@ fn head(ui: &mut Ui, shared: &mut Shared<'_>, run: &Run, folder: &std::path::Pat
     }
 }
 
-fn choose(ui: &mut Ui, chosen: &mut Measure, values: &[(Measure, Values)]) {
+fn choose(ui: &mut Ui, chosen: &mut StudyMeasure, values: &[(StudyMeasure, Values)]) {
     if ui.available_width() < NARROW {
         let menu = egui::ComboBox::from_id_salt("measure").width(130.0).selected_text(chosen.title());
         let response = menu.show_ui(ui, |ui| {

@@ -2,7 +2,7 @@
 
 mod strip;
 
-use super::Shared;
+use super::panes::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, icon_button};
 use crate::session::{Command, Strip};
@@ -10,13 +10,13 @@ use egui::{Rect, RichText, Sense, Stroke, Ui, pos2, vec2};
 
 /// What the strip remembers.
 #[derive(Default)]
-pub(in crate::app) struct State {
+pub(super) struct State {
     drag_frame: Option<usize>,
     strip: strip::Strips,
 }
 
 /// Draws the strip at the bottom of the window.
-pub(in crate::app) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let tokens = Tokens::of(ui);
     let frame = egui::Frame::new().fill(tokens.panel).inner_margin(egui::Margin::symmetric(8, 4));
     egui::Panel::bottom("timeline").exact_size(62.0).frame(frame).show(ui, |ui| {
@@ -72,7 +72,7 @@ fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Toke
         ("▸", "Next frame", "Next frame", index + 1 < count),
         ("▸|", "Last frame", "Last frame", index + 1 < count),
     ] {
-        let tip = crate::app::commands::command(label).map(crate::app::commands::tooltip).unwrap_or_default();
+        let tip = crate::app::commands::command(label).map(|command| command.tip()).unwrap_or_default();
         if icon_button(ui, sign, name, &tip, enabled, playing && label == "Play frames").clicked() {
             shared.invoke(label);
         }
@@ -123,7 +123,7 @@ fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
         ("▸", "Iteration forward", "One step", ready && (back || !running), false),
         ("▸|", "Follow newest", "Follow newest iteration", back, false),
     ] {
-        let tip = crate::app::commands::command(label).map(crate::app::commands::tooltip).unwrap_or_default();
+        let tip = crate::app::commands::command(label).map(|command| command.tip()).unwrap_or_default();
         if icon_button(ui, sign, name, &tip, enabled, active).clicked() {
             shared.invoke(label);
         }
