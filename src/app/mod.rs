@@ -16,7 +16,7 @@ mod timeline;
 mod widgets;
 
 use crate::config::FitConfig;
-use crate::session::{Aim, Command, LogLevel, Runtime, Session, ViewState};
+use crate::session::{Command, LogLevel, Runtime, Session, StartAt, ViewState};
 use commands::{AppAct, UiAction};
 use layout::PaneLayout;
 use overlay::Overlay;
@@ -40,7 +40,7 @@ pub struct Begin {
     /// Data sets; the first one opens, the others become recents.
     pub paths: Vec<PathBuf>,
     /// Where to begin in it.
-    pub aim: Aim,
+    pub aim: StartAt,
     /// A table of results for the frame list.
     pub results: Option<PathBuf>,
     /// The run folder of a study.
@@ -62,7 +62,7 @@ pub struct InspectorApp {
     timeline: timeline::State,
     gpu: Option<eframe::egui_wgpu::RenderState>,
     overlay: Overlay,
-    pictures: sharing::WindowPictures,
+    pictures: sharing::PendingPictures,
     notices_seen: u64,
     last_play: Option<f64>,
     applied_zoom: f32,
@@ -101,7 +101,7 @@ impl InspectorApp {
             timeline: timeline::State::default(),
             gpu: cc.wgpu_render_state.clone(),
             overlay: Overlay::default(),
-            pictures: sharing::WindowPictures::default(),
+            pictures: sharing::PendingPictures::default(),
             notices_seen: 0,
             last_play: None,
             applied_zoom: 1.0,

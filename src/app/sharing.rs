@@ -5,7 +5,7 @@ use super::commands::SaveKind;
 use super::layout::PaneLayout;
 use super::panes::Pane;
 use crate::output::{Sink, portable, replace_file};
-use crate::session::{Command, Export, LogLevel, OutputCheck, Session, Task};
+use crate::session::{BackgroundTask, Command, Export, LogLevel, OutputCheck, Session};
 use egui::{ColorImage, Context, Rect};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -22,7 +22,7 @@ struct WindowState {
 
 /// Pictures that were asked for and are not drawn yet.
 #[derive(Default)]
-pub(super) struct WindowPictures {
+pub(super) struct PendingPictures {
     drawn: Arc<Mutex<Vec<Drawn>>>,
 }
 
@@ -37,7 +37,7 @@ pub(super) enum Wanted {
     Clipboard(Option<Rect>),
 }
 
-impl WindowPictures {
+impl PendingPictures {
     /// Asks for a picture of the next pass.
     fn ask(&self, ctx: &Context, wanted: Wanted) {
         let drawn = Arc::clone(&self.drawn);
@@ -155,7 +155,7 @@ impl InspectorApp {
                 Wanted::File(path, rect) => {
                     let image = cropped(&image, rect, scale);
                     let check = self.session.output_check();
-                    self.apply(Command::RunTask(Task::new(move || write_png(&image, &path, &check))));
+                    self.apply(Command::RunTask(BackgroundTask::new(move || write_png(&image, &path, &check))));
                 }
                 Wanted::Clipboard(rect) => {
                     ctx.copy_image(cropped(&image, rect, scale));

@@ -131,8 +131,13 @@ fn measure(args: &BenchArgs) -> anyhow::Result<Figures> {
     let precision = Precision::from(args.precision);
     let problem = problem(&dataset, 0)?;
     // A start that cannot be found from the maps leaves its figures empty.
-    // A problem remembers what was worked out of its maps: each repetition takes a fresh one.
-    let fresh = || self::problem(&dataset, 0);
+    // A problem keeps what was worked out of its maps, and shares what its axes decide with the other frames of the data set:
+    // each repetition takes one of which nothing is known.
+    let fresh = || {
+        let mut problem = Arc::unwrap_or_clone(self::problem(&dataset, 0)?);
+        problem.views = problem.views.to_vec().into();
+        Ok(Arc::new(problem))
+    };
     let init_ms = fastest_ms(fresh, |problem| begin(&problem, &config).is_ok())?;
     let initial = match args.params.clone().or_else(|| beside("params.npz")) {
         Some(path) => read_pppr(&path, None)?,

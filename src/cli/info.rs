@@ -23,7 +23,7 @@ Examples:
 
 /// What is in a data set: layout, frames, views and axes, ranges of values, skeleton, people, labels.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct InfoArgs {
     /// An MMVR tree or any folder inside one, a `*_radar.npz`, a folder with `dataset.toml`, or an `.npy`/`.npz` of maps.
     path: PathBuf,
     /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
@@ -71,7 +71,7 @@ impl Values {
 ///
 /// # Errors
 /// Where the data set cannot be opened or that frame not be loaded.
-pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frame = dataset.load(args.frame.unwrap_or(dataset.start_index()))?;
     let notes = label_notes(&dataset);

@@ -2,9 +2,10 @@
 
 use super::common::{print, progress_bar};
 use crate::config::{FitConfig, Limbs, Preset};
-use crate::dataset::{Dataset, Frame, Progress};
+use crate::dataset::{Dataset, Frame};
 use crate::mhp::{LimbLesson, LimbMap, Problem, learn_limbs};
 use crate::start::{begin, problem_of};
+use crate::task::Progress;
 use anyhow::Context as _;
 use clap::Args;
 use rayon::prelude::*;

@@ -1,8 +1,9 @@
 //! Which files a data set is made of: names only, nothing is opened and nothing is asked of a file but its name, because
 //! 1.7 million calls to `stat` take longer than anybody waits.
 
+use super::DatasetError;
 use super::walk::{Walk, is_special};
-use super::{DatasetError, Progress};
+use crate::task::Progress;
 use std::cmp::Ordering;
 use std::path::{Component, Path, PathBuf};
 

@@ -6,10 +6,11 @@ use super::files::{RADAR_SUFFIX, Segment, leads_out, matching, radar_stem, segme
 use super::manifest::{Layout, Manifest};
 use super::source::{MAX_NAME_BYTES, Names, Source};
 use super::words::axes_badge;
-use super::{DatasetError, Frame, Heatmap, Progress, generic, hupr, mmvr, xrf55};
+use super::{DatasetError, Frame, Heatmap, generic, hupr, mmvr, xrf55};
 use crate::body::Skeleton;
 use crate::digest;
-use crate::radar::{RadarConfig, View};
+use crate::radar::{RadarConfig, ViewSet};
+use crate::task::Progress;
 use sha2::{Digest as _, Sha256};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock};
@@ -35,7 +36,7 @@ pub struct DatasetInfo {
     /// Chirp and array.
     pub radar: RadarConfig,
     /// The maps of a frame, in the order of [`Frame::maps`].
-    pub views: Vec<View>,
+    pub views: ViewSet,
     /// The convention of the axes in words.
     pub axes_badge: String,
     /// What was assumed because the data set does not publish it.
@@ -214,7 +215,7 @@ impl Dataset {
         let preset = Manifest::xrf55()?;
         let mut info = info_of(root, manifest, &preset, "XRF55".into());
         info.notes = notes;
-        if info.views == preset.views {
+        if *info.views == *preset.views {
             info.assumptions.extend(xrf55::assumptions());
         }
         let steps = if info.views.iter().all(|view| view.axes.len() == 2) { xrf55::STEPS } else { 1 };
@@ -267,7 +268,7 @@ impl Dataset {
         if info.frame_rate_hz == preset.frame_rate_hz {
             info.assumptions.push("frame rate: 900 frames a minute-long segment, hence 15 a second".into());
         }
-        if info.views == preset.views {
+        if *info.views == *preset.views {
             info.assumptions
                 .push("point spread: 0.06 m and 0.03 rad are assumed; MMVR does not publish its own".into());
             info.assumptions.push("quantity: amplitudes are assumed, from the spread of the values".into());
@@ -287,7 +288,7 @@ impl Dataset {
             radar: RadarConfig::default(),
             axes_badge: axes_badge(&choice.views),
             assumptions: assumptions(&choice.views),
-            views: choice.views.clone(),
+            views: choice.views.clone().into(),
             notes: Vec::new(),
         };
         Self::of(info, Source::bare(frames, choice.first_axis_is_frame), 0)
@@ -471,7 +472,7 @@ fn info_of(root: &Path, manifest: &Manifest, preset: &Manifest, name: String) ->
         skeleton,
         radar,
         axes_badge: axes_badge(views),
-        views: views.clone(),
+        views: views.clone().into(),
         assumptions,
         notes: Vec::new(),
     }

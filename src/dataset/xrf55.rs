@@ -7,7 +7,8 @@ use super::files::natural;
 use super::npz::{NPY_KEY, NpzArchive, shape_text};
 use super::truth::truth_beside;
 use super::walk::{Folder, Walk};
-use super::{DatasetError, DatasetInfo, Frame, Heatmap, Progress};
+use super::{DatasetError, DatasetInfo, Frame, Heatmap};
+use crate::task::Progress;
 use std::path::{Path, PathBuf};
 
 /// Maps of a file.

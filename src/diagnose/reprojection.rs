@@ -11,14 +11,14 @@ use crate::radar::View;
 
 /// A pinhole camera at the radar that looks along x; u to the right, v down, px.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Camera {
+pub struct PinholeCamera {
     /// Focal lengths (u, v), px.
     pub focal_px: [f64; 2],
     /// Principal point (u, v), px.
     pub centre_px: [f64; 2],
 }
 
-impl Camera {
+impl PinholeCamera {
     /// MMVR's published intrinsics; lens distortion left out, as the code published with the data does.
     pub const MMVR: Self = Self { focal_px: [379.476, 379.476], centre_px: [322.457, 241.627] };
 
@@ -43,7 +43,7 @@ pub struct Reprojection {
 /// Compares joints (flat, person by person, m) with image labels: `keypoints` (u px, v px, score) a person in the order of
 /// the same joints, and `boxes` (u0, v0, u1, v1 px, score).
 pub fn reprojection(
-    camera: &Camera,
+    camera: &PinholeCamera,
     joints: &[Vec3],
     joints_a_person: usize,
     keypoints: &[Vec<[f64; 3]>],
@@ -113,15 +113,15 @@ mod tests {
     }
 
     fn seen(person: &[Vec3]) -> Vec<[f64; 3]> {
-        person.iter().map(|&p| Camera::MMVR.project(p).unwrap()).map(|[u, v]| [u, v, 1.0]).collect()
+        person.iter().map(|&p| PinholeCamera::MMVR.project(p).unwrap()).map(|[u, v]| [u, v, 1.0]).collect()
     }
 
     #[test]
     fn left_is_left_and_up_is_up_in_the_image() {
-        let [u, v] = Camera::MMVR.project([2.0, 0.5, 0.5]).unwrap();
+        let [u, v] = PinholeCamera::MMVR.project([2.0, 0.5, 0.5]).unwrap();
         assert!((u - (322.457 - 379.476 * 0.25)).abs() < 1e-9 && (v - (241.627 - 379.476 * 0.25)).abs() < 1e-9);
-        assert_eq!(Camera::MMVR.project([-1.0, 0.0, 0.0]), None);
-        assert_eq!(Camera::MMVR.project([f64::NAN, 0.0, 0.0]), None);
+        assert_eq!(PinholeCamera::MMVR.project([-1.0, 0.0, 0.0]), None);
+        assert_eq!(PinholeCamera::MMVR.project([f64::NAN, 0.0, 0.0]), None);
     }
 
     #[test]
@@ -130,11 +130,11 @@ mod tests {
         let joints = [a.clone(), b.clone()].concat();
         let mut labels = vec![seen(&b), seen(&a)];
         labels[0][1] = [0.0, 0.0, 0.0];
-        let exact = reprojection(&Camera::MMVR, &joints, 3, &labels, &[]);
+        let exact = reprojection(&PinholeCamera::MMVR, &joints, 3, &labels, &[]);
         assert!(exact.reprojection_px.unwrap() < 1e-9);
         assert_eq!(exact.box_coverage, None);
         labels[1].iter_mut().for_each(|point| point[0] += 10.0);
-        let off = reprojection(&Camera::MMVR, &joints, 3, &labels, &[]);
+        let off = reprojection(&PinholeCamera::MMVR, &joints, 3, &labels, &[]);
         assert!((off.reprojection_px.unwrap() - 5.0).abs() < 1e-9, "one person of two is off by 10 px");
     }
 
@@ -147,10 +147,10 @@ mod tests {
             [lo(0), lo(1), hi(0), hi(1), 0.9]
         };
         let mut boxes = [whole(&seen(&person(0.6))), whole(&seen(&person(-0.6)))];
-        assert_eq!(reprojection(&Camera::MMVR, &joints, 3, &[], &boxes).box_coverage, Some(1.0));
-        boxes[0][1] = Camera::MMVR.project(person(0.6)[1]).unwrap()[1] - 1.0;
-        let partly = reprojection(&Camera::MMVR, &joints, 3, &[], &boxes).box_coverage.unwrap();
+        assert_eq!(reprojection(&PinholeCamera::MMVR, &joints, 3, &[], &boxes).box_coverage, Some(1.0));
+        boxes[0][1] = PinholeCamera::MMVR.project(person(0.6)[1]).unwrap()[1] - 1.0;
+        let partly = reprojection(&PinholeCamera::MMVR, &joints, 3, &[], &boxes).box_coverage.unwrap();
         assert!((partly - 5.0 / 6.0).abs() < 1e-12);
-        assert_eq!(reprojection(&Camera::MMVR, &[], 3, &[], &boxes), Reprojection::default());
+        assert_eq!(reprojection(&PinholeCamera::MMVR, &[], 3, &[], &boxes), Reprojection::default());
     }
 }

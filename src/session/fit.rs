@@ -1,6 +1,6 @@
 //! The fit of the frame on screen.
 
-use super::history::{Branch, History, Row};
+use super::history::{Branch, History, IterationRow};
 use super::state::FitHashes;
 use crate::body::Pppr;
 use crate::mhp::Problem;
@@ -84,7 +84,7 @@ impl Fit {
     }
 
     /// The row that is looked at.
-    pub fn shown_row(&self) -> Option<&Row> {
+    pub fn shown_row(&self) -> Option<&IterationRow> {
         self.branch()?.row(self.shown_iteration())
     }
 

@@ -19,8 +19,8 @@ mod sequence;
 
 pub use device::{Device, Radar};
 pub use hupr::{HUPR_SHAPE, hupr_amplitudes, hupr_cube};
-pub use options::{Action, Layout, Options, SimulateError};
-pub use preset::{Preset, Recipe};
+pub use options::{Action, Options, SimulateError, SimulatedLayout};
+pub use preset::{Recipe, ScenePreset};
 pub use recording::Recording;
 pub use sequence::{RawFrame, Sequence, SimulatedFrame};
 

@@ -2,10 +2,10 @@
 
 use super::cast::{Stage, cast};
 use super::room::Room;
-use super::{Device, Options, Preset, Recipe, generator};
+use super::{Device, Options, Recipe, ScenePreset, generator};
 use crate::body::{BodyPose, BodySurface, Capsule, Performer};
 use crate::geometry::Vec3;
-use crate::radar::{AdcCube, Echo, Receiver, Track, add_leakage};
+use crate::radar::{AdcCube, Echo, PointMotion, Receiver, add_leakage};
 use num_complex::Complex64;
 use rand::Rng;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ enum Purpose {
 #[derive(Debug)]
 pub struct Sequence {
     index: usize,
-    preset: Preset,
+    preset: ScenePreset,
     people: Vec<(Performer, BodySurface)>,
     room: Room,
     device: Arc<Device>,
@@ -134,7 +134,7 @@ impl Sequence {
     }
 
     /// The scenario.
-    pub fn preset(&self) -> Preset {
+    pub fn preset(&self) -> ScenePreset {
         self.preset
     }
 
@@ -194,7 +194,7 @@ impl Sequence {
         for ((_, skin), [before, now, after]) in self.people.iter().zip(&poses) {
             for (count, (point, position, strength)) in skin.seen(now, &capsules).enumerate() {
                 let place = |pose: &BodyPose| pose.segments[point.segment as usize].place(point.position);
-                let track = Track::through(place(before), position, place(after), half_s);
+                let track = PointMotion::through(place(before), position, place(after), half_s);
                 let reflectivity = point.reflectivity * strength;
                 echoes.push(Echo::direct(track, reflectivity));
                 if count % MULTIPATH_EVERY == 0 {

@@ -53,7 +53,7 @@ pub struct FrameFit {
 
 /// One row of a batch.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FrameRow {
+pub struct BatchRow {
     /// Index in the data set.
     pub index: usize,
     /// The frame's name.
@@ -62,7 +62,7 @@ pub struct FrameRow {
     pub fit: Result<FitNumbers, String>,
 }
 
-impl FrameRow {
+impl BatchRow {
     /// The numbers, in the order of the columns between `annotated` and the end: loss, six terms, the IoU of `views`
     /// views, two joint errors, two times. `None` where unknown.
     pub fn values(&self, views: usize) -> Vec<Option<f64>> {
@@ -138,7 +138,7 @@ impl Means {
     }
 
     /// Counts a row.
-    pub fn add(&mut self, row: &FrameRow) {
+    pub fn add(&mut self, row: &BatchRow) {
         self.frames += 1;
         match &row.fit {
             Ok(fit) => {
@@ -185,7 +185,7 @@ impl Means {
         (self.fitted() > 0).then(|| count as f64 / self.fitted() as f64)
     }
 
-    /// The means in the order of [`FrameRow::values`].
+    /// The means in the order of [`BatchRow::values`].
     pub fn values(&self) -> Vec<Option<f64>> {
         self.sums.iter().map(|&(sum, count)| (count > 0).then(|| sum / count as f64)).collect()
     }
@@ -213,7 +213,7 @@ mod tests {
     use super::*;
     use crate::mhp::Terms;
 
-    fn row(loss: f64, iou: Option<f64>, converged: bool) -> FrameRow {
+    fn row(loss: f64, iou: Option<f64>, converged: bool) -> BatchRow {
         let terms = Terms { em: 0.5, time: 0.0, bone: 0.1, rigid: 0.2, joint: 0.3, sep: 0.0, coll: 0.0 };
         let report = StepReport { iteration: 10, loss, terms, iou: vec![iou].into(), converged };
         let fit = FitNumbers {
@@ -226,7 +226,7 @@ mod tests {
             init_ms: Some(2.0),
             fit_ms: 5.0,
         };
-        FrameRow { index: 0, frame: "a/0".into(), fit: Ok(fit) }
+        BatchRow { index: 0, frame: "a/0".into(), fit: Ok(fit) }
     }
 
     #[test]
@@ -235,7 +235,7 @@ mod tests {
         for row in [row(1.0, Some(0.4), true), row(3.0, None, false)] {
             means.add(&row);
         }
-        means.add(&FrameRow { index: 2, frame: "a/2".into(), fit: Err("x.npz: no".into()) });
+        means.add(&BatchRow { index: 2, frame: "a/2".into(), fit: Err("x.npz: no".into()) });
         let json = means.json(&super::super::columns(&["hm".to_owned()]));
         assert_eq!((means.frames, means.failed, means.converged_share()), (3, 1, Some(0.5)));
         assert_eq!(json["loss"], 2.0);
@@ -274,7 +274,7 @@ mod tests {
         assert_eq!(cells[6].parse(), Ok(0.1 + 0.2));
         assert_eq!(cells[13], "", "an undefined IoU");
         assert_eq!(cells[14..], ["", "", "2", "5"]);
-        let failed = FrameRow { index: 0, frame: "b".into(), fit: Err("why".into()) };
+        let failed = BatchRow { index: 0, frame: "b".into(), fit: Err("why".into()) };
         assert_eq!(failed.cells(1)[1..7], ["", "", "error: why", "", "", ""]);
         assert_eq!(failed.json(&columns)["loss"], Value::Null);
     }

@@ -156,7 +156,7 @@ impl Kept {
 
 /// The answer to [`WorkerCommand::Prepare`].
 #[derive(Debug, Clone)]
-pub struct Prepared {
+pub struct PreparedFit {
     /// Maps filled, shapes checked.
     pub problem: Arc<Problem>,
     /// How the start pose was found, and how many people were counted; `None` when warm or resumed.
@@ -173,7 +173,7 @@ pub struct Prepared {
 #[derive(Debug, Clone)]
 pub enum WorkerEvent {
     /// The job is ready and paused at its start.
-    Prepared(Box<Prepared>),
+    Prepared(Box<PreparedFit>),
     /// Settings changed and hold from the step after `iteration`.
     ConfigApplied {
         /// The branch.

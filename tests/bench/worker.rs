@@ -5,9 +5,10 @@
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a measurement stops where its material cannot be made")]
 
 use mhp_inspector::config::FitConfig;
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::mhp::{Fitter, Precision};
 use mhp_inspector::start::{begin, problem_of};
+use mhp_inspector::task::Progress;
 use mhp_inspector::worker::{Prepare, Start, Worker, WorkerCommand, WorkerEvent, WorkerMessage};
 use std::path::Path;
 use std::sync::Arc;

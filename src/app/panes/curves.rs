@@ -7,7 +7,7 @@ use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
 use crate::app::commands::CTRL;
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
-use crate::session::{Branch, Command, FitStatus, PinRow, Row, numbers};
+use crate::session::{Branch, Command, FitStatus, IterationRow, PinRow, numbers};
 use crate::worker::JobId;
 use egui::{Color32, Key, Ui};
 use egui_plot::{GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, VLine, uniform_grid_spacer};
@@ -55,7 +55,7 @@ enum Tab {
     Quality,
 }
 
-type Value = Box<dyn Fn(&Row) -> Option<f64>>;
+type Value = Box<dyn Fn(&IterationRow) -> Option<f64>>;
 
 struct Curve {
     key: String,
@@ -64,7 +64,7 @@ struct Curve {
     width: f32,
 }
 
-fn curve(key: &str, name: &str, width: f32, value: impl Fn(&Row) -> Option<f64> + 'static) -> Curve {
+fn curve(key: &str, name: &str, width: f32, value: impl Fn(&IterationRow) -> Option<f64> + 'static) -> Curve {
     Curve { key: key.into(), name: name.into(), value: Box::new(value), width }
 }
 
@@ -84,8 +84,8 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             return empty(ui, "No iterations yet", shared.session.data.error.as_deref().unwrap_or(how));
         }
     };
-    let way = fit.history.way();
-    let first = way.first().and_then(|rows| rows.first()).map_or(0, |row| row.report.iteration);
+    let lineage = fit.history.lineage();
+    let first = lineage.first().and_then(|rows| rows.first()).map_or(0, |row| row.report.iteration);
     let curves = curves(shared, branch, state.tab);
     toolbar(ui, shared, state, &curves);
     let fit = &shared.session.fit;
@@ -124,7 +124,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     series.begin((fit.job, fit.history.revision()));
     let visible = curves.iter().filter(|c| !hidden.contains(&c.key));
     let lines: Vec<(Vec<Vec<PlotPoint>>, &Curve)> =
-        visible.map(|c| (series.grown(None, &c.key, first, &way, &c.value).pieces(window, log), c)).collect();
+        visible.map(|c| (series.grown(None, &c.key, first, &lineage, &c.value).pieces(window, log), c)).collect();
     let mut others: Vec<(u32, Vec<Vec<PlotPoint>>)> = Vec::new();
     if let Some(c) = curves.first() {
         for b in fit.history.branches().iter().filter(|b| b.id != branch.id) {

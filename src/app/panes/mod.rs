@@ -30,7 +30,7 @@ pub(super) use pane::{Dock, PaneState, PaneStates};
 
 use super::commands::{AppAct, UiAction, command};
 use super::theme::{self, Tokens};
-use crate::diagnose::Place;
+use crate::diagnose::FindingPlace;
 use crate::labels::CellRegion;
 use crate::session::{Command, Session, ViewState};
 
@@ -77,11 +77,11 @@ impl Shared<'_> {
     }
 
     /// Shows where a finding is seen.
-    pub(super) fn show_place(&mut self, place: Place) {
+    pub(super) fn show_place(&mut self, place: FindingPlace) {
         match place {
-            Place::Joint(joint) => self.send(Command::SelectJoint(Some(joint))),
-            Place::Frame(frame) => self.send(Command::GotoFrame(frame)),
-            Place::Cells { view, lo, hi } => self.acts.push(maps::show_cells(view, lo, hi)),
+            FindingPlace::Joint(joint) => self.send(Command::SelectJoint(Some(joint))),
+            FindingPlace::Frame(frame) => self.send(Command::GotoFrame(frame)),
+            FindingPlace::Cells { view, lo, hi } => self.acts.push(maps::show_cells(view, lo, hi)),
         }
     }
 

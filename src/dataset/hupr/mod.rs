@@ -12,8 +12,9 @@ use super::files::{Segment, natural};
 use super::npz::{NPY_KEY, NpzArchive, shape_text};
 use super::truth::truth_beside;
 use super::walk::Walk;
-use super::{DatasetError, DatasetInfo, Frame, Heatmap, Progress};
+use super::{DatasetError, DatasetInfo, Frame, Heatmap};
 use crate::radar::View;
+use crate::task::Progress;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 

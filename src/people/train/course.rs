@@ -1,13 +1,13 @@
 //! Lessons from the synthetic source: frames with known counts as the counter sees them.
 
-use super::Lesson;
+use super::CounterLesson;
 use crate::people::{Counter, HISTORY, PeopleError, Scan, map_statistics};
-use crate::simulate::{Options, Preset, Recording, SimulateError};
+use crate::simulate::{Options, Recording, ScenePreset, SimulateError};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Scenarios of the lessons; the sequences take them in turn.
-const PRESETS: [Preset; 3] = [Preset::Easy, Preset::Medium, Preset::Hard];
+const PRESETS: [ScenePreset; 3] = [ScenePreset::Easy, ScenePreset::Medium, ScenePreset::Hard];
 /// Of every so many sequences with one person there is one with 0, 1, 2, 3, 4: one person is what is seen most.
 const ONE_OF: [usize; 5] = [8, 1, 2, 4, 8];
 /// Frames of a sequence: long enough for somebody to fall and to lie, and to sit down and to rise.
@@ -18,15 +18,15 @@ const STRIDE: usize = 11;
 
 /// One frame, as the counter sees it and as the classifier alone does.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Example {
+pub struct CounterExample {
     /// Its clusters' features.
-    pub counted: Lesson,
+    pub counted: CounterLesson,
     /// Statistics of its maps.
-    pub alone: Lesson,
+    pub alone: CounterLesson,
     /// Frames before it in its sequence.
     pub history: usize,
     /// Easy, medium, hard.
-    pub preset: Preset,
+    pub preset: ScenePreset,
 }
 
 /// MMVR-like recordings of a seed, one for each number of people: `sequences` sequences with one person, half as many with
@@ -59,7 +59,7 @@ pub fn examples(
     frames: usize,
     counter: &Counter,
     done: impl Fn() + Sync,
-) -> Result<Vec<Example>, PeopleError> {
+) -> Result<Vec<CounterExample>, PeopleError> {
     let places: Vec<(usize, usize)> =
         recordings.iter().enumerate().flat_map(|(r, all)| (0..all.sequences()).map(move |k| (r, k))).collect();
     let frames = frames.min(LENGTH);
@@ -68,7 +68,7 @@ pub fn examples(
         let shown = first(k)..first(k) + frames;
         recordings.get(r).map_or(Ok(Vec::new()), |all| sequence(all, k, shown, counter, &done))
     };
-    let found: Result<Vec<Vec<Example>>, PeopleError> = places.par_iter().map(of).collect();
+    let found: Result<Vec<Vec<CounterExample>>, PeopleError> = places.par_iter().map(of).collect();
     Ok(found?.concat())
 }
 
@@ -78,9 +78,9 @@ fn sequence(
     shown: Range<usize>,
     counter: &Counter,
     done: &(impl Fn() + Sync),
-) -> Result<Vec<Example>, PeopleError> {
+) -> Result<Vec<CounterExample>, PeopleError> {
     let sequence = recording.sequence(number);
-    let (mut scans, mut found): (Vec<Scan>, Vec<Example>) = (Vec::new(), Vec::new());
+    let (mut scans, mut found): (Vec<Scan>, Vec<CounterExample>) = (Vec::new(), Vec::new());
     for (history, k) in shown.enumerate() {
         let frame = sequence.frame(k);
         let maps: Vec<Vec<f64>> = frame.maps.iter().map(|map| map.iter().map(|&x| f64::from(x)).collect()).collect();
@@ -88,9 +88,9 @@ fn sequence(
         let before: Vec<&Scan> = scans.iter().rev().take(HISTORY).collect();
         let now = counter.scan(&maps, &before)?;
         let people = frame.joints.len();
-        found.push(Example {
-            counted: Lesson::of(counter, &now, &before, people),
-            alone: Lesson { rows: vec![map_statistics(&maps).to_vec()], people, placed: false },
+        found.push(CounterExample {
+            counted: CounterLesson::of(counter, &now, &before, people),
+            alone: CounterLesson { rows: vec![map_statistics(&maps).to_vec()], people, placed: false },
             history,
             preset: sequence.preset(),
         });

@@ -4,9 +4,9 @@ use super::diagnosis::hashes;
 use crate::diagnose::joint_errors;
 use crate::session::command::Effect;
 use crate::session::fit::FitStatus;
-use crate::session::history::Row;
+use crate::session::history::IterationRow;
 use crate::session::state::{FrameSummary, LogLevel, Session};
-use crate::worker::{HistoryRow, Prepared, Snapshot, WorkerEvent, WorkerMessage};
+use crate::worker::{HistoryRow, PreparedFit, Snapshot, WorkerEvent, WorkerMessage};
 use std::sync::Arc;
 
 impl Session {
@@ -31,7 +31,7 @@ impl Session {
         let errors = truth.and_then(|truth| joint_errors(row.kept.positions(), &truth.joints, a_person));
         let majpe_mm = errors.map(|errors| errors.majpe_mm);
         let state = row.kept.state().cloned();
-        self.fit.history.push(row.branch, Row { report: row.report, state, majpe_mm });
+        self.fit.history.push(row.branch, IterationRow { report: row.report, state, majpe_mm });
     }
 
     pub(super) fn summarise(&mut self) {
@@ -113,7 +113,7 @@ impl Session {
         }
     }
 
-    pub(super) fn prepared(&mut self, prepared: Prepared) -> Vec<Effect> {
+    pub(super) fn prepared(&mut self, prepared: PreparedFit) -> Vec<Effect> {
         for warning in &prepared.warnings {
             self.note(LogLevel::Warning, warning.clone());
         }

@@ -2,7 +2,7 @@
 //!
 //! A file keeps its place in the tree, its keys, each map's shape, dtype, byte and memory order; arrays that are no maps are copied,
 //! and so are labels beside it. Of HuPR's complex cubes the amplitude that is its map becomes H_sim, and the phases stay. H_sim is
-//! in units of its own: [`MapScale::Match`] brings it to the input's. The manifest comes last: where it is missing the copy is
+//! in units of its own: [`ExportScale::Match`] brings it to the input's. The manifest comes last: where it is missing the copy is
 //! not complete.
 
 use super::ExportError;
@@ -20,7 +20,7 @@ use std::sync::Arc;
 
 /// What becomes of the values of H_sim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MapScale {
+pub enum ExportScale {
     /// One factor a view: the mean of H_ori over its mask by that of H_sim over its own; then nothing below the smallest
     /// value of H_ori, so that a logarithm of the map stays in the input's range.
     Match,
@@ -37,10 +37,10 @@ pub fn scaled_maps(
     config: &FitConfig,
     precision: Precision,
     params: &Pppr,
-    scale: MapScale,
+    scale: ExportScale,
 ) -> Result<Vec<Vec<f64>>, ExportError> {
     let mut maps = simulate(problem, config, precision, params);
-    if scale == MapScale::None {
+    if scale == ExportScale::None {
         return Ok(maps);
     }
     let objective = Objective::new(Arc::clone(problem), *config, precision, params)

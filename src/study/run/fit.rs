@@ -7,11 +7,12 @@ use super::row::RunNumbers;
 use crate::body::Pppr;
 use crate::config::{FitConfig, LearningRates};
 use crate::dataset::{Dataset, Frame, Layout};
-use crate::diagnose::{Camera, Reprojection, joint_errors, map_box_coverage, reprojection};
+use crate::diagnose::{PinholeCamera, Reprojection, joint_errors, map_box_coverage, reprojection};
 use crate::geometry::Vec3;
 use crate::mhp::{Fitter, Precision, Problem, StopReason, predict};
 use crate::start::{begin, problem_of};
 use crate::study::row::annotated;
+use crate::task::milliseconds;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -42,7 +43,7 @@ pub(super) fn fit_key(config: &FitConfig) -> FitConfig {
 }
 
 /// A frame, loaded.
-pub(super) struct Loaded<'a> {
+pub(super) struct LoadedFrame<'a> {
     dataset: &'a Dataset,
     frame: Frame,
     problem: Arc<Problem>,
@@ -50,7 +51,7 @@ pub(super) struct Loaded<'a> {
 
 /// A start, and how long it took to find.
 #[derive(Debug, Clone)]
-pub(super) struct Start {
+pub(super) struct TimedStart {
     /// Where the fit begins.
     pub(super) params: Pppr,
     /// What the frame alone says, without the switches that refine a start.
@@ -65,7 +66,7 @@ pub(super) struct Stop {
     pub(super) params: Pppr,
 }
 
-impl<'a> Loaded<'a> {
+impl<'a> LoadedFrame<'a> {
     /// Reads frame `index`.
     ///
     /// # Errors
@@ -80,16 +81,16 @@ impl<'a> Loaded<'a> {
     ///
     /// # Errors
     /// Where nobody is seen.
-    pub(super) fn cold(&self, config: &FitConfig) -> Result<Start, String> {
+    pub(super) fn cold(&self, config: &FitConfig) -> Result<TimedStart, String> {
         let began = Instant::now();
         let found = begin(&self.problem, config).map_err(|error| self.told(&error))?.initialisation;
-        Ok(Start { params: found.params, unrefined: found.unrefined, init_ms: Some(milliseconds(began)) })
+        Ok(TimedStart { params: found.params, unrefined: found.unrefined, init_ms: Some(milliseconds(began)) })
     }
 
     /// A start from what the frame before ended with, moved as its people moved and spoiled as a cold one is.
-    pub(super) fn warm(&self, config: &FitConfig, before: &Pppr) -> Start {
+    pub(super) fn warm(&self, config: &FitConfig, before: &Pppr) -> TimedStart {
         let params = predict(&self.problem, config, before);
-        Start { unrefined: params.clone(), params, init_ms: None }
+        TimedStart { unrefined: params.clone(), params, init_ms: None }
     }
 
     /// Fits from `start` and looks at it after each of `stops` steps, ascending. What fails from some step on fails there
@@ -98,7 +99,7 @@ impl<'a> Loaded<'a> {
         &self,
         config: &FitConfig,
         precision: Precision,
-        start: &Start,
+        start: &TimedStart,
         stops: &[usize],
     ) -> Vec<Result<Stop, String>> {
         let began = Instant::now();
@@ -122,7 +123,7 @@ impl<'a> Loaded<'a> {
         answers
     }
 
-    fn numbers(&self, fitter: &Fitter, start: &Start, ended: bool) -> RunNumbers {
+    fn numbers(&self, fitter: &Fitter, start: &TimedStart, ended: bool) -> RunNumbers {
         let (report, params) = (fitter.report(), fitter.params());
         let t = report.terms;
         let reason = if ended { StopReason::Converged } else { StopReason::Iterations };
@@ -169,7 +170,7 @@ impl<'a> Loaded<'a> {
         let preset = crate::body::Skeleton::preset(&image.keypoint_skeleton);
         let same = preset.is_some_and(|preset| preset.joints == info.skeleton.joints);
         let keypoints = if same { image.keypoints.as_slice() } else { &[] };
-        reprojection(&Camera::MMVR, joints, a_person, keypoints, &image.boxes)
+        reprojection(&PinholeCamera::MMVR, joints, a_person, keypoints, &image.boxes)
     }
 
     fn map_box_coverage(&self, joints: &[Vec3], a_person: usize) -> Option<f64> {
@@ -197,11 +198,6 @@ fn advance(fitter: &mut Fitter, stop: usize, ended: &mut bool) -> Result<(), cra
 /// An error text without the folder of the data set, which may lie elsewhere on another machine.
 pub(super) fn portable(dataset: &Dataset, text: &str) -> String {
     text.replace(&format!("{}{}", dataset.info().root.display(), std::path::MAIN_SEPARATOR), "")
-}
-
-fn milliseconds(began: Instant) -> f64 {
-    // A microsecond is all that such a time is worth.
-    (began.elapsed().as_secs_f64() * 1e6).round() / 1e3
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use crate::study::run::{PaperRow, Run, Spread, TableRow};
 
 /// A quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum StudyMeasure {
+pub(super) enum PlottedQuantity {
     #[default]
     Majpe,
     PaMajpe,
@@ -29,7 +29,7 @@ pub(super) struct Value {
 /// A value a row; `None` where unknown.
 pub(super) type Values = Vec<Option<Value>>;
 
-impl StudyMeasure {
+impl PlottedQuantity {
     const ALL: [Self; 9] = [
         Self::Majpe,
         Self::PaMajpe,
@@ -128,10 +128,10 @@ impl StudyMeasure {
 }
 
 /// Every quantity that some row of the run knows, with its values.
-pub(super) fn of_run(run: &Run) -> Vec<(StudyMeasure, Values)> {
-    let all = StudyMeasure::ALL.map(|measure| {
+pub(super) fn of_run(run: &Run) -> Vec<(PlottedQuantity, Values)> {
+    let all = PlottedQuantity::ALL.map(|measure| {
         let values = run.table.iter().map(|row| {
-            let known = if measure == StudyMeasure::Time { time(run, row) } else { measure.of(row) };
+            let known = if measure == PlottedQuantity::Time { time(run, row) } else { measure.of(row) };
             let paper = row.paper.and_then(|paper| measure.of_paper(paper));
             known.map(|(mean, error)| Value { mean, error, paper })
         });

@@ -14,7 +14,7 @@ use crate::app::widgets::Named as _;
 use crate::session::Command;
 use crate::study::run::{Run, StudyKind, Subset};
 use egui::{RichText, Role, Ui};
-use measure::{StudyMeasure, Values};
+use measure::{PlottedQuantity, Values};
 
 /// A pane of less than this width, points, has a list of quantities instead of a button for each.
 const NARROW: f32 = 460.0;
@@ -34,8 +34,8 @@ pub(in crate::app) static PANE: Pane = Pane {
 /// Which quantity is plotted, and the values that were made from the run.
 #[derive(Default)]
 struct State {
-    measure: StudyMeasure,
-    values: Option<(u64, Vec<(StudyMeasure, Values)>)>,
+    measure: PlottedQuantity,
+    values: Option<(u64, Vec<(PlottedQuantity, Values)>)>,
 }
 
 impl PaneState for State {}
@@ -167,7 +167,7 @@ fn head(ui: &mut Ui, shared: &mut Shared<'_>, run: &Run, folder: &std::path::Pat
     }
 }
 
-fn choose(ui: &mut Ui, chosen: &mut StudyMeasure, values: &[(StudyMeasure, Values)]) {
+fn choose(ui: &mut Ui, chosen: &mut PlottedQuantity, values: &[(PlottedQuantity, Values)]) {
     if ui.available_width() < NARROW {
         let menu = egui::ComboBox::from_id_salt("measure").width(130.0).selected_text(chosen.title());
         let response = menu.show_ui(ui, |ui| {
