@@ -41,8 +41,8 @@ pub(super) struct Overlay {
     chosen: usize,
     fresh: bool,
     notices: Vec<(f64, LogLevel, String)>,
-    bare: bare::State,
-    files: files::State,
+    bare: bare::BareQuestion,
+    files: files::FileDialog,
 }
 
 impl Overlay {

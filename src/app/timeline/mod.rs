@@ -10,13 +10,13 @@ use egui::{Rect, RichText, Sense, Stroke, Ui, pos2, vec2};
 
 /// What the strip remembers.
 #[derive(Default)]
-pub(super) struct State {
+pub(super) struct Timeline {
     drag_frame: Option<usize>,
     strip: strip::Strips,
 }
 
 /// Draws the strip at the bottom of the window.
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut Timeline) {
     let tokens = Tokens::of(ui);
     let frame = egui::Frame::new().fill(tokens.panel).inner_margin(egui::Margin::symmetric(8, 4));
     egui::Panel::bottom("timeline").exact_size(62.0).frame(frame).show(ui, |ui| {
@@ -58,7 +58,7 @@ fn choose_strip(ui: &mut Ui, shared: &mut Shared<'_>) {
     });
 }
 
-fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tokens) {
+fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut Timeline, tokens: &Tokens) {
     let (count, index, playing) = {
         let data = &shared.session.data;
         (data.len(), data.frame_index, data.playing)
