@@ -17,6 +17,8 @@ pub(super) static PANE: Pane = Pane {
     keys: &[],
     margin: 8,
     state: PaneStates::prepare::<State>,
+    blank: |_| None,
+    toolbar: None,
     ui: |ui, _, states| {
         states.of::<State>().drawn += 1;
         ui.label("dummy");
@@ -90,6 +92,11 @@ fn a_pane_of_the_list_is_drawn_where_it_is_in_front() {
     layout.show_pane(&PANE);
     assert!(pass(&mut layout) > 0);
     assert!(layout.rect(&PANE).is_some());
+    for pane in PANES {
+        layout.show_pane(pane);
+        pass(&mut layout);
+        assert!(layout.rect(pane).is_some(), "{pane:?} is drawn without a data set");
+    }
 }
 
 #[test]

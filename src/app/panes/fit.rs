@@ -18,14 +18,19 @@ pub(super) static PANE: Pane = Pane {
     keys: &[(CTRL, Key::Num6)],
     margin: 8,
     state: PaneStates::prepare::<()>,
+    blank: |_| None,
+    toolbar: Some(|ui, shared, _| toolbar(ui, shared)),
     ui: |ui, shared, _| show(ui, shared),
 };
 
-fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
+fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
     transport(ui, shared);
     // In scopes of their own: what appears in them must not shift the identity of a number that is being typed below.
     ui.scope(|ui| status(ui, shared));
     ui.separator();
+}
+
+fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let old = shared.session.config;
         let mut config = old;

@@ -1,11 +1,12 @@
 //! The image plane: key points, boxes and mask in camera pixels. They are pixels, never metres, and are never compared
 //! with the fit.
 
-use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::body::Skeleton;
 use crate::dataset::{Frame, ImageAnnotations};
+use crate::session::Session;
 use egui::{Align2, Color32, ColorImage, FontId, Key, Rect, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2};
 use std::sync::Arc;
 
@@ -18,6 +19,8 @@ pub(super) static PANE: Pane = Pane {
     keys: &[(CTRL, Key::Num9)],
     margin: 0,
     state: PaneStates::prepare::<State>,
+    blank: blank,
+    toolbar: None,
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };
 
@@ -29,15 +32,18 @@ struct State {
 
 impl PaneState for State {}
 
+fn blank(session: &Session) -> Option<Blank> {
+    let Some(frame) = &session.data.frame else {
+        return Some(Blank::new("No frame", "Labels in camera pixels appear here."));
+    };
+    let how = "This frame has no key points, boxes or masks in camera pixels.";
+    let how = || frame.notes.iter().fold(how.to_owned(), |text, note| format!("{text}\n{note}"));
+    frame.image.is_none().then(|| Blank::new("No image labels", how()))
+}
+
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
-    let Some(frame) = &shared.session.data.frame else {
-        return empty(ui, "No frame", "Labels in camera pixels appear here.");
-    };
-    let Some(image) = &frame.image else {
-        let how = "This frame has no key points, boxes or masks in camera pixels.";
-        let how = frame.notes.iter().fold(how.to_owned(), |text, note| format!("{text}\n{note}"));
-        return empty(ui, "No image labels", &how);
-    };
+    let Some(frame) = &shared.session.data.frame else { return };
+    let Some(image) = &frame.image else { return };
     let [width, height] = image.size.map(|n| n.max(1) as f32);
     let tokens = Tokens::of(ui);
     let area = ui.available_rect_before_wrap().shrink2(vec2(8.0, 8.0));

@@ -1,12 +1,12 @@
 //! The joint inspector: every parameter of the selected joint, its gradient split into the electromagnetic and the
 //! kinematic part, and fields to edit it by hand.
 
-use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::body::{Group, Pppr};
-use crate::session::Command;
+use crate::session::{Command, Session};
 use egui::{Key, RichText, Ui};
 
 /// The pane.
@@ -18,6 +18,8 @@ pub(super) static PANE: Pane = Pane {
     keys: &[(CTRL, Key::Num7)],
     margin: 8,
     state: PaneStates::prepare::<State>,
+    blank: blank,
+    toolbar: Some(|ui, shared, _| picker(ui, shared)),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };
 
@@ -41,15 +43,19 @@ fn components(group: Group) -> (&'static str, &'static [&'static str], &'static 
     }
 }
 
+fn blank(session: &Session) -> Option<Blank> {
+    let fitted = session.fit.problem.is_some() && session.fit.shown.is_some();
+    let how = "The parameters of a joint appear here once a frame is fitted.";
+    (!fitted).then(|| Blank::new("No joint", how))
+}
+
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let session = shared.session;
-    let (Some(problem), Some(snapshot)) = (&session.fit.problem, &session.fit.shown) else {
-        return empty(ui, "No joint", "The parameters of a joint appear here once a frame is fitted.");
-    };
+    let (Some(problem), Some(snapshot)) = (&session.fit.problem, &session.fit.shown) else { return };
     let joints = problem.skeleton.joints.len().max(1);
-    picker(ui, shared);
     let Some(joint) = session.joint.filter(|j| *j < snapshot.params.shape().total_joints()) else {
-        return empty(ui, "No joint selected", "Click a joint in the 3-D view or on a map, or choose one above.");
+        let how = "Click a joint in the 3-D view or on a map, or choose one above.";
+        return Blank::new("No joint selected", how).show(ui);
     };
     let key = (snapshot.job, snapshot.branch, snapshot.iteration);
     if state.edit.as_ref().is_none_or(|(job, branch, iteration, _)| (*job, *branch, *iteration) != key) {

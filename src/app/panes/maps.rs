@@ -5,7 +5,7 @@ mod picture;
 mod region;
 mod toolbar;
 
-use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::{CommandRow, Menu, NONE, UiAction, has_frame};
 use crate::app::figure;
 use crate::app::map_image::Orientation;
@@ -26,6 +26,8 @@ pub(super) static H_ORI: Pane = Pane {
     keys: &[],
     margin: 0,
     state: PaneStates::prepare::<State>,
+    blank: blank,
+    toolbar: Some(|ui, shared, _| toolbar::show(ui, shared, MapColumn::Ori)),
     ui: |ui, shared, states| show(ui, shared, states.of(), MapColumn::Ori),
 };
 
@@ -38,6 +40,8 @@ pub(super) static H_SIM: Pane = Pane {
     keys: &[],
     margin: 0,
     state: PaneStates::prepare::<State>,
+    blank: blank,
+    toolbar: Some(|ui, shared, _| toolbar::show(ui, shared, MapColumn::Sim)),
     ui: |ui, shared, states| show(ui, shared, states.of(), MapColumn::Sim),
 };
 
@@ -50,6 +54,8 @@ pub(super) static MASKS: Pane = Pane {
     keys: &[],
     margin: 0,
     state: PaneStates::prepare::<State>,
+    blank: blank,
+    toolbar: Some(|ui, shared, _| toolbar::show(ui, shared, MapColumn::Masks)),
     ui: |ui, shared, states| show(ui, shared, states.of(), MapColumn::Masks),
 };
 
@@ -165,18 +171,22 @@ impl State {
     }
 }
 
+fn blank(session: &Session) -> Option<Blank> {
+    let data = &session.data;
+    let how = "Open a folder with File > Open folder, or drop it on the window.";
+    match (&data.dataset, &data.error, &data.frame) {
+        (None, ..) => Some(Blank::new("No data set", how)),
+        (_, Some(error), _) => Some(Blank::new("This frame cannot be shown", error.clone())),
+        (.., None) => Some(Blank::new("Reading the frame…", "")),
+        _ => None,
+    }
+}
+
 /// Draws one column.
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColumn) {
     state.begin_pass(ui.ctx());
     let session = shared.session;
-    let Some(dataset) = &session.data.dataset else {
-        let how = "Open a folder with File > Open folder, or drop it on the window.";
-        return empty(ui, "No data set", how);
-    };
-    if let Some(error) = &session.data.error {
-        return empty(ui, "This frame cannot be shown", error);
-    }
-    let Some(frame) = &session.data.frame else { return empty(ui, "Reading the frame…", "") };
+    let (Some(dataset), Some(frame)) = (&session.data.dataset, &session.data.frame) else { return };
     let views = &dataset.info().views;
     let known = state.dataset.as_ref().and_then(std::sync::Weak::upgrade);
     if !known.is_some_and(|known| std::sync::Arc::ptr_eq(&known, dataset)) {
@@ -186,16 +196,14 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColu
     state.windows.resize(views.len(), MapExtent::default());
     state.leave_highlight(Some(session.data.frame_index));
     state.pictures.update(session, views, frame);
-    // A toolbar that is wider than the pane must not push the maps out of it.
-    let pane = ui.max_rect();
-    toolbar::show(ui, shared, column);
     if column != MapColumn::Ori
         && session.fit.shown.is_none()
         && let crate::session::FitStatus::Failed(why) = &session.fit.status
     {
-        return empty(ui, "No fit", why);
+        return Blank::new("No fit", why.clone()).show(ui);
     }
-    let area = ui.available_rect_before_wrap().intersect(pane);
+    // A toolbar that is wider than the pane must not push the maps out of it.
+    let area = ui.available_rect_before_wrap().intersect(ui.clip_rect());
     let pointer = ui.input(|i| i.pointer.hover_pos().filter(|_| i.modifiers.shift));
     state.flipped = column != MapColumn::Masks && pointer.is_some_and(|p| area.contains(p));
     for (i, rect) in arrange(area, views, session.view.true_proportions).into_iter().enumerate() {

@@ -1,8 +1,8 @@
 //! The panes: each draws a part of the session and sends what is asked of it.
 //!
 //! **A pane is one file** (or folder) in this room with one `static PANE: Pane`: its key in stored layouts, title, help,
-//! place in the default layout, the keys that bring it to the front, and the function that draws it. What it remembers
-//! between passes is a type of that file that implements `PaneState`.
+//! place in the default layout, the keys that bring it to the front, what it says where it has nothing to draw, its toolbar,
+//! and the function that draws it. What it remembers between passes is a type of that file that implements `PaneState`.
 //!
 //! To add one, write the file, name it in the `mod` lines below, and add its line to [`PANES`]. The menu, the palette, the
 //! help sheet, the default layout, stored layouts and the option `--pane` of `screenshot` read the list. What a pane lets
@@ -26,10 +26,9 @@ mod statistics;
 pub(super) mod study;
 
 pub use pane::Pane;
-pub(super) use pane::{Dock, PaneState, PaneStates};
+pub(super) use pane::{Blank, Dock, PaneState, PaneStates};
 
 use super::commands::{AppAct, UiAction, command};
-use super::theme::{self, Tokens};
 use crate::diagnose::FindingPlace;
 use crate::labels::CellRegion;
 use crate::session::{Command, Session, ViewState};
@@ -108,26 +107,4 @@ impl Shared<'_> {
             self.send(Command::SetView(Box::new(view)));
         }
     }
-}
-
-/// An empty pane says what would fill it and how.
-pub(super) fn empty(ui: &mut egui::Ui, title: &str, how: &str) {
-    let tokens = Tokens::of(ui);
-    let area = ui.available_rect_before_wrap().shrink(16.0);
-    let mut text = egui::text::LayoutJob::default();
-    let format = |font, color| egui::TextFormat { font_id: font, color, ..Default::default() };
-    text.append(title, 0.0, format(theme::strong(theme::BODY), tokens.text));
-    if !how.is_empty() {
-        text.append(&format!("\n{how}"), 0.0, format(egui::FontId::proportional(theme::CAPTION), tokens.dim));
-    }
-    text.halign = egui::Align::Center;
-    text.wrap.max_width = area.width().clamp(60.0, 420.0);
-    let galley = ui.painter().layout_job(text);
-    let top = (area.center().y - galley.size().y / 2.0).max(area.top());
-    let rect =
-        egui::Rect::from_min_size(egui::pos2(area.left(), top), egui::vec2(area.width().max(1.0), galley.size().y));
-    let response = ui.allocate_rect(rect, egui::Sense::hover());
-    let spoken = format!("{title}. {how}");
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &spoken));
-    ui.painter().with_clip_rect(ui.clip_rect()).galley(egui::pos2(area.center().x, top), galley, tokens.text);
 }

@@ -2,13 +2,18 @@
 
 use super::{PANES, Shared};
 use crate::app::commands::Shortcut;
+use crate::app::theme::{self, Tokens};
 use crate::session::Session;
 use egui::Ui;
 use serde::de::{self, Deserialize, Deserializer, EnumAccess, VariantAccess as _, Visitor};
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 use std::any::Any;
+use std::borrow::Cow;
 use std::fmt;
+
+/// A function that draws a part of a pane.
+type Draw = fn(&mut Ui, &mut Shared<'_>, &mut PaneStates);
 
 /// A pane, as its file describes it.
 pub struct Pane {
@@ -26,8 +31,48 @@ pub struct Pane {
     pub(super) margin: i8,
     /// Makes what it remembers: [`PaneStates::prepare`] of its own type, `()` for nothing.
     pub(super) state: fn(&mut PaneStates),
-    /// Draws it.
-    pub(super) ui: fn(&mut Ui, &mut Shared<'_>, &mut PaneStates),
+    /// What it says where it has nothing to draw.
+    pub(super) blank: fn(&Session) -> Option<Blank>,
+    /// The line above what it draws.
+    pub(super) toolbar: Option<Draw>,
+    /// What it draws.
+    pub(super) ui: Draw,
+}
+
+/// What a pane says where it has nothing to draw: that, and what would fill it.
+pub(crate) struct Blank {
+    title: &'static str,
+    how: Cow<'static, str>,
+}
+
+impl Blank {
+    /// A title, and how to fill the pane.
+    pub(super) fn new(title: &'static str, how: impl Into<Cow<'static, str>>) -> Self {
+        Self { title, how: how.into() }
+    }
+
+    /// Says it in the middle of what is left of `ui`.
+    pub(super) fn show(&self, ui: &mut Ui) {
+        let Self { title, how } = self;
+        let tokens = Tokens::of(ui);
+        let area = ui.available_rect_before_wrap().shrink(16.0);
+        let mut text = egui::text::LayoutJob::default();
+        let format = |font, color| egui::TextFormat { font_id: font, color, ..Default::default() };
+        text.append(title, 0.0, format(theme::strong(theme::BODY), tokens.text));
+        if !how.is_empty() {
+            text.append(&format!("\n{how}"), 0.0, format(egui::FontId::proportional(theme::CAPTION), tokens.dim));
+        }
+        text.halign = egui::Align::Center;
+        text.wrap.max_width = area.width().clamp(60.0, 420.0);
+        let galley = ui.painter().layout_job(text);
+        let top = (area.center().y - galley.size().y / 2.0).max(area.top());
+        let rect =
+            egui::Rect::from_min_size(egui::pos2(area.left(), top), egui::vec2(area.width().max(1.0), galley.size().y));
+        let response = ui.allocate_rect(rect, egui::Sense::hover());
+        let spoken = format!("{title}. {how}");
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &spoken));
+        ui.painter().with_clip_rect(ui.clip_rect()).galley(egui::pos2(area.center().x, top), galley, tokens.text);
+    }
 }
 
 /// Where a pane is in the default layout. Panes of one place are tabs, in the order of the list of panes.
@@ -88,6 +133,12 @@ impl Pane {
     ) {
         egui::Frame::new().fill(fill).inner_margin(self.margin).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
+            if let Some(blank) = (self.blank)(shared.session) {
+                return blank.show(ui);
+            }
+            if let Some(toolbar) = self.toolbar {
+                toolbar(ui, shared, states);
+            }
             (self.ui)(ui, shared, states);
         });
     }

@@ -5,7 +5,7 @@
 
 mod build;
 
-use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::{CTRL, CommandRow, Menu, NONE, UiAction, always};
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
@@ -28,6 +28,8 @@ pub(super) static PANE: Pane = Pane {
     keys: &[(CTRL, Key::Num8)],
     margin: 0,
     state: PaneStates::prepare::<State>,
+    blank: blank,
+    toolbar: Some(|ui, shared, _| toolbar(ui, shared)),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };
 
@@ -138,10 +140,12 @@ fn centre(session: &Session) -> Vec3 {
     sum / positions.len() as f32
 }
 
+fn blank(session: &Session) -> Option<Blank> {
+    let how = "The Gaussians of a fit appear here when a frame is open.";
+    session.data.dataset.is_none().then(|| Blank::new("Nothing in the scene", how))
+}
+
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
-    if shared.session.data.dataset.is_none() {
-        return empty(ui, "Nothing in the scene", "The Gaussians of a fit appear here when a frame is open.");
-    }
     let known = state.dataset.as_ref().and_then(std::sync::Weak::upgrade);
     if !known
         .is_some_and(|known| shared.session.data.dataset.as_ref().is_some_and(|d| std::sync::Arc::ptr_eq(&known, d)))
@@ -152,7 +156,6 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     if state.camera.is_none() && shared.session.fit.shown.is_some() {
         state.camera = Some(overview(shared.session));
     }
-    toolbar(ui, shared);
     let caption = figure::of(shared.session, "3-D, metres, z up");
     let rect = figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref());
     if rect.width() < 16.0 || rect.height() < 16.0 {

@@ -3,7 +3,7 @@
 mod columns;
 mod header;
 
-use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::{CTRL, CommandRow, Menu, UiAction, has_frame};
 use crate::app::theme::{self, Tokens};
 use crate::session::{Command, Session};
@@ -23,6 +23,8 @@ pub(super) static PANE: Pane = Pane {
     keys: &[],
     margin: 8,
     state: PaneStates::prepare::<State>,
+    blank: blank,
+    toolbar: Some(|ui, shared, states| header::show(ui, shared, states.of())),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };
 
@@ -52,13 +54,14 @@ struct State {
 
 impl PaneState for State {}
 
+fn blank(session: &Session) -> Option<Blank> {
+    let how = "Open one with Ctrl+O, or drop a folder on the window.";
+    session.data.dataset.is_none().then(|| Blank::new("No data set", how))
+}
+
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let session = shared.session;
-    if session.data.dataset.is_none() {
-        return empty(ui, "No data set", "Open one with Ctrl+O, or drop a folder on the window.");
-    }
     let tokens = Tokens::of(ui);
-    header::show(ui, shared, state, &tokens);
     let columns: Vec<&Column> =
         COLUMNS.iter().filter(|column| !session.view.hidden_columns.iter().any(|key| key == column.key)).collect();
     let wanted: f32 = columns.iter().map(|column| column.width + GAP).sum::<f32>() + 4.0;

@@ -2,7 +2,7 @@
 
 mod cards;
 
-use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::{CommandRow, Menu, NONE, UiAction, command, has_frame};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
@@ -21,6 +21,8 @@ pub(super) static PANE: Pane = Pane {
     keys: &[],
     margin: 8,
     state: PaneStates::prepare::<State>,
+    blank: blank,
+    toolbar: None,
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };
 
@@ -47,14 +49,12 @@ struct State {
 
 impl PaneState for State {}
 
+fn blank(session: &Session) -> Option<Blank> {
+    let how = "Open a data set; tags, notes and the evidence for each mode appear here.";
+    session.data.dataset.is_none().then(|| Blank::new("No frame to tag", how))
+}
+
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
-    if shared.session.data.dataset.is_none() {
-        return empty(
-            ui,
-            "No frame to tag",
-            "Open a data set; tags, notes and the evidence for each mode appear here.",
-        );
-    }
     let tokens = Tokens::of(ui);
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 6.0;

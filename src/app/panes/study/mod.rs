@@ -7,11 +7,11 @@ mod measure;
 mod parallel;
 mod table;
 
-use super::{Dock, Pane, PaneState, PaneStates, Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::AppAct;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
-use crate::session::Command;
+use crate::session::{Command, Session};
 use crate::study::run::{Run, StudyKind, Subset};
 use egui::{RichText, Role, Ui};
 use measure::{PlottedQuantity, Values};
@@ -28,6 +28,8 @@ pub(in crate::app) static PANE: Pane = Pane {
     keys: &[],
     margin: 8,
     state: PaneStates::prepare::<State>,
+    blank: blank,
+    toolbar: Some(|ui, shared, _| head(ui, shared)),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };
 
@@ -49,18 +51,20 @@ enum Picture {
     Parallel,
 }
 
+fn blank(session: &Session) -> Option<Blank> {
+    let how = "Run one on the command line, for example\n`mhp-inspector study operators DATA --out RUN`,\nand open its \
+               folder with File > Open study…, or drop the folder on the window.";
+    match &session.study {
+        study if study.run.is_some() => None,
+        study if study.reading.is_some() => Some(Blank::new("Reading a run…", "")),
+        _ => Some(Blank::new("No study yet", how)),
+    }
+}
+
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let study = &shared.session.study;
-    let Some((folder, run)) = study.run.clone() else {
-        if study.reading.is_some() {
-            return empty(ui, "Reading a run…", "");
-        }
-        let how = "Run one on the command line, for example\n`mhp-inspector study operators DATA --out RUN`,\nand open its \
-                   folder with File > Open study…, or drop the folder on the window.";
-        return empty(ui, "No study yet", how);
-    };
+    let Some((_, run)) = study.run.clone() else { return };
     let tokens = Tokens::of(ui);
-    head(ui, shared, &run, &folder, &tokens);
     let revision = study.revision;
     if state.values.as_ref().is_none_or(|(known, _)| *known != revision) {
         state.values = Some((revision, measure::of_run(&run)));
@@ -128,7 +132,9 @@ fn number(label: &str) -> Option<f64> {
     label.split_whitespace().next()?.parse().ok().filter(|x: &f64| x.is_finite())
 }
 
-fn head(ui: &mut Ui, shared: &mut Shared<'_>, run: &Run, folder: &std::path::Path, tokens: &Tokens) {
+fn head(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let Some((folder, run)) = shared.session.study.run.clone() else { return };
+    let tokens = Tokens::of(ui);
     let (spec, data) = (&run.spec, &run.spec.data);
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new(spec.study.title()).font(theme::strong(theme::TITLE)));
@@ -141,7 +147,7 @@ fn head(ui: &mut Ui, shared: &mut Shared<'_>, run: &Run, folder: &std::path::Pat
             .on_hover_text("Read the run folder again: what a running study has done since.")
             .clicked()
         {
-            shared.send(Command::OpenRun(folder.to_owned()));
+            shared.send(Command::OpenRun(folder.clone()));
         }
         // Where there is hardly room the menu has it.
         if ui.available_width() > 120.0
