@@ -24,7 +24,7 @@ pub(super) static PANE: Pane = Pane {
     keys: &[(CTRL, Key::Num3)],
     margin: 8,
     state: PaneStates::prepare::<State>,
-    blank: blank,
+    blank,
     toolbar: Some(|ui, shared, states| choose(ui, shared, states.of())),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };

@@ -17,7 +17,7 @@ pub(super) static PANE: Pane = Pane {
     keys: &[(CTRL, Key::Num2)],
     margin: 8,
     state: PaneStates::prepare::<State>,
-    blank: blank,
+    blank,
     toolbar: Some(|ui, shared, _| toolbar(ui, shared)),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };

@@ -27,7 +27,7 @@ pub(super) static PANE: Pane = Pane {
     keys: &[(CTRL, Key::Num1)],
     margin: 8,
     state: PaneStates::prepare::<State>,
-    blank: blank,
+    blank,
     toolbar: Some(|ui, shared, states| toolbar(ui, shared, states.of())),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };

@@ -19,7 +19,7 @@ pub(super) static PANE: Pane = Pane {
     keys: &[(CTRL, Key::Num9)],
     margin: 0,
     state: PaneStates::prepare::<State>,
-    blank: blank,
+    blank,
     toolbar: None,
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };

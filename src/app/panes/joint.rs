@@ -18,7 +18,7 @@ pub(super) static PANE: Pane = Pane {
     keys: &[(CTRL, Key::Num7)],
     margin: 8,
     state: PaneStates::prepare::<State>,
-    blank: blank,
+    blank,
     toolbar: Some(|ui, shared, _| picker(ui, shared)),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };

@@ -15,7 +15,7 @@ pub(super) static PANE: Pane = Pane {
     keys: &[(CTRL, Key::Num5)],
     margin: 8,
     state: PaneStates::prepare::<()>,
-    blank: blank,
+    blank,
     toolbar: Some(|ui, shared, _| toolbar(ui, shared)),
     ui: |ui, shared, _| show(ui, shared),
 };

@@ -26,7 +26,7 @@ pub(super) static H_ORI: Pane = Pane {
     keys: &[],
     margin: 0,
     state: PaneStates::prepare::<State>,
-    blank: blank,
+    blank,
     toolbar: Some(|ui, shared, _| toolbar::show(ui, shared, MapColumn::Ori)),
     ui: |ui, shared, states| show(ui, shared, states.of(), MapColumn::Ori),
 };
@@ -40,7 +40,7 @@ pub(super) static H_SIM: Pane = Pane {
     keys: &[],
     margin: 0,
     state: PaneStates::prepare::<State>,
-    blank: blank,
+    blank,
     toolbar: Some(|ui, shared, _| toolbar::show(ui, shared, MapColumn::Sim)),
     ui: |ui, shared, states| show(ui, shared, states.of(), MapColumn::Sim),
 };
@@ -54,7 +54,7 @@ pub(super) static MASKS: Pane = Pane {
     keys: &[],
     margin: 0,
     state: PaneStates::prepare::<State>,
-    blank: blank,
+    blank,
     toolbar: Some(|ui, shared, _| toolbar::show(ui, shared, MapColumn::Masks)),
     ui: |ui, shared, states| show(ui, shared, states.of(), MapColumn::Masks),
 };

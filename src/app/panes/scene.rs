@@ -28,7 +28,7 @@ pub(super) static PANE: Pane = Pane {
     keys: &[(CTRL, Key::Num8)],
     margin: 0,
     state: PaneStates::prepare::<State>,
-    blank: blank,
+    blank,
     toolbar: Some(|ui, shared, _| toolbar(ui, shared)),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };

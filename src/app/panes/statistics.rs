@@ -18,7 +18,7 @@ pub(super) static PANE: Pane = Pane {
     keys: &[(CTRL, Key::Num4)],
     margin: 8,
     state: PaneStates::prepare::<State>,
-    blank: blank,
+    blank,
     toolbar: Some(|ui, shared, states| controls(ui, shared.session, states.of())),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };

@@ -2,6 +2,7 @@
 
 mod strip;
 
+use super::commands::{UserCommand, command};
 use super::panes::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, icon_button};
@@ -72,7 +73,7 @@ fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut Timeline, tokens: &T
         ("▸", "Next frame", "Next frame", index + 1 < count),
         ("▸|", "Last frame", "Last frame", index + 1 < count),
     ] {
-        let tip = crate::app::commands::command(label).map(|command| command.tip()).unwrap_or_default();
+        let tip = command(label).map(UserCommand::tip).unwrap_or_default();
         if icon_button(ui, sign, name, &tip, enabled, playing && label == "Play frames").clicked() {
             shared.invoke(label);
         }
@@ -123,7 +124,7 @@ fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
         ("▸", "Iteration forward", "One step", ready && (back || !running), false),
         ("▸|", "Follow newest", "Follow newest iteration", back, false),
     ] {
-        let tip = crate::app::commands::command(label).map(|command| command.tip()).unwrap_or_default();
+        let tip = command(label).map(UserCommand::tip).unwrap_or_default();
         if icon_button(ui, sign, name, &tip, enabled, active).clicked() {
             shared.invoke(label);
         }

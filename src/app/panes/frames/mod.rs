@@ -23,7 +23,7 @@ pub(super) static PANE: Pane = Pane {
     keys: &[],
     margin: 8,
     state: PaneStates::prepare::<State>,
-    blank: blank,
+    blank,
     toolbar: Some(|ui, shared, states| header::show(ui, shared, states.of())),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };

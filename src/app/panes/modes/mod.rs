@@ -3,7 +3,7 @@
 mod cards;
 
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
-use crate::app::commands::{CommandRow, Menu, NONE, UiAction, command, has_frame};
+use crate::app::commands::{CommandRow, Menu, NONE, UiAction, UserCommand, command, has_frame};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::labels::{CellRegion, Tag, Verdict};
@@ -21,7 +21,7 @@ pub(super) static PANE: Pane = Pane {
     keys: &[],
     margin: 8,
     state: PaneStates::prepare::<State>,
-    blank: blank,
+    blank,
     toolbar: None,
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };
@@ -215,7 +215,7 @@ fn details(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tok
             }
         });
         menu.response.named(Role::ComboBox, "Person").on_hover_text("The person that the tags are about, from 0.");
-        let tip = command("Mark cells").map(|command| command.tip()).unwrap_or_default();
+        let tip = command("Mark cells").map(UserCommand::tip).unwrap_or_default();
         if ui.small_button("Mark cells").on_hover_text(tip).clicked() {
             shared.invoke("Mark cells");
         }

@@ -1,6 +1,8 @@
 //! Two numbers: the quantity as a map between the grid's points, with lines of equal value, and a point a row.
 //!
 //! The points stand at equal distances whatever their values are: grids are often geometric, and each column is labelled.
+//! The lines are found here, not by the crate `contour`: that one closes every line along the border of the map, and knows
+//! no point without a value.
 
 use super::measure::{PlottedQuantity, Values, levels, limits};
 use crate::app::theme::{self, Tokens};

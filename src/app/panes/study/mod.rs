@@ -28,7 +28,7 @@ pub(in crate::app) static PANE: Pane = Pane {
     keys: &[],
     margin: 8,
     state: PaneStates::prepare::<State>,
-    blank: blank,
+    blank,
     toolbar: Some(|ui, shared, _| head(ui, shared)),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };
