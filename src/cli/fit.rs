@@ -9,7 +9,7 @@ use super::frames::{FrameRange, chosen};
 use super::merge::MergeArgs;
 use super::shards::{end, typed};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
-use crate::config::{FitConfig, Preset};
+use crate::config::{FitConfig, Preset, listing};
 use crate::dataset::Dataset;
 use crate::mhp::Precision;
 use crate::output::{FolderLock, Inputs, replace_file};
@@ -42,6 +42,11 @@ Examples:
       Also the Gaussians of the end as pppr/*.ply and every iteration as curves/*.csv.
   mhp-inspector fit data/d1s1 --shard 2/8 --out shards/2
       The second of eight parts, for as many machines; `mhp-inspector merge shards/* --out results` makes the whole.";
+
+/// Shown under them by `fit --help`, and not by `fit -h`: also every setting.
+pub(super) fn long_help() -> String {
+    format!("{HELP}\n\n{}", listing())
+}
 
 /// The settings in force, and the table.
 const SETTINGS: &str = "fit.toml";
