@@ -3,7 +3,7 @@
 //! [`Problem`] is one frame; [`Objective`] answers loss and gradient for parameters; [`Fitter`] takes Adam steps. The
 //! forward model goes from joints to cells in two steps, `splat.rs` (a joint in a view, f64; in `batch.rs` several at once)
 //! and `kernel.rs` (cells, plainly) or `tiles/mod.rs` (cells, f32, fast), and back in the same (moments) and
-//! `adjoint.rs`. `em.rs` compares the masks, `kinematic.rs` has the other terms, `objective.rs` adds them up.
+//! `adjoint.rs`. `em.rs` compares the masks, `terms/mod.rs` has the table of all terms, `objective.rs` adds them up.
 
 mod adam;
 mod adjoint;
@@ -16,7 +16,6 @@ mod fitter;
 mod form;
 mod init;
 mod kernel;
-mod kinematic;
 mod laid;
 mod lanes;
 mod objective;
@@ -27,6 +26,7 @@ mod scalar;
 mod seen;
 mod simulate;
 mod splat;
+mod terms;
 mod tiles;
 mod types;
 
@@ -42,5 +42,6 @@ pub(crate) use percentile::{percentile, percentiles};
 pub use problem::{Neighbour, Problem};
 pub use region::Region;
 pub use simulate::simulate;
+pub use terms::{Hue, Scope, TERMS, Term, TermGroup, TermId, Terms, Weight, formula};
 pub use tiles::simd_path;
-pub use types::{Evaluation, FitError, Ious, Precision, StepReport, StopReason, Terms};
+pub use types::{Evaluation, FitError, Ious, Precision, StepReport, StopReason};

@@ -39,7 +39,7 @@ pub use fit::{Fit, FitStatus};
 pub use history::{Branch, Flag, History, Row, difference};
 pub use labels::{LabelMode, LabelStatus, LabelTable, Labels};
 pub use pins::{MOST_PINS, Pin, PinRow, Pins, numbers};
-pub use queue::{Facts, Number, Queue, Reads, Rule, SYNTAX, SavedView, Sort, SortKey};
+pub use queue::{Facts, Number, Queue, Reads, Rule, SavedView, Sort, SortKey, syntax};
 pub use records::Records;
 pub use results::FoundResults;
 pub use runtime::{Picker, Runtime, Wake};

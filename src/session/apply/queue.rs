@@ -142,6 +142,7 @@ impl Session {
         {
             facts.iou = summary.iou;
             facts.loss = summary.loss;
+            facts.terms = Some(&summary.terms);
             facts.iterations = summary.iterations;
             facts.converged = summary.converged;
             facts.reason = summary.reason.as_deref();

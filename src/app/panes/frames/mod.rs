@@ -6,7 +6,7 @@ mod header;
 use super::{Shared, empty};
 use crate::app::theme::{self, Tokens};
 use crate::session::{Command, Session};
-use columns::{COLUMNS, Column, cell, spoken};
+use columns::{Column, cell, spoken};
 use egui::{RichText, Sense, Ui, pos2, vec2};
 use std::collections::BTreeSet;
 
@@ -40,8 +40,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     }
     let tokens = Tokens::of(ui);
     header::show(ui, shared, state, &tokens);
-    let columns: Vec<&Column> =
-        COLUMNS.iter().filter(|column| !session.view.hidden_columns.iter().any(|key| key == column.key)).collect();
+    let columns: Vec<&Column> = columns::columns().filter(|column| column.is_shown(&session.view)).collect();
     let wanted: f32 = columns.iter().map(|column| column.width + GAP).sum::<f32>() + 4.0;
     let width = wanted.max(ui.available_width());
     // The name takes what the numbers leave.
