@@ -23,6 +23,15 @@
 //! Every gradient is written by hand, [`mhp`] holds them; the forward model and its derivatives are checked against
 //! reference cases and central differences.
 //!
+//! ```text
+//! data set ── frame ──> problem (NaN filled, views, EM region)
+//!                          │
+//!         initialise ──> PPPR ──> forward model ──> H_sim ──> masks ──> L_EM ┐
+//!                          ▲      (each joint one Gaussian a view)           ├─> L and ∂L/∂Θ ──> Adam ──┐
+//!                          │                          bones, motion, angles ─┘                          │
+//!                          └───────────────────────────────────────────────────────────────────────────┘
+//! ```
+//!
 //! **The rooms**, dependencies pointing down only:
 //!
 //! | room | what is in it |
@@ -44,6 +53,7 @@
 //! | [`radar`] | chirp, axes, views, point-spread functions, FMCW synthesis of a MIMO array and the FFT chain |
 //! | [`config`] | `FitConfig`: defaults, ranges, help text; the only source for files, command line and sliders; [where the program differs from the paper](config::deviations) |
 //! | [`output`] | where results are written: safe names, guarded and locked folders, files whole or not at all |
+//! | [`task`] | work off the caller's thread: progress, cancelling, panics that become errors |
 //! | [`escape`] | text from data on its way to a terminal or a table |
 //! | [`folders`] | where the user's settings, labels and caches lie |
 //! | [`input`] | opening what others made: regular files only, bounded |
@@ -65,6 +75,7 @@ pub mod output;
 pub mod people;
 pub mod radar;
 pub mod study;
+pub mod task;
 pub mod worker;
 
 #[cfg(feature = "viewer")]

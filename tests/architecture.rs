@@ -11,6 +11,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("escape", &[]),
     ("folders", &[]),
     ("input", &[]),
+    ("task", &[]),
     ("output", &["digest"]),
     ("labels", &["escape", "folders"]),
     ("config", &["input"]),
@@ -22,23 +23,23 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("mhp", &["geometry", "config", "radar", "body"]),
     // Diagnoses count people: two who stand close are a failure mode.
     ("diagnose", &["geometry", "config", "radar", "body", "mhp", "people", "labels"]),
-    ("dataset", &["digest", "input", "geometry", "folders", "output", "config", "radar", "body"]),
+    ("dataset", &["digest", "input", "task", "geometry", "folders", "output", "config", "radar", "body"]),
     ("render", &["geometry"]),
     ("start", &["geometry", "config", "radar", "body", "mhp", "people", "dataset"]),
-    ("worker", &["geometry", "config", "radar", "body", "mhp", "dataset", "start"]),
+    ("worker", &["task", "geometry", "config", "radar", "body", "mhp", "dataset", "start"]),
     // The synthetic source is used by the calibration of the evidence alone.
     (
         "study",
         &[
-            "digest", "input", "geometry", "escape", "folders", "output", "config", "radar", "body", "simulate", "mhp",
-            "people", "dataset", "start", "diagnose", "labels",
+            "digest", "input", "task", "geometry", "escape", "folders", "output", "config", "radar", "body",
+            "simulate", "mhp", "people", "dataset", "start", "diagnose", "labels",
         ],
     ),
     (
         "session",
         &[
-            "digest", "input", "geometry", "escape", "folders", "output", "config", "radar", "body", "mhp", "people",
-            "dataset", "start", "diagnose", "labels", "study", "worker",
+            "digest", "input", "task", "geometry", "escape", "folders", "output", "config", "radar", "body", "mhp",
+            "people", "dataset", "start", "diagnose", "labels", "study", "worker",
         ],
     ),
     (
@@ -52,8 +53,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
 
 /// Rooms that know no window and no GPU.
 const WINDOWLESS: &[&str] = &[
-    "digest", "geometry", "folders", "output", "config", "radar", "body", "mhp", "dataset", "diagnose", "labels",
-    "worker", "session", "study", "simulate", "people", "start",
+    "digest", "task", "geometry", "folders", "output", "config", "radar", "body", "mhp", "dataset", "diagnose",
+    "labels", "worker", "session", "study", "simulate", "people", "start",
 ];
 
 fn files(folder: &Path) -> Vec<PathBuf> {

@@ -15,7 +15,7 @@ mod theme;
 mod widgets;
 
 use crate::config::FitConfig;
-use crate::session::{Aim, Command, LogLevel, Runtime, Session, ViewState};
+use crate::session::{Command, LogLevel, Runtime, Session, StartAt, ViewState};
 use commands::{Act, AppAct};
 use layout::Layout;
 use overlay::Overlay;
@@ -39,7 +39,7 @@ pub struct Begin {
     /// Data sets; the first one opens, the others become recents.
     pub paths: Vec<PathBuf>,
     /// Where to begin in it.
-    pub aim: Aim,
+    pub aim: StartAt,
     /// A table of results for the frame list.
     pub results: Option<PathBuf>,
     /// The run folder of a study.
@@ -59,7 +59,7 @@ pub struct InspectorApp {
     layout: Layout,
     panes: PaneStates,
     overlay: Overlay,
-    pictures: sharing::Pictures,
+    pictures: sharing::PendingPictures,
     notices_seen: u64,
     last_play: Option<f64>,
     applied_zoom: f32,
@@ -96,7 +96,7 @@ impl InspectorApp {
             layout,
             panes: PaneStates::new(cc.wgpu_render_state.clone()),
             overlay: Overlay::default(),
-            pictures: sharing::Pictures::default(),
+            pictures: sharing::PendingPictures::default(),
             notices_seen: 0,
             last_play: None,
             applied_zoom: 1.0,

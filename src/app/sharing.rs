@@ -5,7 +5,7 @@ use super::commands::SaveKind;
 use super::layout::{Layout, PaneKind};
 use super::panes::PaneStates;
 use crate::output::{Sink, portable, replace_file};
-use crate::session::{Command, Export, LogLevel, OutputCheck, Session, Task};
+use crate::session::{BackgroundTask, Command, Export, LogLevel, OutputCheck, Session};
 use egui::{ColorImage, Context, Rect};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ struct WindowState {
 
 /// Pictures that were asked for and are not drawn yet.
 #[derive(Default)]
-pub(super) struct Pictures {
+pub(super) struct PendingPictures {
     drawn: Arc<Mutex<Vec<Drawn>>>,
 }
 
@@ -35,7 +35,7 @@ pub(super) enum Wanted {
     Clipboard(Option<Rect>),
 }
 
-impl Pictures {
+impl PendingPictures {
     /// Asks for a picture of the next pass.
     fn ask(&self, ctx: &Context, wanted: Wanted) {
         let drawn = Arc::clone(&self.drawn);
@@ -152,7 +152,7 @@ impl InspectorApp {
                 Wanted::File(path, rect) => {
                     let image = cropped(&image, rect, scale);
                     let check = self.session.output_check();
-                    self.apply(Command::RunTask(Task::new(move || write_png(&image, &path, &check))));
+                    self.apply(Command::RunTask(BackgroundTask::new(move || write_png(&image, &path, &check))));
                 }
                 Wanted::Clipboard(rect) => {
                     ctx.copy_image(cropped(&image, rect, scale));

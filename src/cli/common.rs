@@ -1,10 +1,11 @@
 //! What several subcommands share: opening, settings, precision, printing.
 
 use crate::config::{FitConfig, Preset};
-use crate::dataset::{Dataset, Manifest, OpenOptions, Progress};
+use crate::dataset::{Dataset, Manifest, OpenOptions};
 use crate::escape;
 use crate::mhp::Precision;
 use crate::output::Inputs;
+use crate::task::Progress;
 use anyhow::Context as _;
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};

@@ -4,9 +4,10 @@ mod report;
 
 use super::common::{CsvArgs, complain, inputs, open, print, print_json};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
-use crate::dataset::{Dataset, Progress};
+use crate::dataset::Dataset;
 use crate::study::StudyError;
 use crate::study::complexity::{Complexity, ComplexityJob, ComplexityOptions, cache_folder, json, write_csv};
+use crate::task::Progress;
 use clap::Args;
 use crossbeam_channel::{RecvTimeoutError, bounded};
 use indicatif::{ProgressBar, ProgressStyle};

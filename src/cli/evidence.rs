@@ -6,7 +6,7 @@ use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::body::Pppr;
 use crate::config::Preset;
 use crate::dataset::{Dataset, read_pppr};
-use crate::diagnose::{Evidence, Finding, Place};
+use crate::diagnose::{Evidence, Finding, FindingPlace};
 use crate::escape::{one_line, to_cell};
 use crate::labels::Tag;
 use crate::mhp::Problem;
@@ -232,9 +232,9 @@ fn card(text: &mut String, mode: &Evidence, views: &[View]) {
 fn place(finding: &Finding, views: &[View]) -> String {
     match &finding.place {
         None => String::new(),
-        Some(Place::Joint(joint)) => format!(" [joint {joint}]"),
-        Some(Place::Frame(index)) => format!(" [frame {index}]"),
-        Some(Place::Cells { view, lo, hi }) => {
+        Some(FindingPlace::Joint(joint)) => format!(" [joint {joint}]"),
+        Some(FindingPlace::Frame(index)) => format!(" [frame {index}]"),
+        Some(FindingPlace::Cells { view, lo, hi }) => {
             let array = views.get(*view).map_or("", |view| view.array.as_str());
             let spans: Vec<String> = lo.iter().zip(hi).map(|(lo, hi)| format!("{lo}..={hi}")).collect();
             format!(" [{array}[{}]]", spans.join(", "))

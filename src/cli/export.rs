@@ -9,7 +9,7 @@ use crate::config::{FitConfig, Preset};
 use crate::dataset::Dataset;
 use crate::escape::one_line;
 use crate::output::{FileNames, FolderLock, Inputs};
-use crate::study::{HeatmapExport, MapScale};
+use crate::study::{ExportScale, HeatmapExport};
 use anyhow::Context as _;
 use clap::{Args, ValueEnum};
 use frame::Exported;
@@ -129,10 +129,10 @@ impl ExportArgs {
         self.what.contains(&what)
     }
 
-    fn scale(&self) -> MapScale {
+    fn scale(&self) -> ExportScale {
         match self.scale {
-            ScaleArg::Match => MapScale::Match,
-            ScaleArg::None => MapScale::None,
+            ScaleArg::Match => ExportScale::Match,
+            ScaleArg::None => ExportScale::None,
         }
     }
 

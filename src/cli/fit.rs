@@ -10,7 +10,7 @@ use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::config::{FitConfig, Preset};
 use crate::dataset::Dataset;
 use crate::output::{FolderLock, replace_file};
-use crate::study::{BatchOptions, FrameRow, Means, Summary, columns, run_batch};
+use crate::study::{BatchOptions, BatchRow, Means, Summary, columns, run_batch};
 use anyhow::Context as _;
 use clap::Args;
 use serde_json::{Value, json};
@@ -173,7 +173,7 @@ impl Report {
         }
     }
 
-    fn add(&mut self, row: FrameRow) {
+    fn add(&mut self, row: BatchRow) {
         self.means.add(&row);
         if let (None, Err(why)) = (&self.first_error, &row.fit) {
             self.first_error = Some(why.clone());

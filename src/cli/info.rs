@@ -23,7 +23,7 @@ Examples:
 
 /// What is in a data set: layout, frames, views and axes, ranges of values, skeleton, people, labels.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct InfoArgs {
     /// An MMVR tree or any folder inside one, a `*_radar.npz`, a folder with `dataset.toml`, or an `.npy`/`.npz` of maps.
     path: PathBuf,
     /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
@@ -71,7 +71,7 @@ impl Values {
 ///
 /// # Errors
 /// Where the data set cannot be opened or that frame not be loaded.
-pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frame = dataset.load(args.frame.unwrap_or(dataset.start_index()))?;
     let notes = label_notes(&dataset);
@@ -243,4 +243,23 @@ fn as_text(dataset: &Dataset, frame: &Frame, label_notes: &[String]) -> String {
         );
     }
     out.lines().map(str::trim_end).fold(String::new(), |text, line| text + line + "\n")
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+    use super::*;
+    use crate::task::Progress;
+
+    #[test]
+    fn a_layout_of_the_registry_is_told_by_its_word() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("000.dummy"), b"abcdef").unwrap();
+        let dataset = Dataset::open(folder.path(), &Progress::new()).unwrap();
+        let frame = dataset.load(0).unwrap();
+        let text = as_text(&dataset, &frame, &[]);
+        assert!(text.contains("data set    Dummy\n") && text.contains("layout      dummy\n"), "{text}");
+        assert!(text.contains("view        bytes, 2×3 |u1, amplitude\n"), "{text}");
+        assert_eq!(as_json(&dataset, &frame, &[])["layout"], "dummy");
+    }
 }

@@ -67,7 +67,7 @@ pub struct Cli {
     pub allow_outside: bool,
     /// What to do; without a subcommand the window opens.
     #[command(subcommand)]
-    pub command: Option<Command>,
+    pub command: Option<CliCommand>,
     /// What the window begins with.
     #[command(flatten)]
     pub window: WindowArgs,
@@ -118,7 +118,7 @@ impl WindowArgs {
         if let Some(run) = &self.study {
             crate::study::run::RunSpec::read(run)?;
         }
-        let aim = crate::session::Aim { frame: self.frame, iteration: self.iteration };
+        let aim = crate::session::StartAt { frame: self.frame, iteration: self.iteration };
         Ok(crate::app::Begin {
             paths: self.paths,
             aim,
@@ -133,7 +133,7 @@ impl WindowArgs {
 
 /// The subcommands; everything the window does, one of them can do headless.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub enum CliCommand {
     /// Measure what an iteration, a simulation and a whole frame cost on this machine.
     #[command(after_help = bench::HELP)]
     Bench(bench::BenchArgs),
@@ -163,7 +163,7 @@ pub enum Command {
     Fit(fit::FitArgs),
     /// Tell what is in a data set: layout, frames, views and axes, ranges of values, skeleton, people, labels.
     #[command(after_help = info::HELP)]
-    Info(info::Args),
+    Info(info::InfoArgs),
     /// Tag frames and list labels: what the window writes, for scripts.
     #[command(subcommand, after_help = labels::HELP)]
     Labels(labels::LabelsCommand),
@@ -176,7 +176,7 @@ pub enum Command {
     Screenshot(screenshot::ScreenshotArgs),
     /// Write a synthetic data set with 3-D truth: people and rooms before an FMCW radar, as maps of any supported layout.
     #[command(after_help = simulate::HELP)]
-    Simulate(simulate::Args),
+    Simulate(simulate::SimulateArgs),
     /// Compare variants of a configuration over many frames: the paper's tables, sweeps, shards of them.
     #[command(subcommand, after_help = study::HELP)]
     Study(study::StudyCommand),
@@ -196,9 +196,9 @@ pub enum Command {
 
 /// Starts the program once more where a subcommand needs another environment than it has, and never returns then. For `main`
 /// alone, before anything else.
-pub fn begin_again(command: Option<&Command>) {
+pub fn begin_again(command: Option<&CliCommand>) {
     #[cfg(all(feature = "viewer", unix))]
-    if let Some(Command::Screenshot(_)) = command {
+    if let Some(CliCommand::Screenshot(_)) = command {
         screenshot::without_device_selection();
     }
     #[cfg(not(all(feature = "viewer", unix)))]
@@ -209,26 +209,26 @@ pub fn begin_again(command: Option<&Command>) {
 ///
 /// # Errors
 /// Whatever the subcommand could not do, naming file, key and what was expected.
-pub fn run(command: Command) -> anyhow::Result<ExitCode> {
+pub fn run(command: CliCommand) -> anyhow::Result<ExitCode> {
     match command {
-        Command::Bench(args) => bench::run(&args),
-        Command::Complexity(args) => complexity::run(&args),
-        Command::Count(args) => count::run(&args),
-        Command::Evidence(args) => evidence::run(&args),
-        Command::Export(args) => export::run(&args),
-        Command::Fit(args) => fit::run(&args),
-        Command::Info(args) => info::run(&args),
-        Command::Labels(command) => labels::run(&command),
-        Command::Score(args) => score::run(&args),
+        CliCommand::Bench(args) => bench::run(&args),
+        CliCommand::Complexity(args) => complexity::run(&args),
+        CliCommand::Count(args) => count::run(&args),
+        CliCommand::Evidence(args) => evidence::run(&args),
+        CliCommand::Export(args) => export::run(&args),
+        CliCommand::Fit(args) => fit::run(&args),
+        CliCommand::Info(args) => info::run(&args),
+        CliCommand::Labels(command) => labels::run(&command),
+        CliCommand::Score(args) => score::run(&args),
         #[cfg(feature = "viewer")]
-        Command::Screenshot(args) => screenshot::run(&args),
-        Command::Study(command) => study::run(&command),
-        Command::Simulate(args) => simulate::run(&args),
+        CliCommand::Screenshot(args) => screenshot::run(&args),
+        CliCommand::Study(command) => study::run(&command),
+        CliCommand::Simulate(args) => simulate::run(&args),
         #[cfg(feature = "train")]
-        Command::TrainCounter(args) => train_counter::run(&args),
+        CliCommand::TrainCounter(args) => train_counter::run(&args),
         #[cfg(feature = "train")]
-        Command::TrainEvidence(args) => train_evidence::run(&args),
+        CliCommand::TrainEvidence(args) => train_evidence::run(&args),
         #[cfg(feature = "train")]
-        Command::TrainLimbs(args) => train_limbs::run(&args),
+        CliCommand::TrainLimbs(args) => train_limbs::run(&args),
     }
 }

@@ -1,9 +1,9 @@
 //! `train-counter`: makes the weights of the person counter anew, from synthetic recordings.
 
 use super::common::{print, progress_bar};
-use crate::people::train::{Example, Lesson, TrainOptions, examples, pooled, recordings, train};
+use crate::people::train::{CounterExample, CounterLesson, TrainOptions, examples, pooled, recordings, train};
 use crate::people::{CLASSES, COMPARED, Confusion, Counter, CounterOptions, FEATURES, HISTORY, Network};
-use crate::simulate::{Preset, Recording};
+use crate::simulate::{Recording, ScenePreset};
 use anyhow::Context as _;
 use clap::Args;
 use std::fmt::Write as _;
@@ -67,7 +67,7 @@ pub(super) fn run(args: &TrainCounterArgs) -> anyhow::Result<ExitCode> {
     let mut report = String::new();
     for (name, pick) in [("counter", pick_counted as Pick), ("counter-alone", pick_alone as Pick)] {
         let options = TrainOptions { epochs: args.epochs, seed: args.seed, ..TrainOptions::default() };
-        let chosen: Vec<Lesson> = lessons.iter().map(|example| pick(example).clone()).collect();
+        let chosen: Vec<CounterLesson> = lessons.iter().map(|example| pick(example).clone()).collect();
         let bar = progress_bar(args.epochs);
         let mut network = train(&chosen, &options, |_, _| bar.inc(1))?;
         bar.finish_and_clear();
@@ -79,17 +79,17 @@ pub(super) fn run(args: &TrainCounterArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-type Pick = fn(&Example) -> &Lesson;
+type Pick = fn(&CounterExample) -> &CounterLesson;
 
-fn pick_counted(example: &Example) -> &Lesson {
+fn pick_counted(example: &CounterExample) -> &CounterLesson {
     &example.counted
 }
 
-fn pick_alone(example: &Example) -> &Lesson {
+fn pick_alone(example: &CounterExample) -> &CounterLesson {
     &example.alone
 }
 
-fn simulate(seed: u64, sequences: usize, frames: usize) -> anyhow::Result<Vec<Example>> {
+fn simulate(seed: u64, sequences: usize, frames: usize) -> anyhow::Result<Vec<CounterExample>> {
     let recordings = recordings(seed, sequences)?;
     let views = recordings.first().map(Recording::views).unwrap_or_default();
     // Only the detections and clusters are wanted: any weights do.
@@ -104,8 +104,8 @@ fn simulate(seed: u64, sequences: usize, frames: usize) -> anyhow::Result<Vec<Ex
 fn header(
     args: &TrainCounterArgs,
     network: &Network,
-    lessons: &[Example],
-    tests: &[Example],
+    lessons: &[CounterExample],
+    tests: &[CounterExample],
     pick: Pick,
 ) -> Vec<String> {
     let TrainCounterArgs { sequences, test_sequences, seed, test_seed, epochs, .. } = args;
@@ -130,7 +130,7 @@ fn header(
         lines.extend(told(&name, &confusion(&answers, &|answer| answer.history == first)));
     }
     lines.extend(told("test, frames with enough frames before them", &confusion(&answers, &full)));
-    for preset in [Preset::Easy, Preset::Medium, Preset::Hard] {
+    for preset in [ScenePreset::Easy, ScenePreset::Medium, ScenePreset::Hard] {
         let of = confusion(&answers, &|answer| full(answer) && answer.preset == preset);
         lines.extend(told(&format!("test, {}, likewise", preset.word()), &of));
     }
@@ -142,19 +142,19 @@ struct Answer {
     people: usize,
     said: usize,
     history: usize,
-    preset: Preset,
+    preset: ScenePreset,
 }
 
 /// What is said of every frame: of the counter's lessons what the frames agree on, of the classifier alone each by itself.
-fn answers(examples: &[Example], network: &Network, pick: Pick) -> Vec<Answer> {
+fn answers(examples: &[CounterExample], network: &Network, pick: Pick) -> Vec<Answer> {
     let mut said: Vec<[f64; CLASSES]> = Vec::new();
-    let of = |example: &Example| {
+    let of = |example: &CounterExample| {
         let lesson = pick(example);
         if example.history == 0 || !lesson.placed {
             said.clear();
         }
         said.push(lesson.answer(network));
-        let Example { history, preset, .. } = *example;
+        let CounterExample { history, preset, .. } = *example;
         Answer { people: lesson.people, said: most_probable(&pooled(&said)), history, preset }
     };
     examples.iter().map(of).collect()

@@ -1,9 +1,8 @@
 //! Frames off the window's thread: the latest request wins, what is likely next is read while nobody waits.
 
-use super::error::panic_text;
 use super::{Dataset, DatasetError, Frame, FrameCache};
+use crate::task::catch_panic;
 use std::collections::VecDeque;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
@@ -120,10 +119,8 @@ impl Drop for Loader {
 fn run(shared: &Shared) {
     while let Some((index, asked)) = next(shared) {
         let load = || shared.dataset.load(index).map(Arc::new);
-        let loaded = catch_unwind(AssertUnwindSafe(load)).unwrap_or_else(|panic| {
-            let path = shared.dataset.frame_path(index);
-            Err(DatasetError::Internal { message: panic_text(panic.as_ref()), path })
-        });
+        let broken = |message| Err(DatasetError::Internal { message, path: shared.dataset.frame_path(index) });
+        let loaded = catch_panic(load).unwrap_or_else(broken);
         let mut state = shared.lock();
         if let Ok(frame) = &loaded {
             state.cache.insert(index, Arc::clone(frame), frame.bytes());

@@ -5,8 +5,9 @@
 //! (or of links, which are looked at) are told to the caller: a named pipe is never opened. Depth and number are bounded, and what
 //! was left out is said.
 
-use super::files::natural;
-use super::{DatasetError, Progress};
+use super::DatasetError;
+use super::natural::natural;
+use crate::task::Progress;
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::fs::DirEntry;

@@ -6,10 +6,10 @@ mod metrics;
 mod reprojection;
 
 pub use evidence::{
-    Annotated, Calibration, CalibrationError, Curve, EarlierFrame, Evidence, EvidenceInput, Figures, Finding, FrameSet,
-    Input, Measure, Place, STATIC_FRAMES, STATIC_KAPPA_PCT, evidence, with_share,
+    Annotated, Calibration, CalibrationError, Curve, EarlierFrame, Evidence, EvidenceInput, Figures, Finding,
+    FindingPlace, FrameSet, Input, Measure, STATIC_FRAMES, STATIC_KAPPA_PCT, evidence, with_share,
 };
 #[cfg(feature = "train")]
-pub use evidence::{Example, Measured, chosen_examples, learn_curves};
+pub use evidence::{EvidenceExample, Measured, chosen_examples, learn_curves};
 pub use metrics::{JointErrors, joint_errors, majpe_mm, pa_majpe_mm};
-pub use reprojection::{Camera, Reprojection, map_box_coverage, reprojection};
+pub use reprojection::{Reprojection, map_box_coverage, reprojection};

@@ -91,7 +91,7 @@ struct Header {
 
 /// What a line is.
 #[derive(Debug)]
-pub(super) enum Line {
+pub(super) enum JournalLine {
     /// Nothing, as between a record that lost its newline and the next.
     Blank,
     /// A header of a version that is understood.
@@ -106,20 +106,20 @@ pub(super) enum Line {
 ///
 /// # Errors
 /// For a header of a newer version.
-pub(super) fn parse(line: &[u8], path: &Path) -> Result<Line, LabelError> {
+pub(super) fn parse(line: &[u8], path: &Path) -> Result<JournalLine, LabelError> {
     let text = bare(line);
     if text.is_empty() {
-        return Ok(if line.contains(&0) { Line::Damaged } else { Line::Blank });
+        return Ok(if line.contains(&0) { JournalLine::Damaged } else { JournalLine::Blank });
     }
     if let Ok(record) = serde_json::from_slice(text) {
-        return Ok(Line::Record(Box::new(record)));
+        return Ok(JournalLine::Record(Box::new(record)));
     }
     match serde_json::from_slice::<Header>(text) {
         Ok(header) if header.format == FORMAT && header.version > VERSION => {
             Err(LabelError::Newer { version: header.version, known: VERSION, path: path.to_owned() })
         }
-        Ok(header) if header.format == FORMAT && header.version > 0 => Ok(Line::Header),
-        _ => Ok(Line::Damaged),
+        Ok(header) if header.format == FORMAT && header.version > 0 => Ok(JournalLine::Header),
+        _ => Ok(JournalLine::Damaged),
     }
 }
 

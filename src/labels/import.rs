@@ -1,7 +1,7 @@
 //! Which rows of a table an import writes: it adds what is new, and never takes away what somebody said later.
 
 use super::format::{is_ahead, now_ms, time_ms};
-use super::{Record, Row};
+use super::{LabelRow, Record};
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
@@ -9,7 +9,7 @@ use time::format_description::well_known::Rfc3339;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ImportPlan<'r> {
     /// Rows to write: of frames without a record, newer than the record, or all that differ.
-    pub write: Vec<&'r Row>,
+    pub write: Vec<&'r LabelRow>,
     /// Rows that say what the label says already.
     pub same: usize,
     /// Rows that differ and are not newer than the record, which may have taken a label back: it is kept.
@@ -20,7 +20,7 @@ pub struct ImportPlan<'r> {
 /// rows that are not newer. A row without a time is not newer than anything; one that says nothing of a frame of which
 /// nothing is known is no news.
 pub fn plan_import<'r, 'c>(
-    rows: &'r [Row],
+    rows: &'r [LabelRow],
     replace: bool,
     current: impl Fn(&Record) -> Option<&'c Record>,
 ) -> ImportPlan<'r> {

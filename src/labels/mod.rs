@@ -37,5 +37,5 @@ pub use place::LabelPlace;
 pub use record::{CellRegion, Change, FrameId, Judged, Label, Record};
 pub use statistics::{AnnotatorStatistics, LabelCounts, PAUSE_S, Pace, day, statistics};
 pub use store::{LabelStore, read_journal};
-pub use table::{COLUMNS, Row, Table, TableError, read_table, write_csv, write_json};
+pub use table::{COLUMNS, LabelRow, ReadTable, TableError, read_table, write_csv, write_json};
 pub use tags::{Tag, Tags, Verdict};

@@ -3,7 +3,7 @@
 //! The newest record of each frame is held, and of the others only where they lie, so that a long history costs little.
 
 use super::file::open_to_read;
-use super::format::{Line, is_ahead, now_ms, order_ms, parse, time_ms};
+use super::format::{JournalLine, is_ahead, now_ms, order_ms, parse, time_ms};
 use super::place::{ENDING, file_name};
 use super::stamp::{Stamp, in_lines_order};
 use super::tail::{Found, Span, Tail};
@@ -338,7 +338,7 @@ impl LabelStore {
         let read = read.and_then(|_| file.take(u64::from(line.span.len)).read_to_end(&mut bytes));
         read.map_err(|reason| LabelError::Read { reason, path: path.to_owned() })?;
         Ok(match parse(&bytes, path)? {
-            Line::Record(record) => Some(*record),
+            JournalLine::Record(record) => Some(*record),
             _ => None,
         })
     }

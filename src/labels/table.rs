@@ -122,7 +122,7 @@ pub enum TableError {
 
 /// A row that was read.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct LabelRow {
     /// The line on which it begins in a CSV, the place in the array in JSON; from 1.
     pub line: u64,
     /// What it says. Cells that were not there are empty, the index 0.
@@ -131,9 +131,9 @@ pub struct Row {
 
 /// A table that was read; no frame is there twice for one annotator.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Table {
+pub struct ReadTable {
     /// In the order of the file.
-    pub rows: Vec<Row>,
+    pub rows: Vec<LabelRow>,
     /// What was passed over.
     pub notes: Vec<String>,
 }
@@ -142,7 +142,7 @@ pub struct Table {
 ///
 /// # Errors
 /// One that names the file and, where it can, line and column.
-pub fn read_table(path: &Path) -> Result<Table, TableError> {
+pub fn read_table(path: &Path) -> Result<ReadTable, TableError> {
     table_of(&read_bytes(path)?, path)
 }
 
@@ -150,10 +150,10 @@ pub fn read_table(path: &Path) -> Result<Table, TableError> {
 ///
 /// # Errors
 /// As [`read_table`].
-pub(super) fn table_of(bytes: &[u8], path: &Path) -> Result<Table, TableError> {
+pub(super) fn table_of(bytes: &[u8], path: &Path) -> Result<ReadTable, TableError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let table = match first_sign(bytes) {
-        None => Table::default(),
+        None => ReadTable::default(),
         Some(b'[') => json::read(bytes, path)?,
         Some(b'{') => return Err(TableError::IsJournal { path: path.to_owned() }),
         Some(_) => csv_read::read(bytes, path)?,
@@ -175,9 +175,9 @@ pub(super) fn first_sign(bytes: &[u8]) -> Option<u8> {
     bytes.iter().copied().find(|byte| !byte.is_ascii_whitespace())
 }
 
-fn each_once(rows: &[Row], path: &Path) -> Result<(), TableError> {
+fn each_once(rows: &[LabelRow], path: &Path) -> Result<(), TableError> {
     let mut seen = BTreeMap::new();
-    for Row { line, record } in rows {
+    for LabelRow { line, record } in rows {
         let who_and_what = (record.annotator.as_str(), record.frame.path.as_str());
         let Some(first) = seen.insert(who_and_what, *line) else { continue };
         let (who, frame) = (shortened(&record.annotator), shortened(&record.frame.path));

@@ -1,7 +1,7 @@
 //! Follows one journal: each look reads what was appended since the last, and notices a file that was replaced.
 
 use super::file::regular;
-use super::format::{Line, is_torn_header, parse};
+use super::format::{JournalLine, is_torn_header, parse};
 use super::{LabelError, Record};
 use std::fs::{File, Metadata};
 use std::io::{BufRead as _, BufReader, ErrorKind, Read, Seek as _, SeekFrom};
@@ -197,14 +197,14 @@ impl Tail {
     fn take(&mut self, line: &[u8], sink: &mut impl FnMut(Span, Box<Record>)) -> Result<(), LabelError> {
         let ended = line.ends_with(b"\n");
         match parse(line, &self.path)? {
-            Line::Record(record) => {
+            JournalLine::Record(record) => {
                 (self.has_record, self.foreign) = (true, None);
                 sink(Span { offset: self.offset, len: line.len() as u32 }, record);
             }
-            Line::Header => (self.has_header, self.foreign) = (true, None),
-            Line::Blank if ended => {}
-            Line::Blank => return Ok(()),
-            Line::Damaged => {
+            JournalLine::Header => (self.has_header, self.foreign) = (true, None),
+            JournalLine::Blank if ended => {}
+            JournalLine::Blank => return Ok(()),
+            JournalLine::Damaged => {
                 self.suspect(line);
                 if !ended {
                     // Perhaps another process is still writing it.

@@ -2,42 +2,16 @@
 
 use super::Precision;
 use super::adjoint::{Moments, pull_back};
+use super::floors::{EPSILON, SOFT_FLOOR, ViewLoss, floored, hard_iou, ln_floored};
 use super::form::{FormBars, Forms};
 use super::kernel::Kernel;
 use super::laid::Laid;
 use super::percentile::percentile;
 use super::scalar::Real;
-use super::simulate::{EPSILON, floored, ln_floored};
 use super::splat::{Scene, Splats};
 use super::tiles::{self, Question, Tiles};
 use crate::body::Pppr;
 use crate::config::FitConfig;
-
-/// h of SPEC section 4: the floor in the logarithms of the soft mask.
-pub(super) const SOFT_FLOOR: f64 = 1e-30;
-
-/// What one view says.
-pub(super) struct ViewAnswer {
-    /// L_view
-    pub loss: f64,
-    /// IoU of the hard masks; `None` where both are empty.
-    pub iou: Option<f64>,
-}
-
-/// |a ∩ b| / |a ∪ b|; `None` where both are empty.
-pub(super) fn hard_iou(masks: impl Iterator<Item = (bool, bool)>) -> Option<f64> {
-    let (mut both, mut either) = (0_usize, 0_usize);
-    for (a, b) in masks {
-        both += usize::from(a && b);
-        either += usize::from(a || b);
-    }
-    share(both, either)
-}
-
-/// `both` of `either`; `None` of nothing.
-pub(super) fn share(both: usize, either: usize) -> Option<f64> {
-    (either > 0).then(|| both as f64 / either as f64)
-}
 
 /// What one evaluation of a view needs besides its answer; kept, so that the next one allocates nothing.
 #[derive(Default)]
@@ -69,7 +43,7 @@ impl Workspace {
         aim: &Aim,
         factor: Option<f64>,
         precision: Precision,
-    ) -> ViewAnswer {
+    ) -> ViewLoss {
         let Self { splats, moments, tiles } = self;
         moments.reset(splats.joints(), &scene.view.axes);
         match precision {
@@ -103,7 +77,7 @@ fn plain<T: Real>(
     laid: &Laid,
     scale: Option<f64>,
     moments: &mut Moments,
-) -> ViewAnswer {
+) -> ViewLoss {
     let mut kernel = Kernel::<T>::new(splats, &laid.bins, scene.config.summation);
     let mut ln_s = vec![f64::NEG_INFINITY; laid.marked.len()];
     kernel.forward(&mut ln_s);
@@ -111,7 +85,7 @@ fn plain<T: Real>(
     if let Some(scale) = scale {
         kernel.backward(&mask.weight(&ln_s, &laid.marked, scale), moments);
     }
-    ViewAnswer { loss: mask.loss(), iou: mask.iou }
+    ViewLoss { loss: mask.loss(), iou: mask.iou }
 }
 
 /// The soft mask of H_sim and what it has in common with the hard mask of H_ori.

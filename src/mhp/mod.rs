@@ -4,15 +4,34 @@
 //! forward model goes from joints to cells in two steps, `splat.rs` (a joint in a view, f64; in `batch.rs` several at once)
 //! and `kernel.rs` (cells, plainly) or `tiles/mod.rs` (cells, f32, fast), and back in the same (moments) and
 //! `adjoint.rs`. `em.rs` compares the masks, `terms/mod.rs` has the table of all terms, `objective.rs` adds them up.
+//!
+//! The stages, each of which uses those above it only:
+//!
+//! 1. the terms of the loss, `terms/mod.rs`; numbers: `types.rs`, `percentile.rs`, `fill.rs`, `scalar.rs`, `lanes.rs`,
+//!    `batch.rs`, `floors.rs`
+//! 2. a joint in a view: `seen.rs`, `form.rs`, `splat.rs`, `adjoint.rs`
+//! 3. cells: `kernel.rs`, `tiles/mod.rs`, `laid.rs`, and the masks over them, `em.rs`
+//! 4. what the maps of a frame and those around it show: `region.rs`, `template.rs`, `context/mod.rs`
+//! 5. a frame: `problem.rs`, `simulate.rs`
+//! 6. the objective: `objective.rs`
+//! 7. the fit: `convergence.rs`, `articulation.rs`, `adam.rs`, `fitter.rs`; and the start of one: `init/mod.rs`
+//!
+//! **What it does not do.** The fit moves the body onto its echo; it does not find the pose: yaw and left/right are hardly visible
+//! in a single frame, and the echoes come from the skin, some centimetres before the joints. What error is left is of people
+//! who stand with their back to the radar, of tall people who sit, of arms and falls, and of people so still that they look like
+//! furniture. `sep` and `coll` matter where people are closer than 0.9 m. Single precision drops a gradient entry now and then
+//! where gradients are tiny: of 20,000 random scenes 4 to 7 are off by up to 8e-6, where 1e-6 is asked.
 
 mod adam;
 mod adjoint;
 mod articulation;
 mod batch;
+mod context;
 mod convergence;
 mod em;
 mod fill;
 mod fitter;
+mod floors;
 mod form;
 mod init;
 mod kernel;
@@ -26,20 +45,22 @@ mod scalar;
 mod seen;
 mod simulate;
 mod splat;
+mod template;
 mod terms;
 mod tiles;
 mod types;
 
 pub use adam::Adam;
+pub use context::{Neighbour, Peak};
 pub use fill::fill_missing;
 pub(crate) use fill::for_neighbours;
 pub use fitter::{FitState, Fitter};
-pub use init::{Initialisation, LimbMap, Peak, initialise, initialise_people, predict};
+pub use init::{Initialisation, LimbMap, initialise, initialise_people, predict};
 #[cfg(feature = "train")]
 pub use init::{LimbLesson, learn_limbs};
 pub use objective::{Masks, Objective, masks};
 pub(crate) use percentile::{percentile, percentiles};
-pub use problem::{Neighbour, Problem};
+pub use problem::Problem;
 pub use region::Region;
 pub use simulate::simulate;
 pub use terms::{Hue, Scope, TERMS, Term, TermGroup, TermId, Terms, Weight, formula};

@@ -1,8 +1,8 @@
 //! L(Θ) and ∂L/∂Θ; SPEC section 4.
 
-use super::em::{self, Aim, Workspace};
+use super::em::{Aim, Workspace};
+use super::floors::hard_iou;
 use super::form::{FormBars, Forms};
-use super::init::anchors;
 use super::laid::Laid;
 use super::percentile::percentile;
 use super::region::{self, Region};
@@ -48,7 +48,7 @@ pub struct Masks {
 impl Masks {
     /// Forward-consistency IoU; `None` where both masks are empty.
     pub fn iou(&self) -> Option<f64> {
-        em::hard_iou(self.ori.iter().copied().zip(self.sim.iter().copied()))
+        hard_iou(self.ori.iter().copied().zip(self.sim.iter().copied()))
     }
 }
 
@@ -65,7 +65,7 @@ impl Objective {
     ) -> Result<Self, FitError> {
         problem.check(initial)?;
         let centres = region::centres(initial);
-        let (regions, warnings) = region::regions(&problem, config.em_region, &centres)?;
+        let (regions, warnings) = region::regions(&problem.views, config.em_region, &centres)?;
         let aims = aims(&problem, &regions, config.tau_pct, precision);
         let workspaces = regions.iter().map(|_| Workspace::default()).collect();
         let mut objective = Self {
@@ -89,7 +89,7 @@ impl Objective {
     /// Looks up where the frames around say that each person is, where that has a weight.
     fn anchor(&mut self) {
         if self.config.w_time > 0.0 && self.anchors.is_empty() {
-            self.anchors = anchors(&self.problem, &self.config, &self.initial);
+            self.anchors = self.problem.anchors(&self.config, &self.initial);
         }
     }
 
@@ -97,7 +97,7 @@ impl Objective {
     pub fn set_config(&mut self, config: FitConfig) {
         let before = std::mem::replace(&mut self.config, config);
         if config.em_region != before.em_region
-            && let Ok((regions, warnings)) = region::regions(&self.problem, config.em_region, &self.centres)
+            && let Ok((regions, warnings)) = region::regions(&self.problem.views, config.em_region, &self.centres)
         {
             (self.regions, self.warnings) = (regions, warnings);
         }

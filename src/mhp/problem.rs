@@ -1,26 +1,11 @@
 //! One frame's worth of optimisation problem: radar, skeleton, views and their maps, checked and filled.
 
-use super::init::{Cached, Reading, Surroundings};
+use super::context::{Contexts, Neighbour, Reading, TemporalContext, anchors};
 use super::{FitError, fill_missing};
 use crate::body::{Pppr, Skeleton};
-use crate::config::FramesAround;
-use crate::radar::{RadarConfig, View};
-
-/// The maps of a frame shortly before or after.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Neighbour {
-    /// Seconds after the frame that is fitted; negative before it.
-    pub offset_s: f64,
-    /// One map a view, C-ordered, missing cells filled.
-    maps: Vec<Vec<f64>>,
-}
-
-impl Neighbour {
-    /// H_ori of a view at that time; empty where there is no such view.
-    pub fn map(&self, view: usize) -> &[f64] {
-        self.maps.get(view).map_or(&[], Vec::as_slice)
-    }
-}
+use crate::config::{FitConfig, FramesAround};
+use crate::geometry::Vec3;
+use crate::radar::{RadarConfig, View, ViewSet};
 
 /// Everything a fit needs besides its configuration and its start. Maps are cast to f64 and their missing cells filled
 /// (SPEC section 4).
@@ -31,27 +16,34 @@ pub struct Problem {
     /// Joints, bones and limits.
     pub skeleton: Skeleton,
     /// One view a map.
-    pub views: Vec<View>,
+    pub views: ViewSet,
     maps: Vec<Vec<f64>>,
     filled: Vec<usize>,
     neighbours: Vec<Neighbour>,
-    surroundings: Cached,
+    contexts: Contexts,
 }
 
 impl Problem {
-    /// Checks and fills `maps`, one a view, C-ordered, each as long as the product of its view's bins.
+    /// Checks and fills `maps`, one a view, C-ordered, each as long as the product of its view's bins. Problems of the same
+    /// [`ViewSet`] share what its axes decide.
     ///
     /// # Errors
     /// Where there is no view, a view has other than 1 to 3 axes, an axis has no extent, a fixed region lies outside its
     /// axis, a map has the wrong number of cells, or none of them is finite.
-    pub fn new(radar: RadarConfig, skeleton: Skeleton, views: Vec<View>, maps: &[&[f64]]) -> Result<Self, FitError> {
+    pub fn new(
+        radar: RadarConfig,
+        skeleton: Skeleton,
+        views: impl Into<ViewSet>,
+        maps: &[&[f64]],
+    ) -> Result<Self, FitError> {
+        let views = views.into();
         if views.is_empty() || views.len() != maps.len() {
             return Err(FitError::WrongParameters { what: "maps", got: maps.len(), expected: views.len().max(1) });
         }
         check_skeleton(&skeleton)?;
         views.iter().try_for_each(check_view)?;
         let (maps, filled) = fill(&views, maps)?;
-        Ok(Self { radar, skeleton, views, maps, filled, neighbours: Vec::new(), surroundings: Cached::default() })
+        Ok(Self { radar, skeleton, views, maps, filled, neighbours: Vec::new(), contexts: Contexts::default() })
     }
 
     /// Adds the maps of a frame shortly before or after: (seconds after this frame, one map a view). The start reads
@@ -64,16 +56,25 @@ impl Problem {
             return Err(FitError::WrongParameters { what: "maps", got: maps.len(), expected: self.views.len() });
         }
         let (maps, _) = fill(&self.views, maps)?;
-        self.neighbours.push(Neighbour { offset_s, maps });
-        self.surroundings = Cached::default();
+        self.neighbours.push(Neighbour::new(offset_s, maps));
+        self.contexts = Contexts::default();
         self.neighbours.sort_by(|a, b| a.offset_s.total_cmp(&b.offset_s));
         Ok(())
     }
 
     /// What the maps show to who reads them like this, worked out when first asked for; views must not be changed
     /// afterwards.
-    pub(super) fn surroundings(&self, reading: impl Into<Reading>) -> &Surroundings {
-        self.surroundings.of(self, reading.into())
+    pub(super) fn context(&self, reading: impl Into<Reading>) -> &TemporalContext {
+        let reading = reading.into();
+        self.contexts.of(&self.views, &self.maps, self.neighbours_in(reading.frames), reading)
+    }
+
+    /// Where the frames around say that the mean of each person's joints is, world frame, m; empty without frames around.
+    pub(super) fn anchors(&self, config: &FitConfig, params: &Pppr) -> Vec<Vec3> {
+        if self.neighbours_in(config.frames_around).is_empty() {
+            return Vec::new();
+        }
+        anchors(self.context(config), (&self.radar, &self.skeleton), config, params)
     }
 
     /// Those of [`Self::neighbours`] that a start may look at.

@@ -1,7 +1,7 @@
 //! The EM region: the box of cells over which the masks are compared; SPEC section 4.
 
+use super::FitError;
 use super::seen::Seen;
-use super::{FitError, Problem};
 use crate::body::Pppr;
 use crate::config::EmRegion;
 use crate::geometry::Vec3;
@@ -59,7 +59,7 @@ pub(super) fn centres(params: &Pppr) -> Vec<Vec3> {
 /// # Errors
 /// Where a centre is not finite.
 pub(super) fn regions(
-    problem: &Problem,
+    views: &[View],
     em_region: EmRegion,
     centres: &[Vec3],
 ) -> Result<(Vec<Region>, Vec<String>), FitError> {
@@ -67,8 +67,7 @@ pub(super) fn regions(
         return Err(FitError::Diverged { iteration: 0, joint: format!("person {person}"), term: "position".into() });
     }
     let mut warnings = Vec::new();
-    let regions = problem
-        .views
+    let regions = views
         .iter()
         .map(|view| match (&view.region, em_region) {
             (Some(bins), _) => Region { bins: bins.clone() },

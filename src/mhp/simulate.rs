@@ -1,5 +1,6 @@
 //! H_sim over whole maps; SPEC section 3.
 
+use super::floors::floored;
 use super::form::Forms;
 use super::kernel::Kernel;
 use super::laid::Laid;
@@ -11,28 +12,6 @@ use super::{Precision, Problem};
 use crate::body::Pppr;
 use crate::config::{FitConfig, Summation};
 use crate::radar::View;
-
-/// ε of SPEC section 3.
-pub(super) const EPSILON: f64 = 1e-30;
-
-/// ln √(S² + ε²) from ln S.
-pub(super) fn ln_floored(ln_s: f64) -> f64 {
-    ln_hypot(ln_s, EPSILON.ln())
-}
-
-fn ln_hypot(a: f64, b: f64) -> f64 {
-    let (high, low) = if a >= b { (a, b) } else { (b, a) };
-    // With a NaN the comparison fails and `a` is `low`: it stays visible.
-    high + 0.5 * (2.0 * (low - high)).exp().ln_1p()
-}
-
-/// √(S² + ε²) from ln S, in linear f64: values that differ by less than a step of ln H near the floor stay apart, and the
-/// floor itself is exactly ε, so that a strict comparison with a percentile behaves as SPEC section 4 says.
-pub(super) fn floored(ln_s: f64) -> f64 {
-    let s = ln_s.exp();
-    // As written in SPEC: a more exact hypotenuse would decide ties at the floor differently. Beyond 1e150 ε is nothing.
-    if s > 1e150 { s } else { (s * s + EPSILON * EPSILON).sqrt() }
-}
 
 /// H_sim of every view over its whole map, C order, f64; SPEC section 3.
 pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, params: &Pppr) -> Vec<Vec<f64>> {

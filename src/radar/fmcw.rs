@@ -36,7 +36,7 @@ pub struct Fmcw {
 
 /// Where a point is about the middle of a frame: p(t) = position + velocity t + ½ acceleration t².
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Track {
+pub struct PointMotion {
     /// m, world frame.
     pub position: Vec3,
     /// m/s.
@@ -45,7 +45,7 @@ pub struct Track {
     pub acceleration: Vec3,
 }
 
-impl Track {
+impl PointMotion {
     /// A point that stays.
     pub fn still(position: Vec3) -> Self {
         Self { position, ..Self::default() }
@@ -72,27 +72,27 @@ impl Track {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Echo {
     /// Where the path leads to, as the transmitters see it.
-    pub out: Track,
+    pub out: PointMotion,
     /// Where it comes from, as the receivers see it.
-    pub back: Track,
+    pub back: PointMotion,
     /// Amplitude and phase of the echo of a point at 1 m on boresight.
     pub reflectivity: Complex64,
 }
 
 impl Echo {
     /// The direct echo of a point.
-    pub fn direct(track: Track, reflectivity: Complex64) -> Self {
+    pub fn direct(track: PointMotion, reflectivity: Complex64) -> Self {
         Self { out: track, back: track, reflectivity }
     }
 
     /// The direct echo of a point that stays.
     pub fn still(position: Vec3, reflectivity: Complex64) -> Self {
-        Self::direct(Track::still(position), reflectivity)
+        Self::direct(PointMotion::still(position), reflectivity)
     }
 
     /// The direct echo of a point that moves evenly.
     pub fn moving(position: Vec3, velocity: Vec3, reflectivity: f64) -> Self {
-        Self::direct(Track { velocity, ..Track::still(position) }, Complex64::new(reflectivity, 0.0))
+        Self::direct(PointMotion { velocity, ..PointMotion::still(position) }, Complex64::new(reflectivity, 0.0))
     }
 }
 

@@ -3,20 +3,26 @@
 
 mod array;
 mod axis;
+mod camera;
 mod config;
 mod fft;
 mod fmcw;
 mod psf;
+mod spatial;
 mod tones;
 mod view;
+mod view_set;
 mod window;
 
 pub use array::MimoArray;
 pub use axis::{Axis, AxisKind, Spacing};
+pub use camera::PinholeCamera;
 pub use config::{RadarConfig, SPEED_OF_LIGHT};
 pub use fft::{Chain, PolarMap, RadarCube, RangeDoppler};
-pub use fmcw::{AdcCube, Echo, Fmcw, Receiver, Track, add_leakage, path_gain};
+pub use fmcw::{AdcCube, Echo, Fmcw, PointMotion, Receiver, add_leakage, path_gain};
 pub use psf::{FftSetup, doppler_sigma_mps, first_null_bins, main_lobe_sigma_bins, range_sigma_m, sine_sigma};
+pub(crate) use spatial::{NEAREST_M, SpatialGrid};
 pub(crate) use view::unravel;
 pub use view::{PointSpread, Quantity, View};
+pub use view_set::ViewSet;
 pub use window::Window;

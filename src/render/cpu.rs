@@ -1,7 +1,7 @@
 //! The CPU twin of the GPU renderer: the same primitives in the same order, shaded pixel by pixel in Rust.
 
 use super::camera::Camera;
-use super::order::{Kind, Prepared};
+use super::order::{DrawList, Kind};
 use super::pipeline::Depth;
 use super::projection::Globals;
 use super::renderer::{MAX_SIDE_PX, clamped_size};
@@ -86,7 +86,7 @@ pub(super) fn premultiplied(straight: [f32; 4]) -> [f32; 4] {
 /// Draws a scene, premultiplied alpha; `size` is clamped as the GPU renderer does ([`clamped_size`]).
 pub fn render(size: [u32; 2], scene: &Scene, camera: &Camera) -> RgbaImage {
     let size = clamped_size(size, MAX_SIDE_PX);
-    let prepared = Prepared::new(scene, camera, size);
+    let prepared = DrawList::new(scene, camera, size);
     let mut canvas = Canvas::new(size, prepared.globals, scene.background);
     for run in &prepared.runs {
         let range = run.range.start as usize..run.range.end as usize;

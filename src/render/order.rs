@@ -25,22 +25,22 @@ pub(super) enum Kind {
 
 /// Consecutive primitives of one kind, indices into that kind's list.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Run {
+pub(super) struct DrawRun {
     pub(super) kind: Kind,
     pub(super) range: Range<u32>,
 }
 
 /// A scene on the screen, ready to be drawn run by run.
-pub(super) struct Prepared {
+pub(super) struct DrawList {
     pub(super) globals: Globals,
     pub(super) splats: Vec<SplatPrimitive>,
     pub(super) ellipsoids: Vec<EllipsoidPrimitive>,
     pub(super) lines: Vec<LinePrimitive>,
     pub(super) overlay: Vec<LinePrimitive>,
-    pub(super) runs: Vec<Run>,
+    pub(super) runs: Vec<DrawRun>,
 }
 
-impl Prepared {
+impl DrawList {
     /// Projects, sorts and cuts.
     pub(super) fn new(scene: &Scene, camera: &Camera, size: [u32; 2]) -> Self {
         let projection = Projection::new(camera, size, scene);
@@ -105,7 +105,7 @@ impl Prepared {
 
     fn push_run(&mut self, kind: Kind, range: Range<usize>) {
         if !range.is_empty() {
-            self.runs.push(Run { kind, range: range.start as u32..range.end as u32 });
+            self.runs.push(DrawRun { kind, range: range.start as u32..range.end as u32 });
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::camera::Camera;
 use super::cpu::premultiplied;
-use super::order::{Kind, Prepared, Run};
+use super::order::{DrawList, DrawRun, Kind};
 use super::pipeline::DEPTH_FORMAT;
 use super::projection::Globals;
 use super::scene::{Scene, SceneMode};
@@ -112,7 +112,7 @@ impl SceneRenderer {
                 self.target = Target::new(device, self.format, size);
                 self.target_generation += 1;
             }
-            self.draw(device, queue, &Prepared::new(scene, camera, size), scene.background);
+            self.draw(device, queue, &DrawList::new(scene, camera, size), scene.background);
             self.skipped = scene.invalid_instances();
             self.drawn = Some(key);
             self.pictures += 1;
@@ -140,7 +140,7 @@ impl SceneRenderer {
         &self.target.color
     }
 
-    fn draw(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, prepared: &Prepared, background: [f32; 4]) {
+    fn draw(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, prepared: &DrawList, background: [f32; 4]) {
         queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&prepared.globals));
         self.splats.upload(device, queue, &prepared.splats);
         self.ellipsoids.upload(device, queue, &prepared.ellipsoids);
@@ -157,7 +157,7 @@ impl SceneRenderer {
         queue.submit([encoder.finish()]);
     }
 
-    fn draw_run(&self, pass: &mut wgpu::RenderPass<'_>, run: &Run) {
+    fn draw_run(&self, pass: &mut wgpu::RenderPass<'_>, run: &DrawRun) {
         let batch = match run.kind {
             Kind::Splat => &self.splats,
             Kind::Ellipsoid => &self.ellipsoids,

@@ -82,7 +82,7 @@ impl Changes {
 
 /// An act that can be undone.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Act {
+pub struct LabelAct {
     /// In words: `tag F2 on 12 frames`.
     pub name: String,
     /// What it changed.

@@ -33,7 +33,7 @@ pub enum PickKind {
 
 /// Where to begin in a data set.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Aim {
+pub struct StartAt {
     /// A frame's name, or its index.
     pub frame: Option<String>,
     /// Run the fit until this iteration.
@@ -46,7 +46,7 @@ pub enum Command {
     /// Open a data set.
     Open(PathBuf),
     /// Open a data set at a frame and an iteration.
-    OpenAt(PathBuf, Aim),
+    OpenAt(PathBuf, StartAt),
     /// Show a dialog.
     Pick(PickKind),
     /// Open a bare file with these axes.
@@ -200,7 +200,7 @@ pub enum Command {
     /// Report: something was written, or not.
     TaskDone(Result<String, String>),
     /// Write a picture that the window drew.
-    RunTask(Task),
+    RunTask(BackgroundTask),
     /// Write a line to the log.
     Log(super::LogLevel, String),
     /// Empty the log.
@@ -250,18 +250,18 @@ impl Export {
 }
 
 /// Work for a thread, which answers a line for a person.
-pub struct Task(pub(super) Box<dyn FnOnce() -> Result<String, String> + Send>);
+pub struct BackgroundTask(pub(super) Box<dyn FnOnce() -> Result<String, String> + Send>);
 
-impl Task {
+impl BackgroundTask {
     /// Work that answers what was done, or why it was not.
     pub fn new(work: impl FnOnce() -> Result<String, String> + Send + 'static) -> Self {
         Self(Box::new(work))
     }
 }
 
-impl std::fmt::Debug for Task {
+impl std::fmt::Debug for BackgroundTask {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Task")
+        f.write_str("BackgroundTask")
     }
 }
 
@@ -378,7 +378,7 @@ pub enum Effect {
     /// Stop computing strata.
     CancelStrata,
     /// Do this on a thread.
-    Run(Task),
+    Run(BackgroundTask),
     /// Read a session file on a thread.
     ReadSession(PathBuf),
     /// Read a table of results on a thread, and find its frames in this data set.

@@ -103,7 +103,7 @@ pub struct SavedDataset {
     /// From the root.
     #[serde(with = "crate::folders::portable_path")]
     pub absolute: PathBuf,
-    /// From the session file's folder, where there is a way that is text.
+    /// From the session file's folder, where there is one that is text.
     pub relative: Option<PathBuf>,
     /// What it must be.
     pub fingerprint: String,
@@ -138,7 +138,7 @@ pub struct SavedFit {
     pub edited: bool,
 }
 
-/// A change of settings on the way.
+/// A change of settings along the lineage.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SavedChange {
     /// The last iteration with the old ones.
@@ -222,8 +222,8 @@ impl SessionFile {
     pub fn write(mut self, path: &Path) -> Result<(), SessionFileError> {
         let failed = |reason| SessionFileError::Write { reason, path: path.to_owned() };
         let absolute = std::path::absolute(path).map_err(failed)?;
-        let relative = absolute.parent().and_then(|folder| way(folder, &self.dataset.absolute));
-        self.dataset.relative = relative.filter(|way| way.to_str().is_some());
+        let relative = absolute.parent().and_then(|folder| relative_path(folder, &self.dataset.absolute));
+        self.dataset.relative = relative.filter(|relative| relative.to_str().is_some());
         let text = serde_json::to_vec(&self).map_err(|error| failed(error.into()))?;
         replace_file(path, |out| out.write_all(&text)).map_err(failed)
     }
@@ -261,8 +261,8 @@ impl SessionFile {
     /// # Errors
     /// Where it is at neither of its paths.
     pub fn dataset_path(&self, file: &Path) -> Result<PathBuf, SessionFileError> {
-        let beside = self.dataset.relative.as_ref().and_then(|way| {
-            let joined: PathBuf = file.parent()?.join(way).components().collect();
+        let beside = self.dataset.relative.as_ref().and_then(|relative| {
+            let joined: PathBuf = file.parent()?.join(relative).components().collect();
             // A way up and down again is kept by what it leads to: the next session file begins elsewhere.
             let up = joined.components().any(|part| part == Component::ParentDir);
             Some(if up { joined.canonicalize().unwrap_or(joined) } else { joined })
@@ -286,12 +286,12 @@ fn saved_fit(session: &Session) -> Option<SavedFit> {
     let (branch, initial) = (fit.branch()?, fit.initial.clone()?);
     let head = branch.state_at(branch.head()).filter(|(at, _)| *at == branch.head())?.1;
     let shown = fit.cursor.and_then(|at| branch.state_at(at)).filter(|(at, _)| *at != branch.head());
-    let rows = fit.history.lineage();
-    let (config, changes) = fit.history.settings_on_the_way()?;
+    let rows = fit.history.lineage().into_iter().flatten();
+    let (config, changes) = fit.history.lineage_settings()?;
     let changes = changes.into_iter().map(|(after, config)| SavedChange { after, config: config.to_toml() });
     Some(SavedFit {
         initial,
-        rows: rows.iter().map(|row| PinRow { report: row.report.clone(), majpe_mm: row.majpe_mm }).collect(),
+        rows: rows.map(|row| PinRow { report: row.report.clone(), majpe_mm: row.majpe_mm }).collect(),
         states: std::iter::once(head).chain(shown.map(|(_, state)| state)).map(|state| (**state).clone()).collect(),
         cursor: shown.map(|(at, _)| at),
         config: config.to_toml(),
@@ -300,8 +300,8 @@ fn saved_fit(session: &Session) -> Option<SavedFit> {
     })
 }
 
-/// The way from a folder to a path that share a beginning.
-fn way(from: &Path, to: &Path) -> Option<PathBuf> {
+/// The relative path from a folder to a path that share a beginning.
+fn relative_path(from: &Path, to: &Path) -> Option<PathBuf> {
     let common = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
     if common < 2 {
         return None;
@@ -316,9 +316,9 @@ mod tests {
 
     #[test]
     fn the_way_to_the_data_goes_up_and_down() {
-        let way = |from: &str, to: &str| way(Path::new(from), Path::new(to));
-        assert_eq!(way("/a/b/c", "/a/d"), Some("../../d".into()));
-        assert_eq!(way("/a/b", "/a/b/data"), Some("data".into()));
-        assert_eq!(way("/a", "/b"), None);
+        let relative_path = |from: &str, to: &str| relative_path(Path::new(from), Path::new(to));
+        assert_eq!(relative_path("/a/b/c", "/a/d"), Some("../../d".into()));
+        assert_eq!(relative_path("/a/b", "/a/b/data"), Some("data".into()));
+        assert_eq!(relative_path("/a", "/b"), None);
     }
 }

@@ -9,7 +9,7 @@ pub(super) const STATE_BUDGET: usize = 128 << 20;
 
 /// One iteration.
 #[derive(Debug, Clone)]
-pub struct Row {
+pub struct IterationRow {
     /// Loss, terms, IoU.
     pub report: StepReport,
     /// Parameters and Adam moments; `None` where thinned out.
@@ -39,7 +39,7 @@ pub struct Branch {
     /// Settings at its beginning.
     pub config: FitConfig,
     /// Iterations, ascending and without holes.
-    pub rows: Vec<Row>,
+    pub rows: Vec<IterationRow>,
     /// Changes of settings.
     pub flags: Vec<Flag>,
 }
@@ -56,7 +56,7 @@ impl Branch {
     }
 
     /// The row of an iteration.
-    pub fn row(&self, iteration: usize) -> Option<&Row> {
+    pub fn row(&self, iteration: usize) -> Option<&IterationRow> {
         self.rows.get(iteration.checked_sub(self.start())?)
     }
 
@@ -114,7 +114,7 @@ impl History {
         for super::pins::PinRow { report, majpe_mm } in rows {
             let at = states.iter().position(|state| state.iteration == report.iteration);
             let state = at.map(|at| states.swap_remove(at));
-            history.push(0, Row { report, state, majpe_mm });
+            history.push(0, IterationRow { report, state, majpe_mm });
         }
         for (iteration, config) in changes {
             history.flag(0, iteration, config);
@@ -151,25 +151,20 @@ impl History {
         self.revision
     }
 
-    /// The rows of the active branch with those of its parents before it: the way that led to its head.
-    pub fn lineage(&self) -> Vec<&Row> {
-        self.stretches().into_iter().flat_map(|(_, rows)| rows).collect()
+    /// The rows that led to the head of the active branch, those of its parents before its own: a slice a branch.
+    pub fn lineage(&self) -> Vec<&[IterationRow]> {
+        self.ancestry().into_iter().map(|(_, rows)| rows).collect()
     }
 
-    /// The same, in the pieces that branches keep together.
-    pub fn way(&self) -> Vec<&[Row]> {
-        self.stretches().into_iter().map(|(_, rows)| rows).collect()
-    }
-
-    /// The settings in force at the first row of [`Self::lineage`], and where they changed on the way: the last iteration
+    /// The settings in force at the first row of [`Self::lineage`], and where they changed along it: the last iteration
     /// with the old ones, and the new ones.
-    pub(super) fn settings_on_the_way(&self) -> Option<(FitConfig, Vec<(usize, FitConfig)>)> {
-        let stretches = self.stretches();
-        let mut way = stretches.iter().flat_map(|(branch, rows)| rows.iter().map(|row| (*branch, row))).peekable();
-        let (branch, first) = way.peek()?;
+    pub(super) fn lineage_settings(&self) -> Option<(FitConfig, Vec<(usize, FitConfig)>)> {
+        let ancestry = self.ancestry();
+        let mut lineage = ancestry.iter().flat_map(|(branch, rows)| rows.iter().map(|row| (*branch, row))).peekable();
+        let (branch, first) = lineage.peek()?;
         let begin = branch.config_at(first.report.iteration);
         let (mut now, mut before, mut changes) = (begin, first.report.iteration, Vec::new());
-        for (branch, row) in way {
+        for (branch, row) in lineage {
             let config = branch.config_at(row.report.iteration);
             if config != now {
                 changes.push((before, config));
@@ -184,20 +179,20 @@ impl History {
         Some((begin, changes))
     }
 
-    /// The branches on the way to the head of the active one, each with the rows that lie on it.
-    fn stretches(&self) -> Vec<(&Branch, &[Row])> {
+    /// The branches that led to the head of the active one, each with its rows of the lineage.
+    fn ancestry(&self) -> Vec<(&Branch, &[IterationRow])> {
         let Some(branch) = self.active() else { return Vec::new() };
-        let mut stretches = vec![(branch, branch.rows.as_slice())];
+        let mut ancestry = vec![(branch, branch.rows.as_slice())];
         let (mut from, mut parent) = (branch.start(), branch.parent);
         while let Some((id, at)) = parent {
             let Some(before) = self.branch(id) else { break };
             let last = at.min(from);
             let count = last.saturating_sub(before.start()).min(before.rows.len());
-            stretches.push((before, &before.rows[..count]));
+            ancestry.push((before, &before.rows[..count]));
             (from, parent) = (before.start().min(last), before.parent);
         }
-        stretches.reverse();
-        stretches
+        ancestry.reverse();
+        ancestry
     }
 
     /// Number of the active branch.
@@ -250,7 +245,7 @@ impl History {
 
     /// Appends a row. A second row of the same iteration replaces the first one only where a branch begins (an edit by
     /// hand, or settings changed before the first step); otherwise history is never rewritten.
-    pub fn push(&mut self, branch: u32, row: Row) {
+    pub fn push(&mut self, branch: u32, row: IterationRow) {
         let bytes = row.state.as_ref().map_or(0, state_bytes);
         let Some(branch) = self.branches.iter_mut().find(|b| b.id == branch) else { return };
         match branch.rows.last() {

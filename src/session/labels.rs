@@ -3,7 +3,7 @@
 //! A tag is shown only once its journal has acknowledged it. Acts under way are kept aside, so that a second press of the
 //! same key toggles back and does not ask twice for the same.
 
-use super::acts::{Act, ActKind, Asked, Changes, Done};
+use super::acts::{ActKind, Asked, Changes, Done, LabelAct};
 use super::records::Records;
 use crate::labels::{Label, LabelPlace, Record, Tag, Tags};
 use serde::{Deserialize, Serialize};
@@ -89,8 +89,8 @@ pub struct Labels {
     /// Number of the reading of the journals that is waited for.
     pub(super) opening: u64,
     pub(super) table: LabelTable,
-    pub(super) undo: Vec<Act>,
-    pub(super) redo: Vec<Act>,
+    pub(super) undo: Vec<LabelAct>,
+    pub(super) redo: Vec<LabelAct>,
     /// The frame that this annotator labelled last.
     pub last_edited: Option<usize>,
     /// Frames that the next act is for, instead of the one on screen.
@@ -244,8 +244,8 @@ impl Labels {
         match kind {
             ActKind::Do => {
                 self.redo.clear();
-                self.undo.push(Act { name, changes: Arc::new(changes) });
-                let bytes = |acts: &[Act]| acts.iter().map(|act| act.changes.bytes()).sum::<usize>();
+                self.undo.push(LabelAct { name, changes: Arc::new(changes) });
+                let bytes = |acts: &[LabelAct]| acts.iter().map(|act| act.changes.bytes()).sum::<usize>();
                 while self.undo.len() > UNDO_DEPTH || (self.undo.len() > 1 && bytes(&self.undo) > UNDO_BYTES) {
                     self.undo.remove(0);
                 }
@@ -253,11 +253,11 @@ impl Labels {
             // The stacks change only now: an act that could not be written is still there to be taken back.
             ActKind::Undo => {
                 let name = self.undo.pop().map_or(name, |act| act.name);
-                self.redo.push(Act { name, changes: Arc::new(changes.reversed()) });
+                self.redo.push(LabelAct { name, changes: Arc::new(changes.reversed()) });
             }
             ActKind::Redo => {
                 let name = self.redo.pop().map_or(name, |act| act.name);
-                self.undo.push(Act { name, changes: Arc::new(changes) });
+                self.undo.push(LabelAct { name, changes: Arc::new(changes) });
             }
         }
     }

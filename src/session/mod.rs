@@ -5,7 +5,7 @@
 //! send commands; threads report back by commands too.
 //!
 //! **Time.** A pass of the window has 16 ms of its thread, also on 100,000 frames. What takes longer is an [`Effect`]: it
-//! is done by a thread of the [`Runtime`] and comes back as a command. `tests/large.rs` measures it.
+//! is done by a thread of the [`Runtime`] and comes back as a command. `tests/window/large` measures it.
 //!
 //! **Memory.** A window on 100,000 frames, all of them labelled, graded and with results, takes less than 1 GiB besides
 //! the pictures: frames that were read up to 512 MiB ([`crate::dataset::DEFAULT_BUDGET`]), the states of one fit up to
@@ -30,20 +30,22 @@ mod strata;
 mod study;
 mod view;
 
-pub use acts::{Act, ActKind, Asked, Changes, Done};
+pub use acts::{ActKind, Asked, Changes, Done, LabelAct};
 pub use apply::OutputCheck;
-pub use command::{Aim, Command, Commit, Effect, Export, OpenedLabels, PickKind, PinRequest, Task, Trash, Written};
+pub use command::{
+    BackgroundTask, Command, Commit, Effect, Export, OpenedLabels, PickKind, PinRequest, StartAt, Trash, Written,
+};
 pub use evidence::EvidenceRequest;
 pub use file::{SavedChange, SavedDataset, SavedFit, SavedFrame, SavedPin, SessionFile, SessionFileError};
 pub use fit::{Fit, FitStatus};
-pub use history::{Branch, Flag, History, Row, difference};
+pub use history::{Branch, Flag, History, IterationRow, difference};
 pub use labels::{LabelMode, LabelStatus, LabelTable, Labels};
 pub use pins::{MOST_PINS, Pin, PinRow, Pins, numbers};
-pub use queue::{Facts, Number, Queue, Reads, Rule, SavedView, Sort, SortKey, syntax};
+pub use queue::{FrameFilter, FrameNumber, FrameRow, Queue, Reads, SavedView, Sort, SortKey, syntax};
 pub use records::Records;
 pub use results::FoundResults;
 pub use runtime::{Picker, Runtime, Wake};
 pub use state::{Data, FitHashes, FrameSummary, LogLevel, LogLine, Opening, Session};
 pub use strata::{Strata, StrataStatus};
 pub use study::StudyView;
-pub use view::{Against, ColorRange, Compare, MapScale, SplatMode, Strip, ThemeChoice, ViewState};
+pub use view::{Against, ColorRange, Compare, MapScale, SplatMode, ThemeChoice, TimelineStrip, ViewState};

@@ -19,7 +19,7 @@ pub struct PinRow {
     pub majpe_mm: Option<f64>,
 }
 
-/// A state of a fit with the way that led to it.
+/// A state of a fit with the lineage that led to it.
 #[derive(Debug, Clone)]
 pub struct Pin {
     /// Its number.

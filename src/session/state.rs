@@ -1,6 +1,6 @@
 //! The session's fields.
 
-use super::command::Aim;
+use super::command::StartAt;
 use super::evidence::EvidenceState;
 use super::file::SessionFile;
 use super::fit::Fit;
@@ -176,7 +176,7 @@ pub struct Session {
     /// Where the session was saved to or opened from.
     pub session_path: Option<PathBuf>,
     /// Where to begin in the data set that is being opened.
-    pub(super) aim: Aim,
+    pub(super) aim: StartAt,
     /// A session file whose data set is being opened.
     pub(super) restoring: Option<(PathBuf, Box<SessionFile>)>,
     /// A table of results whose data set is being opened.

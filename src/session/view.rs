@@ -86,7 +86,7 @@ pub enum SplatMode {
 
 /// What the strip over the frames shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum Strip {
+pub enum TimelineStrip {
     /// Easy, medium, hard.
     #[default]
     Stratum,
@@ -157,7 +157,7 @@ pub struct ViewState {
     /// Kept filters.
     pub saved_views: Vec<SavedView>,
     /// What the strip over the frames shows.
-    pub strip: Strip,
+    pub strip: TimelineStrip,
     /// What labelling is for.
     pub label_mode: LabelMode,
     /// In agreement mode, the machine's evidence is hidden until the frame is tagged.
@@ -205,7 +205,7 @@ impl Default for ViewState {
             hidden_columns: ["peaks", "static", "saliency", "reason", "by"].map(str::to_owned).to_vec(),
             shown_terms: Vec::new(),
             saved_views: Vec::new(),
-            strip: Strip::default(),
+            strip: TimelineStrip::default(),
             label_mode: LabelMode::default(),
             blind: true,
             open_cards: Vec::new(),

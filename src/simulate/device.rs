@@ -1,6 +1,6 @@
 //! The radars of each layout, and how their ADC samples become its maps.
 
-use super::Layout;
+use super::SimulatedLayout;
 use super::hupr::{HUPR_SHAPE, hupr_amplitudes, hupr_cube};
 use crate::geometry::Pose;
 use crate::radar::{
@@ -34,7 +34,7 @@ pub struct Radar {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Device {
     /// Whose.
-    pub layout: Layout,
+    pub layout: SimulatedLayout,
     /// One or two.
     pub radars: Vec<Radar>,
     /// The maps of a frame.
@@ -43,12 +43,16 @@ pub struct Device {
 
 impl Device {
     /// The radars of a layout.
-    pub fn new(layout: Layout) -> Self {
+    pub fn new(layout: SimulatedLayout) -> Self {
         let radars = match layout {
-            Layout::Mmvr | Layout::MmvrTree => lines(Chain { range_fft: 512, angle_fft: 128, ..CHAIN }),
-            Layout::Generic => lines(Chain { range_fft: 256, angle_fft: GENERIC[1], max_range_m: 8.0, ..CHAIN }),
-            Layout::Xrf55 | Layout::Xrf55Stack => vec![xrf55(layout)],
-            Layout::Hupr => hupr(),
+            SimulatedLayout::Mmvr | SimulatedLayout::MmvrTree => {
+                lines(Chain { range_fft: 512, angle_fft: 128, ..CHAIN })
+            }
+            SimulatedLayout::Generic => {
+                lines(Chain { range_fft: 256, angle_fft: GENERIC[1], max_range_m: 8.0, ..CHAIN })
+            }
+            SimulatedLayout::Xrf55 | SimulatedLayout::Xrf55Stack => vec![xrf55(layout)],
+            SimulatedLayout::Hupr => hupr(),
         };
         let views = views(layout, &radars);
         Self { layout, radars, views }
@@ -69,22 +73,22 @@ impl Device {
                 let chain = Chain { still_share, ..radar.chain };
                 let polar = || chain.polar(&radar.fmcw, radar.spacing_m, adc);
                 match (self.layout, self.views.get(index).map(|view| &view.axes[..])) {
-                    (Layout::Mmvr | Layout::MmvrTree, Some([depth, lateral])) => {
+                    (SimulatedLayout::Mmvr | SimulatedLayout::MmvrTree, Some([depth, lateral])) => {
                         vec![narrow(polar().cartesian(depth, lateral))]
                     }
-                    (Layout::Generic, Some([_, _, _])) => vec![narrow(radar.polar_doppler(&chain, adc))],
-                    (Layout::Generic, _) => vec![narrow(first(polar().data, GENERIC[0] * GENERIC[1]))],
-                    (Layout::Xrf55, _) => {
+                    (SimulatedLayout::Generic, Some([_, _, _])) => vec![narrow(radar.polar_doppler(&chain, adc))],
+                    (SimulatedLayout::Generic, _) => vec![narrow(first(polar().data, GENERIC[0] * GENERIC[1]))],
+                    (SimulatedLayout::Xrf55, _) => {
                         let speeds = chain.range_doppler(&radar.fmcw, adc).amplitudes();
                         vec![
                             narrow(first(polar().data, XRF55[0] * XRF55[1])),
                             narrow(first(speeds, XRF55[0] * XRF55[2])),
                         ]
                     }
-                    (Layout::Xrf55Stack, _) => {
+                    (SimulatedLayout::Xrf55Stack, _) => {
                         vec![narrow(first(polar().data, STACK[0] * STACK[1]))]
                     }
-                    (Layout::Hupr, _) => vec![narrow(hupr_amplitudes(&hupr_cube(adc)))],
+                    (SimulatedLayout::Hupr, _) => vec![narrow(hupr_amplitudes(&hupr_cube(adc)))],
                     _ => Vec::new(),
                 }
             })
@@ -180,7 +184,7 @@ fn lines(chain: Chain) -> Vec<Radar> {
 }
 
 /// IWR6843 with the chirp of XRF55's capture script (60 GHz, 27.013 MHz/µs, 256 samples at 3 Msps), its three transmitters in turn.
-fn xrf55(layout: Layout) -> Radar {
+fn xrf55(layout: SimulatedLayout) -> Radar {
     let chirp_s = 256.0 / 3e6;
     let bandwidth_hz = 27.013e12 * chirp_s;
     let spacing_m = SPEED_OF_LIGHT / (60e9 + bandwidth_hz / 2.0) / 2.0;
@@ -196,7 +200,7 @@ fn xrf55(layout: Layout) -> Radar {
         doppler_features: 32,
         height_m: None,
     };
-    let stack = layout == Layout::Xrf55Stack;
+    let stack = layout == SimulatedLayout::Xrf55Stack;
     let chain = Chain {
         range_fft: 256,
         doppler_fft: XRF55[2],
@@ -252,7 +256,7 @@ fn hupr() -> Vec<Radar> {
     vec![of("hori", array.clone()), of("vert", array.turned(&quarter))]
 }
 
-fn views(layout: Layout, radars: &[Radar]) -> Vec<View> {
+fn views(layout: SimulatedLayout, radars: &[Radar]) -> Vec<View> {
     let view = |array: &str, psf, axes| View {
         array: array.into(),
         quantity: Quantity::Amplitude,
@@ -273,9 +277,9 @@ fn views(layout: Layout, radars: &[Radar]) -> Vec<View> {
         let end = bins as f64 / 2.0 * radar.doppler_step_mps();
         linear(AxisKind::Doppler, bins, -end, end)
     };
-    let [left, right] = if layout == Layout::MmvrTree { [1.0, -4.0] } else { [2.5, -2.5] };
+    let [left, right] = if layout == SimulatedLayout::MmvrTree { [1.0, -4.0] } else { [2.5, -2.5] };
     match (layout, radars) {
-        (Layout::Mmvr | Layout::MmvrTree, [hori, vert]) => vec![
+        (SimulatedLayout::Mmvr | SimulatedLayout::MmvrTree, [hori, vert]) => vec![
             view(
                 "hm_hori",
                 hori.point_spread(true),
@@ -287,7 +291,7 @@ fn views(layout: Layout, radars: &[Radar]) -> Vec<View> {
                 vec![cells(AxisKind::DepthV, 256, 8.0, 0.0), cells(AxisKind::Z, 128, -2.0, 3.0)],
             ),
         ],
-        (Layout::Generic, [hori, vert]) => vec![
+        (SimulatedLayout::Generic, [hori, vert]) => vec![
             view(
                 "range_cone_doppler",
                 hori.point_spread(true),
@@ -299,7 +303,7 @@ fn views(layout: Layout, radars: &[Radar]) -> Vec<View> {
                 vec![range(vert, GENERIC[0]), sine(AxisKind::Elevation, GENERIC[1], -1.0, 1.0)],
             ),
         ],
-        (Layout::Xrf55, [radar]) => vec![
+        (SimulatedLayout::Xrf55, [radar]) => vec![
             view(
                 "range_cone",
                 radar.point_spread(true),
@@ -307,11 +311,11 @@ fn views(layout: Layout, radars: &[Radar]) -> Vec<View> {
             ),
             view("range_doppler", radar.point_spread(false), vec![range(radar, XRF55[0]), doppler(radar, XRF55[2])]),
         ],
-        (Layout::Xrf55Stack, [radar]) => {
+        (SimulatedLayout::Xrf55Stack, [radar]) => {
             let axes = vec![range(radar, STACK[0]), sine(AxisKind::Cone, STACK[1], -1.0, 1.0)];
             vec![view("array", radar.point_spread(true), axes)]
         }
-        (Layout::Hupr, [hori, vert]) => {
+        (SimulatedLayout::Hupr, [hori, vert]) => {
             let axes = |radar: &Radar, kind| {
                 let step = radar.range_step_m();
                 vec![

@@ -1,6 +1,6 @@
 //! What is asked of the synthetic source.
 
-use super::Preset;
+use super::ScenePreset;
 use std::ops::RangeInclusive;
 
 /// People in a scene at most: the counter tells up to four.
@@ -8,7 +8,7 @@ const MOST_PEOPLE: usize = 4;
 
 /// Whose maps are imitated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Layout {
+pub enum SimulatedLayout {
     /// Two Cartesian maps as MMVR's, the bounds symmetric about boresight, in an npz with a manifest; 10 frames a second.
     Mmvr,
     /// MMVR's own bounds and folders, with labels in the camera's pixels; 15 frames a second.
@@ -24,7 +24,7 @@ pub enum Layout {
     Generic,
 }
 
-impl Layout {
+impl SimulatedLayout {
     /// All.
     pub const ALL: [Self; 6] = [Self::Mmvr, Self::MmvrTree, Self::Hupr, Self::Xrf55, Self::Xrf55Stack, Self::Generic];
 
@@ -92,9 +92,9 @@ impl Action {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// Whose maps.
-    pub layout: Layout,
+    pub layout: SimulatedLayout,
     /// Scenarios; the sequences take them in turn.
-    pub presets: Vec<Preset>,
+    pub presets: Vec<ScenePreset>,
     /// Frames in all.
     pub frames: usize,
     /// Frames a sequence; the last one may be shorter.
@@ -121,8 +121,8 @@ impl Default for Options {
     /// 20 frames of an easy scene with one person, MMVR-like.
     fn default() -> Self {
         Self {
-            layout: Layout::Mmvr,
-            presets: vec![Preset::Easy],
+            layout: SimulatedLayout::Mmvr,
+            presets: vec![ScenePreset::Easy],
             frames: 20,
             sequence_length: 20,
             people: None,

@@ -9,7 +9,7 @@ use std::ops::RangeInclusive;
 
 /// A scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Preset {
+pub enum ScenePreset {
     /// Near, lively, an empty room, little noise.
     Easy,
     /// Farther, furniture, moderate noise.
@@ -57,7 +57,7 @@ pub struct Recipe {
     pub leakage: f64,
 }
 
-impl Preset {
+impl ScenePreset {
     /// All.
     pub const ALL: [Self; 7] = [Self::Easy, Self::Medium, Self::Hard, Self::F1, Self::F2, Self::F3, Self::F4];
 

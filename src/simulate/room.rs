@@ -5,7 +5,7 @@
 
 use super::Recipe;
 use crate::geometry::Vec3;
-use crate::radar::{Echo, Track};
+use crate::radar::{Echo, PointMotion};
 use num_complex::Complex64;
 use rand::{Rng, rngs::StdRng};
 use rand_distr::StandardNormal;
@@ -21,7 +21,7 @@ pub(super) struct Mirror {
 
 impl Mirror {
     /// The mirror image of a track.
-    pub(super) fn image(&self, track: &Track) -> Track {
+    pub(super) fn image(&self, track: &PointMotion) -> PointMotion {
         let mut image = *track;
         image.position[self.axis] = 2.0 * self.at - image.position[self.axis];
         image.velocity[self.axis] = -image.velocity[self.axis];
@@ -30,7 +30,7 @@ impl Mirror {
     }
 
     /// The three paths of first order of a point: there and back by way of the plane, and by way of it once, either way round.
-    pub(super) fn echoes(&self, track: &Track, reflectivity: Complex64) -> [Echo; 3] {
+    pub(super) fn echoes(&self, track: &PointMotion, reflectivity: Complex64) -> [Echo; 3] {
         let image = self.image(track);
         let once = reflectivity * self.share;
         [
@@ -108,7 +108,7 @@ impl Room {
         let Some(fan) = &self.fan else { return Vec::new() };
         let echo = |&(radius, angle, reflectivity): &(f64, f64, Complex64)| {
             let at = |dt| fan.at(t + dt, radius, angle);
-            Echo::direct(Track::through(at(-half_s), at(0.0), at(half_s), half_s), reflectivity)
+            Echo::direct(PointMotion::through(at(-half_s), at(0.0), at(half_s), half_s), reflectivity)
         };
         fan.points.iter().map(echo).collect()
     }
@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn the_image_of_a_point_is_as_far_behind_the_wall() {
         let wall = Mirror { axis: 1, at: 2.0, share: 0.5 };
-        let track = Track { position: [3.0, 0.5, 0.1], velocity: [1.0, 0.4, 0.0], acceleration: [0.0; 3] };
+        let track = PointMotion { position: [3.0, 0.5, 0.1], velocity: [1.0, 0.4, 0.0], acceleration: [0.0; 3] };
         let image = wall.image(&track);
         assert_eq!((image.position, image.velocity), ([3.0, 3.5, 0.1], [1.0, -0.4, 0.0]));
         let [there, back, twice] = wall.echoes(&track, Complex64::ONE);

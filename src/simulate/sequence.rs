@@ -1,11 +1,11 @@
 //! One sequence: its people, its room, its receivers, and its frames.
 
-use super::cast::{Stage, cast};
+use super::performers::{Stage, draw_performers};
 use super::room::Room;
-use super::{Device, Options, Preset, Recipe, generator};
+use super::{Device, Options, Recipe, ScenePreset, generator};
 use crate::body::{BodyPose, BodySurface, Capsule, Performer};
 use crate::geometry::Vec3;
-use crate::radar::{AdcCube, Echo, Receiver, Track, add_leakage};
+use crate::radar::{AdcCube, Echo, PointMotion, Receiver, add_leakage};
 use num_complex::Complex64;
 use rand::Rng;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ enum Purpose {
 #[derive(Debug)]
 pub struct Sequence {
     index: usize,
-    preset: Preset,
+    preset: ScenePreset,
     people: Vec<(Performer, BodySurface)>,
     room: Room,
     device: Arc<Device>,
@@ -87,7 +87,7 @@ impl Sequence {
             lasts_s: (options.sequence_length.saturating_sub(1)) as f64 / rate_hz,
         };
         let actions = if options.actions.is_empty() { &recipe.actions } else { &options.actions };
-        let performers = cast(&recipe, actions, count, &stage, &mut draw);
+        let performers = draw_performers(&recipe, actions, count, &stage, &mut draw);
         let multipath = options.multipath.unwrap_or(true);
         let centre = performers.first().map_or([3.0, 0.0], |p| {
             let hip = p.pose(0.5 * stage.lasts_s).joints[11];
@@ -134,7 +134,7 @@ impl Sequence {
     }
 
     /// The scenario.
-    pub fn preset(&self) -> Preset {
+    pub fn preset(&self) -> ScenePreset {
         self.preset
     }
 
@@ -194,7 +194,7 @@ impl Sequence {
         for ((_, skin), [before, now, after]) in self.people.iter().zip(&poses) {
             for (count, (point, position, strength)) in skin.seen(now, &capsules).enumerate() {
                 let place = |pose: &BodyPose| pose.segments[point.segment as usize].place(point.position);
-                let track = Track::through(place(before), position, place(after), half_s);
+                let track = PointMotion::through(place(before), position, place(after), half_s);
                 let reflectivity = point.reflectivity * strength;
                 echoes.push(Echo::direct(track, reflectivity));
                 if count % MULTIPATH_EVERY == 0 {

@@ -5,18 +5,18 @@
 //! may begin another meanwhile, and the times of both would be wrong.
 
 use super::row::annotated;
-use super::{CurveRow, FitNumbers, FrameFit, FrameRow, StudyError, write_curves, write_ply};
+use super::{BatchRow, CurveRow, FitNumbers, FrameFit, StudyError, write_curves, write_ply};
 use crate::body::Pppr;
 use crate::config::FitConfig;
-use crate::dataset::{Dataset, Truth, panic_text, write_pppr};
+use crate::dataset::{Dataset, Truth, write_pppr};
 use crate::diagnose::{JointErrors, joint_errors};
 use crate::mhp::{FitError, Fitter, Precision, StepReport, StopReason, predict};
 use crate::output::{FileNames, Inputs};
-use crate::start::{begin, problem_of};
+use crate::start::{find_start, problem_of};
+use crate::task::{milliseconds, panic_as_error};
 use crossbeam_channel::Sender;
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -68,7 +68,7 @@ fn fit_watched(
     let (initial, init_ms) = if let Some(params) = start {
         (predict(&problem, &options.config, &params), None)
     } else {
-        let found = begin(&problem, &options.config).map_err(|error| in_file(&error))?.initialisation;
+        let found = find_start(&problem, &options.config).map_err(|error| in_file(&error))?.initialisation;
         (found.params, Some(milliseconds(began)))
     };
     let began = Instant::now();
@@ -105,11 +105,6 @@ pub(super) fn run(fitter: &mut Fitter, mut watch: impl FnMut(StepReport, &Pppr))
     Ok(StopReason::Iterations)
 }
 
-fn milliseconds(began: Instant) -> f64 {
-    // A microsecond is all that such a time is worth.
-    (began.elapsed().as_secs_f64() * 1e6).round() / 1e3
-}
-
 /// Fits `frames` and hands every row to `sink`, in the order of the data set, as soon as it and those before it are
 /// done. A frame that fails is a row with the reason, and the batch goes on; an error of `sink` ends it.
 ///
@@ -119,7 +114,7 @@ pub fn run_batch(
     dataset: &Dataset,
     frames: Range<usize>,
     options: &BatchOptions,
-    mut sink: impl FnMut(FrameRow) -> Result<(), StudyError>,
+    mut sink: impl FnMut(BatchRow) -> Result<(), StudyError>,
 ) -> Result<(), StudyError> {
     let batch = Batch {
         dataset,
@@ -130,7 +125,7 @@ pub fn run_batch(
         end: frames.end,
     };
     let threads = if options.warm_start { 1 } else { rayon::current_num_threads().clamp(1, frames.len().max(1)) };
-    let (outbox, inbox) = crossbeam_channel::bounded::<FrameRow>(threads);
+    let (outbox, inbox) = crossbeam_channel::bounded::<BatchRow>(threads);
     std::thread::scope(|scope| {
         // The inbox goes with this closure: after an error the threads find nobody listening, and end.
         let inbox = inbox;
@@ -165,7 +160,7 @@ struct Batch<'a> {
 
 impl Batch<'_> {
     /// Takes frames until none is left or nobody listens.
-    fn work(&self, outbox: &Sender<FrameRow>) {
+    fn work(&self, outbox: &Sender<BatchRow>) {
         let mut before: Option<(usize, Pppr)> = None;
         loop {
             let index = self.next.fetch_add(1, Ordering::Relaxed);
@@ -173,11 +168,11 @@ impl Batch<'_> {
                 return;
             }
             let start = before.take().filter(|(last, _)| self.follows(*last, index)).map(|(_, params)| params);
-            let fit = caught(|| self.fit_and_keep(index, start)).map(|fit| {
+            let fit = panic_as_error(|| self.fit_and_keep(index, start)).map(|fit| {
                 before = Some((index, fit.params));
                 fit.numbers
             });
-            if outbox.send(FrameRow { index, frame: self.dataset.frame_name(index).to_owned(), fit }).is_err() {
+            if outbox.send(BatchRow { index, frame: self.dataset.frame_name(index).to_owned(), fit }).is_err() {
                 return;
             }
         }
@@ -215,10 +210,4 @@ impl Batch<'_> {
         }
         Ok(fit)
     }
-}
-
-/// A panic is a defect in this program; one frame of thousands must not end the others.
-fn caught<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(work))
-        .unwrap_or_else(|panic| Err(format!("internal error: {}", panic_text(panic.as_ref()))))
 }

@@ -8,27 +8,27 @@
 use super::batch::run;
 use super::evidence::masks_around;
 use crate::body::Skeleton;
-use crate::config::{FitConfig, Preset as Settings};
-use crate::diagnose::{Annotated, EarlierFrame, EvidenceInput, Example, Measured, STATIC_FRAMES, evidence};
+use crate::config::{FitConfig, Preset};
+use crate::diagnose::{Annotated, EarlierFrame, EvidenceExample, EvidenceInput, Measured, STATIC_FRAMES, evidence};
 use crate::labels::Tag;
 use crate::mhp::{FitError, Fitter, Precision, Problem};
-use crate::simulate::{Layout, Options, Preset, Recording, SimulateError};
-use crate::start::begin;
+use crate::simulate::{Options, Recording, ScenePreset, SimulateError, SimulatedLayout};
+use crate::start::find_start;
 use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Layouts that are simulated: MMVR-like Cartesian maps, polar maps with Doppler, HuPR's cubes.
-pub const LAYOUTS: [Layout; 3] = [Layout::Mmvr, Layout::Generic, Layout::Hupr];
+pub const LAYOUTS: [SimulatedLayout; 3] = [SimulatedLayout::Mmvr, SimulatedLayout::Generic, SimulatedLayout::Hupr];
 /// Scenarios in equal shares: preset, number of people where it is not the preset's own, and the mode.
-pub const SCENARIOS: [(&str, Preset, Option<usize>, Option<Tag>); 8] = [
-    ("easy", Preset::Easy, None, None),
-    ("medium", Preset::Medium, None, None),
-    ("hard", Preset::Hard, None, None),
-    ("medium, two people", Preset::Medium, Some(2), None),
-    ("f1", Preset::F1, None, Some(Tag::F1)),
-    ("f2", Preset::F2, None, Some(Tag::F2)),
-    ("f3", Preset::F3, None, Some(Tag::F3)),
-    ("f4", Preset::F4, None, Some(Tag::F4)),
+pub const SCENARIOS: [(&str, ScenePreset, Option<usize>, Option<Tag>); 8] = [
+    ("easy", ScenePreset::Easy, None, None),
+    ("medium", ScenePreset::Medium, None, None),
+    ("hard", ScenePreset::Hard, None, None),
+    ("medium, two people", ScenePreset::Medium, Some(2), None),
+    ("f1", ScenePreset::F1, None, Some(Tag::F1)),
+    ("f2", ScenePreset::F2, None, Some(Tag::F2)),
+    ("f3", ScenePreset::F3, None, Some(Tag::F3)),
+    ("f4", ScenePreset::F4, None, Some(Tag::F4)),
 ];
 /// Fits that are judged: the paper's, which `evidence` makes by default, and the recommended one of as many people as are
 /// counted.
@@ -40,30 +40,30 @@ const STRIDE: usize = 7;
 
 /// A judged fit.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Judged {
+pub struct JudgedFit {
     /// Whose maps.
-    pub layout: Layout,
+    pub layout: SimulatedLayout,
     /// Index in [`SCENARIOS`].
     pub scenario: usize,
     /// Index in [`FITS`].
     pub fit: usize,
     /// What a curve learns from it.
-    pub example: Example,
+    pub example: EvidenceExample,
 }
 
 /// One frame to make and to judge.
 struct Job {
     seed: u64,
-    layout: Layout,
+    layout: SimulatedLayout,
     scenario: usize,
     number: usize,
 }
 
 /// Sequences of a layout and scenario. HuPR's processing removes what stands still and its maps begin at 1.3 m, so that
 /// neither F1 nor F2 can be made in them; the other layouts have the more of these, for equal shares in all.
-fn sequences_of(layout: Layout, mode: Option<Tag>, sequences: usize) -> usize {
+fn sequences_of(layout: SimulatedLayout, mode: Option<Tag>, sequences: usize) -> usize {
     match (mode, layout) {
-        (Some(Tag::F1 | Tag::F2), Layout::Hupr) => 0,
+        (Some(Tag::F1 | Tag::F2), SimulatedLayout::Hupr) => 0,
         (Some(Tag::F1 | Tag::F2), _) => sequences.div_ceil(2) * 3,
         _ => sequences.div_ceil(2) * 2,
     }
@@ -74,8 +74,8 @@ fn sequences_of(layout: Layout, mode: Option<Tag>, sequences: usize) -> usize {
 ///
 /// # Errors
 /// Where a recording's options make no sense, which would be a mistake in here.
-pub fn judged(seeds: &[u64], sequences: usize, done: impl Fn() + Sync) -> Result<Vec<Judged>, SimulateError> {
-    let found: Result<Vec<Vec<Judged>>, SimulateError> = jobs(seeds, sequences)
+pub fn judged(seeds: &[u64], sequences: usize, done: impl Fn() + Sync) -> Result<Vec<JudgedFit>, SimulateError> {
+    let found: Result<Vec<Vec<JudgedFit>>, SimulateError> = jobs(seeds, sequences)
         .par_iter()
         .map(|job| {
             let judged = judge(job)?;
@@ -104,7 +104,7 @@ fn jobs(seeds: &[u64], sequences: usize) -> Vec<Job> {
     jobs
 }
 
-fn judge(job: &Job) -> Result<Vec<Judged>, SimulateError> {
+fn judge(job: &Job) -> Result<Vec<JudgedFit>, SimulateError> {
     let &Job { seed, layout, scenario, number } = job;
     let Some(&(_, preset, people, mode)) = SCENARIOS.get(scenario) else { return Ok(Vec::new()) };
     let recording = Recording::new(&Options {
@@ -125,10 +125,10 @@ fn judge(job: &Job) -> Result<Vec<Judged>, SimulateError> {
     let told = |error: &FitError| tracing::debug!("{}: {error}", sequence.scenario());
     let skeleton = Skeleton::preset("coco17");
     let problem = skeleton.and_then(|skeleton| problem(&recording, skeleton, &frames).inspect_err(told).ok());
-    let configs = [FitConfig::default(), FitConfig { people: 0, ..Settings::Recommended.config() }];
+    let configs = [FitConfig::default(), FitConfig { people: 0, ..Preset::Recommended.config() }];
     let of_fit = |(fit, config): (usize, &FitConfig)| {
         let judged = measured(problem.as_ref()?, &frames, config).inspect_err(told).ok()?;
-        Some(Judged { layout, scenario, fit, example: Example { seed, made_with: mode, judged } })
+        Some(JudgedFit { layout, scenario, fit, example: EvidenceExample { seed, made_with: mode, judged } })
     };
     Ok(configs.iter().enumerate().filter_map(of_fit).collect())
 }
@@ -147,7 +147,7 @@ fn problem(recording: &Recording, skeleton: Skeleton, frames: &[Vec<Vec<f64>>]) 
 
 /// Fits a problem and measures what speaks for each mode.
 fn measured(problem: &Arc<Problem>, frames: &[Vec<Vec<f64>>], config: &FitConfig) -> Result<Measured, FitError> {
-    let initial = begin(problem, config)?.initialisation.params;
+    let initial = find_start(problem, config)?.initialisation.params;
     let mut fitter = Fitter::new(Arc::clone(problem), *config, Precision::F32, initial.clone())?;
     run(&mut fitter, |_, _| {})?;
     let masks = masks_around(problem, &initial, fitter.params(), config, Precision::F32)?;

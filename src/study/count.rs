@@ -50,7 +50,7 @@ pub fn count_frames(
 }
 
 fn count_chunk(dataset: &Dataset, counter: &Counter, chunk: Range<usize>, done: &impl Fn()) -> Vec<FrameCount> {
-    let mut window = Window::new(counter);
+    let mut window = ScanWindow::new(counter);
     let sequence = dataset.sequence(chunk.start);
     let earliest = chunk.start.saturating_sub(LEAD_IN);
     let first = (earliest..chunk.start).find(|&i| dataset.sequence(i) == sequence).unwrap_or(chunk.start);
@@ -82,13 +82,13 @@ fn labelled(frame: Result<Frame, DatasetError>) -> (Option<usize>, Result<Vec<He
 
 /// The scans before the present frame, the latest first. Where there are none, those after it, the next first: what stands
 /// still does so in both directions of time, and in one frame alone furniture is as good as people.
-pub(super) struct Window<'a> {
+pub(super) struct ScanWindow<'a> {
     counter: &'a Counter,
     scans: VecDeque<Scan>,
     ahead: VecDeque<Scan>,
 }
 
-impl<'a> Window<'a> {
+impl<'a> ScanWindow<'a> {
     /// Before the first frame.
     pub(super) fn new(counter: &'a Counter) -> Self {
         Self { counter, scans: VecDeque::new(), ahead: VecDeque::new() }

@@ -19,9 +19,9 @@ mod summary;
 pub use batch::{BatchOptions, fit_frame, run_batch};
 pub use evidence::{FrameEvidence, frame_evidence, frames_before, state_evidence};
 pub use export::{
-    CloudPoint, CurveRow, ExportError, HeatmapExport, MapScale, curve_columns, curves_csv, ply, point_cloud,
+    CloudPoint, CurveRow, ExportError, ExportScale, HeatmapExport, curve_columns, curves_csv, ply, point_cloud,
     scaled_maps, write_cloud_npz, write_cloud_pcd, write_cloud_ply, write_curves, write_ply,
 };
 pub use results::{SummaryRow, read_summary};
-pub use row::{FitNumbers, FrameFit, FrameRow, Means};
+pub use row::{BatchRow, FitNumbers, FrameFit, Means};
 pub use summary::{StudyError, Summary, columns};

@@ -53,7 +53,7 @@ pub struct FrameFit {
 
 /// One row of a batch.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FrameRow {
+pub struct BatchRow {
     /// Index in the data set.
     pub index: usize,
     /// The frame's name.
@@ -62,7 +62,7 @@ pub struct FrameRow {
     pub fit: Result<FitNumbers, String>,
 }
 
-impl FrameRow {
+impl BatchRow {
     /// The numbers, in the order of the columns between `annotated` and the end: loss, its terms, the IoU of `views`
     /// views, two joint errors, two times. `None` where unknown.
     pub fn values(&self, views: usize) -> Vec<Option<f64>> {
@@ -137,7 +137,7 @@ impl Means {
     }
 
     /// Counts a row.
-    pub fn add(&mut self, row: &FrameRow) {
+    pub fn add(&mut self, row: &BatchRow) {
         self.frames += 1;
         match &row.fit {
             Ok(fit) => {
@@ -184,7 +184,7 @@ impl Means {
         (self.fitted() > 0).then(|| count as f64 / self.fitted() as f64)
     }
 
-    /// The means in the order of [`FrameRow::values`].
+    /// The means in the order of [`BatchRow::values`].
     pub fn values(&self) -> Vec<Option<f64>> {
         self.sums.iter().map(|&(sum, count)| (count > 0).then(|| sum / count as f64)).collect()
     }
@@ -212,7 +212,7 @@ mod tests {
     use super::*;
     use crate::mhp::Terms;
 
-    fn row(loss: f64, iou: Option<f64>, converged: bool) -> FrameRow {
+    fn row(loss: f64, iou: Option<f64>, converged: bool) -> BatchRow {
         let terms = Terms::from_fn(|term| if term.key == "dummy" { 0.7 } else { 0.1 });
         let report = StepReport { iteration: 10, loss, terms, iou: vec![iou].into(), converged };
         let fit = FitNumbers {
@@ -225,7 +225,7 @@ mod tests {
             init_ms: Some(2.0),
             fit_ms: 5.0,
         };
-        FrameRow { index: 0, frame: "a/0".into(), fit: Ok(fit) }
+        BatchRow { index: 0, frame: "a/0".into(), fit: Ok(fit) }
     }
 
     #[test]
@@ -234,7 +234,7 @@ mod tests {
         for row in [row(1.0, Some(0.4), true), row(3.0, None, false)] {
             means.add(&row);
         }
-        means.add(&FrameRow { index: 2, frame: "a/2".into(), fit: Err("x.npz: no".into()) });
+        means.add(&BatchRow { index: 2, frame: "a/2".into(), fit: Err("x.npz: no".into()) });
         let json = means.json(&super::super::columns(&["hm".to_owned()]));
         assert_eq!((means.frames, means.failed, means.converged_share()), (3, 1, Some(0.5)));
         assert_eq!(json["loss"], 2.0);
@@ -274,7 +274,7 @@ mod tests {
         let cell = |name: &str| cells[columns.iter().position(|column| column == name).unwrap()].as_str();
         assert_eq!(cell("iou_hm"), "", "an undefined IoU");
         assert_eq!(["majpe_mm", "pa_majpe_mm", "init_ms", "fit_ms"].map(cell), ["", "", "2", "5"]);
-        let failed = FrameRow { index: 0, frame: "b".into(), fit: Err("why".into()) };
+        let failed = BatchRow { index: 0, frame: "b".into(), fit: Err("why".into()) };
         assert_eq!(failed.cells(1)[1..7], ["", "", "error: why", "", "", ""]);
         assert_eq!(failed.json(&columns)["loss"], Value::Null);
     }

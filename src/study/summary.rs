@@ -1,6 +1,6 @@
 //! `summary.csv`: a row a frame; an interrupted run leaves a valid table of what it did ([`Growing`]).
 
-use super::FrameRow;
+use super::BatchRow;
 use crate::mhp::{StepReport, TERMS};
 use crate::output::Growing;
 use std::path::{Path, PathBuf};
@@ -112,7 +112,7 @@ impl Summary {
     ///
     /// # Errors
     /// Where the file cannot be written; what is in its place stays whole.
-    pub fn add(&mut self, row: &FrameRow) -> Result<(), StudyError> {
+    pub fn add(&mut self, row: &BatchRow) -> Result<(), StudyError> {
         let added = line(&row.cells(self.views)).and_then(|row| self.table.add(&row));
         added.map_err(|reason| StudyError::Write { reason, path: self.path.clone() })
     }

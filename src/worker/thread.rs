@@ -2,15 +2,15 @@
 
 use super::handle::Latest;
 use super::protocol::{
-    HistoryRow, JobId, Kept, Prepare, Prepared, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
+    HistoryRow, JobId, Kept, Prepare, PreparedFit, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
 };
 use crate::config::FitConfig;
 use crate::mhp::{
     FitError, FitState, Fitter, Objective, Precision, Problem, StepReport, StopReason, masks, predict, simulate,
 };
-use crate::start::{begin, problem_of};
+use crate::start::{find_start, problem_of};
+use crate::task::{catch_panic, milliseconds};
 use crossbeam_channel::{Receiver, Sender};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -73,15 +73,10 @@ impl Thread {
     /// Until `Shutdown` or until the window is gone.
     pub(super) fn run(&mut self) {
         loop {
-            match catch_unwind(AssertUnwindSafe(|| self.turn())) {
+            match catch_panic(|| self.turn()) {
                 Ok(true) => {}
                 Ok(false) => return,
-                Err(panic) => {
-                    let text = panic
-                        .downcast_ref::<String>()
-                        .cloned()
-                        .or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string))
-                        .unwrap_or_else(|| "unknown cause".into());
+                Err(text) => {
                     self.event(WorkerEvent::Lost(format!("the fit stopped on an internal error: {text}")));
                     self.job = None;
                 }
@@ -221,20 +216,20 @@ enum Reply {
 }
 
 impl Job {
-    fn new(prepare: Prepare) -> Result<(Self, Prepared), FitError> {
+    fn new(prepare: Prepare) -> Result<(Self, PreparedFit), FitError> {
         let Prepare { job, branch, dataset, frame, config, precision, start } = prepare;
         let problem = Arc::new(problem_of(&dataset, &frame)?);
         let began = Instant::now();
-        let (begun, initial, state) = match start {
+        let (found_start, initial, state) = match start {
             Start::Initialise => {
-                let begun = begin(&problem, &config)?;
-                let initial = begun.initialisation.params.clone();
-                (Some(begun), initial, None)
+                let found = find_start(&problem, &config)?;
+                let initial = found.initialisation.params.clone();
+                (Some(found), initial, None)
             }
             Start::Warm(params) => (None, predict(&problem, &config, &params), None),
             Start::Resume { initial, state } => (None, initial, Some(state)),
         };
-        let init_ms = began.elapsed().as_secs_f64() * 1e3;
+        let init_ms = milliseconds(began);
         let mut fitter = Fitter::new(Arc::clone(&problem), config, precision, initial.clone())?;
         let viewer = Objective::new(Arc::clone(&problem), config, precision, &initial)?;
         let warnings = viewer.warnings().to_vec();
@@ -263,7 +258,7 @@ impl Job {
         if !resumed {
             new.push_row(new.fitter.report());
         }
-        Ok((new, Prepared { problem, begun, initial, warnings, init_ms }))
+        Ok((new, PreparedFit { problem, found_start, initial, warnings, init_ms }))
     }
 
     fn iteration(&self) -> usize {
@@ -280,7 +275,7 @@ impl Job {
             branch: self.branch,
             iteration: self.iteration(),
             reason,
-            run_ms: self.run_began.elapsed().as_secs_f64() * 1e3,
+            run_ms: milliseconds(self.run_began),
         }
     }
 

@@ -5,7 +5,7 @@
 #![expect(clippy::unwrap_used, reason = "a measurement stops where its material cannot be made")]
 
 use mhp_inspector::people::{Counter, HISTORY, Network, Scan, map_statistics};
-use mhp_inspector::simulate::{Options, Preset, Recording};
+use mhp_inspector::simulate::{Options, Recording, ScenePreset};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -18,7 +18,7 @@ type Maps = Vec<Vec<f64>>;
 
 fn recordings() -> (Counter, Vec<Vec<Maps>>) {
     let recording = |people: usize| {
-        let (presets, seed) = (vec![Preset::Medium], 3 + people as u64);
+        let (presets, seed) = (vec![ScenePreset::Medium], 3 + people as u64);
         let options = Options {
             presets,
             frames: FRAMES,

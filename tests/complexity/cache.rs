@@ -1,8 +1,9 @@
 //! The cache: what it saves, what makes it stale, what damages it.
 
 use super::sets::{Set, file, open, write_frame};
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::study::complexity::{Complexity, ComplexityOptions, Statistics, cached_share, compute};
+use mhp_inspector::task::Progress;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 

@@ -1,8 +1,8 @@
 //! `complexity` as it is run.
 
 use super::sets::{Set, file, open};
-use mhp_inspector::dataset::Progress;
 use mhp_inspector::study::complexity::{Complexity, ComplexityOptions, compute};
+use mhp_inspector::task::Progress;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};

@@ -3,9 +3,10 @@
 use super::naive::{self, Row};
 use super::sets::{SHAPES, Set, cells, file, open};
 use mhp_inspector::dataset::npz::{ArrayView, write_npy};
-use mhp_inspector::dataset::{Dataset, Manifest, OpenOptions, Progress};
+use mhp_inspector::dataset::{Dataset, Manifest, OpenOptions};
 use mhp_inspector::study::StudyError;
 use mhp_inspector::study::complexity::{Complexity, ComplexityOptions, Stratum, compute};
+use mhp_inspector::task::Progress;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 

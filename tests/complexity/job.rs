@@ -2,9 +2,10 @@
 
 use super::sets::{Set, open};
 use super::tree::tree;
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::study::StudyError;
 use mhp_inspector::study::complexity::{Complexity, ComplexityJob, ComplexityOptions, compute};
+use mhp_inspector::task::Progress;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};

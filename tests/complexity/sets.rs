@@ -1,8 +1,9 @@
 //! Small data sets with everything in them that is awkward.
 
 use super::naive::Maps;
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::dataset::npz::{ArrayView, write};
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::task::Progress;
 use std::path::{Path, PathBuf};
 
 /// A plane and a cube.

@@ -2,7 +2,8 @@
 
 use crate::harness::alone;
 use crate::material::{self, npy};
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::dataset::Dataset;
+use mhp_inspector::task::Progress;
 use std::io::{Cursor, Write as _};
 use std::path::Path;
 

@@ -4,11 +4,12 @@
 use crate::material;
 use crate::mutate::NUMBERS;
 use mhp_inspector::config::{FIELDS, FitConfig, Preset};
-use mhp_inspector::dataset::{Dataset, Progress};
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::mhp::Precision;
 use mhp_inspector::study::complexity::{ComplexityOptions, compute};
 use mhp_inspector::study::count::count_frames;
 use mhp_inspector::study::{BatchOptions, fit_frame, frame_evidence};
+use mhp_inspector::task::Progress;
 use rand::Rng as _;
 use rand::rngs::StdRng;
 use rand::seq::IndexedRandom as _;

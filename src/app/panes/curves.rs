@@ -7,12 +7,12 @@ use super::{Shared, empty};
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
 use crate::mhp::{Scope, TermId, Weight};
-use crate::session::{Branch, Command, FitStatus, PinRow, Row, numbers};
+use crate::session::{Branch, Command, FitStatus, IterationRow, PinRow, numbers};
 use crate::worker::JobId;
 use egui::{Color32, Ui};
 use egui_plot::{GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, VLine, uniform_grid_spacer};
 use series::{SeriesCache, series};
-use thin::Window;
+use thin::VisibleSpan;
 
 /// Room on the right for half of the last number below the plot, points.
 const LAST_NUMBER: f32 = 12.0;
@@ -25,7 +25,7 @@ pub(in crate::app) struct State {
     /// The shown iteration before the last click.
     before_click: usize,
     /// What was on screen in the pass before.
-    window: Option<Window>,
+    window: Option<VisibleSpan>,
     /// Values of the curves of a job's history, as it was built up.
     series: SeriesCache<(JobId, u64)>,
 }
@@ -43,7 +43,7 @@ enum Tab {
     Quality,
 }
 
-type Value = Box<dyn Fn(&Row) -> Option<f64>>;
+type Value = Box<dyn Fn(&IterationRow) -> Option<f64>>;
 
 struct Curve {
     key: String,
@@ -52,7 +52,7 @@ struct Curve {
     width: f32,
 }
 
-fn curve(key: &str, name: &str, width: f32, value: impl Fn(&Row) -> Option<f64> + 'static) -> Curve {
+fn curve(key: &str, name: &str, width: f32, value: impl Fn(&IterationRow) -> Option<f64> + 'static) -> Curve {
     Curve { key: key.into(), name: name.into(), value: Box::new(value), width }
 }
 
@@ -72,8 +72,8 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             return empty(ui, "No iterations yet", shared.session.data.error.as_deref().unwrap_or(how));
         }
     };
-    let way = fit.history.way();
-    let first = way.first().and_then(|rows| rows.first()).map_or(0, |row| row.report.iteration);
+    let lineage = fit.history.lineage();
+    let first = lineage.first().and_then(|rows| rows.first()).map_or(0, |row| row.report.iteration);
     let curves = curves(shared, branch, state.tab);
     toolbar(ui, shared, state, &curves);
     let fit = &shared.session.fit;
@@ -112,7 +112,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     series.begin((fit.job, fit.history.revision()));
     let visible = curves.iter().filter(|c| !hidden.contains(&c.key));
     let lines: Vec<(Vec<Vec<PlotPoint>>, &Curve)> =
-        visible.map(|c| (series.grown(None, &c.key, first, &way, &c.value).pieces(window, log), c)).collect();
+        visible.map(|c| (series.grown(None, &c.key, first, &lineage, &c.value).pieces(window, log), c)).collect();
     let mut others: Vec<(u32, Vec<Vec<PlotPoint>>)> = Vec::new();
     if let Some(c) = curves.first() {
         for b in fit.history.branches().iter().filter(|b| b.id != branch.id) {
@@ -152,7 +152,8 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     });
     flag_texts(ui, &response, branch, &tokens);
     let [lo, hi] = response.transform.bounds().range_x().into_inner().into();
-    state.window = (hi > lo).then(|| Window::new(lo, hi, response.transform.frame().width() * ui.pixels_per_point()));
+    state.window =
+        (hi > lo).then(|| VisibleSpan::new(lo, hi, response.transform.frame().width() * ui.pixels_per_point()));
     let (pointer, inner) = response.inner;
     inner.widget_info(|| figure::spoken("Curves", caption.as_deref()));
     if inner.double_clicked() {
@@ -167,7 +168,12 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
 }
 
 /// The main curve of each pinned fit: L, or the mean IoU.
-fn pinned(shared: &Shared<'_>, tab: Tab, window: Option<&Window>, log: bool) -> Vec<(String, Vec<Vec<PlotPoint>>)> {
+fn pinned(
+    shared: &Shared<'_>,
+    tab: Tab,
+    window: Option<&VisibleSpan>,
+    log: bool,
+) -> Vec<(String, Vec<Vec<PlotPoint>>)> {
     let pins = shared.session.pins.list().iter();
     pins.map(|pin| {
         let value = |row: &PinRow| match tab {
@@ -238,7 +244,7 @@ fn loss_curves(persons: usize, branches: &[Branch]) -> Vec<Curve> {
         Scope::People => persons > 1,
         Scope::Weighed => weighed(term.weight),
     });
-    let terms = shown.map(|term| curve(term.key, term.label, 1.5, move |r: &Row| Some(r.report.terms[term])));
+    let terms = shown.map(|term| curve(term.key, term.label, 1.5, move |r: &IterationRow| Some(r.report.terms[term])));
     [curve("total", "L", 2.0, |r| Some(r.report.loss))].into_iter().chain(terms).collect()
 }
 
@@ -339,7 +345,7 @@ mod tests {
     fn shown(config: FitConfig) -> Vec<(String, Option<f64>)> {
         let terms = Terms::from_fn(|term| if term.key == "dummy" { 0.7 } else { 0.1 });
         let report = StepReport { iteration: 0, loss: 1.0, terms, iou: vec![None].into(), converged: false };
-        let row = Row { report, state: None, majpe_mm: None };
+        let row = IterationRow { report, state: None, majpe_mm: None };
         let branch = Branch { id: 0, parent: None, config, rows: vec![row.clone()], flags: Vec::new() };
         loss_curves(1, &[branch]).into_iter().map(|curve| (curve.key, (curve.value)(&row))).collect()
     }

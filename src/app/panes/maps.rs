@@ -17,7 +17,7 @@ use picture::{Content, Pictures};
 
 /// Which column a pane is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(in crate::app) enum Column {
+pub(in crate::app) enum MapColumn {
     Ori,
     Sim,
     Masks,
@@ -104,7 +104,7 @@ impl State {
 }
 
 /// Draws one column.
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column) {
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColumn) {
     state.begin_pass(ui.ctx());
     let session = shared.session;
     let Some(dataset) = &session.data.dataset else {
@@ -127,7 +127,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, colu
     // A toolbar that is wider than the pane must not push the maps out of it.
     let pane = ui.max_rect();
     toolbar::show(ui, shared, column);
-    if column != Column::Ori
+    if column != MapColumn::Ori
         && session.fit.shown.is_none()
         && let crate::session::FitStatus::Failed(why) = &session.fit.status
     {
@@ -135,7 +135,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, colu
     }
     let area = ui.available_rect_before_wrap().intersect(pane);
     let pointer = ui.input(|i| i.pointer.hover_pos().filter(|_| i.modifiers.shift));
-    state.flipped = column != Column::Masks && pointer.is_some_and(|p| area.contains(p));
+    state.flipped = column != MapColumn::Masks && pointer.is_some_and(|p| area.contains(p));
     for (i, rect) in arrange(area, views, session.view.true_proportions).into_iter().enumerate() {
         let builder = UiBuilder::new().max_rect(rect).id_salt(("map", i));
         ui.scope_builder(builder, |ui| one(ui, shared, state, column, i, rect));
@@ -173,17 +173,17 @@ fn arrange(area: Rect, views: &[View], to_scale: bool) -> Vec<Rect> {
 }
 
 /// One map of one view: title, picture, axes, colour bar, overlays, probe.
-fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, index: usize, rect: Rect) {
+fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColumn, index: usize, rect: Rect) {
     let session = shared.session;
     let Some(view) = session.data.dataset.as_ref().and_then(|d| d.info().views.get(index)) else { return };
     let orientation = Orientation::of(view);
     let flipped = state.flipped;
     let content = match (column, flipped) {
-        (Column::Masks, _) => Content::Masks,
-        (Column::Ori, false) => Content::Ori,
-        (Column::Sim, true) => state.pictures.reference(),
-        (Column::Ori, true) => Content::Sim,
-        (Column::Sim, false) => match session.view.compare {
+        (MapColumn::Masks, _) => Content::Masks,
+        (MapColumn::Ori, false) => Content::Ori,
+        (MapColumn::Sim, true) => state.pictures.reference(),
+        (MapColumn::Ori, true) => Content::Sim,
+        (MapColumn::Sim, false) => match session.view.compare {
             Compare::Flip | Compare::Wipe => Content::Sim,
             Compare::Difference => Content::Difference,
         },
@@ -225,7 +225,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: Column, 
     let painter = ui.painter().with_clip_rect(plot.intersect(ui.clip_rect()));
     painter.rect_filled(plot, 0.0, theme::MASK_GROUND);
     state.pictures.paint(ui, &painter, plot, window_rect(window), index, content);
-    if column == Column::Sim && session.view.compare == Compare::Wipe && !flipped {
+    if column == MapColumn::Sim && session.view.compare == Compare::Wipe && !flipped {
         wipe(ui, shared, state, index, plot, window);
     }
     let to_screen = |unit: [f64; 2]| screen(plot, window, unit);

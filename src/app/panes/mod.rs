@@ -18,7 +18,7 @@ pub(super) mod timeline;
 use super::PaneKind;
 use super::commands::{Act, AppAct, command};
 use super::theme::{self, Tokens};
-use crate::diagnose::Place;
+use crate::diagnose::FindingPlace;
 use crate::labels::CellRegion;
 use crate::session::{Command, Session, ViewState};
 
@@ -42,11 +42,11 @@ impl Shared<'_> {
     }
 
     /// Shows where a finding is seen.
-    pub(super) fn show_place(&mut self, place: Place) {
+    pub(super) fn show_place(&mut self, place: FindingPlace) {
         match place {
-            Place::Joint(joint) => self.send(Command::SelectJoint(Some(joint))),
-            Place::Frame(frame) => self.send(Command::GotoFrame(frame)),
-            Place::Cells { view, lo, hi } => self.acts.push(Act::ShowCells { view, lo, hi }),
+            FindingPlace::Joint(joint) => self.send(Command::SelectJoint(Some(joint))),
+            FindingPlace::Frame(frame) => self.send(Command::GotoFrame(frame)),
+            FindingPlace::Cells { view, lo, hi } => self.acts.push(Act::ShowCells { view, lo, hi }),
         }
     }
 
@@ -134,9 +134,9 @@ impl PaneStates {
 pub(super) fn show(pane: PaneKind, ui: &mut egui::Ui, shared: &mut Shared<'_>, states: &mut PaneStates) {
     match pane {
         PaneKind::Frames => frames::show(ui, shared, &mut states.frames),
-        PaneKind::HOri => maps::show(ui, shared, &mut states.maps, maps::Column::Ori),
-        PaneKind::HSim => maps::show(ui, shared, &mut states.maps, maps::Column::Sim),
-        PaneKind::Masks => maps::show(ui, shared, &mut states.maps, maps::Column::Masks),
+        PaneKind::HOri => maps::show(ui, shared, &mut states.maps, maps::MapColumn::Ori),
+        PaneKind::HSim => maps::show(ui, shared, &mut states.maps, maps::MapColumn::Sim),
+        PaneKind::Masks => maps::show(ui, shared, &mut states.maps, maps::MapColumn::Masks),
         PaneKind::Scene => scene::show(ui, shared, &mut states.scene),
         PaneKind::Curves => curves::show(ui, shared, &mut states.curves),
         PaneKind::Fit => fit::show(ui, shared),

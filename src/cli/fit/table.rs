@@ -1,7 +1,7 @@
 //! The table for people: the first rows, and the means of all.
 
 use crate::escape::one_line;
-use crate::study::{FrameRow, Means, columns};
+use crate::study::{BatchRow, Means, columns};
 
 /// Rows that are shown; the rest is in the means and in summary.csv.
 const SHOWN: usize = 20;
@@ -11,7 +11,7 @@ const UNKNOWN: &str = "-";
 /// Collects what is shown.
 pub(super) struct Table {
     arrays: Vec<String>,
-    rows: Vec<FrameRow>,
+    rows: Vec<BatchRow>,
 }
 
 impl Table {
@@ -19,7 +19,7 @@ impl Table {
         Self { arrays, rows: Vec::new() }
     }
 
-    pub(super) fn add(&mut self, row: FrameRow) {
+    pub(super) fn add(&mut self, row: BatchRow) {
         if self.rows.len() < SHOWN {
             self.rows.push(row);
         }

@@ -40,7 +40,7 @@ Examples:
 
 /// What `labels agreement` is told.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct AgreementArgs {
     /// The first: a journal (*.labels.jsonl), labels exported as CSV or JSON, or a data set.
     a: PathBuf,
     /// The second, likewise.
@@ -70,7 +70,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Where a file cannot be read, or has several annotators and none is named.
-pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &AgreementArgs) -> anyhow::Result<ExitCode> {
     let a = of_one(&args.a, args.annotator_a.as_deref(), "--annotator-a")?;
     if let Some(path) = &args.b {
         let b = of_one(path, args.annotator_b.as_deref(), "--annotator-b")?;
@@ -84,7 +84,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 fn tell(
-    args: &Args,
+    args: &AgreementArgs,
     json: impl FnOnce() -> anyhow::Result<String>,
     text: impl FnOnce() -> String,
 ) -> anyhow::Result<()> {
@@ -146,7 +146,7 @@ fn as_json(found: &Agreement, more: Value, disputes: bool) -> anyhow::Result<Str
     Ok(serde_json::to_string_pretty(&Value::Object(object)).context("writing JSON")? + "\n")
 }
 
-fn two_as_text(args: &Args, found: &Agreement, a: &[Record], b: &[Record]) -> String {
+fn two_as_text(args: &AgreementArgs, found: &Agreement, a: &[Record], b: &[Record]) -> String {
     let b_path = args.b.as_deref().unwrap_or(Path::new(""));
     let mut text = side("A", a, &args.a) + &side("B", b, b_path);
     let (frames, a, b) = (counted(found.frames, "frame"), found.only_in_a, found.only_in_b);
@@ -154,7 +154,7 @@ fn two_as_text(args: &Args, found: &Agreement, a: &[Record], b: &[Record]) -> St
     text + &table(found, args.disputes)
 }
 
-fn machine_as_text(args: &Args, found: &MachineAgreement, a: &[Record]) -> String {
+fn machine_as_text(args: &AgreementArgs, found: &MachineAgreement, a: &[Record]) -> String {
     let mut text = side("A", a, &args.a);
     let _ = writeln!(text, "B  the machine: a score of {} or more", args.threshold);
     let frames = counted(found.agreement.frames, "frame");

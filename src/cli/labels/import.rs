@@ -5,8 +5,8 @@ use super::source::counted;
 use crate::cli::common::{CsvArgs, open, print};
 use crate::escape::one_line;
 use crate::labels::{
-    CellRegion, Change, FrameId, Journal, LabelPlace, LabelStore, Record, Row, SaidElsewhere, Table, is_dated_ahead,
-    plan_import, read_table,
+    CellRegion, Change, FrameId, Journal, LabelPlace, LabelRow, LabelStore, ReadTable, Record, SaidElsewhere,
+    is_dated_ahead, plan_import, read_table,
 };
 use crate::radar::View;
 use anyhow::{Context as _, anyhow, bail};
@@ -36,7 +36,7 @@ Examples:
 
 /// What `labels import` is told.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ImportArgs {
     /// The data set.
     path: PathBuf,
     /// Exported labels.
@@ -62,13 +62,13 @@ pub struct Args {
 }
 
 /// The rows of one annotator, and the act that each file is.
-type Sheets = BTreeMap<String, Vec<(String, Vec<Row>)>>;
+type Sheets = BTreeMap<String, Vec<(String, Vec<LabelRow>)>>;
 
 /// Reads everything, then writes.
 ///
 /// # Errors
 /// Where a file, a row, the data set or a journal is bad: then nothing is written. Where writing fails.
-pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &ImportArgs) -> anyhow::Result<ExitCode> {
     args.cells.apply();
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let sheets = sheets(args, &Frames::new(&dataset), &dataset.info().views)?;
@@ -93,7 +93,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn told(args: &Args, name: &str, [written, same, kept]: [usize; 3], path: &Path) -> String {
+fn told(args: &ImportArgs, name: &str, [written, same, kept]: [usize; 3], path: &Path) -> String {
     let verb = if args.dry_run { "would be imported" } else { "imported" };
     let mut text = format!("{name}: {} {verb}, {same} the same", counted(written, "label"));
     if kept > 0 {
@@ -103,7 +103,7 @@ fn told(args: &Args, name: &str, [written, same, kept]: [usize; 3], path: &Path)
 }
 
 /// The whole label, as a change of the one that is there.
-fn said(row: &Row, journal: &Journal) -> SaidElsewhere {
+fn said(row: &LabelRow, journal: &Journal) -> SaidElsewhere {
     let record = &row.record;
     let before = journal.label(&record.frame.path).cloned().unwrap_or_default();
     SaidElsewhere {
@@ -115,13 +115,13 @@ fn said(row: &Row, journal: &Journal) -> SaidElsewhere {
 }
 
 /// Reads all files and gives each row its annotator and its frame.
-fn sheets(args: &Args, frames: &Frames<'_>, views: &[View]) -> anyhow::Result<Sheets> {
+fn sheets(args: &ImportArgs, frames: &Frames<'_>, views: &[View]) -> anyhow::Result<Sheets> {
     let mut sheets = Sheets::new();
     let mut seen: HashMap<(String, String), (PathBuf, u64)> = HashMap::new();
     let mut ahead = Vec::new();
     for path in &args.files {
         let act = format!("import from {}", path.file_name().unwrap_or_default().to_string_lossy());
-        let Table { rows, notes } = read_table(path)?;
+        let ReadTable { rows, notes } = read_table(path)?;
         for note in notes {
             tracing::warn!("{}: {note}", path.display());
         }
@@ -167,7 +167,7 @@ fn within(region: &CellRegion, views: &[View]) -> Result<(), String> {
     Err(format!("`{region}` is in no map; expected cells of {}", maps.join(" or ")))
 }
 
-fn annotator(args: &Args, row: &Row) -> anyhow::Result<String> {
+fn annotator(args: &ImportArgs, row: &LabelRow) -> anyhow::Result<String> {
     let name = args.annotator.as_deref().unwrap_or(&row.record.annotator).trim();
     if name.is_empty() {
         bail!("no annotator; expected a name in the column `annotator`, or --annotator NAME");
@@ -176,7 +176,7 @@ fn annotator(args: &Args, row: &Row) -> anyhow::Result<String> {
 }
 
 /// The frame of this name in the data set.
-fn frame(args: &Args, row: &Row, frames: &Frames<'_>) -> Result<FrameId, String> {
+fn frame(args: &ImportArgs, row: &LabelRow, frames: &Frames<'_>) -> Result<FrameId, String> {
     match frames.named(&row.record.frame.path) {
         Some(frame) => Ok(frame),
         None if args.keep_unknown => Ok(row.record.frame.clone()),

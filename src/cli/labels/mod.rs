@@ -28,22 +28,22 @@ Examples:
 pub enum LabelsCommand {
     /// Tag frames, as the window does: one act, on disk when the program ends.
     #[command(after_help = tag::HELP)]
-    Tag(tag::Args),
+    Tag(tag::TagArgs),
     /// List the labels of a data set as they are now.
     #[command(after_help = show::HELP)]
-    Show(show::Args),
+    Show(show::ShowArgs),
     /// Tell how far two annotators agree, tag by tag: Cohen's kappa, raw agreement, counts.
     #[command(after_help = agreement::HELP)]
-    Agreement(agreement::Args),
+    Agreement(agreement::AgreementArgs),
     /// Write labels as CSV or JSON.
     #[command(after_help = export::HELP)]
-    Export(export::Args),
+    Export(export::ExportArgs),
     /// Bring labels from CSV into the journals of a data set.
     #[command(after_help = import::HELP)]
-    Import(import::Args),
+    Import(import::ImportArgs),
     /// Count labels: by tag, by scene, stratum or day; and the time that one took.
     #[command(after_help = stats::HELP)]
-    Stats(stats::Args),
+    Stats(stats::StatsArgs),
 }
 
 /// Runs a subcommand of `labels`.

@@ -26,7 +26,7 @@ Examples:
 
 /// What `labels show` is told.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ShowArgs {
     /// The data set.
     path: PathBuf,
     /// Only this annotator's.
@@ -44,7 +44,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Where the data set or the folder of labels cannot be read, or the annotator has no labels there.
-pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &ShowArgs) -> anyhow::Result<ExitCode> {
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let place = LabelPlace::to_read(&dataset.info().root, dataset.fingerprint());
     let store = LabelStore::read(&place)?;

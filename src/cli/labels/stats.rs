@@ -61,7 +61,7 @@ fn part(split: for<'a> fn(&'a str) -> Option<(&'a str, &'a str)>) -> Group {
 
 /// What `labels stats` is told.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct StatsArgs {
     /// A data set, a journal (*.labels.jsonl), or labels exported as CSV or JSON.
     path: PathBuf,
     /// Only this annotator's.
@@ -82,7 +82,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Where PATH cannot be read, or the annotator has no labels there.
-pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &StatsArgs) -> anyhow::Result<ExitCode> {
     let (acts, group) = read(args)?;
     let acts = only(acts, args.annotator.as_deref(), &args.path)?;
     let found = statistics(&acts, &group);
@@ -98,7 +98,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 /// Every act, and what frames are counted together.
-fn read(args: &Args) -> anyhow::Result<(Vec<Record>, Group)> {
+fn read(args: &StatsArgs) -> anyhow::Result<(Vec<Record>, Group)> {
     let manifest = args.manifest.as_deref();
     let group: Group = match args.by {
         Grouping::Scene => part(|frame| frame.split_once('/')),
@@ -109,7 +109,7 @@ fn read(args: &Args) -> anyhow::Result<(Vec<Record>, Group)> {
     Ok((acts(&args.path, manifest)?, group))
 }
 
-fn by_stratum(args: &Args) -> anyhow::Result<(Vec<Record>, Group)> {
+fn by_stratum(args: &StatsArgs) -> anyhow::Result<(Vec<Record>, Group)> {
     if is_table(&args.path) {
         bail!("{}: --by stratum grades the frames; expected a data set, not a file of labels", args.path.display());
     }

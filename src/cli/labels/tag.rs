@@ -52,7 +52,7 @@ impl<T: FromStr<Err: std::fmt::Display>> FromStr for OrNone<T> {
 
 /// What `labels tag` is told.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct TagArgs {
     /// The data set.
     path: PathBuf,
     /// Who tags.
@@ -92,7 +92,7 @@ pub struct Args {
 /// # Errors
 /// Where the data set cannot be opened, a frame is not in it, a request is not understood, or the journal cannot be
 /// written. What was acknowledged before stays.
-pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &TagArgs) -> anyhow::Result<ExitCode> {
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = Frames::new(&dataset);
     if args.from_stdin {
@@ -116,7 +116,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 /// The journal that is written.
-fn journal(args: &Args, dataset: &Dataset) -> anyhow::Result<Journal> {
+fn journal(args: &TagArgs, dataset: &Dataset) -> anyhow::Result<Journal> {
     let place = LabelPlace::of(&dataset.info().root, dataset.fingerprint())?;
     if let Some(reason) = &place.reason {
         tracing::warn!("labels are kept in {}, because {reason}", place.folder.display());
@@ -126,7 +126,7 @@ fn journal(args: &Args, dataset: &Dataset) -> anyhow::Result<Journal> {
     Ok(journal)
 }
 
-impl Args {
+impl TagArgs {
     fn request(&self) -> Request {
         Request {
             frame: None,

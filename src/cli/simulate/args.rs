@@ -1,6 +1,6 @@
 //! What can be typed after `simulate`.
 
-use crate::simulate::{Action, Layout, Options, Preset};
+use crate::simulate::{Action, Options, ScenePreset, SimulatedLayout};
 use anyhow::Context as _;
 use clap::ValueEnum;
 use std::fmt::Write as _;
@@ -26,7 +26,7 @@ Examples:
 
 /// Write a synthetic data set with truth: people and rooms before an FMCW radar, from scatterers to ADC samples to maps.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct SimulateArgs {
     /// Folder to write into; it is made if it does not exist.
     pub out: PathBuf,
     /// Whose maps and files.
@@ -102,7 +102,7 @@ pub enum LayoutArg {
     Generic,
 }
 
-impl From<LayoutArg> for Layout {
+impl From<LayoutArg> for SimulatedLayout {
     fn from(typed: LayoutArg) -> Self {
         match typed {
             LayoutArg::Mmvr => Self::Mmvr,
@@ -127,7 +127,7 @@ pub enum PresetArg {
     F4,
 }
 
-impl From<PresetArg> for Preset {
+impl From<PresetArg> for ScenePreset {
     fn from(typed: PresetArg) -> Self {
         match typed {
             PresetArg::Easy => Self::Easy,
@@ -180,7 +180,7 @@ fn people(text: &str) -> Result<RangeInclusive<usize>, String> {
     if range.is_empty() { Err(fault()) } else { Ok(range) }
 }
 
-impl Args {
+impl SimulateArgs {
     /// As the library takes it.
     ///
     /// # Errors
@@ -209,8 +209,8 @@ impl Args {
         let words = |words: Vec<&str>| words.join(",");
         let mut text = format!(
             "mhp-inspector simulate DIR --layout {} --preset {} --frames {} --sequence-length {}",
-            Layout::from(self.layout).word(),
-            words(self.preset.iter().map(|&preset| Preset::from(preset).word()).collect()),
+            SimulatedLayout::from(self.layout).word(),
+            words(self.preset.iter().map(|&preset| ScenePreset::from(preset).word()).collect()),
             self.frames,
             self.sequence_length
         );

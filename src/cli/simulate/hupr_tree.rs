@@ -2,8 +2,8 @@
 //! HuPR's order of fourteen.
 
 use super::image::HUPR;
-use super::npz_frames::Truth;
-use super::plan::{Place, hupr_path};
+use super::npz_frames::StoredTruth;
+use super::plan::{FramePlace, hupr_path};
 use crate::dataset::npz::{ArrayView, write_deflated, write_npy};
 use crate::geometry::{Vec3, add, scale, sub};
 use crate::output::replace_file;
@@ -22,13 +22,13 @@ pub(super) struct Block {
 }
 
 /// The annotations of a sequence.
-pub(super) type Labels = Vec<Block>;
+pub(super) type Annotations = Vec<Block>;
 
 /// From the nose's height to the crown: HuPR's head is the top of the head, COCO has the ears.
 const CROWN: f64 = 1.6;
 
 pub(super) fn write(
-    place: Place<'_>,
+    place: FramePlace<'_>,
     device: &Device,
     raw: &RawFrame,
     frame: &SimulatedFrame,
@@ -47,7 +47,7 @@ pub(super) fn write(
     let reduced = |persons: &[Vec<Vec3>]| persons.iter().map(|joints| fourteen(joints)).collect();
     let truth =
         SimulatedFrame { joints: reduced(&frame.joints), velocities: reduced(&frame.velocities), ..frame.clone() };
-    write_deflated(&hupr_path(place, "truth", "npz"), &Truth::of(&truth, 14).arrays())?;
+    write_deflated(&hupr_path(place, "truth", "npz"), &StoredTruth::of(&truth, 14).arrays())?;
     // One person a frame: HuPR has no more.
     Ok(truth.joints.first().map(|joints| Block {
         image: format!("{:09}.jpg", place.2),
@@ -67,7 +67,7 @@ fn fourteen(coco: &[Vec3]) -> Vec<Vec3> {
 }
 
 /// The annotations of all sequences, in the order of their folders.
-pub(super) fn write_annotations(out: &Path, sequences: &[Labels]) -> anyhow::Result<()> {
+pub(super) fn write_annotations(out: &Path, sequences: &[Annotations]) -> anyhow::Result<()> {
     let path = out.join("hrnet_annot_train.json");
     let text = serde_json::to_string(sequences)?;
     let written = replace_file(&path, |out| out.write_all(text.as_bytes()));

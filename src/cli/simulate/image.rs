@@ -5,7 +5,7 @@ use crate::geometry::Vec3;
 
 /// A pinhole camera.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Camera {
+pub(super) struct ImageCamera {
     /// px.
     pub(super) focal: f64,
     /// Image centre (x, y), px.
@@ -15,13 +15,13 @@ pub(super) struct Camera {
 }
 
 /// MMVR's, from its published calibration.
-pub(super) const MMVR: Camera = Camera { focal: 379.476, centre: [322.457, 241.627], size: [640.0, 480.0] };
+pub(super) const MMVR: ImageCamera = ImageCamera { focal: 379.476, centre: [322.457, 241.627], size: [640.0, 480.0] };
 /// HuPR's images are 256 px square; its calibration is not published, 60° are taken.
-pub(super) const HUPR: Camera = Camera { focal: 221.7, centre: [128.0, 128.0], size: [256.0, 256.0] };
+pub(super) const HUPR: ImageCamera = ImageCamera { focal: 221.7, centre: [128.0, 128.0], size: [256.0, 256.0] };
 /// Skin beyond the joints, m.
 const MARGIN_M: f64 = 0.10;
 
-impl Camera {
+impl ImageCamera {
     /// A point of the world as (x to the right, y down), px.
     pub(super) fn pixel(&self, p: Vec3) -> [f64; 2] {
         let depth = p[0].max(0.05);

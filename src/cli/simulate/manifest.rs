@@ -4,7 +4,7 @@ use super::Style;
 use super::npz_frames::MANTISSA_BITS;
 use crate::body::Skeleton;
 use crate::radar::{Axis, PointSpread, Quantity, RadarConfig};
-use crate::simulate::{Layout, Recording};
+use crate::simulate::{Recording, SimulatedLayout};
 use serde::Serialize;
 use std::fmt::Write as _;
 
@@ -49,10 +49,10 @@ pub(super) fn text(recording: &Recording, style: Style<'_>) -> anyhow::Result<St
     };
     let layout = recording.options().layout;
     let own = match layout {
-        Layout::Mmvr | Layout::Xrf55 | Layout::Generic => "npz",
-        Layout::MmvrTree => "mmvr",
-        Layout::Hupr => "hupr",
-        Layout::Xrf55Stack => "xrf55",
+        SimulatedLayout::Mmvr | SimulatedLayout::Xrf55 | SimulatedLayout::Generic => "npz",
+        SimulatedLayout::MmvrTree => "mmvr",
+        SimulatedLayout::Hupr => "hupr",
+        SimulatedLayout::Xrf55Stack => "xrf55",
     };
     // HuPR's files and axes are those of its preset; its bones differ from COCO's.
     let manifest = Manifest {
@@ -61,7 +61,7 @@ pub(super) fn text(recording: &Recording, style: Style<'_>) -> anyhow::Result<St
         frames: (own == "npz").then_some(if recording.sequences() == 1 { "frames/*.npz" } else { "frames/*/*.npz" }),
         frame_rate_hz: recording.frame_rate_hz(),
         // Bones of a person of 1.70 m: the people of a recording differ in height.
-        skeleton: (layout != Layout::Hupr).then(|| crate::body::Build::default().skeleton()),
+        skeleton: (layout != SimulatedLayout::Hupr).then(|| crate::body::Build::default().skeleton()),
         radar: recording.radar(),
         view: recording.device().views.iter().map(view).collect(),
     };

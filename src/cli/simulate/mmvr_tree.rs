@@ -1,8 +1,8 @@
 //! MMVR's own folders: `d1s1/000/00000_{radar,bbox,pose,meta}.npz`, and `_truth` beside them. No masks.
 
 use super::image::MMVR;
-use super::npz_frames::{COCO_JOINTS, Truth, rounded};
-use super::plan::{Place, mmvr_path};
+use super::npz_frames::{COCO_JOINTS, StoredTruth, rounded};
+use super::plan::{FramePlace, mmvr_path};
 use crate::dataset::npz::{ArrayView, write_deflated};
 use crate::geometry::Vec3;
 use crate::radar::View;
@@ -11,7 +11,7 @@ use crate::simulate::SimulatedFrame;
 /// Skin beyond the joints, m.
 const MARGIN_M: f64 = 0.10;
 
-pub(super) fn write(place: Place<'_>, views: &[View], frame: &SimulatedFrame) -> anyhow::Result<()> {
+pub(super) fn write(place: FramePlace<'_>, views: &[View], frame: &SimulatedFrame) -> anyhow::Result<()> {
     let maps: Vec<Vec<f32>> = frame.maps.iter().map(|map| map.iter().map(|&x| rounded(x)).collect()).collect();
     let radar: Vec<(&str, ArrayView<'_>)> =
         views.iter().zip(&maps).map(|(view, map)| (&*view.array, ArrayView::f32(&view.shape(), map))).collect();
@@ -53,7 +53,7 @@ pub(super) fn write(place: Place<'_>, views: &[View], frame: &SimulatedFrame) ->
     write_deflated(&mmvr_path(place, "pose"), &[("kp", ArrayView::f32(&[people, 17, 3], &points))])?;
     let id = format!("{:05}", place.2);
     write_deflated(&mmvr_path(place, "meta"), &[("global_frame_id", ArrayView::text(&id))])?;
-    write_deflated(&mmvr_path(place, "truth"), &Truth::of(frame, COCO_JOINTS).arrays())?;
+    write_deflated(&mmvr_path(place, "truth"), &StoredTruth::of(frame, COCO_JOINTS).arrays())?;
     Ok(())
 }
 

@@ -12,11 +12,11 @@ mod npz_frames;
 mod plan;
 mod stacks;
 
-pub use args::{Args, HELP};
+pub use args::{HELP, SimulateArgs};
 
 use crate::dataset::MANIFEST_NAME;
 use crate::output::{FolderLock, Inputs, replace_file};
-use crate::simulate::{Layout, Recording, Sequence};
+use crate::simulate::{Recording, Sequence, SimulatedLayout};
 use anyhow::Context as _;
 use rayon::prelude::*;
 use std::path::Path;
@@ -26,7 +26,7 @@ use std::process::ExitCode;
 ///
 /// # Errors
 /// Where an option makes no sense, or the folder cannot be written or holds frames that would not be overwritten.
-pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
     let recording = Recording::new(&args.options()?)?;
     let bar = super::common::progress_bar(recording.len());
     let typed = args.typed();
@@ -67,8 +67,8 @@ pub fn write_data_set(
     let labels = sequences
         .par_iter()
         .map(|&number| write_sequence(out, recording, &recording.sequence(number), style.narrow, &done))
-        .collect::<anyhow::Result<Vec<hupr_tree::Labels>>>()?;
-    if recording.options().layout == Layout::Hupr {
+        .collect::<anyhow::Result<Vec<hupr_tree::Annotations>>>()?;
+    if recording.options().layout == SimulatedLayout::Hupr {
         hupr_tree::write_annotations(out, &labels)?;
     }
     let (path, text) = (out.join(MANIFEST_NAME), manifest::text(recording, style)?);
@@ -93,10 +93,10 @@ fn write_sequence(
     sequence: &Sequence,
     narrow: bool,
     done: &(impl Fn() + Sync),
-) -> anyhow::Result<hupr_tree::Labels> {
+) -> anyhow::Result<hupr_tree::Annotations> {
     let numbers: Vec<usize> = (0..recording.frames_of(sequence.index()).len()).collect();
     let views = &recording.device().views;
-    if recording.options().layout == Layout::Xrf55Stack {
+    if recording.options().layout == SimulatedLayout::Xrf55Stack {
         return stacks::write(out, sequence, numbers.len(), narrow, done).map(|()| Vec::new());
     }
     let write = |&number: &usize| -> anyhow::Result<Option<hupr_tree::Block>> {
@@ -104,8 +104,8 @@ fn write_sequence(
         let frame = sequence.processed(number, &raw);
         let place = (out, sequence.index(), number);
         let labels = match recording.options().layout {
-            Layout::Hupr => hupr_tree::write(place, recording.device(), &raw, &frame, narrow)?,
-            Layout::MmvrTree => mmvr_tree::write(place, views, &frame).map(|()| None)?,
+            SimulatedLayout::Hupr => hupr_tree::write(place, recording.device(), &raw, &frame, narrow)?,
+            SimulatedLayout::MmvrTree => mmvr_tree::write(place, views, &frame).map(|()| None)?,
             _ => npz_frames::write(&plan::npz_path(place, recording.sequences() == 1), views, &frame).map(|()| None)?,
         };
         done();

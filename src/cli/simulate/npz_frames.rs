@@ -14,7 +14,7 @@ pub(super) const COCO_JOINTS: usize = 17;
 
 pub(super) fn write(path: &Path, views: &[View], frame: &SimulatedFrame) -> Result<(), NpzError> {
     let maps: Vec<Vec<f32>> = frame.maps.iter().map(|map| map.iter().map(|&x| rounded(x)).collect()).collect();
-    let truth = Truth::of(frame, COCO_JOINTS);
+    let truth = StoredTruth::of(frame, COCO_JOINTS);
     let mut arrays: Vec<(&str, ArrayView<'_>)> =
         views.iter().zip(&maps).map(|(view, map)| (&*view.array, ArrayView::f32(&view.shape(), map))).collect();
     arrays.extend(truth.arrays());
@@ -22,7 +22,7 @@ pub(super) fn write(path: &Path, views: &[View], frame: &SimulatedFrame) -> Resu
 }
 
 /// What is true of a frame, as it is stored.
-pub(super) struct Truth<'a> {
+pub(super) struct StoredTruth<'a> {
     shape: [usize; 3],
     joints: Vec<f32>,
     velocities: Vec<f32>,
@@ -31,7 +31,7 @@ pub(super) struct Truth<'a> {
     scenario: &'a str,
 }
 
-impl<'a> Truth<'a> {
+impl<'a> StoredTruth<'a> {
     /// `joints` a person: an empty frame has as many as any other.
     pub(super) fn of(frame: &'a SimulatedFrame, joints: usize) -> Self {
         let flat =

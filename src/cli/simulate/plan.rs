@@ -1,33 +1,33 @@
 //! Where frames lie in the folder, and that nothing else of their kind lies there.
 
 use crate::dataset::XRF55_STEPS;
-use crate::simulate::{Layout, Recording};
+use crate::simulate::{Recording, SimulatedLayout};
 use anyhow::{Context as _, ensure};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// The data set's folder, the sequence, the frame's number in it.
-pub(super) type Place<'a> = (&'a Path, usize, usize);
+pub(super) type FramePlace<'a> = (&'a Path, usize, usize);
 
 /// `frames/s000/000000.npz`, or `frames/000000.npz` where there is one sequence only.
-pub(super) fn npz_path((out, sequence, number): Place<'_>, only: bool) -> PathBuf {
+pub(super) fn npz_path((out, sequence, number): FramePlace<'_>, only: bool) -> PathBuf {
     let folder = out.join("frames");
     let folder = if only { folder } else { folder.join(format!("s{sequence:03}")) };
     folder.join(format!("{number:06}.npz"))
 }
 
 /// MMVR's `d1s1/000/00000_<kind>.npz`.
-pub(super) fn mmvr_path((out, sequence, number): Place<'_>, kind: &str) -> PathBuf {
+pub(super) fn mmvr_path((out, sequence, number): FramePlace<'_>, kind: &str) -> PathBuf {
     out.join("d1s1").join(format!("{sequence:03}")).join(format!("{number:05}_{kind}.npz"))
 }
 
 /// HuPR's `single_1/<part>/000000000.<ending>`; sequences count from 1.
-pub(super) fn hupr_path((out, sequence, number): Place<'_>, part: &str, ending: &str) -> PathBuf {
+pub(super) fn hupr_path((out, sequence, number): FramePlace<'_>, part: &str, ending: &str) -> PathBuf {
     out.join(format!("single_{}", sequence + 1)).join(part).join(format!("{number:09}.{ending}"))
 }
 
 /// XRF55's `mmWave/01_01_01.npy`: volunteer, action, repetition; twenty repetitions an action.
-pub(super) fn stack_path((out, sequence, clip): Place<'_>) -> PathBuf {
+pub(super) fn stack_path((out, sequence, clip): FramePlace<'_>) -> PathBuf {
     out.join("mmWave").join(format!("01_{:02}_{:02}.npy", sequence + 1, clip + 1))
 }
 
@@ -38,14 +38,16 @@ pub(super) fn stack_truth_path(stack: &Path, step: usize) -> PathBuf {
 }
 
 /// Every file of a frame.
-fn files(layout: Layout, place: Place<'_>, only: bool) -> Vec<PathBuf> {
+fn files(layout: SimulatedLayout, place: FramePlace<'_>, only: bool) -> Vec<PathBuf> {
     match layout {
-        Layout::Mmvr | Layout::Xrf55 | Layout::Generic => vec![npz_path(place, only)],
-        Layout::MmvrTree => ["radar", "bbox", "pose", "meta", "truth"].map(|kind| mmvr_path(place, kind)).to_vec(),
-        Layout::Hupr => {
+        SimulatedLayout::Mmvr | SimulatedLayout::Xrf55 | SimulatedLayout::Generic => vec![npz_path(place, only)],
+        SimulatedLayout::MmvrTree => {
+            ["radar", "bbox", "pose", "meta", "truth"].map(|kind| mmvr_path(place, kind)).to_vec()
+        }
+        SimulatedLayout::Hupr => {
             vec![hupr_path(place, "hori", "npy"), hupr_path(place, "vert", "npy"), hupr_path(place, "truth", "npz")]
         }
-        Layout::Xrf55Stack => {
+        SimulatedLayout::Xrf55Stack => {
             let (out, sequence, number) = place;
             let stack = stack_path((out, sequence, number / XRF55_STEPS));
             vec![stack_truth_path(&stack, number % XRF55_STEPS), stack]
@@ -62,7 +64,7 @@ pub(super) fn prepare(out: &Path, recording: &Recording) -> anyhow::Result<()> {
     let layout = recording.options().layout;
     let lengths = (0..recording.sequences()).map(|sequence| recording.frames_of(sequence).len());
     ensure!(
-        layout != Layout::Xrf55Stack || lengths.clone().all(|length| length % XRF55_STEPS == 0),
+        layout != SimulatedLayout::Xrf55Stack || lengths.clone().all(|length| length % XRF55_STEPS == 0),
         "layout xrf55-stack stores {XRF55_STEPS} maps a file; expected --frames and --sequence-length to be multiples of it"
     );
     let only = recording.sequences() == 1;

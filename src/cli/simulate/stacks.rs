@@ -1,6 +1,6 @@
 //! XRF55's stacks: `mmWave/01_<sequence>_<clip>.npy`, (17, 256, 128), and the truth of each map beside them.
 
-use super::npz_frames::{COCO_JOINTS, Truth};
+use super::npz_frames::{COCO_JOINTS, StoredTruth};
 use super::plan::{stack_path, stack_truth_path};
 use crate::dataset::XRF55_STEPS;
 use crate::dataset::npz::{ArrayView, write_deflated, write_npy};
@@ -26,7 +26,7 @@ pub(super) fn write(
             .par_iter()
             .map(|&step| {
                 let frame = sequence.frame(clip * XRF55_STEPS + step);
-                write_deflated(&stack_truth_path(&path, step), &Truth::of(&frame, COCO_JOINTS).arrays())?;
+                write_deflated(&stack_truth_path(&path, step), &StoredTruth::of(&frame, COCO_JOINTS).arrays())?;
                 done();
                 Ok(frame.maps.into_iter().next().unwrap_or_default())
             })

@@ -3,8 +3,8 @@
 mod report;
 
 use super::common::{print, progress_bar};
-use crate::diagnose::{Calibration, Example, FrameSet, learn_curves};
-use crate::study::calibrate::{Judged, frame_count, judged};
+use crate::diagnose::{Calibration, EvidenceExample, FrameSet, learn_curves};
+use crate::study::calibrate::{JudgedFit, frame_count, judged};
 use anyhow::Context as _;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -66,23 +66,24 @@ pub(super) fn run(args: &TrainEvidenceArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn simulated(seeds: &[u64], sequences: usize) -> anyhow::Result<Vec<Judged>> {
+fn simulated(seeds: &[u64], sequences: usize) -> anyhow::Result<Vec<JudgedFit>> {
     let bar = progress_bar(frame_count(seeds, sequences));
     let found = judged(seeds, sequences, || bar.inc(1))?;
     bar.finish_and_clear();
     Ok(found)
 }
 
-fn table(args: &TrainEvidenceArgs, learned: &[Judged], held_out: &[Judged]) -> Calibration {
+fn table(args: &TrainEvidenceArgs, learned: &[JudgedFit], held_out: &[JudgedFit]) -> Calibration {
     let list = |seeds: &[u64]| seeds.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
-    let set = |role: &str, seeds: &[u64], fits: &[Judged]| FrameSet {
+    let set = |role: &str, seeds: &[u64], fits: &[JudgedFit]| FrameSet {
         role: role.to_owned(),
         seeds: seeds.to_vec(),
         sequences: args.sequences,
         frames: frame_count(seeds, args.sequences),
         fits: fits.len(),
     };
-    let examples = |judged: &[Judged]| judged.iter().map(|one| one.example.clone()).collect::<Vec<Example>>();
+    let examples =
+        |judged: &[JudgedFit]| judged.iter().map(|one| one.example.clone()).collect::<Vec<EvidenceExample>>();
     let command = format!(
         "cargo run --release --no-default-features --features train -- train-evidence --out assets --sequences {} --seeds {} \
          --test-seeds {}",

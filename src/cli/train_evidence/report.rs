@@ -2,8 +2,8 @@
 
 use crate::diagnose::{Calibration, Curve, Figures, chosen_examples};
 use crate::labels::Tag;
-use crate::simulate::Layout;
-use crate::study::calibrate::{FITS, Judged, LAYOUTS, SCENARIOS};
+use crate::simulate::SimulatedLayout;
+use crate::study::calibrate::{FITS, JudgedFit, LAYOUTS, SCENARIOS};
 use std::fmt::Write as _;
 
 /// Bins of the predicted probability.
@@ -15,7 +15,7 @@ const PITCH: f64 = 190.0;
 const MARGIN: [f64; 2] = [34.0, 42.0];
 
 /// Score and whether the mode is there, of the fits that a curve judges.
-fn scores(curve: &Curve, held_out: &[Judged], taken: impl Fn(&Judged) -> bool) -> Vec<(f64, bool)> {
+fn scores(curve: &Curve, held_out: &[JudgedFit], taken: impl Fn(&JudgedFit) -> bool) -> Vec<(f64, bool)> {
     let examples: Vec<_> = held_out.iter().filter(|one| taken(one)).map(|one| one.example.clone()).collect();
     let names: Vec<&str> = curve.inputs.iter().map(|input| input.name.as_str()).collect();
     let chosen = chosen_examples(curve.mode, &names, &examples).into_iter();
@@ -54,7 +54,7 @@ fn title(curve: &Curve) -> String {
 }
 
 /// Observed share by predicted probability, a panel a curve; both of the paper's fit, whose frames are independent.
-pub(super) fn diagram(table: &Calibration, held_out: &[Judged]) -> String {
+pub(super) fn diagram(table: &Calibration, held_out: &[JudgedFit]) -> String {
     let width = MARGIN[1] + PITCH * table.curves.len() as f64;
     let height = MARGIN[0] + SIDE + 48.0;
     let mut svg = format!(
@@ -119,7 +119,7 @@ fn panel(svg: &mut String, left: f64, title: &str, bins: &[(f64, f64, usize)], f
 }
 
 /// Figures, reliability and confusion as Markdown.
-pub(super) fn tables(table: &Calibration, held_out: &[Judged]) -> String {
+pub(super) fn tables(table: &Calibration, held_out: &[JudgedFit]) -> String {
     let mut text = format!("Made by `{}`", table.command);
     for set in &table.sets {
         let seeds: Vec<String> = set.seeds.iter().map(ToString::to_string).collect();
@@ -135,7 +135,7 @@ pub(super) fn tables(table: &Calibration, held_out: &[Judged]) -> String {
         let _ = writeln!(text, "| | | | after | {}", figures(&curve.after));
     }
     text += "\nAUC after, by layout and by fit:\n\n| mode |";
-    let columns = LAYOUTS.map(Layout::word).into_iter().chain(FITS);
+    let columns = LAYOUTS.map(SimulatedLayout::word).into_iter().chain(FITS);
     let columns: Vec<&str> = columns.collect();
     let _ = writeln!(text, " {} |\n|---|{}", columns.join(" | "), "---|".repeat(columns.len()));
     for curve in &table.curves {
@@ -160,7 +160,7 @@ fn figures(figures: &Figures) -> String {
 }
 
 /// Rows: what was simulated; columns: share of the fits of which each mode scores above 0.5.
-fn confusion(text: &mut String, table: &Calibration, held_out: &[Judged]) {
+fn confusion(text: &mut String, table: &Calibration, held_out: &[JudgedFit]) {
     *text += "\nShare of the fits that score above 0.5, before → after, by what was simulated (–: never judged):\n\n\
               | simulated | F1 | F2 | F3 | F4 |\n|---|---|---|---|---|\n";
     for (scenario, (name, ..)) in SCENARIOS.iter().enumerate() {
@@ -185,7 +185,7 @@ fn confusion(text: &mut String, table: &Calibration, held_out: &[Judged]) {
     }
 }
 
-fn reliability(text: &mut String, table: &Calibration, held_out: &[Judged]) {
+fn reliability(text: &mut String, table: &Calibration, held_out: &[JudgedFit]) {
     *text += "\nReliability on held-out seeds, the paper's fit: mean score of a bin → observed share (frames):\n\n| mode | bins |\n|---|---|\n";
     for curve in &table.curves {
         let found = scores(curve, held_out, |one| one.fit == 0);

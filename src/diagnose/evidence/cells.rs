@@ -1,6 +1,6 @@
 //! Sets of cells of a map: boxes around them and connected patches.
 
-use super::Place;
+use super::FindingPlace;
 use crate::mhp::for_neighbours;
 
 /// The box around flat cells of a map of `shape`; `None` where there are none.
@@ -21,8 +21,8 @@ pub(super) fn bounds(shape: &[usize], cells: &[usize]) -> Option<(Vec<usize>, Ve
 }
 
 /// The box around flat cells as a place.
-pub(super) fn place(view: usize, shape: &[usize], cells: &[usize]) -> Option<Place> {
-    bounds(shape, cells).map(|(lo, hi)| Place::Cells { view, lo, hi })
+pub(super) fn place(view: usize, shape: &[usize], cells: &[usize]) -> Option<FindingPlace> {
+    bounds(shape, cells).map(|(lo, hi)| FindingPlace::Cells { view, lo, hi })
 }
 
 /// The index along each axis of a flat cell.

@@ -32,9 +32,9 @@
 //! `steadiness_pair`); in a single frame with a Doppler axis on the slowness.
 
 use super::cells::{largest_patch, place};
+use super::number_text::{cell_box, joint, percent};
 use super::resolution::{FWHM, JointCells, radial_mps};
-use super::words::{cell_box, joint, percent};
-use super::{EvidenceInput, Finding, Found, Measure, Past, Place, STATIC_FRAMES, falling, masks_of, mean};
+use super::{EvidenceInput, Finding, FindingPlace, Found, Measure, Past, STATIC_FRAMES, falling, masks_of, mean};
 use crate::labels::Tag;
 use crate::mhp::percentile;
 use crate::radar::{AxisKind, View};
@@ -155,7 +155,11 @@ fn by_doppler(input: &EvidenceInput<'_>, view: &View) -> Option<Measured> {
         joint(input.problem, input.params, fastest),
         fastest_mps.abs()
     );
-    cells.is_finite().then(|| Measured { rms_mps, cells, finding: Finding::new(text, Some(Place::Joint(fastest))) })
+    cells.is_finite().then(|| Measured {
+        rms_mps,
+        cells,
+        finding: Finding::new(text, Some(FindingPlace::Joint(fastest))),
+    })
 }
 
 /// Root mean square of v_r, the fastest joint and its v_r, m/s.
@@ -178,7 +182,7 @@ fn fitted_velocity(input: &EvidenceInput<'_>) -> Option<Finding> {
         mps.abs(),
         joint(input.problem, input.params, fastest)
     );
-    cell_mps.is_finite().then(|| Finding::new(text, Some(Place::Joint(fastest))))
+    cell_mps.is_finite().then(|| Finding::new(text, Some(FindingPlace::Joint(fastest))))
 }
 
 /// The change since the frame before.
@@ -235,7 +239,7 @@ fn view_change(
         percent(if level > 0.0 { change / level } else { 0.0 }),
         times(ratio)
     );
-    let mut findings = vec![Finding::new(text, Some(Place::Frame(before)))];
+    let mut findings = vec![Finding::new(text, Some(FindingPlace::Frame(before)))];
     findings.extend(where_it_changed(index, view, &changes, inside));
     (!ratio.is_nan()).then_some((ratio, findings))
 }
@@ -251,7 +255,7 @@ fn where_it_changed(index: usize, view: &View, changes: &[f64], inside: &[bool])
     let largest = changes.iter().copied().fold(0.0, f64::max);
     let strong: Vec<bool> = changes.iter().map(|&c| c > 0.0 && c >= SHOWN_SHARE * largest).collect();
     let place = place(index, &view.shape(), &largest_patch(&view.shape(), &strong))?;
-    let Place::Cells { lo, hi, .. } = &place else { return None };
+    let FindingPlace::Cells { lo, hi, .. } = &place else { return None };
     let text = format!("{}: it changed most at {}.", view.array, cell_box(view, lo, hi));
     Some(Finding::new(text, Some(place)))
 }

@@ -23,16 +23,16 @@ mod cells;
 mod counted;
 mod low_motion;
 mod near_field;
+mod number_text;
 mod resolution;
 mod static_reflector;
 mod superposition;
 #[cfg(feature = "train")]
 mod train;
-mod words;
 
 pub use calibration::{Calibration, CalibrationError, Curve, Figures, FrameSet, Input, with_share};
 #[cfg(feature = "train")]
-pub use train::{Example, Measured, chosen as chosen_examples, learn as learn_curves};
+pub use train::{EvidenceExample, Measured, chosen as chosen_examples, learn as learn_curves};
 
 use crate::body::Pppr;
 use crate::config::FitConfig;
@@ -104,13 +104,13 @@ pub struct Finding {
     /// Plain words, numbers with units.
     pub text: String,
     /// Where it is seen.
-    pub place: Option<Place>,
+    pub place: Option<FindingPlace>,
 }
 
 /// Where a finding is seen.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Place {
+pub enum FindingPlace {
     /// A box of cells of one view's map.
     Cells {
         /// Index of the view.
@@ -127,7 +127,7 @@ pub enum Place {
 }
 
 impl Finding {
-    fn new(text: impl Into<String>, place: Option<Place>) -> Self {
+    fn new(text: impl Into<String>, place: Option<FindingPlace>) -> Self {
         Self { text: text.into(), place }
     }
 }

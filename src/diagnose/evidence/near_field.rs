@@ -14,9 +14,9 @@
 //! raw value are lower bounds. Each view is judged by its finer angle and its own range; the view with the highest value counts.
 //! The score rests on the nearness, which is the raw value's own order.
 
+use super::number_text::{joint, length};
 use super::resolution::{FWHM, Resolution, echo};
-use super::words::{joint, length};
-use super::{EvidenceInput, Finding, Found, Measure, Place, falling};
+use super::{EvidenceInput, Finding, FindingPlace, Found, Measure, falling};
 use crate::body::{Group, Pppr};
 use crate::geometry::{Mat3, Vec3, dot, mat_t_vec, norm, rotation_from_quaternion};
 use crate::labels::Tag;
@@ -88,7 +88,7 @@ fn nearest(input: &EvidenceInput<'_>, seen: &Seen<'_>) -> Finding {
         length(seen.fraunhofer_m),
         EDGE_PHASE_DEG * seen.fraunhofer_m / seen.range_m.max(NEAREST_M)
     );
-    Finding::new(text, Some(Place::Joint(seen.joint)))
+    Finding::new(text, Some(FindingPlace::Joint(seen.joint)))
 }
 
 /// Where D comes from, once for all views of one width.
@@ -137,7 +137,7 @@ fn smear(input: &EvidenceInput<'_>, seen: &Seen<'_>) -> Finding {
         length(smear_m),
         length(own_m)
     );
-    Finding::new(text, Some(Place::Joint(seen.joint)))
+    Finding::new(text, Some(FindingPlace::Joint(seen.joint)))
 }
 
 /// Standard deviation of a joint's own Gaussian along `direction` of the view frame, m: √(eᵀ R S Sᵀ Rᵀ e).

@@ -21,9 +21,11 @@
 //! does not. The second is how much stronger than the body the strongest such echo is.
 
 use super::cells::{largest_patch, members, place};
+use super::number_text::{cell_box, cells, percent};
 use super::resolution::JointCells;
-use super::words::{cell_box, cells, percent};
-use super::{EvidenceInput, Finding, Found, Measure, Past, Place, STATIC_FRAMES, STATIC_KAPPA_PCT, masks_of, mean};
+use super::{
+    EvidenceInput, Finding, FindingPlace, Found, Measure, Past, STATIC_FRAMES, STATIC_KAPPA_PCT, masks_of, mean,
+};
 use crate::labels::Tag;
 use crate::mhp::{Masks, percentile};
 use crate::radar::View;
@@ -138,7 +140,7 @@ impl Seen<'_> {
         super::cells::bounds(&self.view.shape(), &self.patch)
     }
 
-    fn place_of(&self, cells: &[usize]) -> Option<Place> {
+    fn place_of(&self, cells: &[usize]) -> Option<FindingPlace> {
         place(self.index, &self.view.shape(), cells)
     }
 }
@@ -193,7 +195,7 @@ fn patch(seen: &Seen<'_>) -> Option<Finding> {
         cell_box(seen.view, &lo, &hi),
         percent(missed as f64 / seen.patch.len().max(1) as f64)
     );
-    Some(Finding::new(text, Some(Place::Cells { view: seen.index, lo, hi })))
+    Some(Finding::new(text, Some(FindingPlace::Cells { view: seen.index, lo, hi })))
 }
 
 /// How much of the static part lies within a resolution cell of a joint.

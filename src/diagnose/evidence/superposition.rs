@@ -25,9 +25,9 @@
 
 use super::cells::{members, place};
 use super::counted::count;
+use super::number_text::{cell_box, length, percent};
 use super::resolution::{FWHM, Resolution};
-use super::words::{cell_box, length, percent};
-use super::{EvidenceInput, Finding, Found, Measure, Past, Place, falling};
+use super::{EvidenceInput, Finding, FindingPlace, Found, Measure, Past, falling};
 use crate::body::{Group, Pppr, PpprShape};
 use crate::config::{FitConfig, Summation};
 use crate::geometry::{Vec3, add, flat_distance, norm, scale, sub};
@@ -138,7 +138,7 @@ fn closest_boxes(index: usize, view: &View, boxes: &[[f64; 4]]) -> Option<(f64, 
     let lo = (0..2).map(|k| (k, corners(k).into_iter().fold(f64::INFINITY, f64::min))).map(cell).collect();
     let hi = (0..2).map(|k| (k, corners(k).into_iter().fold(f64::NEG_INFINITY, f64::max))).map(cell).collect();
     let text = format!("{}: two labelled boxes share {} of the smaller one.", view.array, percent(share));
-    Some((share, Finding::new(text, Some(Place::Cells { view: index, lo, hi }))))
+    Some((share, Finding::new(text, Some(FindingPlace::Cells { view: index, lo, hi }))))
 }
 
 /// The common area of two boxes as a share of the smaller one.
@@ -173,7 +173,7 @@ fn by_maps(input: &EvidenceInput<'_>) -> Judged {
         };
         let overlap = alone[a][k].as_ref().zip(alone[b][k].as_ref()).and_then(|(p, q)| overlap(k, view, p, q));
         let at = match &overlap {
-            Some(Place::Cells { lo, hi, .. }) => format!(", at {}", cell_box(view, lo, hi)),
+            Some(FindingPlace::Cells { lo, hi, .. }) => format!(", at {}", cell_box(view, lo, hi)),
             _ => String::new(),
         };
         Finding::new(format!("{}: they share {} of their echo{at}; {apart}.", view.array, percent(share)), overlap)
@@ -216,7 +216,7 @@ fn common(p: &[f64], q: &[f64]) -> Option<f64> {
 }
 
 /// The box around the cells where both are strong.
-fn overlap(index: usize, view: &View, p: &[f64], q: &[f64]) -> Option<Place> {
+fn overlap(index: usize, view: &View, p: &[f64], q: &[f64]) -> Option<FindingPlace> {
     let both: Vec<f64> = p.iter().zip(q).map(|(p, q)| p.min(*q)).collect();
     let largest = both.iter().copied().fold(0.0, f64::max);
     let strong: Vec<bool> = both.iter().map(|&h| h > 0.0 && h >= SHOWN_SHARE * largest).collect();

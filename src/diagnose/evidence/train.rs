@@ -25,7 +25,7 @@ pub type Measured = [Option<(f64, Vec<Measure>)>; 4];
 
 /// A judged fit whose modes are known.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Example {
+pub struct EvidenceExample {
     /// Seed of its recording.
     pub seed: u64,
     /// The mode that it was made with.
@@ -34,7 +34,7 @@ pub struct Example {
     pub judged: Measured,
 }
 
-impl Example {
+impl EvidenceExample {
     /// What is known of a mode.
     pub fn of(&self, mode: Tag) -> Option<&(f64, Vec<Measure>)> {
         let index = Tag::MODES.iter().position(|other| *other == mode)?;
@@ -46,7 +46,7 @@ impl Example {
 type Row = (Vec<f64>, bool);
 
 /// All curves, learned from some examples and reported on others.
-pub fn learn(learned: &[Example], held_out: &[Example]) -> Vec<Curve> {
+pub fn learn(learned: &[EvidenceExample], held_out: &[EvidenceExample]) -> Vec<Curve> {
     let curve = |(mode, inputs): &(Tag, &[&str])| {
         let mut curve = fitted(*mode, inputs, learned);
         let (mut before, mut after) = (Vec::new(), Vec::new());
@@ -61,7 +61,7 @@ pub fn learn(learned: &[Example], held_out: &[Example]) -> Vec<Curve> {
 }
 
 /// The examples that a curve can judge: uncalibrated score, measures, whether they have the mode.
-pub fn chosen<'a>(mode: Tag, inputs: &[&str], examples: &'a [Example]) -> Vec<(f64, &'a [Measure], bool)> {
+pub fn chosen<'a>(mode: Tag, inputs: &[&str], examples: &'a [EvidenceExample]) -> Vec<(f64, &'a [Measure], bool)> {
     let judged = examples.iter().filter_map(|example| {
         let (raw, measures) = example.of(mode)?;
         let known = inputs.iter().all(|name| !value(measures, name).is_nan());
@@ -70,9 +70,9 @@ pub fn chosen<'a>(mode: Tag, inputs: &[&str], examples: &'a [Example]) -> Vec<(f
     judged.collect()
 }
 
-fn fitted(mode: Tag, inputs: &[&str], learned: &[Example]) -> Curve {
+fn fitted(mode: Tag, inputs: &[&str], learned: &[EvidenceExample]) -> Curve {
     let rows = |taken: &dyn Fn(u64) -> bool| -> Vec<Row> {
-        let examples: Vec<Example> = learned.iter().filter(|example| taken(example.seed)).cloned().collect();
+        let examples: Vec<EvidenceExample> = learned.iter().filter(|example| taken(example.seed)).cloned().collect();
         let of = |measures: &[Measure]| inputs.iter().map(|name| value(measures, name)).collect();
         chosen(mode, inputs, &examples).into_iter().map(|(_, measures, with)| (of(measures), with)).collect()
     };

@@ -1,7 +1,7 @@
 //! CSV as records.
 
 use super::check::check;
-use super::{COLUMNS, Row, Table, TableError, machine_column, shortened};
+use super::{COLUMNS, LabelRow, ReadTable, TableError, machine_column, shortened};
 use crate::escape::from_cell;
 use crate::labels::{CellRegion, FrameId, Judged, Label, Record, Tag, Tags, Verdict};
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use std::str::FromStr;
 const LONGEST: usize = 1000;
 
 /// Reads header and rows.
-pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Table, TableError> {
+pub(super) fn read(bytes: &[u8], path: &Path) -> Result<ReadTable, TableError> {
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
     let header = reader.byte_headers().map_err(|error| row_error(&error, path))?.clone();
     let (columns, unknown) = columns(&header, path)?;
@@ -24,10 +24,10 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Table, TableError> {
             let message = format!("{} cells; the header has {}", cells.len(), header.len());
             return Err(TableError::Row { line, message, path: path.to_owned() });
         }
-        rows.push(Row { line, record: Cells { row: &cells, columns: &columns, line, path }.record()? });
+        rows.push(LabelRow { line, record: Cells { row: &cells, columns: &columns, line, path }.record()? });
     }
     let note = |name: &String| format!("column `{name}` is passed over; it is none of a table of labels");
-    Ok(Table { rows, notes: unknown.iter().map(note).collect() })
+    Ok(ReadTable { rows, notes: unknown.iter().map(note).collect() })
 }
 
 fn row_error(error: &csv::Error, path: &Path) -> TableError {

@@ -1,25 +1,25 @@
 //! Records as a JSON array.
 
 use super::check::check;
-use super::{Row, Table, TableError, at_most};
+use super::{LabelRow, ReadTable, TableError, at_most};
 use crate::labels::Record;
 use std::io::Write;
 use std::path::Path;
 
 /// Reads an array of records.
-pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Table, TableError> {
+pub(super) fn read(bytes: &[u8], path: &Path) -> Result<ReadTable, TableError> {
     let failed = |error: serde_json::Error| {
         // The place stands at the end, and what stands before may be as long as the file.
         let (line, column, message) = (error.line(), error.column(), at_most(100, &error.to_string()));
         TableError::Json { message: format!("line {line}, sign {column}: {message}"), path: path.to_owned() }
     };
     let records: Vec<Record> = serde_json::from_slice(bytes).map_err(failed)?;
-    let rows: Vec<Row> = (1..).zip(records).map(|(line, record)| Row { line, record }).collect();
-    for Row { line, record } in &rows {
+    let rows: Vec<LabelRow> = (1..).zip(records).map(|(line, record)| LabelRow { line, record }).collect();
+    for LabelRow { line, record } in &rows {
         let wrong = |(column, message)| TableError::Cell { line: *line, column, message, path: path.to_owned() };
         check(record).map_err(wrong)?;
     }
-    Ok(Table { rows, notes: Vec::new() })
+    Ok(ReadTable { rows, notes: Vec::new() })
 }
 
 /// One record a line, so that tools for text see what changed.

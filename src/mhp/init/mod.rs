@@ -1,7 +1,7 @@
 //! Initialisation from the maps alone; paper section 4.1, and for several people 4.4.
 //!
 //! 1. Background off, and where frames around are known all that stands still, unless the settings keep them; local maxima
-//!    above an adaptive percentile ([`evidence`]).
+//!    above an adaptive percentile ([`context`]).
 //! 2. P: peaks of different views are paired where their coordinates agree on one point in space, and the points are
 //!    grouped by hierarchical clustering ([`place`]).
 //! 3. A standing body is tried at every group, at several heights and depths. The place where all views show
@@ -9,55 +9,49 @@
 //!    of the paper the strongest group wins as it is, and the next step is left out.
 //! 4. The body's middle is that of what all views show lit around the place; its height that of feet and head.
 //! 5. V: velocities from the Doppler axis or the intensity gradients ([`velocity`]); heading, where asked for, from the
-//!    places in the frames around ([`motion`]).
-//! 6. Every joint gets its Gaussian ([`scatterers`]), and the start is spoiled where the settings ask for it
+//!    places in the frames around ([`context`]).
+//! 6. Every joint gets its Gaussian ([`scatterers`]), and the start is perturbed where the settings ask for it
 //!    ([`perturb`]).
 //!
 //! Switches beside the default setting refine the start: where counting finds the one person, behind the skin, on the
-//! line through the frames around, as high as floor and head say in all of them ([`height`]), in the posture that fits
+//! line through the frames around, as high as floor and head say in all of them ([`context`]), in the posture that fits
 //! ([`pose`]), with the limbs where simulated people have them who look alike ([`learned`]). What it is without them is
-//! kept beside it. The evidence is worked out once for a problem ([`surroundings`]).
+//! kept beside it. What the maps show is worked out once for a problem ([`context`]). A warm start goes where the persons of
+//! the frame before went ([`warm`]).
 //!
 //! Nothing here reads a label.
 
-mod evidence;
 mod find;
-mod height;
-mod layout;
 mod learned;
-mod locate;
-mod motion;
+mod notes;
 mod perturb;
 mod place;
 mod pose;
 mod scatterers;
-mod surroundings;
-mod template;
 mod velocity;
+mod warm;
 
-pub use evidence::Peak;
 pub use learned::LimbMap;
 #[cfg(feature = "train")]
-pub use learned::{Lesson as LimbLesson, learn as learn_limbs};
-pub(super) use surroundings::{Cached, Reading, Surroundings};
+pub use learned::{LimbLesson, learn as learn_limbs};
+pub use warm::predict;
 
+use super::context::{
+    self, Expectation, Peak, SaliencyMap, Sighting, Stature, Track, apart_m, behind_skin, bent_if_below, near,
+};
+use super::template::Template;
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
-use crate::config::{FitConfig, GradientVelocity, Height, Limbs, Place, Summation, WarmStart, Yaw};
-use crate::geometry::{Vec3, add, flat_distance, norm, scale, sub};
-use evidence::Evidence;
-use find::{apart_m, centre, find_one, middle_of_views, near};
-use height::{Expectation, Stature};
-use motion::{Sighting, Track};
+use crate::config::{FitConfig, Height, Limbs, Place, Summation, Yaw};
+use crate::geometry::{Vec3, flat_distance, norm, sub};
+use find::{find_one, middle_of_views};
+use notes::notes_of;
 use pose::Posture;
-use scatterers::Dress;
+use scatterers::ScattererModel;
 use std::borrow::Cow;
 use std::sync::Arc;
-use template::Template;
 use velocity::{Radial, Source};
 
-/// Nobody in a room is faster, m/s: a farther jump is somebody else.
-const FASTEST_MPS: f64 = 4.0;
 /// Steps in which a posture's place is looked for, m.
 const POSTURE_STEP_M: f64 = 0.06;
 const MOST_STEPS: usize = 12;
@@ -180,16 +174,16 @@ pub fn initialise_people(
     config: &FitConfig,
     seeds: &[Vec3],
 ) -> Result<Initialisation, FitError> {
-    let (evidence, peaks) = shown(problem, config);
-    let evidence = evidence.as_ref();
+    let (maps, peaks) = shown(problem, config);
+    let maps = maps.as_ref();
     let template = Arc::new(Template::new(&problem.skeleton));
     let mut notes: Vec<String> = (0..problem.views.len())
         .filter(|&k| problem.filled_cells(k) > 0)
         .map(|k| format!("{}: {} missing cells filled", problem.views[k].array, problem.filled_cells(k)))
         .collect();
     let seen = |(at, expected): (Vec3, Expectation)| (at, Some(expected));
-    let nearby = |k: usize| seen(near(problem, evidence, seeds, k));
-    let mut alone = || find_one(problem, config.place, evidence, &template, &peaks, &mut notes).map(seen);
+    let nearby = |k: usize| seen(near(&problem.views, maps, seeds, k));
+    let mut alone = || find_one(problem, config.place, maps, &template, &peaks, &mut notes).map(seen);
     let found = match seeds {
         _ if !config.init.position => vec![(middle_of_views(problem), None)],
         [] => vec![alone()?],
@@ -199,7 +193,7 @@ pub fn initialise_people(
     let places: Vec<Vec3> = found.iter().map(|(at, _)| *at).collect();
     let person = |at: Vec3, expected: Option<Expectation>, apart_m: f64| {
         let here = Sighting { t_s: 0.0, at, lit_m: expected.and_then(|expected| expected.lit) };
-        let track = followed(config).then(|| motion::track(problem, config, here, apart_m)).flatten();
+        let track = followed(config).then(|| context::track(problem.context(config), here, apart_m)).flatten();
         let radial = velocity::radial(problem, config, at);
         Person { at, expected, track, radial, apart_m, posture: Posture::Standing, body: Arc::clone(&template) }
     };
@@ -220,15 +214,15 @@ pub fn initialise_people(
     if config.starts > 1 {
         choose_postures(problem, config, &template, &mut persons)?;
     }
-    let dress = Dress::new(&problem.skeleton, config.scatterers);
-    let mut params = assemble(problem, config, &dress, &persons);
+    let model = ScattererModel::new(&problem.skeleton, config.scatterers);
+    let mut params = assemble(problem, config, &model, &persons);
     let moved_m: Vec<f64> =
         persons.iter().enumerate().map(|(k, person)| mean_way_m(&params, k, &person.posed(problem, config))).collect();
-    let mut unrefined = assemble(problem, &unrefined(config), &dress, &own);
+    let mut unrefined = assemble(problem, &unrefined(config), &model, &own);
     for start in [&mut params, &mut unrefined] {
-        perturb::spoil(problem, &config.init, start);
+        perturb::perturb(problem, &config.init, start);
     }
-    notes.extend(persons.iter().zip(moved_m).flat_map(|(person, moved_m)| tell(person, config, moved_m)));
+    notes.extend(persons.iter().zip(moved_m).flat_map(|(person, moved_m)| notes_of(person, config, moved_m)));
     Ok(Initialisation { params, unrefined, peaks, notes })
 }
 
@@ -241,7 +235,7 @@ fn choose_postures(
     persons: &mut [Person],
 ) -> Result<(), FitError> {
     let config = FitConfig { summation: Summation::Incoherent, w_time: 0.0, limbs: Limbs::Posture, ..*config };
-    let dress = Dress::new(&problem.skeleton, config.scatterers);
+    let model = ScattererModel::new(&problem.skeleton, config.scatterers);
     for k in 0..persons.len() {
         let walks = persons[k].walks();
         let stature = persons[k].stature(problem, &config).filter(|_| !walks);
@@ -250,7 +244,7 @@ fn choose_postures(
         for (posture, better) in tried {
             let posed = Arc::new(pose::posed(template, &problem.skeleton, posture));
             let own = |at: Vec3| Person { at, posture, body: Arc::clone(&posed), ..persons[k].clone() };
-            let body = |at: Vec3| assemble(problem, &config, &dress, &[own(at)]);
+            let body = |at: Vec3| assemble(problem, &config, &model, &[own(at)]);
             let at = persons[k].at;
             let objective = Objective::new(Arc::clone(problem), config, Precision::F32, &body(at))?;
             let lowest = lowest_near(at, POSTURE_STEP_M, |p| objective.em_loss(&body(p)));
@@ -280,77 +274,19 @@ fn postures(
     let Some(top_m) = stature.and_then(|stature| stature.top_m) else { return tried.collect() };
     // Where the head's height is known, it says how far a body is bent.
     let upright = tried.filter(|(posture, _)| !matches!(posture, Posture::Bent(_)));
-    upright.chain([(pose::bent(template, &problem.skeleton, top_m), height::bent_if_below(top_m, speeds))]).collect()
+    upright.chain([(pose::bent(template, &problem.skeleton, top_m), bent_if_below(top_m, speeds))]).collect()
 }
 
-/// What a start sees of its frame: the evidence and its peaks, less what the settings ask to miss.
-fn shown<'a>(problem: &'a Problem, config: &FitConfig) -> (Cow<'a, [Evidence]>, Vec<Peak>) {
-    let evidence = problem.surroundings(config).now.as_slice();
-    let peaks: Vec<Peak> = evidence.iter().flat_map(Evidence::peaks).collect();
+/// What a start sees of its frame: the saliency of its maps and its peaks, less what the settings ask to miss.
+fn shown<'a>(problem: &'a Problem, config: &FitConfig) -> (Cow<'a, [SaliencyMap]>, Vec<Peak>) {
+    let maps = problem.context(config).now.as_slice();
+    let peaks: Vec<Peak> = maps.iter().flat_map(SaliencyMap::peaks).collect();
     let (kept, missed) = perturb::missed(problem, &config.init, peaks);
     if missed.is_empty() {
-        return (Cow::Borrowed(evidence), kept);
+        return (Cow::Borrowed(maps), kept);
     }
-    let of_view = |(k, view): (usize, &Evidence)| view.without(missed.iter().filter(|peak| peak.view == k));
-    (Cow::Owned(evidence.iter().enumerate().map(of_view).collect()), kept)
-}
-
-/// A warm start: the persons of the frame before, moved as the maps of the two frames say that each of them moved, and
-/// spoiled where the settings ask for it. Without that frame among those around, or with [`WarmStart::AsLeft`], they stay
-/// where they are.
-pub fn predict(problem: &Problem, config: &FitConfig, before: &Pppr) -> Pppr {
-    let mut params = before.clone();
-    if config.warm_start == WarmStart::Moved {
-        follow(problem, config, &mut params);
-    }
-    perturb::spoil(problem, &config.init, &mut params);
-    params
-}
-
-/// Moves the persons of the frame before as the maps of the two frames say.
-fn follow(problem: &Problem, config: &FitConfig, params: &mut Pppr) {
-    let surroundings = problem.surroundings(config);
-    let Some((t_s, then)) = surroundings.around(problem).rev().find(|(t_s, _)| *t_s < 0.0) else { return };
-    let ((now, _), then) = (shown(problem, config), then());
-    let now = now.as_ref();
-    let joints = params.shape().joints;
-    let places = super::region::centres(params);
-    for (person, &at) in places.iter().enumerate() {
-        let apart_m = apart_m(&places, person);
-        let (from, _) = centre(problem, then, at, apart_m);
-        let way = sub(centre(problem, now, from, apart_m).0, from);
-        let far = way[0].hypot(way[1]) > FASTEST_MPS * -t_s;
-        if far || !way.iter().all(|x| x.is_finite()) {
-            continue;
-        }
-        for joint in person * joints..(person + 1) * joints {
-            // Heights are read too coarsely to follow them from frame to frame.
-            let moved = add(params.position(joint), [way[0], way[1], 0.0]);
-            params.set_vec3(Group::Position, joint, moved);
-        }
-    }
-}
-
-/// Where a line through each person's places in this frame and those around says that the mean of its joints is, world
-/// frame, m; a person whom no frame around shows stays where it is. Empty without frames around.
-pub(super) fn anchors(problem: &Problem, config: &FitConfig, params: &Pppr) -> Vec<Vec3> {
-    if problem.neighbours_in(config.frames_around).is_empty() {
-        return Vec::new();
-    }
-    let (joints, template) = (params.shape().joints.max(1), Template::new(&problem.skeleton));
-    let middles = super::region::centres(params);
-    let of_person = |person: usize| {
-        let own: Vec<Vec3> = (person * joints..(person + 1) * joints).map(|joint| params.position(joint)).collect();
-        let mean = scale(own.iter().fold([0.0; 3], |sum, &p| add(sum, p)), 1.0 / joints as f64);
-        let (lit, expected) = near(problem, &problem.surroundings(config).now, &middles, person);
-        let here = Sighting { t_s: 0.0, at: lit, lit_m: expected.lit };
-        let Some(track) = motion::track(problem, config, here, apart_m(&middles, person)) else { return mean };
-        let at = if template.is_bent(&own) { track.at } else { behind_skin(config, track.at) };
-        // Where the floor is known, the start stands as high as it should.
-        let floor = problem.radar.height_m.filter(|_| config.height == Height::Floor);
-        [at[0], at[1], floor.map_or(at[2] + template.mean_over_middle_m(), |_| mean[2])]
-    };
-    (0..middles.len()).map(of_person).collect()
+    let of_view = |(k, view): (usize, &SaliencyMap)| view.without(missed.iter().filter(|peak| peak.view == k));
+    (Cow::Owned(maps.iter().enumerate().map(of_view).collect()), kept)
 }
 
 /// The lowest `cost` on the way downhill from `at` on a grid, to the best of the six neighbours until none is better.
@@ -388,15 +324,8 @@ fn unrefined(config: &FitConfig) -> FitConfig {
     }
 }
 
-/// Where the middle of a body is whose lit middle is `at`: the echoes come from the skin before it. Not so where somebody
-/// sits, whose legs are lit before the trunk.
-fn behind_skin(config: &FitConfig, at: Vec3) -> Vec3 {
-    let behind = 1.0 + config.surface_offset_m / at[0].hypot(at[1]).max(0.5);
-    [at[0] * behind, at[1] * behind, at[2]]
-}
-
 /// The parameters of `persons`.
-fn assemble(problem: &Problem, config: &FitConfig, dress: &Dress, persons: &[Person]) -> Pppr {
+fn assemble(problem: &Problem, config: &FitConfig, model: &ScattererModel, persons: &[Person]) -> Pppr {
     let joints = problem.skeleton.joints.len();
     let doppler_features = problem.radar.doppler_features;
     let mut params = Pppr::zeros(PpprShape { persons: persons.len(), joints, doppler_features });
@@ -407,7 +336,7 @@ fn assemble(problem: &Problem, config: &FitConfig, dress: &Dress, persons: &[Per
             params.set_vec3(Group::Velocity, k * joints + joint, velocity);
         }
     }
-    dress.put_on(&mut params, &problem.skeleton);
+    model.apply(&mut params, &problem.skeleton);
     params
 }
 
@@ -415,47 +344,4 @@ fn assemble(problem: &Problem, config: &FitConfig, dress: &Dress, persons: &[Per
 fn mean_way_m(params: &Pppr, k: usize, posed: &[Vec3]) -> f64 {
     let way = |(joint, &p): (usize, &Vec3)| norm(sub(params.position(k * posed.len() + joint), p));
     posed.iter().enumerate().map(way).sum::<f64>() / posed.len().max(1) as f64
-}
-
-/// What was found of a person, in words; `moved_m` is how far its joints are from its posture's.
-fn tell(person: &Person, config: &FitConfig, moved_m: f64) -> Vec<String> {
-    let at = person.at;
-    let walking = person.track.as_ref().filter(|track| config.yaw == Yaw::Motion && track.heading.is_some());
-    let mut notes = vec![match walking {
-        Some(track) => format!(
-            "{} at x {:.2} m, y {:.2} m, facing where it goes: {:.2} m/s over {} frames",
-            person.posture.words(),
-            at[0],
-            at[1],
-            track.velocity[0].hypot(track.velocity[1]),
-            track.sightings.len()
-        ),
-        None => format!("{} at x {:.2} m, y {:.2} m, facing the radar", person.posture.words(), at[0], at[1]),
-    }];
-    notes.push(match person.expected.map(|expected| (expected.extent_m, expected.middle_m)) {
-        Some((Some([low, high]), _)) => format!("feet at z {low:.2} m and head at {high:.2} m seen"),
-        Some((None, middle)) => format!("no feet and head seen: middle of the body expected at z {middle:.2} m"),
-        None => "position not read from the peaks: the middle of the views".to_owned(),
-    });
-    notes.push(match person.radial {
-        _ if !config.init.velocity => "velocity 0: not read from the maps".to_owned(),
-        Some(Radial { mps, source: Source::Doppler, .. }) => {
-            format!("radial velocity {mps:.2} m/s from the Doppler axis")
-        }
-        Some(Radial { mps, source: Source::Gradient, .. }) if walking.is_none() => match config.init.gradient {
-            GradientVelocity::Flow => format!("radial velocity {mps:.2} m/s from the intensity gradient"),
-            GradientVelocity::Magnitude => {
-                format!("radial velocity {mps:.2} m/s, the magnitude of the intensity gradient: it has no sign")
-            }
-        },
-        _ if walking.is_some() => "velocity from the frames around".to_owned(),
-        _ => "velocity 0: no Doppler axis and no frame around".to_owned(),
-    });
-    if config.limbs == Limbs::Learned {
-        notes.push(match moved_m {
-            0.0 => "limbs of the posture: nothing learned applies here".to_owned(),
-            moved_m => format!("joints {:.0} cm from the posture's, as learned of simulated people", 1e2 * moved_m),
-        });
-    }
-    notes
 }

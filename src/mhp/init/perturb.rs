@@ -1,6 +1,6 @@
-//! A start spoiled on purpose: the perturbations of the paper's robustness table.
+//! A start perturbed on purpose: the perturbations of the paper's robustness table.
 //!
-//! Positions and velocities are spoiled last, of a start from the frame's own peaks and of one from the frame before alike. A
+//! Positions and velocities are perturbed last, of a start from the frame's own peaks and of one from the frame before alike. A
 //! peak that is missed takes its hill of the map with it: a start looks at all that is lit around a person, and would not
 //! notice the loss of a few maxima.
 //!
@@ -49,7 +49,7 @@ pub(super) fn missed<T>(problem: &Problem, init: &InitConfig, items: Vec<T>) -> 
 }
 
 /// Adds bias and noise to positions and velocities.
-pub(super) fn spoil(problem: &Problem, init: &InitConfig, params: &mut Pppr) {
+pub(super) fn perturb(problem: &Problem, init: &InitConfig, params: &mut Pppr) {
     if init.position_bias_m > 0.0 {
         let mut rng = generator(problem, init.seed, Purpose::Bias);
         let joints = params.shape().joints.max(1);

@@ -3,10 +3,9 @@
 //! Echoes of one body scatter over half a metre and over its whole height, so points are joined by their distance on the
 //! floor alone (average linkage, cut at the width of a body). A cluster is a place where somebody may stand.
 
-use super::evidence::{Evidence, Peak};
-use super::locate::{Mark, locate, locate_from};
 use crate::geometry::{Vec3, add_scaled, flat_distance, norm, scale};
 use crate::mhp::Problem;
+use crate::mhp::context::{Mark, Peak, SaliencyMap, triangulate, triangulate_from};
 use kodama::{Method, linkage};
 
 /// Peaks of two views that disagree by more are not one body, m.
@@ -31,12 +30,12 @@ pub(super) struct Place {
 }
 
 /// Places where somebody may stand, strongest first.
-pub(super) fn places(problem: &Problem, evidence: &[Evidence], peaks: &[Peak]) -> Vec<Place> {
-    let mut points = pairs(problem, evidence, peaks);
+pub(super) fn places(problem: &Problem, maps: &[SaliencyMap], peaks: &[Peak]) -> Vec<Place> {
+    let mut points = pairs(problem, maps, peaks);
     if points.is_empty() {
         let alone = peaks.iter().filter_map(|peak| {
-            let e = evidence.get(peak.view)?;
-            Some((locate(&problem.views, &[&e.mark(peak)]), e.excess_of(peak)))
+            let e = maps.get(peak.view)?;
+            Some((triangulate(&problem.views, &[&e.mark(peak)]), e.excess_of(peak)))
         });
         points =
             alone.filter(|((p, _), _)| norm(*p).is_finite()).map(|((at, _), weight)| Point { at, weight }).collect();
@@ -49,14 +48,14 @@ pub(super) fn places(problem: &Problem, evidence: &[Evidence], peaks: &[Peak]) -
 }
 
 /// Points where peaks of two views may be one body.
-fn pairs(problem: &Problem, evidence: &[Evidence], peaks: &[Peak]) -> Vec<Point> {
+fn pairs(problem: &Problem, maps: &[SaliencyMap], peaks: &[Peak]) -> Vec<Point> {
     let marks: Vec<(Mark, f64)> =
-        peaks.iter().filter_map(|peak| evidence.get(peak.view).map(|e| (e.mark(peak), e.excess_of(peak)))).collect();
+        peaks.iter().filter_map(|peak| maps.get(peak.view).map(|e| (e.mark(peak), e.excess_of(peak)))).collect();
     let mut points = Vec::new();
     for (i, (a, excess_a)) in marks.iter().enumerate() {
-        let (near, _) = locate(&problem.views, &[a]);
+        let (near, _) = triangulate(&problem.views, &[a]);
         for (b, excess_b) in marks[i + 1..].iter().filter(|(b, _)| b.view != a.view) {
-            let (at, misfit) = locate_from(near, LARGEST_MISFIT_M, &problem.views, &[a, b]);
+            let (at, misfit) = triangulate_from(near, LARGEST_MISFIT_M, &problem.views, &[a, b]);
             if misfit < LARGEST_MISFIT_M && norm(at).is_finite() {
                 let weight = (excess_a * excess_b).sqrt();
                 points.push(Point { at, weight: weight * (1.0 - misfit / LARGEST_MISFIT_M) });

@@ -4,9 +4,9 @@
 //! posture is the standing template with its limbs turned about hips, knees, shoulders and elbows, found by their names; a
 //! skeleton without such names only stands. The angles are textbook ones: legs and arms swing as sines, half a stride apart.
 
-use super::template::Template;
 use crate::body::{Side, Skeleton};
 use crate::geometry::{Vec3, add, mat_vec, rotation_from_quaternion, scale, sub};
+use crate::mhp::template::Template;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// How far hips and knees are bent on a chair, and at most: on the floor, knees up, rad.

@@ -39,9 +39,9 @@ fn part(word: &str) -> Option<Part> {
 }
 
 /// What each joint of a skeleton looks like; `None`: an equal, round Gaussian. The joints' names are read once.
-pub(super) struct Dress(Vec<Option<Part>>);
+pub(super) struct ScattererModel(Vec<Option<Part>>);
 
-impl Dress {
+impl ScattererModel {
     pub(super) fn new(skeleton: &Skeleton, kind: Scatterers) -> Self {
         let of_joint = |name: &String| match kind {
             Scatterers::Equal => None,
@@ -51,7 +51,7 @@ impl Dress {
     }
 
     /// Gives the joints of all persons their scales, orientations and opacities; positions must be there.
-    pub(super) fn put_on(&self, params: &mut Pppr, skeleton: &Skeleton) {
+    pub(super) fn apply(&self, params: &mut Pppr, skeleton: &Skeleton) {
         for joint in 0..params.shape().total_joints() {
             params.set_vec3(Group::LogScale, joint, [EQUAL_SCALE_M.ln(); 3]);
             params.joint_mut(Group::Rotation, joint).copy_from_slice(&[1.0, 0.0, 0.0, 0.0]);
@@ -129,7 +129,7 @@ mod tests {
         params.set_vec3(Group::Position, hip, [0.3, 0.0, 0.9]);
         params.set_vec3(Group::Position, knee, [0.0, 0.0, 0.5]);
         params.set_vec3(Group::Position, ankle, [-0.3, 0.0, 0.1]);
-        Dress::new(&skeleton, Scatterers::BodyParts).put_on(&mut params, &skeleton);
+        ScattererModel::new(&skeleton, Scatterers::BodyParts).apply(&mut params, &skeleton);
         let along = mat_vec(&rotation_from_quaternion(params.rotation(knee)), [1.0, 0.0, 0.0]);
         assert!((along[0].abs() - 0.6).abs() < 1e-6 && (along[2].abs() - 0.8).abs() < 1e-6, "{along:?}");
         assert!(params.scale(knee)[0] > 2.0 * params.scale(knee)[1]);

@@ -5,10 +5,10 @@
 //! map brightens on the far side of the slope, the echo goes away. The paper gives it none, which is a choice
 //! ([`GradientVelocity::Magnitude`]).
 
-use super::evidence::Evidence;
 use crate::config::{FitConfig, GradientVelocity};
 use crate::geometry::{Vec3, norm, scale, sub};
 use crate::mhp::Problem;
+use crate::mhp::context::SaliencyMap;
 
 /// Radial velocity of a place and where it comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,8 +29,8 @@ pub(super) enum Source {
 
 /// The radial velocity at `at` from the first view that tells it.
 pub(super) fn radial(problem: &Problem, config: &FitConfig, at: Vec3) -> Option<Radial> {
-    let (surroundings, gain_mps) = (problem.surroundings(config), config.init.velocity_gain_mps);
-    let now = &surroundings.now;
+    let (context, gain_mps) = (problem.context(config), config.init.velocity_gain_mps);
+    let now = &context.now;
     let along = |k: usize, mps: f64, source: Source| {
         let from_radar = sub(at, problem.views[k].pose.world_from_view([0.0; 3]));
         Radial { mps, vector: scale(from_radar, mps / norm(from_radar).max(1e-6)), source }
@@ -38,12 +38,12 @@ pub(super) fn radial(problem: &Problem, config: &FitConfig, at: Vec3) -> Option<
     let doppler = now.iter().enumerate().find_map(|(k, e)| Some(along(k, e.radial_mps(at)?, Source::Doppler)));
     doppler.or_else(|| {
         if config.init.gradient == GradientVelocity::Magnitude {
-            let steepness = |(k, e): (usize, &Evidence)| Some((k, e.steepness(at)?));
+            let steepness = |(k, e): (usize, &SaliencyMap)| Some((k, e.steepness(at)?));
             let (k, steepness) = now.iter().enumerate().find_map(steepness)?;
             return Some(along(k, gain_mps * steepness, Source::Gradient));
         }
         // The nearest frame in time tells the change best.
-        let (offset_s, near) = surroundings.around(problem).min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))?;
+        let (offset_s, near) = context.around().min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))?;
         now.iter().zip(near()).enumerate().find_map(|(k, (now, then))| {
             let flow = now.flow(then, at)?;
             Some(along(k, gain_mps * flow.steepness * flow.sign * offset_s.signum(), Source::Gradient))

@@ -24,10 +24,9 @@ mod strip;
 mod sum;
 
 use super::adjoint::{self, Moments};
-use super::em::{SOFT_FLOOR, ViewAnswer, share};
+use super::floors::{EPSILON, SOFT_FLOOR, ViewLoss, share};
 use super::lanes::{Lanes, splat};
 use super::percentile::{between, place};
-use super::simulate::EPSILON;
 use super::splat::Splats;
 use crate::config::Summation;
 use collect::Gathered;
@@ -283,7 +282,7 @@ pub fn simd_path() -> &'static str {
 
 impl Tiles {
     /// Answers `question`, and fills `moments` (one a joint, zeroed) where a gradient is wanted.
-    pub(super) fn evaluate(&mut self, question: &Question<'_>, moments: &mut Moments) -> ViewAnswer {
+    pub(super) fn evaluate(&mut self, question: &Question<'_>, moments: &mut Moments) -> ViewLoss {
         match question.summation {
             Summation::Coherent => Arch::new().dispatch(Run::<true> { tiles: self, question, moments }),
             Summation::Incoherent => Arch::new().dispatch(Run::<false> { tiles: self, question, moments }),
@@ -320,13 +319,13 @@ struct Run<'a, const COHERENT: bool> {
 }
 
 impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
-    type Output = ViewAnswer;
+    type Output = ViewLoss;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> ViewAnswer {
+    fn with_simd<S: Simd>(self, simd: S) -> ViewLoss {
         let Self { tiles, question, moments } = self;
         if !tiles.fill::<S, COHERENT>(simd, question.splats, question.tiling) {
-            return ViewAnswer { loss: f64::NAN, iou: None };
+            return ViewLoss { loss: f64::NAN, iou: None };
         }
         let floor = EPSILON.log2();
         let mut guess = tiles.guess(simd, question);
@@ -438,9 +437,9 @@ struct Mask {
 }
 
 impl Mask {
-    fn answer(&self) -> ViewAnswer {
+    fn answer(&self) -> ViewLoss {
         let loss = if self.union == 0.0 { 1.0 } else { 1.0 - self.common / self.union };
-        ViewAnswer { loss, iou: share(self.both, self.either) }
+        ViewLoss { loss, iou: share(self.both, self.either) }
     }
 }
 

@@ -4,9 +4,9 @@
 //! The truth is the count of a frame, never of a cluster: the distributions of a frame's clusters are convolved, and the
 //! gradient goes through that sum.
 
-mod course;
+mod examples;
 
-pub use course::{Example, examples, recordings};
+pub use examples::{CounterExample, examples, recordings};
 
 use super::counter::{Counter, MOST_CLUSTERS, NOBODY, agreed, convolve};
 use super::network::{CLASSES, Layer, Network, widths};
@@ -28,7 +28,7 @@ const OCCURRENCE: [f32; CLASSES] = [8.0, 80.0, 14.0, 4.0, 2.0];
 
 /// What a frame teaches.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Lesson {
+pub struct CounterLesson {
     /// Features of up to eight clusters, whose counts add up.
     pub rows: Vec<Vec<f32>>,
     /// How many people there are.
@@ -37,7 +37,7 @@ pub struct Lesson {
     pub placed: bool,
 }
 
-impl Lesson {
+impl CounterLesson {
     /// A frame with `people` people, scanned after those `before` it, the latest first.
     pub fn of(counter: &Counter, now: &Scan, before: &[&Scan], people: usize) -> Self {
         let rows = counter.describe(now, before).features.iter().map(|row| row.to_vec()).collect();
@@ -107,9 +107,9 @@ impl Default for TrainOptions {
 ///
 /// # Errors
 /// candle's, which would be a mistake in here.
-pub fn train(lessons: &[Lesson], options: &TrainOptions, mut told: impl FnMut(usize, f32)) -> Result<Network> {
+pub fn train(lessons: &[CounterLesson], options: &TrainOptions, mut told: impl FnMut(usize, f32)) -> Result<Network> {
     let mut rng = StdRng::seed_from_u64(options.seed);
-    let lessons: Vec<Lesson> = lessons.iter().flat_map(|lesson| [lesson.clone(), lesson.mirrored()]).collect();
+    let lessons: Vec<CounterLesson> = lessons.iter().flat_map(|lesson| [lesson.clone(), lesson.mirrored()]).collect();
     let (mean, scale) = moments(&lessons);
     let options = TrainOptions { weights: shared(&lessons, options.weights), ..*options };
     let model = Model::new(mean.len(), &mut rng)?;
@@ -123,7 +123,7 @@ pub fn train(lessons: &[Lesson], options: &TrainOptions, mut told: impl FnMut(us
         adam.set_learning_rate(0.5 * options.learning_rate * (1.0 + (std::f64::consts::PI * done).cos()));
         let mut sum = 0.0;
         for chosen in order.chunks(options.batch.max(1)) {
-            let batch: Vec<&Lesson> = chosen.iter().filter_map(|&i| lessons.get(i)).collect();
+            let batch: Vec<&CounterLesson> = chosen.iter().filter_map(|&i| lessons.get(i)).collect();
             let loss = model.loss(&batch, (&mean, &scale), &options, &mut rng)?;
             adam.backward_step(&loss)?;
             sum += loss.to_scalar::<f32>()? * batch.len() as f32;
@@ -134,14 +134,14 @@ pub fn train(lessons: &[Lesson], options: &TrainOptions, mut told: impl FnMut(us
 }
 
 /// What one lesson of each number of people counts, so that together they count as asked for; 1 on average.
-fn shared(lessons: &[Lesson], weights: [f32; CLASSES]) -> [f32; CLASSES] {
+fn shared(lessons: &[CounterLesson], weights: [f32; CLASSES]) -> [f32; CLASSES] {
     let all: f32 = weights.iter().sum();
     let of = |k: usize| lessons.iter().filter(|lesson| lesson.people.min(CLASSES - 1) == k).count().max(1);
     std::array::from_fn(|k| weights[k] / all * lessons.len() as f32 / of(k) as f32)
 }
 
 /// Mean and standard deviation of each feature.
-fn moments(lessons: &[Lesson]) -> (Vec<f32>, Vec<f32>) {
+fn moments(lessons: &[CounterLesson]) -> (Vec<f32>, Vec<f32>) {
     let rows: Vec<&Vec<f32>> = lessons.iter().flat_map(|lesson| &lesson.rows).collect();
     let inputs = rows.first().map_or(0, |row| row.len());
     let n = rows.len().max(1) as f64;
@@ -185,7 +185,7 @@ impl Model {
     /// Cross-entropy of the counts of a batch.
     fn loss(
         &self,
-        batch: &[&Lesson],
+        batch: &[&CounterLesson],
         (mean, scale): (&[f32], &[f32]),
         options: &TrainOptions,
         rng: &mut StdRng,

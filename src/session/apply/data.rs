@@ -2,7 +2,7 @@
 
 use crate::body::Pppr;
 use crate::dataset::{Dataset, DatasetError, Frame};
-use crate::session::command::{Aim, Effect};
+use crate::session::command::{Effect, StartAt};
 use crate::session::evidence::EvidenceState;
 use crate::session::fit::{Fit, FitStatus};
 use crate::session::history::History;
@@ -20,7 +20,7 @@ const KEPT_FIT_BYTES: usize = 4 << 20;
 impl Session {
     pub(super) fn open(&mut self, path: PathBuf) -> Vec<Effect> {
         self.data.bare = None;
-        self.aim = Aim::default();
+        self.aim = StartAt::default();
         self.data.opening = Some(opening(path.clone()));
         vec![Effect::Open(path)]
     }

@@ -4,7 +4,7 @@
 use crate::dataset::{Dataset, write_pppr};
 use crate::labels::{Record, write_csv, write_json};
 use crate::output::replace_file;
-use crate::session::command::{Effect, Export, Task};
+use crate::session::command::{BackgroundTask, Effect, Export};
 use crate::session::file::SessionFile;
 use crate::session::state::{LogLevel, Session};
 use crate::study::{CurveRow, complexity, write_curves, write_ply};
@@ -33,10 +33,10 @@ impl Session {
     }
 
     /// Every branch of the fit on screen, iteration by iteration.
-    fn curves_task(&self, path: PathBuf) -> Option<Task> {
+    fn curves_task(&self, path: PathBuf) -> Option<BackgroundTask> {
         let (history, check) = (self.fit.history.clone(), self.output_check());
         let arrays: Vec<String> = self.fit.problem.as_ref()?.views.iter().map(|view| view.array.clone()).collect();
-        Some(Task::new(move || {
+        Some(BackgroundTask::new(move || {
             check.file(&path)?;
             let rows = history.branches().iter().flat_map(|branch| {
                 branch.rows.iter().map(move |row| CurveRow {
@@ -51,20 +51,20 @@ impl Session {
         }))
     }
 
-    fn gaussians_task(&self, path: PathBuf) -> Option<Task> {
+    fn gaussians_task(&self, path: PathBuf) -> Option<BackgroundTask> {
         let (shown, problem) = (Arc::clone(self.fit.shown.as_ref()?), Arc::clone(self.fit.problem.as_ref()?));
         let check = self.output_check();
-        Some(Task::new(move || {
+        Some(BackgroundTask::new(move || {
             check.file(&path)?;
             write_ply(&path, &shown.params, &problem.skeleton).map_err(|error| error.to_string())?;
             Ok(written(&path))
         }))
     }
 
-    fn parameters_task(&self, path: PathBuf) -> Option<Task> {
+    fn parameters_task(&self, path: PathBuf) -> Option<BackgroundTask> {
         let shown = Arc::clone(self.fit.shown.as_ref()?);
         let check = self.output_check();
-        Some(Task::new(move || {
+        Some(BackgroundTask::new(move || {
             check.file(&path)?;
             write_pppr(&path, &shown.params).map_err(|error| error.to_string())?;
             Ok(written(&path))
@@ -72,14 +72,14 @@ impl Session {
     }
 
     /// Everybody's labels; in agreement mode only one's own, so that nothing hidden leaves through this door.
-    fn labels_task(&self, path: PathBuf, json: bool) -> Option<Task> {
+    fn labels_task(&self, path: PathBuf, json: bool) -> Option<BackgroundTask> {
         self.labels.place.as_ref()?;
         let mut shared: Vec<Arc<Record>> = Vec::new();
         for (_, records) in self.labels.seen(self.view.label_mode) {
             shared.extend(records.said().map(|(_, record)| Arc::clone(record)));
         }
         let check = self.output_check();
-        Some(Task::new(move || {
+        Some(BackgroundTask::new(move || {
             check.file(&path)?;
             let mut records: Vec<Record> = shared.into_iter().map(Arc::unwrap_or_clone).collect();
             records.sort_by(|a, b| {
@@ -93,10 +93,10 @@ impl Session {
         }))
     }
 
-    fn strata_task(&self, path: PathBuf) -> Option<Task> {
+    fn strata_task(&self, path: PathBuf) -> Option<BackgroundTask> {
         let (dataset, strata) = (Arc::clone(self.data.dataset.as_ref()?), Arc::clone(self.strata.result()?));
         let check = self.output_check();
-        Some(Task::new(move || {
+        Some(BackgroundTask::new(move || {
             check.file(&path)?;
             complexity::write_csv(&path, &dataset, &strata).map_err(|error| error.to_string())?;
             Ok(written(&path))
@@ -110,7 +110,7 @@ impl Session {
         };
         let check = self.output_check();
         self.session_path = Some(path.clone());
-        vec![Effect::Run(Task::new(move || {
+        vec![Effect::Run(BackgroundTask::new(move || {
             check.file(&path)?;
             file.write(&path).map_err(|error| error.to_string())?;
             Ok(format!("session saved to {}", path.display()))

@@ -16,8 +16,8 @@ impl Session {
             self.note(LogLevel::Error, format!("{MOST_PINS} fits are pinned, and no more can be; remove one first"));
             return Vec::new();
         }
-        let rows = self.fit.history.lineage();
-        let rows = rows.into_iter().take_while(|row| row.report.iteration <= shown.iteration);
+        let rows = self.fit.history.lineage().into_iter().flatten();
+        let rows = rows.take_while(|row| row.report.iteration <= shown.iteration);
         let rows = rows.map(|row| PinRow { report: row.report.clone(), majpe_mm: row.majpe_mm }).collect();
         let pin = Pin {
             id: self.pins.made,

@@ -1,7 +1,7 @@
 //! The frame list: filter, order, and what "next" means.
 
 use crate::session::command::Effect;
-use crate::session::queue::{Facts, Reads, SavedView, Sort};
+use crate::session::queue::{FrameRow, Reads, SavedView, Sort};
 use crate::session::state::{FrameSummary, LogLevel, Session};
 
 impl Session {
@@ -25,7 +25,7 @@ impl Session {
             self.note(LogLevel::Error, "a saved view needs a name and a filter without error".into());
             return Vec::new();
         }
-        let view = SavedView { name: name.into(), rule: self.queue.text.clone(), sort: self.view.sort };
+        let view = SavedView { name: name.into(), filter: self.queue.text.clone(), sort: self.view.sort };
         self.view.saved_views.retain(|known| known.name != name);
         self.view.saved_views.push(view);
         self.view.saved_views.sort_by(|a, b| a.name.cmp(&b.name));
@@ -36,7 +36,7 @@ impl Session {
         let Some(view) = self.view.saved_views.iter().find(|view| view.name == name).cloned() else {
             return Vec::new();
         };
-        self.set_filter(view.rule);
+        self.set_filter(view.filter);
         self.set_sort(view.sort)
     }
 
@@ -57,7 +57,7 @@ impl Session {
         }
         if self.data.playing {
             self.data.playing = false;
-        } else if !self.queue.rule.is_empty() {
+        } else if !self.queue.filter.is_empty() {
             self.hint(format!("no frame further that way: {}", self.queue_words()));
         }
         Vec::new()
@@ -82,7 +82,7 @@ impl Session {
     pub fn queue_words(&self) -> String {
         let (rows, all) = (self.queue.rows().len(), self.data.len());
         let plural = |n: usize| if n == 1 { "frame" } else { "frames" };
-        if self.queue.rule.is_empty() {
+        if self.queue.filter.is_empty() {
             return format!("all {all} {}", plural(all));
         }
         format!("{rows} of {all} {} match “{}”", plural(all), self.queue.text.trim())
@@ -105,7 +105,7 @@ impl Session {
         queue.fill(self.data.len(), self.view.sort, |frame| {
             while reads.fit && summaries.next_if(|(at, _)| **at < frame).is_some() {}
             let summary = summaries.peek().filter(|(at, _)| **at == frame).map(|(_, summary)| *summary);
-            self.facts_of(frame, reads, summary)
+            self.row_of(frame, reads, summary)
         });
         self.queue = queue;
         if let Some(at) = self.queue.position(self.data.frame_index) {
@@ -113,65 +113,65 @@ impl Session {
         }
     }
 
-    /// Which facts the list depends on.
+    /// What of a row the list depends on.
     pub(super) fn list_reads(&self) -> Reads {
         self.queue.reads(self.view.sort)
     }
 
     /// Everything that the list knows of a frame.
-    pub fn facts(&self, index: usize) -> Facts<'_> {
-        self.facts_of(index, Reads::ALL, self.summaries.get(&index))
+    pub fn frame_row(&self, index: usize) -> FrameRow<'_> {
+        self.row_of(index, Reads::ALL, self.summaries.get(&index))
     }
 
     /// What the list knows of a frame, as far as it is asked for.
-    fn facts_of<'a>(&'a self, index: usize, reads: Reads, summary: Option<&'a FrameSummary>) -> Facts<'a> {
-        let mut facts = Facts { index, ..Facts::default() };
-        let Some(dataset) = &self.data.dataset else { return facts };
+    fn row_of<'a>(&'a self, index: usize, reads: Reads, summary: Option<&'a FrameSummary>) -> FrameRow<'a> {
+        let mut row = FrameRow { index, ..FrameRow::default() };
+        let Some(dataset) = &self.data.dataset else { return row };
         let mode = self.view.label_mode;
         if reads.name {
-            facts.name = dataset.frame_name(index);
+            row.name = dataset.frame_name(index);
         }
         if reads.scene {
-            facts.scene = dataset.sequence(index);
+            row.scene = dataset.sequence(index);
         }
         if reads.strata {
-            self.add_strata(&mut facts);
+            self.add_strata(&mut row);
         }
         if reads.fit
             && let Some(summary) = summary
         {
-            facts.iou = summary.iou;
-            facts.loss = summary.loss;
-            facts.terms = Some(&summary.terms);
-            facts.iterations = summary.iterations;
-            facts.converged = summary.converged;
-            facts.reason = summary.reason.as_deref();
-            facts.majpe_mm = summary.majpe_mm;
+            row.iou = summary.iou;
+            row.loss = summary.loss;
+            row.terms = Some(&summary.terms);
+            row.iterations = summary.iterations;
+            row.converged = summary.converged;
+            row.reason = summary.reason.as_deref();
+            row.majpe_mm = summary.majpe_mm;
         }
         if reads.tags {
-            facts.tags = self.labels.visible_tags(index, mode);
-            facts.own_tags = self.labels.tags(index);
+            row.tags = self.labels.visible_tags(index, mode);
+            row.own_tags = self.labels.tags(index);
         }
         if reads.said
             && let Some(record) = self.labels.mine(index)
         {
-            facts.note = &record.label.note;
-            facts.verdict = record.label.verdict;
+            row.note = &record.label.note;
+            row.verdict = record.label.verdict;
         }
         if reads.annotators {
-            facts.annotators = self.labels.visible_annotators(index, mode);
+            row.annotators = self.labels.visible_annotators(index, mode);
         }
-        facts
+        row
     }
 
-    fn add_strata(&self, facts: &mut Facts<'_>) {
-        facts.readable = self.strata.is_readable(facts.index);
-        if let Some(complexity) = self.strata.of(facts.index) {
-            facts.stratum = complexity.stratum;
-            facts.hardness = complexity.hardness;
-            facts.peak_density = complexity.statistics.peak_density;
-            facts.static_dominance = complexity.statistics.static_dominance;
-            facts.human_saliency = complexity.statistics.human_saliency;
+    fn add_strata(&self, row: &mut FrameRow<'_>) {
+        row.readable = self.strata.is_readable(row.index);
+        if let Some(complexity) = self.strata.of(row.index) {
+            row.stratum = complexity.stratum;
+            row.hardness = complexity.hardness;
+            row.peak_density = complexity.statistics.peak_density;
+            row.static_dominance = complexity.statistics.static_dominance;
+            row.human_saliency = complexity.statistics.human_saliency;
         }
     }
 }

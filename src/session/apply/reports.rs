@@ -4,9 +4,9 @@ use super::diagnosis::hashes;
 use crate::diagnose::joint_errors;
 use crate::session::command::Effect;
 use crate::session::fit::FitStatus;
-use crate::session::history::Row;
+use crate::session::history::IterationRow;
 use crate::session::state::{FrameSummary, LogLevel, Session};
-use crate::worker::{HistoryRow, Prepared, Snapshot, WorkerEvent, WorkerMessage};
+use crate::worker::{HistoryRow, PreparedFit, Snapshot, WorkerEvent, WorkerMessage};
 use std::sync::Arc;
 
 impl Session {
@@ -31,7 +31,7 @@ impl Session {
         let errors = truth.and_then(|truth| joint_errors(row.kept.positions(), &truth.joints, a_person));
         let majpe_mm = errors.map(|errors| errors.majpe_mm);
         let state = row.kept.state().cloned();
-        self.fit.history.push(row.branch, Row { report: row.report, state, majpe_mm });
+        self.fit.history.push(row.branch, IterationRow { report: row.report, state, majpe_mm });
     }
 
     pub(super) fn summarise(&mut self) {
@@ -114,12 +114,12 @@ impl Session {
         }
     }
 
-    pub(super) fn prepared(&mut self, prepared: Prepared) -> Vec<Effect> {
+    pub(super) fn prepared(&mut self, prepared: PreparedFit) -> Vec<Effect> {
         for warning in &prepared.warnings {
             self.note(LogLevel::Warning, warning.clone());
         }
-        if let Some(begun) = &prepared.begun {
-            for note in &begun.initialisation.notes {
+        if let Some(found) = &prepared.found_start {
+            for note in &found.initialisation.notes {
                 self.note(LogLevel::Info, note.clone());
             }
         }
@@ -131,8 +131,8 @@ impl Session {
         self.fit.initial = Some(prepared.initial);
         self.identify();
         self.fit.init_ms = prepared.init_ms;
-        if prepared.begun.is_some() {
-            self.fit.begun = prepared.begun;
+        if prepared.found_start.is_some() {
+            self.fit.found_start = prepared.found_start;
         }
         self.fit.status = FitStatus::Paused;
         // A fit that comes back, from this session or from a file, is known to the list again.

@@ -1,13 +1,13 @@
 //! The queue: which frames are in the list, and in what order.
 //!
-//! A [`Rule`] chooses them and a [`Sort`] orders them. What "next" means follows from both: along the queue it is the next
+//! A [`FrameFilter`] chooses them and a [`Sort`] orders them. What "next" means follows from both: along the queue it is the next
 //! row, along time it is the next frame that matches.
 
-mod facts;
-mod rule;
+mod filter;
+mod row;
 
-pub use facts::{Facts, Number, Reads};
-pub use rule::{Rule, syntax};
+pub use filter::{FrameFilter, syntax};
+pub use row::{FrameNumber, FrameRow, Reads};
 
 use crate::labels::Tags;
 use crate::mhp::TermId;
@@ -44,7 +44,7 @@ pub enum SortKey {
 }
 
 impl SortKey {
-    /// Which facts it depends on.
+    /// What of a row it depends on.
     pub fn reads(self) -> Reads {
         let none = Reads::default();
         match self {
@@ -68,13 +68,14 @@ pub struct Sort {
     pub descending: bool,
 }
 
-/// A filter with an order, kept under a name. It is the rule that is kept, not the frames it found.
+/// A filter with an order, kept under a name. It is the text that is kept, not the frames it found.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SavedView {
     /// Its name.
     pub name: String,
     /// The filter's text.
-    pub rule: String,
+    #[serde(rename = "rule")]
+    pub filter: String,
     /// The order.
     pub sort: Sort,
 }
@@ -87,7 +88,7 @@ pub struct Queue {
     /// Why the text is no filter; the list then keeps the last one that was.
     pub error: Option<String>,
     /// The filter in force.
-    pub rule: Rule,
+    pub filter: FrameFilter,
     /// Frames in the order of the list.
     rows: Vec<u32>,
     /// The same frames in the order of the data set.
@@ -125,30 +126,30 @@ impl Queue {
 
     /// Takes a new filter. One that cannot be understood leaves the last one in force.
     pub(super) fn set_text(&mut self, text: String) {
-        match Rule::parse(&text) {
-            Ok(rule) => (self.rule, self.error) = (rule, None),
+        match FrameFilter::parse(&text) {
+            Ok(filter) => (self.filter, self.error) = (filter, None),
             Err(error) => self.error = Some(error),
         }
         self.text = text;
     }
 
-    /// Which facts the list depends on.
+    /// What of a row the list depends on.
     pub fn reads(&self, sort: Sort) -> Reads {
-        self.rule.reads().or(sort.key.reads())
+        self.filter.reads().or(sort.key.reads())
     }
 
-    /// Fills the list again: `frames` facts, asked for in the order of the data set.
-    pub(super) fn fill<'a>(&mut self, frames: usize, sort: Sort, mut facts: impl FnMut(usize) -> Facts<'a>) {
+    /// Fills the list again: the rows of `frames` frames, asked for in the order of the data set.
+    pub(super) fn fill<'a>(&mut self, frames: usize, sort: Sort, mut row_of: impl FnMut(usize) -> FrameRow<'a>) {
         self.matching.clear();
         self.rows.clear();
-        if self.rule.is_empty() && sort == Sort::default() {
+        if self.filter.is_empty() && sort == Sort::default() {
             self.matching.extend(0..frames as u32);
             self.rows.extend_from_slice(&self.matching);
         } else {
             let mut keyed: Vec<u128> = Vec::with_capacity(frames);
             for frame in 0..frames {
-                let row = facts(frame);
-                if self.rule.matches(&row) {
+                let row = row_of(frame);
+                if self.filter.matches(&row) {
                     // One whole number to compare: the key, then the frame, so that equal ones keep their order.
                     keyed.push(u128::from(key(sort, &row)) << 32 | frame as u128);
                     self.matching.push(frame as u32);
@@ -210,20 +211,20 @@ impl Queue {
 const NOTHING: u64 = u64::MAX;
 
 /// The place in the order as a whole number: smaller comes first, what has no value comes last either way.
-fn key(sort: Sort, facts: &Facts<'_>) -> u64 {
+fn key(sort: Sort, row: &FrameRow<'_>) -> u64 {
     let rising = match sort.key {
-        SortKey::Index => Some(facts.index as u64),
-        SortKey::Stratum => facts.stratum.map(|stratum| stratum as u64),
-        SortKey::Hardness => facts.hardness.and_then(ordered),
-        SortKey::PeakDensity => facts.peak_density.and_then(ordered),
-        SortKey::StaticDominance => facts.static_dominance.and_then(ordered),
-        SortKey::HumanSaliency => facts.human_saliency.and_then(ordered),
-        SortKey::Iou => facts.iou.and_then(ordered),
-        SortKey::Converged => facts.converged.map(u64::from),
-        SortKey::Majpe => facts.majpe_mm.and_then(ordered),
-        SortKey::Tags => Some(tag_rank(facts.tags)).filter(|&rank| rank > 0),
-        SortKey::Annotator => facts.annotators.first().map(|name| letters(name)),
-        SortKey::Term(term) => facts.number(Number::Term(term)).and_then(ordered),
+        SortKey::Index => Some(row.index as u64),
+        SortKey::Stratum => row.stratum.map(|stratum| stratum as u64),
+        SortKey::Hardness => row.hardness.and_then(ordered),
+        SortKey::PeakDensity => row.peak_density.and_then(ordered),
+        SortKey::StaticDominance => row.static_dominance.and_then(ordered),
+        SortKey::HumanSaliency => row.human_saliency.and_then(ordered),
+        SortKey::Iou => row.iou.and_then(ordered),
+        SortKey::Converged => row.converged.map(u64::from),
+        SortKey::Majpe => row.majpe_mm.and_then(ordered),
+        SortKey::Tags => Some(tag_rank(row.tags)).filter(|&rank| rank > 0),
+        SortKey::Annotator => row.annotators.first().map(|name| letters(name)),
+        SortKey::Term(term) => row.number(FrameNumber::Term(term)).and_then(ordered),
     };
     // Nothing but NaN, which is left out, comes near the ends of the range.
     rising.map_or(NOTHING, |rising| if sort.descending { NOTHING - 1 - rising } else { rising })
@@ -257,7 +258,7 @@ mod tests {
     fn queue(text: &str, sort: Sort, iou: &[Option<f64>]) -> Queue {
         let mut queue = Queue::default();
         queue.set_text(text.into());
-        queue.fill(iou.len(), sort, |index| Facts { index, iou: iou[index], ..Facts::default() });
+        queue.fill(iou.len(), sort, |index| FrameRow { index, iou: iou[index], ..FrameRow::default() });
         queue
     }
 
@@ -267,7 +268,7 @@ mod tests {
         let sort = Sort { key, descending: false };
         let terms = [0.5, 0.1, 0.3].map(|value| Terms::from_fn(|term| (term.key == "dummy").then_some(value)));
         let mut queue = Queue::default();
-        queue.fill(terms.len(), sort, |index| Facts { index, terms: Some(&terms[index]), ..Facts::default() });
+        queue.fill(terms.len(), sort, |index| FrameRow { index, terms: Some(&terms[index]), ..FrameRow::default() });
         assert_eq!(queue.rows(), [1, 2, 0]);
         let text = serde_json::to_string(&sort).unwrap();
         assert_eq!((text.contains("\"dummy\""), serde_json::from_str(&text).unwrap()), (true, sort));
@@ -291,8 +292,8 @@ mod tests {
         let sets = ["F1", "F1 F2", "F1 F2 F3", "F1 F3", "F2", "F2 unsure", "clean", "unsure"];
         assert!(sets.windows(2).all(|pair| tags(pair[0]) < tags(pair[1])));
         assert!(letters("ada") < letters("Adam") && letters("Adam") < letters("bo"));
-        let by = |key, descending, facts: &Facts<'_>| super::key(Sort { key, descending }, facts);
-        let (none, some) = (Facts::default(), Facts { iou: Some(0.3), ..Facts::default() });
+        let by = |key, descending, row: &FrameRow<'_>| super::key(Sort { key, descending }, row);
+        let (none, some) = (FrameRow::default(), FrameRow { iou: Some(0.3), ..FrameRow::default() });
         assert!(by(SortKey::Iou, true, &some) < by(SortKey::Iou, true, &none));
     }
 
@@ -309,7 +310,7 @@ mod tests {
         // Frame 2 leaves the list, as one does that is tagged under `tag:none`: the next one is what took its place.
         q.last_position = 0;
         q.set_text("iou<0.5 -index=2".into());
-        q.fill(IOU.len(), sort, |index| Facts { index, iou: IOU[index], ..Facts::default() });
+        q.fill(IOU.len(), sort, |index| FrameRow { index, iou: IOU[index], ..FrameRow::default() });
         assert_eq!((q.step(2, 1), q.step(2, -1)), (Some(5), None));
     }
 
@@ -326,7 +327,7 @@ mod tests {
         let mut q = queue("iou<0.2", Sort::default(), &IOU);
         q.set_text("iou<".into());
         assert!(q.error.as_ref().is_some_and(|why| why.contains("not a number")));
-        q.fill(IOU.len(), Sort::default(), |index| Facts { index, iou: IOU[index], ..Facts::default() });
+        q.fill(IOU.len(), Sort::default(), |index| FrameRow { index, iou: IOU[index], ..FrameRow::default() });
         assert_eq!(q.rows(), [2]);
         q.set_text(String::new());
         assert_eq!(q.error, None);

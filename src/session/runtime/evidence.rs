@@ -3,13 +3,12 @@
 
 use super::Wake;
 use crate::body::Pppr;
-use crate::dataset::panic_text;
 use crate::mhp::{Objective, Precision, Problem, masks, simulate};
 use crate::session::command::{Command, PinRequest};
 use crate::session::evidence::EvidenceRequest;
+use crate::task::panic_as_error;
 use crate::worker::Snapshot;
 use crossbeam_channel::{Receiver, Sender, unbounded};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 /// What is asked of the thread.
@@ -73,16 +72,11 @@ fn newest(asks: Vec<Ask>) -> Vec<Ask> {
 fn answer(ask: Ask) -> Command {
     match ask {
         Ask::Evidence(request) => {
-            let found = caught(|| Ok(request.gather()));
+            let found = panic_as_error(|| Ok(request.gather()));
             Command::EvidenceFound(request.frame.index, request.fit, found)
         }
-        Ask::Pin(request) => Command::PinDrawn(request.pin.id, caught(|| drawn(&request).map(Box::new))),
+        Ask::Pin(request) => Command::PinDrawn(request.pin.id, panic_as_error(|| drawn(&request).map(Box::new))),
     }
-}
-
-fn caught<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(work))
-        .unwrap_or_else(|panic| Err(format!("internal error: {}", panic_text(panic.as_ref()))))
 }
 
 /// The maps and masks of a pin.

@@ -263,9 +263,9 @@ impl Open {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::Progress;
     use crate::labels::Tag;
     use crate::session::acts::{ActKind, Asked};
+    use crate::task::Progress;
     use std::collections::BTreeMap;
     use std::error::Error;
     use std::path::Path;

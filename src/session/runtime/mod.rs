@@ -124,7 +124,7 @@ impl Runtime {
             let (path, _) = self.opening.take()?;
             return Some(Command::Opened(path, result.map(Arc::new)));
         }
-        let crate::dataset::ProgressState { stage, done, total } = job.progress().state();
+        let crate::task::ProgressState { stage, done, total } = job.progress().state();
         let shown = session.data.opening.as_ref()?;
         (shown.stage != stage || shown.done != done || shown.total != total).then_some(Command::OpenProgress {
             stage,

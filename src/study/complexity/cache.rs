@@ -28,7 +28,7 @@ const MAX_FAILURES: usize = 10_000;
 static WRITING: Mutex<()> = Mutex::new(());
 
 /// What is kept of a frame: its statistics, or why it cannot be read.
-pub(super) type Kept = Result<Statistics, String>;
+pub(super) type CachedStatistics = Result<Statistics, String>;
 
 /// The user's folder of cached statistics; `None` where there is no home.
 pub fn cache_folder() -> Option<PathBuf> {
@@ -87,7 +87,7 @@ impl CacheFile {
     }
 
     /// All that it holds; nothing where it does not exist, or with a warning where it cannot be read.
-    pub(super) fn read(&self) -> HashMap<Key, Kept> {
+    pub(super) fn read(&self) -> HashMap<Key, CachedStatistics> {
         match self.try_read() {
             Ok(kept) => {
                 touch(&self.path);
@@ -101,7 +101,7 @@ impl CacheFile {
         }
     }
 
-    fn try_read(&self) -> Result<HashMap<Key, Kept>, NpzError> {
+    fn try_read(&self) -> Result<HashMap<Key, CachedStatistics>, NpzError> {
         let mut file = NpzArchive::open(&self.path)?;
         self.check_head(&mut file)?;
         let (keys, statistics) = (file.read("keys")?, file.read("statistics")?);
@@ -126,7 +126,7 @@ impl CacheFile {
     }
 
     /// Replaces the file by these frames. That it cannot be written is a warning: everything can be computed again.
-    pub(super) fn write<'a>(&self, frames: impl Iterator<Item = (Key, &'a Kept)>) {
+    pub(super) fn write<'a>(&self, frames: impl Iterator<Item = (Key, &'a CachedStatistics)>) {
         let (mut keys, mut statistics, mut failures) = (Vec::new(), Vec::new(), BTreeMap::new());
         for (Key(key), kept) in frames {
             let numbers = match kept {

@@ -6,7 +6,8 @@ use super::plan::{Sequences, chunk_length, chunks};
 use super::scan::{Scanned, scan};
 use super::stamps::{Key, keys};
 use super::{Complexity, ComplexityOptions, rank};
-use crate::dataset::{Dataset, Progress};
+use crate::dataset::Dataset;
+use crate::task::Progress;
 use std::path::Path;
 use std::time::{Duration, Instant};
 

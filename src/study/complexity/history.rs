@@ -7,7 +7,7 @@ use crate::mhp::fill_missing;
 
 /// Statistics of consecutive frames of one sequence, fed one after the other.
 #[derive(Debug)]
-pub(super) struct History {
+pub(super) struct MaskHistory {
     options: ComplexityOptions,
     views: Vec<ViewHistory>,
     /// Readable frames in a row, up to now.
@@ -26,7 +26,7 @@ struct ViewHistory {
     masks: Vec<u64>,
 }
 
-impl History {
+impl MaskHistory {
     /// Nothing seen yet of a sequence whose views have these arrays and bins.
     pub(super) fn new(views: impl Iterator<Item = (String, Vec<usize>)>, options: ComplexityOptions) -> Self {
         let views = views.map(|(array, shape)| {

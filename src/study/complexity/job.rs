@@ -2,7 +2,8 @@
 
 use super::super::StudyError;
 use super::{Complexity, ComplexityOptions, compute};
-use crate::dataset::{Dataset, Job, Progress};
+use crate::dataset::Dataset;
+use crate::task::{Job, Progress};
 use std::path::PathBuf;
 use std::sync::Arc;
 

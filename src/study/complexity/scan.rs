@@ -1,13 +1,13 @@
 //! The threads that read maps and measure them.
 
-use super::cache::Kept;
-use super::history::History;
+use super::cache::CachedStatistics;
+use super::history::MaskHistory;
 use super::plan::Chunk;
 use super::{ComplexityOptions, Statistics};
-use crate::dataset::{Dataset, DatasetError, MapReader, NpzError, Progress, panic_text};
+use crate::dataset::{Dataset, DatasetError, MapReader, NpzError};
 use crate::study::StudyError;
+use crate::task::{Progress, catch_panic};
 use crossbeam_channel::{Sender, bounded};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Results that may wait to be taken: few, so that little is lost where the taker stops.
@@ -17,7 +17,7 @@ const WAITING: usize = 64;
 #[derive(Debug)]
 pub(super) struct Scanned {
     /// Its statistics, or why there are none.
-    pub(super) kept: Kept,
+    pub(super) kept: CachedStatistics,
     /// False where a frame of its window failed for a reason that may pass without any file changing.
     pub(super) lasting: bool,
 }
@@ -80,7 +80,7 @@ impl Work<'_> {
     /// Takes chunks until none is left, nobody listens, or somebody pressed cancel.
     fn run(&self, outbox: &Sender<(usize, Scanned)>) {
         let views = self.dataset.info().views.iter().map(|view| (view.array.clone(), view.shape()));
-        let mut history = History::new(views, *self.options);
+        let mut history = MaskHistory::new(views, *self.options);
         while let Some(chunk) = self.chunks.get(self.next.fetch_add(1, Ordering::Relaxed)) {
             if self.run_chunk(chunk, &mut history, outbox).is_none() {
                 return;
@@ -89,7 +89,7 @@ impl Work<'_> {
     }
 
     /// `None` to stop.
-    fn run_chunk(&self, chunk: &Chunk, history: &mut History, outbox: &Sender<(usize, Scanned)>) -> Option<()> {
+    fn run_chunk(&self, chunk: &Chunk, history: &mut MaskHistory, outbox: &Sender<(usize, Scanned)>) -> Option<()> {
         history.forget();
         let end = chunk.frames.end;
         let mut maps = self.dataset.maps(chunk.from..end);
@@ -99,11 +99,9 @@ impl Work<'_> {
             if self.progress.is_cancelled() {
                 return None;
             }
-            let measured = catch_unwind(AssertUnwindSafe(|| self.measure(i, &mut maps, history)));
-            let measured = measured.unwrap_or_else(|panic| {
+            let measured = catch_panic(|| self.measure(i, &mut maps, history)).unwrap_or_else(|message| {
                 maps = self.dataset.maps(i + 1..end);
-                let path = self.dataset.frame_path(i);
-                Err(DatasetError::Internal { message: panic_text(panic.as_ref()), path }.into())
+                Err(DatasetError::Internal { message, path: self.dataset.frame_path(i) }.into())
             });
             if let Err(fault) = &measured {
                 history.forget();
@@ -118,7 +116,7 @@ impl Work<'_> {
         Some(())
     }
 
-    fn measure(&self, i: usize, maps: &mut MapReader<'_>, history: &mut History) -> Result<Statistics, Fault> {
+    fn measure(&self, i: usize, maps: &mut MapReader<'_>, history: &mut MaskHistory) -> Result<Statistics, Fault> {
         let mut maps = maps.next().transpose()?.unwrap_or_default();
         history
             .push(&mut maps)

@@ -5,7 +5,8 @@
 
 use super::super::StudyError;
 use super::plan::Sequences;
-use crate::dataset::{Dataset, Progress};
+use crate::dataset::Dataset;
+use crate::task::Progress;
 use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
 use std::path::Path;

@@ -13,5 +13,5 @@ pub use cloud::{CloudPoint, point_cloud};
 pub use cloud_files::{write_cloud_npz, write_cloud_pcd, write_cloud_ply};
 pub use curves::{CurveRow, curve_columns, curves_csv, write_curves};
 pub use error::ExportError;
-pub use heatmap::{HeatmapExport, MapScale, scaled_maps};
+pub use heatmap::{ExportScale, HeatmapExport, scaled_maps};
 pub use ply::{ply, write_ply};

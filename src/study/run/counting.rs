@@ -5,18 +5,19 @@ use super::variant::Method;
 use crate::dataset::{Dataset, Heatmap};
 use crate::mhp::fill_missing;
 use crate::people::{CLASSES, Counter, Network, map_statistics};
-use crate::study::count::{LEAD_IN, Window};
+use crate::study::count::{LEAD_IN, ScanWindow};
 use crate::study::row::annotated;
+use crate::task::milliseconds;
 use std::time::Instant;
 
 /// Frames of a unit: short enough for all cores, long against the frames that are read before it.
 pub(super) const CHUNK: usize = 32;
 
 /// One frame's count, and the time that it took without reading, ms.
-pub(super) type Counted = (Result<RunNumbers, String>, Option<f64>);
+pub(super) type CountOutcome = (Result<RunNumbers, String>, Option<f64>);
 
 /// Counts consecutive frames of one sequence; those before them in it are looked at where the method asks for them.
-pub(super) fn count(dataset: &Dataset, method: Method, frames: &[usize]) -> Vec<Counted> {
+pub(super) fn count(dataset: &Dataset, method: Method, frames: &[usize]) -> Vec<CountOutcome> {
     let Some(&first) = frames.first() else { return Vec::new() };
     let made = match method {
         Method::Counter => Counter::new(&dataset.info().views).map(|counter| Tool::Counter(Box::new(counter))),
@@ -29,7 +30,7 @@ pub(super) fn count(dataset: &Dataset, method: Method, frames: &[usize]) -> Vec<
     match &tool {
         Tool::Alone(network) => frames.iter().map(|&frame| alone(dataset, network, frame)).collect(),
         Tool::Counter(counter) => {
-            let mut window = Window::new(counter);
+            let mut window = ScanWindow::new(counter);
             let sequence = dataset.sequence(first);
             let begin =
                 (first.saturating_sub(LEAD_IN)..first).find(|&i| dataset.sequence(i) == sequence).unwrap_or(first);
@@ -47,7 +48,7 @@ enum Tool {
     Alone(Network),
 }
 
-fn with_counter(dataset: &Dataset, window: &mut Window<'_>, frame: usize) -> Counted {
+fn with_counter(dataset: &Dataset, window: &mut ScanWindow<'_>, frame: usize) -> CountOutcome {
     let (maps, annotated) = match maps(dataset, frame) {
         Ok((maps, annotated)) => (Ok(maps), annotated),
         Err(why) => (Err(why), None),
@@ -61,7 +62,7 @@ fn with_counter(dataset: &Dataset, window: &mut Window<'_>, frame: usize) -> Cou
     (numbers.map_err(|why| super::fit::portable(dataset, &why)), ms)
 }
 
-fn alone(dataset: &Dataset, network: &Network, frame: usize) -> Counted {
+fn alone(dataset: &Dataset, network: &Network, frame: usize) -> CountOutcome {
     let (mut maps, annotated) = match maps(dataset, frame) {
         Ok(found) => found,
         Err(why) => return (Err(super::fit::portable(dataset, &why)), None),
@@ -84,8 +85,4 @@ fn maps(dataset: &Dataset, frame: usize) -> Result<(Vec<Heatmap>, Option<usize>)
 
 fn numbers(people: usize, annotated: Option<usize>) -> RunNumbers {
     RunNumbers { persons: people, annotated, reason: "counted".to_owned(), ..RunNumbers::default() }
-}
-
-fn milliseconds(began: Instant) -> f64 {
-    (began.elapsed().as_secs_f64() * 1e6).round() / 1e3
 }

@@ -4,14 +4,14 @@
 
 use super::counting;
 use super::error::RunError;
-use super::fit::{Loaded, Start, Stop, fit_key};
-use super::journal::{Journal, Rows};
+use super::fit::{LoadedFrame, Stop, TimedStart, fit_key};
+use super::journal::{Rows, RunJournal};
 use super::plan::{RunPlan, Unit};
 use super::row::{RunNumbers, RunRow};
 use crate::body::Pppr;
-use crate::dataset::{Dataset, Progress, panic_text, read_pppr, write_pppr};
+use crate::dataset::{Dataset, read_pppr, write_pppr};
+use crate::task::{Progress, panic_as_error};
 use std::collections::BTreeSet;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -26,7 +26,7 @@ const CHAINS: &str = "chains";
 pub(super) fn execute(
     dataset: &Dataset,
     plan: &RunPlan,
-    (journal, rows): (Journal, Rows),
+    (journal, rows): (RunJournal, Rows),
     folder: &Path,
     threads: usize,
     progress: &Progress,
@@ -65,7 +65,7 @@ pub(super) fn execute(
 
 /// What the threads write.
 struct Kept {
-    journal: Journal,
+    journal: RunJournal,
     rows: Rows,
     fault: Option<RunError>,
 }
@@ -110,8 +110,8 @@ impl Engine<'_> {
         self.halted()?;
         let missing: Vec<usize> = variants.iter().copied().filter(|&v| !self.done.contains(&(v, frame))).collect();
         let Some(&first) = missing.first() else { return Ok(()) };
-        let started = caught(|| {
-            let loaded = Loaded::read(self.dataset, frame)?;
+        let started = panic_as_error(|| {
+            let loaded = LoadedFrame::read(self.dataset, frame)?;
             let start = loaded.cold(&self.plan.spec.variants[first].config)?;
             Ok((loaded, start))
         });
@@ -139,12 +139,12 @@ impl Engine<'_> {
         groups
     }
 
-    fn fits(&self, frame: usize, loaded: &Loaded<'_>, start: &Start, variants: &[usize]) -> Result<(), Halt> {
+    fn fits(&self, frame: usize, loaded: &LoadedFrame<'_>, start: &TimedStart, variants: &[usize]) -> Result<(), Halt> {
         let spec = &self.plan.spec;
         let Some(&longest) = variants.last() else { return Ok(()) };
         let stops: Vec<usize> = variants.iter().map(|&v| spec.variants[v].config.iterations).collect();
         let config = &spec.variants[longest].config;
-        let answers = caught(|| Ok(loaded.fit(config, spec.precision, start, &stops)));
+        let answers = panic_as_error(|| Ok(loaded.fit(config, spec.precision, start, &stops)));
         let answers = answers.unwrap_or_else(|why| stops.iter().map(|_| Err(why.clone())).collect());
         for (&variant, answer) in variants.iter().zip(answers) {
             self.keep(variant, frame, start.init_ms, answer)?;
@@ -185,7 +185,7 @@ impl Engine<'_> {
             return Ok(());
         }
         let method = self.plan.spec.variants[variant].method;
-        let counted = caught(|| Ok(counting::count(self.dataset, method, frames)));
+        let counted = panic_as_error(|| Ok(counting::count(self.dataset, method, frames)));
         let counted = counted.unwrap_or_else(|why| frames.iter().map(|_| (Err(why.clone()), None)).collect());
         for (&frame, (numbers, ms)) in frames.iter().zip(counted).filter(|(frame, _)| missing(frame)) {
             self.keep_numbers(variant, frame, [None, ms], numbers)?;
@@ -214,8 +214,8 @@ impl Engine<'_> {
         let spec = &self.plan.spec;
         let config = &spec.variants[variant].config;
         let mut init_ms = None;
-        let answer = caught(|| {
-            let loaded = Loaded::read(self.dataset, frame)?;
+        let answer = panic_as_error(|| {
+            let loaded = LoadedFrame::read(self.dataset, frame)?;
             let start = before.map_or_else(|| loaded.cold(config), |before| Ok(loaded.warm(config, before)))?;
             init_ms = start.init_ms;
             let mut answers = loaded.fit(config, spec.precision, &start, &[config.iterations]);
@@ -279,10 +279,4 @@ impl Engine<'_> {
         self.progress.advance(1);
         Ok(())
     }
-}
-
-/// A panic is a defect in this program; one frame of thousands must not end the others.
-fn caught<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(work))
-        .unwrap_or_else(|panic| Err(format!("internal error: {}", panic_text(panic.as_ref()))))
 }

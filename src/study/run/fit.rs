@@ -6,12 +6,13 @@
 use super::row::RunNumbers;
 use crate::body::Pppr;
 use crate::config::{FitConfig, LearningRates};
-use crate::dataset::{Dataset, Frame, Layout};
-use crate::diagnose::{Camera, Reprojection, joint_errors, map_box_coverage, reprojection};
+use crate::dataset::{Dataset, Frame};
+use crate::diagnose::{Reprojection, joint_errors, map_box_coverage, reprojection};
 use crate::geometry::Vec3;
 use crate::mhp::{Fitter, Precision, Problem, StopReason, predict};
-use crate::start::{begin, problem_of};
+use crate::start::{find_start, problem_of};
 use crate::study::row::annotated;
+use crate::task::milliseconds;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -42,7 +43,7 @@ pub(super) fn fit_key(config: &FitConfig) -> FitConfig {
 }
 
 /// A frame, loaded.
-pub(super) struct Loaded<'a> {
+pub(super) struct LoadedFrame<'a> {
     dataset: &'a Dataset,
     frame: Frame,
     problem: Arc<Problem>,
@@ -50,7 +51,7 @@ pub(super) struct Loaded<'a> {
 
 /// A start, and how long it took to find.
 #[derive(Debug, Clone)]
-pub(super) struct Start {
+pub(super) struct TimedStart {
     /// Where the fit begins.
     pub(super) params: Pppr,
     /// What the frame alone says, without the switches that refine a start.
@@ -65,7 +66,7 @@ pub(super) struct Stop {
     pub(super) params: Pppr,
 }
 
-impl<'a> Loaded<'a> {
+impl<'a> LoadedFrame<'a> {
     /// Reads frame `index`.
     ///
     /// # Errors
@@ -80,16 +81,16 @@ impl<'a> Loaded<'a> {
     ///
     /// # Errors
     /// Where nobody is seen.
-    pub(super) fn cold(&self, config: &FitConfig) -> Result<Start, String> {
+    pub(super) fn cold(&self, config: &FitConfig) -> Result<TimedStart, String> {
         let began = Instant::now();
-        let found = begin(&self.problem, config).map_err(|error| self.told(&error))?.initialisation;
-        Ok(Start { params: found.params, unrefined: found.unrefined, init_ms: Some(milliseconds(began)) })
+        let found = find_start(&self.problem, config).map_err(|error| self.told(&error))?.initialisation;
+        Ok(TimedStart { params: found.params, unrefined: found.unrefined, init_ms: Some(milliseconds(began)) })
     }
 
-    /// A start from what the frame before ended with, moved as its people moved and spoiled as a cold one is.
-    pub(super) fn warm(&self, config: &FitConfig, before: &Pppr) -> Start {
+    /// A start from what the frame before ended with, moved as its people moved and perturbed as a cold one is.
+    pub(super) fn warm(&self, config: &FitConfig, before: &Pppr) -> TimedStart {
         let params = predict(&self.problem, config, before);
-        Start { unrefined: params.clone(), params, init_ms: None }
+        TimedStart { unrefined: params.clone(), params, init_ms: None }
     }
 
     /// Fits from `start` and looks at it after each of `stops` steps, ascending. What fails from some step on fails there
@@ -98,7 +99,7 @@ impl<'a> Loaded<'a> {
         &self,
         config: &FitConfig,
         precision: Precision,
-        start: &Start,
+        start: &TimedStart,
         stops: &[usize],
     ) -> Vec<Result<Stop, String>> {
         let began = Instant::now();
@@ -122,7 +123,7 @@ impl<'a> Loaded<'a> {
         answers
     }
 
-    fn numbers(&self, fitter: &Fitter, start: &Start, ended: bool) -> RunNumbers {
+    fn numbers(&self, fitter: &Fitter, start: &TimedStart, ended: bool) -> RunNumbers {
         let (report, params) = (fitter.report(), fitter.params());
         let reason = if ended { StopReason::Converged } else { StopReason::Iterations };
         let now = self.measured(params);
@@ -159,16 +160,16 @@ impl<'a> Loaded<'a> {
         }
     }
 
-    /// Only MMVR publishes a camera; its key points count where the skeleton is theirs.
+    /// Only where the data set publishes a camera; its key points count where the skeleton is theirs.
     fn reprojection(&self, joints: &[Vec3], a_person: usize) -> Reprojection {
         let info = self.dataset.info();
-        let Some(image) = self.frame.image.as_ref().filter(|_| info.layout == Layout::Mmvr) else {
+        let (Some(image), Some(camera)) = (&self.frame.image, info.layout.camera()) else {
             return Reprojection::default();
         };
         let preset = crate::body::Skeleton::preset(&image.keypoint_skeleton);
         let same = preset.is_some_and(|preset| preset.joints == info.skeleton.joints);
         let keypoints = if same { image.keypoints.as_slice() } else { &[] };
-        reprojection(&Camera::MMVR, joints, a_person, keypoints, &image.boxes)
+        reprojection(&camera, joints, a_person, keypoints, &image.boxes)
     }
 
     fn map_box_coverage(&self, joints: &[Vec3], a_person: usize) -> Option<f64> {
@@ -196,11 +197,6 @@ fn advance(fitter: &mut Fitter, stop: usize, ended: &mut bool) -> Result<(), cra
 /// An error text without the folder of the data set, which may lie elsewhere on another machine.
 pub(super) fn portable(dataset: &Dataset, text: &str) -> String {
     text.replace(&format!("{}{}", dataset.info().root.display(), std::path::MAIN_SEPARATOR), "")
-}
-
-fn milliseconds(began: Instant) -> f64 {
-    // A microsecond is all that such a time is worth.
-    (began.elapsed().as_secs_f64() * 1e6).round() / 1e3
 }
 
 #[cfg(test)]
@@ -256,7 +252,7 @@ mod tests {
     #[test]
     fn variants_with_one_key_have_one_start() {
         let (problem, base) = (Arc::new(problem()), FitConfig::default());
-        let start = |config: &FitConfig| begin(&problem, config).unwrap().initialisation.params;
+        let start = |config: &FitConfig| find_start(&problem, config).unwrap().initialisation.params;
         let same = start(&base);
         let rates = LearningRates { position: Some(0.01), bone: Some(0.02), ..LearningRates::default() };
         let variants = [

@@ -2,15 +2,16 @@
 
 use super::engine::execute;
 use super::error::RunError;
-use super::journal::{JOURNAL_FILE, Journal, Rows, read, rewrite};
+use super::journal::{JOURNAL_FILE, Rows, RunJournal, read, rewrite};
 use super::markdown;
 use super::output::{self, TABLE_FILE, json_text};
 use super::plan::RunPlan;
 use super::row::RunRow;
 use super::spec::{RUN_FILE, RunSpec};
 use super::table::{TableRow, table};
-use crate::dataset::{Dataset, Progress};
+use crate::dataset::Dataset;
 use crate::output::{FolderLock, Inputs};
+use crate::task::Progress;
 use std::path::Path;
 
 /// A run as it lies on disk, finished or not.
@@ -89,7 +90,7 @@ pub fn execute_run(
     } else {
         plan.spec.write(folder)?;
     }
-    let rows = execute(dataset, plan, Journal::open(folder, &plan.spec)?, folder, threads, progress)?;
+    let rows = execute(dataset, plan, RunJournal::open(folder, &plan.spec)?, folder, threads, progress)?;
     output::write(folder, &plan.spec, &rows)?;
     Ok(Run::of(plan.spec.clone(), &rows, true))
 }

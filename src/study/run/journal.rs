@@ -21,7 +21,7 @@ pub(super) type Rows = BTreeMap<(usize, usize), RunRow>;
 
 /// An open journal.
 #[derive(Debug)]
-pub(super) struct Journal {
+pub(super) struct RunJournal {
     file: File,
     path: PathBuf,
 }
@@ -31,7 +31,7 @@ struct Head {
     run: String,
 }
 
-impl Journal {
+impl RunJournal {
     /// Opens the journal of a run folder, or begins it, and gives the rows that are in it.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! The values of curves as they grow, and what of them can be seen: lowest and highest of ever longer stretches.
 
-use super::thin::Window;
+use super::thin::VisibleSpan;
 use egui_plot::PlotPoint;
 use std::collections::HashMap;
 
@@ -42,7 +42,7 @@ impl Series {
 
     /// The points that a curve in `window` is drawn from, in pieces: it breaks where there is no value, or on a logarithmic
     /// scale none above 1e−7. Everything where nothing was on screen yet.
-    pub(super) fn pieces(&self, window: Option<&Window>, log: bool) -> Vec<Vec<PlotPoint>> {
+    pub(super) fn pieces(&self, window: Option<&VisibleSpan>, log: bool) -> Vec<Vec<PlotPoint>> {
         let Some(last) = self.values.len().checked_sub(1) else { return Vec::new() };
         let (shown, stretch) = window.map_or((0..=last, 1), |window| {
             let place = |x: f64| ((x - self.first as f64).max(0.0) as usize).min(last);
@@ -146,7 +146,7 @@ mod tests {
     fn a_part_looks_as_if_all_points_were_drawn() {
         let series = series(5, (0..100_000).map(value));
         for (lo, hi, pixels) in [(0.0, 100_005.0, 800.0), (61_000.0, 63_000.0, 640.0), (300.0, 420.0, 500.0)] {
-            let window = Window::new(lo, hi, pixels);
+            let window = VisibleSpan::new(lo, hi, pixels);
             let every = series.joined(0..series.values.len(), false);
             let every: Vec<PlotPoint> = every.into_iter().flat_map(|piece| window.thinned(piece)).collect();
             let few: Vec<PlotPoint> = series.pieces(Some(&window), false).concat();

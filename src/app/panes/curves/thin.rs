@@ -5,14 +5,14 @@ use std::ops::RangeInclusive;
 
 /// What of a curve can be told apart on screen.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Window {
+pub(super) struct VisibleSpan {
     /// Iterations that are drawn: those on screen, and as many on both sides for a drag in between.
     drawn: RangeInclusive<f64>,
     /// Iterations a pixel column.
     column: f64,
 }
 
-impl Window {
+impl VisibleSpan {
     /// Of a plot that shows iterations `lo` to `hi` on `pixels` columns.
     pub(super) fn new(lo: f64, hi: f64, pixels: f32) -> Self {
         let span = hi - lo;
@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn a_hundred_thousand_points_become_two_a_column_and_keep_their_spikes() {
-        let thinned = Window::new(0.0, 100_000.0, 800.0).thinned(curve(100_000));
+        let thinned = VisibleSpan::new(0.0, 100_000.0, 800.0).thinned(curve(100_000));
         assert!(thinned.len() <= 2 * 801 + 2, "{}", thinned.len());
         assert!(thinned.iter().any(|p| p.x == 61_803.0 && p.y == 9.0));
         assert!(thinned.windows(2).all(|pair| pair[0].x < pair[1].x), "in order, none twice");
@@ -74,13 +74,13 @@ mod tests {
     #[test]
     fn where_each_point_has_a_column_none_is_lost() {
         let points = curve(300);
-        let same = Window::new(0.0, 300.0, 800.0).thinned(points.clone());
+        let same = VisibleSpan::new(0.0, 300.0, 800.0).thinned(points.clone());
         assert!(same.len() == 300 && same.iter().zip(&points).all(|(a, b)| a.x == b.x && a.y == b.y));
     }
 
     #[test]
     fn what_is_far_off_screen_is_not_drawn() {
-        let thinned = Window::new(50_000.0, 50_100.0, 800.0).thinned(curve(100_000));
+        let thinned = VisibleSpan::new(50_000.0, 50_100.0, 800.0).thinned(curve(100_000));
         assert_eq!(thinned.len(), 303, "a window on both sides, and the ends");
     }
 }

@@ -4,7 +4,7 @@ use crate::app::theme::{self, Tokens};
 use crate::app::widgets::iou_color;
 use crate::labels::Verdict;
 use crate::mhp::TermId;
-use crate::session::{Facts, Number, SortKey, ViewState};
+use crate::session::{FrameNumber, FrameRow, SortKey, ViewState};
 use egui::{Align2, Color32, FontId, Painter, Rect, pos2};
 use std::sync::LazyLock;
 
@@ -193,46 +193,46 @@ fn number(value: Option<f64>, digits: usize) -> String {
 }
 
 /// Text and colour of a cell.
-fn text(column: &Column, facts: &Facts<'_>, tokens: &Tokens) -> (String, Color32) {
+fn text(column: &Column, row: &FrameRow<'_>, tokens: &Tokens) -> (String, Color32) {
     let dim = |text: String| (text, tokens.dim);
-    let fitted = facts.iterations.is_some();
+    let fitted = row.iterations.is_some();
     if let SortKey::Term(term) = column.sort {
-        let value = facts.number(Number::Term(term));
+        let value = row.number(FrameNumber::Term(term));
         return (value.map_or_else(String::new, |x| format!("{x:.4}")), tokens.text);
     }
     match column.key {
-        "index" => dim(facts.index.to_string()),
+        "index" => dim(row.index.to_string()),
         "frame" => {
-            let short = facts.name.rsplit('/').next().unwrap_or(facts.name);
-            (short.to_owned(), if facts.readable { tokens.text } else { tokens.bad })
+            let short = row.name.rsplit('/').next().unwrap_or(row.name);
+            (short.to_owned(), if row.readable { tokens.text } else { tokens.bad })
         }
-        "hardness" => (number(facts.hardness, 2), tokens.text),
-        "peaks" => dim(number(facts.peak_density.map(|x| x * 1000.0), 2)),
-        "static" => dim(number(facts.static_dominance, 2)),
-        "saliency" => dim(number(facts.human_saliency, 2)),
-        "iou" => match facts.iou {
+        "hardness" => (number(row.hardness, 2), tokens.text),
+        "peaks" => dim(number(row.peak_density.map(|x| x * 1000.0), 2)),
+        "static" => dim(number(row.static_dominance, 2)),
+        "saliency" => dim(number(row.human_saliency, 2)),
+        "iou" => match row.iou {
             Some(iou) => (format!("{iou:.2}"), iou_color(tokens, iou)),
             None => dim(if fitted { "–".into() } else { String::new() }),
         },
-        "converged" => match facts.converged {
+        "converged" => match row.converged {
             Some(true) => ("✓".into(), tokens.ok),
             Some(false) => ("✕".into(), tokens.warn),
             None => dim(String::new()),
         },
-        "reason" => dim(facts.reason.unwrap_or_default().to_owned()),
-        "majpe" => (facts.majpe_mm.map_or_else(String::new, |mm| format!("{mm:.0}")), tokens.text),
-        "by" => dim(facts.annotators.join(", ")),
+        "reason" => dim(row.reason.unwrap_or_default().to_owned()),
+        "majpe" => (row.majpe_mm.map_or_else(String::new, |mm| format!("{mm:.0}")), tokens.text),
+        "by" => dim(row.annotators.join(", ")),
         _ => dim(String::new()),
     }
 }
 
 /// Draws a cell into `rect`.
-pub(super) fn cell(painter: &Painter, rect: Rect, column: &Column, facts: &Facts<'_>, tokens: &Tokens) {
+pub(super) fn cell(painter: &Painter, rect: Rect, column: &Column, row: &FrameRow<'_>, tokens: &Tokens) {
     let painter = painter.with_clip_rect(rect.intersect(painter.clip_rect()));
     let y = rect.center().y;
     match column.key {
         "stratum" => {
-            let Some(stratum) = facts.stratum else { return };
+            let Some(stratum) = row.stratum else { return };
             let font = theme::strong(theme::CAPTION);
             let letter = stratum.letter();
             painter.text(pos2(rect.center().x, y), Align2::CENTER_CENTER, letter, font, tokens.stratum(stratum));
@@ -240,7 +240,7 @@ pub(super) fn cell(painter: &Painter, rect: Rect, column: &Column, facts: &Facts
         "tags" => {
             let mut x = rect.left();
             let font = || FontId::proportional(theme::CAPTION);
-            if let Some(verdict) = facts.verdict {
+            if let Some(verdict) = row.verdict {
                 let short = match verdict {
                     Verdict::AnnotationError => "annot. err",
                     Verdict::DetectionError => "detect. err",
@@ -249,14 +249,14 @@ pub(super) fn cell(painter: &Painter, rect: Rect, column: &Column, facts: &Facts
                 };
                 x = painter.text(pos2(x, y), Align2::LEFT_CENTER, short, font(), tokens.text).right() + 4.0;
             }
-            for tag in facts.tags.iter() {
-                let fade = if facts.own_tags.contains(tag) { 1.0 } else { 0.45 };
+            for tag in row.tags.iter() {
+                let fade = if row.own_tags.contains(tag) { 1.0 } else { 0.45 };
                 let color = tokens.tag(tag).gamma_multiply(fade);
                 x = painter.text(pos2(x, y), Align2::LEFT_CENTER, tag.code(), font(), color).right() + 4.0;
             }
         }
         _ => {
-            let (text, color) = text(column, facts, tokens);
+            let (text, color) = text(column, row, tokens);
             let font = if column.right { theme::mono(theme::CAPTION) } else { FontId::proportional(12.0) };
             let (at, align) = if column.right {
                 (pos2(rect.right(), y), Align2::RIGHT_CENTER)
@@ -269,15 +269,15 @@ pub(super) fn cell(painter: &Painter, rect: Rect, column: &Column, facts: &Facts
 }
 
 /// What a screen reader says of a row besides its name.
-pub(super) fn spoken(facts: &Facts<'_>) -> String {
+pub(super) fn spoken(row: &FrameRow<'_>) -> String {
     let mut parts = Vec::new();
-    parts.extend(facts.stratum.map(|stratum| stratum.word().to_owned()));
-    parts.extend(facts.iou.map(|iou| format!("IoU {iou:.2}")));
-    parts.extend(facts.converged.map(|yes| if yes { "converged" } else { "not converged" }.to_owned()));
-    if !facts.tags.is_empty() {
-        parts.push(format!("tagged {}", facts.tags));
+    parts.extend(row.stratum.map(|stratum| stratum.word().to_owned()));
+    parts.extend(row.iou.map(|iou| format!("IoU {iou:.2}")));
+    parts.extend(row.converged.map(|yes| if yes { "converged" } else { "not converged" }.to_owned()));
+    if !row.tags.is_empty() {
+        parts.push(format!("tagged {}", row.tags));
     }
-    parts.extend(facts.verdict.map(|verdict| format!("verdict {verdict}")));
+    parts.extend(row.verdict.map(|verdict| format!("verdict {verdict}")));
     parts.join(", ")
 }
 
@@ -296,8 +296,8 @@ mod tests {
         column.show(&mut view, true);
         assert!(column.is_shown(&view));
         let terms = Terms::from_fn(|term| (term.key == "dummy").then_some(0.7));
-        let facts = Facts { terms: Some(&terms), ..Facts::default() };
-        assert_eq!(text(column, &facts, &crate::app::theme::DARK).0, "0.7000");
+        let row = FrameRow { terms: Some(&terms), ..FrameRow::default() };
+        assert_eq!(text(column, &row, &crate::app::theme::DARK).0, "0.7000");
         column.show(&mut view, false);
         assert_eq!(view, ViewState::default());
     }

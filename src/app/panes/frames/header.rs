@@ -82,7 +82,7 @@ fn views(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         }
         for view in kept {
             ui.horizontal(|ui| {
-                if ui.button(&view.name).on_hover_text(format!("Filter: {}", view.rule)).clicked() {
+                if ui.button(&view.name).on_hover_text(format!("Filter: {}", view.filter)).clicked() {
                     state.filter = None;
                     shared.send(Command::UseView(view.name.clone()));
                     ui.close();

@@ -130,13 +130,13 @@ fn row(
     tokens: &Tokens,
 ) -> bool {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
-    let facts = session.facts(index);
+    let row = session.frame_row(index);
     let current = index == session.data.frame_index;
     let selected = session.labels.selection.contains(&index);
     response.widget_info(|| {
-        let name = format!("Frame {}", facts.name);
+        let name = format!("Frame {}", row.name);
         let mut info = egui::WidgetInfo::selected(egui::Role::Button, true, current || selected, name);
-        info.current_text_value = Some(spoken(&facts));
+        info.current_text_value = Some(spoken(&row));
         info
     });
     let painter = ui.painter();
@@ -155,33 +155,33 @@ fn row(
     for column in columns {
         let width = extent(column);
         let at = egui::Rect::from_min_max(pos2(x, rect.top()), pos2(x + width, rect.bottom()));
-        cell(painter, at, column, &facts, tokens);
+        cell(painter, at, column, &row, tokens);
         x += width + GAP;
     }
     response.on_hover_ui(|ui| tooltip(ui, session, index)).clicked()
 }
 
 fn tooltip(ui: &mut Ui, session: &Session, index: usize) {
-    let facts = session.facts(index);
-    ui.label(format!("{} · {}", facts.scene, facts.name));
+    let row = session.frame_row(index);
+    ui.label(format!("{} · {}", row.scene, row.name));
     let number = |value: Option<f64>| value.map_or_else(|| "undefined".into(), |x| format!("{x:.3}"));
-    if let Some(hardness) = facts.hardness {
-        let word = facts.stratum.map_or("ungraded", |stratum| stratum.word());
+    if let Some(hardness) = row.hardness {
+        let word = row.stratum.map_or("ungraded", |stratum| stratum.word());
         ui.label(format!("{word}, hardness {hardness:.3}"));
-        let peaks = facts.peak_density.map_or_else(|| "undefined".into(), |x| format!("{x:.5}"));
-        let (stat, human) = (number(facts.static_dominance), number(facts.human_saliency));
+        let peaks = row.peak_density.map_or_else(|| "undefined".into(), |x| format!("{x:.5}"));
+        let (stat, human) = (number(row.static_dominance), number(row.human_saliency));
         ui.label(format!("ρ_peak {peaks} · s_static {stat} · r_human {human}"));
     }
-    if let (Some(n), Some(loss)) = (facts.iterations, facts.loss) {
-        let word = if facts.converged == Some(true) { "converged" } else { "not converged" };
-        let majpe = facts.majpe_mm.map_or_else(String::new, |mm| format!(" · MAJPE {mm:.1} mm"));
+    if let (Some(n), Some(loss)) = (row.iterations, row.loss) {
+        let word = if row.converged == Some(true) { "converged" } else { "not converged" };
+        let majpe = row.majpe_mm.map_or_else(String::new, |mm| format!(" · MAJPE {mm:.1} mm"));
         ui.label(format!("{n} iterations · L {loss:.4} · {word}{majpe}"));
     }
-    if !facts.tags.is_empty() {
-        ui.label(format!("{} by {}", facts.tags, facts.annotators.join(", ")));
+    if !row.tags.is_empty() {
+        ui.label(format!("{} by {}", row.tags, row.annotators.join(", ")));
     }
-    if !facts.note.is_empty() {
-        ui.label(facts.note);
+    if !row.note.is_empty() {
+        ui.label(row.note);
     }
     let hint = "Click to show. Ctrl+click and Shift+click select frames to tag together.";
     ui.label(RichText::new(hint).font(egui::FontId::proportional(theme::CAPTION)).weak());

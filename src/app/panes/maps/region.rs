@@ -25,14 +25,14 @@ pub(super) struct Marking {
     /// The next drag marks, with or without Ctrl.
     pub(super) armed: bool,
     /// Where the drag began.
-    pub(super) from: Option<Begun>,
+    pub(super) from: Option<DragStart>,
     /// Where the pointer is.
     to: [f64; 2],
 }
 
 /// Where a drag began. The three columns draw the same views: the drag is that of one of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Begun {
+pub(super) struct DragStart {
     column: egui::Id,
     view: usize,
     /// Picture coordinates.
@@ -111,12 +111,12 @@ impl State {
             && (self.marking.armed || ui.input(|i| i.modifiers.command))
             && let Some(origin) = ui.input(|i| i.pointer.press_origin())
         {
-            self.marking.from = Some(Begun { column: response.id, view: index, at: unit_at(plot, window, origin) });
+            self.marking.from = Some(DragStart { column: response.id, view: index, at: unit_at(plot, window, origin) });
         }
         if self.marking.armed && response.hovered() {
             ui.ctx().set_cursor_icon(egui::CursorIcon::Crosshair);
         }
-        let Some(Begun { at: from, .. }) = self.marking.from.filter(|begun| begun.column == response.id) else {
+        let Some(DragStart { at: from, .. }) = self.marking.from.filter(|begun| begun.column == response.id) else {
             return (false, None);
         };
         let to = pointer.map_or(from, |pointer| unit_at(plot, window, pointer));

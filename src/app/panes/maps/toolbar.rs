@@ -1,25 +1,25 @@
 //! The line above the maps: scale and colours over H_ori, comparison over H_sim, the legend over the masks.
 
-use super::{Column, Shared};
+use super::{MapColumn, Shared};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::render::Colormap;
 use crate::session::{Against, ColorRange, Compare, MapScale};
 use egui::{Color32, RichText, Sense, Ui, vec2};
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, column: Column) {
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, column: MapColumn) {
     egui::Frame::new().inner_margin(egui::Margin::symmetric(8, 3)).show(ui, |ui| {
         ui.horizontal(|ui| {
             ui.set_height(22.0);
             ui.spacing_mut().item_spacing.x = 4.0;
-            if column == Column::Sim && ui.available_width() < 260.0 {
+            if column == MapColumn::Sim && ui.available_width() < 260.0 {
                 ui.spacing_mut().item_spacing.x = 1.0;
                 ui.spacing_mut().button_padding.x = 5.0;
             }
             match column {
-                Column::Ori => colours(ui, shared),
-                Column::Sim => comparison(ui, shared),
-                Column::Masks => legend(ui),
+                MapColumn::Ori => colours(ui, shared),
+                MapColumn::Sim => comparison(ui, shared),
+                MapColumn::Masks => legend(ui),
             }
         });
     });

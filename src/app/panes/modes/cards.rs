@@ -3,7 +3,7 @@
 use crate::app::panes::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
-use crate::diagnose::{Evidence, Finding, Place};
+use crate::diagnose::{Evidence, Finding, FindingPlace};
 use crate::session::FitStatus;
 use egui::{RichText, Role, Sense, Ui, vec2};
 
@@ -118,9 +118,9 @@ fn line(ui: &mut Ui, shared: &mut Shared<'_>, card: &Evidence, finding: &Finding
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.add(egui::Label::new(text).wrap());
         let (word, tip) = match place {
-            Place::Cells { .. } => ("show", "Zoom the maps to these cells."),
-            Place::Joint(_) => ("select", "Select the joint."),
-            Place::Frame(_) => ("go", "Show that frame."),
+            FindingPlace::Cells { .. } => ("show", "Zoom the maps to these cells."),
+            FindingPlace::Joint(_) => ("select", "Select the joint."),
+            FindingPlace::Frame(_) => ("go", "Show that frame."),
         };
         let link = ui.link(RichText::new(word).small());
         let name = format!("{word} where {} is seen: {}", card.mode, finding.text);

@@ -2,7 +2,7 @@
 //!
 //! The points stand at equal distances whatever their values are: grids are often geometric, and each column is labelled.
 
-use super::measure::{Measure, Values, levels, limits};
+use super::measure::{Quantity, Values, levels, limits};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{ColorBar, Named as _, colorbar};
 use crate::render::Colormap;
@@ -58,7 +58,7 @@ impl Field {
 pub(super) fn show(
     ui: &mut Ui,
     run: &Run,
-    measure: Measure,
+    measure: Quantity,
     values: &Values,
     session: &Session,
     height: f32,
@@ -153,7 +153,7 @@ fn points(
     ui: &mut Ui,
     run: &Run,
     field: &Field,
-    measure: Measure,
+    measure: Quantity,
     place: &dyn Fn(f64, f64) -> Pos2,
     tokens: &Tokens,
 ) -> Option<usize> {

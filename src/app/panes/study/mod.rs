@@ -14,7 +14,7 @@ use crate::app::widgets::Named as _;
 use crate::session::Command;
 use crate::study::run::{Run, StudyKind, Subset};
 use egui::{RichText, Role, Ui};
-use measure::{Measure, Values};
+use measure::{Quantity, Values};
 
 /// A pane of less than this width, points, has a list of quantities instead of a button for each.
 const NARROW: f32 = 460.0;
@@ -22,8 +22,8 @@ const NARROW: f32 = 460.0;
 /// Which quantity is plotted, and the values that were made from the run.
 #[derive(Default)]
 pub(in crate::app) struct State {
-    measure: Measure,
-    values: Option<(u64, Vec<(Measure, Values)>)>,
+    measure: Quantity,
+    values: Option<(u64, Vec<(Quantity, Values)>)>,
 }
 
 /// How a study is plotted.
@@ -153,7 +153,7 @@ fn head(ui: &mut Ui, shared: &mut Shared<'_>, run: &Run, folder: &std::path::Pat
     }
 }
 
-fn choose(ui: &mut Ui, chosen: &mut Measure, values: &[(Measure, Values)]) {
+fn choose(ui: &mut Ui, chosen: &mut Quantity, values: &[(Quantity, Values)]) {
     if ui.available_width() < NARROW {
         let menu = egui::ComboBox::from_id_salt("measure").width(130.0).selected_text(chosen.title());
         let response = menu.show_ui(ui, |ui| {

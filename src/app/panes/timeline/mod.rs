@@ -5,7 +5,7 @@ mod strip;
 use super::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, icon_button};
-use crate::session::{Command, Strip};
+use crate::session::{Command, TimelineStrip};
 use egui::{Rect, RichText, Sense, Stroke, Ui, pos2, vec2};
 
 /// What the strip remembers.
@@ -40,7 +40,7 @@ fn caption(ui: &mut Ui, text: &str) {
 
 /// What the strip shows, in the place of its caption.
 fn choose_strip(ui: &mut Ui, shared: &mut Shared<'_>) {
-    let names = [(Strip::Stratum, "Stratum"), (Strip::Iou, "IoU"), (Strip::Tags, "Tags")];
+    let names = [(TimelineStrip::Stratum, "Stratum"), (TimelineStrip::Iou, "IoU"), (TimelineStrip::Tags, "Tags")];
     let now = shared.session.view.strip;
     ui.allocate_ui_with_layout(vec2(CAPTION, 22.0), egui::Layout::left_to_right(egui::Align::Center), |ui| {
         ui.set_min_width(CAPTION);
@@ -97,10 +97,10 @@ fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Toke
         ui.painter().vline(x, rect.y_range(), Stroke::new(2.0, tokens.accent));
         if let (Some(pointer), Some(dataset)) = (response.hover_pos(), &shared.session.data.dataset) {
             let i = at(pointer.x);
-            let facts = shared.session.facts(i);
-            let stratum = facts.stratum.map_or("not graded", |stratum| stratum.word());
-            let iou = facts.iou.map_or_else(|| "not fitted".into(), |x| format!("IoU {x:.3}"));
-            let tags = if facts.tags.is_empty() { "no tag".into() } else { facts.tags.to_string() };
+            let row = shared.session.frame_row(i);
+            let stratum = row.stratum.map_or("not graded", |stratum| stratum.word());
+            let iou = row.iou.map_or_else(|| "not fitted".into(), |x| format!("IoU {x:.3}"));
+            let tags = if row.tags.is_empty() { "no tag".into() } else { row.tags.to_string() };
             response.on_hover_text_at_pointer(format!("{i} · {}\n{stratum} · {iou} · {tags}", dataset.frame_name(i)));
         }
     }

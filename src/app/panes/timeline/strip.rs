@@ -5,7 +5,7 @@
 use crate::app::theme::Tokens;
 use crate::app::widgets::iou_color;
 use crate::labels::{Tag, Tags};
-use crate::session::{LabelMode, Session, StrataStatus, Strip};
+use crate::session::{LabelMode, Session, StrataStatus, TimelineStrip};
 use crate::study::complexity::Stratum;
 use egui::{Align2, Color32, Rect, Ui, pos2, vec2};
 
@@ -73,15 +73,15 @@ impl Strips {
         self.update(session, (frames, columns));
         let width = rect.width() / columns.max(1) as f32;
         let gap = if width > 4.0 { 1.0 } else { 0.0 };
-        let filtered = !session.queue.rule.is_empty();
+        let filtered = !session.queue.filter.is_empty();
         for i in 0..columns {
             let x = rect.left() + i as f32 * width;
             let column = Rect::from_min_max(pos2(x, rect.top() + 2.0), pos2(x + width - gap, rect.bottom() - 2.0));
             let faded = if filtered && self.matching.at(i) == 0 { 0.25 } else { 1.0 };
             match session.view.strip {
-                Strip::Stratum => strata(ui, column, self.strata.at(i), faded, tokens),
-                Strip::Iou => iou(ui, column, self.iou.at(i), faded, tokens),
-                Strip::Tags => tags(ui, column, self.tags.at(i), faded, tokens),
+                TimelineStrip::Stratum => strata(ui, column, self.strata.at(i), faded, tokens),
+                TimelineStrip::Iou => iou(ui, column, self.iou.at(i), faded, tokens),
+                TimelineStrip::Tags => tags(ui, column, self.tags.at(i), faded, tokens),
             }
         }
     }
@@ -91,18 +91,18 @@ impl Strips {
         let matching = session.queue.matching().iter().map(|&frame| (frame as usize, ()));
         self.matching.update(size, (size, session.queue.revision), matching, |sum, ()| *sum += 1);
         match session.view.strip {
-            Strip::Stratum => {
+            TimelineStrip::Stratum => {
                 let of = |frame| session.strata.of(frame).and_then(|complexity| complexity.stratum);
                 let strata = (0..size.0).map(|frame| (frame, of(frame).map_or(3, |stratum| stratum as usize)));
                 let key = (size, session.strata.status == StrataStatus::Ready);
                 self.strata.update(size, key, strata, |sum, stratum| sum[stratum] += 1);
             }
-            Strip::Iou => {
+            TimelineStrip::Iou => {
                 let known = session.summaries.iter().filter_map(|(&frame, summary)| Some((frame, summary.iou?)));
                 let key = (size, session.summaries_revision());
                 self.iou.update(size, key, known, |sum, iou| *sum = (sum.0 + iou, sum.1 + 1));
             }
-            Strip::Tags => {
+            TimelineStrip::Tags => {
                 let mode = session.view.label_mode;
                 let seen = session.labels.seen(mode).flat_map(|(_, records)| records.said_tags());
                 self.tags.update(size, (size, session.labels.revision, mode), seen, |sum, tags| *sum = sum.union(tags));

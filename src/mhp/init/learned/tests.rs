@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::body::Skeleton;
-use crate::mhp::init::template::Template;
+use crate::mhp::template::Template;
 
 fn skeleton(name: &str) -> Skeleton {
     Skeleton::preset(name).unwrap()

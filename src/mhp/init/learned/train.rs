@@ -11,13 +11,13 @@ const ELSEWHERE_M: f64 = 0.4;
 
 /// What one frame teaches.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Lesson {
+pub struct LimbLesson {
     inputs: Vec<f32>,
     /// How far each part is from where the start has it: away, to the left, up, m.
     ways: [Vec3; PARTS],
 }
 
-impl Lesson {
+impl LimbLesson {
     /// Of a frame with one person whose joints are `truth` (world frame, m) and whose start is `start`; `None` where the
     /// views or the skeleton say nothing of the limbs, or the start stands elsewhere.
     pub fn of(problem: &Problem, start: &Pppr, truth: &[Vec3]) -> Option<Self> {
@@ -66,11 +66,11 @@ impl Lesson {
 
 /// Learns from `lessons` and their mirror images: the least squares of the ways, and of the weights of the standardised
 /// inputs, of which each counts as much as `ridge` (above 0) of the lessons. `None` without lessons.
-pub fn learn(lessons: &[Lesson], ridge: f64) -> Option<LimbMap> {
+pub fn learn(lessons: &[LimbLesson], ridge: f64) -> Option<LimbMap> {
     if lessons.is_empty() {
         return None;
     }
-    let lessons: Vec<Lesson> = lessons.iter().flat_map(|lesson| [lesson.clone(), lesson.mirrored()]).collect();
+    let lessons: Vec<LimbLesson> = lessons.iter().flat_map(|lesson| [lesson.clone(), lesson.mirrored()]).collect();
     let rows = lessons.len();
     let x = DMatrix::from_fn(rows, INPUTS, |i, k| f64::from(lessons[i].inputs[k]));
     let y = DMatrix::from_fn(rows, 3 * PARTS, |i, k| lessons[i].ways[k / 3][k % 3]);
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     /// Inputs of many sizes, none of which follows from the others.
-    fn lesson(seed: usize) -> Lesson {
+    fn lesson(seed: usize) -> LimbLesson {
         let noise = |k: usize| ((seed * 7919 + k * 104_729 + seed * k * 31) % 1009) as f32 / 1009.0;
         let inputs: Vec<f32> = (0..INPUTS).map(noise).collect();
         // The head goes where the distance says, and both hands outwards.
@@ -106,7 +106,7 @@ mod tests {
         let mut ways = [[0.0; 3]; PARTS];
         ways[0] = [0.2 * distance, 0.0, 0.1];
         (ways[5], ways[6]) = ([0.0, -0.3 * distance, 0.0], [0.0, 0.3 * distance, 0.0]);
-        Lesson { inputs, ways }
+        LimbLesson { inputs, ways }
     }
 
     #[test]
@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn what_is_linear_is_found() {
-        let lessons: Vec<Lesson> = (0..1200).map(lesson).collect();
+        let lessons: Vec<LimbLesson> = (0..1200).map(lesson).collect();
         let map = learn(&lessons, 1e-6).unwrap();
         for lesson in (2000..2040).map(lesson) {
             let [before, after] = lesson.errors_m(&map);

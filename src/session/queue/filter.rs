@@ -1,0 +1,375 @@
+//! The text that filters the frame list: `stratum:hard iou<0.5 -tag:F1`.
+//!
+//! Terms are separated by spaces and must all hold; a `-` before a term negates it; `a|b` after a colon means either.
+//! A bare word is looked for in the frame's name. What a frame has no value for satisfies no comparison.
+
+use super::row::{FrameNumber, FrameRow, Reads};
+use crate::labels::{Tag, Verdict};
+use crate::mhp::TERMS;
+use crate::study::complexity::Stratum;
+
+/// A parsed filter. The empty text matches every frame.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FrameFilter {
+    terms: Vec<Term>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Term {
+    negated: bool,
+    test: Test,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Test {
+    /// The name contains this, in lower case.
+    Name(String),
+    /// One of the values of a word.
+    Word(Word, Vec<String>),
+    /// A tag, `None` for any or for none at all.
+    Tags { any_of: Vec<Tag>, any: bool, none: bool },
+    /// A number compared with a limit.
+    Compare(FrameNumber, Comparison, f64),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Comparison {
+    Less,
+    LessOrEqual,
+    Equal,
+    GreaterOrEqual,
+    Greater,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Word {
+    Stratum,
+    Scene,
+    Note,
+    By,
+    Verdict,
+    Reason,
+    Converged,
+    Fitted,
+    Readable,
+}
+
+const WORDS: [(&str, Word); 9] = [
+    ("stratum", Word::Stratum),
+    ("scene", Word::Scene),
+    ("note", Word::Note),
+    ("by", Word::By),
+    ("verdict", Word::Verdict),
+    ("reason", Word::Reason),
+    ("converged", Word::Converged),
+    ("fitted", Word::Fitted),
+    ("readable", Word::Readable),
+];
+
+/// What a filter may say, for the tooltip of its field.
+pub fn syntax() -> String {
+    let of_loss: Vec<&str> = TERMS.iter().map(|term| term.key).collect();
+    format!(
+        "Terms that must all hold, separated by spaces; - negates, | means either:\n\
+        stratum:hard · tag:F1 · tag:F1|F2 · tag:none · tag:any · by:ada · note:word · scene:d5s1\n\
+        iou<0.5 · majpe>200 · hardness>=0.7 · peaks static saliency loss iterations index\n\
+        {}: the terms of the loss\n\
+        converged:no · fitted:yes · reason:diverged · verdict:detection-error · readable:no\n\
+        A bare word is looked for in the frame's name.",
+        of_loss.join(" ")
+    )
+}
+
+impl FrameFilter {
+    /// Parses a filter.
+    ///
+    /// # Errors
+    /// One line that names the term and what was expected.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        Ok(Self { terms: split(text)?.iter().map(|part| term(part)).collect::<Result<_, _>>()? })
+    }
+
+    /// True where every frame matches.
+    pub fn is_empty(&self) -> bool {
+        self.terms.is_empty()
+    }
+
+    /// What of a row the answer depends on.
+    pub fn reads(&self) -> Reads {
+        self.terms.iter().fold(Reads::default(), |reads, term| reads.or(term.test.reads()))
+    }
+
+    /// True where a frame with this row matches.
+    pub fn matches(&self, row: &FrameRow<'_>) -> bool {
+        self.terms.iter().all(|term| term.test.holds(row) != term.negated)
+    }
+}
+
+impl Test {
+    fn reads(&self) -> Reads {
+        let none = Reads::default();
+        match self {
+            Self::Name(_) => Reads { name: true, ..none },
+            Self::Tags { .. } => Reads { tags: true, ..none },
+            Self::Compare(number, ..) => number.reads(),
+            Self::Word(word, _) => match word {
+                Word::Stratum | Word::Readable => Reads { strata: true, ..none },
+                Word::Scene => Reads { scene: true, ..none },
+                Word::Note | Word::Verdict => Reads { said: true, ..none },
+                Word::By => Reads { annotators: true, ..none },
+                Word::Reason | Word::Converged | Word::Fitted => Reads { fit: true, ..none },
+            },
+        }
+    }
+
+    fn holds(&self, row: &FrameRow<'_>) -> bool {
+        match self {
+            Self::Name(part) => contains(row.name, part),
+            Self::Tags { any_of, any, none } => {
+                any_of.iter().any(|&tag| row.tags.contains(tag))
+                    || (*any && !row.tags.is_empty())
+                    || (*none && row.tags.is_empty())
+            }
+            Self::Compare(number, comparison, limit) => {
+                row.number(*number).is_some_and(|value| comparison.holds(value, *limit))
+            }
+            Self::Word(word, values) => values.iter().any(|value| word.holds(row, value)),
+        }
+    }
+}
+
+impl Word {
+    fn holds(self, row: &FrameRow<'_>, value: &str) -> bool {
+        let is = |text: Option<&str>| text.is_some_and(|text| text.eq_ignore_ascii_case(value));
+        let yes = matches!(value, "yes" | "true" | "1");
+        match self {
+            Self::Stratum => is(row.stratum.map(Stratum::word)),
+            Self::Scene => contains(row.scene, value),
+            Self::Note => contains(row.note, value),
+            Self::By => row.annotators.iter().any(|name| contains(name, value)),
+            Self::Verdict => is(row.verdict.map(Verdict::code)),
+            Self::Reason => row.reason.is_some_and(|reason| contains(reason, value)),
+            Self::Converged => row.converged == Some(yes),
+            Self::Fitted => row.iterations.is_some() == yes,
+            Self::Readable => row.readable == yes,
+        }
+    }
+}
+
+impl Comparison {
+    fn holds(self, value: f64, limit: f64) -> bool {
+        match self {
+            Self::Less => value < limit,
+            Self::LessOrEqual => value <= limit,
+            Self::Equal => value == limit,
+            Self::GreaterOrEqual => value >= limit,
+            Self::Greater => value > limit,
+        }
+    }
+}
+
+/// True where `text` contains `part`, which is in lower case, whatever the case of `text`.
+fn contains(text: &str, part: &str) -> bool {
+    if part.is_ascii() {
+        let (text, part) = (text.as_bytes(), part.as_bytes());
+        return part.is_empty() || text.windows(part.len()).any(|window| window.eq_ignore_ascii_case(part));
+    }
+    text.to_lowercase().contains(part)
+}
+
+/// Splits at spaces outside quotes.
+fn split(text: &str) -> Result<Vec<String>, String> {
+    let (mut parts, mut part, mut quoted) = (Vec::new(), String::new(), false);
+    for c in text.chars() {
+        match c {
+            '"' => quoted = !quoted,
+            c if c.is_whitespace() && !quoted => {
+                if !part.is_empty() {
+                    parts.push(std::mem::take(&mut part));
+                }
+            }
+            c => part.push(c),
+        }
+    }
+    if quoted {
+        return Err("a quote is not closed".into());
+    }
+    if !part.is_empty() {
+        parts.push(part);
+    }
+    Ok(parts)
+}
+
+fn term(part: &str) -> Result<Term, String> {
+    let (negated, rest) = part.strip_prefix('-').map_or((false, part), |rest| (true, rest));
+    if rest.is_empty() {
+        return Err("a single - negates nothing; expected for example -tag:F1".into());
+    }
+    Ok(Term { negated, test: test(rest)? })
+}
+
+fn test(text: &str) -> Result<Test, String> {
+    if let Some(at) = text.find(['<', '>', '=']).filter(|&at| at > 0 && !text[..at].contains(':')) {
+        return compare(&text[..at], &text[at..]);
+    }
+    let Some((key, value)) = text.split_once(':') else { return Ok(Test::Name(text.to_lowercase())) };
+    let key = key.to_lowercase();
+    if FrameNumber::of(&key).is_some() {
+        return Err(format!("`{text}`: {key} is a number; expected for example {key}<0.5"));
+    }
+    let values: Vec<String> = value.split('|').map(str::to_lowercase).filter(|v| !v.is_empty()).collect();
+    if values.is_empty() {
+        return Err(format!("`{text}`: nothing after the colon"));
+    }
+    if key == "tag" {
+        return tags(&values);
+    }
+    let known = WORDS.iter().find(|(name, _)| *name == key).map(|(_, word)| *word);
+    let word = known.ok_or_else(|| {
+        let names: Vec<&str> = WORDS.iter().map(|(name, _)| *name).collect();
+        format!("`{key}:` is not known; expected tag, {}", names.join(", "))
+    })?;
+    check(word, &values)?;
+    Ok(Test::Word(word, values))
+}
+
+/// Words with a fixed set of values take no other.
+fn check(word: Word, values: &[String]) -> Result<(), String> {
+    let allowed: &[&str] = match word {
+        Word::Stratum => &["easy", "medium", "hard"],
+        Word::Verdict => &["annotation-error", "detection-error", "both-incorrect", "true-negative"],
+        Word::Converged | Word::Fitted | Word::Readable => &["yes", "no", "true", "false", "1", "0"],
+        Word::Scene | Word::Note | Word::By | Word::Reason => return Ok(()),
+    };
+    match values.iter().find(|value| !allowed.contains(&value.as_str())) {
+        Some(wrong) => Err(format!("`{wrong}`: expected {}", allowed.join(", "))),
+        None => Ok(()),
+    }
+}
+
+fn tags(values: &[String]) -> Result<Test, String> {
+    let (mut any_of, mut any, mut none) = (Vec::new(), false, false);
+    for value in values {
+        match value.as_str() {
+            "any" => any = true,
+            "none" => none = true,
+            code => any_of.push(code.parse().map_err(|why: String| format!("{why}, any or none"))?),
+        }
+    }
+    Ok(Test::Tags { any_of, any, none })
+}
+
+fn compare(key: &str, rest: &str) -> Result<Test, String> {
+    let number = FrameNumber::of(&key.to_lowercase()).ok_or_else(|| {
+        let names: Vec<&str> = FrameNumber::all().map(FrameNumber::key).collect();
+        format!("`{key}` is no number of a frame; expected {}", names.join(", "))
+    })?;
+    let (comparison, digits) = [
+        ("<=", Comparison::LessOrEqual),
+        (">=", Comparison::GreaterOrEqual),
+        ("==", Comparison::Equal),
+        ("<", Comparison::Less),
+        (">", Comparison::Greater),
+        ("=", Comparison::Equal),
+    ]
+    .into_iter()
+    .find_map(|(sign, comparison)| rest.strip_prefix(sign).map(|digits| (comparison, digits)))
+    .unwrap_or((Comparison::Equal, rest));
+    let limit: f64 =
+        digits.parse().map_err(|_| format!("`{key}{rest}`: `{digits}` is not a number; expected for example 0.5"))?;
+    Ok(Test::Compare(number, comparison, limit))
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests")]
+    use super::*;
+    use crate::labels::{Tags, Verdict};
+    use crate::mhp::Terms;
+    use crate::study::complexity::Stratum;
+
+    fn row() -> FrameRow<'static> {
+        FrameRow {
+            index: 12,
+            name: "d5s1/003/00012",
+            scene: "d5s1/003",
+            readable: true,
+            stratum: Some(Stratum::Hard),
+            hardness: Some(0.9),
+            iou: Some(0.42),
+            iterations: Some(40),
+            converged: Some(false),
+            reason: Some("iterations"),
+            tags: Tags::NONE.with(Tag::F2),
+            note: "Two words, near the Wall",
+            verdict: Some(Verdict::BothIncorrect),
+            annotators: vec!["ada"],
+            ..FrameRow::default()
+        }
+    }
+
+    fn holds(text: &str) -> bool {
+        FrameFilter::parse(text).unwrap().matches(&row())
+    }
+
+    #[test]
+    fn every_term_must_hold() {
+        assert!(holds(""));
+        assert!(holds("stratum:hard iou<0.5 -tag:F1"));
+        assert!(!holds("stratum:hard iou<0.4"));
+        assert!(holds("STRATUM:Hard|easy tag:f1|F2 hardness>=0.9 index=12"));
+        assert!(holds("d5S1 00012 -d6"));
+        assert!(holds("note:\"near the wall\" by:AD verdict:both-incorrect scene:/003"));
+        assert!(holds("converged:no fitted:yes tag:any -tag:none reason:iter"));
+        assert!(!holds("converged:yes") && !holds("readable:no"));
+    }
+
+    #[test]
+    fn an_unknown_value_satisfies_no_comparison() {
+        assert!(!holds("majpe>0") && !holds("majpe<=0"));
+        assert!(holds("-majpe>0"));
+        let bare = FrameRow { name: "x", ..FrameRow::default() };
+        assert!(!FrameFilter::parse("converged:no").unwrap().matches(&bare), "not fitted is not unconverged");
+    }
+
+    #[test]
+    fn what_is_wrong_is_told() {
+        for (text, expected) in [
+            ("iou:0.5", "iou is a number"),
+            ("iou<a", "`a` is not a number"),
+            ("stratum:hrad", "expected easy, medium, hard"),
+            ("tag:F7", "expected F1"),
+            ("foo:1", "`foo:` is not known"),
+            ("foo<1", "expected index"),
+            ("tag:", "nothing after the colon"),
+            ("note:\"a", "quote"),
+            ("-", "negates nothing"),
+        ] {
+            let error = FrameFilter::parse(text).unwrap_err();
+            assert!(error.contains(expected), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn frames_are_found_by_the_dummy_term() {
+        let terms = Terms::from_fn(|term| (term.key == "dummy").then_some(0.7));
+        let row = FrameRow { terms: Some(&terms), ..row() };
+        let holds = |text: &str| FrameFilter::parse(text).unwrap().matches(&row);
+        assert!(holds("dummy>0.5 -dummy>0.8") && !holds("dummy<0.5") && !holds("bone>=0"));
+        assert!(syntax().contains(" dummy:"), "{}", syntax());
+    }
+
+    #[test]
+    fn only_rules_about_fits_follow_a_run() {
+        assert!(FrameFilter::parse("iou<0.5").unwrap().reads().fit);
+        assert!(!FrameFilter::parse("stratum:hard tag:F1 hardness>0.5 00").unwrap().reads().fit);
+    }
+
+    #[test]
+    fn only_rules_about_labels_follow_tags() {
+        for text in ["-tag:none", "note:wall", "by:ada", "verdict:true-negative"] {
+            assert!(FrameFilter::parse(text).unwrap().reads().labels(), "{text}");
+        }
+        assert!(!FrameFilter::parse("stratum:hard iou<0.5 00").unwrap().reads().labels());
+    }
+}

@@ -1,0 +1,76 @@
+//! Writes `tests/RESULTS.md`: how exact, how good and how fast the program is, each figure by the command beside it.
+//!
+//! `cargo bench --no-default-features --bench results` measures all sections; `… --bench results -- fits speed` those that are
+//! named, and leaves the others as they stand. Data are simulated into a temporary folder; what the shared folder beside the
+//! checkout holds (real frames, another simulator, the peer for speed) is used where it is there, and said to be missing where
+//! not. `MHP_PEER` is a Python that has jax, for the peer; `MHP_PROGRAM` another build of the program to be measured.
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a measurement stops where its material cannot be made")]
+
+mod bed;
+mod fits;
+mod people;
+mod reference;
+mod speed;
+mod studies;
+
+use bed::Bed;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// A part of the file: its heading and what writes it.
+struct Section {
+    key: &'static str,
+    heading: &'static str,
+    write: fn(&Bed) -> String,
+}
+
+const SECTIONS: &[Section] = &[
+    Section { key: "reference", heading: "Reference cases", write: reference::section },
+    Section { key: "fits", heading: "Fits against truth", write: fits::section },
+    Section { key: "people", heading: "Several people", write: people::several },
+    Section { key: "counting", heading: "Counting", write: people::counting },
+    Section { key: "studies", heading: "Studies of the bundled sample", write: studies::section },
+    Section { key: "speed", heading: "Speed", write: speed::section },
+    Section { key: "growth", heading: "How an iteration grows", write: speed::growth },
+    Section { key: "watched", heading: "What being watched costs", write: speed::watched },
+];
+
+const TITLE: &str = "\
+# Results
+
+Written by `cargo bench --no-default-features --bench results`; after `--` the sections may be named that are to be measured again.
+Evidence scores and the counter's training have their own: [`assets/evidence.md`](../assets/evidence.md).
+";
+
+/// The text of a section in a file of before, without its heading.
+fn before(file: &str, heading: &str) -> Option<String> {
+    let start = file.find(&format!("\n## {heading}\n"))?;
+    let text = &file[start + 1..];
+    let text = &text[text.find('\n')? + 1..];
+    Some(text[..text.find("\n## ").unwrap_or(text.len())].trim().to_owned())
+}
+
+fn main() {
+    let asked: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
+    let known = |word: &String| SECTIONS.iter().any(|section| section.key == word);
+    if let Some(wrong) = asked.iter().find(|word| !known(word)) {
+        let keys: Vec<&str> = SECTIONS.iter().map(|section| section.key).collect();
+        panic!("no section `{wrong}`; expected one of {}", keys.join(", "));
+    }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/RESULTS.md");
+    let file = std::fs::read_to_string(&path).unwrap_or_default();
+    let bed = Bed::new();
+    let mut text = TITLE.to_owned();
+    for section in SECTIONS {
+        let measured = asked.is_empty() || asked.iter().any(|word| word == section.key);
+        let body = if measured {
+            eprintln!("{} ...", section.key);
+            format!("{}\n\n{}", bed.machine(), (section.write)(&bed).trim())
+        } else {
+            before(&file, section.heading).unwrap_or_else(|| "Not measured yet.".to_owned())
+        };
+        writeln!(text, "\n## {}\n\n{body}", section.heading).unwrap();
+    }
+    std::fs::write(&path, text).unwrap();
+    eprintln!("{}", path.display());
+}

@@ -1,0 +1,9 @@
+//! Data sets: every layout opened, read and written, what is damaged or hostile, and the threads that load.
+
+mod bad_input;
+mod info;
+mod layouts;
+mod npz;
+mod open;
+mod simulate;
+mod threads;

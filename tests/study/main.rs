@@ -1,0 +1,14 @@
+//! Studies and their run folders, the evidence of failure modes, and what is exported.
+
+#[path = "../common/blob.rs"]
+mod blob;
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../common/scenes.rs"]
+mod scenes;
+
+mod clouds;
+mod evidence;
+mod export;
+mod maps;
+mod runs;

@@ -1,0 +1,190 @@
+//! A study in the window: opened by menu and by dropping its folder, its table and plots, and from a row to its frames.
+#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+
+use crate::blob;
+use crate::window::Window;
+use mhp_inspector::app::PaneKind;
+use mhp_inspector::dataset::Dataset;
+use mhp_inspector::session::{Command, LogLevel};
+use mhp_inspector::study::complexity::{ComplexityOptions, compute};
+use mhp_inspector::study::run::{RunPlan, RunRequest, StudyKind, Subset, execute_run};
+use mhp_inspector::task::Progress;
+use mhp_inspector::{config::Preset, mhp::Precision};
+use std::path::{Path, PathBuf};
+
+/// Runs a small study of the window's data set.
+fn run(window: &Window, study: StudyKind, grid: &[&str]) -> PathBuf {
+    let dataset = Dataset::open(window.folder.path(), &Progress::new()).unwrap();
+    // As with --into-data: the folder lives as long as the window.
+    mhp_inspector::output::allow_into_data(true);
+    let out = window.folder.path().join(format!("run-{study}-{}", grid.len()));
+    run_of(&dataset, &out, study, grid);
+    out
+}
+
+fn run_of(dataset: &Dataset, out: &Path, study: StudyKind, grid: &[&str]) {
+    run_with(dataset, out, study, grid, Preset::Default);
+}
+
+fn run_with(dataset: &Dataset, out: &Path, study: StudyKind, grid: &[&str], preset: Preset) {
+    let request = RunRequest {
+        study,
+        base: preset.config(),
+        base_name: preset.name().into(),
+        precision: Precision::F32,
+        frames: 0..dataset.len().min(4),
+        subset: Subset::All,
+        grid: grid.iter().map(|axis| axis.parse().unwrap()).collect(),
+        iterations: Some(2),
+        shard: None,
+    };
+    let complexity = RunPlan::needs_strata(&request)
+        .then(|| compute(dataset, &ComplexityOptions::default(), None, &Progress::new()).unwrap());
+    let plan = RunPlan::new(dataset, &request, complexity.as_ref()).unwrap();
+    execute_run(dataset, &plan, out, 2, &Progress::new()).unwrap();
+}
+
+fn shown(window: &mut Window, study: StudyKind) {
+    window.until("the study", |w| w.session().study.shown().is_some_and(|run| run.spec.study == study));
+    window.harness.run_steps(3);
+}
+
+#[test]
+fn an_empty_pane_says_how_it_is_filled() {
+    let mut window = Window::open(2);
+    window.harness.state_mut().show_pane(PaneKind::Study);
+    window.harness.run_steps(2);
+    assert!(window.says("No study yet") && window.says("study operators DATA --out RUN"));
+}
+
+#[test]
+fn a_dropped_run_folder_shows_its_table_and_bars() {
+    let mut window = Window::open(5);
+    let folder = run(&window, StudyKind::Operators, &[]);
+    window.drop_file(&folder);
+    shown(&mut window, StudyKind::Operators);
+    assert!(window.says("Radar simulation without one operator"));
+    for name in ["Study row full pipeline", "Study row without range", "Plotted quantity"] {
+        assert!(window.named(name), "{name}: {:#?}", window.names());
+    }
+    let bar = window.names().into_iter().find(|name| name.starts_with("Bar without range: ")).unwrap();
+    assert!(bar.contains("mm") && !bar.contains("paper"), "the paper's figures are of MMVR: {bar}");
+    assert!(window.says("are of MMVR and not shown: the layout here is npz."));
+    window.click("Plotted quantity");
+    window.harness.run_steps(2);
+    window.click("PA-MAJPE, mm");
+    window.harness.run_steps(2);
+    let bar = window.names().into_iter().find(|name| name.starts_with("Bar without range: ")).unwrap();
+    assert!(bar.contains("mm"), "{bar}");
+}
+
+#[test]
+fn a_row_that_cannot_differ_says_why() {
+    let mut window = Window::open(3);
+    let dataset = Dataset::open(window.folder.path(), &Progress::new()).unwrap();
+    let folder = window.folder.path().join("run-robustness");
+    run_with(&dataset, &folder, StudyKind::Robustness, &[], Preset::Recommended);
+    window.apply(Command::OpenRun(folder));
+    window.harness.state_mut().show_pane(PaneKind::Study);
+    shown(&mut window, StudyKind::Robustness);
+    let why = "[1] cannot move a joint: velocities reach none, for powers add, and no map has a Doppler axis";
+    assert!(window.says(why), "{:#?}", window.names());
+}
+
+#[test]
+fn a_row_puts_its_frames_into_the_list() {
+    let mut window = Window::open(5);
+    let folder = run(&window, StudyKind::Init, &[]);
+    window.apply(Command::OpenRun(folder));
+    window.harness.state_mut().show_pane(PaneKind::Study);
+    shown(&mut window, StudyKind::Init);
+    window.click("Study row without position (P)");
+    window.until("its frames", |w| w.session().summaries.len() == 4);
+    assert_eq!(window.session().queue.rows(), [0, 1, 2, 3], "frame 4 was not studied");
+    let run = window.session().study.shown().unwrap();
+    let wanted: Vec<Option<f64>> = run.rows_of(&run.table[1]).map(|row| row.fit.as_ref().unwrap().majpe_mm).collect();
+    let listed: Vec<Option<f64>> = (0..4).map(|frame| window.session().frame_row(frame).majpe_mm).collect();
+    assert_eq!(listed, wanted);
+    assert_eq!(window.session().study.row, Some(1));
+    // The other row's frames replace them.
+    window.click("Study row full (P + V)");
+    window.until("the other row", |w| w.session().study.row == Some(0) && w.session().summaries.len() == 4);
+}
+
+#[test]
+fn a_stratum_shows_its_own_frames_only() {
+    let mut window = Window::open(4);
+    let folder = run(&window, StudyKind::Complexity, &[]);
+    window.apply(Command::OpenRun(folder));
+    window.harness.state_mut().show_pane(PaneKind::Study);
+    shown(&mut window, StudyKind::Complexity);
+    let hard = window.session().study.shown().unwrap().table[2].frames;
+    assert!(hard > 0 && hard < 4);
+    window.click("Study row hard");
+    window.until("the hard frames", |w| w.session().summaries.len() == hard);
+    assert_eq!(window.session().queue.rows().len(), hard);
+}
+
+#[test]
+fn sweeps_are_curves_maps_or_parallel_lines() {
+    let mut window = Window::open(2);
+    let cases: [(&[&str], &str); 3] = [
+        (&["tau_pct=5,10,20"], "Plot of MAJPE, mm by tau_pct"),
+        (&["tau_pct=5,10,20", "w_em=0.1,1"], "Contour of MAJPE, mm over tau_pct and w_em"),
+        (
+            &["tau_pct=5,10", "w_em=0.1,1", "summation=coherent,incoherent"],
+            "Parallel coordinates of MAJPE, mm over tau_pct, w_em, summation",
+        ),
+    ];
+    window.harness.state_mut().show_pane(PaneKind::Study);
+    for (grid, name) in cases {
+        let folder = run(&window, StudyKind::Sweep, grid);
+        window.apply(Command::OpenRun(folder));
+        let points = grid.iter().map(|axis| axis.matches(',').count() + 1).product::<usize>();
+        window.until("the sweep", |w| w.session().study.shown().is_some_and(|run| run.table.len() == points));
+        window.harness.run_steps(3);
+        assert!(window.named(name), "{name}: {:#?}", window.names());
+    }
+    let folder = run(&window, StudyKind::Sweep, cases[1].0);
+    window.apply(Command::OpenRun(folder));
+    window.until("the map", |w| w.session().study.shown().is_some_and(|run| run.table.len() == 6));
+    window.harness.run_steps(3);
+    let point = window.names().into_iter().find(|name| name.starts_with("Point 10, 1: ")).unwrap();
+    window.click(&point);
+    window.until("the point's frames", |w| w.session().study.row == Some(3));
+}
+
+#[test]
+fn a_run_of_other_data_says_so_and_offers_them() {
+    let mut window = Window::open(2);
+    let other = tempfile::tempdir().unwrap();
+    blob::write_dataset(other.path(), 3);
+    let manifest = blob::MANIFEST.replace("\"blob\"", "\"elsewhere\"");
+    std::fs::write(other.path().join("dataset.toml"), manifest).unwrap();
+    let dataset = Dataset::open(other.path(), &Progress::new()).unwrap();
+    run_of(&dataset, &other.path().join("run"), StudyKind::Init, &[]);
+    window.apply(Command::OpenRun(other.path().join("run/run.toml")));
+    window.harness.state_mut().show_pane(PaneKind::Study);
+    shown(&mut window, StudyKind::Init);
+    assert!(window.says("Another data set is open"));
+    window.click("Open its data set");
+    window.until("its data set", |w| w.session().data.dataset.as_ref().is_some_and(|d| d.info().name == "elsewhere"));
+    window.harness.run_steps(3);
+    assert!(!window.says("Another data set is open"));
+}
+
+#[test]
+fn what_is_no_run_is_told() {
+    let mut window = Window::open(2);
+    window.choose("File", "Open study…");
+    let nothing = window.folder.path().join("nothing");
+    window.answer_path("Run folder", &nothing);
+    window.until("the error", |w| w.session().log.iter().any(|line| line.level == LogLevel::Error));
+    assert!(window.told("nothing/run.toml: cannot be read"));
+    let damaged = window.folder.path().join("damaged");
+    std::fs::create_dir_all(&damaged).unwrap();
+    std::fs::write(damaged.join("run.toml"), "study = \"dance\"").unwrap();
+    window.apply(Command::OpenRun(damaged));
+    window.until("the second error", |w| w.told("damaged/run.toml"));
+    assert!(window.session().study.shown().is_none());
+}

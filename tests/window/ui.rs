@@ -1,0 +1,499 @@
+//! The real window without a display, driven by the names that a screen reader would say.
+#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+
+use crate::blob;
+use crate::window::Window;
+use egui::{Key, Modifiers, pos2};
+use egui_kittest::Harness;
+use mhp_inspector::app::{Begin, InspectorApp};
+use mhp_inspector::body::Group;
+use mhp_inspector::config::{FitConfig, Preset};
+use mhp_inspector::dataset::Dataset;
+use mhp_inspector::geometry::{norm, sub};
+use mhp_inspector::session::{Command, Compare, FitStatus, ThemeChoice};
+use mhp_inspector::start::{find_start, problem_of};
+use mhp_inspector::task::Progress;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+#[test]
+fn a_data_set_opens_runs_pauses_and_steps() {
+    let mut window = Window::open(3);
+    assert_eq!((window.session().data.len(), window.fit().head()), (3, 0));
+    window.type_value("Iterations value", "100000");
+    window.click("Run fit");
+    window.until("some iterations", |w| w.fit().is_running() && w.fit().head() > 5);
+    window.click("Pause fit");
+    window.until("the pause", |w| w.fit().status == FitStatus::Paused);
+    let head = window.fit().head();
+    let first = window.fit().branch().unwrap().rows[0].report.loss;
+    assert!(window.fit().branch().unwrap().rows[head].report.loss < first);
+    window.click("Step forward");
+    window.paused_at(head + 1);
+    window.click("Ten steps forward");
+    window.paused_at(head + 11);
+    window.click("Step back");
+    window.until("the iteration before", |w| w.fit().shown.as_ref().is_some_and(|s| s.iteration == head + 10));
+    assert_eq!(window.fit().cursor, Some(head + 10));
+    assert!(window.says("looking back"));
+    window.click("Follow newest");
+    window.until("the newest", |w| w.fit().shown.as_ref().is_some_and(|s| s.iteration == head + 11));
+    assert_eq!(window.fit().cursor, None);
+}
+
+#[test]
+fn presets_are_chosen_by_what_they_stand_for() {
+    let mut window = Window::open(2);
+    for preset in [Preset::Paper, Preset::Recommended, Preset::Default] {
+        window.click(&format!("Preset {}", preset.name()));
+        window.harness.run_steps(2);
+        assert_eq!(window.session().config, preset.config(), "{}", preset.name());
+        assert!(window.says(preset.help()), "{}", preset.name());
+    }
+}
+
+/// A start is found as soon as a data set is open: settings that come later would not be in it.
+#[test]
+fn settings_given_at_the_beginning_are_in_the_first_start() {
+    let sample = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/walk");
+    let config = Preset::Recommended.config();
+    let begin = Begin { paths: vec![sample.clone()], config: Some(config), ..Begin::default() };
+    let harness = Harness::builder().with_size([1280.0, 800.0]).build_eframe(|cc| InspectorApp::begin(cc, &begin));
+    let mut window = Window { harness, folder: tempfile::tempdir().unwrap() };
+    window.ready(0);
+    let dataset = Dataset::open(&sample, &Progress::new()).unwrap();
+    let problem = Arc::new(problem_of(&dataset, &dataset.load(0).unwrap()).unwrap());
+    let start = find_start(&problem, &config).unwrap().initialisation.params;
+    assert_eq!(window.session().config, config);
+    assert_eq!(window.fit().initial.as_ref(), Some(&start));
+    // Where nothing was fitted yet, another preset finds another start; a slider does not, nor a preset after a run.
+    let plain = FitConfig::default();
+    window.apply(Command::SetConfig(Box::new(plain)));
+    window.ready(0);
+    let other = find_start(&problem, &plain).unwrap().initialisation.params;
+    assert!(window.fit().initial.as_ref() == Some(&other) && other != start);
+    let job = window.fit().job;
+    window.apply(Command::SetConfig(Box::new(FitConfig { w_em: 0.7, ..plain })));
+    window.apply(Command::StepFit(2));
+    window.paused_at(2);
+    window.apply(Command::SetConfig(Box::new(config)));
+    window.ready(0);
+    assert!(window.fit().job == job && window.fit().head() == 2, "what was fitted is kept");
+}
+
+#[test]
+fn the_scrubber_shows_any_earlier_iteration() {
+    let mut window = Window::fitted(1);
+    window.drag("Iteration scrubber", 0.9, 0.25);
+    window.until("iteration 5", |w| w.fit().shown.as_ref().is_some_and(|s| s.iteration == 5));
+    assert_eq!(window.fit().cursor, Some(5));
+    window.drag("Iteration scrubber", 0.25, 1.0);
+    window.paused_at(20);
+    assert_eq!(window.fit().cursor, None);
+}
+
+#[test]
+fn a_setting_typed_during_a_run_takes_effect_and_is_flagged() {
+    let mut window = Window::open(1);
+    window.run_forever();
+    window.type_value("τ_pct value", "20");
+    window.until("the flag", |w| !w.fit().branch().unwrap().flags.is_empty());
+    assert!(window.fit().is_running(), "the run goes on");
+    assert_eq!(window.fit().branch().unwrap().flags[0].text, "τ_pct 10 → 20");
+    assert_eq!(window.fit().history.branches().len(), 1);
+    // Keys work after numbers were typed and sliders dragged.
+    window.key(Key::Enter);
+    window.until("the pause", |w| w.fit().status == FitStatus::Paused);
+    let head = window.fit().head();
+    window.drag("w_EM", 0.5, 0.7);
+    assert!(window.session().config.w_em != 0.5);
+    window.key(Key::Period);
+    window.paused_at(head + 1);
+    window.drag("w_kine value", 0.5, 0.9);
+    assert!(window.session().config.w_kine > 0.5);
+    window.key(Key::Comma);
+    window.until("the step back", |w| w.fit().cursor == Some(head));
+    window.key(Key::L);
+    window.until("the newest", |w| w.fit().cursor.is_none());
+    window.key(Key::Enter);
+    window.until("another run", |w| w.fit().is_running());
+    let weights: Vec<&str> = window.fit().branch().unwrap().flags.iter().map(|flag| flag.text.as_str()).collect();
+    assert!(weights.iter().any(|text| text.contains("w_EM")), "{weights:?}");
+}
+
+#[test]
+fn a_setting_changed_at_an_earlier_iteration_branches_and_discard_goes_back() {
+    let mut window = Window::fitted(1);
+    window.key_with(Modifiers::SHIFT, Key::Comma);
+    window.until("iteration 10", |w| w.fit().shown.as_ref().is_some_and(|s| s.iteration == 10));
+    // Two keystrokes: the branch that the first one begins must not take the field away from the second.
+    window.type_value("w_EM value", "2.5");
+    window.paused_at(10);
+    assert_eq!(window.session().config.w_em, 2.5);
+    let branches: Vec<_> = window.fit().history.branches().iter().map(|b| (b.id, b.parent, b.head())).collect();
+    assert_eq!(branches, [(0, None, 20), (1, Some((0, 10)), 10)]);
+    window.key(Key::Enter);
+    window.paused_at(20);
+    let row =
+        |branch: u32| window.fit().history.branch(branch).unwrap().row(20).unwrap().report.terms.get("em").unwrap();
+    assert_ne!(row(0), row(1));
+    window.click("Discard run");
+    window.until("branch 0", |w| w.fit().history.active_id() == 0);
+    window.paused_at(20);
+    assert_eq!((window.fit().history.branches().len(), window.session().config.w_em), (1, 0.5));
+    window.click("Discard run");
+    window.paused_at(0);
+}
+
+#[test]
+fn branches_are_chosen_by_name() {
+    let mut window = Window::fitted(1);
+    window.key_with(Modifiers::SHIFT, Key::Comma);
+    window.type_value("w_EM value", "2");
+    window.paused_at(10);
+    window.click("Branch");
+    window.click("branch 0: 0 → 20");
+    window.paused_at(20);
+    assert_eq!((window.fit().history.active_id(), window.session().config.w_em), (0, 0.5));
+}
+
+#[test]
+fn frames_change_at_any_time_and_fits_are_found_again() {
+    let mut window = Window::open(12);
+    window.run_forever();
+    window.key(Key::ArrowRight);
+    window.ready(1);
+    assert_eq!((window.fit().head(), window.fit().status.clone()), (0, FitStatus::Paused));
+    window.key(Key::ArrowLeft);
+    window.ready(0);
+    assert!(window.fit().head() > 3 && !window.fit().is_running(), "the fit that was left");
+    window.key(Key::End);
+    window.ready(11);
+    window.click("Previous frame");
+    window.ready(10);
+    window.key_with(Modifiers::SHIFT, Key::ArrowLeft);
+    window.ready(0);
+    window.key_with(Modifiers::COMMAND, Key::J);
+    assert!(window.named("Frame number"));
+    window.key_with(Modifiers::COMMAND, Key::A);
+    window.type_text("7");
+    window.key(Key::Enter);
+    window.ready(7);
+    assert!(!window.named("Frame number"));
+    window.drag("Timeline", 0.1, 0.3);
+    window.ready(3);
+    window.click("Frame frames/005");
+    window.ready(5);
+    window.key(Key::Home);
+    window.ready(0);
+    window.key(Key::Space);
+    window.until("the end of the film", |w| w.session().data.frame_index == 11 && !w.session().data.playing);
+}
+
+#[test]
+fn reset_forgets_and_warm_start_carries_over() {
+    let mut window = Window::fitted(2);
+    window.key_with(Modifiers::COMMAND, Key::K);
+    window.type_text("warm");
+    window.key(Key::Enter);
+    assert!(window.session().warm_start);
+    let state = Arc::clone(window.fit().branch().unwrap().rows[20].state.as_ref().unwrap());
+    window.key(Key::ArrowRight);
+    window.ready(1);
+    // Moved as the two frames' maps tell: the whole body, on the floor, by less than a fast step.
+    let initial = window.fit().initial.clone().unwrap();
+    let moved = |joint: usize| sub(initial.position(joint), state.params.position(joint));
+    let (first, length) = (moved(0), norm(moved(0)));
+    assert!(first[2] == 0.0 && length < 0.4, "{first:?}");
+    for joint in 1..state.params.shape().joints {
+        assert!(norm(sub(moved(joint), first)) < 1e-12);
+    }
+    assert_eq!(initial.group(Group::LogScale), state.params.group(Group::LogScale));
+    window.click("Reset fit");
+    window.until("the new start pose", |w| w.fit().is_ready() && w.fit().shown.is_some());
+    assert_ne!(window.fit().initial.as_ref(), Some(&state.params), "its own start pose");
+    window.key(Key::ArrowLeft);
+    window.ready(0);
+    assert_eq!(window.fit().head(), 20);
+}
+
+#[test]
+fn keys_toggle_what_is_compared_and_the_theme() {
+    let mut window = Window::open(1);
+    let compare = |w: &Window| w.session().view.compare;
+    assert!(!window.named("Wipe position"));
+    window.key(Key::W);
+    assert_eq!(compare(&window), Compare::Wipe);
+    window.key(Key::D);
+    assert_eq!(compare(&window), Compare::Difference);
+    assert!(window.named("H_sim − H_ori map of hori"));
+    window.key(Key::D);
+    assert_eq!(compare(&window), Compare::Flip);
+    window.click("Wipe");
+    assert_eq!(compare(&window), Compare::Wipe);
+    window.key_with(Modifiers::COMMAND, Key::T);
+    assert_eq!(window.session().view.theme, ThemeChoice::Light);
+    window.key_with(Modifiers::COMMAND, Key::T);
+    assert_eq!(window.session().view.theme, ThemeChoice::Dark);
+    // While text is typed its letters are text.
+    window.click("Filter frames");
+    window.key(Key::D);
+    window.type_text("d");
+    assert_eq!(compare(&window), Compare::Wipe);
+    assert!(window.says("No frame matches"));
+}
+
+#[test]
+fn the_palette_finds_and_does_a_command() {
+    let mut window = Window::open(1);
+    window.key_with(Modifiers::COMMAND, Key::K);
+    assert!(window.named("Command palette"));
+    window.type_text("wipe");
+    window.key(Key::Enter);
+    assert_eq!(window.session().view.compare, Compare::Wipe);
+    assert!(!window.named("Command palette"));
+    window.key_with(Modifiers::COMMAND, Key::K);
+    window.type_text("no such command");
+    assert!(window.says("No command has these words."));
+    window.key(Key::Escape);
+    assert!(!window.named("Command palette"));
+    window.key(Key::Questionmark);
+    assert!(window.says("Keys and gestures"));
+    window.key(Key::Escape);
+    assert!(!window.says("Keys and gestures"));
+}
+
+#[test]
+fn a_folder_dropped_on_the_window_opens() {
+    let other = tempfile::tempdir().unwrap();
+    blob::write_dataset(other.path(), 5);
+    let mut window = Window::open(2);
+    window.run_forever();
+    window.drop_file(other.path());
+    window.until("the other data set", |w| w.session().data.len() == 5);
+    window.ready(0);
+    assert_eq!(window.fit().head(), 0);
+    let recent = &window.session().data.recent;
+    assert_eq!(recent[..], [other.path().to_path_buf(), window.folder.path().to_path_buf()]);
+    // The same folder again is opened again.
+    window.key(Key::ArrowRight);
+    window.ready(1);
+    window.drop_file(other.path());
+    window.until("the first frame", |w| w.session().data.frame_index == 0);
+    window.ready(0);
+}
+
+#[test]
+fn a_text_called_npz_is_told_and_the_window_lives_on() {
+    let mut window = Window::fitted(2);
+    let bad = window.folder.path().join("notes.npz");
+    std::fs::write(&bad, "these are my notes\n").unwrap();
+    window.drop_file(&bad);
+    window.until("the notification", |w| w.named("Dismiss notification"));
+    assert!(window.says("notes.npz"));
+    assert_eq!((window.session().data.len(), window.fit().head()), (2, 20));
+    window.click("Dismiss notification");
+    assert!(!window.named("Dismiss notification"));
+    window.key(Key::Period);
+    window.paused_at(21);
+}
+
+#[test]
+fn a_frame_deleted_while_open_is_told_and_the_others_are_fine() {
+    let mut window = Window::open(9);
+    std::fs::remove_file(window.folder.path().join("frames/008.npz")).unwrap();
+    window.key(Key::End);
+    window.until("the error", |w| w.session().data.error.is_some() && w.named("Dismiss notification"));
+    assert!(window.says("008.npz"));
+    assert!(window.says("This frame cannot be shown"));
+    window.key(Key::Home);
+    window.ready(0);
+}
+
+#[test]
+fn a_map_without_numbers_is_told_and_the_others_are_fine() {
+    use mhp_inspector::dataset::npz::{ArrayView, write};
+    let folder = tempfile::tempdir().unwrap();
+    blob::write_dataset(folder.path(), 2);
+    let nan = vec![f64::NAN; 48 * 32];
+    let maps = [("hori", ArrayView::f64(&[48, 32], &nan)), ("vert", ArrayView::f64(&[48, 32], &nan))];
+    write(&folder.path().join("frames/001.npz"), &maps).unwrap();
+    let harness = Window::empty(&[folder.path().into()], [1440.0, 900.0]);
+    let mut window = Window { harness, folder };
+    window.ready(0);
+    window.key(Key::ArrowRight);
+    window.until("the error", |w| matches!(w.fit().status, FitStatus::Failed(_)) && w.named("Dismiss notification"));
+    assert!(window.says("`hori` has no finite cell"));
+    window.harness.run_steps(3);
+    window.key(Key::ArrowLeft);
+    window.ready(0);
+}
+
+#[test]
+fn closing_during_a_run_takes_no_time() {
+    let mut window = Window::open(1);
+    window.run_forever();
+    let begun = Instant::now();
+    drop(window);
+    assert!(begun.elapsed() < Duration::from_secs(2), "{:?}", begun.elapsed());
+}
+
+#[test]
+fn a_window_without_data_says_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let nowhere = folder.path().join("nothing here");
+    let harness = Window::empty(&[nowhere], [1440.0, 900.0]);
+    let mut window = Window { harness, folder };
+    window.until("the error", |w| w.named("Dismiss notification"));
+    assert!(window.says("no such file or folder"));
+    assert!(window.says("No data set"));
+    for key in [Key::Enter, Key::Period, Key::Comma, Key::ArrowRight, Key::Space, Key::F, Key::R, Key::End] {
+        window.key(key);
+    }
+    assert_eq!(window.harness.unnamed_widgets(), Vec::<String>::new());
+}
+
+#[test]
+fn everything_that_can_be_used_has_a_name() {
+    let mut window = Window::fitted(2);
+    window.key(Key::W);
+    window.key_with(Modifiers::SHIFT, Key::Comma);
+    window.type_value("w_EM value", "2");
+    window.paused_at(10);
+    let mut unnamed = Vec::new();
+    let mut look = |window: &mut Window, place: &str| {
+        window.harness.run_steps(2);
+        let found = window.harness.unnamed_widgets();
+        unnamed.extend(found.into_iter().map(|what| format!("{place}: {what}")));
+    };
+    look(&mut window, "the panes");
+    window.key(Key::P);
+    for tab in [
+        "Log",
+        "Compare",
+        "Agreement",
+        "Statistics",
+        "Curves",
+        "Image plane",
+        "3-D",
+        "IoU and error",
+        "Kinematic limits",
+    ] {
+        window.click(tab);
+        look(&mut window, tab);
+    }
+    for menu in ["File", "Edit", "Frame", "Fit", "Labels", "View", "Help"] {
+        window.open_menu(menu);
+        look(&mut window, menu);
+        window.key(Key::Escape);
+    }
+    for (sheet, modifiers, key) in [
+        ("palette", Modifiers::COMMAND, Key::K),
+        ("help", Modifiers::NONE, Key::F1),
+        ("go to", Modifiers::COMMAND, Key::J),
+        ("path", Modifiers::COMMAND, Key::L),
+    ] {
+        window.key_with(modifiers, key);
+        look(&mut window, sheet);
+        window.key(Key::Escape);
+    }
+    // A joint, and the question about a bare file.
+    let bare = window.folder.path().join("bare.npy");
+    let map = vec![1.0; 64 * 32];
+    let array = mhp_inspector::dataset::npz::ArrayView::f64(&[64, 32], &map);
+    mhp_inspector::dataset::npz::write_npy(&bare, &array).unwrap();
+    window.drop_file(&bare);
+    window.until("the question", |w| w.says("What do these maps measure?"));
+    look(&mut window, "the question");
+    assert_eq!(unnamed, Vec::<String>::new());
+}
+
+#[test]
+fn a_window_in_which_nothing_happens_is_not_drawn_again() {
+    let mut window = Window::fitted(2);
+    window.harness.remove_cursor();
+    window.harness.run_steps(5);
+    let delay = |w: &Window| w.harness.output().viewport_output[&egui::ViewportId::ROOT].repaint_delay;
+    window.until("rest", |w| delay(w) > Duration::from_mins(1));
+    for _ in 0..5 {
+        window.harness.step();
+        assert!(delay(&window) > Duration::from_mins(1), "{:?}", window.harness.ctx.repaint_causes());
+    }
+}
+
+/// True where pictures are drawn by Mesa's software renderer, whose pixels the committed pictures are.
+fn software_renderer(harness_adapter: Option<&str>) -> bool {
+    let name = harness_adapter.unwrap_or("no adapter");
+    let known = ["llvmpipe", "lavapipe"].iter().any(|part| name.to_lowercase().contains(part));
+    if !known {
+        println!("skipped: the pictures were drawn by llvmpipe, this is {name}");
+    }
+    known
+}
+
+fn picture(theme: ThemeChoice, name: &str) {
+    use eframe::wgpu::{Backends, Instance, InstanceDescriptor};
+    let mut wanted = InstanceDescriptor::new_without_display_handle();
+    wanted.backends = Backends::VULKAN;
+    let adapters = pollster::block_on(Instance::new(wanted).enumerate_adapters(Backends::VULKAN));
+    let adapter = adapters.first().map(|adapter| adapter.get_info().name);
+    if !software_renderer(adapter.as_deref()) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("blob");
+    blob::write_dataset(&data, 4);
+    let paths = [data];
+    let harness = Harness::builder()
+        .with_size([1000.0, 640.0])
+        .with_step_dt(1.0 / 60.0)
+        .with_max_steps(200)
+        .wgpu()
+        .build_eframe(|cc| InspectorApp::new(cc, &paths));
+    let mut window = Window { harness, folder };
+    window.apply(Command::SetAnnotator("ada".into()));
+    window.ready(0);
+    if theme == ThemeChoice::Light {
+        window.key_with(Modifiers::COMMAND, Key::T);
+    }
+    window.key_with(Modifiers::SHIFT, Key::Period);
+    window.paused_at(10);
+    assert_eq!(window.session().view.theme, theme);
+    window.at_rest();
+    window.harness.remove_cursor();
+    window.harness.run_steps(20);
+    // Times differ from run to run, and what is beside them on the bar moves with their width.
+    window.harness.mask(egui::Rect::from_min_max(pos2(90.0, 0.0), pos2(1000.0, 27.0)));
+    window.harness.snapshot(name);
+}
+
+#[test]
+fn the_default_layout_in_the_dark() {
+    picture(ThemeChoice::Dark, "default_dark");
+}
+
+#[test]
+fn the_default_layout_in_the_light() {
+    picture(ThemeChoice::Light, "default_light");
+}
+
+/// As in a container: nothing says where a Wayland server is, and nobody asked for one.
+#[test]
+#[cfg(unix)]
+fn a_picture_without_a_session_is_drawn_in_silence() {
+    let folder = tempfile::tempdir().unwrap();
+    blob::write_dataset(folder.path(), 1);
+    let home = tempfile::tempdir().unwrap();
+    let picture = home.path().join("window.png");
+    let drawn = std::process::Command::new(env!("CARGO_BIN_EXE_mhp-inspector"))
+        .args(["screenshot", folder.path().to_str().unwrap(), "--iterations", "2", "--size", "640x400"])
+        .args(["--out", picture.to_str().unwrap()])
+        .env("MHP_INSPECTOR_HOME", home.path().join("home"))
+        .env_remove("XDG_RUNTIME_DIR")
+        .env_remove("NODEVICE_SELECT")
+        .output()
+        .unwrap();
+    let told = String::from_utf8_lossy(&drawn.stderr);
+    assert!(drawn.status.success() && picture.exists(), "{told}");
+    assert_eq!(told, "");
+}
