@@ -1,18 +1,36 @@
 //! The fit: transport, the shown iteration's numbers, and every setting.
 
-use super::Shared;
+use super::{Dock, Pane, PaneStates, Shared};
+use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, chip, icon_button, iou_color, value_row};
 use crate::config::{ChoiceGroup, Convergence, EmRegion, Field, FieldGroup, FitConfig, Preset};
 use crate::mhp::{Precision, Scope, TERMS, TermId, Terms, formula};
 use crate::session::{Command, FitStatus};
-use egui::{RichText, Ui};
+use egui::{Key, RichText, Ui};
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Fit",
+    title: "Fit",
+    help: "the run, the numbers of the iteration that is shown, and every setting",
+    dock: Dock::RightTop,
+    keys: &[(CTRL, Key::Num6)],
+    margin: 8,
+    state: PaneStates::prepare::<()>,
+    blank: |_| None,
+    toolbar: Some(|ui, shared, _| toolbar(ui, shared)),
+    ui: |ui, shared, _| show(ui, shared),
+};
+
+fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
     transport(ui, shared);
     // In scopes of their own: what appears in them must not shift the identity of a number that is being typed below.
     ui.scope(|ui| status(ui, shared));
     ui.separator();
+}
+
+fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let old = shared.session.config;
         let mut config = old;
