@@ -4,8 +4,8 @@ use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
-use crate::config::FitConfig;
-use crate::session::{Command, Pin, Session, difference, numbers};
+use crate::config::{FitConfig, difference, from_preset};
+use crate::session::{Command, Pin, Session, numbers};
 use egui::{Color32, Key, RichText, Role, Ui};
 
 /// The pane.
@@ -154,14 +154,10 @@ fn cells(ui: &mut Ui, values: [Option<f64>; 3], base: Option<&[Option<f64>; 3]>,
 }
 
 fn settings(ui: &mut Ui, base: Option<&FitConfig>, config: &FitConfig, tokens: &Tokens) {
-    let text = match base {
-        Some(base) => difference(base, config),
-        None => difference(&FitConfig::default(), config),
-    };
-    let text = match (text.is_empty(), base.is_some()) {
-        (true, true) => "the same".into(),
-        (true, false) => "default".into(),
-        (false, _) => text,
+    let text = match base.map(|base| difference(base, config)) {
+        Some(text) if text.is_empty() => "the same".into(),
+        Some(text) => text,
+        None => from_preset(config),
     };
     ui.label(RichText::new(text).small().color(tokens.dim));
 }

@@ -3,7 +3,7 @@
 
 use super::{Inputs, Scope, TERMS, TermGroup, TermId, Terms, WHOLE, Weight, evaluate, formula, weigh};
 use crate::body::{Group, Pppr, PpprShape, Skeleton};
-use crate::config::{FIELDS, FitConfig};
+use crate::config::{Field, FitConfig, Value};
 use crate::geometry::Vec3;
 
 const SHAPE: PpprShape = PpprShape { persons: 2, joints: 4, doppler_features: 1 };
@@ -106,9 +106,9 @@ fn a_line_of_the_table_says_all_there_is_to_say() {
         assert!(term.label.starts_with("L_") && !term.formula.is_empty() && term.help.ends_with('.'), "{}", term.key);
     }
     for &weight in Weight::ALL {
-        let field = FIELDS.iter().find(|field| field.key == weight.key()).unwrap();
+        let field = Field::of(weight.key()).unwrap();
         let mut config = FitConfig::default();
-        (field.set)(&mut config, 0.375);
+        field.set(&mut config, Value::Number(0.375));
         assert_eq!(weight.of(&config), 0.375, "{}", weight.key());
         assert!(weight.terms().next().is_some(), "{} weighs nothing", weight.key());
         assert!(weight.terms().all(|term| term.scope != Scope::Weighed || weight.of(&FitConfig::default()) == 0.0));

@@ -2,7 +2,7 @@
 
 use super::{TERMS, TermId, Terms};
 use crate::body::Pppr;
-use crate::config::{FIELDS, FitConfig};
+use crate::config::{Field, FitConfig};
 
 /// A factor of the loss. Terms that share one are summed before they are weighed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -95,7 +95,7 @@ impl Weight {
     /// The label of its field.
     pub fn label(self) -> &'static str {
         let key = self.key();
-        FIELDS.iter().find(|field| field.key == key).map_or(key, |field| field.label)
+        Field::of(key).map_or(key, |field| field.label)
     }
 
     /// The group that its terms are of.
