@@ -106,7 +106,7 @@ fn a_line_of_the_table_says_all_there_is_to_say() {
         assert!(term.label.starts_with("L_") && !term.formula.is_empty() && term.help.ends_with('.'), "{}", term.key);
     }
     for &weight in Weight::ALL {
-        let field = Field::of(weight.key()).unwrap();
+        let field = Field::of_key(weight.key()).unwrap();
         let mut config = FitConfig::default();
         field.set(&mut config, Value::Number(0.375));
         assert_eq!(weight.of(&config), 0.375, "{}", weight.key());

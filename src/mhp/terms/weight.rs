@@ -95,7 +95,7 @@ impl Weight {
     /// The label of its field.
     pub fn label(self) -> &'static str {
         let key = self.key();
-        Field::of(key).map_or(key, |field| field.label)
+        Field::of_key(key).map_or(key, |field| field.label)
     }
 
     /// The group that its terms are of.
