@@ -16,11 +16,12 @@ mod hupr;
 mod index;
 mod mmvr;
 mod pattern;
+mod write;
 mod xrf55;
 
 pub use bare::{BareCatalog, BareChoice, Remembered};
 pub use frames::{FrameSource, MapArray, Stored};
-pub use xrf55::STEPS as XRF55_STEPS;
+pub use write::{FrameWriter, MANTISSA_BITS, NewFrame, NewPlace};
 
 use super::DatasetError;
 use super::axes_text::axes_badge;
@@ -87,6 +88,11 @@ pub trait Layout: Debug + Sync {
         _progress: &Progress,
     ) -> Result<Opened, DatasetError> {
         Err(no_single_file(self.word(), file, manifest))
+    }
+
+    /// Writes new frames in this layout's files, where it can.
+    fn writer(&self) -> Option<&dyn FrameWriter> {
+        None
     }
 
     /// The camera whose pixels its image labels are, where its calibration is published.
