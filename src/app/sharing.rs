@@ -5,7 +5,7 @@ use super::commands::SaveKind;
 use super::layout::{Layout, PaneKind};
 use super::panes::PaneStates;
 use crate::output::{Sink, portable, replace_file};
-use crate::session::{BackgroundTask, Command, Export, LogLevel, OutputCheck, Session};
+use crate::session::{BackgroundTask, Command, Export, LogLevel, OutputCheck, Report, Session};
 use egui::{ColorImage, Context, Rect};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -98,13 +98,13 @@ fn suggestion(session: &Session, kind: SaveKind) -> PathBuf {
 impl InspectorApp {
     /// Asks where to write something.
     pub(super) fn ask_save(&mut self, kind: SaveKind) {
-        let path = suggestion(&self.session, kind);
+        let path = suggestion(self.runtime.session(), kind);
         self.overlay.open_save(kind, &path);
     }
 
     /// Writes the session where it was last, or asks.
     pub(super) fn save_session_again(&mut self, ctx: &Context) {
-        match self.session.session_path.clone() {
+        match self.session().session_path.clone() {
             Some(path) => self.save(ctx, SaveKind::Session, path),
             None => self.ask_save(SaveKind::Session),
         }
@@ -119,7 +119,8 @@ impl InspectorApp {
                 match serde_json::to_value(&window) {
                     Ok(window) => self.apply(Command::SaveSession(path, window)),
                     Err(error) => {
-                        self.apply(Command::Log(LogLevel::Error, format!("the session was not saved: {error}")));
+                        self.runtime
+                            .report(Report::Log(LogLevel::Error, format!("the session was not saved: {error}")));
                     }
                 }
             }
@@ -138,7 +139,7 @@ impl InspectorApp {
 
     /// Puts the path of the frame's file on the clipboard.
     pub(super) fn copy_path(&mut self, ctx: &Context) {
-        if let (Some(dataset), Some(frame)) = (&self.session.data.dataset, &self.session.data.frame) {
+        if let (Some(dataset), Some(frame)) = (&self.session().data.dataset, &self.session().data.frame) {
             ctx.copy_text(dataset.frame_path(frame.index).display().to_string());
             self.overlay.notify(LogLevel::Info, "path copied".into(), ctx.input(|i| i.time));
         }
@@ -151,7 +152,7 @@ impl InspectorApp {
             match wanted {
                 Wanted::File(path, rect) => {
                     let image = cropped(&image, rect, scale);
-                    let check = self.session.output_check();
+                    let check = self.session().output_check();
                     self.apply(Command::RunTask(BackgroundTask::new(move || write_png(&image, &path, &check))));
                 }
                 Wanted::Clipboard(rect) => {
@@ -164,15 +165,15 @@ impl InspectorApp {
 
     /// Puts back what a session file says of the window.
     pub(super) fn take_restored(&mut self) {
-        let Some(window) = self.session.take_restored_window() else { return };
+        let Some(window) = self.runtime.take_restored_window() else { return };
         match serde_json::from_value::<WindowState>(window) {
             Ok(state) => {
                 self.layout = Layout::restored(state.layout);
-                self.panes.restore(state.panes, &self.session);
+                self.panes.restore(state.panes, self.runtime.session());
             }
             Err(error) => {
                 let text = format!("camera and layout of the session could not be put back: {error}");
-                self.apply(Command::Log(LogLevel::Warning, text));
+                self.runtime.report(Report::Log(LogLevel::Warning, text));
             }
         }
     }

@@ -7,7 +7,7 @@ use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::{BareCatalog, BareChoice, Dataset, DatasetError};
 use mhp_inspector::mhp::{Adam, Evaluation, FitState, Problem, StepReport, StopReason, Terms, initialise};
 use mhp_inspector::session::{
-    Command, Effect, FitStatus, History, IterationRow, LogLevel, PickKind, Session, ThemeChoice, ViewState,
+    Command, Effect, FitStatus, History, IterationRow, LogLevel, PickKind, Report, Session, ThemeChoice, ViewState,
 };
 use mhp_inspector::task::Progress;
 use mhp_inspector::worker::{
@@ -29,6 +29,21 @@ fn dataset(folder: &Path, frames: usize) -> Arc<Dataset> {
     Arc::new(Dataset::open(folder, &Progress::new()).unwrap())
 }
 
+/// Labels, strata and evidence are tested elsewhere.
+fn of_data_and_fit(mut effects: Vec<Effect>) -> Vec<Effect> {
+    effects.retain(|effect| {
+        !matches!(
+            effect,
+            Effect::OpenLabels { .. }
+                | Effect::RefreshLabels
+                | Effect::ComputeStrata { .. }
+                | Effect::CancelStrata
+                | Effect::Evidence(_)
+        )
+    });
+    effects
+}
+
 impl Bench {
     /// Frame 0 is on screen and its fit is ready at iteration 0.
     fn new() -> Self {
@@ -41,33 +56,27 @@ impl Bench {
             Arc::new(Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap());
         let params = initialise(&problem, &FitConfig::default()).unwrap().params;
         let mut bench = Self { session: Session::default(), dataset, params, folder };
-        let effects = bench.apply(Command::Opened(bench.folder.path().into(), Ok(Arc::clone(&bench.dataset))));
+        let effects = bench.report(Report::Opened(bench.folder.path().into(), Ok(Arc::clone(&bench.dataset))));
         assert!(matches!(&effects[..], [Effect::UseDataset(_), Effect::Load(0)]), "{effects:?}");
         let prepare = bench.load(0);
         bench.answer(prepare);
         bench
     }
 
-    /// What follows for data and fit; labels, strata and evidence are tested elsewhere.
+    /// What follows for data and fit of what a person asks.
     fn apply(&mut self, command: Command) -> Vec<Effect> {
-        let mut effects = self.session.apply(command);
-        effects.retain(|effect| {
-            !matches!(
-                effect,
-                Effect::OpenLabels { .. }
-                    | Effect::RefreshLabels
-                    | Effect::ComputeStrata { .. }
-                    | Effect::CancelStrata
-                    | Effect::Evidence(_)
-            )
-        });
-        effects
+        of_data_and_fit(self.session.apply(command))
+    }
+
+    /// What follows for data and fit of what a thread tells.
+    fn report(&mut self, report: Report) -> Vec<Effect> {
+        of_data_and_fit(self.session.report(report))
     }
 
     /// The frame that was asked for arrives; answers what the worker is told.
     fn load(&mut self, index: usize) -> Prepare {
         let frame = Arc::new(self.dataset.load(index).unwrap());
-        let effects = self.apply(Command::FrameLoaded(index, Ok(frame)));
+        let effects = self.report(Report::FrameLoaded(index, Ok(frame)));
         prepare_of(effects)
     }
 
@@ -107,11 +116,11 @@ impl Bench {
     fn rows(&mut self, job: JobId, branch: u32, iterations: std::ops::RangeInclusive<usize>) {
         let rows =
             iterations.map(|k| HistoryRow { branch, report: report(k), kept: Kept::State(self.state(k)) }).collect();
-        assert!(self.apply(Command::Worker(WorkerMessage::Rows(job, rows))).is_empty());
+        assert!(self.report(Report::Worker(WorkerMessage::Rows(job, rows))).is_empty());
     }
 
     fn event(&mut self, job: JobId, event: WorkerEvent) -> Vec<Effect> {
-        self.apply(Command::Worker(WorkerMessage::Event(job, event)))
+        self.report(Report::Worker(WorkerMessage::Event(job, event)))
     }
 
     fn job(&self) -> JobId {
@@ -147,7 +156,7 @@ impl Bench {
         let iterations_per_s = 0.0;
         let snapshot =
             Snapshot { job, branch, iteration, live, config, params, evaluation, h_sim, masks, iterations_per_s };
-        assert!(self.apply(Command::Snapshot(Box::new(snapshot))).is_empty());
+        assert!(self.report(Report::Snapshot(Box::new(snapshot))).is_empty());
     }
 
     fn shown(&self) -> Option<(u32, usize)> {
@@ -191,12 +200,12 @@ fn opening_shows_progress_and_then_the_first_frame() {
     assert!(matches!(effects[..], [Effect::Pick(PickKind::Folder)]));
     let effects = session.apply(Command::Open("/somewhere".into()));
     assert!(matches!(&effects[..], [Effect::Open(path)] if path == Path::new("/somewhere")));
-    session.apply(Command::OpenProgress { stage: "listing".into(), done: 3, total: 9 });
+    session.report(Report::OpenProgress { stage: "listing".into(), done: 3, total: 9 });
     let opening = session.data.opening.as_ref().unwrap();
     assert_eq!((opening.stage.as_str(), opening.done, opening.total), ("listing", 3, 9));
     assert!(matches!(session.apply(Command::CancelOpen)[..], [Effect::CancelOpen]));
     assert_eq!(session.data.opening, None);
-    session.apply(Command::OpenProgress { stage: "late".into(), done: 4, total: 9 });
+    session.report(Report::OpenProgress { stage: "late".into(), done: 4, total: 9 });
     assert_eq!(session.data.opening, None, "late progress of what was cancelled");
 
     let bench = Bench::new();
@@ -215,14 +224,14 @@ fn an_error_while_opening_keeps_what_is_on_screen() {
     let job = bench.job();
     bench.apply(Command::Open("/gone".into()));
     assert!(bench.session.data.frame.is_some() && bench.session.data.dataset.is_some());
-    let effects = bench.apply(Command::Opened("/gone".into(), Err(DatasetError::NotFound { path: "/gone".into() })));
+    let effects = bench.report(Report::Opened("/gone".into(), Err(DatasetError::NotFound { path: "/gone".into() })));
     assert!(effects.is_empty());
     assert_eq!(bench.errors(), ["/gone: no such file or folder"]);
     let (count, level, text) = bench.session.notice.clone().unwrap();
     assert_eq!((level, text.as_str()), (LogLevel::Error, "/gone: no such file or folder"));
     assert_eq!((bench.session.data.opening.clone(), bench.job(), bench.session.fit.head()), (None, job, 3));
     assert!(!bench.session.data.recent.contains(&PathBuf::from("/gone")), "what cannot be opened is not remembered");
-    bench.apply(Command::Opened("/gone".into(), Err(DatasetError::NotFound { path: "/gone".into() })));
+    bench.report(Report::Opened("/gone".into(), Err(DatasetError::NotFound { path: "/gone".into() })));
     assert_eq!(bench.session.notice.unwrap().0, count + 1, "the same text again is told again");
 }
 
@@ -230,7 +239,7 @@ fn an_error_while_opening_keeps_what_is_on_screen() {
 fn a_cancelled_opening_is_no_error() {
     let mut bench = Bench::new();
     bench.apply(Command::Open("/slow".into()));
-    bench.apply(Command::Opened("/slow".into(), Err(DatasetError::Cancelled)));
+    bench.report(Report::Opened("/slow".into(), Err(DatasetError::Cancelled)));
     assert!(bench.errors().is_empty() && bench.session.notice.is_none());
     assert!(bench.session.log.back().unwrap().text.contains("/slow was cancelled"));
 }
@@ -246,7 +255,7 @@ fn a_bare_file_asks_for_its_axes() {
     let mut bench = Bench::new();
     let asks = |bench: &mut Bench| {
         bench.apply(Command::Open(path.clone()));
-        bench.apply(Command::Opened(path.clone(), Err(DatasetError::NeedsAxes(catalog.clone()))));
+        bench.report(Report::Opened(path.clone(), Err(DatasetError::NeedsAxes(catalog.clone()))));
     };
     asks(&mut bench);
     assert_eq!(bench.session.data.bare, Some((path.clone(), catalog.clone())));
@@ -265,12 +274,12 @@ fn recents_are_newest_first_without_repeats_and_few() {
     let mut bench = Bench::new();
     bench.apply(Command::ClearRecent);
     for path in ["/a", "/b", "/a", "/c"] {
-        bench.apply(Command::Opened(path.into(), Ok(Arc::clone(&bench.dataset))));
+        bench.report(Report::Opened(path.into(), Ok(Arc::clone(&bench.dataset))));
     }
     let recent: Vec<_> = bench.session.data.recent.iter().map(|path| path.display().to_string()).collect();
     assert_eq!(recent, ["/c", "/a", "/b"]);
     for i in 0..40 {
-        bench.apply(Command::Opened(format!("/many/{i}").into(), Ok(Arc::clone(&bench.dataset))));
+        bench.report(Report::Opened(format!("/many/{i}").into(), Ok(Arc::clone(&bench.dataset))));
     }
     assert_eq!(bench.session.data.recent.len(), 12);
     assert_eq!(bench.session.data.recent[0], Path::new("/many/39"));
@@ -312,12 +321,12 @@ fn a_frame_that_arrives_too_late_is_dropped() {
     bench.apply(Command::GotoFrame(1));
     bench.apply(Command::GotoFrame(2));
     let stale = Arc::new(bench.dataset.load(1).unwrap());
-    assert!(bench.apply(Command::FrameLoaded(1, Ok(stale))).is_empty());
+    assert!(bench.report(Report::FrameLoaded(1, Ok(stale))).is_empty());
     assert_eq!((bench.session.data.frame.as_ref().unwrap().index, bench.session.data.loading), (0, Some(2)));
     let prepare = bench.load(2);
     assert_eq!((prepare.frame.index, bench.session.data.loading), (2, None));
     let again = Arc::new(bench.dataset.load(2).unwrap());
-    assert!(bench.apply(Command::FrameLoaded(2, Ok(again))).is_empty(), "nobody asked twice");
+    assert!(bench.report(Report::FrameLoaded(2, Ok(again))).is_empty(), "nobody asked twice");
 }
 
 #[test]
@@ -327,7 +336,7 @@ fn a_frame_that_cannot_be_read_is_told_and_the_next_one_is_fine() {
     bench.apply(Command::TogglePlay);
     bench.apply(Command::GotoFrame(1));
     let error = DatasetError::NotFound { path: "frames/001.npz".into() };
-    let effects = bench.apply(Command::FrameLoaded(1, Err(error)));
+    let effects = bench.report(Report::FrameLoaded(1, Err(error)));
     assert!(matches!(sent(&effects), WorkerCommand::Discard));
     let data = &bench.session.data;
     assert!(data.frame.is_none() && !data.playing && data.error.as_ref().unwrap().contains("001.npz"));
@@ -647,7 +656,7 @@ fn another_data_set_begins_anew_and_keeps_how_things_are_shown() {
     bench.apply(Command::SetConfig(Box::new(config)));
     let other = tempfile::tempdir().unwrap();
     let dataset = dataset(other.path(), 2);
-    bench.apply(Command::Opened(other.path().into(), Ok(dataset)));
+    bench.report(Report::Opened(other.path().into(), Ok(dataset)));
     let session = &bench.session;
     assert_eq!((session.data.len(), session.data.frame_index, session.data.loading), (2, 0, Some(0)));
     assert!(session.fits.is_empty() && session.summaries.is_empty() && session.data.frame.is_none());
@@ -659,7 +668,7 @@ fn only_so_many_left_fits_are_kept() {
     let folder = tempfile::tempdir().unwrap();
     let many = dataset(folder.path(), 20);
     let mut bench = Bench::new();
-    bench.apply(Command::Opened(folder.path().into(), Ok(Arc::clone(&many))));
+    bench.report(Report::Opened(folder.path().into(), Ok(Arc::clone(&many))));
     bench.dataset = many;
     let mut prepare = bench.load(0);
     for index in 1..20 {
@@ -725,7 +734,7 @@ fn a_long_history_thins_its_states_and_keeps_every_row() {
     let rows = (1..=count)
         .map(|k| HistoryRow { branch: 0, report: report(k), kept: Kept::State(Arc::clone(&state)) })
         .collect();
-    bench.apply(Command::Worker(WorkerMessage::Rows(job, rows)));
+    bench.report(Report::Worker(WorkerMessage::Rows(job, rows)));
     let branch = bench.session.fit.branch().unwrap();
     assert_eq!((branch.rows.len(), branch.head()), (count + 1, count));
     let kept = |row: &IterationRow| row.state.is_some();
@@ -753,7 +762,7 @@ fn a_long_history_thins_its_states_and_keeps_every_row() {
 fn the_log_is_bounded() {
     let mut session = Session::default();
     for i in 0..2500 {
-        session.apply(Command::Log(LogLevel::Info, format!("line {i}")));
+        session.report(Report::Log(LogLevel::Info, format!("line {i}")));
     }
     assert_eq!((session.log.len(), session.log.front().unwrap().text.as_str()), (2000, "line 500"));
     assert_eq!(session.notice, None, "information is not a notification");

@@ -77,7 +77,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         ui.label(RichText::new(text).small().color(tokens.dim));
     }
     choose(ui, state, &names);
-    let key = (labels.revision, state.pair.clone());
+    let key = (labels.revision(), state.pair.clone());
     if state.found.as_ref().is_none_or(|(known, _)| *known != key) {
         state.found = Some((key, compute(labels, &state.pair)));
     }

@@ -2,7 +2,7 @@
 
 use crate::body::Pppr;
 use crate::config::FitConfig;
-use crate::session::command::Effect;
+use crate::session::effect::Effect;
 use crate::session::fit::FitStatus;
 use crate::session::history::difference;
 use crate::session::state::{LogLevel, Session};

@@ -4,8 +4,9 @@
 use super::Wake;
 use crate::body::Pppr;
 use crate::mhp::{Objective, Precision, Problem, masks, simulate};
-use crate::session::command::{Command, PinRequest};
+use crate::session::effect::PinRequest;
 use crate::session::evidence::EvidenceRequest;
+use crate::session::report::Report;
 use crate::task::panic_as_error;
 use crate::worker::Snapshot;
 use crossbeam_channel::{Receiver, Sender, unbounded};
@@ -20,7 +21,7 @@ pub(super) enum Ask {
 /// The window's end.
 pub(super) struct EvidenceKeeper {
     requests: Sender<Ask>,
-    answers: Receiver<Command>,
+    answers: Receiver<Report>,
 }
 
 impl EvidenceKeeper {
@@ -52,7 +53,7 @@ impl EvidenceKeeper {
         let _ = self.requests.send(ask);
     }
 
-    pub(super) fn poll(&self) -> Option<Command> {
+    pub(super) fn poll(&self) -> Option<Report> {
         self.answers.try_recv().ok()
     }
 }
@@ -69,13 +70,13 @@ fn newest(asks: Vec<Ask>) -> Vec<Ask> {
     evidence.into_iter().chain(pins).collect()
 }
 
-fn answer(ask: Ask) -> Command {
+fn answer(ask: Ask) -> Report {
     match ask {
         Ask::Evidence(request) => {
             let found = panic_as_error(|| Ok(request.gather()));
-            Command::EvidenceFound(request.frame.index, request.fit, found)
+            Report::EvidenceFound(request.frame.index, request.fit, found)
         }
-        Ask::Pin(request) => Command::PinDrawn(request.pin.id, panic_as_error(|| drawn(&request).map(Box::new))),
+        Ask::Pin(request) => Report::PinDrawn(request.pin.id, panic_as_error(|| drawn(&request).map(Box::new))),
     }
 }
 

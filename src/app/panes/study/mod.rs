@@ -47,7 +47,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     };
     let tokens = Tokens::of(ui);
     head(ui, shared, &run, &folder, &tokens);
-    let revision = study.revision;
+    let revision = study.run.revision();
     if state.values.as_ref().is_none_or(|(known, _)| *known != revision) {
         state.values = Some((revision, measure::of_run(&run)));
     }
