@@ -9,9 +9,9 @@ use crate::dataset::{Dataset, read_pppr};
 use crate::diagnose::{Evidence, Finding, FindingPlace};
 use crate::escape::{one_line, to_cell};
 use crate::labels::Tag;
-use crate::mhp::Problem;
 use crate::output::replace_file;
 use crate::radar::View;
+use crate::start::problem_alone;
 use crate::study::{BatchOptions, FrameEvidence, frame_evidence};
 use anyhow::Context as _;
 use clap::Args;
@@ -140,11 +140,9 @@ fn params(path: &Path, dataset: &Dataset, frames: &Range<usize>) -> anyhow::Resu
         anyhow::bail!("{}: --params is of one frame, {count} were asked for; expected --frames N", path.display());
     }
     let params = read_pppr(path, None)?;
-    let info = dataset.info();
     let frame = dataset.load(frames.start)?;
-    let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-    let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps)
-        .with_context(|| dataset.frame_path(frames.start).display().to_string())?;
+    let problem =
+        problem_alone(dataset, &frame).with_context(|| dataset.frame_path(frames.start).display().to_string())?;
     problem.check(&params).with_context(|| path.display().to_string())?;
     Ok(params)
 }

@@ -5,6 +5,7 @@ use crate::body::{Group, Pppr};
 use crate::dataset::npz::{ArrayView, write};
 use crate::dataset::read_pppr;
 use crate::mhp::{Evaluation, Objective, Problem, simulate};
+use crate::start::problem_alone;
 use anyhow::Context as _;
 use clap::Args;
 use serde_json::{Map, Value};
@@ -60,10 +61,8 @@ pub(super) fn run(args: &ScoreArgs) -> anyhow::Result<ExitCode> {
     inputs(&dataset, &args.dataset, &named).check_file(&args.out)?;
     let frame = dataset.load(args.frame)?;
     let params = read_pppr(&args.params, None)?;
-    let info = dataset.info();
-    let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-    let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps)
-        .with_context(|| dataset.frame_path(args.frame).display().to_string())?;
+    let problem =
+        problem_alone(&dataset, &frame).with_context(|| dataset.frame_path(args.frame).display().to_string())?;
     problem.check(&params).with_context(|| args.params.display().to_string())?;
 
     let (problem, precision) = (Arc::new(problem), args.precision.into());

@@ -17,7 +17,7 @@ pub use init::{Height, InitConfig, LearningRates, Limbs, Parameterization, Place
 pub use preset::Preset;
 pub use reading::{Background, Convergence, FramesAround, GradientVelocity, Still, WarmStart};
 
-use crate::input::{MOST_TEXT, read_text};
+use crate::input::{MOST_TEXT, place, read_text};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -306,10 +306,6 @@ impl FitConfig {
 fn plainly(value: f64) -> String {
     let size = value.abs();
     if size != 0.0 && !(1e-6..1e15).contains(&size) { format!("{value:e}") } else { value.to_string() }
-}
-
-fn place(path: &Path, line: Option<usize>) -> String {
-    line.map_or_else(|| path.display().to_string(), |line| format!("{}:{line}", path.display()))
 }
 
 /// `unknown field` is the parser's word; a configuration has keys.

@@ -2,7 +2,8 @@
 
 use super::BareCatalog;
 use super::npz::NpzError;
-use std::path::{Path, PathBuf};
+use crate::input::place;
+use std::path::PathBuf;
 
 /// Why a data set could not be opened or a frame not loaded.
 #[derive(Debug, thiserror::Error)]
@@ -138,10 +139,6 @@ pub enum DatasetError {
         /// What was being read.
         path: PathBuf,
     },
-}
-
-fn place(path: &Path, line: Option<usize>) -> String {
-    line.map_or_else(|| path.display().to_string(), |line| format!("{}:{line}", path.display()))
 }
 
 impl From<crate::task::Cancelled> for DatasetError {

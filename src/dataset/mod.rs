@@ -41,7 +41,7 @@ pub const MAX_PERSONS: usize = 256;
 pub use bare::{BareCatalog, BareChoice, Remembered};
 pub use cache::{Cache, DEFAULT_BUDGET, FrameCache};
 pub use error::DatasetError;
-pub use frame::{Frame, Heatmap, ImageAnnotations, Truth};
+pub use frame::{Frame, Heatmap, ImageAnnotations, Truth, map_cells};
 pub(crate) use hupr::{LEVEL as HUPR_LEVEL, LEVELS as HUPR_LEVELS};
 pub use job::OpenJob;
 pub use loader::{Loaded, Loader};

@@ -3,7 +3,7 @@
 use super::Terms;
 use crate::body::{Pppr, Skeleton};
 use crate::config::FitConfig;
-use crate::geometry::{Vec3, add, add_scaled, cross, dot, scale, sub};
+use crate::geometry::{Vec3, add, add_scaled, cross, dot, mean, scale, sub};
 use smallvec::SmallVec;
 
 /// δ of the pseudo-Huber function ψ.
@@ -130,10 +130,8 @@ impl Joints<'_> {
     }
 
     fn separation(&mut self, limit: f64) -> f64 {
+        let centroids: SmallVec<[Vec3; 4]> = self.positions.chunks_exact(self.count.max(1)).map(mean).collect();
         let share = 1.0 / self.count as f64;
-        let bodies = self.positions.chunks_exact(self.count.max(1));
-        let centroids: SmallVec<[Vec3; 4]> =
-            bodies.map(|body| scale(body.iter().fold([0.0; 3], |sum, &p| add(sum, p)), share)).collect();
         let mut total = 0.0;
         for s in 0..centroids.len() {
             for t in 0..s {
@@ -181,18 +179,12 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests")]
 
     use super::*;
-    use crate::body::{Group, PpprShape};
+    use crate::body::Group;
+    use crate::mhp::convergence::tests::two_joints;
 
     /// L_bone of a bone of 0.4 m that is `length_m` long, and its slope by the length.
     fn bone(length_m: f64, bone_tolerance_m: f64) -> (f64, f64) {
-        let skeleton = Skeleton {
-            joints: vec!["a".into(), "b".into()],
-            bones: vec![[0, 1]],
-            bone_lengths_m: vec![0.4],
-            angles: vec![],
-        };
-        let mut params = Pppr::zeros(PpprShape { persons: 1, joints: 2, doppler_features: 1 });
-        params.set_vec3(Group::Position, 1, [length_m, 0.0, 0.0]);
+        let (skeleton, params) = two_joints(length_m);
         let mut gradient = Pppr::zeros(params.shape());
         let config = FitConfig { bone_tolerance_m, ..FitConfig::default() };
         let terms = evaluate(&skeleton, &config, &params, &mut gradient);

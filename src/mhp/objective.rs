@@ -10,7 +10,7 @@ use super::splat::Scene;
 use super::{Evaluation, FitError, Precision, Problem, kinematic};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::{Vec3, add, add_scaled, dot, scale, sub};
+use crate::geometry::{Vec3, add_scaled, dot, mean, sub};
 use smallvec::SmallVec;
 use std::sync::Arc;
 
@@ -197,8 +197,7 @@ fn anchored(anchors: &[Vec3], params: &Pppr, weight: f64, gradient: &mut Pppr) -
     let mut sum = 0.0;
     for (person, anchor) in anchors.iter().enumerate().take(params.shape().persons) {
         let own = person * joints..(person + 1) * joints;
-        let mean = scale(own.clone().fold([0.0; 3], |sum, joint| add(sum, params.position(joint))), share);
-        let off = sub(mean, *anchor);
+        let off = sub(mean(params.person(person)), *anchor);
         sum += dot(off, off);
         for joint in own {
             let mut slope = gradient.vec3(Group::Position, joint);

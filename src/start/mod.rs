@@ -5,4 +5,4 @@ mod people;
 mod problem;
 
 pub use people::{Begun, begin};
-pub use problem::problem_of;
+pub use problem::{problem_alone, problem_of};

@@ -1,22 +1,21 @@
 //! Labels, evidence and strata in `Session::apply` without threads: what a window meets only when answers come late.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
-use crate::blob;
+use crate::dataset;
 use mhp_inspector::body::Pppr;
 use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::diagnose::Evidence;
 use mhp_inspector::labels::{Change, FrameId, Judged, Label, LabelPlace, Record, Tag};
-use mhp_inspector::mhp::{Evaluation, Problem, Terms, initialise};
+use mhp_inspector::mhp::{Evaluation, Terms, initialise};
 use mhp_inspector::session::{
     ActKind, Changes, Command, Commit, Done, Effect, FitHashes, LabelStatus, LabelTable, LogLevel, OpenedLabels,
     Report, Session, SessionFile, StrataStatus, Written,
 };
+use mhp_inspector::start::problem_alone;
 use mhp_inspector::study::complexity::Complexity;
-use mhp_inspector::task::Progress;
 use mhp_inspector::worker::{PreparedFit, Snapshot, WorkerCommand, WorkerEvent, WorkerMessage};
 use std::collections::{BTreeSet, HashMap};
-use std::path::Path;
 use std::sync::Arc;
 
 /// A session on a data set, and a journal that answers when it is told to.
@@ -25,11 +24,6 @@ struct Bench {
     dataset: Arc<Dataset>,
     journal: HashMap<usize, Label>,
     folder: tempfile::TempDir,
-}
-
-fn dataset(folder: &Path, frames: usize) -> Arc<Dataset> {
-    blob::write_dataset(folder, frames);
-    Arc::new(Dataset::open(folder, &Progress::new()).unwrap())
 }
 
 impl Bench {
@@ -118,10 +112,7 @@ impl Bench {
             _ => None,
         });
         let prepare = prepare.unwrap();
-        let maps: Vec<&[f64]> = prepare.frame.maps.iter().map(|map| map.data.as_slice()).collect();
-        let info = prepare.dataset.info();
-        let (radar, skeleton, views) = (info.radar.clone(), info.skeleton.clone(), info.views.clone());
-        let problem = Arc::new(Problem::new(radar, skeleton, views, &maps).unwrap());
+        let problem = Arc::new(problem_alone(&prepare.dataset, &prepare.frame).unwrap());
         let params = initialise(&problem, &FitConfig::default()).unwrap().params;
         let initial = params.clone();
         let prepared = PreparedFit { problem, begun: None, initial, warnings: Vec::new(), init_ms: 1.0 };

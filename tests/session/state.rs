@@ -1,15 +1,15 @@
 //! `Session::apply` without threads: commands and reports in, effects and state out.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
-use crate::blob;
+use crate::dataset;
 use mhp_inspector::body::{Group, Pppr};
 use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::{BareCatalog, BareChoice, Dataset, DatasetError};
-use mhp_inspector::mhp::{Adam, Evaluation, FitState, Problem, StepReport, StopReason, Terms, initialise};
+use mhp_inspector::mhp::{Adam, Evaluation, FitState, StepReport, StopReason, Terms, initialise};
 use mhp_inspector::session::{
     Command, Effect, FitStatus, History, IterationRow, LogLevel, PickKind, Report, Session, ThemeChoice, ViewState,
 };
-use mhp_inspector::task::Progress;
+use mhp_inspector::start::problem_alone;
 use mhp_inspector::worker::{
     HistoryRow, JobId, Kept, Prepare, PreparedFit, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
 };
@@ -22,11 +22,6 @@ struct Bench {
     dataset: Arc<Dataset>,
     params: Pppr,
     folder: tempfile::TempDir,
-}
-
-fn dataset(folder: &Path, frames: usize) -> Arc<Dataset> {
-    blob::write_dataset(folder, frames);
-    Arc::new(Dataset::open(folder, &Progress::new()).unwrap())
 }
 
 /// Labels, strata and evidence are tested elsewhere.
@@ -50,10 +45,7 @@ impl Bench {
         let folder = tempfile::tempdir().unwrap();
         let dataset = dataset(folder.path(), 4);
         let frame = dataset.load(0).unwrap();
-        let info = dataset.info();
-        let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-        let problem =
-            Arc::new(Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap());
+        let problem = Arc::new(problem_alone(&dataset, &frame).unwrap());
         let params = initialise(&problem, &FitConfig::default()).unwrap().params;
         let mut bench = Self { session: Session::default(), dataset, params, folder };
         let effects = bench.report(Report::Opened(bench.folder.path().into(), Ok(Arc::clone(&bench.dataset))));
@@ -89,10 +81,7 @@ impl Bench {
     /// The worker answers a preparation.
     fn answer(&mut self, prepare: Prepare) {
         let Prepare { job, branch, dataset, frame, start, .. } = prepare;
-        let info = dataset.info();
-        let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-        let problem =
-            Arc::new(Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap());
+        let problem = Arc::new(problem_alone(&dataset, &frame).unwrap());
         let (initial, resumed) = match start {
             Start::Initialise => (self.params.clone(), false),
             Start::Warm(params) => (params, false),
@@ -704,15 +693,7 @@ fn a_run_begins_by_itself_only_where_asked() {
     let job = prepare.job;
     bench.rows(job, 0, 0..=0);
     let prepared = PreparedFit {
-        problem: Arc::new(
-            Problem::new(
-                prepare.dataset.info().radar.clone(),
-                prepare.dataset.info().skeleton.clone(),
-                prepare.dataset.info().views.clone(),
-                &prepare.frame.maps.iter().map(|m| m.data.as_slice()).collect::<Vec<_>>(),
-            )
-            .unwrap(),
-        ),
+        problem: Arc::new(problem_alone(&prepare.dataset, &prepare.frame).unwrap()),
         begun: None,
         initial: bench.params.clone(),
         warnings: vec!["the region has no cell".into()],

@@ -3,10 +3,11 @@
 
 use super::Wake;
 use crate::body::Pppr;
-use crate::mhp::{Objective, Precision, Problem, masks, simulate};
+use crate::mhp::{Objective, Precision, masks, simulate};
 use crate::session::effect::PinRequest;
 use crate::session::evidence::EvidenceRequest;
 use crate::session::report::Report;
+use crate::start::problem_alone;
 use crate::task::panic_as_error;
 use crate::worker::Snapshot;
 use crossbeam_channel::{Receiver, Sender, unbounded};
@@ -83,12 +84,9 @@ fn answer(ask: Ask) -> Report {
 /// The maps and masks of a pin.
 fn drawn(request: &PinRequest) -> Result<Snapshot, String> {
     let PinRequest { dataset, pin } = request;
-    let info = dataset.info();
     let frame = dataset.load(pin.frame).map_err(|error| error.to_string())?;
     let in_file = |error: &dyn std::fmt::Display| format!("{}: {error}", dataset.frame_path(pin.frame).display());
-    let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-    let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps);
-    let problem = Arc::new(problem.map_err(|error| in_file(&error))?);
+    let problem = Arc::new(problem_alone(dataset, &frame).map_err(|error| in_file(&error))?);
     let check = |params: &Pppr| problem.check(params).map_err(|error| in_file(&error));
     check(&pin.initial)?;
     check(&pin.params)?;
