@@ -5,7 +5,7 @@ use crate::body::Pppr;
 use crate::config::{EmRegion, FitConfig};
 use crate::dataset::{Dataset, read_pppr};
 use crate::mhp::{Fitter, Precision, Problem, simd_path, simulate};
-use crate::start::{begin, problem_of};
+use crate::start::{find_start, problem_of};
 use anyhow::Context as _;
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
@@ -138,10 +138,10 @@ fn measure(args: &BenchArgs) -> anyhow::Result<Figures> {
         problem.views = problem.views.to_vec().into();
         Ok(Arc::new(problem))
     };
-    let init_ms = fastest_ms(fresh, |problem| begin(&problem, &config).is_ok())?;
+    let init_ms = fastest_ms(fresh, |problem| find_start(&problem, &config).is_ok())?;
     let initial = match args.params.clone().or_else(|| beside("params.npz")) {
         Some(path) => read_pppr(&path, None)?,
-        None => begin(&problem, &config)?.initialisation.params,
+        None => find_start(&problem, &config)?.initialisation.params,
     };
     let mut fitter = Fitter::new(Arc::clone(&problem), config, precision, initial.clone())?;
     for _ in 0..WARM_UP {
@@ -185,7 +185,7 @@ fn problem(dataset: &Dataset, index: usize) -> anyhow::Result<Arc<Problem>> {
 
 /// Start and 80 iterations; `None` where there is no start or it diverges.
 fn whole_frame(problem: &Arc<Problem>, config: &FitConfig, precision: Precision) -> Option<Pppr> {
-    let initial = begin(problem, config).ok()?.initialisation.params;
+    let initial = find_start(problem, config).ok()?.initialisation.params;
     let mut fitter = Fitter::new(Arc::clone(problem), *config, precision, initial).ok()?;
     (0..FRAME_ITERATIONS).try_for_each(|_| fitter.step().map(drop)).ok()?;
     Some(fitter.params().clone())

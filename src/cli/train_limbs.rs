@@ -4,7 +4,7 @@ use super::common::{print, progress_bar};
 use crate::config::{FitConfig, Limbs, Preset};
 use crate::dataset::Dataset;
 use crate::mhp::{LimbLesson, LimbMap, Problem, learn_limbs};
-use crate::start::{begin, problem_alone, problem_of};
+use crate::start::{find_start, problem_alone, problem_of};
 use crate::task::Progress;
 use anyhow::Context as _;
 use clap::Args;
@@ -87,8 +87,8 @@ fn lessons(paths: &[PathBuf]) -> anyhow::Result<Vec<LimbLesson>> {
             let Some(truth) = &frame.truth else { return Vec::new() };
             let lesson = |problem: Problem| {
                 let problem = Arc::new(problem);
-                let begun = begin(&problem, &config).ok()?;
-                LimbLesson::of(&problem, &begun.initialisation.params, &truth.joints)
+                let found = find_start(&problem, &config).ok()?;
+                LimbLesson::of(&problem, &found.initialisation.params, &truth.joints)
             };
             // Some without the frames around, which not every data set has.
             let alone = index.is_multiple_of(ALONE).then(|| problem_alone(&dataset, &frame).ok()).into_iter();

@@ -17,7 +17,7 @@ pub enum FieldGroup {
     Limits,
     /// How a start is found.
     Start,
-    /// How a start is spoiled on purpose.
+    /// How a start is perturbed on purpose.
     Perturbation,
 }
 

@@ -116,7 +116,7 @@ impl LearningRates {
     }
 }
 
-/// How a start is found (paper 4.1, appendix A), and how it is spoiled on purpose (the paper's robustness table).
+/// How a start is found (paper 4.1, appendix A), and how it is perturbed on purpose (the paper's robustness table).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct InitConfig {

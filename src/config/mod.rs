@@ -163,7 +163,7 @@ pub struct FitConfig {
     pub operators: Operators,
     /// Step sizes of single groups.
     pub learning_rates: LearningRates,
-    /// How a start is found, and spoiled on purpose.
+    /// How a start is found, and perturbed on purpose.
     pub init: InitConfig,
 }
 

@@ -14,7 +14,7 @@
 //!
 //! A [`Counter`] is made once for the views of a data set; [`Counter::scan`] looks at a frame, [`Counter::count`] at a scanned
 //! frame and those before it. All of it is pure. `train/` (feature `train`) makes the weights in `assets/counter.json`;
-//! `alone.rs` is what the counter is compared with.
+//! `map_statistics.rs` is what the classifier that the counter is compared with sees.
 //!
 //! The counter is trained on synthetic maps alone. It needs two seconds of frames before the one that is counted; without them
 //! people who stand closer than their echoes are wide count as one, and an arm or a body that falls sometimes as another person.
@@ -23,7 +23,6 @@
 //! people. `train-counter` prints what it reaches on seeds that nothing was tuned on: of 1005 frames with nineteen before them 100,
 //! 100, 96.0, 90.4 and 70.8 % right for 0, 1, 2, 3 and 4 or more people.
 
-mod alone;
 mod cfar;
 mod change;
 mod cluster;
@@ -32,6 +31,7 @@ mod counter;
 mod error;
 mod features;
 mod identity;
+mod map_statistics;
 mod network;
 mod scan;
 mod seeds;
@@ -40,7 +40,6 @@ mod sight;
 #[cfg(feature = "train")]
 pub mod train;
 
-pub use alone::{STATISTICS, map_statistics};
 pub use cfar::{CfarOptions, Detection, detect};
 pub use cluster::{Cluster, ClusterOptions};
 pub use confusion::{Confusion, PREVALENCE};
@@ -48,5 +47,6 @@ pub use counter::{Count, Counted, Counter, CounterOptions};
 pub use error::PeopleError;
 pub use features::FEATURES;
 pub use identity::{Track, Tracker, TrackerOptions, match_people};
+pub use map_statistics::{STATISTICS, map_statistics};
 pub use network::{CLASSES, LAYERS, Layer, Network};
 pub use scan::{COMPARED, HISTORY, Point, Scan};

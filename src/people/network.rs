@@ -1,8 +1,8 @@
 //! The classifier: features → 64 → 32 → 5 with ReLU, read from its committed weights; f32.
 
-use super::alone::STATISTICS;
 use super::error::PeopleError;
 use super::features::FEATURES;
+use super::map_statistics::STATISTICS;
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 

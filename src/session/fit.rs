@@ -4,7 +4,7 @@ use super::history::{Branch, History, IterationRow};
 use super::state::FitHashes;
 use crate::body::Pppr;
 use crate::mhp::Problem;
-use crate::start::Begun;
+use crate::start::FoundStart;
 use crate::worker::{JobId, Snapshot};
 use std::sync::Arc;
 
@@ -38,7 +38,7 @@ pub struct Fit {
     /// The pose that fixes the EM region.
     pub initial: Option<Pppr>,
     /// How the start pose was found, and how many people were counted.
-    pub begun: Option<Begun>,
+    pub found_start: Option<FoundStart>,
     /// Milliseconds that took.
     pub init_ms: f64,
     /// Parameters were edited by hand.
@@ -74,7 +74,7 @@ impl Fit {
 
     /// Whether this is a start that was found, and nothing was done with it yet.
     pub fn is_untouched(&self) -> bool {
-        let found = self.begun.is_some() && !self.edited && self.status == FitStatus::Paused;
+        let found = self.found_start.is_some() && !self.edited && self.status == FitStatus::Paused;
         found && self.head() == 0 && self.history.branches().len() == 1
     }
 

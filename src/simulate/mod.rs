@@ -5,13 +5,13 @@
 //! consecutive frames find them. Every frame can be made by itself, in any order and on any thread, with the same numbers.
 //!
 //! From the outside in: `options.rs` is what is asked for, `preset.rs` what a scenario means in numbers, `device.rs` the radars
-//! and the processing of each layout, `cast.rs` who moves how and where, `room.rs` what else is there, `sequence.rs` puts them
+//! and the processing of each layout, `performers.rs` who moves how and where, `room.rs` what else is there, `sequence.rs` puts them
 //! together, `recording.rs` counts the frames.
 
-mod cast;
 mod device;
 mod hupr;
 mod options;
+mod performers;
 mod preset;
 mod recording;
 mod room;

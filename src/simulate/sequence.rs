@@ -1,6 +1,6 @@
 //! One sequence: its people, its room, its receivers, and its frames.
 
-use super::cast::{Stage, cast};
+use super::performers::{Stage, draw_performers};
 use super::room::Room;
 use super::{Device, Options, Recipe, ScenePreset, generator};
 use crate::body::{BodyPose, BodySurface, Capsule, Performer};
@@ -87,7 +87,7 @@ impl Sequence {
             lasts_s: (options.sequence_length.saturating_sub(1)) as f64 / rate_hz,
         };
         let actions = if options.actions.is_empty() { &recipe.actions } else { &options.actions };
-        let performers = cast(&recipe, actions, count, &stage, &mut draw);
+        let performers = draw_performers(&recipe, actions, count, &stage, &mut draw);
         let multipath = options.multipath.unwrap_or(true);
         let centre = performers.first().map_or([3.0, 0.0], |p| {
             let hip = p.pose(0.5 * stage.lasts_s).joints[11];

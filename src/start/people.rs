@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// A start, and the count that it rests on where people were counted.
 #[derive(Debug, Clone)]
-pub struct Begun {
+pub struct FoundStart {
     /// The start.
     pub initialisation: Initialisation,
     /// How many people were found, with probabilities; `None` for a fit of one person, which no count decides.
@@ -20,13 +20,13 @@ pub struct Begun {
 /// # Errors
 /// [`FitError::NoStart`] where nothing stands above the background, nobody was counted, or people cannot be counted in
 /// these views.
-pub fn begin(problem: &Arc<Problem>, config: &FitConfig) -> Result<Begun, FitError> {
+pub fn find_start(problem: &Arc<Problem>, config: &FitConfig) -> Result<FoundStart, FitError> {
     if config.people == 1 {
         // The paper looks for one person without a count, and so it goes where nothing can be counted, or nobody is.
         let asked = config.place == Place::Counted && !problem.neighbours_in(config.frames_around).is_empty();
         let counted = asked.then(|| count(problem, config).ok()).flatten().filter(|count| count.people() > 0);
         let seeds = counted.map_or_else(Vec::new, |count| count.seeds(1));
-        return Ok(Begun { initialisation: initialise_people(problem, config, &seeds)?, count: None });
+        return Ok(FoundStart { initialisation: initialise_people(problem, config, &seeds)?, count: None });
     }
     let count = count(problem, config)?;
     let people = if config.people == 0 { count.people() } else { config.people };
@@ -39,7 +39,7 @@ pub fn begin(problem: &Arc<Problem>, config: &FitConfig) -> Result<Begun, FitErr
     let counted = count.people();
     let note = format!("{counted} counted (p = {:.2}), {people} fitted", count.probability(counted));
     initialisation.notes.insert(0, note);
-    Ok(Begun { initialisation, count: Some(count) })
+    Ok(FoundStart { initialisation, count: Some(count) })
 }
 
 /// Counts the people of a frame, with those of the frames around it that a start may look at: those after it tell as much as

@@ -12,7 +12,7 @@ use crate::dataset::{Dataset, Truth, write_pppr};
 use crate::diagnose::{JointErrors, joint_errors};
 use crate::mhp::{Fitter, Precision, StepReport, predict};
 use crate::output::{FileNames, Inputs};
-use crate::start::{begin, problem_of};
+use crate::start::{find_start, problem_of};
 use crate::task::{milliseconds, panic_as_error};
 use crossbeam_channel::Sender;
 use std::collections::BTreeMap;
@@ -68,7 +68,7 @@ fn fit_watched(
     let (initial, init_ms) = if let Some(params) = start {
         (predict(&problem, &options.config, &params), None)
     } else {
-        let found = begin(&problem, &options.config).map_err(|error| in_file(&error))?.initialisation;
+        let found = find_start(&problem, &options.config).map_err(|error| in_file(&error))?.initialisation;
         (found.params, Some(milliseconds(began)))
     };
     let began = Instant::now();

@@ -12,7 +12,7 @@ use crate::diagnose::{Annotated, EarlierFrame, EvidenceExample, EvidenceInput, M
 use crate::labels::Tag;
 use crate::mhp::{FitError, Fitter, Precision, Problem};
 use crate::simulate::{Options, Recording, ScenePreset, SimulateError, SimulatedLayout};
-use crate::start::begin;
+use crate::start::find_start;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -146,7 +146,7 @@ fn problem(recording: &Recording, skeleton: Skeleton, frames: &[Vec<Vec<f64>>]) 
 
 /// Fits a problem and measures what speaks for each mode.
 fn measured(problem: &Arc<Problem>, frames: &[Vec<Vec<f64>>], config: &FitConfig) -> Result<Measured, FitError> {
-    let initial = begin(problem, config)?.initialisation.params;
+    let initial = find_start(problem, config)?.initialisation.params;
     let mut fitter = Fitter::new(Arc::clone(problem), *config, Precision::F32, initial.clone())?;
     fitter.run_to(config.iterations, |_, _| {})?;
     let masks = masks_around(problem, &initial, fitter.params(), config, Precision::F32)?;

@@ -5,7 +5,7 @@ use crate::config::FitConfig;
 use crate::dataset::{Dataset, Frame};
 use crate::geometry::Vec3;
 use crate::mhp::{Evaluation, FitState, Masks, Precision, Problem, StepReport, StopReason};
-use crate::start::Begun;
+use crate::start::FoundStart;
 use std::sync::Arc;
 
 /// Identifies one fit of one frame; messages of an older job are dropped.
@@ -160,7 +160,7 @@ pub struct PreparedFit {
     /// Maps filled, shapes checked.
     pub problem: Arc<Problem>,
     /// How the start pose was found, and how many people were counted; `None` when warm or resumed.
-    pub begun: Option<Begun>,
+    pub found_start: Option<FoundStart>,
     /// The pose that fixes the EM region.
     pub initial: Pppr,
     /// Warnings of the objective (an EM region without cells, …).

@@ -8,7 +8,7 @@ use crate::config::FitConfig;
 use crate::mhp::{
     FitError, FitState, Fitter, Objective, Precision, Problem, StepReport, StopReason, masks, predict, simulate,
 };
-use crate::start::{begin, problem_of};
+use crate::start::{find_start, problem_of};
 use crate::task::{catch_panic, milliseconds};
 use crossbeam_channel::{Receiver, Sender};
 use std::sync::Arc;
@@ -220,11 +220,11 @@ impl Job {
         let Prepare { job, branch, dataset, frame, config, precision, start } = prepare;
         let problem = Arc::new(problem_of(&dataset, &frame)?);
         let began = Instant::now();
-        let (begun, initial, state) = match start {
+        let (found_start, initial, state) = match start {
             Start::Initialise => {
-                let begun = begin(&problem, &config)?;
-                let initial = begun.initialisation.params.clone();
-                (Some(begun), initial, None)
+                let found = find_start(&problem, &config)?;
+                let initial = found.initialisation.params.clone();
+                (Some(found), initial, None)
             }
             Start::Warm(params) => (None, predict(&problem, &config, &params), None),
             Start::Resume { initial, state } => (None, initial, Some(state)),
@@ -258,7 +258,7 @@ impl Job {
         if !resumed {
             new.push_row(new.fitter.report());
         }
-        Ok((new, PreparedFit { problem, begun, initial, warnings, init_ms }))
+        Ok((new, PreparedFit { problem, found_start, initial, warnings, init_ms }))
     }
 
     fn iteration(&self) -> usize {

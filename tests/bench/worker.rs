@@ -7,7 +7,7 @@
 use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::mhp::{Fitter, Precision};
-use mhp_inspector::start::{begin, problem_of};
+use mhp_inspector::start::{find_start, problem_of};
 use mhp_inspector::task::Progress;
 use mhp_inspector::worker::{Prepare, Start, Worker, WorkerCommand, WorkerEvent, WorkerMessage};
 use std::path::Path;
@@ -23,7 +23,7 @@ const PASS: Duration = Duration::from_micros(16_667);
 fn alone(dataset: &Dataset, precision: Precision, iterations: usize) -> f64 {
     let config = FitConfig::default();
     let problem = Arc::new(problem_of(dataset, &dataset.load(0).unwrap()).unwrap());
-    let initial = begin(&problem, &config).unwrap().initialisation.params;
+    let initial = find_start(&problem, &config).unwrap().initialisation.params;
     let mut fitter = Fitter::new(problem, config, precision, initial).unwrap();
     let began = Instant::now();
     for _ in 0..iterations {

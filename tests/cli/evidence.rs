@@ -29,7 +29,7 @@ fn blob(frames: usize) -> tempfile::TempDir {
     folder
 }
 
-fn spoil(folder: &Path, frame: usize) {
+fn damage(folder: &Path, frame: usize) {
     let bad = vec![f64::NAN; 48 * 32];
     let arrays = ["hori", "vert"].map(|key| (key, ArrayView::f64(&[48, 32], &bad)));
     write(&folder.join(format!("frames/{frame:03}.npz")), &arrays).unwrap();
@@ -123,7 +123,7 @@ fn parameters_given_are_those_judged() {
 #[test]
 fn cards_are_read_by_people_and_the_table_by_programs() {
     let folder = blob(6);
-    spoil(folder.path(), 1);
+    damage(folder.path(), 1);
     let out = tempfile::tempdir().unwrap();
     let table = out.path().join("evidence.csv");
     let output = evidence(folder.path(), &["--iterations", "2", "--csv", table.to_str().unwrap()]);
@@ -153,7 +153,7 @@ fn cards_are_read_by_people_and_the_table_by_programs() {
 #[test]
 fn where_nothing_can_be_judged_the_code_is_two() {
     let folder = blob(1);
-    spoil(folder.path(), 0);
+    damage(folder.path(), 0);
     let output = evidence(folder.path(), &["--iterations", "1"]);
     assert_eq!(output.status.code(), Some(2));
     let told = text(&output.stderr);

@@ -10,7 +10,7 @@ use mhp_inspector::diagnose::joint_errors;
 use mhp_inspector::mhp::{Fitter, Precision, Problem, predict, simulate};
 use mhp_inspector::output::{FolderLock, Inputs};
 use mhp_inspector::radar::RadarConfig;
-use mhp_inspector::start::{begin, problem_of};
+use mhp_inspector::start::{find_start, problem_of};
 use mhp_inspector::study::{BatchOptions, StudyError, run_batch};
 use mhp_inspector::task::Progress;
 use serde_json::Value;
@@ -129,7 +129,7 @@ impl Small {
         write(&file, &[("hm_hori", map(0)), ("hm_vert", map(1)), ("joints", joints)]).unwrap();
     }
 
-    fn spoil(&self, name: &str) {
+    fn damage(&self, name: &str) {
         self.write(name, &[vec![1.0; 64 * 48], vec![f64::NAN; 64 * 48]], &[0.5; 51]);
     }
 
@@ -167,7 +167,7 @@ fn by_hand(dataset: &Dataset, index: usize, config: &FitConfig, start: Option<Pp
     let problem = Arc::new(problem_of(dataset, &dataset.load(index).unwrap()).unwrap());
     let start = match start {
         Some(before) => predict(&problem, config, &before),
-        None => begin(&problem, config).unwrap().initialisation.params,
+        None => find_start(&problem, config).unwrap().initialisation.params,
     };
     let mut fitter = Fitter::new(problem, *config, Precision::default(), start).unwrap();
     for _ in 0..config.iterations {
@@ -179,7 +179,7 @@ fn by_hand(dataset: &Dataset, index: usize, config: &FitConfig, start: Option<Pp
 #[test]
 fn a_batch_writes_rows_in_order_and_goes_on_after_a_bad_frame() {
     let small = Small::new(&[("a/000", 0.0), ("a/001", 0.1), ("a/003", 0.2), ("b/000", -0.3)]);
-    small.spoil("a/002");
+    small.damage("a/002");
     let out = small.out("deep/out");
     let output = fit(small.path(), &["--iterations", "6", "--out", out.to_str().unwrap()]);
     assert_eq!(code(&output), 1, "{}", text(&output.stderr));
@@ -222,7 +222,7 @@ fn a_batch_writes_rows_in_order_and_goes_on_after_a_bad_frame() {
 #[test]
 fn a_warm_start_follows_a_sequence_and_no_further() {
     let small = Small::new(&[("a/000", 0.0), ("a/001", 0.05), ("a/003", 0.1), ("b/000", -0.3)]);
-    small.spoil("a/002");
+    small.damage("a/002");
     let out = small.out("out");
     let output = fit(small.path(), &["--iterations", "5", "--warm-start", "--out", out.to_str().unwrap()]);
     assert_eq!(code(&output), 1);
@@ -373,8 +373,8 @@ fn hostile_settings_are_refused_or_end() {
 #[test]
 fn where_no_frame_can_be_fitted_the_code_is_two_and_the_table_still_valid() {
     let small = Small::new(&[]);
-    small.spoil("a/000");
-    small.spoil("a/001");
+    small.damage("a/000");
+    small.damage("a/001");
     let out = small.out("out");
     let output = fit(small.path(), &["--out", out.to_str().unwrap()]);
     assert_eq!(code(&output), 2);

@@ -14,7 +14,7 @@ use mhp_inspector::mhp::{
 };
 use mhp_inspector::people::{Counter, Scan};
 use mhp_inspector::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
-use mhp_inspector::start::begin;
+use mhp_inspector::start::find_start;
 use proptest::prelude::*;
 use proptest::sample::select;
 use std::sync::Arc;
@@ -122,14 +122,14 @@ fn twice() -> (Arc<Problem>, FitConfig) {
 
 /// Noise of positions acts on a start from the frame before as on one from the frame's own peaks.
 #[test]
-fn a_warm_start_is_spoiled_like_a_cold_one() {
+fn a_warm_start_is_perturbed_like_a_cold_one() {
     let (problem, plain) = twice();
     let before = initialise(&problem, &plain).unwrap().params;
-    let unspoiled = predict(&problem, &plain, &before);
+    let unperturbed = predict(&problem, &plain, &before);
     let mut config = plain;
     config.init.position_noise_m = 0.05;
-    let spoiled = predict(&problem, &config, &before);
-    let off = |k: usize| norm(sub(spoiled.position(k), unspoiled.position(k)));
+    let perturbed = predict(&problem, &config, &before);
+    let off = |k: usize| norm(sub(perturbed.position(k), unperturbed.position(k)));
     let joints = before.shape().joints;
     let square = (0..joints).map(|k| off(k) * off(k)).sum::<f64>() / (3 * joints) as f64;
     assert!((0.03..0.07).contains(&square.sqrt()), "the deviation of a coordinate is {:.3} m", square.sqrt());
@@ -137,7 +137,7 @@ fn a_warm_start_is_spoiled_like_a_cold_one() {
     config.init.position_bias_m = 0.1;
     let shifted = predict(&problem, &config, &before);
     for joint in 0..joints {
-        assert!((norm(sub(shifted.position(joint), unspoiled.position(joint))) - 0.1).abs() < 1e-9);
+        assert!((norm(sub(shifted.position(joint), unperturbed.position(joint))) - 0.1).abs() < 1e-9);
     }
     let left = predict(&problem, &FitConfig { warm_start: WarmStart::AsLeft, ..plain }, &before);
     assert_eq!(left, before, "the paper's warm start is the result of the frame before as it is");
@@ -339,7 +339,7 @@ fn radars() -> impl Strategy<Value = RadarConfig> {
 
 /// Start, three steps, maps, masks and evidence of a problem: finite, or an error that says something.
 fn fitted(problem: &Arc<Problem>, config: &FitConfig, precision: Precision, earlier: &[&[f64]]) -> Result<(), String> {
-    let start = begin(problem, config).map_err(|error| error.to_string())?.initialisation.params;
+    let start = find_start(problem, config).map_err(|error| error.to_string())?.initialisation.params;
     assert!(start.is_finite(), "{start:?}");
     let mut fitter = Fitter::new(Arc::clone(problem), *config, precision, start).map_err(|error| error.to_string())?;
     for _ in 0..3 {

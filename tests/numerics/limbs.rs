@@ -7,7 +7,7 @@ use mhp_inspector::dataset::Dataset;
 use mhp_inspector::diagnose::{majpe_mm, pa_majpe_mm};
 use mhp_inspector::geometry::{Vec3, norm, sub};
 use mhp_inspector::mhp::Problem;
-use mhp_inspector::start::{begin, problem_of};
+use mhp_inspector::start::{find_start, problem_of};
 use mhp_inspector::task::Progress;
 use std::path::Path;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ fn joints(params: &Pppr) -> Vec<Vec3> {
 fn starts(problem: &Arc<Problem>) -> [Vec<Vec3>; 2] {
     [Limbs::Posture, Limbs::Learned].map(|limbs| {
         let config = FitConfig { limbs, ..Preset::Recommended.config() };
-        joints(&begin(problem, &config).unwrap().initialisation.params)
+        joints(&find_start(problem, &config).unwrap().initialisation.params)
     })
 }
 
@@ -65,7 +65,7 @@ fn two_people_side_by_side_keep_their_postures() {
     let problem = Arc::new(problem_of(&dataset, &frame).unwrap());
     let [posture, learned] = [Limbs::Posture, Limbs::Learned].map(|limbs| {
         let config = FitConfig { limbs, people: 2, ..Preset::Recommended.config() };
-        begin(&problem, &config).unwrap().initialisation
+        find_start(&problem, &config).unwrap().initialisation
     });
     assert_eq!(posture.params, learned.params);
     assert!(learned.notes.iter().any(|note| note.contains("nothing learned applies here")), "{:?}", learned.notes);

@@ -115,7 +115,7 @@ impl Bench {
         let problem = Arc::new(problem_alone(&prepare.dataset, &prepare.frame).unwrap());
         let params = initialise(&problem, &FitConfig::default()).unwrap().params;
         let initial = params.clone();
-        let prepared = PreparedFit { problem, begun: None, initial, warnings: Vec::new(), init_ms: 1.0 };
+        let prepared = PreparedFit { problem, found_start: None, initial, warnings: Vec::new(), init_ms: 1.0 };
         let event = WorkerEvent::Prepared(Box::new(prepared));
         self.session.report(Report::Worker(WorkerMessage::Event(prepare.job, event)));
         self.draw(params);

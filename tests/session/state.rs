@@ -90,7 +90,7 @@ impl Bench {
         if !resumed {
             self.rows(job, branch, 0..=0);
         }
-        let prepared = PreparedFit { problem, begun: None, initial, warnings: Vec::new(), init_ms: 1.5 };
+        let prepared = PreparedFit { problem, found_start: None, initial, warnings: Vec::new(), init_ms: 1.5 };
         self.event(job, WorkerEvent::Prepared(Box::new(prepared)));
         assert_eq!(self.session.fit.status, FitStatus::Paused);
     }
@@ -619,7 +619,7 @@ fn a_fit_that_was_left_is_found_again() {
     let job = bench.job();
     let prepared = PreparedFit {
         problem: fit.problem.clone().unwrap(),
-        begun: None,
+        found_start: None,
         initial: bench.params.clone(),
         warnings: Vec::new(),
         init_ms: 0.0,
@@ -694,7 +694,7 @@ fn a_run_begins_by_itself_only_where_asked() {
     bench.rows(job, 0, 0..=0);
     let prepared = PreparedFit {
         problem: Arc::new(problem_alone(&prepare.dataset, &prepare.frame).unwrap()),
-        begun: None,
+        found_start: None,
         initial: bench.params.clone(),
         warnings: vec!["the region has no cell".into()],
         init_ms: 0.0,

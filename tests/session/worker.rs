@@ -172,7 +172,7 @@ fn preparing_answers_the_start_pose_its_row_and_a_picture_of_it() {
     let (row, prepared) = rig.prepared();
     assert_eq!((row.branch, row.report.iteration), (0, 0));
     assert_eq!(state(&row).params, prepared.initial);
-    assert_eq!(prepared.begun.unwrap().initialisation.params, prepared.initial);
+    assert_eq!(prepared.found_start.unwrap().initialisation.params, prepared.initial);
     assert_eq!(prepared.problem.views.len(), 2);
     assert_eq!(prepared.warnings, Vec::<String>::new());
     let snapshot = rig.snapshot(|_| true);
@@ -365,7 +365,7 @@ fn a_fit_that_is_resumed_goes_on_bit_for_bit() {
     rig.prepare_with(1, &FitConfig::default(), start);
     let (none, event) = rig.rows_until(1, |event| matches!(event, WorkerEvent::Prepared(_)));
     let WorkerEvent::Prepared(prepared) = event else { panic!("{event:?}") };
-    assert!(none.is_empty() && prepared.begun.is_none());
+    assert!(none.is_empty() && prepared.found_start.is_none());
     rig.send(WorkerCommand::RunTo { target: 20, run: 1 });
     same(&rig.finish().0, &rows[10..]);
 }

@@ -14,7 +14,7 @@ use mhp_inspector::labels::Tag;
 use mhp_inspector::mhp::{Fitter, Masks, Objective, Precision, Problem, masks, simulate};
 use mhp_inspector::radar::{Axis, AxisKind, FftSetup, PointSpread, Quantity, RadarConfig, Spacing, View, Window};
 use mhp_inspector::simulate::{Options, Recording, ScenePreset, SimulatedLayout};
-use mhp_inspector::start::begin;
+use mhp_inspector::start::find_start;
 use mhp_inspector::study::{BatchOptions, fit_frame, frame_evidence, frames_before};
 use mhp_inspector::task::Progress;
 use proptest::prelude::*;
@@ -602,7 +602,7 @@ fn simulated(
     let skeleton = Skeleton::preset("coco17").unwrap();
     let problem = Arc::new(Problem::new(recording.radar(), skeleton, recording.views(), &maps).unwrap());
     let config = FitConfig::default();
-    let initial = begin(&problem, &config).ok()?.initialisation.params;
+    let initial = find_start(&problem, &config).ok()?.initialisation.params;
     let mut fitter = Fitter::new(Arc::clone(&problem), config, Precision::F32, initial.clone()).unwrap();
     for _ in 0..30 {
         fitter.step().unwrap();

@@ -94,7 +94,7 @@ impl Drop for Killed {
     }
 }
 
-/// Warm and cold variants, a subset, spoiled starts: everything that could depend on how it is cut.
+/// Warm and cold variants, a subset, perturbed starts: everything that could depend on how it is cut.
 const ROBUSTNESS: &[&str] = &["robustness", "--iterations", "6", "--seed", "5"];
 
 #[test]
@@ -394,7 +394,7 @@ fn a_run_that_another_process_works_on_or_that_lies_in_the_data_is_left_alone() 
     assert!(!case.run("data/runs").exists());
 }
 
-/// What a study spoils acts where its row says, or the row says why it cannot.
+/// What a study perturbs acts where its row says, or the row says why it cannot.
 #[test]
 fn a_perturbation_acts_or_its_row_says_why_not() {
     let case = Case::new();
@@ -411,7 +411,8 @@ fn a_perturbation_acts_or_its_row_says_why_not() {
         };
         for row in &run.table[1..] {
             // The rounding of a sum that is 0 may differ, and no more.
-            let acts = errors(row.variant).iter().zip(errors(0)).any(|(spoiled, plain)| (spoiled - plain).abs() > 1e-6);
+            let acts =
+                errors(row.variant).iter().zip(errors(0)).any(|(perturbed, plain)| (perturbed - plain).abs() > 1e-6);
             assert_eq!(acts, row.note.is_none(), "{preset}, {:?}: {:?}", row.labels, row.note);
             if row.labels[0] == "v corruption" {
                 assert_eq!(row.note.is_some(), preset == "recommended", "{:?}", row.note);
@@ -420,9 +421,12 @@ fn a_perturbation_acts_or_its_row_says_why_not() {
         // Every frame of the chain begins with joints that are 5 cm off in each coordinate, not its first alone.
         let warm = fits(run.table.len() - 1);
         let plain = fits(0);
-        for (spoiled, plain) in warm.iter().zip(plain) {
-            let (spoiled, plain) = (spoiled.init_pa_majpe_mm.unwrap(), plain.init_pa_majpe_mm.unwrap());
-            assert!((spoiled * spoiled - plain * plain).max(0.0).sqrt() > 40.0, "{preset}: {spoiled} and {plain} mm");
+        for (perturbed, plain) in warm.iter().zip(plain) {
+            let (perturbed, plain) = (perturbed.init_pa_majpe_mm.unwrap(), plain.init_pa_majpe_mm.unwrap());
+            assert!(
+                (perturbed * perturbed - plain * plain).max(0.0).sqrt() > 40.0,
+                "{preset}: {perturbed} and {plain} mm"
+            );
         }
         let table = std::fs::read_to_string(case.run(preset).join("table.md")).unwrap();
         let told = "[1] cannot move a joint: velocities reach none, for powers add, and no map has a Doppler axis, and the body";

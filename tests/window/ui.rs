@@ -11,7 +11,7 @@ use mhp_inspector::config::{FitConfig, Preset};
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::geometry::{norm, sub};
 use mhp_inspector::session::{Command, Compare, FitStatus, ThemeChoice};
-use mhp_inspector::start::{begin as begin_fit, problem_of};
+use mhp_inspector::start::{find_start, problem_of};
 use mhp_inspector::task::Progress;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -63,14 +63,14 @@ fn settings_given_at_the_beginning_are_in_the_first_start() {
     window.ready(0);
     let dataset = Dataset::open(&sample, &Progress::new()).unwrap();
     let problem = Arc::new(problem_of(&dataset, &dataset.load(0).unwrap()).unwrap());
-    let start = begin_fit(&problem, &config).unwrap().initialisation.params;
+    let start = find_start(&problem, &config).unwrap().initialisation.params;
     assert_eq!(window.session().config, config);
     assert_eq!(window.fit().initial.as_ref(), Some(&start));
     // Where nothing was fitted yet, another preset finds another start; a slider does not, nor a preset after a run.
     let plain = FitConfig::default();
     window.apply(Command::SetConfig(Box::new(plain)));
     window.ready(0);
-    let other = begin_fit(&problem, &plain).unwrap().initialisation.params;
+    let other = find_start(&problem, &plain).unwrap().initialisation.params;
     assert!(window.fit().initial.as_ref() == Some(&other) && other != start);
     let job = window.fit().job;
     window.apply(Command::SetConfig(Box::new(FitConfig { w_em: 0.7, ..plain })));

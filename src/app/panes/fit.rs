@@ -144,7 +144,7 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
     let (loss, terms, iou) =
         evaluation.map_or((report.loss, report.terms, report.iou.clone()), |e| (e.loss, e.terms, e.iou.clone()));
     value_row(ui, "Iteration", &format!("{} / {}", report.iteration, fit.head()), "");
-    if let Some(count) = fit.begun.as_ref().and_then(|begun| begun.count.as_ref()) {
+    if let Some(count) = fit.found_start.as_ref().and_then(|found| found.count.as_ref()) {
         let (people, chances) = (count.people(), count.probabilities.map(|p| format!("{:.0} %", 100.0 * p)));
         let chance = chances.get(people).cloned().unwrap_or_default();
         value_row(ui, "People counted", &format!("{people} ({chance})"), "").on_hover_text(format!(
@@ -251,7 +251,7 @@ fn settings(ui: &mut Ui, shared: &mut Shared<'_>, config: &mut FitConfig) {
         for field in FieldGroup::Start.fields() {
             slider(ui, field, config);
         }
-        ui.label("Spoil the start").on_hover_text("The perturbations of the paper's robustness table.");
+        ui.label("Perturb the start").on_hover_text("The perturbations of the paper's robustness table.");
         for field in FieldGroup::Perturbation.fields() {
             slider(ui, field, config);
         }

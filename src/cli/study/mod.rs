@@ -23,7 +23,7 @@ Examples:
   mhp-inspector study complexity data/walk --out runs/complexity
       Easy, medium and hard frames, and their mean.
   mhp-inspector study robustness data/mmvr --out runs/robustness --preset recommended
-      The hard frames, from starts that are spoiled on purpose.
+      The hard frames, from starts that are perturbed on purpose.
   mhp-inspector study sweep data/walk --grid w_em=0.1,0.5,1 --grid tau_pct=5,10,20 --out runs/sweep
       Nine configurations; keys are those of FIT.toml.
   mhp-inspector study threshold data/mmvr --shard $SLURM_ARRAY_TASK_ID/8 --out runs/threshold-$SLURM_ARRAY_TASK_ID
@@ -36,7 +36,7 @@ Examples:
 pub enum StudyCommand {
     /// One configuration by easy, medium and hard frames: errors, IoU, convergence.
     Complexity(run::RunArgs),
-    /// Starts spoiled on purpose: noise and bias of positions, corrupt velocities, lost peaks; and the warm start.
+    /// Starts perturbed on purpose: noise and bias of positions, corrupt velocities, lost peaks; and the warm start.
     /// 80 iterations, on the hard frames.
     Robustness(run::HardArgs),
     /// The radar simulation without each of its four operators.

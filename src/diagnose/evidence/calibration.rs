@@ -272,7 +272,7 @@ impl Curve {
     /// What a score of this curve is worth, for people.
     pub fn told(&self) -> String {
         let Figures { auc, hits, false_alarms, .. } = self.after;
-        let percent = |share: f64| super::words::percent(share);
+        let percent = |share: f64| super::number_text::percent(share);
         let worth = if auc < TELLING_AUC {
             "hardly told from frames without it, so that the score claims little and stays near that share"
         } else {

@@ -32,8 +32,8 @@
 //! `steadiness_pair`); in a single frame with a Doppler axis on the slowness.
 
 use super::cells::{largest_patch, place};
+use super::number_text::{cell_box, joint, percent};
 use super::resolution::{FWHM, JointCells, radial_mps};
-use super::words::{cell_box, joint, percent};
 use super::{EvidenceInput, Finding, FindingPlace, Found, Measure, Past, STATIC_FRAMES, falling, masks_of, mean};
 use crate::labels::Tag;
 use crate::mhp::percentile;

@@ -23,12 +23,12 @@ mod cells;
 mod counted;
 mod low_motion;
 mod near_field;
+mod number_text;
 mod resolution;
 mod static_reflector;
 mod superposition;
 #[cfg(feature = "train")]
 mod train;
-mod words;
 
 pub use calibration::{Calibration, CalibrationError, Curve, Figures, FrameSet, Input, with_share};
 #[cfg(feature = "train")]

@@ -14,8 +14,8 @@
 //! raw value are lower bounds. Each view is judged by its finer angle and its own range; the view with the highest value counts.
 //! The score rests on the nearness, which is the raw value's own order.
 
+use super::number_text::{joint, length};
 use super::resolution::{FWHM, Resolution, echo};
-use super::words::{joint, length};
 use super::{EvidenceInput, Finding, FindingPlace, Found, Measure, falling};
 use crate::body::{Group, Pppr};
 use crate::geometry::{Mat3, Vec3, dot, mat_t_vec, norm, rotation_from_quaternion};

@@ -21,8 +21,8 @@
 //! does not. The second is how much stronger than the body the strongest such echo is.
 
 use super::cells::{largest_patch, members, place};
+use super::number_text::{cell_box, cells, percent};
 use super::resolution::JointCells;
-use super::words::{cell_box, cells, percent};
 use super::{
     EvidenceInput, Finding, FindingPlace, Found, Measure, Past, STATIC_FRAMES, STATIC_KAPPA_PCT, masks_of, mean,
 };

@@ -25,8 +25,8 @@
 
 use super::cells::{members, place};
 use super::counted::count;
+use super::number_text::{cell_box, length, percent};
 use super::resolution::{FWHM, Resolution};
-use super::words::{cell_box, length, percent};
 use super::{EvidenceInput, Finding, FindingPlace, Found, Measure, Past, falling};
 use crate::body::{Group, Pppr, PpprShape};
 use crate::config::{FitConfig, Summation};

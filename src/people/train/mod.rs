@@ -4,9 +4,9 @@
 //! The truth is the count of a frame, never of a cluster: the distributions of a frame's clusters are convolved, and the
 //! gradient goes through that sum.
 
-mod course;
+mod examples;
 
-pub use course::{CounterExample, examples, recordings};
+pub use examples::{CounterExample, examples, recordings};
 
 use super::counter::{Counter, MOST_CLUSTERS, NOBODY, agreed, convolve};
 use super::network::{CLASSES, Layer, Network, widths};

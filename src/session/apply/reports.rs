@@ -119,8 +119,8 @@ impl Session {
         for warning in &prepared.warnings {
             self.note(LogLevel::Warning, warning.clone());
         }
-        if let Some(begun) = &prepared.begun {
-            for note in &begun.initialisation.notes {
+        if let Some(found) = &prepared.found_start {
+            for note in &found.initialisation.notes {
                 self.note(LogLevel::Info, note.clone());
             }
         }
@@ -132,8 +132,8 @@ impl Session {
         self.fit.initial = Some(prepared.initial);
         self.identify();
         self.fit.init_ms = prepared.init_ms;
-        if prepared.begun.is_some() {
-            self.fit.begun = prepared.begun;
+        if prepared.found_start.is_some() {
+            self.fit.found_start = prepared.found_start;
         }
         self.fit.status = FitStatus::Paused;
         // A fit that comes back, from this session or from a file, is known to the list again.

@@ -6,11 +6,11 @@
 use super::row::RunNumbers;
 use crate::body::Pppr;
 use crate::config::{FitConfig, LearningRates};
-use crate::dataset::{Dataset, Frame, Layout};
-use crate::diagnose::{PinholeCamera, Reprojection, joint_errors, map_box_coverage, reprojection};
+use crate::dataset::{Dataset, Frame};
+use crate::diagnose::{Reprojection, joint_errors, map_box_coverage, reprojection};
 use crate::geometry::Vec3;
 use crate::mhp::{Fitter, Precision, Problem, StopReason, predict};
-use crate::start::{begin, problem_of};
+use crate::start::{find_start, problem_of};
 use crate::study::row::annotated;
 use crate::task::milliseconds;
 use std::sync::Arc;
@@ -83,11 +83,11 @@ impl<'a> LoadedFrame<'a> {
     /// Where nobody is seen.
     pub(super) fn cold(&self, config: &FitConfig) -> Result<TimedStart, String> {
         let began = Instant::now();
-        let found = begin(&self.problem, config).map_err(|error| self.told(&error))?.initialisation;
+        let found = find_start(&self.problem, config).map_err(|error| self.told(&error))?.initialisation;
         Ok(TimedStart { params: found.params, unrefined: found.unrefined, init_ms: Some(milliseconds(began)) })
     }
 
-    /// A start from what the frame before ended with, moved as its people moved and spoiled as a cold one is.
+    /// A start from what the frame before ended with, moved as its people moved and perturbed as a cold one is.
     pub(super) fn warm(&self, config: &FitConfig, before: &Pppr) -> TimedStart {
         let params = predict(&self.problem, config, before);
         TimedStart { unrefined: params.clone(), params, init_ms: None }
@@ -164,16 +164,16 @@ impl<'a> LoadedFrame<'a> {
         }
     }
 
-    /// Only MMVR publishes a camera; its key points count where the skeleton is theirs.
+    /// Only where the data set publishes a camera; its key points count where the skeleton is theirs.
     fn reprojection(&self, joints: &[Vec3], a_person: usize) -> Reprojection {
         let info = self.dataset.info();
-        let Some(image) = self.frame.image.as_ref().filter(|_| info.layout == Layout::Mmvr) else {
+        let (Some(image), Some(camera)) = (&self.frame.image, info.layout.camera()) else {
             return Reprojection::default();
         };
         let preset = crate::body::Skeleton::preset(&image.keypoint_skeleton);
         let same = preset.is_some_and(|preset| preset.joints == info.skeleton.joints);
         let keypoints = if same { image.keypoints.as_slice() } else { &[] };
-        reprojection(&PinholeCamera::MMVR, joints, a_person, keypoints, &image.boxes)
+        reprojection(&camera, joints, a_person, keypoints, &image.boxes)
     }
 
     fn map_box_coverage(&self, joints: &[Vec3], a_person: usize) -> Option<f64> {
@@ -247,7 +247,7 @@ mod tests {
     #[test]
     fn variants_with_one_key_have_one_start() {
         let (problem, base) = (Arc::new(problem()), FitConfig::default());
-        let start = |config: &FitConfig| begin(&problem, config).unwrap().initialisation.params;
+        let start = |config: &FitConfig| find_start(&problem, config).unwrap().initialisation.params;
         let same = start(&base);
         let rates = LearningRates { position: Some(0.01), bone: Some(0.02), ..LearningRates::default() };
         let variants = [

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub enum StudyKind {
     /// One configuration, by easy, medium and hard frames.
     Complexity,
-    /// Starts spoiled on purpose.
+    /// Starts perturbed on purpose.
     Robustness,
     /// The forward model without one of its operators.
     Operators,
@@ -63,7 +63,7 @@ impl StudyKind {
     pub fn title(self) -> &'static str {
         match self {
             Self::Complexity => "Fits by complexity of the frame",
-            Self::Robustness => "Robustness against spoiled starts",
+            Self::Robustness => "Robustness against perturbed starts",
             Self::Operators => "Radar simulation without one operator",
             Self::Threshold => "Reconstruction threshold τ",
             Self::Weights => "Weights of electromagnetic and kinematic constraints",

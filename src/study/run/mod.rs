@@ -3,7 +3,7 @@
 //! A [`RunPlan`] says what is compared and in which units it is done; [`execute_run`] does it on all cores and goes on where a
 //! killed run stopped; [`merge_runs`] makes one run of its shards; [`Run`] reads it back. From the inside out: `variant.rs` is one
 //! configuration, `plans.rs` the studies' rows, `grid.rs` and `switches.rs` two ways to make them, `kind.rs` their names,
-//! `paper.rs` the paper's figures beside them and `reach.rs` whether what they spoil can act; `spec.rs` is the file that says
+//! `paper.rs` the paper's figures beside them and `reach.rs` whether what they perturb can act; `spec.rs` is the file that says
 //! what a run is, `stamp.rs` what its data are known by, `plan.rs` its units of work, `fit.rs` one frame, `counting.rs` the
 //! people of a frame, `row.rs` what is known of either, `journal.rs` what is done, `engine.rs` the threads, `table.rs` the sums,
 //! `output.rs`, `markdown.rs` and `parquet_rows.rs` the files, `folder.rs` all of them together.

@@ -65,9 +65,9 @@ fn robustness(base: &FitConfig, set: Option<PaperSet>, views: &[View]) -> Vec<Va
     };
     let velocity = |noise: f64| move |init: &mut InitConfig| init.velocity_noise_mps = noise;
     let dropout = |share: f64| move |init: &mut InitConfig| init.peak_dropout = share;
-    let unspoiled = FitConfig { iterations: ROBUSTNESS_ITERATIONS, ..*base };
+    let unperturbed = FitConfig { iterations: ROBUSTNESS_ITERATIONS, ..*base };
     let rows = vec![
-        Variant::cold(["none", "as found"], &unspoiled),
+        Variant::cold(["none", "as found"], &unperturbed),
         row("p noise/bias", "σ_p = 0.02 m, Δp = 0 m", [80.2, 73.1, 0.942], &position(0.02, 0.0)),
         row("p noise/bias", "σ_p = 0.05 m, Δp = 0.05 m", [82.8, 75.4, 0.921], &position(0.05, 0.05)),
         row("p noise/bias", "σ_p = 0.08 m, Δp = 0.10 m", [85.6, 77.9, 0.893], &position(0.08, 0.10)),
@@ -82,7 +82,7 @@ fn robustness(base: &FitConfig, set: Option<PaperSet>, views: &[View]) -> Vec<Va
         })
         .warm(),
     ];
-    let noted = |row: Variant| Variant { note: reach::silent(&row.config, &unspoiled, row.start, views), ..row };
+    let noted = |row: Variant| Variant { note: reach::silent(&row.config, &unperturbed, row.start, views), ..row };
     rows.into_iter().map(noted).collect()
 }
 

@@ -7,19 +7,20 @@ use super::variant::StartFrom;
 use crate::config::{FitConfig, Parameterization, Summation, WarmStart};
 use crate::radar::{AxisKind, View};
 
-/// Why what a variant spoils, beside `base`, cannot move a joint; `None` where it can, or nothing is spoiled.
+/// Why what a variant perturbs, beside `base`, cannot move a joint; `None` where it can, or nothing is perturbed.
 pub(super) fn silent(config: &FitConfig, base: &FitConfig, start: StartFrom, views: &[View]) -> Option<String> {
-    let (spoiled, plain) = (&config.init, &base.init);
-    let position = spoiled.position_noise_m > plain.position_noise_m || spoiled.position_bias_m > plain.position_bias_m;
+    let (perturbed, plain) = (&config.init, &base.init);
+    let position =
+        perturbed.position_noise_m > plain.position_noise_m || perturbed.position_bias_m > plain.position_bias_m;
     if position {
         return None;
     }
     let mut reasons = Vec::new();
-    let velocity = spoiled.velocity_noise_mps > plain.velocity_noise_mps || spoiled.velocity != plain.velocity;
+    let velocity = perturbed.velocity_noise_mps > plain.velocity_noise_mps || perturbed.velocity != plain.velocity;
     if velocity {
         reasons.push(deaf_to_velocities(config, views)?);
     }
-    if spoiled.peak_dropout > plain.peak_dropout {
+    if perturbed.peak_dropout > plain.peak_dropout {
         reasons.push(deaf_to_peaks(config, start)?);
     }
     (!reasons.is_empty()).then(|| format!("cannot move a joint: {}", reasons.join("; ")))
@@ -71,9 +72,9 @@ mod tests {
         }
     }
 
-    fn spoiled(base: &FitConfig, spoil: impl Fn(&mut FitConfig)) -> FitConfig {
+    fn perturbed(base: &FitConfig, perturb: impl Fn(&mut FitConfig)) -> FitConfig {
         let mut config = *base;
-        spoil(&mut config);
+        perturb(&mut config);
         config
     }
 
@@ -82,7 +83,7 @@ mod tests {
         let flat = [view(&[AxisKind::DepthH, AxisKind::Y])];
         let moving = [view(&[AxisKind::Range, AxisKind::Azimuth, AxisKind::Doppler])];
         let noise = |config: &mut FitConfig| config.init.velocity_noise_mps = 0.3;
-        let told = |base: &FitConfig, views: &[View]| silent(&spoiled(base, noise), base, StartFrom::Cold, views);
+        let told = |base: &FitConfig, views: &[View]| silent(&perturbed(base, noise), base, StartFrom::Cold, views);
         let best = Preset::Recommended.config();
         let why = told(&best, &flat).unwrap_or_default();
         assert!(why.contains("powers add, and no map has a Doppler axis") && why.contains("moves as one"), "{why}");
@@ -100,7 +101,7 @@ mod tests {
     #[test]
     fn peaks_act_where_a_start_reads_them() {
         let drop = |config: &mut FitConfig| config.init.peak_dropout = 0.4;
-        let told = |base: FitConfig, start| silent(&spoiled(&base, drop), &base, start, &[]);
+        let told = |base: FitConfig, start| silent(&perturbed(&base, drop), &base, start, &[]);
         for preset in Preset::ALL {
             assert_eq!(told(preset.config(), StartFrom::Cold), None);
         }
@@ -109,6 +110,6 @@ mod tests {
         let mut blind = FitConfig::default();
         blind.init.position = false;
         assert!(told(blind, StartFrom::Cold).is_some_and(|why| why.contains("not read")));
-        assert_eq!(silent(&blind, &blind, StartFrom::Cold, &[]), None, "nothing is spoiled");
+        assert_eq!(silent(&blind, &blind, StartFrom::Cold, &[]), None, "nothing is perturbed");
     }
 }

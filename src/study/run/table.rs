@@ -14,8 +14,8 @@ use crate::people::{CLASSES, Confusion};
 use crate::study::complexity::Stratum;
 use serde::Serialize;
 
-/// The variant of the study `robustness` that nothing spoils: its first.
-const UNSPOILED: usize = 0;
+/// The variant of the study `robustness` that nothing perturbs: its first.
+const UNPERTURBED: usize = 0;
 
 /// Mean, spread and number of a quantity over frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -158,13 +158,13 @@ pub(super) fn table(spec: &RunSpec, all_rows: &Rows) -> Vec<TableRow> {
     of_stratum.collect()
 }
 
-/// Where a spoiled start, against the settings, left every frame exactly as it is without.
+/// Where a perturbed start, against the settings, left every frame exactly as it is without.
 fn unmoved(spec: &RunSpec, rows: &[&RunRow], all_rows: &Rows) -> Option<String> {
-    let of_another = |row: &&RunRow| row.variant != UNSPOILED;
+    let of_another = |row: &&RunRow| row.variant != UNPERTURBED;
     if spec.study != StudyKind::Robustness || rows.is_empty() || !rows.iter().all(of_another) {
         return None;
     }
-    let same = |row: &&RunRow| all_rows.get(&(UNSPOILED, row.frame)).is_some_and(|plain| plain.fit == row.fit);
+    let same = |row: &&RunRow| all_rows.get(&(UNPERTURBED, row.frame)).is_some_and(|plain| plain.fit == row.fit);
     rows.iter().all(same).then(|| "acted on nothing: every frame is as without it".to_owned())
 }
 

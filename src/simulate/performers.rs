@@ -27,7 +27,7 @@ pub(super) struct Stage {
 }
 
 /// Draws `count` people.
-pub(super) fn cast(
+pub(super) fn draw_performers(
     recipe: &Recipe,
     actions: &[Action],
     count: usize,
