@@ -41,7 +41,7 @@
 //! | [`cli`] | one file a subcommand |
 //! | [`session`] | the state behind the window and the only function that changes it |
 //! | [`worker`] | the thread that runs a fit, and its protocol |
-//! | [`study`] | batch runs; studies, their tables and run folders; exports; which frames are hard |
+//! | [`study`] | batch runs; studies, their tables and run folders; exports; which frames are hard; shards of all of them |
 //! | [`labels`] | tags, notes, verdicts, the journal that keeps them, agreement |
 //! | [`diagnose`] | metrics: MAJPE, PA-MAJPE; evidence for each failure mode |
 //! | [`start`] | where a frame's fit begins: the problem with the frames around it, and for how many people a start is asked |

@@ -5,10 +5,13 @@ use crate::body::Pppr;
 use crate::dataset::Frame;
 use crate::escape::to_cell;
 use crate::mhp::{StepReport, StopReason};
+use crate::study::shard::{FrameCommand, ShardRow};
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 /// The numbers of a fit that worked.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FitNumbers {
     /// Iteration, loss, terms, IoU of each view and convergence at the end.
     pub report: StepReport,
@@ -52,7 +55,8 @@ pub struct FrameFit {
 }
 
 /// One row of a batch.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct BatchRow {
     /// Index in the data set.
     pub index: usize,
@@ -60,6 +64,18 @@ pub struct BatchRow {
     pub frame: String,
     /// The fit, or why there is none: one line that names the file.
     pub fit: Result<FitNumbers, String>,
+}
+
+impl ShardRow for BatchRow {
+    const COMMAND: FrameCommand = FrameCommand::Fit;
+
+    fn index(&self) -> usize {
+        self.index
+    }
+
+    fn failure(&self) -> Option<&str> {
+        self.fit.as_ref().err().map(String::as_str)
+    }
 }
 
 impl BatchRow {
