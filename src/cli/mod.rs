@@ -173,11 +173,7 @@ pub enum CliCommand {
     #[command(after_help = merge::HELP)]
     Merge(merge::MergeArgs),
     /// Evaluate the objective at given parameters: simulated maps, losses and gradients.
-    ///
-    /// Writes an npz with `sim_<array>`, `iou_<array>`, `loss`, its terms `em bone rigid joint sep coll`, and the gradients
-    /// `grad_<group>` (of the total) and `grad_em_<group>` (of L_EM alone), all float64. Prints the scalars as one JSON
-    /// object; an IoU of two empty masks is null there and NaN in the npz. The EM region is that of the given positions.
-    #[command(after_help = score::HELP)]
+    #[command(long_about = score::about(), after_help = score::HELP)]
     Score(score::ScoreArgs),
     /// Draw the real window offscreen after a number of iterations, and save it as a PNG.
     #[cfg(feature = "viewer")]
