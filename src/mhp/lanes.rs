@@ -11,15 +11,16 @@ use pulp::Simd;
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
 /// 1.5 · 2²³ + 127: adding it rounds to a whole number and leaves that number, biased as an exponent, in the low bits.
-const ROUND: f32 = 12_583_039.0;
+const ROUND_TO_EXPONENT: f32 = 12_583_039.0;
 /// 2ᶠ on |f| ≤ ½, relative error 3e-6 (least squares at Chebyshev points).
-const EXP2: [f32; 5] = [0.999_999_2, 0.693_121_97, 0.240_249_81, 0.055_917_04, 0.009_560_51];
+const EXP2_SERIES: [f32; 5] = [0.999_999_2, 0.693_121_97, 0.240_249_81, 0.055_917_04, 0.009_560_51];
 
 /// 1.5 · 2²³: adding it rounds to a whole number.
-const WHOLE: f32 = 12_582_912.0;
+const ROUND_TO_INTEGER: f32 = 12_582_912.0;
 /// Series of cos πt and sin(πt)/t by t².
-const COS_PI: [f32; 7] = [1.0, -4.934_802, 4.058_712, -1.335_262_8, 0.235_330_63, -0.025_806_89, 0.001_929_6];
-const SIN_PI: [f32; 6] = [std::f32::consts::PI, -5.167_712_8, 2.550_164, -0.599_264_5, 0.082_145_89, -0.007_370_43];
+const COS_PI_SERIES: [f32; 7] = [1.0, -4.934_802, 4.058_712, -1.335_262_8, 0.235_330_63, -0.025_806_89, 0.001_929_6];
+const SIN_PI_SERIES: [f32; 6] =
+    [std::f32::consts::PI, -5.167_712_8, 2.550_164, -0.599_264_5, 0.082_145_89, -0.007_370_43];
 
 /// A register of f32.
 #[derive(Clone, Copy)]
@@ -40,16 +41,16 @@ impl<S: Simd> Lanes<S> {
         Self { simd, value }
     }
 
-    /// self · b + c
+    /// self · a + b
     #[inline(always)]
-    pub(super) fn mul_add(self, b: Self, c: Self) -> Self {
-        Self::new(self.simd, self.simd.mul_add_f32s(self.value, b.value, c.value))
+    pub(super) fn mul_add(self, a: Self, b: Self) -> Self {
+        Self::new(self.simd, self.simd.mul_add_f32s(self.value, a.value, b.value))
     }
 
-    /// self − a · b
+    /// b − self · a
     #[inline(always)]
-    pub(super) fn minus(self, a: Self, b: Self) -> Self {
-        Self::new(self.simd, self.simd.negate_mul_add_f32s(a.value, b.value, self.value))
+    pub(super) fn neg_mul_add(self, a: Self, b: Self) -> Self {
+        Self::new(self.simd, self.simd.negate_mul_add_f32s(self.value, a.value, b.value))
     }
 
     #[inline(always)]
@@ -75,7 +76,7 @@ impl<S: Simd> Lanes<S> {
 
     /// `yes` where self > b, else `no`.
     #[inline(always)]
-    pub(super) fn choose(self, b: Self, yes: Self, no: Self) -> Self {
+    pub(super) fn select_gt(self, b: Self, yes: Self, no: Self) -> Self {
         let mask = self.simd.less_than_f32s(b.value, self.value);
         Self::new(self.simd, self.simd.select_f32s(mask, yes.value, no.value))
     }
@@ -88,7 +89,7 @@ impl<S: Simd> Lanes<S> {
 
     /// A bit a lane that is positive, the first lane's the lowest.
     #[inline(always)]
-    pub(super) fn positive(self) -> u32 {
+    pub(super) fn positive_bits(self) -> u32 {
         let simd = self.simd;
         let mask = simd.less_than_f32s(simd.splat_f32s(0.0), self.value);
         let bytes = bytemuck::bytes_of(&mask);
@@ -103,25 +104,27 @@ impl<S: Simd> Lanes<S> {
         bits
     }
 
+    /// The largest lane.
     #[inline(always)]
-    pub(super) fn largest(self) -> f32 {
+    pub(super) fn reduce_max(self) -> f32 {
         self.simd.reduce_max_f32s(self.value)
     }
 
+    /// Σ of the lanes.
     #[inline(always)]
-    pub(super) fn sum(self) -> f32 {
+    pub(super) fn reduce_sum(self) -> f32 {
         self.simd.reduce_sum_f32s(self.value)
     }
 
     /// cos and sin of a number of turns, absolute error 3e-7 and what rounding leaves of whole turns.
     #[inline(always)]
-    pub(super) fn turn(self) -> [Self; 2] {
+    pub(super) fn cos_sin_turns(self) -> [Self; 2] {
         let of = |x: f32| splat(self.simd, x);
-        let t = self - ((self + of(WHOLE)) - of(WHOLE));
+        let t = self - ((self + of(ROUND_TO_INTEGER)) - of(ROUND_TO_INTEGER));
         let t2 = t * t;
         let polynomial = |of_t2: &[f32]| of_t2.iter().rev().fold(of(0.0), |sum, &c| sum.mul_add(t2, of(c)));
         // Of half the angle, −π/2 to π/2.
-        let (c, s) = (polynomial(&COS_PI), t * polynomial(&SIN_PI));
+        let (c, s) = (polynomial(&COS_PI_SERIES), t * polynomial(&SIN_PI_SERIES));
         let twice = s + s;
         [of(1.0) - twice * s, twice * c]
     }
@@ -130,11 +133,11 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub(super) fn exp2(self) -> Self {
         let simd = self.simd;
-        let rounded = self + splat(simd, ROUND);
-        let f = self - (rounded - splat(simd, ROUND));
-        let mut power = splat(simd, EXP2[4]);
+        let rounded = self + splat(simd, ROUND_TO_EXPONENT);
+        let f = self - (rounded - splat(simd, ROUND_TO_EXPONENT));
+        let mut power = splat(simd, EXP2_SERIES[4]);
         for k in (0..4).rev() {
-            power = power.mul_add(f, splat(simd, EXP2[k]));
+            power = power.mul_add(f, splat(simd, EXP2_SERIES[k]));
         }
         let bits = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(rounded.value), simd.splat_u32s(23));
         power * Self::new(simd, simd.transmute_f32s_u32s(bits))

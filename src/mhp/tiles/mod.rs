@@ -37,41 +37,41 @@ use std::ops::{Deref, DerefMut};
 use strip::Strip;
 
 /// Bins of a tile along the last axis and along the one before.
-const ALONG_BINS: usize = 4;
-const ACROSS_BINS: usize = 8;
-const CELLS: usize = ALONG_BINS * ACROSS_BINS;
+const TILE_ALONG_BINS: usize = 4;
+const TILE_ACROSS_BINS: usize = 8;
+const TILE_CELLS: usize = TILE_ALONG_BINS * TILE_ACROSS_BINS;
 /// Tiles of a block.
-const BLOCK: usize = 16;
+const BLOCK_TILES: usize = 16;
 /// From a tile's middle to its outermost cells.
-const REACH_ALONG: f32 = 0.5 * (ALONG_BINS - 1) as f32;
-const REACH_ACROSS: f32 = 0.5 * (ACROSS_BINS - 1) as f32;
+const HALF_TILE_ALONG_BINS: f32 = 0.5 * (TILE_ALONG_BINS - 1) as f32;
+const HALF_TILE_ACROSS_BINS: f32 = 0.5 * (TILE_ACROSS_BINS - 1) as f32;
 /// Cells of a tile relative to its middle.
-const ALONG: Cells = from_middle(1, ALONG_BINS);
-const ACROSS: Cells = from_middle(ALONG_BINS, ACROSS_BINS);
+const CELL_ALONG_BINS: PerCell = from_middle(1, TILE_ALONG_BINS);
+const CELL_ACROSS_BINS: PerCell = from_middle(TILE_ALONG_BINS, TILE_ACROSS_BINS);
 /// From the first tile of a block to each of its sixteen, bins.
-const STEPS: Sixteen = {
-    let mut steps = [0.0; BLOCK];
+const TILE_STEPS_BINS: PerTile = {
+    let mut steps = [0.0; BLOCK_TILES];
     let mut tile = 0;
-    while tile < BLOCK {
-        steps[tile] = (tile * ALONG_BINS) as f32;
+    while tile < BLOCK_TILES {
+        steps[tile] = (tile * TILE_ALONG_BINS) as f32;
         tile += 1;
     }
-    Row(steps)
+    Aligned(steps)
 };
 
 /// Numbers that lie as registers want them.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
-struct Row<const N: usize>([f32; N]);
+struct Aligned<const N: usize>([f32; N]);
 
 /// A number a cell of a tile.
-type Cells = Row<CELLS>;
+type PerCell = Aligned<TILE_CELLS>;
 /// Re and Im.
-type Pair = [Cells; 2];
+type ComplexPerCell = [PerCell; 2];
 /// A number a tile of a block, or a row of tiles of sixteen.
-type Sixteen = Row<BLOCK>;
+type PerTile = Aligned<BLOCK_TILES>;
 
-impl<const N: usize> Row<N> {
+impl<const N: usize> Aligned<N> {
     const ZERO: Self = Self::all(0.0);
 
     const fn all(x: f32) -> Self {
@@ -79,13 +79,13 @@ impl<const N: usize> Row<N> {
     }
 }
 
-impl<const N: usize> Default for Row<N> {
+impl<const N: usize> Default for Aligned<N> {
     fn default() -> Self {
         Self::ZERO
     }
 }
 
-impl<const N: usize> Deref for Row<N> {
+impl<const N: usize> Deref for Aligned<N> {
     type Target = [f32; N];
     #[inline(always)]
     fn deref(&self) -> &[f32; N] {
@@ -93,7 +93,7 @@ impl<const N: usize> Deref for Row<N> {
     }
 }
 
-impl<const N: usize> DerefMut for Row<N> {
+impl<const N: usize> DerefMut for Aligned<N> {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut [f32; N] {
         &mut self.0
@@ -101,50 +101,51 @@ impl<const N: usize> DerefMut for Row<N> {
 }
 
 /// Each cell's bin, of those that are `stride` cells apart, from the middle of `bins`.
-const fn from_middle(stride: usize, bins: usize) -> Cells {
-    let mut from = [0.0; CELLS];
+const fn from_middle(stride: usize, bins: usize) -> PerCell {
+    let mut from = [0.0; TILE_CELLS];
     let mut cell = 0;
-    while cell < CELLS {
+    while cell < TILE_CELLS {
         from[cell] = (cell / stride % bins) as f32 - 0.5 * (bins - 1) as f32;
         cell += 1;
     }
-    Row(from)
+    Aligned(from)
 }
 
 /// Softest mask, T, whose reach the powers of two of f32 hold; softer ones take the plain kernel.
-const SOFTEST: f64 = 1.5;
-/// Below e^−15T of the threshold, `GUESS` included, a cell neither counts nor pulls (3e-7).
-const MASK_REACH: f64 = 14.0;
-/// A joint this much weaker (in ln) than the threshold is dropped, and at least `MARGIN` under the weakest cell that counts.
-const BELOW: f64 = 13.0;
-const MARGIN: f64 = 3.0;
-/// The guess of ln threshold may be this much too high.
-const GUESS: f64 = 1.0;
-/// And this much too low: beyond it the strongest returns would leave f32's range.
-const HIGH: f64 = 12.0;
+const MAX_SOFTNESS: f64 = 1.5;
+/// Below e^−15T of the threshold, `MAX_GUESS_TOO_HIGH_LN` included, a cell neither counts nor pulls (3e-7).
+const MASK_REACH_PER_SOFTNESS_LN: f64 = 14.0;
+/// A joint this much weaker than the threshold is dropped, ln, and at least `JOINT_MARGIN_LN` under the weakest cell that
+/// counts.
+const MIN_JOINT_REACH_LN: f64 = 13.0;
+const JOINT_MARGIN_LN: f64 = 3.0;
+/// The guess of the threshold may be this much too high, ln.
+const MAX_GUESS_TOO_HIGH_LN: f64 = 1.0;
+/// And this much too low, ln: beyond it the strongest returns would leave f32's range.
+const MAX_GUESS_TOO_LOW_LN: f64 = 12.0;
 /// Guesses of the threshold at most.
-const TRIES: usize = 40;
-/// A joint this much weaker (in ln) than the strongest at its cells is dropped: from the objective (3e-4), whose mask is
+const MAX_GUESSES: usize = 40;
+/// A joint this much weaker, ln, than the strongest at its cells is dropped: from the objective (3e-4), whose mask is
 /// soft, and from a map (5e-5).
-const RELATIVE: f64 = 8.0;
-const RELATIVE_IN_MAPS: f64 = 10.0;
-/// ln of the weakest return that counts relative to the view's scale.
-const WEAKEST: f64 = -36.0;
+const MAX_BELOW_STRONGEST_LN: f64 = 8.0;
+const MAX_BELOW_STRONGEST_IN_MAPS_LN: f64 = 10.0;
+/// The weakest return that counts, relative to the view's scale.
+const MIN_COUNTED_LN: f64 = -36.0;
 /// log₂ below which no return is taken: squares of its parts are normal f32, for others cost a hundred cycles.
-const FAINTEST: f32 = -54.0;
+const MIN_RETURN_LOG2: f32 = -54.0;
 /// log₂ of the strongest return relative to the view's scale; what is stronger is far above any threshold.
-const STRONGEST: f32 = 54.0;
+const MAX_RETURN_LOG2: f32 = 54.0;
 /// log₂ of how far the strongest joint of a map stays under what is strongest in f32, for the sum of all.
-const ROOM: f64 = 8.0;
+const MAP_HEADROOM_LOG2: f64 = 8.0;
 /// log₂ of how far a map may stay under its strongest joint.
-const OUTSIDE: f64 = 30.0;
+const MAX_MAP_BELOW_JOINTS_LOG2: f64 = 30.0;
 /// m(1 − m)/T below which a tile has no slope.
-const NO_SLOPE: f32 = 3e-7;
+const MIN_MASK_SLOPE: f32 = 3e-7;
 
 /// A box of cells in tiles, and B_ori over it: fixed for a fit. Sixteen tiles beside each other are a block; the last
 /// block of a row may reach beyond the box, as may the last row and column of tiles.
 #[derive(Debug, Clone)]
-pub(super) struct Tiling {
+pub(super) struct TileGrid {
     /// First bin of the last three axes (outermost first; missing axes have one bin, 0).
     lo: [usize; 3],
     size: [usize; 3],
@@ -153,7 +154,7 @@ pub(super) struct Tiling {
     columns: usize,
     blocks: Vec<Block>,
     /// Sixteen tiles a block: B_ori as 0 or 1, −1 beyond the box.
-    target: Vec<Cells>,
+    target: Vec<PerCell>,
     cells: usize,
     marked: usize,
 }
@@ -168,40 +169,40 @@ struct Block {
 
 /// Blocks of a box of these sizes, the last axis last.
 pub(super) fn blocks_of(sizes: impl DoubleEndedIterator<Item = usize>) -> usize {
-    let in_block = [BLOCK * ALONG_BINS, ACROSS_BINS, 1];
+    let in_block = [BLOCK_TILES * TILE_ALONG_BINS, TILE_ACROSS_BINS, 1];
     sizes.rev().zip(in_block).fold(1, |blocks, (size, bins)| blocks * size.div_ceil(bins))
 }
 
-impl Tiling {
+impl TileGrid {
     /// Cuts the box `bins` ([lo, hi) per axis), with B_ori in C order.
     pub(super) fn new(bins: &[[usize; 2]], ori: &[bool]) -> Self {
         let (mut lo, mut size) = ([0; 3], [1; 3]);
         for (k, &[from, to]) in bins.iter().rev().take(3).enumerate() {
             (lo[2 - k], size[2 - k]) = (from, to.saturating_sub(from));
         }
-        let (rows, columns) = (size[1].div_ceil(ACROSS_BINS), size[2].div_ceil(ALONG_BINS));
+        let (rows, columns) = (size[1].div_ceil(TILE_ACROSS_BINS), size[2].div_ceil(TILE_ALONG_BINS));
         let marked = ori.iter().filter(|&&b| b).count();
         let of_line = |line| {
             let (slice, row) = (line / rows, line % rows);
-            (0..columns).step_by(BLOCK).map(move |column| Block { slice, row, column })
+            (0..columns).step_by(BLOCK_TILES).map(move |column| Block { slice, row, column })
         };
         let blocks = (0..size[0] * rows).flat_map(of_line).collect();
-        let mut tiling = Self { lo, size, rows, columns, blocks, target: Vec::new(), cells: ori.len(), marked };
-        let mut target = vec![Cells::all(-1.0); size[0] * rows * columns.div_ceil(BLOCK) * BLOCK];
+        let mut grid = Self { lo, size, rows, columns, blocks, target: Vec::new(), cells: ori.len(), marked };
+        let mut target = vec![PerCell::all(-1.0); size[0] * rows * columns.div_ceil(BLOCK_TILES) * BLOCK_TILES];
         let mut ori = ori.iter();
-        tiling.for_places(|tile, cell| target[tile][cell] = ori.next().map_or(-1.0, |&ori| f32::from(u8::from(ori))));
-        tiling.target = target;
-        tiling
+        grid.for_places(|tile, cell| target[tile][cell] = ori.next().map_or(-1.0, |&ori| f32::from(u8::from(ori))));
+        grid.target = target;
+        grid
     }
 
     /// Calls `each` with the tile of every cell of the box and which of its cells it is, in C order.
     fn for_places(&self, mut each: impl FnMut(usize, usize)) {
-        let ([slices, height, width], row_tiles) = (self.size, self.columns.div_ceil(BLOCK) * BLOCK);
+        let ([slices, height, width], row_tiles) = (self.size, self.columns.div_ceil(BLOCK_TILES) * BLOCK_TILES);
         for slice in 0..slices {
             for y in 0..height {
-                let first = (slice * self.rows + y / ACROSS_BINS) * row_tiles;
+                let first = (slice * self.rows + y / TILE_ACROSS_BINS) * row_tiles;
                 for x in 0..width {
-                    each(first + x / ALONG_BINS, y % ACROSS_BINS * ALONG_BINS + x % ALONG_BINS);
+                    each(first + x / TILE_ALONG_BINS, y % TILE_ACROSS_BINS * TILE_ALONG_BINS + x % TILE_ALONG_BINS);
                 }
             }
         }
@@ -209,7 +210,7 @@ impl Tiling {
 
     /// Bins of the first tile's middle, across and along.
     fn middle(&self) -> [f64; 2] {
-        [self.lo[1] as f64 + f64::from(REACH_ACROSS), self.lo[2] as f64 + f64::from(REACH_ALONG)]
+        [self.lo[1] as f64 + f64::from(HALF_TILE_ACROSS_BINS), self.lo[2] as f64 + f64::from(HALF_TILE_ALONG_BINS)]
     }
 }
 
@@ -218,7 +219,7 @@ impl Tiling {
 pub(super) struct Tiles {
     joints: Vec<Joint>,
     /// log₂ of the strongest joint in the middles of some blocks' tiles.
-    middles: Vec<Sixteen>,
+    middles: Vec<PerTile>,
     /// Those that reach a row.
     present: Vec<u32>,
     /// Block by block, the first `used` of them; `ends` tells where each block's strips end.
@@ -232,9 +233,9 @@ pub(super) struct Tiles {
     lit: Vec<u32>,
     /// The sum over joints a tile (Σ(AK)² where the sum is incoherent); later times w/|S|². This and what follows holds
     /// where tiles are lit.
-    sums: Vec<Pair>,
+    sums: Vec<ComplexPerCell>,
     /// H² relative to the scale, −1 beyond the box; later m(1 − m)/|S|² · d ln(H + h)/d ln|S|.
-    power: Vec<Cells>,
+    power: Vec<PerCell>,
     /// Tiles where the mask has a slope: a bit each, a block's in one number.
     sloped: Vec<u32>,
     /// Each joint's moments over the blocks, a number a cell of a tile; zeros when they have been collected.
@@ -246,20 +247,20 @@ pub(super) struct Tiles {
     last_level: f64,
 }
 
-/// What one view asks.
-pub(super) struct Question<'a> {
+/// L_EM of one view, as it is asked for.
+pub(super) struct EmQuery<'a> {
     pub splats: &'a Splats,
-    pub tiling: &'a Tiling,
+    pub grid: &'a TileGrid,
     pub summation: Summation,
     pub tau_pct: f64,
     pub softness: f64,
     /// Factor of the gradient; `None` where none is wanted.
-    pub scale: Option<f64>,
+    pub gradient_factor: Option<f64>,
 }
 
-/// Whether f32 reaches as far as a soft mask of this temperature.
-pub(super) fn reaches(softness: f64) -> bool {
-    softness <= SOFTEST
+/// Whether f32 holds a soft mask of this temperature.
+pub(super) fn holds(softness: f64) -> bool {
+    softness <= MAX_SOFTNESS
 }
 
 /// The instruction set that the tiles run on here.
@@ -281,29 +282,29 @@ pub fn simd_path() -> &'static str {
 }
 
 impl Tiles {
-    /// Answers `question`, and fills `moments` (one a joint, zeroed) where a gradient is wanted.
-    pub(super) fn evaluate(&mut self, question: &Question<'_>, moments: &mut Moments) -> ViewLoss {
-        match question.summation {
-            Summation::Coherent => Arch::new().dispatch(Run::<true> { tiles: self, question, moments }),
-            Summation::Incoherent => Arch::new().dispatch(Run::<false> { tiles: self, question, moments }),
+    /// Answers `query`, and fills `moments` (one a joint, zeroed) where a gradient is wanted.
+    pub(super) fn evaluate(&mut self, query: &EmQuery<'_>, moments: &mut Moments) -> ViewLoss {
+        match query.summation {
+            Summation::Coherent => Arch::new().dispatch(EvaluateQuery::<true> { tiles: self, query, moments }),
+            Summation::Incoherent => Arch::new().dispatch(EvaluateQuery::<false> { tiles: self, query, moments }),
         }
     }
 }
 
 impl Tiles {
     /// H_sim of every cell in C order, f64; `None` where f32's range does not hold it.
-    pub(super) fn map(&mut self, splats: &Splats, tiling: &Tiling, summation: Summation) -> Option<Vec<f64>> {
+    pub(super) fn map(&mut self, splats: &Splats, grid: &TileGrid, summation: Summation) -> Option<Vec<f64>> {
         match summation {
-            Summation::Coherent => Arch::new().dispatch(Whole::<true> { tiles: self, splats, tiling }),
-            Summation::Incoherent => Arch::new().dispatch(Whole::<false> { tiles: self, splats, tiling }),
+            Summation::Coherent => Arch::new().dispatch(EvaluateMap::<true> { tiles: self, splats, grid }),
+            Summation::Incoherent => Arch::new().dispatch(EvaluateMap::<false> { tiles: self, splats, grid }),
         }
     }
 
-    fn values<const COHERENT: bool>(&self, tiling: &Tiling, log2: f64) -> Vec<f64> {
+    fn values<const COHERENT: bool>(&self, grid: &TileGrid, log2: f64) -> Vec<f64> {
         let (unit, floor) = ((2.0 * log2).exp2(), EPSILON * EPSILON);
-        let mut values = Vec::with_capacity(tiling.cells);
-        tiling.for_places(|tile, cell| {
-            let lit = self.lit_bits[tile / BLOCK] >> (tile % BLOCK) & 1 == 1;
+        let mut values = Vec::with_capacity(grid.cells);
+        grid.for_places(|tile, cell| {
+            let lit = self.lit_bits[tile / BLOCK_TILES] >> (tile % BLOCK_TILES) & 1 == 1;
             let [re, im] = [0, 1].map(|part| f64::from(self.sums[tile][part][cell]));
             let square = if COHERENT { re * re + im * im } else { re };
             values.push(if lit { (unit * square + floor).sqrt() } else { EPSILON });
@@ -312,41 +313,41 @@ impl Tiles {
     }
 }
 
-struct Run<'a, const COHERENT: bool> {
+struct EvaluateQuery<'a, const COHERENT: bool> {
     tiles: &'a mut Tiles,
-    question: &'a Question<'a>,
+    query: &'a EmQuery<'a>,
     moments: &'a mut Moments,
 }
 
-impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
+impl<const COHERENT: bool> WithSimd for EvaluateQuery<'_, COHERENT> {
     type Output = ViewLoss;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> ViewLoss {
-        let Self { tiles, question, moments } = self;
-        if !tiles.fill::<S, COHERENT>(simd, question.splats, question.tiling) {
+        let Self { tiles, query, moments } = self;
+        if !tiles.fill::<S, COHERENT>(simd, query.splats, query.grid) {
             return ViewLoss { loss: f64::NAN, iou: None };
         }
         let floor = EPSILON.log2();
-        let mut guess = tiles.guess(simd, question);
-        let mut tries = 0..TRIES;
+        let mut guess = tiles.guess(simd, query);
+        let mut tries = 0..MAX_GUESSES;
         loop {
-            let scale = Scale::new(guess, question.softness);
-            tiles.sum::<S, COHERENT>(simd, question.tiling, &scale);
-            let threshold = tiles.threshold::<S, COHERENT>(simd, question, &scale);
-            let low = guess > floor && threshold.log2 < guess - GUESS * LOG2_E;
-            let high = threshold.log2 > guess + HIGH * LOG2_E;
+            let range = F32Range::new(guess, query.softness);
+            tiles.sum::<S, COHERENT>(simd, query.grid, &range);
+            let threshold = tiles.threshold::<S, COHERENT>(simd, query, &range);
+            let low = guess > floor && threshold.log2 < guess - MAX_GUESS_TOO_HIGH_LN * LOG2_E;
+            let high = threshold.log2 > guess + MAX_GUESS_TOO_LOW_LN * LOG2_E;
             if (low || high) && tries.next().is_some() {
                 guess = if threshold.among_lit { threshold.log2 } else { guess - 30.0 }.max(floor);
                 continue;
             }
             tiles.last = Some(threshold.log2);
-            let mask = tiles.mask::<S, COHERENT>(simd, question, &scale, &threshold);
-            if let Some(factor) = question.scale
+            let mask = tiles.mask::<S, COHERENT>(simd, query, &range, &threshold);
+            if let Some(factor) = query.gradient_factor
                 && mask.union > 0.0
             {
-                tiles.weigh::<S, COHERENT>(simd, question, &mask, factor / question.softness);
-                tiles.collect::<S, COHERENT>(simd, question.tiling, moments);
+                tiles.weight_sums::<S, COHERENT>(simd, query, &mask, factor / query.softness);
+                tiles.collect::<S, COHERENT>(simd, query.grid, moments);
             }
             return mask.answer();
         }
@@ -354,32 +355,32 @@ impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
 }
 
 /// H_sim over a box.
-struct Whole<'a, const COHERENT: bool> {
+struct EvaluateMap<'a, const COHERENT: bool> {
     tiles: &'a mut Tiles,
     splats: &'a Splats,
-    tiling: &'a Tiling,
+    grid: &'a TileGrid,
 }
 
-impl<const COHERENT: bool> WithSimd for Whole<'_, COHERENT> {
+impl<const COHERENT: bool> WithSimd for EvaluateMap<'_, COHERENT> {
     type Output = Option<Vec<f64>>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Option<Vec<f64>> {
-        let Self { tiles, splats, tiling } = self;
-        if !tiles.fill::<S, COHERENT>(simd, splats, tiling) {
+        let Self { tiles, splats, grid } = self;
+        if !tiles.fill::<S, COHERENT>(simd, splats, grid) {
             return None;
         }
         let loudest = tiles.joints.iter().map(|joint| joint.top + f64::from(joint.spectrum())).fold(f64::MIN, f64::max);
-        let scale = Scale::below(loudest);
-        tiles.sum::<S, COHERENT>(simd, tiling, &scale);
+        let range = F32Range::below(loudest);
+        tiles.sum::<S, COHERENT>(simd, grid, &range);
         // A map that none of the joints reaches in its own cells has its largest values elsewhere in f32's range.
-        let within = f64::from(tiles.highest) >= loudest - OUTSIDE;
-        within.then(|| tiles.values::<COHERENT>(tiling, scale.log2))
+        let within = f64::from(tiles.highest) >= loudest - MAX_MAP_BELOW_JOINTS_LOG2;
+        within.then(|| tiles.values::<COHERENT>(grid, range.log2))
     }
 }
 
 /// Where f32's range lies in this view.
-struct Scale {
+struct F32Range {
     /// log₂ of what 1 stands for.
     log2: f64,
     /// log₂ relative to it below which nothing counts.
@@ -395,26 +396,33 @@ struct Scale {
     relative: f32,
 }
 
-impl Scale {
+impl F32Range {
     /// For a whole map whose strongest joint has `log2` at its middle: all that f32's range holds below it.
     fn below(log2: f64) -> Self {
-        let relative = (RELATIVE_IN_MAPS * LOG2_E) as f32;
-        Self { log2: log2 - f64::from(STRONGEST) + ROOM, fading: 0.0, relative, ..Self::new(0.0, 1.0) }
+        let relative = (MAX_BELOW_STRONGEST_IN_MAPS_LN * LOG2_E) as f32;
+        Self {
+            log2: log2 - f64::from(MAX_RETURN_LOG2) + MAP_HEADROOM_LOG2,
+            fading: 0.0,
+            relative,
+            ..Self::new(0.0, 1.0)
+        }
     }
 
     fn new(guess: f64, softness: f64) -> Self {
-        let below = ((MASK_REACH * softness + MARGIN).max(BELOW) + GUESS) * LOG2_E;
-        let log2 = guess - below - WEAKEST * LOG2_E;
+        let below = ((MASK_REACH_PER_SOFTNESS_LN * softness + JOINT_MARGIN_LN).max(MIN_JOINT_REACH_LN)
+            + MAX_GUESS_TOO_HIGH_LN)
+            * LOG2_E;
+        let log2 = guess - below - MIN_COUNTED_LN * LOG2_E;
         let epsilon = (EPSILON.log2() - log2).exp2();
         let soft_floor = (SOFT_FLOOR.log2() - log2).exp2() as f32;
         Self {
             log2,
-            cut: (WEAKEST * LOG2_E) as f32,
+            cut: (MIN_COUNTED_LN * LOG2_E) as f32,
             epsilon_sq: (epsilon * epsilon) as f32,
             soft_floor,
-            low: (guess - GUESS * LOG2_E) as f32,
+            low: (guess - MAX_GUESS_TOO_HIGH_LN * LOG2_E) as f32,
             fading: (1.0 / softness - 1.0).max(0.0) as f32,
-            relative: (RELATIVE * LOG2_E) as f32,
+            relative: (MAX_BELOW_STRONGEST_LN * LOG2_E) as f32,
         }
     }
 }
@@ -445,27 +453,27 @@ impl Mask {
 
 /// Parts of a tile's cells, and of a block's tiles.
 const fn cell_parts<S: Simd>() -> usize {
-    CELLS / S::F32_LANES
+    TILE_CELLS / S::F32_LANES
 }
 
 const fn tile_parts<S: Simd>() -> usize {
-    BLOCK / S::F32_LANES
+    BLOCK_TILES / S::F32_LANES
 }
 
 #[inline(always)]
-fn lanes<S: Simd, const N: usize>(simd: S, of: &Row<N>, part: usize) -> Lanes<S> {
+fn lanes<S: Simd, const N: usize>(simd: S, of: &Aligned<N>, part: usize) -> Lanes<S> {
     Lanes::new(simd, S::as_simd_f32s(&of.0).0[part])
 }
 
 #[inline(always)]
-fn store<S: Simd, const N: usize>(into: &mut Row<N>, part: usize, x: Lanes<S>) {
+fn store<S: Simd, const N: usize>(into: &mut Aligned<N>, part: usize, x: Lanes<S>) {
     S::as_mut_simd_f32s(&mut into.0).0[part] = x.value;
 }
 
 impl Tiles {
     /// Takes the splats in; false where one is not finite.
     #[inline(always)]
-    fn fill<S: Simd, const COHERENT: bool>(&mut self, simd: S, splats: &Splats, grid: &Tiling) -> bool {
+    fn fill<S: Simd, const COHERENT: bool>(&mut self, simd: S, splats: &Splats, grid: &TileGrid) -> bool {
         self.joints.resize_with(splats.joints(), Joint::default);
         for (joint, splat) in self.joints.iter_mut().zip(splats.iter()) {
             joint.fill::<S, COHERENT>(simd, &splat, grid);
