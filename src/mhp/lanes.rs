@@ -203,3 +203,96 @@ impl<S: Simd> Div for Lanes<S> {
         Self::new(self.simd, self.simd.div_f32s(self.value, b.value))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pulp::{Arch, WithSimd};
+
+    /// Sixteen numbers, of which every register holds a part.
+    type Sixteen = [f32; 16];
+
+    /// 2ˣ, log₂ x, cosine and sine of turns, |x|, 5 − 3x, and 2 where x > 1, else 3.
+    struct Functions<'a>(&'a [Sixteen]);
+
+    impl WithSimd for Functions<'_> {
+        type Output = Vec<[Sixteen; 7]>;
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+            let of = |x: f32| splat(simd, x);
+            let mut found = vec![[[0.0; 16]; 7]; self.0.len()];
+            for (x, found) in self.0.iter().zip(&mut found) {
+                for part in 0..16 / S::F32_LANES {
+                    let x = Lanes::new(simd, S::as_simd_f32s(x).0[part]);
+                    let [cos, sin] = x.cos_sin_turns();
+                    let chosen = x.select_gt(of(1.0), of(2.0), of(3.0));
+                    let all = [x.exp2(), x.log2(), cos, sin, x.abs(), x.neg_mul_add(of(3.0), of(5.0)), chosen];
+                    for (found, y) in found.iter_mut().zip(all) {
+                        S::as_mut_simd_f32s(found).0[part] = y.value;
+                    }
+                }
+            }
+            found
+        }
+    }
+
+    /// Each number with what is found of it.
+    fn functions(of: impl Iterator<Item = f32>) -> Vec<(f64, [f64; 7])> {
+        let of: Vec<f32> = of.collect();
+        let rows: Vec<Sixteen> = of.chunks_exact(16).map(|row| std::array::from_fn(|k| row[k])).collect();
+        let found = Arch::new().dispatch(Functions(&rows));
+        let pairs = rows.iter().zip(&found);
+        pairs.flat_map(|(x, y)| (0..16).map(|k| (f64::from(x[k]), y.map(|y| f64::from(y[k]))))).collect()
+    }
+
+    #[test]
+    fn powers_turns_and_choices_are_those_of_double_precision() {
+        for (x, [exp2, _, cos, sin, abs, plane, chosen]) in functions((-16 * 63..16 * 63).map(|k| 0.123 * k as f32)) {
+            assert!((exp2 / x.exp2() - 1.0).abs() < 4e-6, "2^{x}: {exp2}");
+            let (wanted_sin, wanted_cos) = (std::f64::consts::TAU * x).sin_cos();
+            assert!((cos - wanted_cos).abs() < 1e-6 && (sin - wanted_sin).abs() < 1e-6, "{x} turns: {cos}, {sin}");
+            assert!(abs == x.abs() && chosen == if x > 1.0 { 2.0 } else { 3.0 }, "{x}: {abs}, {chosen}");
+            assert!((plane - (5.0 - 3.0 * x)).abs() < 1e-6 * (5.0 + x.abs()), "5 - 3 {x}: {plane}");
+        }
+    }
+
+    #[test]
+    fn logarithms_are_those_of_double_precision() {
+        let largest = 2.0_f32.powi(126);
+        let of = (0..16 * 64).map(|k| (1.0 + 0.37 * k as f32) * 1.187_f32.powi(k % 400 - 200)).chain([largest; 16]);
+        for (x, [_, log2, ..]) in functions(of) {
+            let wanted = x.log2();
+            assert!((log2 - wanted).abs() < 3e-7 * wanted.abs().max(1.0), "log2 {x}: {log2}, not {wanted}");
+        }
+    }
+
+    /// A bit a lane, the largest lane and Σ of the lanes.
+    struct Reductions(Sixteen);
+
+    impl WithSimd for Reductions {
+        type Output = (u32, f32, f32, bool);
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+            let (mut bits, mut largest, mut sum, mut any) = (0, f32::MIN, 0.0, false);
+            for part in 0..16 / S::F32_LANES {
+                let x = Lanes::new(simd, S::as_simd_f32s(&self.0).0[part]);
+                bits |= x.positive_bits() << (part * S::F32_LANES);
+                (largest, sum) = (x.reduce_max().max(largest), sum + x.reduce_sum());
+                any |= x.any_positive();
+            }
+            (bits, largest, sum, any)
+        }
+    }
+
+    #[test]
+    fn lanes_are_marked_from_the_first_on() {
+        let mut x = [-1.0; 16];
+        assert_eq!(Arch::new().dispatch(Reductions(x)), (0, -1.0, -16.0, false));
+        (x[0], x[5], x[15]) = (2.0, 0.5, 7.0);
+        assert_eq!(Arch::new().dispatch(Reductions(x)), (1 | 1 << 5 | 1 << 15, 7.0, -3.5, true));
+        x[5] = 0.0;
+        assert_eq!(Arch::new().dispatch(Reductions(x)).0, 1 | 1 << 15, "nothing is not positive");
+    }
+}

@@ -105,6 +105,17 @@ impl Splats {
         Splat { bin, weight, skew, ln_weight, phase, kappa, spectrum }
     }
 
+    /// Of these numbers a joint, in the order of [`Self::of`]; no axis has a spectrum.
+    #[cfg(test)]
+    pub(super) fn from_numbers(joints: &[[f64; NUMBERS]]) -> Self {
+        let mut splats = Self { joints: joints.len(), ..Self::default() };
+        splats.numbers.hold(joints.len());
+        for (joint, numbers) in joints.iter().enumerate() {
+            OneJoint(joint).store(*numbers, &mut splats.numbers);
+        }
+        splats
+    }
+
     pub(super) fn iter(&self) -> impl Iterator<Item = Splat<'_>> {
         (0..self.joints).map(|joint| self.of(joint))
     }

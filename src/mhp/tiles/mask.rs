@@ -3,10 +3,12 @@
 use super::strip::bits;
 use super::sum::clear;
 use super::{
-    BLOCK_TILES, EmQuery, F32Range, Lanes, MIN_MASK_SLOPE, MIN_RETURN_LOG2, Mask, Simd, Threshold, Tiles, between,
-    cell_parts, lanes, place, splat, store,
+    BLOCK_TILES, EmQuery, F32Range, Lanes, MIN_RETURN_LOG2, Mask, Simd, Threshold, Tiles, between, cell_parts, lanes,
+    place, splat, store,
 };
 
+/// m(1 − m)/T below which a tile has no slope.
+const MIN_MASK_SLOPE: f32 = 3e-7;
 /// The square of the threshold is looked for between these multiples of the last one, and then between those.
 const NEAR_LEVELS: [f64; 2] = [0.93, 1.07];
 const FAR_LEVELS: [f64; 2] = [0.5, 2.0];
