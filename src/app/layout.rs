@@ -1,126 +1,39 @@
 //! Where the panes are: a tree of tiles that can be dragged, resized, stored and reset.
 
 use super::commands::{AppAct, SaveKind};
-use super::panes::{self, PaneStates, Shared};
+use super::panes::{Dock, Pane, PaneStates, Shared};
 use super::theme::{self, Tokens};
 use egui_tiles::{
     Container, Linear, LinearDir, SimplificationOptions, TabState, Tile, TileId, Tiles, Tree, UiResponse,
 };
-use serde::{Deserialize, Serialize};
 
-/// A pane.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum PaneKind {
-    /// The frame list.
-    Frames,
-    /// The measured maps.
-    HOri,
-    /// The simulated maps.
-    HSim,
-    /// The masks of the two.
-    Masks,
-    /// Gaussians and skeleton in 3-D.
-    Scene,
-    /// Loss curves.
-    Curves,
-    /// Settings of the fit.
-    Fit,
-    /// The selected joint.
-    Joint,
-    /// Labels in image pixels.
-    Image,
-    /// The log.
-    Log,
-    /// Tags, notes and evidence.
-    Modes,
-    /// Pinned fits.
-    Compare,
-    /// How far annotators agree.
-    Agreement,
-    /// Counts of labels.
-    Statistics,
-    /// A study's table and plot.
-    Study,
-}
-
-impl PaneKind {
-    /// Every pane.
-    pub const ALL: [Self; 15] = [
-        Self::Frames,
-        Self::HOri,
-        Self::HSim,
-        Self::Masks,
-        Self::Scene,
-        Self::Curves,
-        Self::Fit,
-        Self::Joint,
-        Self::Image,
-        Self::Log,
-        Self::Modes,
-        Self::Compare,
-        Self::Agreement,
-        Self::Statistics,
-        Self::Study,
-    ];
-
-    /// The title on its tab.
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::Frames => "Frames",
-            Self::HOri => "H_ori",
-            Self::HSim => "H_sim",
-            Self::Masks => "Masks",
-            Self::Scene => "3-D",
-            Self::Curves => "Curves",
-            Self::Fit => "Fit",
-            Self::Joint => "Joint",
-            Self::Image => "Image plane",
-            Self::Log => "Log",
-            Self::Modes => "Failure modes",
-            Self::Compare => "Compare",
-            Self::Agreement => "Agreement",
-            Self::Statistics => "Statistics",
-            Self::Study => "Study",
-        }
-    }
-}
+/// A pane in the tree.
+type Leaf = &'static Pane;
 
 /// The tree of tiles.
-pub(crate) struct Layout {
-    tree: Tree<PaneKind>,
+pub(crate) struct PaneLayout {
+    tree: Tree<Leaf>,
     /// A pane whose tab was right-clicked, and what was chosen.
     asked: Option<AppAct>,
 }
 
-impl Default for Layout {
+impl Default for PaneLayout {
     fn default() -> Self {
         let mut tiles = Tiles::default();
-        let maps: Vec<TileId> =
-            [PaneKind::HOri, PaneKind::HSim, PaneKind::Masks].map(|pane| tiles.insert_pane(pane)).to_vec();
-        let maps = tiles.insert_horizontal_tile(maps);
-        let scene = tiles.insert_pane(PaneKind::Scene);
-        let image = tiles.insert_pane(PaneKind::Image);
-        let scene = tabs(&mut tiles, vec![scene, image]);
-        let curves = tiles.insert_pane(PaneKind::Curves);
-        let log = tiles.insert_pane(PaneKind::Log);
-        let [study, compare, agreement, statistics] =
-            [PaneKind::Study, PaneKind::Compare, PaneKind::Agreement, PaneKind::Statistics]
-                .map(|pane| tiles.insert_pane(pane));
-        let curves = tabs(&mut tiles, vec![curves, study, compare, agreement, statistics, log]);
-        let below = linear(&mut tiles, LinearDir::Horizontal, &[(scene, 1.0), (curves, 1.0)]);
-        let middle = linear(&mut tiles, LinearDir::Vertical, &[(maps, 1.12), (below, 1.0)]);
-        let frames = tiles.insert_pane(PaneKind::Frames);
-        let fit = tiles.insert_pane(PaneKind::Fit);
-        let joint = tiles.insert_pane(PaneKind::Joint);
-        let modes = tiles.insert_pane(PaneKind::Modes);
-        let fit = tabs(&mut tiles, vec![fit, joint]);
-        let right = linear(&mut tiles, LinearDir::Vertical, &[(fit, 1.0), (modes, 1.25)]);
-        let root = linear(&mut tiles, LinearDir::Horizontal, &[(frames, 0.235), (middle, 0.6), (right, 0.25)]);
+        let top = docked(&mut tiles, Dock::Top);
+        let bottom = [Dock::BottomLeft, Dock::BottomRight].map(|dock| (docked(&mut tiles, dock), 1.0));
+        let bottom = linear(&mut tiles, LinearDir::Horizontal, &bottom);
+        let middle = linear(&mut tiles, LinearDir::Vertical, &[(top, 1.12), (bottom, 1.0)]);
+        let left = docked(&mut tiles, Dock::Left);
+        let right = [(Dock::RightTop, 1.0), (Dock::RightBottom, 1.25)];
+        let right = right.map(|(dock, share)| (docked(&mut tiles, dock), share));
+        let right = linear(&mut tiles, LinearDir::Vertical, &right);
+        let root = linear(&mut tiles, LinearDir::Horizontal, &[(left, 0.235), (middle, 0.6), (right, 0.25)]);
         Self { tree: Tree::new(egui::Id::unique("panes"), root, tiles), asked: None }
     }
 }
 
-fn linear(tiles: &mut Tiles<PaneKind>, dir: LinearDir, children: &[(TileId, f32)]) -> TileId {
+fn linear(tiles: &mut Tiles<Leaf>, dir: LinearDir, children: &[(TileId, f32)]) -> TileId {
     let mut linear = Linear::new(dir, children.iter().map(|child| child.0).collect());
     for &(child, share) in children {
         linear.shares.set_share(child, share);
@@ -128,13 +41,20 @@ fn linear(tiles: &mut Tiles<PaneKind>, dir: LinearDir, children: &[(TileId, f32)
     tiles.insert_container(Container::Linear(linear))
 }
 
-fn tabs(tiles: &mut Tiles<PaneKind>, children: Vec<TileId>) -> TileId {
-    tiles.insert_tab_tile(children)
+/// The panes of a place: side by side at the top, else tabs, and one alone as it is.
+fn docked(tiles: &mut Tiles<Leaf>, dock: Dock) -> TileId {
+    let panes = Pane::all().iter().filter(|pane| pane.dock() == dock);
+    let panes: Vec<TileId> = panes.map(|pane| tiles.insert_pane(*pane)).collect();
+    match panes[..] {
+        [one] => one,
+        _ if dock == Dock::Top => tiles.insert_horizontal_tile(panes),
+        _ => tiles.insert_tab_tile(panes),
+    }
 }
 
-impl Layout {
+impl PaneLayout {
     /// A stored tree; one without a single pane is replaced by the default.
-    pub(crate) fn restored(tree: Tree<PaneKind>) -> Self {
+    pub(crate) fn restored(tree: Tree<Leaf>) -> Self {
         if tree.root().is_some() && tree.tiles.iter().any(|(_, tile)| matches!(tile, Tile::Pane(_))) {
             let mut restored = Self { tree, asked: None };
             restored.complete();
@@ -144,40 +64,39 @@ impl Layout {
         }
     }
 
-    /// Adds what an older tree does not know yet to the tabs of the curves, or to the first tabs that there are.
+    /// Adds what an older tree does not know yet: to the tabs with a pane of the same place, or to the first tabs there are.
     fn complete(&mut self) {
-        let tiles = &self.tree.tiles;
-        let has = |wanted: PaneKind| tiles.iter().any(|(_, tile)| matches!(tile, Tile::Pane(pane) if *pane == wanted));
-        let missing: Vec<PaneKind> = PaneKind::ALL.into_iter().filter(|&pane| !has(pane)).collect();
-        let of_curves = tiles.iter().find_map(|(id, tile)| {
-            matches!(tile, Tile::Pane(PaneKind::Curves)).then(|| tiles.parent_of(*id)).flatten()
-        });
-        let is_tabs = |id: &TileId| matches!(tiles.get(*id), Some(Tile::Container(Container::Tabs(_))));
-        let mut all: Vec<TileId> = tiles.iter().map(|(id, _)| *id).filter(|id| is_tabs(id)).collect();
-        all.sort_unstable_by_key(|id| id.0);
-        let Some(home) = of_curves.filter(|id| is_tabs(id)).or_else(|| all.first().copied()) else { return };
-        for pane in missing {
-            let id = self.tree.tiles.insert_pane(pane);
-            if let Some(Tile::Container(Container::Tabs(tabs))) = self.tree.tiles.get_mut(home) {
+        for &pane in Pane::all() {
+            let tiles = &mut self.tree.tiles;
+            if tiles.find_pane(&pane).is_some() {
+                continue;
+            }
+            let is_tabs = |id: &TileId| matches!(tiles.get(*id), Some(Tile::Container(Container::Tabs(_))));
+            let neighbours = Pane::all().iter().filter(|other| other.dock() == pane.dock());
+            let mut homes = neighbours.filter_map(|other| tiles.parent_of(tiles.find_pane(other)?)).filter(is_tabs);
+            let Some(home) = homes.next().or_else(|| tiles.tile_ids().filter(is_tabs).min_by_key(|id| id.0)) else {
+                return;
+            };
+            let id = tiles.insert_pane(pane);
+            if let Some(Tile::Container(Container::Tabs(tabs))) = tiles.get_mut(home) {
                 tabs.add_child(id);
             }
         }
     }
 
     /// The tree, to be stored.
-    pub(crate) fn stored(&self) -> &Tree<PaneKind> {
+    pub(crate) fn stored(&self) -> &Tree<Leaf> {
         &self.tree
     }
 
     /// Where a pane was drawn in the last pass, points; `None` where it is behind another tab.
-    pub(crate) fn rect(&self, pane: PaneKind) -> Option<egui::Rect> {
-        let (id, _) = self.tree.tiles.iter().find(|(_, tile)| matches!(tile, Tile::Pane(kind) if *kind == pane))?;
-        self.tree.tiles.rect(*id)
+    pub(crate) fn rect(&self, pane: Leaf) -> Option<egui::Rect> {
+        self.tree.tiles.rect(self.tree.tiles.find_pane(&pane)?)
     }
 
     /// Brings a pane to the front; one that was closed is not brought back.
-    pub(crate) fn show_pane(&mut self, pane: PaneKind) {
-        self.tree.make_active(|_, tile| matches!(tile, Tile::Pane(kind) if *kind == pane));
+    pub(crate) fn show_pane(&mut self, pane: Leaf) {
+        self.tree.make_active(|_, tile| matches!(tile, Tile::Pane(other) if *other == pane));
     }
 
     /// What was asked for on a tab.
@@ -201,24 +120,18 @@ struct Behavior<'a, 'b> {
     asked: &'a mut Option<AppAct>,
 }
 
-impl egui_tiles::Behavior<PaneKind> for Behavior<'_, '_> {
-    fn pane_ui(&mut self, ui: &mut egui::Ui, _tile: TileId, pane: &mut PaneKind) -> UiResponse {
+impl egui_tiles::Behavior<Leaf> for Behavior<'_, '_> {
+    fn pane_ui(&mut self, ui: &mut egui::Ui, _tile: TileId, pane: &mut Leaf) -> UiResponse {
         let tokens = Tokens::of(ui);
-        let data =
-            matches!(pane, PaneKind::HOri | PaneKind::HSim | PaneKind::Masks | PaneKind::Scene | PaneKind::Image);
-        let margin = if data { 0 } else { 8 };
-        egui::Frame::new().fill(tokens.panel).inner_margin(margin).show(ui, |ui| {
-            ui.set_min_size(ui.available_size());
-            panes::show(*pane, ui, self.shared, self.states);
-        });
+        pane.show(ui, tokens.panel, self.shared, self.states);
         UiResponse::None
     }
 
-    fn tab_title_for_pane(&mut self, pane: &PaneKind) -> egui::WidgetText {
+    fn tab_title_for_pane(&mut self, pane: &Leaf) -> egui::WidgetText {
         egui::RichText::new(pane.title()).font(theme::strong(12.0)).into()
     }
 
-    fn on_tab_button(&mut self, tiles: &mut Tiles<PaneKind>, tile: TileId, response: egui::Response) -> egui::Response {
+    fn on_tab_button(&mut self, tiles: &mut Tiles<Leaf>, tile: TileId, response: egui::Response) -> egui::Response {
         if let Some(Tile::Pane(pane)) = tiles.get(tile) {
             response.context_menu(|ui| {
                 let tip = "As it is on screen, without the rest of the window.";
@@ -247,22 +160,16 @@ impl egui_tiles::Behavior<PaneKind> for Behavior<'_, '_> {
         if visuals.dark_mode { theme::DARK.panel } else { theme::LIGHT.panel }
     }
 
-    fn tab_bg_color(&self, visuals: &egui::Visuals, _: &Tiles<PaneKind>, _: TileId, _: &TabState) -> egui::Color32 {
+    fn tab_bg_color(&self, visuals: &egui::Visuals, _: &Tiles<Leaf>, _: TileId, _: &TabState) -> egui::Color32 {
         self.tab_bar_color(visuals)
     }
 
-    fn tab_text_color(
-        &self,
-        visuals: &egui::Visuals,
-        _: &Tiles<PaneKind>,
-        _: TileId,
-        state: &TabState,
-    ) -> egui::Color32 {
+    fn tab_text_color(&self, visuals: &egui::Visuals, _: &Tiles<Leaf>, _: TileId, state: &TabState) -> egui::Color32 {
         let tokens = if visuals.dark_mode { theme::DARK } else { theme::LIGHT };
         if state.active { tokens.text } else { tokens.dim }
     }
 
-    fn tab_outline_stroke(&self, _: &egui::Visuals, _: &Tiles<PaneKind>, _: TileId, _: &TabState) -> egui::Stroke {
+    fn tab_outline_stroke(&self, _: &egui::Visuals, _: &Tiles<Leaf>, _: TileId, _: &TabState) -> egui::Stroke {
         egui::Stroke::NONE
     }
 

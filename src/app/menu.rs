@@ -1,6 +1,6 @@
 //! The bar at the top: menus from the command table, and the status of data set, frame and fit.
 
-use super::commands::{Menu, all, shortcut_text, tooltip};
+use super::commands::{Menu, all, shortcut_text};
 use super::panes::Shared;
 use super::theme::{self, Tokens};
 use crate::session::{Command, FitStatus, LabelMode};
@@ -13,7 +13,10 @@ pub(super) fn bar(ui: &mut Ui, shared: &mut Shared<'_>) {
         ui.horizontal_centered(|ui| {
             egui::MenuBar::new().ui(ui, |ui| {
                 for menu in Menu::ALL {
-                    ui.menu_button(menu.title(), |ui| items(ui, shared, menu));
+                    ui.menu_button(menu.title(), |ui| {
+                        let height = ui.ctx().content_rect().height() - 48.0;
+                        egui::ScrollArea::vertical().max_height(height).show(ui, |ui| items(ui, shared, menu));
+                    });
                 }
                 status(ui, shared, &tokens);
             });
@@ -23,17 +26,17 @@ pub(super) fn bar(ui: &mut Ui, shared: &mut Shared<'_>) {
 
 fn items(ui: &mut Ui, shared: &mut Shared<'_>, menu: Menu) {
     ui.set_min_width(230.0);
-    for command in all().filter(|command| command.menu == menu) {
-        if menu == Menu::File && command.label == "Quit" {
+    for command in all().filter(|command| command.menu() == menu) {
+        if menu == Menu::File && command.label() == "Quit" {
             recent(ui, shared);
             ui.separator();
         }
-        let enabled = (command.enabled)(shared.session);
-        let mut button = egui::Button::new(command.text(shared.session));
-        if let Some(&keys) = command.keys.first() {
+        let enabled = command.enabled(shared.session);
+        let mut button = egui::Button::new(command.text(shared.session).into_owned());
+        if let Some(&keys) = command.keys().first() {
             button = button.shortcut_text(shortcut_text(keys));
         }
-        let mark = match command.label {
+        let mark = match command.label().as_ref() {
             "Warm start" => shared.session.warm_start,
             "Play frames" => shared.session.data.playing,
             "Explore" => shared.session.view.label_mode == LabelMode::Explore,
@@ -42,8 +45,8 @@ fn items(ui: &mut Ui, shared: &mut Shared<'_>, menu: Menu) {
             _ => false,
         };
         let response = ui.add_enabled(enabled, button.selected(mark));
-        if response.on_hover_text(tooltip(command)).clicked() {
-            shared.acts.push((command.act)(shared.session));
+        if response.on_hover_text(command.tip()).clicked() {
+            shared.acts.push(command.action(shared.session));
             ui.close();
         }
     }

@@ -12,18 +12,19 @@ mod overlay;
 mod panes;
 mod sharing;
 mod theme;
+mod timeline;
 mod widgets;
 
 use crate::config::FitConfig;
 use crate::session::{Command, LogLevel, Runtime, Session, StartAt, ViewState};
-use commands::{Act, AppAct};
-use layout::Layout;
+use commands::{AppAct, UiAction};
+use layout::PaneLayout;
 use overlay::Overlay;
-use panes::{PaneStates, Shared};
+use panes::{PaneStates, Shared, study};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-pub use layout::PaneKind;
+pub use panes::Pane;
 
 /// The name under which settings are stored.
 pub const APP_ID: &str = "mhp-inspector";
@@ -56,8 +57,10 @@ pub struct Begin {
 pub struct InspectorApp {
     session: Session,
     runtime: Runtime,
-    layout: Layout,
+    layout: PaneLayout,
     panes: PaneStates,
+    timeline: timeline::Timeline,
+    gpu: Option<eframe::egui_wgpu::RenderState>,
     overlay: Overlay,
     pictures: sharing::PendingPictures,
     notices_seen: u64,
@@ -76,14 +79,14 @@ impl InspectorApp {
     pub fn begin(cc: &eframe::CreationContext<'_>, begin: &Begin) -> Self {
         theme::install(&cc.egui_ctx);
         let mut session = Session::default();
-        let mut layout = Layout::default();
+        let mut layout = PaneLayout::default();
         let mut annotator = crate::folders::user_name();
         if let Some(storage) = cc.storage {
             annotator = eframe::get_value(storage, ANNOTATOR_KEY).unwrap_or(annotator);
             session.view = eframe::get_value::<ViewState>(storage, VIEW_KEY).unwrap_or_default();
             session.data.recent = eframe::get_value(storage, RECENT_KEY).unwrap_or_default();
             if let Some(stored) = eframe::get_value(storage, LAYOUT_KEY) {
-                layout = Layout::restored(stored);
+                layout = PaneLayout::restored(stored);
             }
         }
         session.apply(Command::SetAnnotator(annotator));
@@ -94,7 +97,9 @@ impl InspectorApp {
             session,
             runtime,
             layout,
-            panes: PaneStates::new(cc.wgpu_render_state.clone()),
+            panes: PaneStates::default(),
+            timeline: timeline::Timeline::default(),
+            gpu: cc.wgpu_render_state.clone(),
             overlay: Overlay::default(),
             pictures: sharing::PendingPictures::default(),
             notices_seen: 0,
@@ -139,12 +144,12 @@ impl InspectorApp {
     }
 
     /// Brings a pane to the front.
-    pub fn show_pane(&mut self, pane: PaneKind) {
+    pub fn show_pane(&mut self, pane: &'static Pane) {
         self.layout.show_pane(pane);
     }
 
     /// Where a pane was drawn in the last pass, points; `None` where it is behind another tab.
-    pub fn pane_rect(&self, pane: PaneKind) -> Option<egui::Rect> {
+    pub fn pane_rect(&self, pane: &'static Pane) -> Option<egui::Rect> {
         self.layout.rect(pane)
     }
 
@@ -153,13 +158,18 @@ impl InspectorApp {
         self.panes.focus(&self.session);
     }
 
-    fn act(&mut self, ctx: &egui::Context, act: Act) {
+    fn act(&mut self, ctx: &egui::Context, act: UiAction) {
         match act {
-            Act::Session(Command::OpenRun(folder)) => self.open_run(folder),
-            Act::Session(command) => self.apply(command),
-            Act::App(act) => self.app_act(ctx, act),
-            Act::Write(kind, path) => self.save(ctx, kind, path),
-            Act::ShowCells { view, lo, hi } => self.panes.maps.show_cells(&self.session, view, &lo, &hi),
+            UiAction::Session(Command::OpenRun(folder)) => self.open_run(folder),
+            UiAction::Session(command) => self.apply(command),
+            UiAction::App(act) => self.app_act(ctx, act),
+            UiAction::Write(kind, path) => self.save(ctx, kind, path),
+            UiAction::Panes { front, change } => {
+                if let Some(pane) = front {
+                    self.layout.show_pane(pane);
+                }
+                change(&mut self.panes, &self.session);
+            }
         }
     }
 
@@ -171,12 +181,9 @@ impl InspectorApp {
             AppAct::About => self.overlay.toggle_about(),
             AppAct::GotoFrame => self.overlay.open_goto(self.session.data.frame_index),
             AppAct::OpenPath => self.overlay.open_path(self.session.data.recent.first()),
-            AppAct::ResetLayout => self.layout = Layout::default(),
+            AppAct::ResetLayout => self.layout = PaneLayout::default(),
             AppAct::ResetViews => self.panes.reset_views(),
             AppAct::Focus => self.panes.focus(&self.session),
-            AppAct::CameraRadar => self.panes.scene.look_from_radar(&self.session),
-            AppAct::CameraTop => self.panes.scene.look_from_top(&self.session),
-            AppAct::CameraSide => self.panes.scene.look_from_side(&self.session),
             AppAct::ZoomIn => self.set_zoom(self.session.view.zoom + 0.1),
             AppAct::ZoomOut => self.set_zoom(self.session.view.zoom - 0.1),
             AppAct::ZoomReset => self.set_zoom(1.0),
@@ -188,12 +195,6 @@ impl InspectorApp {
             AppAct::LoadResults => self.overlay.load_results(),
             AppAct::OpenStudy => self.overlay.open_study(),
             AppAct::CopyPath => self.copy_path(ctx),
-            AppAct::FocusFilter => self.panes.frames.focus_filter(),
-            AppAct::FocusNote => {
-                self.layout.show_pane(PaneKind::Modes);
-                self.panes.modes.focus_note();
-            }
-            AppAct::MarkCells => self.panes.maps.mark_cells(),
             AppAct::FullScreen => {
                 let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
                 ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!full));
@@ -209,7 +210,7 @@ impl InspectorApp {
 
     /// Reads a run folder and brings its pane to the front.
     fn open_run(&mut self, folder: PathBuf) {
-        self.layout.show_pane(PaneKind::Study);
+        self.layout.show_pane(&study::PANE);
         self.apply(Command::OpenRun(folder));
     }
 
@@ -282,8 +283,8 @@ impl eframe::App for InspectorApp {
         }
         if !self.overlay.is_modal() {
             for command in commands::pressed(ctx) {
-                if (command.enabled)(&self.session) {
-                    let act = (command.act)(&self.session);
+                if command.enabled(&self.session) {
+                    let act = command.action(&self.session);
                     self.act(ctx, act);
                 }
             }
@@ -292,16 +293,16 @@ impl eframe::App for InspectorApp {
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
-        let mut acts: Vec<Act> = Vec::new();
+        let mut acts: Vec<UiAction> = Vec::new();
         {
-            let mut shared = Shared { session: &self.session, acts: &mut acts };
+            let mut shared = Shared { session: &self.session, acts: &mut acts, gpu: self.gpu.as_ref() };
             menu::bar(ui, &mut shared);
-            panes::timeline::show(ui, &mut shared, &mut self.panes.timeline);
+            timeline::show(ui, &mut shared, &mut self.timeline);
             self.layout.show(ui, &mut shared, &mut self.panes);
             self.overlay.show(ui, &mut shared);
         }
         let ctx = ui.ctx().clone();
-        acts.extend(self.layout.take_asked().map(Act::App));
+        acts.extend(self.layout.take_asked().map(UiAction::App));
         for act in acts {
             self.act(&ctx, act);
         }

@@ -3,7 +3,7 @@
 mod bare;
 mod files;
 
-use super::commands::{Menu, SaveKind, UserCommand, all, shortcut_text};
+use super::commands::{Menu, SaveKind, all, found, shortcut_text};
 use super::panes::Shared;
 use super::theme::{self, Tokens};
 use crate::session::{Command, LogLevel, PickKind};
@@ -41,8 +41,8 @@ pub(super) struct Overlay {
     chosen: usize,
     fresh: bool,
     notices: Vec<(f64, LogLevel, String)>,
-    bare: bare::State,
-    files: files::State,
+    bare: bare::BareQuestion,
+    files: files::FileDialog,
 }
 
 impl Overlay {
@@ -113,12 +113,7 @@ impl Overlay {
             let none = egui::Modifiers::NONE;
             (i.consume_key(none, Key::ArrowUp), i.consume_key(none, Key::ArrowDown), i.key_pressed(Key::Enter))
         });
-        let words: Vec<String> = self.query.to_lowercase().split_whitespace().map(str::to_owned).collect();
-        let fits = |c: &&UserCommand| {
-            let text = format!("{} {} {}", c.label, c.menu.title(), c.tooltip).to_lowercase();
-            words.iter().all(|word| text.contains(word.as_str()))
-        };
-        let found: Vec<&UserCommand> = all().filter(fits).collect();
+        let found = found(&self.query);
         let last = found.len().saturating_sub(1);
         self.chosen = (self.chosen + usize::from(down)).min(last).saturating_sub(usize::from(up));
         let mut done = false;
@@ -139,18 +134,18 @@ impl Overlay {
             ui.add_space(4.0);
             egui::ScrollArea::vertical().max_height(340.0).show(ui, |ui| {
                 for (i, command) in found.iter().enumerate() {
-                    let enabled = (command.enabled)(shared.session);
-                    let mut button = egui::Button::new(command.text(shared.session))
+                    let enabled = command.enabled(shared.session);
+                    let mut button = egui::Button::new(command.text(shared.session).into_owned())
                         .selected(i == self.chosen)
                         .min_size(vec2(440.0, 22.0));
-                    let keys = command.keys.first().map(|&k| shortcut_text(k)).unwrap_or_default();
+                    let keys = command.keys().first().map(|&k| shortcut_text(k)).unwrap_or_default();
                     button = button.shortcut_text(keys).frame_when_inactive(false);
-                    let response = ui.add_enabled(enabled, button).on_hover_text(command.tooltip);
+                    let response = ui.add_enabled(enabled, button).on_hover_text(command.tooltip());
                     if i == self.chosen && (up || down) {
                         response.scroll_to_me(None);
                     }
                     if response.clicked() || (enter && i == self.chosen && enabled) {
-                        shared.acts.push((command.act)(shared.session));
+                        shared.acts.push(command.action(shared.session));
                         done = true;
                     }
                 }
@@ -285,8 +280,8 @@ fn help(ui: &mut Ui) {
         for (i, menu) in Menu::ALL.into_iter().enumerate() {
             let ui = &mut columns[usize::from(i >= 4)];
             ui.label(RichText::new(menu.title()).font(theme::strong(13.0)));
-            for command in all().filter(|c| c.menu == menu && !c.keys.is_empty()) {
-                key_row(ui, &shortcut_text(command.keys[0]), command.label, &tokens);
+            for command in all().filter(|c| c.menu() == menu && !c.keys().is_empty()) {
+                key_row(ui, &shortcut_text(command.keys()[0]), &command.label(), &tokens);
             }
             ui.add_space(8.0);
         }

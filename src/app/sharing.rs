@@ -2,20 +2,22 @@
 
 use super::InspectorApp;
 use super::commands::SaveKind;
-use super::layout::{Layout, PaneKind};
-use super::panes::PaneStates;
+use super::layout::PaneLayout;
+use super::panes::Pane;
 use crate::output::{Sink, portable, replace_file};
 use crate::session::{BackgroundTask, Command, Export, LogLevel, OutputCheck, Session};
 use egui::{ColorImage, Context, Rect};
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// What only the window knows of a session.
 #[derive(Serialize, Deserialize)]
 struct WindowState {
-    layout: egui_tiles::Tree<PaneKind>,
-    panes: super::panes::Stored,
+    layout: egui_tiles::Tree<&'static Pane>,
+    /// What the panes keep, each under its own name.
+    panes: Map<String, Value>,
 }
 
 /// Pictures that were asked for and are not drawn yet.
@@ -115,8 +117,9 @@ impl InspectorApp {
         match kind {
             SaveKind::Export(what) => self.apply(Command::Export(what, path)),
             SaveKind::Session => {
-                let window = WindowState { layout: self.layout.stored().clone(), panes: self.panes.stored() };
-                match serde_json::to_value(&window) {
+                let layout = self.layout.stored().clone();
+                let window = self.panes.stored().map(|panes| WindowState { layout, panes });
+                match window.and_then(serde_json::to_value) {
                     Ok(window) => self.apply(Command::SaveSession(path, window)),
                     Err(error) => {
                         self.apply(Command::Log(LogLevel::Error, format!("the session was not saved: {error}")));
@@ -131,7 +134,7 @@ impl InspectorApp {
     }
 
     /// Puts the picture of the window, or of one pane, on the clipboard.
-    pub(super) fn copy_picture(&mut self, ctx: &Context, pane: Option<PaneKind>) {
+    pub(super) fn copy_picture(&mut self, ctx: &Context, pane: Option<&'static Pane>) {
         let rect = pane.and_then(|pane| self.layout.rect(pane));
         self.pictures.ask(ctx, Wanted::Clipboard(rect));
     }
@@ -165,28 +168,16 @@ impl InspectorApp {
     /// Puts back what a session file says of the window.
     pub(super) fn take_restored(&mut self) {
         let Some(window) = self.session.take_restored_window() else { return };
-        match serde_json::from_value::<WindowState>(window) {
-            Ok(state) => {
-                self.layout = Layout::restored(state.layout);
-                self.panes.restore(state.panes, &self.session);
-            }
+        let restored = serde_json::from_value::<WindowState>(window).and_then(|state| {
+            self.panes.restore(state.panes, &self.session)?;
+            Ok(state.layout)
+        });
+        match restored {
+            Ok(layout) => self.layout = PaneLayout::restored(layout),
             Err(error) => {
                 let text = format!("camera and layout of the session could not be put back: {error}");
                 self.apply(Command::Log(LogLevel::Warning, text));
             }
         }
-    }
-}
-
-impl PaneStates {
-    /// Camera and zoom of the maps, to be kept in a session file.
-    pub(super) fn stored(&self) -> super::panes::Stored {
-        super::panes::Stored { camera: self.scene.stored(), maps: self.maps.stored() }
-    }
-
-    /// Puts camera and zoom back.
-    pub(super) fn restore(&mut self, stored: super::panes::Stored, session: &Session) {
-        self.scene.restore(stored.camera, session);
-        self.maps.restore(stored.maps, session);
     }
 }

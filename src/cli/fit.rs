@@ -7,7 +7,7 @@ use super::common::{
 };
 use super::frames::{FrameRange, chosen};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
-use crate::config::{FitConfig, Preset};
+use crate::config::{FitConfig, Preset, listing};
 use crate::dataset::Dataset;
 use crate::output::{FolderLock, replace_file};
 use crate::study::{BatchOptions, BatchRow, Means, Summary, columns, run_batch};
@@ -34,6 +34,11 @@ Examples:
       A minute of MMVR, each frame from the one before; writes results/summary.csv, fit.toml, pppr/*.npz.
   mhp-inspector fit data/walk --frames 7 --out results --ply --curves
       Also the Gaussians of the end as pppr/*.ply and every iteration as curves/*.csv.";
+
+/// Shown under them by `fit --help`, and not by `fit -h`: also every setting.
+pub(super) fn long_help() -> String {
+    format!("{HELP}\n\n{}", listing())
+}
 
 /// The folders of parameters and of iterations.
 const PARAMS: &str = "pppr";

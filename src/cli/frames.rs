@@ -1,6 +1,6 @@
 //! `--frames A..B`: which frames, as a range is written in Rust.
 
-use crate::dataset::{Dataset, Layout};
+use crate::dataset::Dataset;
 use std::ops::Range;
 use std::path::Path;
 use std::str::FromStr;
@@ -10,11 +10,9 @@ use std::str::FromStr;
 /// # Errors
 /// Where the range reaches past the end.
 pub(super) fn chosen(asked: Option<FrameRange>, path: &Path, dataset: &Dataset) -> anyhow::Result<Range<usize>> {
-    let whole = asked.is_none() && !(dataset.info().layout == Layout::Mmvr && path.is_file());
-    if whole {
-        return Ok(0..dataset.len());
-    }
-    let Some(range) = asked else { return Ok(dataset.start_index()..dataset.start_index() + 1) };
+    let Some(range) = asked else {
+        return Ok(dataset.named_frame().map_or(0..dataset.len(), |frame| frame..frame + 1));
+    };
     range.within(dataset.len()).map_err(|why| anyhow::anyhow!("{}: --frames: {why}", path.display()))
 }
 

@@ -244,3 +244,22 @@ fn as_text(dataset: &Dataset, frame: &Frame, label_notes: &[String]) -> String {
     }
     out.lines().map(str::trim_end).fold(String::new(), |text, line| text + line + "\n")
 }
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+    use super::*;
+    use crate::task::Progress;
+
+    #[test]
+    fn a_layout_of_the_registry_is_told_by_its_word() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("000.dummy"), b"abcdef").unwrap();
+        let dataset = Dataset::open(folder.path(), &Progress::new()).unwrap();
+        let frame = dataset.load(0).unwrap();
+        let text = as_text(&dataset, &frame, &[]);
+        assert!(text.contains("data set    Dummy\n") && text.contains("layout      dummy\n"), "{text}");
+        assert!(text.contains("view        bytes, 2×3 |u1, amplitude\n"), "{text}");
+        assert_eq!(as_json(&dataset, &frame, &[])["layout"], "dummy");
+    }
+}

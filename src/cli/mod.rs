@@ -159,7 +159,7 @@ pub enum CliCommand {
     ///
     /// Each frame starts from the peaks of its own maps, or with --warm-start from the frame before, and takes the
     /// configured number of Adam steps. Frames are fitted side by side; rows are in the order of the data set.
-    #[command(after_help = fit::HELP)]
+    #[command(after_help = fit::HELP, after_long_help = fit::long_help())]
     Fit(fit::FitArgs),
     /// Tell what is in a data set: layout, frames, views and axes, ranges of values, skeleton, people, labels.
     #[command(after_help = info::HELP)]

@@ -1,7 +1,7 @@
 //! `screenshot`: the real window, drawn offscreen after a number of iterations.
 
 use super::common::{config, outside_allowed};
-use crate::app::{Begin, InspectorApp, PaneKind};
+use crate::app::{Begin, InspectorApp, Pane};
 use crate::output::{Sink, replace_file};
 use crate::session::{Command, FitStatus, LabelStatus, StrataStatus, ThemeChoice};
 use anyhow::{Context as _, bail};
@@ -189,10 +189,11 @@ fn set_up(harness: &mut Harness<'_, InspectorApp>, args: &ScreenshotArgs) -> any
     Ok(())
 }
 
-fn pane_called(name: &str) -> anyhow::Result<PaneKind> {
-    let names: Vec<&str> = PaneKind::ALL.iter().map(|pane| pane.title()).collect();
-    let found = PaneKind::ALL.into_iter().find(|pane| pane.title().eq_ignore_ascii_case(name));
-    found.with_context(|| format!("no pane is called {name}; expected one of {}", names.join(", ")))
+fn pane_called(name: &str) -> anyhow::Result<&'static Pane> {
+    Pane::called(name).with_context(|| {
+        let titles: Vec<&str> = Pane::all().iter().map(|pane| pane.title()).collect();
+        format!("no pane is called {name}; expected one of {}", titles.join(", "))
+    })
 }
 
 /// Goes to the frame and takes the asked iterations.

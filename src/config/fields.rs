@@ -1,298 +1,384 @@
-//! The numbers of [`FitConfig`] one by one: label, meaning, unit, range. Sliders, tooltips and checks read this table.
+//! The one table of settings: a row for each key of `FIT.toml`, in the order that they are shown.
+//!
+//! A new setting is a field of [`FitConfig`] with its default, and a row here.
 
-use super::FitConfig;
+use super::field::{Access, Answer, Field, FieldGroup, ReadBy, Unset, Value};
+use super::rows::{choice, count_at, flag_at, maybe_at, number, number_at, one_of_at, switch};
+use super::{
+    Background, Convergence, EM_REGION_FORM, EmRegion, FitConfig, FramesAround, GradientVelocity, Height, Limbs,
+    Parameterization, Place, Scatterers, Still, Summation, WarmStart, Yaw, answers,
+};
+use FieldGroup::{Limits, Model, Optimiser, Perturbation, Radar, Start as Starting, StepSizes, Weights};
+use ReadBy::{Run, Start, Steps, StepsAndStart};
 
-/// Which part of the settings a field belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FieldGroup {
-    /// What is weighed against what.
-    Weights,
-    /// The optimiser and its regularisation.
-    Optimiser,
-    /// What the paper's objective lacks.
-    Regularisation,
-    /// The radar's simulation.
-    Radar,
-    /// Kinematic limits.
-    Limits,
-    /// How a start is found.
-    Start,
-    /// How a start is perturbed on purpose.
-    Perturbation,
-}
+const EM_REGION: Access = (
+    |c| match c.em_region {
+        EmRegion::Full => Value::Unset,
+        EmRegion::HalfWidth(half) => Value::Number(half),
+    },
+    |c, value| match value {
+        Value::Unset => c.em_region = EmRegion::Full,
+        Value::Number(half) => c.em_region = EmRegion::HalfWidth(half),
+        Value::Switch(_) | Value::Answer(_) => {}
+    },
+);
 
-impl FieldGroup {
-    /// The fields of this group, in the order they are shown.
-    pub fn fields(self) -> impl Iterator<Item = &'static Field> {
-        FIELDS.iter().filter(move |field| field.group == self)
-    }
-}
+const WHOLE_MAP: Unset = Unset {
+    answer: Answer { word: "full", label: "whole map", help: "All cells: the paper (4.3)." },
+    number: "±",
+    first: 1.25,
+    form: Some(EM_REGION_FORM),
+};
 
-/// How a number of [`FitConfig`] is edited and explained.
-pub struct Field {
-    /// The key in `FIT.toml`; `table.key` inside a table.
-    pub key: &'static str,
-    /// Where it is shown.
-    pub group: FieldGroup,
-    /// The label on screen, in the paper's notation.
-    pub label: &'static str,
-    /// Meaning and formula.
-    pub help: &'static str,
-    /// Unit, or "".
-    pub unit: &'static str,
-    /// Inclusive range that is accepted.
-    pub range: (f64, f64),
-    /// Whether the slider is logarithmic.
-    pub logarithmic: bool,
-    /// Reads the number.
-    pub get: fn(&FitConfig) -> f64,
-    /// Writes the number.
-    pub set: fn(&mut FitConfig, f64),
-}
+const AS_ALL: Unset = Unset {
+    answer: Answer { word: "unset", label: "as all", help: "That of all groups: the key is left out." },
+    number: "own",
+    first: 1e-3,
+    form: None,
+};
 
-/// Every number of [`FitConfig`], in the order it is shown.
+/// Every setting of [`FitConfig`], in the order it is shown.
 pub const FIELDS: &[Field] = &[
     Field {
-        key: "w_em",
-        group: FieldGroup::Weights,
-        label: "w_EM",
         help: "Weight of the electromagnetic term: L = w_EM·L_EM + w_kine·L_kine, L_EM = 1 − soft IoU of the masks of H_sim and H_ori.",
-        unit: "",
-        range: (0.0, 1000.0),
-        logarithmic: true,
-        get: |c| c.w_em,
-        set: |c, x| c.w_em = x,
+        ..number(Weights, "w_em", "w_EM", Steps, (0.0, 1000.0), number_at!(w_em)).logarithmic().row("weights")
     },
     Field {
-        key: "w_kine",
-        group: FieldGroup::Weights,
-        label: "w_kine",
         help: "Weight of the kinematic terms: bone lengths, rigid motion, joint angles, and for several people separation and collision.",
-        unit: "",
-        range: (0.0, 1000.0),
-        logarithmic: true,
-        get: |c| c.w_kine,
-        set: |c, x| c.w_kine = x,
+        ..number(Weights, "w_kine", "w_kine", Steps, (0.0, 1000.0), number_at!(w_kine)).logarithmic().row("weights")
     },
     Field {
-        key: "tau_pct",
-        group: FieldGroup::Weights,
-        label: "τ_pct",
         help: "Share of the EM region's cells that a mask holds: B = [H > P_{100−τ}(H)]. At 100 % all but the smallest cell: no masking.",
-        unit: "%",
-        range: (0.1, 100.0),
-        logarithmic: true,
-        get: |c| c.tau_pct,
-        set: |c, x| c.tau_pct = x,
+        ..number(Weights, "tau_pct", "τ_pct", StepsAndStart, (0.1, 100.0), number_at!(tau_pct))
+            .logarithmic()
+            .unit("%")
+            .row("threshold")
     },
     #[cfg(test)]
     Field {
-        key: "w_dummy",
-        group: FieldGroup::Weights,
-        label: "w_dummy",
         help: "Weight of a term that only tests know.",
-        unit: "",
-        range: (0.0, 1000.0),
-        logarithmic: true,
-        get: |c| c.w_dummy,
-        set: |c, x| c.w_dummy = x,
+        ..number(Weights, "w_dummy", "w_dummy", Steps, (0.0, 1000.0), number_at!(w_dummy)).logarithmic().row("weights")
     },
     Field {
-        key: "softness",
-        group: FieldGroup::Optimiser,
-        label: "T (softness)",
         help: "Temperature of the soft mask m = σ((ln H_sim − ln P)/T): small is sharp, large spreads the gradient.",
-        unit: "",
-        range: (0.01, 10.0),
-        logarithmic: true,
-        get: |c| c.softness,
-        set: |c, x| c.softness = x,
+        ..number(Optimiser, "softness", "T (softness)", StepsAndStart, (0.01, 10.0), number_at!(softness))
+            .logarithmic()
+            .row("softness")
     },
     Field {
-        key: "learning_rate",
-        group: FieldGroup::Optimiser,
-        label: "Learning rate",
         help: "Adam's step size for every group (m, ln m, m/s, … a step).",
-        unit: "",
-        range: (1e-6, 1.0),
-        logarithmic: true,
-        get: |c| c.learning_rate,
-        set: |c, x| c.learning_rate = x,
+        ..number(Optimiser, "learning_rate", "Learning rate", Steps, (1e-6, 1.0), number_at!(learning_rate))
+            .logarithmic()
+            .row("step sizes")
     },
     Field {
-        key: "iterations",
-        group: FieldGroup::Optimiser,
-        label: "Iterations",
         help: "Adam steps of a run.",
-        unit: "",
-        range: (1.0, 100_000.0),
-        logarithmic: true,
-        get: |c| c.iterations as f64,
-        set: |c, x| c.iterations = x.round().max(0.0) as usize,
+        ..number(Optimiser, "iterations", "Iterations", Run, (1.0, 100_000.0), count_at!(iterations))
+            .logarithmic()
+            .whole()
+            .row("iterations")
     },
     Field {
-        key: "theta_max_deg",
-        group: FieldGroup::Limits,
-        label: "θ_max",
-        help: "Largest elbow and knee angle; beyond it L_joint = Σ max(0, θ − θ_max)² grows.",
-        unit: "°",
-        range: (0.0, 180.0),
-        logarithmic: false,
-        get: |c| c.theta_max_deg,
-        set: |c, x| c.theta_max_deg = x,
+        help: "End a run as soon as the convergence criterion holds.",
+        ..switch(Optimiser, "stop_when_converged", "Stop when converged", Run, flag_at!(stop_when_converged))
+            .called("stop when converged")
+            .row("early stop")
     },
     Field {
-        key: "bone_tolerance_m",
-        group: FieldGroup::Limits,
-        label: "Bone tolerance",
-        help: "How far a bone may be from its reference length at no cost: L_bone = Σ ψ(max(0, |l − ℓ| − tolerance)). The paper's formula has none (4.3), its list of settings has 5 cm (appendix D).",
-        unit: "m",
-        range: (0.0, 0.5),
-        logarithmic: false,
-        get: |c| c.bone_tolerance_m,
-        set: |c, x| c.bone_tolerance_m = x,
+        help: "When five iterations count as no more progress.",
+        ..choice(
+            Optimiser,
+            "convergence",
+            "Converged",
+            Steps,
+            answers::CONVERGENCE,
+            one_of_at!(convergence, [Convergence::Change, Convergence::Improvement]),
+        )
+        .row("convergence")
     },
     Field {
-        key: "surface_offset_m",
-        group: FieldGroup::Radar,
-        label: "δ (skin)",
+        help: "A = α·(r_max/d)⁴; off: A = α.",
+        ..switch(Radar, "operators.attenuation", "attenuation", StepsAndStart, flag_at!(operators.attenuation))
+            .row("operators")
+    },
+    Field {
+        help: "Beat-frequency phase 2πSτ²; off: range axes see every joint at 0 m.",
+        ..switch(Radar, "operators.range", "range", StepsAndStart, flag_at!(operators.range)).row("operators")
+    },
+    Field {
+        help: "Phase 2π(2v_r/λ)T_frame and the ramp; off: Doppler axes see every joint at rest.",
+        ..switch(Radar, "operators.doppler", "Doppler", StepsAndStart, flag_at!(operators.doppler)).row("operators")
+    },
+    Field {
+        help: "Array phase; off: angular axes see every joint at boresight.",
+        ..switch(Radar, "operators.angle", "angle", StepsAndStart, flag_at!(operators.angle)).row("operators")
+    },
+    Field {
+        help: "How the joints' returns are combined.",
+        ..choice(
+            Radar,
+            "summation",
+            "Sum",
+            StepsAndStart,
+            answers::SUMMATION,
+            one_of_at!(summation, [Summation::Coherent, Summation::Incoherent]),
+        )
+        .row("powers add")
+    },
+    Field {
+        help: "Where L_EM is computed: the whole map, or a box of this half width around the start pose.",
+        ..number(Radar, "em_region", "EM region", StepsAndStart, (f64::from_bits(1), f64::MAX), EM_REGION)
+            .offered(0.1, 20.0)
+            .unit("m")
+            .or(WHOLE_MAP)
+            .row("EM region")
+    },
+    Field {
         help: "The echo of a body comes from its skin, not from the joint: p is moved this far towards the radar. 0 is the paper.",
-        unit: "m",
-        range: (0.0, 0.5),
-        logarithmic: false,
-        get: |c| c.surface_offset_m,
-        set: |c, x| c.surface_offset_m = x,
+        ..number(Radar, "surface_offset_m", "δ (skin)", StepsAndStart, (0.0, 0.5), number_at!(surface_offset_m))
+            .unit("m")
+            .row("skin in front of the joints")
     },
     Field {
-        key: "d_sep_m",
-        group: FieldGroup::Limits,
-        label: "d_sep",
+        help: "Largest elbow and knee angle; beyond it L_joint = Σ max(0, θ − θ_max)² grows.",
+        ..number(Limits, "theta_max_deg", "θ_max", Steps, (0.0, 180.0), number_at!(theta_max_deg))
+            .unit("°")
+            .row("limits")
+    },
+    Field {
+        help: "How far a bone may be from its reference length at no cost: L_bone = Σ ψ(max(0, |l − ℓ| − tolerance)). The paper's formula has none (4.3), its list of settings has 5 cm (appendix D).",
+        ..number(Limits, "bone_tolerance_m", "Bone tolerance", Steps, (0.0, 0.5), number_at!(bone_tolerance_m))
+            .unit("m")
+            .row("bone tolerance")
+    },
+    Field {
         help: "Several people: centroids closer than this are pushed apart, L_sep = Σ max(0, d_sep − ‖c_s − c_t‖)².",
-        unit: "m",
-        range: (0.0, 5.0),
-        logarithmic: false,
-        get: |c| c.d_sep_m,
-        set: |c, x| c.d_sep_m = x,
+        ..number(Limits, "d_sep_m", "d_sep", Steps, (0.0, 5.0), number_at!(d_sep_m)).unit("m").row("limits")
     },
     Field {
-        key: "d_joint_m",
-        group: FieldGroup::Limits,
-        label: "d_joint",
         help: "Several people: joints closer than this are pushed apart, L_coll = Σ max(0, d_joint − ‖p_sm − p_tn‖)².",
-        unit: "m",
-        range: (0.0, 1.0),
-        logarithmic: false,
-        get: |c| c.d_joint_m,
-        set: |c, x| c.d_joint_m = x,
+        ..number(Limits, "d_joint_m", "d_joint", Steps, (0.0, 1.0), number_at!(d_joint_m)).unit("m").row("limits")
     },
     Field {
-        key: "scale_max_m",
-        group: FieldGroup::Limits,
-        label: "s_max",
         help: "A joint's Gaussian is a part of a body: no step makes its standard deviation larger than this along any of its axes. At 0.43 m four of them hold a whole body of 1.70 m. What is wider already may shrink. Acts on the step, not on the objective.",
-        unit: "m",
-        range: (0.01, 10.0),
-        logarithmic: true,
-        get: |c| c.scale_max_m,
-        set: |c, x| c.scale_max_m = x,
+        ..number(Limits, "scale_max_m", "s_max", StepsAndStart, (0.01, 10.0), number_at!(scale_max_m))
+            .logarithmic()
+            .unit("m")
+            .row("limits")
     },
     Field {
-        key: "w_time",
-        group: FieldGroup::Regularisation,
-        label: "w_time",
+        help: "What Adam moves.",
+        ..choice(
+            Model,
+            "parameterization",
+            "Moves",
+            StepsAndStart,
+            answers::PARAMETERIZATION,
+            one_of_at!(parameterization, [Parameterization::Joints, Parameterization::Bones]),
+        )
+        .row("bones turn")
+    },
+    Field {
+        help: "What the Gaussians of a start look like.",
+        ..choice(
+            Model,
+            "scatterers",
+            "Gaussians",
+            Start,
+            answers::SCATTERERS,
+            one_of_at!(scatterers, [Scatterers::Equal, Scatterers::BodyParts]),
+        )
+        .row("scales and opacities by body part")
+    },
+    Field {
+        help: "Where a start looks.",
+        ..choice(Model, "yaw", "Looks", Start, answers::YAW, one_of_at!(yaw, [Yaw::Radar, Yaw::Motion]))
+            .row("heading from motion")
+    },
+    Field {
+        help: "What tells where the start of one person stands.",
+        ..choice(
+            Model,
+            "place",
+            "Place",
+            Start,
+            answers::PLACE,
+            one_of_at!(place, [Place::Peaks, Place::Cluster, Place::Counted]),
+        )
+        .row("place")
+    },
+    Field {
+        help: "What tells how high a start stands.",
+        ..choice(Model, "height", "Height", Start, answers::HEIGHT, one_of_at!(height, [Height::Echo, Height::Floor]))
+            .row("height from the floor")
+    },
+    Field {
+        help: "What tells where the limbs of a start are.",
+        ..choice(Model, "limbs", "Limbs", Start, answers::LIMBS, one_of_at!(limbs, [Limbs::Posture, Limbs::Learned]))
+            .row("limbs as learned")
+    },
+    Field {
         help: "Weight of the temporal term: L_time = Σ ‖c − ĉ‖² (m²), c the mean of a person's joints, ĉ where a line through its places in this frame and those around says it is. Only where a frame has neighbours. Above 0 a start stands on that line too. 0 is the paper.",
-        unit: "",
-        range: (0.0, 1000.0),
-        logarithmic: true,
-        get: |c| c.w_time,
-        set: |c, x| c.w_time = x,
+        ..number(Model, "w_time", "w_time", StepsAndStart, (0.0, 1000.0), number_at!(w_time))
+            .logarithmic()
+            .row("temporal term")
     },
     Field {
-        key: "people",
-        group: FieldGroup::Start,
-        label: "People",
-        help: "Persons that are fitted at once; 0 fits as many as are counted. Takes effect when a start is found.",
-        unit: "",
-        range: (0.0, 8.0),
-        logarithmic: false,
-        get: |c| c.people as f64,
-        set: |c, x| c.people = x.round().max(0.0) as usize,
+        help: "Step size of the positions of the joints, or of the root (m).",
+        ..number(StepSizes, "learning_rates.position", "η_p", Steps, (0.0, 1.0), maybe_at!(learning_rates.position))
+            .logarithmic()
+            .or(AS_ALL)
+            .row("step sizes")
     },
     Field {
-        key: "starts",
-        group: FieldGroup::Start,
-        label: "Starts",
+        help: "Step size of the turns of root and bones (rad); only where bones are moved. 0: the body moves as one.",
+        ..number(StepSizes, "learning_rates.bone", "η_bone", Steps, (0.0, 1.0), maybe_at!(learning_rates.bone))
+            .logarithmic()
+            .or(AS_ALL)
+            .row("step sizes")
+    },
+    Field {
+        help: "Step size of ln s.",
+        ..number(StepSizes, "learning_rates.log_scale", "η_s", Steps, (0.0, 1.0), maybe_at!(learning_rates.log_scale))
+            .logarithmic()
+            .or(AS_ALL)
+            .row("step sizes")
+    },
+    Field {
+        help: "Step size of the quaternions.",
+        ..number(StepSizes, "learning_rates.rotation", "η_q", Steps, (0.0, 1.0), maybe_at!(learning_rates.rotation))
+            .logarithmic()
+            .or(AS_ALL)
+            .row("step sizes")
+    },
+    Field {
+        help: "Step size of the velocities (m/s).",
+        ..number(StepSizes, "learning_rates.velocity", "η_v", Steps, (0.0, 1.0), maybe_at!(learning_rates.velocity))
+            .logarithmic()
+            .or(AS_ALL)
+            .row("step sizes")
+    },
+    Field {
+        help: "Step size of the opacities before the sigmoid.",
+        ..number(StepSizes, "learning_rates.beta", "η_β", Steps, (0.0, 1.0), maybe_at!(learning_rates.beta))
+            .logarithmic()
+            .or(AS_ALL)
+            .row("step sizes")
+    },
+    Field {
+        help: "Step size of the Doppler features.",
+        ..number(StepSizes, "learning_rates.omega", "η_ω", Steps, (0.0, 1.0), maybe_at!(learning_rates.omega))
+            .logarithmic()
+            .or(AS_ALL)
+            .row("step sizes")
+    },
+    Field {
+        help: "Off: the body stands in the middle of what the views cover.",
+        ..switch(Starting, "init.position", "P: positions from the peaks", Start, flag_at!(init.position))
+            .called("P")
+            .row("initialiser")
+    },
+    Field {
+        help: "From the Doppler axis, or from the intensity gradients of consecutive maps. Off: 0.",
+        ..switch(Starting, "init.velocity", "V: velocities from the maps", Start, flag_at!(init.velocity))
+            .called("V")
+            .row("initialiser")
+    },
+    Field {
+        help: "Which frames beside its own a start may look at.",
+        ..choice(
+            Starting,
+            "frames_around",
+            "Frames",
+            Start,
+            answers::FRAMES_AROUND,
+            one_of_at!(frames_around, [FramesAround::Both, FramesAround::Past, FramesAround::None]),
+        )
+        .row("frames around")
+    },
+    Field {
+        help: "What becomes of echoes that do not change over the frames around.",
+        ..choice(
+            Starting,
+            "init.still",
+            "Still echoes",
+            Start,
+            answers::STILL,
+            one_of_at!(init.still, [Still::LeftOut, Still::Kept]),
+        )
+        .row("still echoes")
+    },
+    Field {
+        help: "What a cell is compared with before it counts as an echo.",
+        ..choice(
+            Starting,
+            "init.background",
+            "Background",
+            Start,
+            answers::BACKGROUND,
+            one_of_at!(init.background, [Background::Range, Background::Map]),
+        )
+        .row("background")
+    },
+    Field {
+        help: "How an intensity gradient becomes a velocity.",
+        ..choice(
+            Starting,
+            "init.gradient",
+            "Gradient",
+            Start,
+            answers::GRADIENT,
+            one_of_at!(init.gradient, [GradientVelocity::Flow, GradientVelocity::Magnitude]),
+        )
+        .row("gradient's velocity")
+    },
+    Field {
+        help: "Where a warm start begins.",
+        ..choice(
+            Starting,
+            "warm_start",
+            "Warm start",
+            ReadBy::WarmStart,
+            answers::WARM_START,
+            one_of_at!(warm_start, [WarmStart::Moved, WarmStart::AsLeft]),
+        )
+        .row("warm start")
+    },
+    Field {
+        help: "Persons that are fitted at once; 0 fits as many as are counted.",
+        ..number(Starting, "people", "People", Start, (0.0, 8.0), count_at!(people)).whole().row("people")
+    },
+    Field {
         help: "Postures that are tried at the place of the start, the one with the smallest L_EM is fitted: standing, then for who walks several moments of a stride, for others raised arms and sitting where they are clearly better. 1 is the paper: standing.",
-        unit: "",
-        range: (1.0, 16.0),
-        logarithmic: false,
-        get: |c| c.starts as f64,
-        set: |c, x| c.starts = x.round().max(1.0) as usize,
+        ..number(Starting, "starts", "Starts", Start, (1.0, 16.0), count_at!(starts)).whole().row("several starts")
     },
     Field {
-        key: "init.velocity_gain_mps",
-        group: FieldGroup::Start,
-        label: "γ",
         help: "Without a Doppler axis the start's speed is γ times the normalised intensity gradient of consecutive maps (appendix A).",
-        unit: "m/s",
-        range: (0.0, 5.0),
-        logarithmic: false,
-        get: |c| c.init.velocity_gain_mps,
-        set: |c, x| c.init.velocity_gain_mps = x,
+        ..number(Starting, "init.velocity_gain_mps", "γ", Start, (0.0, 5.0), number_at!(init.velocity_gain_mps))
+            .unit("m/s")
+            .row("initialiser")
     },
     Field {
-        key: "init.position_noise_m",
-        group: FieldGroup::Perturbation,
-        label: "σ_p",
         help: "Perturbation: standard deviation of Gaussian noise on every coordinate of every joint of a start, from the peaks or from the frame before.",
-        unit: "m",
-        range: (0.0, 1.0),
-        logarithmic: false,
-        get: |c| c.init.position_noise_m,
-        set: |c, x| c.init.position_noise_m = x,
+        ..number(Perturbation, "init.position_noise_m", "σ_p", Start, (0.0, 1.0), number_at!(init.position_noise_m))
+            .unit("m")
     },
     Field {
-        key: "init.position_bias_m",
-        group: FieldGroup::Perturbation,
-        label: "Δp",
         help: "Perturbation: the whole start is shifted this far in a direction drawn for each frame.",
-        unit: "m",
-        range: (0.0, 1.0),
-        logarithmic: false,
-        get: |c| c.init.position_bias_m,
-        set: |c, x| c.init.position_bias_m = x,
+        ..number(Perturbation, "init.position_bias_m", "Δp", Start, (0.0, 1.0), number_at!(init.position_bias_m))
+            .unit("m")
     },
     Field {
-        key: "init.velocity_noise_mps",
-        group: FieldGroup::Perturbation,
-        label: "σ_v",
         help: "Perturbation: standard deviation of Gaussian noise on every component of every start velocity.",
-        unit: "m/s",
-        range: (0.0, 5.0),
-        logarithmic: false,
-        get: |c| c.init.velocity_noise_mps,
-        set: |c, x| c.init.velocity_noise_mps = x,
+        ..number(Perturbation, "init.velocity_noise_mps", "σ_v", Start, (0.0, 5.0), number_at!(init.velocity_noise_mps))
+            .unit("m/s")
     },
     Field {
-        key: "init.peak_dropout",
-        group: FieldGroup::Perturbation,
-        label: "r_drop",
         help: "Perturbation: share of the detected peaks that is missed at random before they are clustered, each with its hill of the map.",
-        unit: "",
-        range: (0.0, 0.95),
-        logarithmic: false,
-        get: |c| c.init.peak_dropout,
-        set: |c, x| c.init.peak_dropout = x,
+        ..number(Perturbation, "init.peak_dropout", "r_drop", Start, (0.0, 0.95), number_at!(init.peak_dropout))
     },
     Field {
-        key: "init.seed",
-        group: FieldGroup::Perturbation,
-        label: "Seed",
         help: "Seed of the perturbations; each frame draws its own numbers from it.",
-        unit: "",
-        range: (0.0, 1e9),
-        logarithmic: false,
-        get: |c| c.init.seed as f64,
-        set: |c, x| c.init.seed = x.round().max(0.0) as u64,
+        ..number(Perturbation, "init.seed", "Seed", Start, (0.0, 1e9), count_at!(init.seed)).whole()
     },
 ];

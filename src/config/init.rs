@@ -99,23 +99,6 @@ pub struct LearningRates {
     pub omega: Option<f64>,
 }
 
-impl LearningRates {
-    /// The rates that are given, with their keys.
-    pub fn given(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        [
-            ("learning_rates.position", self.position),
-            ("learning_rates.bone", self.bone),
-            ("learning_rates.log_scale", self.log_scale),
-            ("learning_rates.rotation", self.rotation),
-            ("learning_rates.velocity", self.velocity),
-            ("learning_rates.beta", self.beta),
-            ("learning_rates.omega", self.omega),
-        ]
-        .into_iter()
-        .filter_map(|(key, rate)| Some((key, rate?)))
-    }
-}
-
 /// How a start is found (paper 4.1, appendix A), and how it is perturbed on purpose (the paper's robustness table).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

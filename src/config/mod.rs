@@ -1,25 +1,35 @@
-//! `FitConfig`: every number that steers a fit, with its default, range and explanation.
+//! `FitConfig`: every setting that steers a fit, with its default, range and explanation.
 //!
-//! This is the only source: the command line, the sliders, their tooltips and `FIT.toml` all read [`FIELDS`] and [`CHOICES`]. The
-//! default is what SPEC fixes of the paper; [`Preset`] names it, the paper to the letter and the recommended setting, and
-//! [`deviations`] tells how they differ and why.
+//! [`FIELDS`] is the only table of them: the *Fit* pane, tooltips, the words for a change ([`difference`]), new starts, the study
+//! `switches`, sweeps, the list under `--help` and the errors of `FIT.toml` read it. The default is what SPEC fixes of the paper;
+//! [`Preset`] names it, the paper to the letter and the recommended setting, and [`deviations`] tells how they differ and why.
 
-mod choices;
+mod answers;
 pub mod deviations;
+mod difference;
+mod error;
+mod field;
 mod fields;
 mod init;
 mod preset;
 mod reading;
+mod rows;
+#[cfg(test)]
+pub(crate) mod samples;
+#[cfg(test)]
+mod tests;
 
-pub use choices::{Answer, CHOICES, Choice, ChoiceGroup};
-pub use fields::{FIELDS, Field, FieldGroup};
+pub use difference::{difference, from_preset, listing};
+pub use error::ConfigError;
+pub use field::{Answer, Field, FieldGroup, FieldKind, Number, ReadBy, Unset, Value};
+pub use fields::FIELDS;
 pub use init::{Height, InitConfig, LearningRates, Limbs, Parameterization, Place, Scatterers, Yaw};
 pub use preset::Preset;
 pub use reading::{Background, Convergence, FramesAround, GradientVelocity, Still, WarmStart};
 
 use crate::input::{MOST_TEXT, read_text};
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// How the joints' returns are combined; SPEC section 3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -47,6 +57,9 @@ impl Default for EmRegion {
     }
 }
 
+/// What `FIT.toml` holds of it.
+const EM_REGION_FORM: &str = "\"full\" or { half_width_m = METRES } with METRES > 0";
+
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
 enum EmRegionText {
@@ -72,7 +85,7 @@ impl<'de> Deserialize<'de> for EmRegion {
             Ok(EmRegionText::Table { half_width_m }) if half_width_m > 0.0 && half_width_m.is_finite() => {
                 Ok(Self::HalfWidth(half_width_m))
             }
-            _ => Err(D::Error::custom("em_region must be \"full\" or { half_width_m = METRES } with METRES > 0")),
+            _ => Err(D::Error::custom(format!("em_region must be {EM_REGION_FORM}"))),
         }
     }
 }
@@ -206,66 +219,24 @@ impl Default for FitConfig {
     }
 }
 
-/// What is wrong with a configuration.
-#[derive(Debug, thiserror::Error)]
-pub enum ConfigError {
-    /// A number is outside its range.
-    #[error("{key} is {value}; expected a number in {lo} ..= {hi}", value = plainly(*value))]
-    OutOfRange {
-        /// The key.
-        key: &'static str,
-        /// What was given.
-        value: f64,
-        /// Smallest accepted.
-        lo: f64,
-        /// Largest accepted.
-        hi: f64,
-    },
-    /// A file that is not TOML, has a wrong key or a wrong value.
-    #[error("{place}: {message}", place = place(path, *line))]
-    Invalid {
-        /// What is wrong, naming the key.
-        message: String,
-        /// The line, counted from 1, where one can be named.
-        line: Option<usize>,
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file could not be read.
-    #[error("{path}: cannot be read: {reason}", path = path.display())]
-    Read {
-        /// What the operating system said.
-        reason: std::io::Error,
-        /// The file.
-        path: PathBuf,
-    },
-}
-
 impl FitConfig {
-    /// Checks every number against its range.
+    /// Checks every setting.
     ///
     /// # Errors
     /// Names the first key that is out of range or not finite.
     pub fn validated(self) -> Result<Self, ConfigError> {
-        for field in FIELDS {
-            let (value, (lo, hi)) = ((field.get)(&self), field.range);
-            if !(lo..=hi).contains(&value) {
-                return Err(ConfigError::OutOfRange { key: field.key, value, lo, hi });
-            }
-        }
-        for (key, value) in self.learning_rates.given() {
-            if !(0.0..=1.0).contains(&value) {
-                return Err(ConfigError::OutOfRange { key, value, lo: 0.0, hi: 1.0 });
-            }
-        }
+        FIELDS.iter().try_for_each(|field| field.check(field.get(&self)))?;
         Ok(self)
     }
 
-    /// Whether a start is found in the same way, as far as switches decide; a slider that is moved asks for no new start.
-    pub fn starts_as(&self, other: &Self) -> bool {
-        let switches =
-            |c: &Self| (c.scatterers, c.place, c.yaw, c.people, c.starts, c.height, c.limbs, c.frames_around);
-        switches(self) == switches(other) && self.init == other.init
+    /// The settings that another configuration sets otherwise, in the order they are shown.
+    pub fn changes<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = &'static Field> + 'a {
+        FIELDS.iter().filter(|field| field.get(self) != field.get(other))
+    }
+
+    /// Whether all settings but those that `left_out` takes are the same.
+    pub fn same_but(&self, other: &Self, left_out: impl Fn(ReadBy) -> bool) -> bool {
+        self.changes(other).all(|field| left_out(field.read_by))
     }
 
     /// Reads `FIT.toml`; missing keys take their defaults.
@@ -283,91 +254,11 @@ impl FitConfig {
     /// # Errors
     /// As [`Self::from_file`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, ConfigError> {
-        let invalid = |message: String, at: Option<usize>| ConfigError::Invalid {
-            message,
-            line: at.map(|at| 1 + text.bytes().take(at).filter(|&byte| byte == b'\n').count()),
-            path: path.to_owned(),
-        };
-        let parsed = toml::from_str::<Self>(text)
-            .map_err(|error| invalid(in_our_words(error.message()), error.span().map(|span| span.start)))?;
-        parsed.validated().map_err(|error| {
-            let ConfigError::OutOfRange { key, .. } = error else { return error };
-            invalid(error.to_string(), offset_of(text, key))
-        })
+        error::parse(text, path)
     }
 
     /// The configuration as `FIT.toml`.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).unwrap_or_default()
-    }
-}
-
-/// A number as somebody would write it: not with three hundred zeros.
-fn plainly(value: f64) -> String {
-    let size = value.abs();
-    if size != 0.0 && !(1e-6..1e15).contains(&size) { format!("{value:e}") } else { value.to_string() }
-}
-
-fn place(path: &Path, line: Option<usize>) -> String {
-    line.map_or_else(|| path.display().to_string(), |line| format!("{}:{line}", path.display()))
-}
-
-/// `unknown field` is the parser's word; a configuration has keys.
-fn in_our_words(message: &str) -> String {
-    let message = message.trim_end().replace('\n', "; ");
-    match message.strip_prefix("unknown field ") {
-        Some(rest) => format!("unknown key {}", rest.replacen(", expected", "; expected", 1)),
-        None => message,
-    }
-}
-
-/// Where the line begins that sets a key of the top table.
-fn offset_of(text: &str, key: &str) -> Option<usize> {
-    let mut at = 0;
-    text.split_inclusive('\n').find_map(|line| {
-        let here = at;
-        at += line.len();
-        let rest = line.trim_start().strip_prefix(key.rsplit('.').next().unwrap_or(key))?;
-        rest.trim_start().starts_with('=').then_some(here)
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn refusal(text: &str) -> String {
-        FitConfig::parse(text, Path::new("fit.toml")).err().map_or_else(|| "accepted".into(), |e| e.to_string())
-    }
-
-    #[test]
-    fn what_is_written_reads_back() {
-        let full = FitConfig {
-            em_region: EmRegion::Full,
-            summation: Summation::Incoherent,
-            learning_rate: 3e-3,
-            operators: Operators { range: false, ..Operators::default() },
-            stop_when_converged: true,
-            ..FitConfig::default()
-        };
-        for config in [FitConfig::default(), full] {
-            let text = config.to_toml();
-            assert_eq!(FitConfig::parse(&text, Path::new("fit.toml")).ok(), Some(config), "{text}");
-        }
-    }
-
-    #[test]
-    fn a_wrong_key_or_value_names_file_line_key_and_expectation() {
-        let text = refusal("w_em = 1\nw_kin = 2\n");
-        assert!(text.starts_with("fit.toml:2: unknown key `w_kin`; expected one of `w_em`, `w_kine`"), "{text}");
-        assert_eq!(refusal("\ntau_pct = 101\n"), "fit.toml:2: tau_pct is 101; expected a number in 0.1 ..= 100");
-        let text = refusal("iterations = -1");
-        assert!(text.starts_with("fit.toml:1: ") && !text.contains('\n'), "{text}");
-        let text = refusal("em_region = \"half\"");
-        assert!(text.starts_with("fit.toml:1: em_region must be \"full\" or"), "{text}");
-        let text = refusal("[operators]\nrang = true");
-        assert!(text.starts_with("fit.toml:2: unknown key `rang`; expected one of `attenuation`"), "{text}");
-        assert!(refusal("w_em = ").starts_with("fit.toml:1: "));
-        assert!(refusal("softness = nan").starts_with("fit.toml:1: softness is NaN; expected"));
     }
 }

@@ -1,6 +1,7 @@
 //! What can be wrong with a data set; every message names file, key and what was expected.
 
 use super::BareCatalog;
+use super::names::MAX_NAME_BYTES;
 use super::npz::NpzError;
 use std::path::{Path, PathBuf};
 
@@ -93,27 +94,11 @@ pub enum DatasetError {
         /// The file.
         path: PathBuf,
     },
-    /// A frame of HuPR without one of its cubes.
-    #[error("{path}: no such file; a frame of HuPR has two cubes, and the one in {present}/ is there", path = path.display())]
-    HalfFrame {
-        /// The folder of the cube that exists.
-        present: String,
-        /// The cube that does not.
-        path: PathBuf,
-    },
-    /// MMVR's grouped variant: four frames in one file.
-    #[error(
-        "{path}: array `{key}` has shape {got}: this is the grouped variant of MMVR, several frames in one file, which is not \
-         read; expected {expected}: open the ungrouped data set",
-        path = path.display()
-    )]
-    Grouped {
-        /// The array.
-        key: String,
-        /// Its shape.
-        got: String,
-        /// The shape of one frame.
-        expected: String,
+    /// A frame whose files are not what its layout says.
+    #[error("{path}: {message}", path = path.display())]
+    Frame {
+        /// What is wrong, and what was expected.
+        message: String,
         /// The file.
         path: PathBuf,
     },
@@ -138,6 +123,13 @@ pub enum DatasetError {
         /// What was being read.
         path: PathBuf,
     },
+}
+
+impl DatasetError {
+    /// More bytes in the names of frames than are held.
+    pub(super) fn too_long_names(root: &Path) -> Self {
+        Self::TooMany { what: "bytes in the names of all frames", most: MAX_NAME_BYTES, path: root.to_owned() }
+    }
 }
 
 fn place(path: &Path, line: Option<usize>) -> String {

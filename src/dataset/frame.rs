@@ -40,7 +40,7 @@ pub struct ImageAnnotations {
 }
 
 /// One frame of a data set.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Frame {
     /// Index in the data set.
     pub index: usize,

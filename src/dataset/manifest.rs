@@ -3,7 +3,9 @@
 //! Unknown keys are errors with their line, because a typo in `bandwidth_hz` would otherwise silently become a default.
 
 use super::DatasetError;
+use super::layout::{LAYOUTS, Layout};
 use super::npz::MAX_ELEMENTS;
+use super::set::MANIFEST_NAME;
 use crate::body::Skeleton;
 use crate::geometry::{IDENTITY, Mat3, Pose, Vec3, dot};
 use crate::input::{MOST_TEXT, read_text};
@@ -22,42 +24,6 @@ const MAX_KEY: usize = 200;
 /// Views of a frame that are accepted.
 const MAX_VIEWS: usize = 16;
 
-/// How a data set lies on disk.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Layout {
-    /// One npz a frame, described by a manifest.
-    Npz,
-    /// The MMVR tree.
-    Mmvr,
-    /// A single `.npy` or `.npz` whose axes a person named.
-    #[serde(skip_deserializing)]
-    Bare,
-    /// HuPR: folders of complex cubes.
-    Hupr,
-    /// XRF55: stacks of maps.
-    Xrf55,
-}
-
-impl Layout {
-    /// The word in manifests and in `info`.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Npz => "npz",
-            Self::Mmvr => "mmvr",
-            Self::Bare => "bare",
-            Self::Hupr => "hupr",
-            Self::Xrf55 => "xrf55",
-        }
-    }
-}
-
-impl std::fmt::Display for Layout {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.word())
-    }
-}
-
 /// A checked manifest. What is `None` takes the layout's preset, or a stated assumption.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Manifest {
@@ -66,7 +32,7 @@ pub struct Manifest {
     /// Name of the data set.
     pub name: Option<String>,
     /// How the frames lie on disk.
-    pub layout: Layout,
+    pub layout: &'static dyn Layout,
     /// Files of the frames relative to the folder, with `*` in any part; sorted by name, one frame a file.
     pub frames: Option<String>,
     /// The line of `frames`, counted from 1, for messages.
@@ -85,7 +51,8 @@ pub struct Manifest {
 #[serde(deny_unknown_fields)]
 struct ManifestText {
     name: Option<String>,
-    layout: Layout,
+    #[serde(deserialize_with = "layout_named")]
+    layout: &'static dyn Layout,
     frames: Option<Spanned<String>>,
     frame_rate_hz: Option<Spanned<f64>>,
     skeleton: Option<Spanned<SkeletonText>>,
@@ -109,6 +76,14 @@ pub(super) struct ViewText {
     axes: Vec<Spanned<Axis>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     region: Option<Vec<[usize; 2]>>,
+}
+
+fn layout_named<'de, D: Deserializer<'de>>(deserializer: D) -> Result<&'static dyn Layout, D::Error> {
+    let word = String::deserialize(deserializer)?;
+    <dyn Layout>::named(&word).filter(|layout| layout.in_manifests()).ok_or_else(|| {
+        let known = LAYOUTS.iter().filter(|layout| layout.in_manifests()).map(|layout| format!("`{layout}`"));
+        de::Error::custom(format!("unknown variant `{word}`, expected one of {}", known.collect::<Vec<_>>().join(", ")))
+    })
 }
 
 fn identity() -> Mat3 {
@@ -214,11 +189,12 @@ impl Manifest {
             check(cells_fault(&views), span)?;
         }
         let frames_line = parsed.frames.as_ref().map(|frames| line_of(text, frames.span().start));
-        let missing = |key: &str| fault(format!("missing key `{key}`; layout \"npz\" needs it"), None);
-        if parsed.layout == Layout::Npz && views.is_empty() {
+        let alone = parsed.layout.preset_text().is_none();
+        let missing = |key: &str| fault(format!("missing key `{key}`; layout \"{}\" needs it", parsed.layout), None);
+        if alone && views.is_empty() {
             return Err(missing("[[view]]"));
         }
-        if parsed.layout == Layout::Npz && parsed.skeleton.is_none() {
+        if alone && parsed.skeleton.is_none() {
             return Err(missing("skeleton"));
         }
         Ok(Self {
@@ -234,28 +210,29 @@ impl Manifest {
         })
     }
 
-    /// The built-in description of HuPR, from `assets/hupr.toml`.
+    /// The manifest in a folder, where there is one.
     ///
     /// # Errors
-    /// As [`Self::mmvr`].
-    pub fn hupr() -> Result<Self, DatasetError> {
-        Self::parse(include_str!("../../assets/hupr.toml"), Path::new("assets/hupr.toml"))
+    /// As [`Self::from_file`].
+    pub fn in_folder(folder: &Path) -> Result<Option<Self>, DatasetError> {
+        let path = folder.join(MANIFEST_NAME);
+        let there = path.try_exists().map_err(|reason| DatasetError::Read { reason, path: path.clone() })?;
+        if there { Self::from_file(&path).map(Some) } else { Ok(None) }
     }
 
-    /// The built-in description of XRF55, from `assets/xrf55.toml`.
-    ///
-    /// # Errors
-    /// As [`Self::mmvr`].
-    pub fn xrf55() -> Result<Self, DatasetError> {
-        Self::parse(include_str!("../../assets/xrf55.toml"), Path::new("assets/xrf55.toml"))
-    }
-
-    /// The built-in description of MMVR, from `assets/mmvr.toml`.
-    ///
-    /// # Errors
-    /// Never for the file that the program was built with; a test holds it.
-    pub fn mmvr() -> Result<Self, DatasetError> {
-        Self::parse(include_str!("../../assets/mmvr.toml"), Path::new("assets/mmvr.toml"))
+    /// One that says nothing but the layout.
+    pub(super) fn unsaid(layout: &'static dyn Layout) -> Self {
+        Self {
+            path: PathBuf::new(),
+            name: None,
+            layout,
+            frames: None,
+            frames_line: None,
+            frame_rate_hz: None,
+            skeleton: None,
+            radar: None,
+            views: Vec::new(),
+        }
     }
 }
 

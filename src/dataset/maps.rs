@@ -1,8 +1,6 @@
 //! The maps of many frames, one after the other: what a study over a whole data set needs, without labels and truth.
 
-use super::source::Source;
-use super::{Dataset, DatasetError, Heatmap, generic, hupr, mmvr, xrf55};
-use crate::radar::View;
+use super::{Dataset, DatasetError, Heatmap};
 use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::{Arc, PoisonError};
@@ -16,9 +14,6 @@ pub struct MapReader<'a> {
     at_once: usize,
     ready: VecDeque<Vec<Heatmap>>,
 }
-
-/// Maps of a stacked file that are read in one pass, bytes: every pass reads the file from its start.
-const STACKED_BYTES: usize = 64 << 20;
 
 impl Dataset {
     /// The maps of `frames`, read as they are asked for. Frames of a stacked file are read many at a time.
@@ -36,7 +31,7 @@ impl Dataset {
         if let Some(maps) = recent().get(index) {
             return Ok(maps);
         }
-        let maps = Arc::new(self.read_maps(&(index..index + 1))?.into_iter().next().unwrap_or_default());
+        let maps = Arc::new(self.read_maps(index..index + 1)?.into_iter().next().unwrap_or_default());
         let bytes = maps.iter().map(|map| map.data.len() * size_of::<f64>()).sum();
         recent().insert(index, Arc::clone(&maps), bytes);
         Ok(maps)
@@ -44,44 +39,16 @@ impl Dataset {
 
     /// Frames whose maps [`Self::maps`] reads in one go: 1, or as many of a stacked file as make 64 MiB.
     pub fn maps_at_once(&self) -> usize {
-        match &self.source {
-            Source::Bare { stacked: true, .. } => {
-                let cells: usize = self.info.views.iter().map(View::cells).sum();
-                (STACKED_BYTES / (cells * size_of::<f64>()).max(1)).max(1)
-            }
-            _ => 1,
-        }
+        self.frames.maps_at_once(&self.info)
     }
 
     /// The maps of consecutive frames, in this thread; at most [`Self::maps_at_once`] are asked for.
-    fn read_maps(&self, frames: &Range<usize>) -> Result<Vec<Vec<Heatmap>>, DatasetError> {
-        let past = || DatasetError::NoSuchFrame {
-            index: frames.end.saturating_sub(1),
-            count: self.len(),
-            path: self.info.root.clone(),
-        };
+    fn read_maps(&self, frames: Range<usize>) -> Result<Vec<Vec<Heatmap>>, DatasetError> {
         if frames.end > self.len() {
-            return Err(past());
+            let index = frames.end.saturating_sub(1);
+            return Err(DatasetError::NoSuchFrame { index, count: self.len(), path: self.info.root.clone() });
         }
-        let one = match &self.source {
-            Source::Bare { stacked: true, sums, .. } => {
-                sums.of(&self.info.root, &self.info)?;
-                return generic::stacked_maps(frames, &self.info.root, &self.info);
-            }
-            Source::Files(_) | Source::Bare { .. } => generic::maps_only(&self.frame_path(frames.start), &self.info),
-            Source::Stacks { steps, .. } => {
-                xrf55::maps_only(&self.frame_path(frames.start), frames.start % steps, &self.info)
-            }
-            Source::Hupr { .. } => {
-                let (segment, k) = self.segment(frames.start).ok_or_else(past)?;
-                hupr::maps_only(&segment.path, segment.stem(k), &self.info)
-            }
-            Source::Mmvr { .. } => {
-                let (segment, k) = self.segment(frames.start).ok_or_else(past)?;
-                mmvr::maps_only(&segment.path, segment.stem(k), &self.info)
-            }
-        };
-        Ok(vec![one?])
+        self.frames.maps(frames, &self.info)
     }
 }
 
@@ -95,7 +62,7 @@ impl Iterator for MapReader<'_> {
         let first = self.left.start;
         if self.ready.is_empty() && self.at_once > 1 {
             let end = first.saturating_add(self.at_once).min(self.left.end);
-            match self.dataset.read_maps(&(first..end)) {
+            match self.dataset.read_maps(first..end) {
                 Ok(maps) => self.ready = maps.into(),
                 // Something in there cannot be read: from here on each frame answers for itself.
                 Err(_) => self.at_once = 1,
@@ -103,8 +70,7 @@ impl Iterator for MapReader<'_> {
         }
         self.left.start = first + 1;
         let ready = self.ready.pop_front().map(Ok);
-        let read =
-            || self.dataset.read_maps(&(first..first + 1)).map(|maps| maps.into_iter().next().unwrap_or_default());
+        let read = || self.dataset.read_maps(first..first + 1).map(|maps| maps.into_iter().next().unwrap_or_default());
         Some(ready.unwrap_or_else(read))
     }
 }

@@ -12,44 +12,37 @@
 //! last two are tested on files synthesised in the published form, no real file was at hand. *Generic*: a folder with
 //! `dataset.toml` and one npz a frame; `samples/walk/dataset.toml` has every key. What is assumed is said on screen and by `info`.
 
-mod bare;
+mod axes_text;
 mod cache;
 mod error;
-mod files;
 mod frame;
-mod generic;
-mod hupr;
 mod inputs;
 mod job;
+pub mod layout;
 mod loader;
 mod manifest;
 mod maps;
-mod mmvr;
+mod names;
+mod natural;
 pub mod npz;
 mod pppr_io;
 mod sample;
 mod set;
-mod source;
-mod truth;
 mod walk;
-mod words;
-mod xrf55;
 
 /// Persons of a frame that labels or truth may speak of. A room holds fewer; a damaged count would take all memory.
 pub const MAX_PERSONS: usize = 256;
 
-pub use bare::{BareCatalog, BareChoice, Remembered};
+pub use axes_text::{axes_badge, axis_position, axis_words, system_words, view_words};
 pub use cache::{Cache, DEFAULT_BUDGET, FrameCache};
 pub use error::DatasetError;
 pub use frame::{Frame, Heatmap, ImageAnnotations, Truth};
-pub(crate) use hupr::{LEVEL as HUPR_LEVEL, LEVELS as HUPR_LEVELS};
 pub use job::OpenJob;
+pub use layout::{BareCatalog, BareChoice, LAYOUTS, Layout, MapArray, Remembered, Stored, XRF55_STEPS};
 pub use loader::{Loaded, Loader};
-pub use manifest::{Layout, Manifest};
+pub use manifest::Manifest;
 pub use maps::MapReader;
 pub use npz::NpzError;
 pub use pppr_io::{read_pppr, write_pppr};
 pub use sample::bundled_sample;
 pub use set::{Dataset, DatasetInfo, MANIFEST_NAME, OpenOptions};
-pub use words::{axes_badge, axis_position, axis_words, system_words, view_words};
-pub use xrf55::STEPS as XRF55_STEPS;

@@ -6,7 +6,7 @@
 //! was left out is said.
 
 use super::DatasetError;
-use super::files::natural;
+use super::natural::natural;
 use crate::task::Progress;
 use rayon::prelude::*;
 use std::collections::HashSet;

@@ -7,28 +7,7 @@
 
 use super::assign::assign;
 use crate::geometry::Vec3;
-use crate::radar::View;
-
-/// A pinhole camera at the radar that looks along x; u to the right, v down, px.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PinholeCamera {
-    /// Focal lengths (u, v), px.
-    pub focal_px: [f64; 2],
-    /// Principal point (u, v), px.
-    pub centre_px: [f64; 2],
-}
-
-impl PinholeCamera {
-    /// MMVR's published intrinsics; lens distortion left out, as the code published with the data does.
-    pub const MMVR: Self = Self { focal_px: [379.476, 379.476], centre_px: [322.457, 241.627] };
-
-    /// A world point (m; x forward, y left, z up) in the image, px; `None` at or behind the camera.
-    pub fn project(&self, [x, y, z]: Vec3) -> Option<[f64; 2]> {
-        let seen = x > 0.05 && y.is_finite() && z.is_finite();
-        let [fu, fv] = self.focal_px;
-        seen.then(|| [self.centre_px[0] - fu * y / x, self.centre_px[1] - fv * z / x])
-    }
-}
+use crate::radar::{PinholeCamera, View};
 
 /// How joints lie on image labels.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -108,20 +87,23 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "a test stops where a metric is undefined")]
     use super::*;
 
+    /// MMVR's.
+    const CAMERA: PinholeCamera = PinholeCamera { focal_px: [379.476, 379.476], centre_px: [322.457, 241.627] };
+
     fn person(left_m: f64) -> Vec<Vec3> {
         vec![[3.0, left_m, 0.5], [3.0, left_m + 0.2, 0.0], [3.0, left_m - 0.2, -0.5]]
     }
 
     fn seen(person: &[Vec3]) -> Vec<[f64; 3]> {
-        person.iter().map(|&p| PinholeCamera::MMVR.project(p).unwrap()).map(|[u, v]| [u, v, 1.0]).collect()
+        person.iter().map(|&p| CAMERA.project(p).unwrap()).map(|[u, v]| [u, v, 1.0]).collect()
     }
 
     #[test]
     fn left_is_left_and_up_is_up_in_the_image() {
-        let [u, v] = PinholeCamera::MMVR.project([2.0, 0.5, 0.5]).unwrap();
+        let [u, v] = CAMERA.project([2.0, 0.5, 0.5]).unwrap();
         assert!((u - (322.457 - 379.476 * 0.25)).abs() < 1e-9 && (v - (241.627 - 379.476 * 0.25)).abs() < 1e-9);
-        assert_eq!(PinholeCamera::MMVR.project([-1.0, 0.0, 0.0]), None);
-        assert_eq!(PinholeCamera::MMVR.project([f64::NAN, 0.0, 0.0]), None);
+        assert_eq!(CAMERA.project([-1.0, 0.0, 0.0]), None);
+        assert_eq!(CAMERA.project([f64::NAN, 0.0, 0.0]), None);
     }
 
     #[test]
@@ -130,11 +112,11 @@ mod tests {
         let joints = [a.clone(), b.clone()].concat();
         let mut labels = vec![seen(&b), seen(&a)];
         labels[0][1] = [0.0, 0.0, 0.0];
-        let exact = reprojection(&PinholeCamera::MMVR, &joints, 3, &labels, &[]);
+        let exact = reprojection(&CAMERA, &joints, 3, &labels, &[]);
         assert!(exact.reprojection_px.unwrap() < 1e-9);
         assert_eq!(exact.box_coverage, None);
         labels[1].iter_mut().for_each(|point| point[0] += 10.0);
-        let off = reprojection(&PinholeCamera::MMVR, &joints, 3, &labels, &[]);
+        let off = reprojection(&CAMERA, &joints, 3, &labels, &[]);
         assert!((off.reprojection_px.unwrap() - 5.0).abs() < 1e-9, "one person of two is off by 10 px");
     }
 
@@ -147,10 +129,10 @@ mod tests {
             [lo(0), lo(1), hi(0), hi(1), 0.9]
         };
         let mut boxes = [whole(&seen(&person(0.6))), whole(&seen(&person(-0.6)))];
-        assert_eq!(reprojection(&PinholeCamera::MMVR, &joints, 3, &[], &boxes).box_coverage, Some(1.0));
-        boxes[0][1] = PinholeCamera::MMVR.project(person(0.6)[1]).unwrap()[1] - 1.0;
-        let partly = reprojection(&PinholeCamera::MMVR, &joints, 3, &[], &boxes).box_coverage.unwrap();
+        assert_eq!(reprojection(&CAMERA, &joints, 3, &[], &boxes).box_coverage, Some(1.0));
+        boxes[0][1] = CAMERA.project(person(0.6)[1]).unwrap()[1] - 1.0;
+        let partly = reprojection(&CAMERA, &joints, 3, &[], &boxes).box_coverage.unwrap();
         assert!((partly - 5.0 / 6.0).abs() < 1e-12);
-        assert_eq!(reprojection(&PinholeCamera::MMVR, &[], 3, &[], &boxes), Reprojection::default());
+        assert_eq!(reprojection(&CAMERA, &[], 3, &[], &boxes), Reprojection::default());
     }
 }

@@ -1,6 +1,6 @@
 //! Every step of a fit: reports for the curves, states to go back to, branches that began at an earlier state.
 
-use crate::config::{CHOICES, FIELDS, FitConfig};
+use crate::config::{FitConfig, difference};
 use crate::mhp::{FitState, StepReport};
 use std::sync::Arc;
 
@@ -141,6 +141,12 @@ impl History {
         self.branches.iter().find(|branch| branch.id == id)
     }
 
+    /// What a branch sets otherwise than the iteration that it began at, in words.
+    pub fn departure(&self, branch: &Branch) -> String {
+        let before = branch.parent.and_then(|(id, at)| Some(self.branch(id)?.config_at(at)));
+        before.map_or_else(String::new, |before| difference(&before, &branch.config))
+    }
+
     /// The branch that a run continues.
     pub fn active(&self) -> Option<&Branch> {
         self.branch(self.active)
@@ -279,9 +285,8 @@ impl History {
             branch.flags.pop();
         }
         let old = branch.newest_config();
-        let text = difference(&old, &config);
-        if !text.is_empty() {
-            branch.flags.push(Flag { iteration, text, config });
+        if config != old {
+            branch.flags.push(Flag { iteration, text: difference(&old, &config), config });
         }
     }
 
@@ -324,57 +329,48 @@ fn state_bytes(state: &Arc<FitState>) -> usize {
     3 * size_of::<f64>() * state.params.shape().total()
 }
 
-/// What differs between two configurations, in words: `τ_pct 10 → 15`.
-pub fn difference(old: &FitConfig, new: &FitConfig) -> String {
-    let mut parts: Vec<String> = FIELDS
-        .iter()
-        .filter(|field| (field.get)(old) != (field.get)(new))
-        .map(|field| format!("{} {} → {}", field.label, short((field.get)(old)), short((field.get)(new))))
-        .collect();
-    for choice in CHOICES {
-        if let (Some(was), Some(is)) = (choice.answer(old), choice.answer(new))
-            && was.word != is.word
-        {
-            parts.push(format!("{} {} → {}", choice.label.to_lowercase(), was.label, is.label));
-        }
-    }
-    if old.em_region != new.em_region {
-        parts.push("EM region changed".into());
-    }
-    if old.operators != new.operators {
-        let pairs = [
-            ("attenuation", old.operators.attenuation, new.operators.attenuation),
-            ("range", old.operators.range, new.operators.range),
-            ("Doppler", old.operators.doppler, new.operators.doppler),
-            ("angle", old.operators.angle, new.operators.angle),
-        ];
-        for (name, was, is) in pairs {
-            if was != is {
-                parts.push(format!("{name} {}", if is { "on" } else { "off" }));
-            }
-        }
-    }
-    let starts = [("P", old.init.position, new.init.position), ("V", old.init.velocity, new.init.velocity)];
-    for (name, was, is) in starts {
-        if was != is {
-            parts.push(format!("{name} {}", if is { "on" } else { "off" }));
-        }
-    }
-    if old.learning_rates != new.learning_rates {
-        parts.push("step sizes changed".into());
-    }
-    if old.stop_when_converged != new.stop_when_converged {
-        parts.push(format!("stop when converged {}", if new.stop_when_converged { "on" } else { "off" }));
-    }
-    parts.join(", ")
-}
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+    use super::*;
+    use crate::config::samples::changed;
+    use crate::mhp::Terms;
+    use proptest::prelude::*;
 
-/// A number with at most four significant digits.
-fn short(x: f64) -> String {
-    if x == 0.0 {
-        return "0".into();
+    fn run(history: &mut History, branch: u32, iterations: std::ops::RangeInclusive<usize>) {
+        for iteration in iterations {
+            let report = StepReport {
+                iteration,
+                loss: 1.0,
+                terms: Terms::default(),
+                iou: [].into_iter().collect(),
+                converged: false,
+            };
+            history.push(branch, IterationRow { report, state: None, majpe_mm: None });
+        }
     }
-    let digits = (3 - x.abs().log10().floor() as i32).clamp(0, 9) as usize;
-    let text = format!("{x:.digits$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+
+    proptest! {
+        /// Whatever is set otherwise on the way is flagged with its words, in force from there on, and still so after another
+        /// branch was looked at.
+        #[test]
+        fn no_change_of_settings_is_lost((old, new, fields) in changed()) {
+            let mut history = History::new(old);
+            run(&mut history, 0, 0..=4);
+            history.flag(0, 4, new);
+            run(&mut history, 0, 5..=6);
+            let other = history.begin(Some((0, 2)), new);
+            run(&mut history, other, 2..=3);
+            history.activate(0);
+            let (branch, other) = (history.active().unwrap(), history.branch(other).unwrap());
+            prop_assert_eq!([4, 5].map(|iteration| branch.config_at(iteration)), [old, new]);
+            prop_assert_eq!(branch.newest_config(), new);
+            prop_assert_eq!(history.lineage_settings(), Some((old, fields.first().map(|_| (4, new)).into_iter().collect())));
+            let told: Vec<&str> = branch.flags.iter().map(|flag| flag.text.as_str()).collect();
+            let expected = difference(&old, &new);
+            prop_assert_eq!(told, fields.first().map(|_| expected.as_str()).into_iter().collect::<Vec<_>>());
+            prop_assert_eq!(history.departure(other), expected);
+            prop_assert!(fields.iter().all(|field| history.departure(other).to_lowercase().contains(&field.name.to_lowercase())));
+        }
+    }
 }

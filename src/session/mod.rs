@@ -38,7 +38,7 @@ pub use command::{
 pub use evidence::EvidenceRequest;
 pub use file::{SavedChange, SavedDataset, SavedFit, SavedFrame, SavedPin, SessionFile, SessionFileError};
 pub use fit::{Fit, FitStatus};
-pub use history::{Branch, Flag, History, IterationRow, difference};
+pub use history::{Branch, Flag, History, IterationRow};
 pub use labels::{LabelMode, LabelStatus, LabelTable, Labels};
 pub use pins::{MOST_PINS, Pin, PinRow, Pins, numbers};
 pub use queue::{FrameFilter, FrameNumber, FrameRow, Queue, Reads, SYNTAX, SavedView, Sort, SortKey};

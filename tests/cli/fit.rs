@@ -346,8 +346,8 @@ fn hostile_settings_are_refused_or_end() {
         ("softness = 1e-300", "softness is 1e-300; expected a number in 0.01 ..= 10"),
         ("learning_rate = 1e300", "learning_rate is 1e300; expected a number in 0.000001 ..= 1"),
         ("learning_rates = { log_scale = 1e300 }", "learning_rates.log_scale is 1e300; expected a number in 0 ..= 1"),
-        ("iterations = 1000000000000000000", "iterations is 1e18; expected a number in 1 ..= 100000"),
-        ("people = 1000000000", "people is 1000000000; expected a number in 0 ..= 8"),
+        ("iterations = 1000000000000000000", "iterations is 1e18; expected a whole number in 1 ..= 100000"),
+        ("people = 1000000000", "people is 1000000000; expected a whole number in 0 ..= 8"),
         ("scale_max_m = 0.0", "scale_max_m is 0; expected a number in 0.01 ..= 10"),
         ("em_region = { half_width_m = inf }", "half_width_m = METRES } with METRES > 0"),
     ];

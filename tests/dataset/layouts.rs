@@ -3,7 +3,7 @@
 
 use mhp_inspector::cli::simulate::{Style, write_data_set};
 use mhp_inspector::dataset::npz::{ArrayView, write_npy};
-use mhp_inspector::dataset::{Dataset, Layout, Manifest};
+use mhp_inspector::dataset::{Dataset, Layout};
 use mhp_inspector::geometry::{norm, sub};
 use mhp_inspector::radar::{Axis, View};
 use mhp_inspector::simulate::{Device, Options, Recording, ScenePreset, SimulatedLayout};
@@ -61,8 +61,9 @@ fn same_axes(a: &[View], b: &[View]) {
 #[test]
 fn presets_have_the_axes_that_follow_from_the_processing() {
     let views = |layout| Device::new(layout).views;
-    same_axes(&Manifest::hupr().unwrap().views, &views(SimulatedLayout::Hupr));
-    same_axes(&Manifest::xrf55().unwrap().views, &views(SimulatedLayout::Xrf55Stack));
+    let published = |word| <dyn Layout>::named(word).unwrap().preset().unwrap().views;
+    same_axes(&published("hupr"), &views(SimulatedLayout::Hupr));
+    same_axes(&published("xrf55"), &views(SimulatedLayout::Xrf55Stack));
 }
 
 #[test]
@@ -74,7 +75,7 @@ fn hupr_is_read_with_its_labels_and_without_a_manifest() {
     std::fs::remove_file(folder.path().join("dataset.toml")).unwrap();
     let dataset = open(folder.path());
     let info = dataset.info();
-    assert_eq!((info.layout, dataset.len(), dataset.sequences()), (Layout::Hupr, 2, 1));
+    assert_eq!((info.layout.word(), dataset.len(), dataset.sequences()), ("hupr", 2, 1));
     assert_eq!((info.frame_rate_hz, info.skeleton.joints.len()), (Some(10.0), 14));
     assert!(info.assumptions.iter().any(|text| text.contains("elevation")), "{:?}", info.assumptions);
     let (frame, exact) = (dataset.load(1).unwrap(), recording.frame(1));
@@ -142,7 +143,7 @@ fn xrf55_stacks_are_seventeen_frames_or_one() {
     let (folder, recording) = written(SimulatedLayout::Xrf55Stack, 17, 1, false);
     std::fs::remove_file(folder.path().join("dataset.toml")).unwrap();
     let dataset = open(folder.path());
-    assert_eq!((dataset.info().layout, dataset.len(), dataset.sequences()), (Layout::Xrf55, 17, 1));
+    assert_eq!((dataset.info().layout.word(), dataset.len(), dataset.sequences()), ("xrf55", 17, 1));
     assert!(dataset.info().assumptions.iter().any(|text| text.contains("does not publish")));
     assert_eq!((dataset.frame_name(3), dataset.sequence(3)), ("mmWave/01_01_01/03", "mmWave/01_01_01"));
     let (frame, exact) = (dataset.load(3).unwrap(), recording.frame(3));
@@ -193,7 +194,7 @@ fn mmvr_folders_have_labels_in_pixels_and_truth_beside_them() {
         let (folder, recording) = written(SimulatedLayout::MmvrTree, 1, people, false);
         std::fs::remove_file(folder.path().join("dataset.toml")).unwrap();
         let dataset = open(folder.path());
-        assert_eq!((dataset.info().layout, dataset.frame_name(0)), (Layout::Mmvr, "d1s1/000/00000"));
+        assert_eq!((dataset.info().layout.word(), dataset.frame_name(0)), ("mmvr", "d1s1/000/00000"));
         let (frame, exact) = (dataset.load(0).unwrap(), recording.frame(0));
         assert_eq!(frame.notes, ["00000_mask.npz is missing: no masks"]);
         assert_eq!((frame.person_count, frame.global_id.as_deref()), (Some(people), Some("00000")));

@@ -42,7 +42,7 @@ fn the_real_mmvr_frame_is_read_as_measured() {
     let Some(shared) = shared() else { return };
     let dataset = open(&shared.join("data/mmvr/00383_radar.npz")).unwrap();
     let info = dataset.info();
-    assert_eq!((info.layout, dataset.len(), dataset.start_index()), (Layout::Mmvr, 1, 0));
+    assert_eq!((info.layout.word(), dataset.len(), dataset.start_index()), ("mmvr", 1, 0));
     assert_eq!((dataset.frame_name(0), dataset.sequence(0)), ("mmvr/00383", "mmvr"));
     assert_eq!(
         info.axes_badge,
@@ -77,7 +77,7 @@ fn the_real_mmvr_frame_is_read_as_measured() {
 
 #[test]
 fn the_preset_of_mmvr_is_the_geometry_of_the_reference_case() {
-    let preset = Manifest::mmvr().unwrap();
+    let preset = <dyn Layout>::named("mmvr").unwrap().preset().unwrap();
     let [hori, vert] = &preset.views[..] else { unreachable!("two views") };
     assert_eq!([hori.axes[0].kind, hori.axes[1].kind], [AxisKind::DepthH, AxisKind::Y]);
     assert_eq!([vert.axes[0].kind, vert.axes[1].kind], [AxisKind::DepthV, AxisKind::Z]);
@@ -203,7 +203,7 @@ fn a_manifest_overrides_the_preset_of_mmvr() {
     )
     .unwrap();
     let info = dataset.info();
-    assert_eq!((info.name.as_str(), info.layout, info.radar.start_hz), ("ours", Layout::Mmvr, 60e9));
+    assert_eq!((info.name.as_str(), info.layout.word(), info.radar.start_hz), ("ours", "mmvr", 60e9));
     assert_eq!(info.radar.doppler_features, 32);
     assert!(!info.assumptions.iter().any(|text| text.starts_with("radar")), "{:?}", info.assumptions);
     assert_eq!(info.skeleton, Skeleton::preset("coco17").unwrap());
@@ -298,7 +298,7 @@ fn a_bare_file_asks_once_and_is_remembered() {
     choice.frame_rate_hz = Some(20.0);
     choice.views[0].axes[1].lo = 0.3;
     let dataset = Dataset::open_bare_remembering(&path, &choice, Some(&remembered)).unwrap();
-    assert_eq!((dataset.len(), dataset.info().layout, dataset.frame_name(1)), (2, Layout::Bare, "maps/000001"));
+    assert_eq!((dataset.len(), dataset.info().layout.word(), dataset.frame_name(1)), (2, "bare", "maps/000001"));
     let frame = dataset.load(1).unwrap();
     assert_eq!((frame.maps[1].shape.as_slice(), frame.maps[1].data[0]), ([6, 4].as_slice(), 24.0));
     assert_eq!(frame.timestamp_s, Some(0.05));
@@ -319,7 +319,11 @@ fn a_bare_npy_opens_with_a_manifest_or_a_guess() {
     let map = vec![1.0; 256 * 128];
     write_npy(&path, &ArrayView::f64(&[256, 128], &map)).unwrap();
     let choice = BareChoice::guess(&BareCatalog::read(&path).unwrap());
-    assert_eq!(choice.views[0].axes, Manifest::mmvr().unwrap().views[0].axes, "256 by 128 are taken for MMVR");
+    assert_eq!(
+        choice.views[0].axes,
+        <dyn Layout>::named("mmvr").unwrap().preset().unwrap().views[0].axes,
+        "256 by 128 are taken for MMVR"
+    );
     let text = GENERIC.replace("\"rd\"", "\"array\"").replace("bins = 2", "bins = 256");
     let text = text.replace("bins = 3", "bins = 128");
     let manifest = Manifest::parse(&text, Path::new("m.toml")).unwrap();

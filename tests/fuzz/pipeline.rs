@@ -3,7 +3,7 @@
 
 use crate::material;
 use crate::mutate::NUMBERS;
-use mhp_inspector::config::{FIELDS, FitConfig, Preset};
+use mhp_inspector::config::{FIELDS, FieldKind, FitConfig, Number, Preset, Value};
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::mhp::Precision;
 use mhp_inspector::study::complexity::{ComplexityOptions, compute};
@@ -157,13 +157,19 @@ fn map(axes: &[Axis], random: &mut StdRng) -> Vec<u8> {
     material::npy("<f8", &format!("({shape})"), false, &numbers.collect::<Vec<u8>>())
 }
 
-/// A preset, of which some numbers lie at the ends of their ranges.
+/// A preset, of which some numbers lie at the ends of their ranges, and some switches and choices anywhere.
 fn config(random: &mut StdRng) -> FitConfig {
     let mut config = Preset::ALL.choose(random).map(|preset| preset.config()).unwrap_or_default();
     for field in FIELDS {
         if random.random_bool(0.1) {
-            let (least, most) = field.range;
-            (field.set)(&mut config, if random.random() { least } else { most });
+            let value = match &field.kind {
+                FieldKind::Number(Number { range, .. }) => {
+                    Value::Number(if random.random() { range.0 } else { range.1 })
+                }
+                FieldKind::Switch => Value::Switch(random.random()),
+                FieldKind::Choice(answers) => Value::Answer(random.random_range(0..answers.len())),
+            };
+            field.set(&mut config, value);
         }
     }
     config.iterations = random.random_range(0..=3);

@@ -3,7 +3,7 @@
 
 use crate::blob;
 use mhp_inspector::body::{Group, Pppr};
-use mhp_inspector::config::FitConfig;
+use mhp_inspector::config::{FIELDS, Field, FieldKind, FitConfig, Number, ReadBy, Value};
 use mhp_inspector::dataset::{BareCatalog, BareChoice, Dataset, DatasetError};
 use mhp_inspector::mhp::{Adam, Evaluation, FitState, Problem, StepReport, StopReason, Terms, initialise};
 use mhp_inspector::session::{
@@ -533,6 +533,59 @@ fn a_setting_changed_while_running_is_a_flag() {
         bench.apply(Command::SetConfig(Box::new(FitConfig { tau_pct: 30.0, ..config }))).is_empty(),
         "nothing changed"
     );
+}
+
+/// Another value than a configuration has.
+fn another(field: &Field, config: &FitConfig) -> Value {
+    match (field.get(config), &field.kind) {
+        (Value::Switch(on), _) => Value::Switch(!on),
+        (Value::Answer(k), FieldKind::Choice(answers)) => Value::Answer((k + 1) % answers.len()),
+        (Value::Unset, FieldKind::Number(Number { unset: Some(unset), .. })) => Value::Number(unset.first),
+        (value, FieldKind::Number(number)) if value == Value::Number(number.offered.0) => {
+            Value::Number(number.offered.1)
+        }
+        (_, FieldKind::Number(number)) => Value::Number(number.offered.0),
+        (value, _) => panic!("{}: {value:?}", field.key),
+    }
+}
+
+/// Whatever is set, while it runs or at an earlier iteration: a flag or a branch tells it, and other branches keep theirs.
+#[test]
+fn no_setting_is_lost_on_the_way() {
+    let mut bench = Bench::new();
+    bench.run_to(2);
+    for field in FIELDS {
+        let mut config = bench.session.config;
+        field.set(&mut config, another(field, &bench.session.config));
+        let (job, head) = (bench.job(), bench.session.fit.head());
+        let effects = bench.apply(Command::SetConfig(Box::new(config)));
+        assert!(matches!(sent(&effects), WorkerCommand::Configure(told) if **told == config), "{}", field.key);
+        bench.event(job, WorkerEvent::ConfigApplied { branch: 0, iteration: head, config: Box::new(config) });
+        bench.run_to(head + 1);
+        let flag = bench.session.fit.branch().unwrap().flags.last().unwrap();
+        assert!(flag.iteration == head && flag.config == config, "{}", field.key);
+        assert!(flag.text.to_lowercase().starts_with(&field.name.to_lowercase()), "{}: {}", field.key, flag.text);
+    }
+    bench.run_to(bench.session.fit.head() + 2);
+    let (first, head) = (bench.session.config, bench.session.fit.head());
+    for field in FIELDS.iter().filter(|field| field.read_by != ReadBy::Run) {
+        bench.apply(Command::GotoIteration(head - 1));
+        let mut config = first;
+        field.set(&mut config, another(field, &first));
+        let effects = bench.apply(Command::SetConfig(Box::new(config)));
+        let WorkerCommand::Branch { branch, config: told, .. } = sent(&effects) else { panic!("{}", field.key) };
+        let (branch, told) = (*branch, **told);
+        assert_eq!(told, config);
+        let history = &bench.session.fit.history;
+        let departure = history.departure(history.branch(branch).unwrap());
+        assert!(departure.to_lowercase().contains(&field.name.to_lowercase()), "{}: {departure}", field.key);
+        assert!(bench.session.log.iter().any(|line| line.text.ends_with(&departure)), "{}: {departure}", field.key);
+        // There and back again.
+        for (id, settings) in [(0, first), (branch, config), (0, first)] {
+            bench.apply(Command::SelectBranch(id));
+            assert_eq!(bench.session.config, settings, "{}", field.key);
+        }
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use crate::blob;
 use crate::window::Window;
-use mhp_inspector::app::PaneKind;
+use mhp_inspector::app::Pane;
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::session::{Command, LogLevel};
 use mhp_inspector::study::complexity::{ComplexityOptions, compute};
@@ -52,7 +52,7 @@ fn shown(window: &mut Window, study: StudyKind) {
 #[test]
 fn an_empty_pane_says_how_it_is_filled() {
     let mut window = Window::open(2);
-    window.harness.state_mut().show_pane(PaneKind::Study);
+    window.harness.state_mut().show_pane(Pane::called("Study").unwrap());
     window.harness.run_steps(2);
     assert!(window.says("No study yet") && window.says("study operators DATA --out RUN"));
 }
@@ -85,7 +85,7 @@ fn a_row_that_cannot_differ_says_why() {
     let folder = window.folder.path().join("run-robustness");
     run_with(&dataset, &folder, StudyKind::Robustness, &[], Preset::Recommended);
     window.apply(Command::OpenRun(folder));
-    window.harness.state_mut().show_pane(PaneKind::Study);
+    window.harness.state_mut().show_pane(Pane::called("Study").unwrap());
     shown(&mut window, StudyKind::Robustness);
     let why = "[1] cannot move a joint: velocities reach none, for powers add, and no map has a Doppler axis";
     assert!(window.says(why), "{:#?}", window.names());
@@ -96,7 +96,7 @@ fn a_row_puts_its_frames_into_the_list() {
     let mut window = Window::open(5);
     let folder = run(&window, StudyKind::Init, &[]);
     window.apply(Command::OpenRun(folder));
-    window.harness.state_mut().show_pane(PaneKind::Study);
+    window.harness.state_mut().show_pane(Pane::called("Study").unwrap());
     shown(&mut window, StudyKind::Init);
     window.click("Study row without position (P)");
     window.until("its frames", |w| w.session().summaries.len() == 4);
@@ -116,7 +116,7 @@ fn a_stratum_shows_its_own_frames_only() {
     let mut window = Window::open(4);
     let folder = run(&window, StudyKind::Complexity, &[]);
     window.apply(Command::OpenRun(folder));
-    window.harness.state_mut().show_pane(PaneKind::Study);
+    window.harness.state_mut().show_pane(Pane::called("Study").unwrap());
     shown(&mut window, StudyKind::Complexity);
     let hard = window.session().study.shown().unwrap().table[2].frames;
     assert!(hard > 0 && hard < 4);
@@ -136,7 +136,7 @@ fn sweeps_are_curves_maps_or_parallel_lines() {
             "Parallel coordinates of MAJPE, mm over tau_pct, w_em, summation",
         ),
     ];
-    window.harness.state_mut().show_pane(PaneKind::Study);
+    window.harness.state_mut().show_pane(Pane::called("Study").unwrap());
     for (grid, name) in cases {
         let folder = run(&window, StudyKind::Sweep, grid);
         window.apply(Command::OpenRun(folder));
@@ -164,7 +164,7 @@ fn a_run_of_other_data_says_so_and_offers_them() {
     let dataset = Dataset::open(other.path(), &Progress::new()).unwrap();
     run_of(&dataset, &other.path().join("run"), StudyKind::Init, &[]);
     window.apply(Command::OpenRun(other.path().join("run/run.toml")));
-    window.harness.state_mut().show_pane(PaneKind::Study);
+    window.harness.state_mut().show_pane(Pane::called("Study").unwrap());
     shown(&mut window, StudyKind::Init);
     assert!(window.says("Another data set is open"));
     window.click("Open its data set");

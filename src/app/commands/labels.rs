@@ -1,21 +1,22 @@
 //! The commands about the queue, tags, notes and the undoing of them.
 
 use super::table::{CTRL, CTRL_SHIFT, NONE, SHIFT, always, has_frame, has_frames, view};
-use super::{Act, AppAct, Menu, UserCommand};
+use super::{CommandRow, Menu, UiAction};
+use crate::app::panes::{frames, maps, modes};
 use crate::labels::{Tag, Verdict};
 use crate::session::{Command, LabelMode, Session};
 use egui::Key;
 
-fn toggle(tag: Tag) -> Act {
-    Act::Session(Command::ToggleTag(tag))
+fn toggle(tag: Tag) -> UiAction {
+    UiAction::Session(Command::ToggleTag(tag))
 }
 
-fn judge(s: &Session, verdict: Verdict) -> Act {
+fn judge(s: &Session, verdict: Verdict) -> UiAction {
     let now = s.labels.label(s.data.frame_index).verdict;
-    Act::Session(Command::SetVerdict((now != Some(verdict)).then_some(verdict)))
+    UiAction::Session(Command::SetVerdict((now != Some(verdict)).then_some(verdict)))
 }
 
-fn mode(s: &Session, mode: LabelMode) -> Act {
+fn mode(s: &Session, mode: LabelMode) -> UiAction {
     view(s, |v| v.label_mode = mode)
 }
 
@@ -24,80 +25,72 @@ fn reviewing(s: &Session) -> bool {
 }
 
 /// Commands about labels, in the order of their menus.
-pub(super) const COMMANDS: &[UserCommand] = &[
-    UserCommand {
+pub(super) const COMMANDS: &[CommandRow] = &[
+    CommandRow {
         label: "Undo",
         title: Some(|s| s.labels.undo_name().map_or_else(|| "Undo".into(), |name| format!("Undo: {name}"))),
         tooltip: "Take the last act of labelling back.",
         menu: Menu::Edit,
         keys: &[(CTRL, Key::Z)],
         enabled: |s| s.labels.undo_name().is_some(),
-        act: |_| Act::Session(Command::Undo),
+        act: |_| UiAction::Session(Command::Undo),
     },
-    UserCommand {
+    CommandRow {
         label: "Redo",
         title: Some(|s| s.labels.redo_name().map_or_else(|| "Redo".into(), |name| format!("Redo: {name}"))),
         tooltip: "Do the last act again that was taken back.",
         menu: Menu::Edit,
         keys: &[(CTRL_SHIFT, Key::Z), (CTRL, Key::Y)],
         enabled: |s| s.labels.redo_name().is_some(),
-        act: |_| Act::Session(Command::Redo),
+        act: |_| UiAction::Session(Command::Redo),
     },
-    UserCommand {
+    CommandRow {
         label: "Select all listed frames",
         title: None,
         tooltip: "Select every frame of the list, to tag them together.",
         menu: Menu::Edit,
         keys: &[(CTRL, Key::A)],
         enabled: |s| !s.queue.rows().is_empty(),
-        act: |s| Act::Session(Command::SelectFrames(s.queue.rows().iter().map(|&row| row as usize).collect())),
+        act: |s| UiAction::Session(Command::SelectFrames(s.queue.rows().iter().map(|&row| row as usize).collect())),
     },
-    UserCommand {
-        label: "Filter frames…",
-        title: None,
-        tooltip: "Type which frames are listed, for example stratum:hard iou<0.5 -tag:F1.",
-        menu: Menu::Edit,
-        keys: &[(CTRL, Key::F)],
-        enabled: has_frame,
-        act: |_| Act::App(AppAct::FocusFilter),
-    },
-    UserCommand {
+    frames::FILTER,
+    CommandRow {
         label: "Next in queue",
         title: None,
         tooltip: "The next frame of the list, in its order and under its filter.",
         menu: Menu::Frame,
         keys: &[(NONE, Key::N)],
         enabled: has_frames,
-        act: |_| Act::Session(Command::StepQueue(1)),
+        act: |_| UiAction::Session(Command::StepQueue(1)),
     },
-    UserCommand {
+    CommandRow {
         label: "Previous in queue",
         title: None,
         tooltip: "The frame before in the list, in its order and under its filter.",
         menu: Menu::Frame,
         keys: &[(SHIFT, Key::N)],
         enabled: has_frames,
-        act: |_| Act::Session(Command::StepQueue(-1)),
+        act: |_| UiAction::Session(Command::StepQueue(-1)),
     },
-    UserCommand {
+    CommandRow {
         label: "Next untagged",
         title: None,
         tooltip: "The next frame of the list that you have not judged yet; from the top again after the end.",
         menu: Menu::Frame,
         keys: &[(NONE, Key::U)],
         enabled: has_frames,
-        act: |_| Act::Session(Command::NextUntagged),
+        act: |_| UiAction::Session(Command::NextUntagged),
     },
-    UserCommand {
+    CommandRow {
         label: "Last edited",
         title: None,
         tooltip: "The frame that you labelled last.",
         menu: Menu::Frame,
         keys: &[(NONE, Key::E)],
         enabled: |s| s.labels.last_edited.is_some(),
-        act: |_| Act::Session(Command::GotoLastEdited),
+        act: |_| UiAction::Session(Command::GotoLastEdited),
     },
-    UserCommand {
+    CommandRow {
         label: "Tag F1: static reflector dominance",
         title: None,
         tooltip: "Tag the frame, or all selected frames, with F1; again to take it away.",
@@ -106,7 +99,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: has_frame,
         act: |_| toggle(Tag::F1),
     },
-    UserCommand {
+    CommandRow {
         label: "Tag F2: near-field distortion",
         title: None,
         tooltip: "Tag the frame, or all selected frames, with F2; again to take it away.",
@@ -115,7 +108,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: has_frame,
         act: |_| toggle(Tag::F2),
     },
-    UserCommand {
+    CommandRow {
         label: "Tag F3: close multi-person superposition",
         title: None,
         tooltip: "Tag the frame, or all selected frames, with F3; again to take it away.",
@@ -124,7 +117,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: has_frame,
         act: |_| toggle(Tag::F3),
     },
-    UserCommand {
+    CommandRow {
         label: "Tag F4: low-motion ambiguity",
         title: None,
         tooltip: "Tag the frame, or all selected frames, with F4; again to take it away.",
@@ -133,7 +126,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: has_frame,
         act: |_| toggle(Tag::F4),
     },
-    UserCommand {
+    CommandRow {
         label: "Tag clean",
         title: None,
         tooltip: "Say that the fit does not fail; takes F1 to F4 away.",
@@ -142,7 +135,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: has_frame,
         act: |_| toggle(Tag::Clean),
     },
-    UserCommand {
+    CommandRow {
         label: "Tag unsure",
         title: None,
         tooltip: "Say that you cannot tell.",
@@ -151,34 +144,18 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: has_frame,
         act: |_| toggle(Tag::Unsure),
     },
-    UserCommand {
-        label: "Write a note",
-        title: None,
-        tooltip: "Put the text cursor into the note of the frame.",
-        menu: Menu::Labels,
-        keys: &[(NONE, Key::M)],
-        enabled: has_frame,
-        act: |_| Act::App(AppAct::FocusNote),
-    },
-    UserCommand {
-        label: "Mark cells",
-        title: None,
-        tooltip: "Drag a box on a map to mark the cells that your label is about. Ctrl+drag does it at any time.",
-        menu: Menu::Labels,
-        keys: &[(NONE, Key::G)],
-        enabled: has_frame,
-        act: |_| Act::App(AppAct::MarkCells),
-    },
-    UserCommand {
+    modes::WRITE_NOTE,
+    maps::MARK_CELLS,
+    CommandRow {
         label: "Clear label",
         title: None,
         tooltip: "Say nothing of the frame, or of all selected frames, any more: tags, note, verdict, cells.",
         menu: Menu::Labels,
         keys: &[(NONE, Key::Delete)],
         enabled: |s| s.label_targets().iter().any(|&frame| s.labels.mine(frame as usize).is_some()),
-        act: |_| Act::Session(Command::ClearLabel),
+        act: |_| UiAction::Session(Command::ClearLabel),
     },
-    UserCommand {
+    CommandRow {
         label: "Verdict: annotation error",
         title: None,
         tooltip: Verdict::AnnotationError.words(),
@@ -187,7 +164,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: reviewing,
         act: |s| judge(s, Verdict::AnnotationError),
     },
-    UserCommand {
+    CommandRow {
         label: "Verdict: detection error",
         title: None,
         tooltip: Verdict::DetectionError.words(),
@@ -196,7 +173,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: reviewing,
         act: |s| judge(s, Verdict::DetectionError),
     },
-    UserCommand {
+    CommandRow {
         label: "Verdict: both incorrect",
         title: None,
         tooltip: Verdict::BothIncorrect.words(),
@@ -205,7 +182,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: reviewing,
         act: |s| judge(s, Verdict::BothIncorrect),
     },
-    UserCommand {
+    CommandRow {
         label: "Verdict: true negative",
         title: None,
         tooltip: Verdict::TrueNegative.words(),
@@ -214,7 +191,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: reviewing,
         act: |s| judge(s, Verdict::TrueNegative),
     },
-    UserCommand {
+    CommandRow {
         label: "Explore",
         title: None,
         tooltip: "Show everything while labelling: evidence and other people's labels.",
@@ -223,7 +200,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: always,
         act: |s| mode(s, LabelMode::Explore),
     },
-    UserCommand {
+    CommandRow {
         label: "Label for agreement",
         title: None,
         tooltip: "Hide other people's labels, and the evidence until you have tagged the frame.",
@@ -232,7 +209,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: always,
         act: |s| mode(s, LabelMode::Agreement),
     },
-    UserCommand {
+    CommandRow {
         label: "Review counts",
         title: None,
         tooltip: "Give verdicts on frames whose number of people is disputed.",

@@ -1,13 +1,19 @@
 //! The one table of user commands: label, tooltip, shortcut, when enabled, what it does. Menus, palette, help sheet and
-//! keys all read it; a test holds that no two commands share a key.
+//! keys all read it; a test holds that no two commands share a key. The commands that show a pane come from the list of
+//! panes.
 
 mod labels;
+mod search;
 mod sharing;
 mod table;
 
-use super::PaneKind;
+pub(crate) use search::found;
+pub(crate) use table::{CTRL, NONE, always, has_frame};
+
+use super::panes::{Pane, PaneStates};
 use crate::session::{Command, Export, Session};
-use egui::{Id, Key, Modifiers};
+use egui::{Id, Key, KeyboardShortcut, ModifierNames, Modifiers};
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 /// The menu that a command is in.
@@ -69,12 +75,6 @@ pub(crate) enum AppAct {
     ResetViews,
     /// Zoom the maps to the person and the camera to the selection.
     Focus,
-    /// Look from the radar.
-    CameraRadar,
-    /// Look from above.
-    CameraTop,
-    /// Look from the side.
-    CameraSide,
     /// Larger interface.
     ZoomIn,
     /// Smaller interface.
@@ -83,12 +83,6 @@ pub(crate) enum AppAct {
     ZoomReset,
     /// Fill the screen.
     FullScreen,
-    /// Put the text cursor into the filter of the frame list.
-    FocusFilter,
-    /// Put the text cursor into the note.
-    FocusNote,
-    /// The next drag on a map marks cells.
-    MarkCells,
     /// Ask where to write something.
     Save(SaveKind),
     /// Write the session where it was last, or ask.
@@ -96,9 +90,9 @@ pub(crate) enum AppAct {
     /// Type the path of a session file.
     OpenSession,
     /// Put the picture of the window, or of one pane, on the clipboard.
-    CopyPicture(Option<PaneKind>),
+    CopyPicture(Option<&'static Pane>),
     /// Bring a pane to the front.
-    ShowPane(PaneKind),
+    ShowPane(&'static Pane),
     /// Type the path of a table of results.
     LoadResults,
     /// Type the path of a run folder.
@@ -115,41 +109,46 @@ pub(crate) enum SaveKind {
     /// The session file.
     Session,
     /// A picture of the window, or of one pane.
-    Picture(Option<PaneKind>),
+    Picture(Option<&'static Pane>),
 }
 
 /// What a command does.
-#[derive(Debug)]
-pub(crate) enum Act {
+pub(crate) enum UiAction {
     /// Change the session.
     Session(Command),
     /// Change the window.
     App(AppAct),
     /// Write something to a file.
     Write(SaveKind, PathBuf),
-    /// Show these cells of a view's map.
-    ShowCells {
-        /// Index of the view.
-        view: usize,
-        /// First bin of each axis.
-        lo: Vec<usize>,
-        /// Last bin of each axis.
-        hi: Vec<usize>,
+    /// Change what the panes remember.
+    Panes {
+        /// The pane that is brought to the front first.
+        front: Option<&'static Pane>,
+        /// The change.
+        change: PaneChange,
     },
 }
 
-impl UserCommand {
-    /// What a menu says.
-    pub(crate) fn text(&self, session: &Session) -> String {
-        self.title.map_or_else(|| self.label.to_owned(), |title| title(session))
+/// A change of what the panes remember.
+pub(crate) type PaneChange = Box<dyn FnOnce(&mut PaneStates, &Session)>;
+
+impl UiAction {
+    /// Changes what the panes remember.
+    pub(crate) fn panes(change: impl FnOnce(&mut PaneStates, &Session) + 'static) -> Self {
+        Self::Panes { front: None, change: Box::new(change) }
+    }
+
+    /// Brings a pane to the front and changes what the panes remember.
+    pub(crate) fn in_front(pane: &'static Pane, change: impl FnOnce(&mut PaneStates, &Session) + 'static) -> Self {
+        Self::Panes { front: Some(pane), change: Box::new(change) }
     }
 }
 
 /// A key with its modifiers.
 pub(crate) type Shortcut = (Modifiers, Key);
 
-/// One command.
-pub(crate) struct UserCommand {
+/// A row of the table.
+pub(crate) struct CommandRow {
     /// Sentence case, unique.
     pub(crate) label: &'static str,
     /// What its menu says instead where that depends on the session: `Undo: tag F2 on 12 frames`.
@@ -163,59 +162,104 @@ pub(crate) struct UserCommand {
     /// Whether it would do something now.
     pub(crate) enabled: fn(&Session) -> bool,
     /// What it does.
-    pub(crate) act: fn(&Session) -> Act,
+    pub(crate) act: fn(&Session) -> UiAction,
+}
+
+/// A command that a person can give.
+#[derive(Clone, Copy)]
+pub(crate) enum UserCommand {
+    /// As a row of the table says.
+    Row(&'static CommandRow),
+    /// Bring a pane to the front.
+    Show(&'static Pane),
+}
+
+impl UserCommand {
+    /// Its name, unique.
+    pub(crate) fn label(self) -> Cow<'static, str> {
+        match self {
+            Self::Row(row) => row.label.into(),
+            Self::Show(pane) => format!("Show {}", pane.title()).into(),
+        }
+    }
+
+    /// What a menu says.
+    pub(crate) fn text(self, session: &Session) -> Cow<'static, str> {
+        match self {
+            Self::Row(CommandRow { title: Some(title), .. }) => title(session).into(),
+            _ => self.label(),
+        }
+    }
+
+    /// One sentence: what it does.
+    pub(crate) fn tooltip(self) -> Cow<'static, str> {
+        match self {
+            Self::Row(row) => row.tooltip.into(),
+            Self::Show(pane) => format!("Bring the pane {} to the front: {}.", pane.title(), pane.help()).into(),
+        }
+    }
+
+    /// What it does, and its shortcut.
+    pub(crate) fn tip(self) -> String {
+        let keys = self.keys().first().map_or_else(String::new, |&keys| format!("\nKey: {}", shortcut_text(keys)));
+        format!("{}{keys}", self.tooltip())
+    }
+
+    /// Its menu.
+    pub(crate) fn menu(self) -> Menu {
+        match self {
+            Self::Row(row) => row.menu,
+            Self::Show(_) => Menu::View,
+        }
+    }
+
+    /// Its keys; the first is shown.
+    pub(crate) fn keys(self) -> &'static [Shortcut] {
+        match self {
+            Self::Row(row) => row.keys,
+            Self::Show(pane) => pane.keys(),
+        }
+    }
+
+    /// Whether it would do something now.
+    pub(crate) fn enabled(self, session: &Session) -> bool {
+        match self {
+            Self::Row(row) => (row.enabled)(session),
+            Self::Show(_) => true,
+        }
+    }
+
+    /// What it does.
+    pub(crate) fn action(self, session: &Session) -> UiAction {
+        match self {
+            Self::Row(row) => (row.act)(session),
+            Self::Show(pane) => UiAction::App(AppAct::ShowPane(pane)),
+        }
+    }
 }
 
 /// Every command; those of one menu are in its order.
-pub(crate) fn all() -> impl Iterator<Item = &'static UserCommand> {
-    table::COMMANDS.iter().chain(labels::COMMANDS).chain(sharing::COMMANDS)
+pub(crate) fn all() -> impl Iterator<Item = UserCommand> {
+    let rows = table::COMMANDS.iter().chain(labels::COMMANDS).chain(sharing::COMMANDS);
+    rows.map(UserCommand::Row).chain(Pane::all().iter().map(|pane| UserCommand::Show(pane)))
 }
 
 /// The command called `label`.
-pub(crate) fn command(label: &str) -> Option<&'static UserCommand> {
-    all().find(|command| command.label == label)
+pub(crate) fn command(label: &str) -> Option<UserCommand> {
+    all().find(|command| command.label() == label)
 }
 
 /// A shortcut as it is printed: `Ctrl+Shift+O`.
 pub(crate) fn shortcut_text((modifiers, key): Shortcut) -> String {
-    let key_text = match key {
-        Key::ArrowLeft => "←",
-        Key::ArrowRight => "→",
-        Key::Period => ".",
-        Key::Comma => ",",
-        Key::Plus => "+",
-        Key::Minus => "−",
-        Key::Questionmark => return "?".into(),
-        Key::Escape => "Esc",
-        Key::PageUp => "Page up",
-        Key::PageDown => "Page down",
-        Key::Num0 => "0",
-        Key::OpenBracket => "[",
-        Key::CloseBracket => "]",
-        other => other.name(),
-    };
-    let mut text = String::new();
-    if modifiers.command {
-        text.push_str(if cfg!(target_os = "macos") { "⌘" } else { "Ctrl+" });
-    }
-    if modifiers.shift {
-        text.push_str("Shift+");
-    }
-    text + key_text
-}
-
-/// Tooltip with the shortcut at its end.
-pub(crate) fn tooltip(command: &UserCommand) -> String {
-    command.keys.first().map_or_else(
-        || command.tooltip.to_owned(),
-        |&keys| format!("{}\nKey: {}", command.tooltip, shortcut_text(keys)),
-    )
+    // Words for the modifiers, signs for the keys that have one.
+    const NAMES: ModifierNames<'_> = ModifierNames { is_short: true, ..ModifierNames::NAMES };
+    KeyboardShortcut::new(modifiers, key).format(&NAMES, cfg!(target_os = "macos"))
 }
 
 /// The commands whose keys were pressed in this pass; their key events are taken out of the input.
 ///
 /// While text is being typed nothing is taken except function keys and combinations with Ctrl that text fields do not use.
-pub(crate) fn pressed(ctx: &egui::Context) -> Vec<&'static UserCommand> {
+pub(crate) fn pressed(ctx: &egui::Context) -> Vec<UserCommand> {
     let focused = ctx.memory(egui::Memory::focused);
     let typing = focused.is_some_and(|id| egui::text_edit::TextEditState::load(ctx, id).is_some());
     let was_typing = ctx.data_mut(|data| std::mem::replace(data.get_temp_mut_or_default(Id::unique("typing")), typing));
@@ -246,7 +290,8 @@ pub(crate) fn pressed(ctx: &egui::Context) -> Vec<&'static UserCommand> {
             if focused.is_some() && !held.0 && matches!(key, Key::Space | Key::Enter | Key::Escape | Key::Tab) {
                 return true;
             }
-            let hit = all().find(|command| command.keys.iter().any(|(m, k)| k == key && (m.command, m.shift) == held));
+            let hit =
+                all().find(|command| command.keys().iter().any(|(m, k)| k == key && (m.command, m.shift) == held));
             found.extend(hit);
             hit.is_none()
         });
@@ -264,10 +309,15 @@ mod tests {
         let mut keys = HashSet::new();
         let mut labels = HashSet::new();
         for command in all() {
-            assert!(labels.insert(command.label), "two commands are called {}", command.label);
-            assert!(!command.tooltip.is_empty(), "{} has no tooltip", command.label);
-            for &(m, k) in command.keys {
-                assert!(keys.insert((m.command, m.shift, k)), "{} clashes on {}", command.label, shortcut_text((m, k)));
+            assert!(labels.insert(command.label()), "two commands are called {}", command.label());
+            assert!(!command.tooltip().is_empty(), "{} has no tooltip", command.label());
+            for &(m, k) in command.keys() {
+                assert!(
+                    keys.insert((m.command, m.shift, k)),
+                    "{} clashes on {}",
+                    command.label(),
+                    shortcut_text((m, k))
+                );
             }
         }
         assert!(all().count() > 60);

@@ -1,13 +1,12 @@
 //! The commands about comparing fits, taking things home, and session files.
 
 use super::table::{CTRL, CTRL_SHIFT, NONE, SHIFT, always, has_frame, view};
-use super::{Act, AppAct, Menu, SaveKind, UserCommand};
-use crate::app::PaneKind;
+use super::{AppAct, CommandRow, Menu, SaveKind, UiAction};
 use crate::session::{Against, Command, Export, Session};
 use egui::Key;
 
-fn save(what: Export) -> Act {
-    Act::App(AppAct::Save(SaveKind::Export(what)))
+fn save(what: Export) -> UiAction {
+    UiAction::App(AppAct::Save(SaveKind::Export(what)))
 }
 
 fn fitted(s: &Session) -> bool {
@@ -19,62 +18,62 @@ fn labelled(s: &Session) -> bool {
 }
 
 /// Commands about comparing and sharing, in the order of their menus.
-pub(super) const COMMANDS: &[UserCommand] = &[
-    UserCommand {
+pub(super) const COMMANDS: &[CommandRow] = &[
+    CommandRow {
         label: "Open session…",
         title: None,
         tooltip: "Open a session file: the same frame, iteration, camera, pins and layout.",
         menu: Menu::File,
         keys: &[],
         enabled: always,
-        act: |_| Act::App(AppAct::OpenSession),
+        act: |_| UiAction::App(AppAct::OpenSession),
     },
-    UserCommand {
+    CommandRow {
         label: "Load results…",
         title: None,
         tooltip: "Take IoU, convergence, reason and MAJPE of a whole batch into the list: the summary.csv of `fit --out`.",
         menu: Menu::File,
         keys: &[],
         enabled: |s| s.data.dataset.is_some(),
-        act: |_| Act::App(AppAct::LoadResults),
+        act: |_| UiAction::App(AppAct::LoadResults),
     },
-    UserCommand {
+    CommandRow {
         label: "Open study…",
         title: None,
         tooltip: "Show the table and the plot of a study: the run folder that `study NAME --out` wrote.",
         menu: Menu::File,
         keys: &[],
         enabled: always,
-        act: |_| Act::App(AppAct::OpenStudy),
+        act: |_| UiAction::App(AppAct::OpenStudy),
     },
-    UserCommand {
+    CommandRow {
         label: "Save session",
         title: None,
         tooltip: "Write frame, iteration, camera, pins and layout to the session file; asks where the first time.",
         menu: Menu::File,
         keys: &[(CTRL, Key::S)],
         enabled: has_frame,
-        act: |_| Act::App(AppAct::SaveSession),
+        act: |_| UiAction::App(AppAct::SaveSession),
     },
-    UserCommand {
+    CommandRow {
         label: "Save session as…",
         title: None,
         tooltip: "Write frame, iteration, camera, pins and layout to another session file.",
         menu: Menu::File,
         keys: &[],
         enabled: has_frame,
-        act: |_| Act::App(AppAct::Save(SaveKind::Session)),
+        act: |_| UiAction::App(AppAct::Save(SaveKind::Session)),
     },
-    UserCommand {
+    CommandRow {
         label: "Save picture…",
         title: None,
         tooltip: "Save the window, as it is on screen, as PNG. A pane alone: right click on its tab.",
         menu: Menu::File,
         keys: &[(CTRL_SHIFT, Key::S)],
         enabled: always,
-        act: |_| Act::App(AppAct::Save(SaveKind::Picture(None))),
+        act: |_| UiAction::App(AppAct::Save(SaveKind::Picture(None))),
     },
-    UserCommand {
+    CommandRow {
         label: "Export labels as CSV…",
         title: None,
         tooltip: "Every annotator's labels, a row a frame and annotator; in agreement mode only your own.",
@@ -83,7 +82,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: labelled,
         act: |_| save(Export::LabelsCsv),
     },
-    UserCommand {
+    CommandRow {
         label: "Export labels as JSON…",
         title: None,
         tooltip: "Every annotator's labels with all that was recorded; in agreement mode only your own.",
@@ -92,7 +91,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: labelled,
         act: |_| save(Export::LabelsJson),
     },
-    UserCommand {
+    CommandRow {
         label: "Export strata as CSV…",
         title: None,
         tooltip: "Hardness, its three parts and the stratum of every frame.",
@@ -101,7 +100,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: |s| s.strata.result().is_some(),
         act: |_| save(Export::Strata),
     },
-    UserCommand {
+    CommandRow {
         label: "Export curves as CSV…",
         title: None,
         tooltip: "Loss, terms, IoU and MAJPE of every iteration and branch of this fit.",
@@ -110,7 +109,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: fitted,
         act: |_| save(Export::Curves),
     },
-    UserCommand {
+    CommandRow {
         label: "Export parameters as npz…",
         title: None,
         tooltip: "The PPPR parameters on screen.",
@@ -119,7 +118,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: fitted,
         act: |_| save(Export::Parameters),
     },
-    UserCommand {
+    CommandRow {
         label: "Export Gaussians as PLY…",
         title: None,
         tooltip: "The Gaussians on screen, in the layout of 3-D Gaussian splatting.",
@@ -128,34 +127,34 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: fitted,
         act: |_| save(Export::Gaussians),
     },
-    UserCommand {
+    CommandRow {
         label: "Copy picture",
         title: None,
         tooltip: "Put the picture of the window on the clipboard.",
         menu: Menu::Edit,
         keys: &[(CTRL, Key::C)],
         enabled: always,
-        act: |_| Act::App(AppAct::CopyPicture(None)),
+        act: |_| UiAction::App(AppAct::CopyPicture(None)),
     },
-    UserCommand {
+    CommandRow {
         label: "Copy path of the frame",
         title: None,
         tooltip: "Put the path of the frame's file on the clipboard.",
         menu: Menu::Edit,
         keys: &[(CTRL_SHIFT, Key::C)],
         enabled: has_frame,
-        act: |_| Act::App(AppAct::CopyPath),
+        act: |_| UiAction::App(AppAct::CopyPath),
     },
-    UserCommand {
+    CommandRow {
         label: "Pin this fit",
         title: None,
         tooltip: "Keep the frame, iteration and settings on screen to compare other fits with.",
         menu: Menu::Fit,
         keys: &[(NONE, Key::P)],
         enabled: fitted,
-        act: |_| Act::Session(Command::PinFit),
+        act: |_| UiAction::Session(Command::PinFit),
     },
-    UserCommand {
+    CommandRow {
         label: "Compare with the baseline",
         title: None,
         tooltip: "Flip, wipe and difference show H_sim against the baseline's H_sim; again for H_ori.",
@@ -164,7 +163,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: |s| s.pins.baseline().is_some(),
         act: |s| view(s, |v| v.against = if v.against == Against::Ori { Against::Baseline } else { Against::Ori }),
     },
-    UserCommand {
+    CommandRow {
         label: "Figure captions",
         title: None,
         tooltip: "Print units, τ, iteration, seed and version small under every picture, for figures.",
@@ -173,97 +172,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
         enabled: always,
         act: |s| view(s, |v| v.figure = !v.figure),
     },
-    UserCommand {
-        label: "Show Curves",
-        title: None,
-        tooltip: "Bring the pane Curves to the front.",
-        menu: Menu::View,
-        keys: &[(CTRL, Key::Num1)],
-        enabled: always,
-        act: |_| Act::App(AppAct::ShowPane(PaneKind::Curves)),
-    },
-    UserCommand {
-        label: "Show Compare",
-        title: None,
-        tooltip: "Bring the pane Compare to the front.",
-        menu: Menu::View,
-        keys: &[(CTRL, Key::Num2)],
-        enabled: always,
-        act: |_| Act::App(AppAct::ShowPane(PaneKind::Compare)),
-    },
-    UserCommand {
-        label: "Show Agreement",
-        title: None,
-        tooltip: "Bring the pane Agreement to the front.",
-        menu: Menu::View,
-        keys: &[(CTRL, Key::Num3)],
-        enabled: always,
-        act: |_| Act::App(AppAct::ShowPane(PaneKind::Agreement)),
-    },
-    UserCommand {
-        label: "Show Statistics",
-        title: None,
-        tooltip: "Bring the pane Statistics to the front.",
-        menu: Menu::View,
-        keys: &[(CTRL, Key::Num4)],
-        enabled: always,
-        act: |_| Act::App(AppAct::ShowPane(PaneKind::Statistics)),
-    },
-    UserCommand {
-        label: "Show study",
-        title: None,
-        tooltip: "Bring a study's table and plot to the front.",
-        menu: Menu::View,
-        keys: &[],
-        enabled: always,
-        act: |_| Act::App(AppAct::ShowPane(PaneKind::Study)),
-    },
-    UserCommand {
-        label: "Show Log",
-        title: None,
-        tooltip: "Bring the pane Log to the front.",
-        menu: Menu::View,
-        keys: &[(CTRL, Key::Num5)],
-        enabled: always,
-        act: |_| Act::App(AppAct::ShowPane(PaneKind::Log)),
-    },
-    UserCommand {
-        label: "Show Fit",
-        title: None,
-        tooltip: "Bring the pane Fit to the front.",
-        menu: Menu::View,
-        keys: &[(CTRL, Key::Num6)],
-        enabled: always,
-        act: |_| Act::App(AppAct::ShowPane(PaneKind::Fit)),
-    },
-    UserCommand {
-        label: "Show Joint",
-        title: None,
-        tooltip: "Bring the pane Joint to the front.",
-        menu: Menu::View,
-        keys: &[(CTRL, Key::Num7)],
-        enabled: always,
-        act: |_| Act::App(AppAct::ShowPane(PaneKind::Joint)),
-    },
-    UserCommand {
-        label: "Show 3-D",
-        title: None,
-        tooltip: "Bring the pane 3-D to the front.",
-        menu: Menu::View,
-        keys: &[(CTRL, Key::Num8)],
-        enabled: always,
-        act: |_| Act::App(AppAct::ShowPane(PaneKind::Scene)),
-    },
-    UserCommand {
-        label: "Show Image plane",
-        title: None,
-        tooltip: "Bring the pane Image plane to the front.",
-        menu: Menu::View,
-        keys: &[(CTRL, Key::Num9)],
-        enabled: always,
-        act: |_| Act::App(AppAct::ShowPane(PaneKind::Image)),
-    },
-    UserCommand {
+    CommandRow {
         label: "Select this frame",
         title: None,
         tooltip: "Add the frame on screen to those that tags go to, or take it out.",
@@ -275,7 +184,7 @@ pub(super) const COMMANDS: &[UserCommand] = &[
             if !frames.remove(&s.data.frame_index) {
                 frames.insert(s.data.frame_index);
             }
-            Act::Session(Command::SelectFrames(frames))
+            UiAction::Session(Command::SelectFrames(frames))
         },
     },
 ];

@@ -11,11 +11,11 @@ use egui::{RichText, Ui};
 
 /// The choice that is being edited.
 #[derive(Default)]
-pub(super) struct State {
+pub(super) struct BareQuestion {
     choice: Option<(BareCatalog, BareChoice, Vec<bool>)>,
 }
 
-impl State {
+impl BareQuestion {
     pub(super) fn is_open(&self) -> bool {
         self.choice.is_some()
     }

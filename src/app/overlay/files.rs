@@ -1,7 +1,7 @@
 //! Sheets that ask for a file: one to write, or a session file or a table of results to read.
 
 use super::{Overlay, modal};
-use crate::app::commands::{Act, SaveKind};
+use crate::app::commands::{SaveKind, UiAction};
 use crate::app::panes::Shared;
 use crate::app::theme::Tokens;
 use crate::session::Command;
@@ -11,11 +11,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// What a file dialog answered, once it did.
 #[derive(Default)]
-pub(super) struct State {
+pub(super) struct FileDialog {
     picked: Arc<Mutex<Option<PathBuf>>>,
 }
 
-impl State {
+impl FileDialog {
     /// Shows a dialog on a thread of its own; its answer comes into the field.
     fn browse(&self, ctx: &egui::Context, pick: impl FnOnce() -> Option<PathBuf> + Send + 'static) {
         let (picked, ctx) = (Arc::clone(&self.picked), ctx.clone());
@@ -58,25 +58,25 @@ impl Overlay {
     pub(in crate::app) fn open_save(&mut self, kind: SaveKind, suggested: &Path) {
         self.toggle(super::Sheet::Save(kind));
         self.query = suggested.display().to_string();
-        self.files = State::default();
+        self.files = FileDialog::default();
     }
 
     /// Asks for a session file.
     pub(in crate::app) fn open_session(&mut self) {
         self.toggle(super::Sheet::Session);
-        self.files = State::default();
+        self.files = FileDialog::default();
     }
 
     /// Asks for a table of results.
     pub(in crate::app) fn load_results(&mut self) {
         self.toggle(super::Sheet::Results);
-        self.files = State::default();
+        self.files = FileDialog::default();
     }
 
     /// Asks for a run folder.
     pub(in crate::app) fn open_study(&mut self) {
         self.toggle(super::Sheet::Study);
-        self.files = State::default();
+        self.files = FileDialog::default();
     }
 
     pub(super) fn save(&mut self, ui: &mut Ui, shared: &mut Shared<'_>, kind: SaveKind) -> bool {
@@ -93,7 +93,7 @@ impl Overlay {
                 ui.label(RichText::new("△ The file is there already and will be replaced.").small().color(tokens.warn));
             }
             if let Some(path) = chosen {
-                shared.acts.push(Act::Write(kind, path));
+                shared.acts.push(UiAction::Write(kind, path));
                 done = true;
             }
         });

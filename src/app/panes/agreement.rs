@@ -1,11 +1,12 @@
 //! How far two annotators agree, or one and the machine: a row a tag, and the frames in dispute one click away.
 
-use super::{Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
+use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::labels::{MACHINE_THRESHOLD, Record, Tag, TagAgreement, Tags, against_machine, compare_tags};
-use crate::session::{Command, LabelMode, Labels, Records};
-use egui::{RichText, Role, Ui};
+use crate::session::{Command, LabelMode, Labels, Records, Session};
+use egui::{Key, RichText, Role, Ui};
 use std::cmp::Ordering;
 use std::collections::HashMap;
 
@@ -14,16 +15,32 @@ const MACHINE: &str = "machine";
 /// Disputes that are listed at most.
 const LISTED: usize = 200;
 
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Agreement",
+    title: "Agreement",
+    help: "how far two annotators agree, or one and the machine",
+    dock: Dock::BottomRight,
+    keys: &[(CTRL, Key::Num3)],
+    margin: 8,
+    state: PaneStates::prepare::<State>,
+    blank,
+    toolbar: Some(|ui, shared, states| choose(ui, shared, states.of())),
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
+
 /// Whose labels are compared, what came out, and which disputes are listed.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     pair: [String; 2],
-    found: Option<(Key, Found)>,
+    found: Option<(MadeFrom, Found)>,
     listed: Option<Listed>,
 }
 
+impl PaneState for State {}
+
 /// What the comparison was made from.
-type Key = (u64, [String; 2]);
+type MadeFrom = (u64, [String; 2]);
 
 struct Found {
     /// Frames that both judged.
@@ -51,19 +68,26 @@ struct Listed {
     b: bool,
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+/// Who has said something.
+fn names(labels: &Labels) -> Vec<&String> {
+    labels.table().iter().filter(|(_, records)| !records.is_empty()).map(|(name, _)| name).collect()
+}
+
+fn blank(session: &Session) -> Option<Blank> {
+    let how = "Once somebody has tagged frames, choose two annotators, or one and the machine, to see Cohen's κ of each \
+               tag and the frames in dispute. Another annotator's journal lies beside the data, or comes with \
+               `mhp-inspector labels import`.";
+    names(&session.labels).is_empty().then(|| Blank::new("No labels to compare", how))
+}
+
+/// Who is compared with whom.
+fn choose(ui: &mut Ui, shared: &Shared<'_>, state: &mut State) {
     let labels = &shared.session.labels;
-    let names: Vec<&String> = labels.table().iter().filter(|(_, r)| !r.is_empty()).map(|(name, _)| name).collect();
-    if names.is_empty() {
-        let how = "Once somebody has tagged frames, choose two annotators, or one and the machine, to see Cohen's κ of each \
-                   tag and the frames in dispute. Another annotator's journal lies beside the data, or comes with \
-                   `mhp-inspector labels import`.";
-        return empty(ui, "No labels to compare", how);
-    }
-    let tokens = Tokens::of(ui);
+    let names = names(labels);
+    let Some(first) = names.first() else { return };
     if !names.iter().any(|name| **name == state.pair[0]) {
         let mine = names.iter().find(|name| ***name == labels.annotator);
-        state.pair[0].clone_from(mine.unwrap_or(&names[0]));
+        state.pair[0].clone_from(mine.unwrap_or(first));
     }
     if state.pair[1] != MACHINE && (!names.iter().any(|name| **name == state.pair[1]) || state.pair[0] == state.pair[1])
     {
@@ -74,9 +98,14 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         // Two others' disputes would tell what they said of frames that are still to be judged.
         state.pair[0].clone_from(&labels.annotator);
         let text = "A is you while you label for agreement; only frames that you have judged are counted.";
-        ui.label(RichText::new(text).small().color(tokens.dim));
+        ui.label(RichText::new(text).small().color(Tokens::of(ui).dim));
     }
-    choose(ui, state, &names);
+    pair(ui, state, &names);
+}
+
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    let labels = &shared.session.labels;
+    let tokens = Tokens::of(ui);
     let key = (labels.revision, state.pair.clone());
     if state.found.as_ref().is_none_or(|(known, _)| *known != key) {
         state.found = Some((key, compute(labels, &state.pair)));
@@ -91,7 +120,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     state.listed = listed;
 }
 
-fn choose(ui: &mut Ui, state: &mut State, names: &[&String]) {
+fn pair(ui: &mut Ui, state: &mut State, names: &[&String]) {
     ui.horizontal(|ui| {
         for (k, word) in ["A", "B"].into_iter().enumerate() {
             ui.label(RichText::new(word).font(theme::strong(12.0)));

@@ -1,36 +1,56 @@
 //! Pinned fits in a table: the baseline, and how far each other one and the fit on screen is from it.
 
-use super::{Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
+use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
-use crate::config::FitConfig;
-use crate::session::{Command, Pin, difference, numbers};
-use egui::{Color32, RichText, Role, Ui};
+use crate::config::{FitConfig, difference, from_preset};
+use crate::session::{Command, Pin, Session, numbers};
+use egui::{Color32, Key, RichText, Role, Ui};
+
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Compare",
+    title: "Compare",
+    help: "pinned fits, and how far the others are from the baseline",
+    dock: Dock::BottomRight,
+    keys: &[(CTRL, Key::Num2)],
+    margin: 8,
+    state: PaneStates::prepare::<State>,
+    blank,
+    toolbar: Some(|ui, shared, _| toolbar(ui, shared)),
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
 
 /// What the pane remembers: a name while it is typed.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     renaming: Option<(u32, String)>,
 }
+
+impl PaneState for State {}
 
 /// Columns of numbers: title, digits, unit, and whether less is better.
 const NUMBERS: [(&str, usize, &str, bool); 3] = [("L", 4, "", true), ("IoU", 3, "", false), ("MAJPE", 1, "mm", true)];
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
-    let pins = shared.session.pins.list();
-    if pins.is_empty() {
-        let how = "Press P to pin the fit on screen. Then change a setting, run again, and see here, in the curves, on the \
-                   maps (key B) and in 3-D how far the new fit is from the pinned one.";
-        return empty(ui, "No pinned fit", how);
-    }
-    let tokens = Tokens::of(ui);
+fn blank(session: &Session) -> Option<Blank> {
+    let how = "Press P to pin the fit on screen. Then change a setting, run again, and see here, in the curves, on the \
+               maps (key B) and in 3-D how far the new fit is from the pinned one.";
+    session.pins.list().is_empty().then(|| Blank::new("No pinned fit", how))
+}
+
+fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
     ui.horizontal(|ui| {
         if ui.small_button("Pin this fit").on_hover_text("Key: P").clicked() {
             shared.invoke("Pin this fit");
         }
         let text = "● baseline; differences are to it";
-        ui.label(RichText::new(text).small().color(tokens.dim));
+        ui.label(RichText::new(text).small().color(Tokens::of(ui).dim));
     });
+}
+
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    let tokens = Tokens::of(ui);
     let base = shared.session.pins.baseline().map(|pin| (pin.id, pin.numbers(), pin.config));
     egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
         egui::Grid::new("pins").num_columns(9).spacing([10.0, 4.0]).striped(false).show(ui, |ui| {
@@ -134,14 +154,10 @@ fn cells(ui: &mut Ui, values: [Option<f64>; 3], base: Option<&[Option<f64>; 3]>,
 }
 
 fn settings(ui: &mut Ui, base: Option<&FitConfig>, config: &FitConfig, tokens: &Tokens) {
-    let text = match base {
-        Some(base) => difference(base, config),
-        None => difference(&FitConfig::default(), config),
-    };
-    let text = match (text.is_empty(), base.is_some()) {
-        (true, true) => "the same".into(),
-        (true, false) => "default".into(),
-        (false, _) => text,
+    let text = match base.map(|base| difference(base, config)) {
+        Some(text) if text.is_empty() => "the same".into(),
+        Some(text) => text,
+        None => from_preset(config),
     };
     ui.label(RichText::new(text).small().color(tokens.dim));
 }

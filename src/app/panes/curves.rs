@@ -3,22 +3,38 @@
 mod series;
 mod thin;
 
-use super::{Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
+use crate::app::commands::CTRL;
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
-use crate::session::{Branch, Command, FitStatus, IterationRow, PinRow, numbers};
+use crate::session::{Branch, Command, FitStatus, IterationRow, PinRow, Session, numbers};
 use crate::worker::JobId;
-use egui::{Color32, Ui};
+use egui::{Color32, Key, Ui};
 use egui_plot::{GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, VLine, uniform_grid_spacer};
 use series::{SeriesCache, series};
+use std::borrow::Cow;
 use thin::VisibleSpan;
 
 /// Room on the right for half of the last number below the plot, points.
 const LAST_NUMBER: f32 = 12.0;
 
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Curves",
+    title: "Curves",
+    help: "loss, its terms, IoU and MAJPE over the iterations",
+    dock: Dock::BottomRight,
+    keys: &[(CTRL, Key::Num1)],
+    margin: 8,
+    state: PaneStates::prepare::<State>,
+    blank,
+    toolbar: Some(|ui, shared, states| toolbar(ui, shared, states.of())),
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
+
 /// What the plot remembers.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     reset: bool,
     tab: Tab,
     /// The shown iteration before the last click.
@@ -29,8 +45,8 @@ pub(in crate::app) struct State {
     series: SeriesCache<(JobId, u64)>,
 }
 
-impl State {
-    pub(in crate::app) fn reset(&mut self) {
+impl PaneState for State {
+    fn reset_view(&mut self) {
         self.reset = true;
     }
 }
@@ -55,27 +71,31 @@ fn curve(key: &str, name: &str, width: f32, value: impl Fn(&IterationRow) -> Opt
     Curve { key: key.into(), name: name.into(), value: Box::new(value), width }
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+/// The branch on screen, where it has an iteration.
+fn begun(session: &Session) -> Option<&Branch> {
+    session.fit.branch().filter(|branch| !branch.rows.is_empty())
+}
+
+/// The plot stays while the next frame is prepared.
+fn blank(session: &Session) -> Option<Blank> {
+    let how = "Press Enter to run the fit; loss, IoU and error appear here as it runs.";
+    let how = session.data.error.clone().map_or(how.into(), Cow::Owned);
+    let nothing = begun(session).is_none() && session.fit.status != FitStatus::Preparing;
+    nothing.then(|| Blank::new("No iterations yet", how))
+}
+
+/// The branch on screen; one without an iteration while a fit is prepared.
+fn branch_of(session: &Session) -> Cow<'_, Branch> {
+    let none = || Branch { id: 0, parent: None, config: session.config, rows: Vec::new(), flags: Vec::new() };
+    begun(session).map_or_else(|| Cow::Owned(none()), Cow::Borrowed)
+}
+
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let fit = &shared.session.fit;
-    let blank;
-    let branch = match fit.branch().filter(|b| !b.rows.is_empty()) {
-        Some(branch) => branch,
-        // The plot stays while the next frame is prepared.
-        None if fit.status == FitStatus::Preparing => {
-            let config = shared.session.config;
-            blank = Branch { id: 0, parent: None, config, rows: Vec::new(), flags: Vec::new() };
-            &blank
-        }
-        None => {
-            let how = "Press Enter to run the fit; loss, IoU and error appear here as it runs.";
-            return empty(ui, "No iterations yet", shared.session.data.error.as_deref().unwrap_or(how));
-        }
-    };
+    let branch = &*branch_of(shared.session);
     let lineage = fit.history.lineage();
     let first = lineage.first().and_then(|rows| rows.first()).map_or(0, |row| row.report.iteration);
     let curves = curves(shared, branch, state.tab);
-    toolbar(ui, shared, state, &curves);
-    let fit = &shared.session.fit;
     let log = shared.session.view.log_loss && state.tab == Tab::Loss;
     let hidden = &shared.session.view.hidden_curves;
     let tokens = Tokens::of(ui);
@@ -290,7 +310,8 @@ fn power(exponent: f64) -> String {
     }
 }
 
-fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, curves: &[Curve]) {
+fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    let curves = curves(shared, &branch_of(shared.session), state.tab);
     let tokens = Tokens::of(ui);
     let mut view = shared.session.view.clone();
     ui.horizontal_wrapped(|ui| {
@@ -301,7 +322,7 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, curves: &[Cu
             ui.checkbox(&mut view.log_loss, "log y").on_hover_text("Logarithmic vertical axis.");
         }
         ui.add_space(4.0);
-        for c in curves {
+        for c in &curves {
             let on = !view.hidden_curves.contains(&c.key);
             let mut text = egui::text::LayoutJob::default();
             let font = egui::FontId::proportional(theme::CAPTION);

@@ -1,28 +1,44 @@
 //! The fit: transport, the shown iteration's numbers, and every setting.
 
-use super::Shared;
+use super::{Dock, Pane, PaneStates, Shared};
+use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::{Named as _, chip, icon_button, iou_color, value_row};
-use crate::config::{ChoiceGroup, Convergence, EmRegion, Field, FieldGroup, FitConfig, Preset};
+use crate::app::widgets::{Named as _, chip, icon_button, iou_color, settings, value_row};
+use crate::config::{Convergence, FieldGroup, FitConfig, Preset, difference};
 use crate::mhp::Precision;
 use crate::session::{Command, FitStatus};
-use egui::{RichText, Ui};
+use egui::{Key, RichText, Ui};
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Fit",
+    title: "Fit",
+    help: "the run, the numbers of the iteration that is shown, and every setting",
+    dock: Dock::RightTop,
+    keys: &[(CTRL, Key::Num6)],
+    margin: 8,
+    state: PaneStates::prepare::<()>,
+    blank: |_| None,
+    toolbar: Some(|ui, shared, _| toolbar(ui, shared)),
+    ui: |ui, shared, _| show(ui, shared),
+};
+
+fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
     transport(ui, shared);
     // In scopes of their own: what appears in them must not shift the identity of a number that is being typed below.
     ui.scope(|ui| status(ui, shared));
     ui.separator();
+}
+
+fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let old = shared.session.config;
         let mut config = old;
-        for field in FieldGroup::Weights.fields() {
-            slider(ui, field, &mut config);
-        }
+        settings(ui, FieldGroup::Weights, &mut config);
         ui.separator();
         ui.scope(|ui| numbers(ui, shared));
         ui.separator();
-        settings(ui, shared, &mut config);
+        sections(ui, shared, &mut config);
         if config != old {
             shared.send(Command::SetConfig(Box::new(config)));
         }
@@ -109,7 +125,11 @@ fn branches(ui: &mut Ui, shared: &mut Shared<'_>) {
         .selected_text(current)
         .show_ui(ui, |ui| {
             for b in history.branches() {
-                ui.selectable_value(&mut chosen, b.id, name(b.id, b.parent, b.head()));
+                let text = match history.departure(b) {
+                    what if what.is_empty() => name(b.id, b.parent, b.head()),
+                    what => format!("{}, {what}", name(b.id, b.parent, b.head())),
+                };
+                ui.selectable_value(&mut chosen, b.id, text);
             }
         })
         .response
@@ -191,73 +211,53 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
     }
 }
 
-fn settings(ui: &mut Ui, shared: &mut Shared<'_>, config: &mut FitConfig) {
-    egui::CollapsingHeader::new("Optimiser").default_open(true).show(ui, |ui| {
-        for field in FieldGroup::Optimiser.fields() {
-            slider(ui, field, config);
-        }
-        ui.checkbox(&mut config.stop_when_converged, "Stop when converged")
-            .on_hover_text("End a run as soon as the convergence criterion holds.");
-        choices(ui, ChoiceGroup::Optimiser, config);
-        let mut warm = shared.session.warm_start;
-        if ui
-            .checkbox(&mut warm, "Warm start")
-            .on_hover_text("Start the next frame from this frame's result instead of from its own peaks.")
-            .changed()
-        {
-            shared.send(Command::SetWarmStart(warm));
-        }
-        let mut precision = shared.session.precision;
-        ui.horizontal(|ui| {
-            ui.label("Kernel");
-            ui.selectable_value(&mut precision, Precision::F64, "f64")
-                .on_hover_text("Double precision, the oracle: some seventy times as slow. Changing it resets the fit.");
-            ui.selectable_value(&mut precision, Precision::F32, "f32")
-                .on_hover_text("Single precision, right to five digits. Changing it resets the fit.");
+/// Every group but the weights, which stand above, each under its head.
+fn sections(ui: &mut Ui, shared: &mut Shared<'_>, config: &mut FitConfig) {
+    for group in FieldGroup::ALL.into_iter().filter(|group| *group != FieldGroup::Weights) {
+        let open = matches!(group, FieldGroup::Optimiser | FieldGroup::Radar | FieldGroup::Model);
+        egui::CollapsingHeader::new(group.title()).default_open(open).show(ui, |ui| {
+            if !group.help().is_empty() {
+                ui.label(RichText::new(group.help()).small());
+            }
+            settings(ui, group, config);
+            if group == FieldGroup::Optimiser {
+                ways(ui, shared);
+            }
         });
-        if precision != shared.session.precision {
-            shared.send(Command::SetPrecision(precision));
-        }
-        let mut auto = shared.session.view.run_on_open;
-        if ui
-            .checkbox(&mut auto, "Fit each frame when shown")
-            .on_hover_text("Begin a run as soon as a frame without a fit is shown.")
-            .changed()
-        {
-            shared.set_view(|v| v.run_on_open = auto);
-        }
-    });
-    egui::CollapsingHeader::new("Radar simulation").default_open(true).show(ui, |ui| {
-        operators(ui, config);
-        choices(ui, ChoiceGroup::Radar, config);
-        region(ui, config);
-        for field in FieldGroup::Radar.fields() {
-            slider(ui, field, config);
-        }
-    });
-    egui::CollapsingHeader::new("Kinematic limits").default_open(false).show(ui, |ui| {
-        for field in FieldGroup::Limits.fields() {
-            slider(ui, field, config);
-        }
-    });
-    egui::CollapsingHeader::new("Model").default_open(true).show(ui, |ui| model(ui, config));
-    egui::CollapsingHeader::new("Start").default_open(false).show(ui, |ui| {
-        ui.label(egui::RichText::new("Takes effect when a start is found: Ctrl+R.").small());
-        ui.checkbox(&mut config.init.position, "P: positions from the peaks")
-            .on_hover_text("Off: the body stands in the middle of what the views cover.");
-        ui.checkbox(&mut config.init.velocity, "V: velocities from the maps")
-            .on_hover_text("From the Doppler axis, or from the intensity gradients of consecutive maps. Off: 0.");
-        choices(ui, ChoiceGroup::Start, config);
-        for field in FieldGroup::Start.fields() {
-            slider(ui, field, config);
-        }
-        ui.label("Perturb the start").on_hover_text("The perturbations of the paper's robustness table.");
-        for field in FieldGroup::Perturbation.fields() {
-            slider(ui, field, config);
-        }
-    });
+    }
     ui.add_space(4.0);
     presets(ui, config);
+}
+
+/// How fits are run: no settings of a fit, and in no `FIT.toml`.
+fn ways(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let mut warm = shared.session.warm_start;
+    if ui
+        .checkbox(&mut warm, "Warm start")
+        .on_hover_text("Start the next frame from this frame's result instead of from its own peaks.")
+        .changed()
+    {
+        shared.send(Command::SetWarmStart(warm));
+    }
+    let mut precision = shared.session.precision;
+    ui.horizontal(|ui| {
+        ui.label("Kernel");
+        ui.selectable_value(&mut precision, Precision::F64, "f64")
+            .on_hover_text("Double precision, the oracle: some seventy times as slow. Changing it resets the fit.");
+        ui.selectable_value(&mut precision, Precision::F32, "f32")
+            .on_hover_text("Single precision, right to five digits. Changing it resets the fit.");
+    });
+    if precision != shared.session.precision {
+        shared.send(Command::SetPrecision(precision));
+    }
+    let mut auto = shared.session.view.run_on_open;
+    if ui
+        .checkbox(&mut auto, "Fit each frame when shown")
+        .on_hover_text("Begin a run as soon as a frame without a fit is shown.")
+        .changed()
+    {
+        shared.set_view(|v| v.run_on_open = auto);
+    }
 }
 
 /// Every setting at once, by name; what each name stands for beside it.
@@ -268,122 +268,14 @@ fn presets(ui: &mut Ui, config: &mut FitConfig) {
         ui.horizontal_wrapped(|ui| {
             let button = ui.selectable_label(*config == preset.config(), preset.name());
             let button = button.named(egui::Role::Button, &format!("Preset {}", preset.name()));
-            if button.on_hover_text(preset.help()).clicked() {
+            let tip = match difference(config, &preset.config()) {
+                what if what.is_empty() => preset.help().to_owned(),
+                what => format!("{}\nSets {what}", preset.help()),
+            };
+            if button.on_hover_text(tip).clicked() {
                 *config = preset.config();
             }
             ui.label(RichText::new(preset.help()).small().color(tokens.dim));
         });
     }
-}
-
-/// What is moved, what the Gaussians look like, where the start looks, and the terms that the paper's objective lacks.
-fn model(ui: &mut Ui, config: &mut FitConfig) {
-    choices(ui, ChoiceGroup::Model, config);
-    for field in FieldGroup::Regularisation.fields() {
-        slider(ui, field, config);
-    }
-}
-
-/// The switches of a group: label and answers, one a line.
-fn choices(ui: &mut Ui, group: ChoiceGroup, config: &mut FitConfig) {
-    for choice in group.choices() {
-        ui.horizontal_wrapped(|ui| {
-            let given = (choice.get)(config);
-            let tip = format!("Default: {}. FIT.toml: {}", choice.answers[0].label, choice.key);
-            ui.label(choice.label).on_hover_text(tip);
-            for (k, answer) in choice.answers.iter().enumerate() {
-                let at_start = if choice.starts() { " Takes effect when a start is found." } else { "" };
-                let tip = format!("{}{at_start}\nFIT.toml: {} = \"{}\"", answer.help, choice.key, answer.word);
-                if ui.selectable_label(given == k, answer.label).on_hover_text(tip).clicked() {
-                    (choice.set)(config, k);
-                }
-            }
-        });
-    }
-}
-
-/// Label, slider, value, and a button back to the default where the value differs from it.
-fn slider(ui: &mut Ui, field: &Field, config: &mut FitConfig) {
-    let default = (field.get)(&FitConfig::default());
-    let mut value = (field.get)(config);
-    let (lo, hi) = field.range;
-    let tip = format!(
-        "{}\nDefault {default}{}{}. FIT.toml: {}",
-        field.help,
-        if field.unit.is_empty() { "" } else { " " },
-        field.unit,
-        field.key
-    );
-    ui.horizontal(|ui| {
-        let layout = egui::Layout::left_to_right(egui::Align::Center);
-        let label = ui.allocate_ui_with_layout(egui::vec2(96.0, 20.0), layout, |ui| {
-            ui.set_min_width(96.0);
-            ui.add(egui::Label::new(field.label).truncate())
-        });
-        label.inner.on_hover_text(&tip);
-        let width = (ui.available_width() - 92.0).max(40.0);
-        ui.spacing_mut().slider_width = width;
-        let mut slider = egui::Slider::new(&mut value, lo..=hi).show_value(false);
-        if field.logarithmic {
-            slider = slider.logarithmic(true).smallest_positive(if lo > 0.0 { lo } else { 1e-3 });
-        }
-        let response = ui.add(slider);
-        response.widget_info(|| egui::WidgetInfo::slider(true, value, field.label));
-        response.on_hover_text(&tip);
-        let speed = if value == 0.0 { 0.001 } else { value.abs() * 0.01 };
-        let digits = if field.key == "iterations" { 0 } else { 6 };
-        let drag = egui::DragValue::new(&mut value)
-            .update_while_editing(false)
-            .range(lo..=hi)
-            .speed(speed)
-            .max_decimals(digits)
-            .suffix(if field.unit == "m" { " m" } else { field.unit });
-        let response = ui.add_sized([62.0, 20.0], drag);
-        let spoken = format!("{} value", field.label);
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, &spoken));
-        response.on_hover_text(&tip);
-        let off = value != default;
-        let back = ui.add_visible(off, egui::Button::new("↺").small().frame(false));
-        let spoken = format!("Reset {}", field.label);
-        back.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, off, &spoken));
-        if back.on_hover_text(format!("Back to {default}")).clicked() {
-            value = default;
-        }
-    });
-    if value != (field.get)(config) {
-        (field.set)(config, value);
-    }
-}
-
-fn operators(ui: &mut Ui, config: &mut FitConfig) {
-    ui.horizontal_wrapped(|ui| {
-        let o = &mut config.operators;
-        ui.checkbox(&mut o.attenuation, "attenuation").on_hover_text("A = α·(r_max/d)⁴; off: A = α.");
-        ui.checkbox(&mut o.range, "range")
-            .on_hover_text("Beat-frequency phase 2πSτ²; off: range axes see every joint at 0 m.");
-        ui.checkbox(&mut o.doppler, "Doppler")
-            .on_hover_text("Phase 2π(2v_r/λ)T_frame and the ramp; off: Doppler axes see every joint at rest.");
-        ui.checkbox(&mut o.angle, "angle")
-            .on_hover_text("Array phase; off: angular axes see every joint at boresight.");
-    });
-}
-
-fn region(ui: &mut Ui, config: &mut FitConfig) {
-    ui.horizontal(|ui| {
-        ui.label("EM region").on_hover_text("Where L_EM is computed: the whole map, or a box around the start pose.");
-        let full = config.em_region == EmRegion::Full;
-        if ui.selectable_label(full, "whole map").clicked() {
-            config.em_region = EmRegion::Full;
-        }
-        if ui.selectable_label(!full, "±").clicked() && full {
-            config.em_region = EmRegion::default();
-        }
-        if let EmRegion::HalfWidth(half) = &mut config.em_region {
-            let drag =
-                egui::DragValue::new(half).update_while_editing(false).range(0.1..=20.0).speed(0.01).suffix(" m");
-            let response = ui.add(drag);
-            response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, "EM region half width"));
-            response.on_hover_text("Half width of the box around the person's start pose. Default 1.25 m.");
-        }
-    });
 }

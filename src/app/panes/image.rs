@@ -1,28 +1,49 @@
 //! The image plane: key points, boxes and mask in camera pixels. They are pixels, never metres, and are never compared
 //! with the fit.
 
-use super::{Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
+use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::body::Skeleton;
 use crate::dataset::{Frame, ImageAnnotations};
-use egui::{Align2, Color32, ColorImage, FontId, Rect, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2};
+use crate::session::Session;
+use egui::{Align2, Color32, ColorImage, FontId, Key, Rect, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2};
 use std::sync::Arc;
+
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Image",
+    title: "Image plane",
+    help: "key points, boxes and masks in camera pixels",
+    dock: Dock::BottomLeft,
+    keys: &[(CTRL, Key::Num9)],
+    margin: 0,
+    state: PaneStates::prepare::<State>,
+    blank,
+    toolbar: None,
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
 
 /// The mask's texture.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     mask: Option<(Arc<Frame>, TextureHandle)>,
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
-    let Some(frame) = &shared.session.data.frame else {
-        return empty(ui, "No frame", "Labels in camera pixels appear here.");
+impl PaneState for State {}
+
+fn blank(session: &Session) -> Option<Blank> {
+    let Some(frame) = &session.data.frame else {
+        return Some(Blank::new("No frame", "Labels in camera pixels appear here."));
     };
-    let Some(image) = &frame.image else {
-        let how = "This frame has no key points, boxes or masks in camera pixels.";
-        let how = frame.notes.iter().fold(how.to_owned(), |text, note| format!("{text}\n{note}"));
-        return empty(ui, "No image labels", &how);
-    };
+    let how = "This frame has no key points, boxes or masks in camera pixels.";
+    let how = || frame.notes.iter().fold(how.to_owned(), |text, note| format!("{text}\n{note}"));
+    frame.image.is_none().then(|| Blank::new("No image labels", how()))
+}
+
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    let Some(frame) = &shared.session.data.frame else { return };
+    let Some(image) = &frame.image else { return };
     let [width, height] = image.size.map(|n| n.max(1) as f32);
     let tokens = Tokens::of(ui);
     let area = ui.available_rect_before_wrap().shrink2(vec2(8.0, 8.0));

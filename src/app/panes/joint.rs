@@ -1,18 +1,35 @@
 //! The joint inspector: every parameter of the selected joint, its gradient split into the electromagnetic and the
 //! kinematic part, and fields to edit it by hand.
 
-use super::{Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
+use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::body::{Group, Pppr};
-use crate::session::Command;
-use egui::{RichText, Ui};
+use crate::session::{Command, Session};
+use egui::{Key, RichText, Ui};
+
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Joint",
+    title: "Joint",
+    help: "every parameter of the selected joint, and its gradient",
+    dock: Dock::RightTop,
+    keys: &[(CTRL, Key::Num7)],
+    margin: 8,
+    state: PaneStates::prepare::<State>,
+    blank,
+    toolbar: Some(|ui, shared, _| picker(ui, shared)),
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
 
 /// Values that are being edited.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     edit: Option<(u64, u32, usize, Pppr)>,
 }
+
+impl PaneState for State {}
 
 /// Names, units and step of a group's components.
 fn components(group: Group) -> (&'static str, &'static [&'static str], &'static str, f64) {
@@ -26,15 +43,19 @@ fn components(group: Group) -> (&'static str, &'static [&'static str], &'static 
     }
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+fn blank(session: &Session) -> Option<Blank> {
+    let fitted = session.fit.problem.is_some() && session.fit.shown.is_some();
+    let how = "The parameters of a joint appear here once a frame is fitted.";
+    (!fitted).then(|| Blank::new("No joint", how))
+}
+
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let session = shared.session;
-    let (Some(problem), Some(snapshot)) = (&session.fit.problem, &session.fit.shown) else {
-        return empty(ui, "No joint", "The parameters of a joint appear here once a frame is fitted.");
-    };
+    let (Some(problem), Some(snapshot)) = (&session.fit.problem, &session.fit.shown) else { return };
     let joints = problem.skeleton.joints.len().max(1);
-    picker(ui, shared);
     let Some(joint) = session.joint.filter(|j| *j < snapshot.params.shape().total_joints()) else {
-        return empty(ui, "No joint selected", "Click a joint in the 3-D view or on a map, or choose one above.");
+        let how = "Click a joint in the 3-D view or on a map, or choose one above.";
+        return Blank::new("No joint selected", how).show(ui);
     };
     let key = (snapshot.job, snapshot.branch, snapshot.iteration);
     if state.edit.as_ref().is_none_or(|(job, branch, iteration, _)| (*job, *branch, *iteration) != key) {

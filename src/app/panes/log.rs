@@ -1,14 +1,31 @@
 //! The log: what was opened, assumed, repaired, refused.
 
-use super::{Shared, empty};
+use super::{Blank, Dock, Pane, PaneStates, Shared};
+use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
-use crate::session::{Command, LogLevel};
+use crate::session::{Command, LogLevel, Session};
+use egui::Key;
 
-pub(super) fn show(ui: &mut egui::Ui, shared: &mut Shared<'_>) {
-    if shared.session.log.is_empty() {
-        empty(ui, "Nothing to tell", "Opened data sets, assumptions, warnings and errors appear here.");
-        return;
-    }
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Log",
+    title: "Log",
+    help: "what was opened, assumed, repaired and refused",
+    dock: Dock::BottomRight,
+    keys: &[(CTRL, Key::Num5)],
+    margin: 8,
+    state: PaneStates::prepare::<()>,
+    blank,
+    toolbar: Some(|ui, shared, _| toolbar(ui, shared)),
+    ui: |ui, shared, _| show(ui, shared),
+};
+
+fn blank(session: &Session) -> Option<Blank> {
+    let how = "Opened data sets, assumptions, warnings and errors appear here.";
+    session.log.is_empty().then(|| Blank::new("Nothing to tell", how))
+}
+
+fn toolbar(ui: &mut egui::Ui, shared: &mut Shared<'_>) {
     let tokens = Tokens::of(ui);
     ui.horizontal(|ui| {
         ui.label(egui::RichText::new(format!("{} lines", shared.session.log.len())).small().color(tokens.dim));
@@ -22,6 +39,10 @@ pub(super) fn show(ui: &mut egui::Ui, shared: &mut Shared<'_>) {
             }
         });
     });
+}
+
+fn show(ui: &mut egui::Ui, shared: &Shared<'_>) {
+    let tokens = Tokens::of(ui);
     egui::ScrollArea::vertical().auto_shrink(false).stick_to_bottom(true).show(ui, |ui| {
         for line in &shared.session.log {
             let (mark, color) = match line.level {

@@ -5,19 +5,79 @@ mod picture;
 mod region;
 mod toolbar;
 
-use super::{Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
+use crate::app::commands::{CommandRow, Menu, NONE, UiAction, has_frame};
 use crate::app::figure;
 use crate::app::map_image::Orientation;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{ColorBar, colorbar};
 use crate::radar::View;
 use crate::session::{ColorRange, Compare, Session};
-use egui::{Rect, Sense, Ui, UiBuilder, pos2, vec2};
+use egui::{Key, Rect, Sense, Ui, UiBuilder, pos2, vec2};
 use picture::{Content, Pictures};
+use serde_json::Value;
+
+/// The measured maps.
+pub(super) static H_ORI: Pane = Pane {
+    key: "HOri",
+    title: "H_ori",
+    help: "the measured maps",
+    dock: Dock::Top,
+    keys: &[],
+    margin: 0,
+    state: PaneStates::prepare::<State>,
+    blank,
+    toolbar: Some(|ui, shared, _| toolbar::show(ui, shared, MapColumn::Ori)),
+    ui: |ui, shared, states| show(ui, shared, states.of(), MapColumn::Ori),
+};
+
+/// The simulated maps.
+pub(super) static H_SIM: Pane = Pane {
+    key: "HSim",
+    title: "H_sim",
+    help: "the simulated maps",
+    dock: Dock::Top,
+    keys: &[],
+    margin: 0,
+    state: PaneStates::prepare::<State>,
+    blank,
+    toolbar: Some(|ui, shared, _| toolbar::show(ui, shared, MapColumn::Sim)),
+    ui: |ui, shared, states| show(ui, shared, states.of(), MapColumn::Sim),
+};
+
+/// The masks of the two.
+pub(super) static MASKS: Pane = Pane {
+    key: "Masks",
+    title: "Masks",
+    help: "the masks of both",
+    dock: Dock::Top,
+    keys: &[],
+    margin: 0,
+    state: PaneStates::prepare::<State>,
+    blank,
+    toolbar: Some(|ui, shared, _| toolbar::show(ui, shared, MapColumn::Masks)),
+    ui: |ui, shared, states| show(ui, shared, states.of(), MapColumn::Masks),
+};
+
+/// The next drag on a map marks cells; again to leave it.
+pub(in crate::app) const MARK_CELLS: CommandRow = CommandRow {
+    label: "Mark cells",
+    title: None,
+    tooltip: "Drag a box on a map to mark the cells that your label is about. Ctrl+drag does it at any time.",
+    menu: Menu::Labels,
+    keys: &[(NONE, Key::G)],
+    enabled: has_frame,
+    act: |_| UiAction::panes(|states, _| states.of::<State>().mark_cells()),
+};
+
+/// Points at cells of a view, first and last bin of each axis, and zooms its maps to them.
+pub(super) fn show_cells(view: usize, lo: Vec<usize>, hi: Vec<usize>) -> UiAction {
+    UiAction::panes(move |states, session| states.of::<State>().show_cells(session, view, &lo, &hi))
+}
 
 /// Which column a pane is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(in crate::app) enum MapColumn {
+enum MapColumn {
     Ori,
     Sim,
     Masks,
@@ -25,12 +85,12 @@ pub(in crate::app) enum MapColumn {
 
 /// The part of a map that is seen, in picture coordinates (0..1 both ways).
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Window {
+struct MapExtent {
     min: [f32; 2],
     max: [f32; 2],
 }
 
-impl Default for Window {
+impl Default for MapExtent {
     fn default() -> Self {
         Self { min: [0.0; 2], max: [1.0; 2] }
     }
@@ -38,9 +98,9 @@ impl Default for Window {
 
 /// What the three panes share between passes.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     pictures: Pictures,
-    windows: Vec<Window>,
+    windows: Vec<MapExtent>,
     /// View and (column, row) pixel under the pointer, whichever pane it is in.
     hovered: Option<(usize, [usize; 2])>,
     hovered_next: Option<(usize, [usize; 2])>,
@@ -53,42 +113,50 @@ pub(in crate::app) struct State {
     dataset: Option<std::sync::Weak<crate::dataset::Dataset>>,
 }
 
-impl State {
-    pub(in crate::app) fn reset(&mut self) {
+impl PaneState for State {
+    fn reset_view(&mut self) {
         self.highlight = None;
         self.windows.clear();
     }
 
-    /// What is seen of each view, for a session file.
-    pub(in crate::app) fn stored(&self) -> Vec<[f32; 4]> {
-        self.windows.iter().map(|w| [w.min[0], w.min[1], w.max[0], w.max[1]]).collect()
+    fn stored_as(&self) -> Option<&'static str> {
+        Some("maps")
     }
 
-    /// Puts back what a session file says.
-    pub(in crate::app) fn restore(&mut self, stored: Vec<[f32; 4]>, session: &Session) {
+    /// What is seen of each view: left, top, right, bottom, 0..1.
+    fn stored(&self) -> serde_json::Result<Value> {
+        let seen = self.windows.iter().map(|w| [w.min[0], w.min[1], w.max[0], w.max[1]]);
+        serde_json::to_value(seen.collect::<Vec<[f32; 4]>>())
+    }
+
+    fn restore(&mut self, stored: Value, session: &Session) -> serde_json::Result<()> {
+        let stored: Vec<[f32; 4]> = serde_json::from_value(stored)?;
         self.dataset = session.data.dataset.as_ref().map(std::sync::Arc::downgrade);
         let valid =
             |w: &[f32; 4]| w.iter().all(|x| (0.0..=1.0).contains(x)) && w[2] - w[0] > 0.01 && w[3] - w[1] > 0.01;
-        let window = |w: [f32; 4]| Window { min: [w[0], w[1]], max: [w[2], w[3]] };
-        self.windows = stored.into_iter().map(|w| if valid(&w) { window(w) } else { Window::default() }).collect();
+        let window = |w: [f32; 4]| MapExtent { min: [w[0], w[1]], max: [w[2], w[3]] };
+        self.windows = stored.into_iter().map(|w| if valid(&w) { window(w) } else { MapExtent::default() }).collect();
+        Ok(())
     }
 
     /// Zooms every map to the EM region.
-    pub(in crate::app) fn focus(&mut self, session: &Session) {
+    fn focus(&mut self, session: &Session) {
         let (Some(dataset), Some(snapshot)) = (&session.data.dataset, &session.fit.shown) else { return };
         let views = &dataset.info().views;
-        self.windows.resize(views.len(), Window::default());
+        self.windows.resize(views.len(), MapExtent::default());
         for (i, (view, masks)) in views.iter().zip(&snapshot.masks).enumerate() {
             if let Some([min, max]) = overlay::region_box(view, &masks.inside) {
                 let pad = [(max[0] - min[0]) * 0.06, (max[1] - min[1]) * 0.06];
-                self.windows[i] = Window {
+                self.windows[i] = MapExtent {
                     min: [(min[0] - pad[0]).max(0.0), (min[1] - pad[1]).max(0.0)],
                     max: [(max[0] + pad[0]).min(1.0), (max[1] + pad[1]).min(1.0)],
                 };
             }
         }
     }
+}
 
+impl State {
     /// The pixel that was hovered in the last pass is this pass's linked cursor.
     fn begin_pass(&mut self, ctx: &egui::Context) {
         let pass = ctx.cumulative_pass_nr();
@@ -103,37 +171,39 @@ impl State {
     }
 }
 
+fn blank(session: &Session) -> Option<Blank> {
+    let data = &session.data;
+    let how = "Open a folder with File > Open folder, or drop it on the window.";
+    match (&data.dataset, &data.error, &data.frame) {
+        (None, ..) => Some(Blank::new("No data set", how)),
+        (_, Some(error), _) => Some(Blank::new("This frame cannot be shown", error.clone())),
+        (.., None) => Some(Blank::new("Reading the frame…", "")),
+        _ => None,
+    }
+}
+
 /// Draws one column.
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColumn) {
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColumn) {
     state.begin_pass(ui.ctx());
     let session = shared.session;
-    let Some(dataset) = &session.data.dataset else {
-        let how = "Open a folder with File > Open folder, or drop it on the window.";
-        return empty(ui, "No data set", how);
-    };
-    if let Some(error) = &session.data.error {
-        return empty(ui, "This frame cannot be shown", error);
-    }
-    let Some(frame) = &session.data.frame else { return empty(ui, "Reading the frame…", "") };
+    let (Some(dataset), Some(frame)) = (&session.data.dataset, &session.data.frame) else { return };
     let views = &dataset.info().views;
     let known = state.dataset.as_ref().and_then(std::sync::Weak::upgrade);
     if !known.is_some_and(|known| std::sync::Arc::ptr_eq(&known, dataset)) {
         state.dataset = Some(std::sync::Arc::downgrade(dataset));
         state.windows.clear();
     }
-    state.windows.resize(views.len(), Window::default());
+    state.windows.resize(views.len(), MapExtent::default());
     state.leave_highlight(Some(session.data.frame_index));
     state.pictures.update(session, views, frame);
-    // A toolbar that is wider than the pane must not push the maps out of it.
-    let pane = ui.max_rect();
-    toolbar::show(ui, shared, column);
     if column != MapColumn::Ori
         && session.fit.shown.is_none()
         && let crate::session::FitStatus::Failed(why) = &session.fit.status
     {
-        return empty(ui, "No fit", why);
+        return Blank::new("No fit", why.clone()).show(ui);
     }
-    let area = ui.available_rect_before_wrap().intersect(pane);
+    // A toolbar that is wider than the pane must not push the maps out of it.
+    let area = ui.available_rect_before_wrap().intersect(ui.clip_rect());
     let pointer = ui.input(|i| i.pointer.hover_pos().filter(|_| i.modifiers.shift));
     state.flipped = column != MapColumn::Masks && pointer.is_some_and(|p| area.contains(p));
     for (i, rect) in arrange(area, views, session.view.true_proportions).into_iter().enumerate() {
@@ -285,7 +355,7 @@ fn fit_aspect(inner: Rect, view: &View, orientation: Orientation) -> Rect {
 }
 
 /// Drag pans, the wheel zooms at the pointer, a double click shows everything.
-fn navigate(ui: &Ui, response: &egui::Response, plot: Rect, window: &mut Window) {
+fn navigate(ui: &Ui, response: &egui::Response, plot: Rect, window: &mut MapExtent) {
     let span = [window.max[0] - window.min[0], window.max[1] - window.min[1]];
     let mut moved = *window;
     if response.dragged() {
@@ -311,13 +381,13 @@ fn navigate(ui: &Ui, response: &egui::Response, plot: Rect, window: &mut Window)
         }
     }
     if response.double_clicked() {
-        moved = Window::default();
+        moved = MapExtent::default();
     }
     *window = moved;
 }
 
 /// The line between what is compared with (left) and H_sim (right), and the former left of it.
-fn wipe(ui: &Ui, shared: &mut Shared<'_>, state: &State, index: usize, plot: Rect, window: Window) {
+fn wipe(ui: &Ui, shared: &mut Shared<'_>, state: &State, index: usize, plot: Rect, window: MapExtent) {
     let x = plot.min.x + plot.width() * shared.session.view.wipe;
     let left = Rect::from_min_max(plot.min, pos2(x, plot.max.y));
     let painter = ui.painter().with_clip_rect(left.intersect(ui.clip_rect()));
@@ -335,18 +405,18 @@ fn wipe(ui: &Ui, shared: &mut Shared<'_>, state: &State, index: usize, plot: Rec
     ui.painter().vline(x, plot.y_range(), egui::Stroke::new(width, tokens.accent));
 }
 
-fn window_rect(window: Window) -> Rect {
+fn window_rect(window: MapExtent) -> Rect {
     Rect::from_min_max(pos2(window.min[0], window.min[1]), pos2(window.max[0], window.max[1]))
 }
 
 /// Picture coordinates to the screen.
-fn screen(plot: Rect, window: Window, unit: [f64; 2]) -> egui::Pos2 {
+fn screen(plot: Rect, window: MapExtent, unit: [f64; 2]) -> egui::Pos2 {
     let t = |axis: usize| (unit[axis] as f32 - window.min[axis]) / (window.max[axis] - window.min[axis]);
     pos2(plot.min.x + t(0) * plot.width(), plot.min.y + t(1) * plot.height())
 }
 
 /// Picture coordinates under a point of the screen.
-fn unit_at(plot: Rect, window: Window, at: egui::Pos2) -> [f64; 2] {
+fn unit_at(plot: Rect, window: MapExtent, at: egui::Pos2) -> [f64; 2] {
     let t = [(at.x - plot.min.x) / plot.width(), (at.y - plot.min.y) / plot.height()];
     std::array::from_fn(|axis| f64::from(window.min[axis] + t[axis] * (window.max[axis] - window.min[axis])))
 }

@@ -5,22 +5,74 @@
 
 mod build;
 
-use super::{Shared, empty};
-use crate::app::commands::AppAct;
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
+use crate::app::commands::{CTRL, CommandRow, Menu, NONE, UiAction, always};
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
 use crate::render::{Camera, Scene, SceneRenderer, Vec2, Vec3, pick, shapes};
 use crate::session::{Command, Session, SplatMode};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
-use egui::{Align2, Color32, Rect, RichText, Sense, TextureId, Ui, pos2, vec2};
+use egui::{Align2, Color32, Key, Rect, RichText, Sense, TextureId, Ui, pos2, vec2};
+use serde_json::Value;
 
 /// Radius that a camera at its start shows, m.
 const RADIUS_M: f32 = 2.4;
 
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Scene",
+    title: "3-D",
+    help: "Gaussians, bones and the radar in the room",
+    dock: Dock::BottomLeft,
+    keys: &[(CTRL, Key::Num8)],
+    margin: 0,
+    state: PaneStates::prepare::<State>,
+    blank,
+    toolbar: Some(|ui, shared, _| toolbar(ui, shared)),
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
+
+/// Looks from the radar.
+pub(in crate::app) const FROM_RADAR: CommandRow = CommandRow {
+    label: "View from the radar",
+    title: None,
+    tooltip: "Put the camera at the radar, looking along its boresight.",
+    menu: Menu::View,
+    keys: &[(NONE, Key::V)],
+    enabled: always,
+    act: |_| look(from_radar),
+};
+
+/// Looks from above.
+pub(in crate::app) const FROM_ABOVE: CommandRow = CommandRow {
+    label: "View from above",
+    title: None,
+    tooltip: "Put the camera above the scene.",
+    menu: Menu::View,
+    keys: &[(NONE, Key::T)],
+    enabled: always,
+    act: |_| look(|session| Camera::top(centre(session) * 0.7, RADIUS_M)),
+};
+
+/// Looks from the side.
+pub(in crate::app) const FROM_SIDE: CommandRow = CommandRow {
+    label: "View from the side",
+    title: None,
+    tooltip: "Put the camera to the right of the scene.",
+    menu: Menu::View,
+    keys: &[(NONE, Key::S)],
+    enabled: always,
+    act: |_| look(|session| Camera::side(centre(session) * 0.7, RADIUS_M)),
+};
+
+fn look(camera: fn(&Session) -> Camera) -> UiAction {
+    UiAction::panes(move |states, session| states.of::<State>().camera = Some(camera(session)))
+}
+
 /// Camera and GPU objects.
-pub(in crate::app) struct State {
-    gpu: Option<RenderState>,
+#[derive(Default)]
+struct State {
     renderer: Option<SceneRenderer>,
     texture: Option<(TextureId, u64)>,
     camera: Option<Camera>,
@@ -29,34 +81,14 @@ pub(in crate::app) struct State {
 }
 
 /// A camera as a session file keeps it: target x, y, z, distance, yaw, pitch.
-pub(in crate::app) type StoredCamera = [f32; 6];
+type StoredCamera = [f32; 6];
 
-impl State {
-    /// The camera, where it was moved.
-    pub(in crate::app) fn stored(&self) -> Option<StoredCamera> {
-        let c = self.camera?;
-        Some([c.target.x, c.target.y, c.target.z, c.distance, c.yaw, c.pitch])
-    }
-
-    /// Puts a camera back.
-    pub(in crate::app) fn restore(&mut self, stored: Option<StoredCamera>, session: &Session) {
-        self.dataset = session.data.dataset.as_ref().map(std::sync::Arc::downgrade);
-        self.camera =
-            stored.filter(|numbers| numbers.iter().all(|x| x.is_finite())).map(|[x, y, z, distance, yaw, pitch]| {
-                Camera { target: Vec3::new(x, y, z), distance, yaw, pitch, ..Camera::default() }
-            });
-    }
-
-    pub(in crate::app) fn new(gpu: Option<RenderState>) -> Self {
-        let renderer = gpu.as_ref().map(|s| SceneRenderer::new(&s.device, &s.queue, s.target_format));
-        Self { gpu, renderer, texture: None, camera: None, dataset: None }
-    }
-
-    pub(in crate::app) fn reset(&mut self) {
+impl PaneState for State {
+    fn reset_view(&mut self) {
         self.camera = None;
     }
 
-    pub(in crate::app) fn focus(&mut self, session: &Session) {
+    fn focus(&mut self, session: &Session) {
         let positions = session.shown_positions();
         let camera = self.camera.get_or_insert_with(|| overview(session));
         match session.joint.and_then(|joint| positions.get(joint)) {
@@ -65,22 +97,31 @@ impl State {
         }
     }
 
-    pub(in crate::app) fn look_from_radar(&mut self, session: &Session) {
-        let mut camera = Camera::from_radar();
-        let eye = Vec3::new(0.0, 0.0, 0.0);
-        let to = centre(session) - eye;
-        camera.target = eye + Vec3::X * to.length().max(1.0);
-        camera.distance = to.length().max(1.0);
-        self.camera = Some(camera);
+    fn stored_as(&self) -> Option<&'static str> {
+        Some("camera")
     }
 
-    pub(in crate::app) fn look_from_top(&mut self, session: &Session) {
-        self.camera = Some(Camera::top(centre(session) * 0.7, RADIUS_M));
+    /// The camera, where it was moved.
+    fn stored(&self) -> serde_json::Result<Value> {
+        let numbers = |c: Camera| [c.target.x, c.target.y, c.target.z, c.distance, c.yaw, c.pitch];
+        serde_json::to_value(self.camera.map(numbers))
     }
 
-    pub(in crate::app) fn look_from_side(&mut self, session: &Session) {
-        self.camera = Some(Camera::side(centre(session) * 0.7, RADIUS_M));
+    fn restore(&mut self, stored: Value, session: &Session) -> serde_json::Result<()> {
+        let stored: Option<StoredCamera> = serde_json::from_value(stored)?;
+        self.dataset = session.data.dataset.as_ref().map(std::sync::Arc::downgrade);
+        self.camera =
+            stored.filter(|numbers| numbers.iter().all(|x| x.is_finite())).map(|[x, y, z, distance, yaw, pitch]| {
+                Camera { target: Vec3::new(x, y, z), distance, yaw, pitch, ..Camera::default() }
+            });
+        Ok(())
     }
+}
+
+/// The radar's own look at the room.
+fn from_radar(session: &Session) -> Camera {
+    let distance = centre(session).length().max(1.0);
+    Camera { target: Vec3::X * distance, distance, ..Camera::from_radar() }
 }
 
 /// Radar and person in one picture.
@@ -99,10 +140,12 @@ fn centre(session: &Session) -> Vec3 {
     sum / positions.len() as f32
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
-    if shared.session.data.dataset.is_none() {
-        return empty(ui, "Nothing in the scene", "The Gaussians of a fit appear here when a frame is open.");
-    }
+fn blank(session: &Session) -> Option<Blank> {
+    let how = "The Gaussians of a fit appear here when a frame is open.";
+    session.data.dataset.is_none().then(|| Blank::new("Nothing in the scene", how))
+}
+
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let known = state.dataset.as_ref().and_then(std::sync::Weak::upgrade);
     if !known
         .is_some_and(|known| shared.session.data.dataset.as_ref().is_some_and(|d| std::sync::Arc::ptr_eq(&known, d)))
@@ -113,7 +156,6 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     if state.camera.is_none() && shared.session.fit.shown.is_some() {
         state.camera = Some(overview(shared.session));
     }
-    toolbar(ui, shared);
     let caption = figure::of(shared.session, "3-D, metres, z up");
     let rect = figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref());
     if rect.width() < 16.0 || rect.height() < 16.0 {
@@ -130,7 +172,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let corner = Vec2::new(34.0 * scale, viewport.y - 34.0 * scale);
     let (triad, letters) = shapes::corner_triad(&camera, viewport, corner, 20.0 * scale, 1.6 * scale);
     scene.overlay.extend(triad);
-    paint(ui, state, rect, viewport, &scene, &camera);
+    paint(ui, shared.gpu, state, rect, viewport, &scene, &camera);
     if state.camera.is_some() {
         state.camera = Some(camera);
     }
@@ -168,12 +210,22 @@ fn steer(ui: &Ui, response: &egui::Response, rect: Rect, viewport: Vec2, scale: 
     }
 }
 
-fn paint(ui: &Ui, state: &mut State, rect: Rect, viewport: Vec2, scene: &Scene, camera: &Camera) {
-    let (Some(gpu), Some(renderer)) = (&state.gpu, &mut state.renderer) else {
+fn paint(
+    ui: &Ui,
+    gpu: Option<&RenderState>,
+    state: &mut State,
+    rect: Rect,
+    viewport: Vec2,
+    scene: &Scene,
+    camera: &Camera,
+) {
+    let Some(gpu) = gpu else {
         let how = "No graphics adapter: the 3-D view is not drawn.";
         ui.painter().text(rect.center(), Align2::CENTER_CENTER, how, egui::FontId::proportional(12.0), Color32::GRAY);
         return;
     };
+    let made = || SceneRenderer::new(&gpu.device, &gpu.queue, gpu.target_format);
+    let renderer = state.renderer.get_or_insert_with(made);
     let size = [viewport.x.round().max(1.0) as u32, viewport.y.round().max(1.0) as u32];
     renderer.render(&gpu.device, &gpu.queue, size, scene, camera);
     let generation = renderer.target_generation();
@@ -292,13 +344,9 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
             .response
             .on_hover_text("What is drawn in the scene.");
             ui.menu_button("Camera", |ui| {
-                for (label, act) in [
-                    ("View from the radar", AppAct::CameraRadar),
-                    ("View from above", AppAct::CameraTop),
-                    ("View from the side", AppAct::CameraSide),
-                ] {
-                    if ui.button(label).clicked() {
-                        shared.app(act);
+                for row in [FROM_RADAR, FROM_ABOVE, FROM_SIDE] {
+                    if ui.button(row.label).clicked() {
+                        shared.acts.push((row.act)(shared.session));
                         ui.close();
                     }
                 }

@@ -1,12 +1,27 @@
 //! Counts of labels: tags by stratum, by scene or by day, for one annotator or all.
 
-use super::{Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
+use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::labels::Tag;
 use crate::session::{LabelMode, Records, Session};
-use egui::{RichText, Role, Sense, Ui, vec2};
+use egui::{Key, RichText, Role, Sense, Ui, vec2};
 use std::collections::BTreeMap;
+
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Statistics",
+    title: "Statistics",
+    help: "how often each tag was given",
+    dock: Dock::BottomRight,
+    keys: &[(CTRL, Key::Num4)],
+    margin: 8,
+    state: PaneStates::prepare::<State>,
+    blank,
+    toolbar: Some(|ui, shared, states| controls(ui, shared.session, states.of())),
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
 
 /// What the rows are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -19,14 +34,16 @@ enum Group {
 
 /// How the counts are grouped, whose they are, and what they were made from.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     group: Group,
     /// `None` for everybody.
     annotator: Option<String>,
-    rows: Option<(Key, Vec<Row>)>,
+    rows: Option<(MadeFrom, Vec<Row>)>,
 }
 
-type Key = (u64, Group, Option<String>, bool, LabelMode);
+impl PaneState for State {}
+
+type MadeFrom = (u64, Group, Option<String>, bool, LabelMode);
 
 struct Row {
     name: String,
@@ -37,15 +54,15 @@ struct Row {
     tags: [usize; Tag::ALL.len()],
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+fn blank(session: &Session) -> Option<Blank> {
+    let how = "Tag frames with the keys 1 to 5 and 0. Here you then see how often each tag was given, by stratum, by \
+               scene and by day.";
+    session.labels.table().values().all(Records::is_empty).then(|| Blank::new("No labels yet", how))
+}
+
+fn show(ui: &mut Ui, shared: &Shared<'_>, state: &mut State) {
     let session = shared.session;
-    if session.labels.table().values().all(Records::is_empty) {
-        let how = "Tag frames with the keys 1 to 5 and 0. Here you then see how often each tag was given, by stratum, by \
-                   scene and by day.";
-        return empty(ui, "No labels yet", how);
-    }
     let tokens = Tokens::of(ui);
-    controls(ui, session, state);
     let graded = session.strata.result().is_some();
     let key = (session.labels.revision, state.group, state.annotator.clone(), graded, session.view.label_mode);
     if state.rows.as_ref().is_none_or(|(known, _)| *known != key) {

@@ -2,6 +2,8 @@
 
 mod chip;
 mod colorbar;
+mod setting;
 
 pub(super) use chip::{Named, chip, icon_button, iou_color, value_row};
 pub(super) use colorbar::{ColorBar, colorbar, tick};
+pub(super) use setting::settings;

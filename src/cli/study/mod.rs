@@ -54,7 +54,8 @@ pub enum StudyCommand {
     Switches(run::RunArgs),
     /// How often the number of people is right, by number and weighted by 91, 8 and 1 %; speed in timing.md.
     Counting(run::RunArgs),
-    /// Any grid over the configuration.
+    /// Any grid over the configuration: numbers, switches and choices.
+    #[command(after_long_help = crate::config::listing())]
     Sweep(run::SweepArgs),
     /// Make one run of the shards of a study.
     Merge(merge::MergeArgs),

@@ -1,10 +1,9 @@
 //! Running, stepping, going back, branching, changing settings.
 
 use crate::body::Pppr;
-use crate::config::FitConfig;
+use crate::config::{FitConfig, ReadBy, difference};
 use crate::session::command::Effect;
 use crate::session::fit::FitStatus;
-use crate::session::history::difference;
 use crate::session::state::{LogLevel, Session};
 use crate::worker::WorkerCommand;
 use std::sync::Arc;
@@ -132,12 +131,8 @@ impl Session {
         if config == self.config {
             return Vec::new();
         }
-        let steering_only = FitConfig {
-            iterations: self.config.iterations,
-            stop_when_converged: self.config.stop_when_converged,
-            ..config
-        } == self.config;
-        let starts_alike = config.starts_as(&self.config);
+        let steering_only = config.same_but(&self.config, |read_by| read_by == ReadBy::Run);
+        let starts_alike = config.same_but(&self.config, |read_by| read_by != ReadBy::Start);
         self.config = config;
         if !starts_alike && self.fit.is_untouched() {
             return self.reset();

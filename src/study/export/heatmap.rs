@@ -1,16 +1,16 @@
 //! PPPR-Heatmap: H_sim in the place of H_ori, file by file, so that a model made for the data set reads it unchanged.
 //!
 //! A file keeps its place in the tree, its keys, each map's shape, dtype, byte and memory order; arrays that are no maps are copied,
-//! and so are labels beside it. Of HuPR's complex cubes the amplitude that is its map becomes H_sim, and the phases stay. H_sim is
+//! and so are labels beside it. Of complex cubes the amplitude that is the map becomes H_sim, and the phases stay. H_sim is
 //! in units of its own: [`ExportScale::Match`] brings it to the input's. The manifest comes last: where it is missing the copy is
 //! not complete.
 
 use super::ExportError;
-use super::layout::{MapArray, MapFile, STRANGERS_PATTERN, Slot, Tree};
+use super::layout::{MapFile, STRANGERS_PATTERN, Tree};
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::npz::{Form, NpzArchive, copy_with, shape_text};
-use crate::dataset::{Dataset, HUPR_LEVEL, HUPR_LEVELS, Layout, MANIFEST_NAME, XRF55_STEPS};
+use crate::dataset::{Dataset, MANIFEST_NAME, MapArray, Stored};
 use crate::mhp::{Objective, Precision, Problem, masks, simulate};
 use crate::output::{FolderGuard, Inputs, replace_file, resolved};
 use std::collections::BTreeMap;
@@ -114,18 +114,13 @@ impl<'a> HeatmapExport<'a> {
         Ok(export)
     }
 
-    /// Readers of XRF55 expect all maps of a file.
+    /// Where every reader expects all frames of a file.
     fn check_whole_stacks(&self, frames: &Range<usize>) -> Result<(), ExportError> {
-        let part =
-            self.stack_length().is_some_and(|n| !(frames.start.is_multiple_of(n) && frames.end.is_multiple_of(n)));
-        let (steps, root) = (XRF55_STEPS, self.dataset.info().root.clone());
-        if part { Err(ExportError::Part { steps, frames: frames.clone(), path: root }) } else { Ok(()) }
-    }
-
-    /// Frames of a file, where every file must have so many.
-    fn stack_length(&self) -> Option<usize> {
-        let info = self.dataset.info();
-        (info.layout == Layout::Xrf55 && info.views.iter().all(|view| view.axes.len() == 2)).then_some(XRF55_STEPS)
+        let Some(steps) = self.dataset.frames_a_file() else { return Ok(()) };
+        if frames.start.is_multiple_of(steps) && frames.end.is_multiple_of(steps) {
+            return Ok(());
+        }
+        Err(ExportError::Part { steps, frames: frames.clone(), path: self.dataset.info().root.clone() })
     }
 
     /// Whether maps can be written as the arrays of the first frame are. A frame that cannot be read is told of later.
@@ -135,11 +130,11 @@ impl<'a> HeatmapExport<'a> {
             for (array, form) in file.arrays.iter().zip(&forms) {
                 let Some(view) = self.dataset.info().views.get(array.view) else { continue };
                 let one = |axis| form.with_axis(axis, 1);
-                let fits = match array.slot {
-                    Slot::Numbers => {
+                let fits = match array.stored {
+                    Stored::Numbers => {
                         form.stack_axis(view.axes.len()).map_or_else(|| form.clone(), one).fits(view.cells())
                     }
-                    Slot::Amplitude => form.fits_amplitudes(view.cells(), HUPR_LEVELS),
+                    Stored::Amplitude { every, .. } => form.fits_amplitudes(view.cells(), every),
                 };
                 fits.map_err(|reason| wrong(&file, array, form, reason))?;
             }
@@ -169,7 +164,7 @@ impl<'a> HeatmapExport<'a> {
             let forms = forms_of(&file)?;
             let maps: Vec<&Vec<f64>> = file.arrays.iter().filter_map(|array| maps.get(array.view)).collect();
             let axes = |array: &MapArray| self.dataset.info().views.get(array.view).map_or(0, |view| view.axes.len());
-            let numbers = file.arrays.iter().all(|array| array.slot == Slot::Numbers);
+            let numbers = file.arrays.iter().all(|array| array.stored == Stored::Numbers);
             let mut arrays = forms.iter().zip(&file.arrays);
             if numbers && arrays.all(|(form, array)| form.stack_axis(axes(array)).is_some()) {
                 self.stack(index, file, forms, maps)?;
@@ -191,7 +186,7 @@ impl<'a> HeatmapExport<'a> {
         let from = file.from.clone();
         let stack = self.stacked.entry(from.clone()).or_insert_with(|| Stack { file, forms, frames: BTreeMap::new() });
         stack.frames.insert(index, maps.into_iter().cloned().collect());
-        if self.stack_length() != self.stacked.get(&from).map(|stack| stack.frames.len()) {
+        if self.dataset.frames_a_file() != self.stacked.get(&from).map(|stack| stack.frames.len()) {
             return Ok(());
         }
         self.stacked.remove(&from).map_or(Ok(()), |full| self.write_stack(&full))
@@ -202,7 +197,7 @@ impl<'a> HeatmapExport<'a> {
     /// # Errors
     /// As [`Self::add`].
     pub fn finish(mut self, complete: bool) -> Result<(), ExportError> {
-        if self.stack_length().is_none() {
+        if self.dataset.frames_a_file().is_none() {
             let stacks = std::mem::take(&mut self.stacked);
             stacks.values().try_for_each(|stack| self.write_stack(stack))?;
         }
@@ -273,11 +268,11 @@ fn encoded<'m>(
     let arrays = file.arrays.iter().zip(forms).zip(maps);
     arrays
         .map(|((array, form), cells)| {
-            let bytes = match array.slot {
-                Slot::Numbers => form.encode(cells),
-                Slot::Amplitude => {
+            let bytes = match array.stored {
+                Stored::Numbers => form.encode(cells),
+                Stored::Amplitude { every, first } => {
                     let measured = NpzArchive::open(&file.from)?.bytes(&array.key)?;
-                    form.with_amplitudes(&measured, cells, HUPR_LEVELS, HUPR_LEVEL)
+                    form.with_amplitudes(&measured, cells, every, first)
                 }
             };
             Ok((array.key.clone(), bytes.map_err(|reason| wrong(file, array, form, reason))?))

@@ -1,7 +1,6 @@
 //! Which files hold the maps of a frame, what lies beside them, and where all of it goes in a copy of the data set.
 
-use crate::dataset::npz::NPY_KEY;
-use crate::dataset::{Dataset, Layout};
+use crate::dataset::{Dataset, MapArray};
 use crate::output::FileNames;
 use std::path::{Component, Path, PathBuf};
 use std::sync::OnceLock;
@@ -9,24 +8,6 @@ use std::sync::OnceLock;
 /// The folder of frames from outside the data set's own, and the pattern that finds them there.
 const STRANGERS: &str = "frames";
 pub(super) const STRANGERS_PATTERN: &str = "frames/*";
-
-/// How an array holds a map.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Slot {
-    /// Its numbers are the map's, or those of many frames' maps.
-    Numbers,
-    /// HuPR's cube of complex numbers: the map is the amplitude of one element of its last axis.
-    Amplitude,
-}
-
-/// One array of a file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct MapArray {
-    pub(super) key: String,
-    /// Index of the view.
-    pub(super) view: usize,
-    pub(super) slot: Slot,
-}
 
 /// One file of maps.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -57,23 +38,9 @@ impl<'a> Tree<'a> {
 
     /// The files that frame `index` is read from.
     pub(super) fn map_files(&self, index: usize) -> Vec<MapFile> {
-        let views = &self.dataset.info().views;
         let paths = self.dataset.map_paths(index).into_iter().enumerate();
-        let cubes = self.dataset.info().layout == Layout::Hupr;
         paths
-            .map(|(k, from)| {
-                let arrays = if cubes {
-                    vec![MapArray { key: NPY_KEY.to_owned(), view: k, slot: Slot::Amplitude }]
-                } else {
-                    let array = |(view, of): (usize, &crate::radar::View)| MapArray {
-                        key: of.array.clone(),
-                        view,
-                        slot: Slot::Numbers,
-                    };
-                    views.iter().enumerate().map(array).collect()
-                };
-                MapFile { inside: self.place(index, &from), from, arrays }
-            })
+            .map(|(k, from)| MapFile { inside: self.place(index, &from), from, arrays: self.dataset.map_arrays(k) })
             .collect()
     }
 

@@ -5,9 +5,9 @@
 
 use super::row::RunNumbers;
 use crate::body::Pppr;
-use crate::config::{FitConfig, LearningRates};
-use crate::dataset::{Dataset, Frame, Layout};
-use crate::diagnose::{PinholeCamera, Reprojection, joint_errors, map_box_coverage, reprojection};
+use crate::config::{FIELDS, FitConfig};
+use crate::dataset::{Dataset, Frame};
+use crate::diagnose::{Reprojection, joint_errors, map_box_coverage, reprojection};
 use crate::geometry::Vec3;
 use crate::mhp::{Fitter, Precision, Problem, StopReason, predict};
 use crate::start::{find_start, problem_of};
@@ -19,22 +19,9 @@ use std::time::Instant;
 /// A configuration with everything at its default that a start does not depend on: two variants with the same key start from
 /// the same pose. Where several postures are tried, the unweighted L_EM alone decides between them.
 pub(super) fn start_key(config: &FitConfig) -> FitConfig {
-    let plain = FitConfig::default();
-    FitConfig {
-        iterations: plain.iterations,
-        stop_when_converged: plain.stop_when_converged,
-        convergence: plain.convergence,
-        warm_start: plain.warm_start,
-        w_em: plain.w_em,
-        w_kine: plain.w_kine,
-        theta_max_deg: plain.theta_max_deg,
-        bone_tolerance_m: plain.bone_tolerance_m,
-        d_sep_m: plain.d_sep_m,
-        d_joint_m: plain.d_joint_m,
-        learning_rate: plain.learning_rate,
-        learning_rates: LearningRates::default(),
-        ..*config
-    }
+    let (mut key, plain) = (*config, FitConfig::default());
+    FIELDS.iter().filter(|field| !field.read_by.by_cold_start()).for_each(|field| field.take(&mut key, &plain));
+    key
 }
 
 /// A configuration without its number of iterations: variants with the same key are one fit.
@@ -161,16 +148,16 @@ impl<'a> LoadedFrame<'a> {
         }
     }
 
-    /// Only MMVR publishes a camera; its key points count where the skeleton is theirs.
+    /// Only where the data set publishes a camera; its key points count where the skeleton is theirs.
     fn reprojection(&self, joints: &[Vec3], a_person: usize) -> Reprojection {
         let info = self.dataset.info();
-        let Some(image) = self.frame.image.as_ref().filter(|_| info.layout == Layout::Mmvr) else {
+        let (Some(image), Some(camera)) = (&self.frame.image, info.layout.camera()) else {
             return Reprojection::default();
         };
         let preset = crate::body::Skeleton::preset(&image.keypoint_skeleton);
         let same = preset.is_some_and(|preset| preset.joints == info.skeleton.joints);
         let keypoints = if same { image.keypoints.as_slice() } else { &[] };
-        reprojection(&PinholeCamera::MMVR, joints, a_person, keypoints, &image.boxes)
+        reprojection(&camera, joints, a_person, keypoints, &image.boxes)
     }
 
     fn map_box_coverage(&self, joints: &[Vec3], a_person: usize) -> Option<f64> {
@@ -205,7 +192,7 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
     use super::*;
     use crate::body::{Group, PpprShape, Skeleton};
-    use crate::config::{Background, Convergence, InitConfig, Place, WarmStart};
+    use crate::config::{Background, InitConfig, Place};
     use crate::geometry::Pose;
     use crate::mhp::simulate;
     use crate::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
@@ -255,18 +242,11 @@ mod tests {
         let (problem, base) = (Arc::new(problem()), FitConfig::default());
         let start = |config: &FitConfig| find_start(&problem, config).unwrap().initialisation.params;
         let same = start(&base);
-        let rates = LearningRates { position: Some(0.01), bone: Some(0.02), ..LearningRates::default() };
-        let variants = [
-            FitConfig { w_em: 0.0, w_kine: 1.0, ..base },
-            FitConfig { theta_max_deg: 90.0, d_sep_m: 1.0, d_joint_m: 0.5, ..base },
-            FitConfig { learning_rate: 0.1, learning_rates: rates, ..base },
-            FitConfig { iterations: 3, stop_when_converged: true, ..base },
-            FitConfig { convergence: Convergence::Improvement, warm_start: WarmStart::AsLeft, ..base },
-            FitConfig { bone_tolerance_m: 0.05, ..base },
-        ];
-        for variant in variants {
-            assert_eq!(start_key(&variant), start_key(&base));
-            assert_eq!(start(&variant), same, "{variant:?}");
+        for field in FIELDS.iter().filter(|field| !field.read_by.by_cold_start()) {
+            let mut variant = base;
+            field.set(&mut variant, field.another(&base, 1));
+            assert_eq!(start_key(&variant), start_key(&base), "{}", field.key);
+            assert_eq!(start(&variant), same, "{}", field.key);
         }
         let others = [
             FitConfig { tau_pct: 40.0, ..base },

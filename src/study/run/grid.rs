@@ -1,12 +1,11 @@
 //! Grids over the configuration: `KEY=VALUE,VALUE` becomes variants.
 //!
-//! Keys are those of `FIT.toml`, `table.key` inside a table, so that every number, word and flag of [`FitConfig`] can be
-//! swept and a wrong one is refused in the configuration's own words.
+//! Keys and values are those of [`FIELDS`], so that every number, switch and choice can be swept and a wrong one is refused in
+//! the configuration's own words.
 
 use super::RunError;
 use super::variant::Variant;
-use crate::config::FitConfig;
-use std::path::Path;
+use crate::config::{FIELDS, Field, FitConfig};
 
 /// Points of a grid that are accepted.
 const MOST: usize = 10_000;
@@ -68,46 +67,15 @@ pub(super) fn variants(base: &FitConfig, axes: &[GridAxis]) -> Result<Vec<Varian
 
 /// `base` with these values under the axes' keys.
 fn with(base: &FitConfig, axes: &[GridAxis], values: &[String]) -> Result<FitConfig, String> {
-    let mut table: toml::Table = toml::from_str(&base.to_toml()).map_err(|error| error.message().to_owned())?;
+    let mut config = *base;
     for (axis, value) in axes.iter().zip(values) {
-        set(&mut table, &axis.key, value)?;
+        let field = Field::of_key(&axis.key).ok_or_else(|| {
+            let keys: Vec<String> = FIELDS.iter().map(|field| format!("`{}`", field.key)).collect();
+            format!("unknown key `{}`; expected one of {}", axis.key, keys.join(", "))
+        })?;
+        field.set(&mut config, field.parse(value).map_err(|error| error.to_string())?);
     }
-    let text = toml::to_string(&table).map_err(|error| error.to_string())?;
-    let parsed = FitConfig::parse(&text, Path::new(""));
-    // The text is made here: its lines say nothing to a person.
-    parsed.map_err(|error| {
-        error.to_string().trim_start_matches(|c: char| c == ':' || c.is_ascii_digit()).trim().to_owned()
-    })
-}
-
-fn set(table: &mut toml::Table, key: &str, value: &str) -> Result<(), String> {
-    let value = literal(key, value);
-    match key.split_once('.') {
-        None => {
-            table.insert(key.to_owned(), value);
-            Ok(())
-        }
-        Some((outer, inner)) => {
-            let entry = table.entry(outer).or_insert_with(|| toml::Value::Table(toml::Table::new()));
-            let inside = entry.as_table_mut().ok_or_else(|| format!("{outer} is no table"))?;
-            inside.insert(inner.to_owned(), value);
-            Ok(())
-        }
-    }
-}
-
-/// A number or flag where it reads as one, else a word. A number for the region is its half width.
-fn literal(key: &str, value: &str) -> toml::Value {
-    let plain = value.parse::<i64>().map(toml::Value::Integer).ok();
-    let plain = plain.or_else(|| value.parse::<f64>().ok().map(toml::Value::Float));
-    let plain = plain.or_else(|| value.parse::<bool>().ok().map(toml::Value::Boolean));
-    match plain {
-        Some(number) if key == "em_region" => {
-            toml::Value::Table(std::iter::once(("half_width_m".to_owned(), number)).collect())
-        }
-        Some(plain) => plain,
-        None => toml::Value::String(value.to_owned()),
-    }
+    Ok(config)
 }
 
 #[cfg(test)]
@@ -143,8 +111,25 @@ mod tests {
         assert!(refusal(&["tau_pct=5", "tau_pct=6"]).contains("key tau_pct is there twice"));
         assert!(refusal(&["tau=5"]).contains("unknown key `tau`"), "{}", refusal(&["tau=5"]));
         assert!(refusal(&["tau_pct=101"]).contains("tau_pct is 101; expected a number in 0.1 ..= 100"));
-        assert!(refusal(&["summation=loud"]).contains("loud"));
-        assert!(refusal(&["w_em.x=1"]).contains("w_em is no table"));
+        let told = "summation is loud; expected \"coherent\" or \"incoherent\"";
+        assert!(refusal(&["summation=loud"]).contains(told), "{}", refusal(&["summation=loud"]));
+        assert!(refusal(&["iterations=2.5"]).contains("iterations is 2.5; expected a whole number in 1 ..= 100000"));
+        assert!(refusal(&["operators.range=off"]).contains("operators.range is off; expected true or false"));
+        assert!(refusal(&["w_em.x=1"]).contains("unknown key `w_em.x`"));
         assert!(refusal(&[]).contains("at least one"));
+    }
+
+    /// Numbers, switches and choices, the words for no number among them, and a setting that only tests know.
+    #[test]
+    fn any_setting_can_be_swept() {
+        for field in FIELDS {
+            let values = field.legal();
+            let texts: Vec<String> = values.iter().map(|value| field.text(*value)).collect();
+            let axis = GridAxis { key: field.key.to_owned(), values: texts.clone() };
+            let rows = variants(&FitConfig::default(), &[axis]).unwrap();
+            let swept: Vec<_> = rows.iter().map(|row| field.get(&row.config)).collect();
+            assert_eq!((swept, rows.iter().map(Variant::name).collect::<Vec<_>>()), (values, texts), "{}", field.key);
+        }
+        assert_eq!(grid(&["w_dummy=0,2"]).unwrap()[1].config.w_dummy, 2.0);
     }
 }

@@ -57,6 +57,5 @@ pub use output::TABLE_FILE;
 pub use plan::{RunPlan, RunRequest};
 pub use row::{RunNumbers, RunRow};
 pub use spec::{DataSpec, RUN_FILE, RunSpec, Shard, Subset};
-pub use switches::{SWITCHES, Switch};
 pub use table::{CountShares, Spread, TableRow, mark, notes};
 pub use variant::{Method, PaperRow, StartFrom, Variant};

@@ -5,7 +5,6 @@
 
 use super::kind::StudyKind;
 use super::variant::PaperRow;
-use crate::dataset::Layout;
 use crate::study::complexity::Stratum;
 
 /// A data set of the paper.
@@ -19,11 +18,12 @@ pub(super) enum PaperSet {
 impl PaperSet {
     pub(super) const ALL: [Self; 3] = [Self::Mmvr, Self::Hupr, Self::Xrf55];
 
-    fn layout(self) -> Layout {
+    /// The layout that it is published in, as [`crate::dataset::Layout::word`] says it.
+    fn layout(self) -> &'static str {
         match self {
-            Self::Mmvr => Layout::Mmvr,
-            Self::Hupr => Layout::Hupr,
-            Self::Xrf55 => Layout::Xrf55,
+            Self::Mmvr => "mmvr",
+            Self::Hupr => "hupr",
+            Self::Xrf55 => "xrf55",
         }
     }
 
@@ -46,9 +46,9 @@ impl PaperSet {
         }
     }
 
-    /// The one whose figures stand beside a study of data with this layout (as [`Layout::word`] says it).
+    /// The one whose figures stand beside a study of data with this layout (as [`crate::dataset::Layout::word`] says it).
     pub(super) fn beside(study: StudyKind, layout: &str) -> Option<Self> {
-        Self::of_study(study).iter().copied().find(|set| set.layout().word() == layout)
+        Self::of_study(study).iter().copied().find(|set| set.layout() == layout)
     }
 }
 

@@ -189,6 +189,15 @@ impl RunSpec {
         if let Some((what, text)) = found {
             return Some((what, text(self), text(other)));
         }
+        // A variant that both have may be set otherwise; what else there is differs as a whole.
+        let pairs = || self.variants.iter().zip(&other.variants);
+        let setting = pairs().find_map(|(a, b)| Some((a, b, a.config.changes(&b.config).next()?)));
+        if let Some((a, b, field)) = setting
+            && pairs().all(|(a, b)| a.labels == b.labels)
+        {
+            let text = |variant: &Variant| field.text(field.get(&variant.config));
+            return Some((field.key, text(a), text(b)));
+        }
         (self.digest() != other.digest()).then(|| ("configuration", self.digest(), other.digest()))
     }
 }

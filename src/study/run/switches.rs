@@ -1,63 +1,58 @@
-//! The switches in which the presets differ, one place: the rows of the study `switches` are made from this list.
+//! The settings in which the presets differ, one place: the rows of the study `switches` are made from the table of settings.
 
 use super::variant::{StartFrom, Variant};
-use crate::config::{FitConfig, Preset};
+use crate::config::{FIELDS, Field, FitConfig, Preset};
 
-/// A named part of a configuration that another configuration may set otherwise.
-pub struct Switch {
+/// The order of the rows in the runs that exist; a row that is not named here follows in the order of the table of settings.
+const ORDER: &[&str] = &[
+    "bones turn",
+    "scales and opacities by body part",
+    "skin in front of the joints",
+    "powers add",
+    "place",
+    "heading from motion",
+    "several starts",
+    "temporal term",
+    "height from the floor",
+    "limbs as learned",
+    "convergence",
+    "bone tolerance",
+    "frames around",
+    "still echoes",
+    "background",
+    "gradient's velocity",
+    "warm start",
+    "EM region",
+    "step sizes",
+];
+
+/// Settings that another configuration may set otherwise, all of them together.
+struct Switch {
     /// The row's name.
-    pub name: &'static str,
-    /// Takes this part from the second configuration.
-    pub take: fn(&mut FitConfig, &FitConfig),
+    name: &'static str,
+    fields: Vec<&'static Field>,
 }
 
-/// Every part in which two presets may differ; perturbations and seed belong to a study and not to a preset. A test holds that
-/// together they make one preset of the other.
-pub const SWITCHES: &[Switch] = &[
-    Switch { name: "bones turn", take: |to, from| to.parameterization = from.parameterization },
-    Switch { name: "scales and opacities by body part", take: |to, from| to.scatterers = from.scatterers },
-    Switch { name: "skin in front of the joints", take: |to, from| to.surface_offset_m = from.surface_offset_m },
-    Switch { name: "powers add", take: |to, from| to.summation = from.summation },
-    Switch { name: "place", take: |to, from| to.place = from.place },
-    Switch { name: "heading from motion", take: |to, from| to.yaw = from.yaw },
-    Switch { name: "several starts", take: |to, from| to.starts = from.starts },
-    Switch { name: "temporal term", take: |to, from| to.w_time = from.w_time },
-    Switch { name: "height from the floor", take: |to, from| to.height = from.height },
-    Switch { name: "limbs as learned", take: |to, from| to.limbs = from.limbs },
-    Switch { name: "people", take: |to, from| to.people = from.people },
-    Switch { name: "softness", take: |to, from| to.softness = from.softness },
-    Switch { name: "convergence", take: |to, from| to.convergence = from.convergence },
-    Switch { name: "bone tolerance", take: |to, from| to.bone_tolerance_m = from.bone_tolerance_m },
-    Switch { name: "frames around", take: |to, from| to.frames_around = from.frames_around },
-    Switch { name: "still echoes", take: |to, from| to.init.still = from.init.still },
-    Switch { name: "background", take: |to, from| to.init.background = from.init.background },
-    Switch { name: "gradient's velocity", take: |to, from| to.init.gradient = from.init.gradient },
-    Switch { name: "warm start", take: |to, from| to.warm_start = from.warm_start },
-    Switch { name: "threshold", take: |to, from| to.tau_pct = from.tau_pct },
-    Switch { name: "EM region", take: |to, from| to.em_region = from.em_region },
-    Switch { name: "weights", take: |to, from| (to.w_em, to.w_kine) = (from.w_em, from.w_kine) },
-    Switch {
-        name: "step sizes",
-        take: |to, from| (to.learning_rate, to.learning_rates) = (from.learning_rate, from.learning_rates),
-    },
-    Switch { name: "iterations", take: |to, from| to.iterations = from.iterations },
-    Switch {
-        name: "limits",
-        take: |to, from| {
-            (to.theta_max_deg, to.d_sep_m, to.d_joint_m) = (from.theta_max_deg, from.d_sep_m, from.d_joint_m);
-        },
-    },
-    Switch { name: "operators", take: |to, from| to.operators = from.operators },
-    Switch {
-        name: "initialiser",
-        take: |to, from| {
-            to.init.position = from.init.position;
-            to.init.velocity = from.init.velocity;
-            to.init.velocity_gain_mps = from.init.velocity_gain_mps;
-        },
-    },
-    Switch { name: "early stop", take: |to, from| to.stop_when_converged = from.stop_when_converged },
-];
+impl Switch {
+    /// Takes these settings from another configuration.
+    fn take(&self, to: &mut FitConfig, from: &FitConfig) {
+        self.fields.iter().for_each(|field| field.take(to, from));
+    }
+}
+
+/// Every row; perturbations and seed belong to a study and not to a preset, and to no row. A test holds that together they make
+/// one preset of the other.
+fn switches() -> Vec<Switch> {
+    let mut rows: Vec<Switch> = Vec::new();
+    for (name, field) in FIELDS.iter().filter_map(|field| Some((field.row?, field))) {
+        match rows.iter_mut().find(|row| row.name == name) {
+            Some(row) => row.fields.push(field),
+            None => rows.push(Switch { name, fields: vec![field] }),
+        }
+    }
+    rows.sort_by_key(|row| ORDER.iter().position(|name| *name == row.name).unwrap_or(ORDER.len()));
+    rows
+}
 
 /// Changes a configuration.
 type Change = fn(&mut FitConfig);
@@ -68,7 +63,7 @@ const EXTRAS: &[(&str, Change)] = &[("limbs that turn", |config| config.learning
 /// What a configuration becomes with one part of another; `None` where both have it alike.
 fn with(base: &FitConfig, other: &FitConfig, switch: &Switch) -> Option<FitConfig> {
     let mut config = *base;
-    (switch.take)(&mut config, other);
+    switch.take(&mut config, other);
     (config != *base).then_some(config)
 }
 
@@ -82,10 +77,11 @@ pub(super) fn variants(base: &FitConfig) -> Vec<Variant> {
         config
     };
     let [plain, paper, best] = [Preset::Default, Preset::Paper, Preset::Recommended].map(of);
+    let switches = switches();
     let row =
         |preset: Preset, change: String, config: FitConfig| Variant::cold([preset.name().to_owned(), change], &config);
     let one_by_one = |preset: Preset, from: &FitConfig, to: &FitConfig, how: &str| -> Vec<Variant> {
-        let changed = SWITCHES.iter().filter_map(|switch| Some((switch, with(from, to, switch)?)));
+        let changed = switches.iter().filter_map(|switch| Some((switch, with(from, to, switch)?)));
         changed.map(|(switch, config)| row(preset, format!("{how} {}", switch.name), config)).collect()
     };
     let mut rows = vec![row(Preset::Default, "as it is".into(), plain)];
@@ -110,14 +106,15 @@ pub(super) fn variants(base: &FitConfig) -> Vec<Variant> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::FieldGroup;
 
     #[test]
     fn the_switches_together_make_any_preset_of_any_other() {
         for from in Preset::ALL {
             for to in Preset::ALL {
                 let (mut config, to) = (from.config(), to.config());
-                for switch in SWITCHES {
-                    (switch.take)(&mut config, &to);
+                for switch in switches() {
+                    switch.take(&mut config, &to);
                 }
                 assert_eq!(config, to, "every setting of a preset belongs to a switch");
             }
@@ -153,9 +150,25 @@ mod tests {
             "EM region",
         ];
         assert_eq!(names, expected);
-        let switches = SWITCHES.iter().filter(|switch| names.contains(&switch.name));
+        let letters = switches().into_iter().filter(|switch| names.contains(&switch.name));
         let mut config = FitConfig::default();
-        switches.for_each(|switch| (switch.take)(&mut config, &Preset::Paper.config()));
+        letters.for_each(|switch| switch.take(&mut config, &Preset::Paper.config()));
         assert_eq!(config, Preset::Paper.config());
+    }
+
+    /// A setting that a later change brings is compared without a word here.
+    #[test]
+    fn every_setting_of_a_preset_is_in_one_row() {
+        let rows = switches();
+        assert!(ORDER.iter().all(|name| rows.iter().any(|row| row.name == *name)), "no row is named that is not there");
+        for field in FIELDS {
+            let of: Vec<&str> =
+                rows.iter().filter(|row| row.fields.iter().any(|of| of.key == field.key)).map(|row| row.name).collect();
+            assert_eq!(of.len(), usize::from(field.group != FieldGroup::Perturbation), "{}: {of:?}", field.key);
+        }
+        let (plain, other) = (FitConfig::default(), FitConfig { w_dummy: 2.0, ..FitConfig::default() });
+        let changed: Vec<&str> =
+            rows.iter().filter(|row| with(&plain, &other, row).is_some()).map(|row| row.name).collect();
+        assert_eq!(changed, ["weights"]);
     }
 }

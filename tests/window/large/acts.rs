@@ -4,7 +4,7 @@ use super::meter::{Meter, memory_mib, peak_memory_mib};
 use egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, Rect, TouchPhase, pos2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use mhp_inspector::app::{InspectorApp, PaneKind};
+use mhp_inspector::app::{InspectorApp, Pane};
 use mhp_inspector::labels::Tag;
 use mhp_inspector::session::{Command, LabelStatus, Session, Sort, SortKey, StrataStatus, TimelineStrip};
 use std::fmt::Write as _;
@@ -280,7 +280,7 @@ impl Window {
         self.passes_until(&mut meter, |s| s.fit.head() >= 300 && !s.fit.is_running());
         meter.print();
         self.show("Curves");
-        assert!(self.0.state().pane_rect(PaneKind::Curves).is_some(), "the curves are on screen");
+        assert!(self.0.state().pane_rect(Pane::called("Curves").unwrap()).is_some(), "the curves are on screen");
         let mut meter = Meter::new("a run of 100,000 iterations");
         meter.pass_with(&mut self.0, |harness| harness.state_mut().apply(Command::StepFit(100_000 - 300)));
         self.passes_until(&mut meter, |s| s.fit.head() >= 100_000 && !s.fit.is_running());

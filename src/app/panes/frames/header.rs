@@ -10,7 +10,8 @@ use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Align2, RichText, Role, Sense, Ui, pos2, vec2};
 use std::collections::BTreeSet;
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tokens) {
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    let tokens = &Tokens::of(ui);
     filter(ui, shared, state, tokens);
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;

@@ -3,19 +3,45 @@
 mod columns;
 mod header;
 
-use super::{Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
+use crate::app::commands::{CTRL, CommandRow, Menu, UiAction, has_frame};
 use crate::app::theme::{self, Tokens};
 use crate::session::{Command, Session};
 use columns::{COLUMNS, Column, cell, spoken};
-use egui::{RichText, Sense, Ui, pos2, vec2};
+use egui::{Key, RichText, Sense, Ui, pos2, vec2};
 use std::collections::BTreeSet;
 
 const ROW: f32 = 20.0;
 const GAP: f32 = 5.0;
 
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Frames",
+    title: "Frames",
+    help: "the list of frames, its filter and its order",
+    dock: Dock::Left,
+    keys: &[],
+    margin: 8,
+    state: PaneStates::prepare::<State>,
+    blank,
+    toolbar: Some(|ui, shared, states| header::show(ui, shared, states.of())),
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
+
+/// Puts the text cursor into the filter.
+pub(in crate::app) const FILTER: CommandRow = CommandRow {
+    label: "Filter frames…",
+    title: None,
+    tooltip: "Type which frames are listed, for example stratum:hard iou<0.5 -tag:F1.",
+    menu: Menu::Edit,
+    keys: &[(CTRL, Key::F)],
+    enabled: has_frame,
+    act: |_| UiAction::panes(|states, _| states.of::<State>().focus_filter = true),
+};
+
 /// What the list remembers.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     /// The filter while it is being typed.
     filter: Option<String>,
     /// Name of a view to be kept.
@@ -26,20 +52,16 @@ pub(in crate::app) struct State {
     anchor: Option<usize>,
 }
 
-impl State {
-    /// Puts the text cursor into the filter.
-    pub(in crate::app) fn focus_filter(&mut self) {
-        self.focus_filter = true;
-    }
+impl PaneState for State {}
+
+fn blank(session: &Session) -> Option<Blank> {
+    let how = "Open one with Ctrl+O, or drop a folder on the window.";
+    session.data.dataset.is_none().then(|| Blank::new("No data set", how))
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let session = shared.session;
-    if session.data.dataset.is_none() {
-        return empty(ui, "No data set", "Open one with Ctrl+O, or drop a folder on the window.");
-    }
     let tokens = Tokens::of(ui);
-    header::show(ui, shared, state, &tokens);
     let columns: Vec<&Column> =
         COLUMNS.iter().filter(|column| !session.view.hidden_columns.iter().any(|key| key == column.key)).collect();
     let wanted: f32 = columns.iter().map(|column| column.width + GAP).sum::<f32>() + 4.0;

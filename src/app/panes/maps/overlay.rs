@@ -1,6 +1,6 @@
 //! What lies on a map: axes, labelled boxes, the EM region, the skeleton, the cursor and the probe's text.
 
-use super::Window;
+use super::MapExtent;
 use super::picture::{Content, Pictures};
 use crate::app::map_image::{Orientation, level};
 use crate::app::theme::{self, Tokens};
@@ -49,7 +49,7 @@ pub(super) fn title(
 }
 
 /// Ticks and names along the left and the lower edge.
-pub(super) fn axes(ui: &Ui, plot: Rect, view: &View, o: Orientation, window: Window, tokens: &Tokens) {
+pub(super) fn axes(ui: &Ui, plot: Rect, view: &View, o: Orientation, window: MapExtent, tokens: &Tokens) {
     let painter = ui.painter();
     let stroke = Stroke::new(1.0, tokens.dim);
     let font = theme::mono(10.0);

@@ -1,6 +1,6 @@
 //! Boxes of cells: those that a label marks, drawn with the mouse, and those that a finding points at.
 
-use super::{State, Window, unit_at};
+use super::{MapExtent, State, unit_at};
 use crate::app::map_image::Orientation;
 use crate::app::theme::Tokens;
 use crate::labels::CellRegion;
@@ -16,7 +16,7 @@ pub(super) struct Highlight {
     lo: Vec<usize>,
     hi: Vec<usize>,
     /// What was seen of the view before.
-    before: Window,
+    before: MapExtent,
 }
 
 /// Whether the mouse marks cells.
@@ -41,12 +41,12 @@ pub(super) struct DragStart {
 
 impl State {
     /// The next drag on a map marks cells; again to leave it.
-    pub(in crate::app) fn mark_cells(&mut self) {
+    pub(super) fn mark_cells(&mut self) {
         self.marking.armed = !self.marking.armed;
     }
 
     /// Points at cells and zooms the map to them.
-    pub(in crate::app) fn show_cells(&mut self, session: &Session, view: usize, lo: &[usize], hi: &[usize]) {
+    pub(super) fn show_cells(&mut self, session: &Session, view: usize, lo: &[usize], hi: &[usize]) {
         let Some(v) = session.data.dataset.as_ref().and_then(|dataset| dataset.info().views.get(view)) else { return };
         let Some([min, max]) = unit_box(v, lo, hi) else { return };
         let frame = session.data.frame_index;

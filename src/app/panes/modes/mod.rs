@@ -2,19 +2,44 @@
 
 mod cards;
 
-use super::{Shared, empty};
-use crate::app::commands::{AppAct, command, tooltip};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
+use crate::app::commands::{CommandRow, Menu, NONE, UiAction, UserCommand, command, has_frame};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::labels::{CellRegion, Tag, Verdict};
 use crate::radar::View;
 use crate::session::{Command, LabelMode, LabelStatus, Session};
-use egui::{RichText, Role, Ui, vec2};
+use egui::{Key, RichText, Role, Ui, vec2};
 use std::sync::Arc;
+
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Modes",
+    title: "Failure modes",
+    help: "a frame's tags and note, and the machine's evidence",
+    dock: Dock::RightBottom,
+    keys: &[],
+    margin: 8,
+    state: PaneStates::prepare::<State>,
+    blank,
+    toolbar: None,
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
+
+/// Brings the pane to the front and puts the text cursor into the note.
+pub(in crate::app) const WRITE_NOTE: CommandRow = CommandRow {
+    label: "Write a note",
+    title: None,
+    tooltip: "Put the text cursor into the note of the frame.",
+    menu: Menu::Labels,
+    keys: &[(NONE, Key::M)],
+    enabled: has_frame,
+    act: |_| UiAction::in_front(&PANE, |states, _| states.of::<State>().focus_note = true),
+};
 
 /// What the pane remembers: fields while they are typed in.
 #[derive(Default)]
-pub(in crate::app) struct State {
+struct State {
     /// What is being typed, and for which frames: the one on screen, the selection, and how often that changed.
     note: Option<(Arc<[u32]>, String)>,
     annotator: Option<String>,
@@ -22,21 +47,14 @@ pub(in crate::app) struct State {
     focus_note: bool,
 }
 
-impl State {
-    /// Puts the text cursor into the note.
-    pub(in crate::app) fn focus_note(&mut self) {
-        self.focus_note = true;
-    }
+impl PaneState for State {}
+
+fn blank(session: &Session) -> Option<Blank> {
+    let how = "Open a data set; tags, notes and the evidence for each mode appear here.";
+    session.data.dataset.is_none().then(|| Blank::new("No frame to tag", how))
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
-    if shared.session.data.dataset.is_none() {
-        return empty(
-            ui,
-            "No frame to tag",
-            "Open a data set; tags, notes and the evidence for each mode appear here.",
-        );
-    }
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let tokens = Tokens::of(ui);
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 6.0;
@@ -155,14 +173,14 @@ fn note(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let field = egui::TextEdit::multiline(&mut text)
         .hint_text("Note: Enter keeps it, Esc drops it")
         .desired_rows(1)
-        .return_key(Some(egui::KeyboardShortcut::new(egui::Modifiers::SHIFT, egui::Key::Enter)))
+        .return_key(Some(egui::KeyboardShortcut::new(egui::Modifiers::SHIFT, Key::Enter)))
         .desired_width(f32::INFINITY);
     let response = ui.add(field).named(Role::TextInput, "Note");
     if std::mem::take(&mut state.focus_note) {
         response.request_focus();
     }
-    let escape = ui.input(|i| i.key_pressed(egui::Key::Escape));
-    let enter = response.has_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter) && !i.modifiers.shift);
+    let escape = ui.input(|i| i.key_pressed(Key::Escape));
+    let enter = response.has_focus() && ui.input(|i| i.key_pressed(Key::Enter) && !i.modifiers.shift);
     if enter {
         response.surrender_focus();
     }
@@ -197,9 +215,9 @@ fn details(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tok
             }
         });
         menu.response.named(Role::ComboBox, "Person").on_hover_text("The person that the tags are about, from 0.");
-        let tip = command("Mark cells").map(tooltip).unwrap_or_default();
+        let tip = command("Mark cells").map(UserCommand::tip).unwrap_or_default();
         if ui.small_button("Mark cells").on_hover_text(tip).clicked() {
-            shared.app(AppAct::MarkCells);
+            shared.invoke("Mark cells");
         }
         if let Some(region) = &label.region {
             if ui.small_button("Show").named(Role::Button, "Show marked cells").clicked() {
@@ -236,7 +254,7 @@ fn region(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, known: Option
     {
         ui.label(RichText::new(why).small().color(tokens.bad));
     }
-    let escape = ui.input(|i| i.key_pressed(egui::Key::Escape));
+    let escape = ui.input(|i| i.key_pressed(Key::Escape));
     if response.lost_focus() {
         state.region = None;
         if let (Ok(region), false) = (region, escape)

@@ -1,6 +1,6 @@
 //! Bars with error bars: a bar a row, named, with the paper's figure as a mark where there is one.
 
-use super::measure::{Quantity, Value, Values};
+use super::measure::{PlottedQuantity, Value, Values};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::study::run::Run;
@@ -12,7 +12,7 @@ const ROW: f32 = 20.0;
 pub(super) fn show(
     ui: &mut Ui,
     run: &Run,
-    measure: Quantity,
+    measure: PlottedQuantity,
     values: &Values,
     chosen: Option<usize>,
     tokens: &Tokens,
@@ -56,7 +56,7 @@ fn written(run: &Run, names: &[String]) -> Vec<String> {
     if distinct.len() == last.len() { last } else { names.to_vec() }
 }
 
-fn spoken(measure: Quantity, value: &Value) -> String {
+fn spoken(measure: PlottedQuantity, value: &Value) -> String {
     let unit = measure.unit();
     let error = if value.error > 0.0 { format!(" ± {}", measure.text(value.error)) } else { String::new() };
     let paper = value.paper.map(|paper| format!(", paper {}", measure.text(paper))).unwrap_or_default();
@@ -64,7 +64,7 @@ fn spoken(measure: Quantity, value: &Value) -> String {
 }
 
 /// What is drawn, and what its marks mean.
-fn title(ui: &mut Ui, measure: Quantity, values: &Values, tokens: &Tokens) {
+fn title(ui: &mut Ui, measure: PlottedQuantity, values: &Values, tokens: &Tokens) {
     let paper = values.iter().flatten().any(|value| value.paper.is_some());
     let marks = if paper { ", with its standard error   ◆ paper" } else { ", with its standard error" };
     let text = egui::RichText::new(format!("{}{marks}", measure.title())).small().color(tokens.dim);
@@ -84,7 +84,7 @@ impl Scale {
     }
 }
 
-fn bar(ui: &Ui, rect: Rect, scale: &Scale, measure: Quantity, value: &Value, chosen: bool, tokens: &Tokens) {
+fn bar(ui: &Ui, rect: Rect, scale: &Scale, measure: PlottedQuantity, value: &Value, chosen: bool, tokens: &Tokens) {
     let painter = ui.painter();
     let (zero, end) = (scale.x(rect, 0.0), scale.x(rect, value.mean));
     let fill = if chosen { tokens.accent } else { tokens.accent.gamma_multiply(0.55) };

@@ -1,8 +1,10 @@
 //! Two numbers: the quantity as a map between the grid's points, with lines of equal value, and a point a row.
 //!
 //! The points stand at equal distances whatever their values are: grids are often geometric, and each column is labelled.
+//! The lines are found here, not by the crate `contour`: that one closes every line along the border of the map, and knows
+//! no point without a value.
 
-use super::measure::{Quantity, Values, levels, limits};
+use super::measure::{PlottedQuantity, Values, levels, limits};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{ColorBar, Named as _, colorbar};
 use crate::render::Colormap;
@@ -58,7 +60,7 @@ impl Field {
 pub(super) fn show(
     ui: &mut Ui,
     run: &Run,
-    measure: Quantity,
+    measure: PlottedQuantity,
     values: &Values,
     session: &Session,
     height: f32,
@@ -153,7 +155,7 @@ fn points(
     ui: &mut Ui,
     run: &Run,
     field: &Field,
-    measure: Quantity,
+    measure: PlottedQuantity,
     place: &dyn Fn(f64, f64) -> Pos2,
     tokens: &Tokens,
 ) -> Option<usize> {

@@ -1,6 +1,6 @@
 //! Curves over a number: a curve for each group of the other labels, error bars at its points, the paper's figures beside.
 
-use super::measure::{Quantity, Values};
+use super::measure::{PlottedQuantity, Values};
 use super::number;
 use crate::app::theme::Tokens;
 use crate::study::run::Run;
@@ -19,7 +19,7 @@ struct Series {
 pub(super) fn show(
     ui: &mut Ui,
     run: &Run,
-    measure: Quantity,
+    measure: PlottedQuantity,
     values: &Values,
     height: f32,
     tokens: &Tokens,

@@ -4,7 +4,7 @@ use crate::study::run::{PaperRow, Run, Spread, TableRow};
 
 /// A quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Quantity {
+pub(super) enum PlottedQuantity {
     #[default]
     Majpe,
     PaMajpe,
@@ -29,7 +29,7 @@ pub(super) struct Value {
 /// A value a row; `None` where unknown.
 pub(super) type Values = Vec<Option<Value>>;
 
-impl Quantity {
+impl PlottedQuantity {
     const ALL: [Self; 9] = [
         Self::Majpe,
         Self::PaMajpe,
@@ -128,10 +128,10 @@ impl Quantity {
 }
 
 /// Every quantity that some row of the run knows, with its values.
-pub(super) fn of_run(run: &Run) -> Vec<(Quantity, Values)> {
-    let all = Quantity::ALL.map(|measure| {
+pub(super) fn of_run(run: &Run) -> Vec<(PlottedQuantity, Values)> {
+    let all = PlottedQuantity::ALL.map(|measure| {
         let values = run.table.iter().map(|row| {
-            let known = if measure == Quantity::Time { time(run, row) } else { measure.of(row) };
+            let known = if measure == PlottedQuantity::Time { time(run, row) } else { measure.of(row) };
             let paper = row.paper.and_then(|paper| measure.of_paper(paper));
             known.map(|(mean, error)| Value { mean, error, paper })
         });

@@ -7,24 +7,40 @@ mod measure;
 mod parallel;
 mod table;
 
-use super::{Shared, empty};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::AppAct;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
-use crate::session::Command;
+use crate::session::{Command, Session};
 use crate::study::run::{Run, StudyKind, Subset};
 use egui::{RichText, Role, Ui};
-use measure::{Quantity, Values};
+use measure::{PlottedQuantity, Values};
 
 /// A pane of less than this width, points, has a list of quantities instead of a button for each.
 const NARROW: f32 = 460.0;
 
+/// The pane.
+pub(in crate::app) static PANE: Pane = Pane {
+    key: "Study",
+    title: "Study",
+    help: "a study's table and plot",
+    dock: Dock::BottomRight,
+    keys: &[],
+    margin: 8,
+    state: PaneStates::prepare::<State>,
+    blank,
+    toolbar: Some(|ui, shared, _| head(ui, shared)),
+    ui: |ui, shared, states| show(ui, shared, states.of()),
+};
+
 /// Which quantity is plotted, and the values that were made from the run.
 #[derive(Default)]
-pub(in crate::app) struct State {
-    measure: Quantity,
-    values: Option<(u64, Vec<(Quantity, Values)>)>,
+struct State {
+    measure: PlottedQuantity,
+    values: Option<(u64, Vec<(PlottedQuantity, Values)>)>,
 }
+
+impl PaneState for State {}
 
 /// How a study is plotted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,18 +51,20 @@ enum Picture {
     Parallel,
 }
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+fn blank(session: &Session) -> Option<Blank> {
+    let how = "Run one on the command line, for example\n`mhp-inspector study operators DATA --out RUN`,\nand open its \
+               folder with File > Open study…, or drop the folder on the window.";
+    match &session.study {
+        study if study.run.is_some() => None,
+        study if study.reading.is_some() => Some(Blank::new("Reading a run…", "")),
+        _ => Some(Blank::new("No study yet", how)),
+    }
+}
+
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let study = &shared.session.study;
-    let Some((folder, run)) = study.run.clone() else {
-        if study.reading.is_some() {
-            return empty(ui, "Reading a run…", "");
-        }
-        let how = "Run one on the command line, for example\n`mhp-inspector study operators DATA --out RUN`,\nand open its \
-                   folder with File > Open study…, or drop the folder on the window.";
-        return empty(ui, "No study yet", how);
-    };
+    let Some((_, run)) = study.run.clone() else { return };
     let tokens = Tokens::of(ui);
-    head(ui, shared, &run, &folder, &tokens);
     let revision = study.revision;
     if state.values.as_ref().is_none_or(|(known, _)| *known != revision) {
         state.values = Some((revision, measure::of_run(&run)));
@@ -114,7 +132,9 @@ fn number(label: &str) -> Option<f64> {
     label.split_whitespace().next()?.parse().ok().filter(|x: &f64| x.is_finite())
 }
 
-fn head(ui: &mut Ui, shared: &mut Shared<'_>, run: &Run, folder: &std::path::Path, tokens: &Tokens) {
+fn head(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let Some((folder, run)) = shared.session.study.run.clone() else { return };
+    let tokens = Tokens::of(ui);
     let (spec, data) = (&run.spec, &run.spec.data);
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new(spec.study.title()).font(theme::strong(theme::TITLE)));
@@ -127,7 +147,7 @@ fn head(ui: &mut Ui, shared: &mut Shared<'_>, run: &Run, folder: &std::path::Pat
             .on_hover_text("Read the run folder again: what a running study has done since.")
             .clicked()
         {
-            shared.send(Command::OpenRun(folder.to_owned()));
+            shared.send(Command::OpenRun(folder.clone()));
         }
         // Where there is hardly room the menu has it.
         if ui.available_width() > 120.0
@@ -153,7 +173,7 @@ fn head(ui: &mut Ui, shared: &mut Shared<'_>, run: &Run, folder: &std::path::Pat
     }
 }
 
-fn choose(ui: &mut Ui, chosen: &mut Quantity, values: &[(Quantity, Values)]) {
+fn choose(ui: &mut Ui, chosen: &mut PlottedQuantity, values: &[(PlottedQuantity, Values)]) {
     if ui.available_width() < NARROW {
         let menu = egui::ComboBox::from_id_salt("measure").width(130.0).selected_text(chosen.title());
         let response = menu.show_ui(ui, |ui| {

@@ -1,6 +1,6 @@
 //! Many settings: parallel coordinates, an upright axis a setting and one for the quantity, a line a row.
 
-use super::measure::{Quantity, Values, levels, limits};
+use super::measure::{PlottedQuantity, Values, levels, limits};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::render::Colormap;
@@ -16,7 +16,7 @@ const NEAR: f32 = 8.0;
 pub(super) fn show(
     ui: &mut Ui,
     run: &Run,
-    measure: Quantity,
+    measure: PlottedQuantity,
     values: &Values,
     chosen: Option<usize>,
     session: &Session,
@@ -111,7 +111,7 @@ fn axes(
     ui: &Ui,
     run: &Run,
     settings: &[Vec<String>],
-    measure: Quantity,
+    measure: PlottedQuantity,
     (lo, hi): (f64, f64),
     area: Rect,
     x: &dyn Fn(usize) -> f32,

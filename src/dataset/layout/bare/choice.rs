@@ -1,9 +1,10 @@
 //! Files of maps that say nothing of their axes: what is in them, a first guess, and the memory of what a person chose.
 
-use super::manifest::{ViewText, cells_fault, view_fault};
-use super::npz::{Entry, NpzArchive, shape_text};
-use super::{DatasetError, words};
 use crate::body::Skeleton;
+use crate::dataset::DatasetError;
+use crate::dataset::axes_text::axes_badge;
+use crate::dataset::manifest::{ViewText, cells_fault, view_fault};
+use crate::dataset::npz::{Entry, NpzArchive, shape_text};
 use crate::geometry::Pose;
 use crate::input::{MOST_TEXT, read_text};
 use crate::output::replace_file;
@@ -226,6 +227,6 @@ impl Remembered {
 pub(super) fn assumptions(views: &[View]) -> Vec<String> {
     vec![
         "radar: chirp and array are not in the file; a 77 GHz radar with 2.5 GHz of bandwidth is assumed".into(),
-        format!("axes: as chosen by the user: {}", words::axes_badge(views)),
+        format!("axes: as chosen by the user: {}", axes_badge(views)),
     ]
 }

@@ -2,7 +2,8 @@
 
 mod strip;
 
-use super::Shared;
+use super::commands::{UserCommand, command};
+use super::panes::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, icon_button};
 use crate::session::{Command, TimelineStrip};
@@ -10,13 +11,13 @@ use egui::{Rect, RichText, Sense, Stroke, Ui, pos2, vec2};
 
 /// What the strip remembers.
 #[derive(Default)]
-pub(in crate::app) struct State {
+pub(super) struct Timeline {
     drag_frame: Option<usize>,
     strip: strip::Strips,
 }
 
 /// Draws the strip at the bottom of the window.
-pub(in crate::app) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut Timeline) {
     let tokens = Tokens::of(ui);
     let frame = egui::Frame::new().fill(tokens.panel).inner_margin(egui::Margin::symmetric(8, 4));
     egui::Panel::bottom("timeline").exact_size(62.0).frame(frame).show(ui, |ui| {
@@ -58,7 +59,7 @@ fn choose_strip(ui: &mut Ui, shared: &mut Shared<'_>) {
     });
 }
 
-fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tokens) {
+fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut Timeline, tokens: &Tokens) {
     let (count, index, playing) = {
         let data = &shared.session.data;
         (data.len(), data.frame_index, data.playing)
@@ -72,7 +73,7 @@ fn frames(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Toke
         ("▸", "Next frame", "Next frame", index + 1 < count),
         ("▸|", "Last frame", "Last frame", index + 1 < count),
     ] {
-        let tip = crate::app::commands::command(label).map(crate::app::commands::tooltip).unwrap_or_default();
+        let tip = command(label).map(UserCommand::tip).unwrap_or_default();
         if icon_button(ui, sign, name, &tip, enabled, playing && label == "Play frames").clicked() {
             shared.invoke(label);
         }
@@ -123,7 +124,7 @@ fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
         ("▸", "Iteration forward", "One step", ready && (back || !running), false),
         ("▸|", "Follow newest", "Follow newest iteration", back, false),
     ] {
-        let tip = crate::app::commands::command(label).map(crate::app::commands::tooltip).unwrap_or_default();
+        let tip = command(label).map(UserCommand::tip).unwrap_or_default();
         if icon_button(ui, sign, name, &tip, enabled, active).clicked() {
             shared.invoke(label);
         }

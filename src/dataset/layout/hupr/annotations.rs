@@ -5,7 +5,8 @@
 //! in their order, where their number fits. Files are read when the first frame is: the largest has 50 MB.
 
 use crate::dataset::ImageAnnotations;
-use crate::dataset::files::{Segment, natural};
+use crate::dataset::layout::index::Segment;
+use crate::dataset::natural::natural;
 use crate::input::open_file;
 use serde::Deserialize;
 use std::collections::HashMap;
@@ -21,7 +22,7 @@ const SPLITS: [&str; 3] = ["train", "val", "test"];
 
 /// The label files of a data set.
 #[derive(Debug)]
-pub(in crate::dataset) struct Annotations {
+pub(super) struct Annotations {
     /// Split and file.
     files: Vec<(&'static str, PathBuf)>,
     /// Sequence folders, in order.
@@ -56,7 +57,7 @@ struct Splits {
 
 impl Annotations {
     /// Looks for label files in `root` and the folders above its sequences; reads none.
-    pub(in crate::dataset) fn beside(root: &Path, sequences: &[Segment]) -> Self {
+    pub(super) fn beside(root: &Path, sequences: &[Segment]) -> Self {
         let mut places: Vec<&Path> = vec![root];
         places.extend(sequences.first().and_then(|segment| segment.path.parent()));
         places.extend(root.parent());
@@ -70,17 +71,12 @@ impl Annotations {
     }
 
     /// The label files.
-    pub(in crate::dataset) fn paths(&self) -> impl Iterator<Item = &Path> {
+    pub(super) fn paths(&self) -> impl Iterator<Item = &Path> {
         self.files.iter().map(|(_, path)| path.as_path())
     }
 
     /// The labels of a frame; what is wrong with the files goes to `notes`.
-    pub(in crate::dataset) fn of(
-        &self,
-        sequence: &str,
-        stem: &str,
-        notes: &mut Vec<String>,
-    ) -> Option<ImageAnnotations> {
+    pub(super) fn of(&self, sequence: &str, stem: &str, notes: &mut Vec<String>) -> Option<ImageAnnotations> {
         if self.files.is_empty() {
             notes.push("hrnet_annot_train.json, _val and _test are missing: no key points".into());
             return None;
@@ -138,7 +134,7 @@ impl Annotations {
     /// The numbers of the sequences that a list of `count` stands for.
     fn sequences_of(&self, split: &str, count: usize) -> Result<Vec<u32>, String> {
         let splits: Splits =
-            toml::from_str(include_str!("../../../assets/hupr_splits.toml")).map_err(|error| error.to_string())?;
+            toml::from_str(include_str!("../../../../assets/hupr_splits.toml")).map_err(|error| error.to_string())?;
         let ids = match split {
             "train" => splits.train,
             "val" => splits.val,

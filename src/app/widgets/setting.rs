@@ -1,0 +1,156 @@
+//! One setting on screen, made from its row in the table.
+
+use super::Named as _;
+use crate::config::{Answer, Field, FieldGroup, FieldKind, FitConfig, Number, Value};
+use egui::{Response, Ui};
+
+/// The settings of a group, one a line; switches that follow each other share one.
+pub(in crate::app) fn settings(ui: &mut Ui, group: FieldGroup, config: &mut FitConfig) {
+    let fields: Vec<&Field> = group.fields().collect();
+    for run in fields.chunk_by(|a, b| matches!((&a.kind, &b.kind), (FieldKind::Switch, FieldKind::Switch))) {
+        if let [Field { kind: FieldKind::Switch, .. }, ..] = run {
+            ui.horizontal_wrapped(|ui| run.iter().for_each(|field| switch(ui, field, config)));
+            continue;
+        }
+        for field in run {
+            match &field.kind {
+                FieldKind::Choice(answers) => choice(ui, field, answers, config),
+                FieldKind::Number(number) if number.unset.is_some() => optional(ui, field, number, config),
+                FieldKind::Number(number) => slider(ui, field, number, config),
+                FieldKind::Switch => {}
+            }
+        }
+    }
+}
+
+fn switch(ui: &mut Ui, field: &Field, config: &mut FitConfig) {
+    let mut on = field.get(config) == Value::Switch(true);
+    if ui.checkbox(&mut on, field.label).on_hover_text(field.tip()).changed() {
+        field.set(config, Value::Switch(on));
+    }
+}
+
+/// Label and answers.
+fn choice(ui: &mut Ui, field: &Field, answers: &[Answer], config: &mut FitConfig) {
+    ui.horizontal_wrapped(|ui| {
+        ui.label(field.label).on_hover_text(field.tip());
+        for (k, answer) in answers.iter().enumerate() {
+            let given = field.get(config) == Value::Answer(k);
+            if ui.selectable_label(given, answer.label).on_hover_text(field.answer_tip(answer)).clicked() {
+                field.set(config, Value::Answer(k));
+            }
+        }
+    });
+}
+
+/// Label, slider, value, and a button back to the default where the value differs from it.
+fn slider(ui: &mut Ui, field: &Field, number: &Number, config: &mut FitConfig) {
+    let (Value::Number(old), Value::Number(default)) = (field.get(config), field.default()) else { return };
+    let mut value = old;
+    let (lo, hi) = number.offered;
+    let tip = field.tip();
+    ui.horizontal(|ui| {
+        let layout = egui::Layout::left_to_right(egui::Align::Center);
+        let label = ui.allocate_ui_with_layout(egui::vec2(96.0, 20.0), layout, |ui| {
+            ui.set_min_width(96.0);
+            ui.add(egui::Label::new(field.label).truncate())
+        });
+        label.inner.on_hover_text(&tip);
+        let width = (ui.available_width() - 92.0).max(40.0);
+        ui.spacing_mut().slider_width = width;
+        let mut slider = egui::Slider::new(&mut value, lo..=hi).show_value(false);
+        if number.logarithmic {
+            slider = slider.logarithmic(true).smallest_positive(if lo > 0.0 { lo } else { 1e-3 });
+        }
+        let response = ui.add(slider);
+        response.widget_info(|| egui::WidgetInfo::slider(true, value, field.label));
+        response.on_hover_text(&tip);
+        typed(ui, field, number, &mut value).on_hover_text(&tip);
+        let off = value != default;
+        let back = ui.add_visible(off, egui::Button::new("↺").small().frame(false));
+        let back = back.named(egui::Role::Button, &format!("Reset {}", field.label));
+        if back.on_hover_text(format!("Back to {default}")).clicked() {
+            value = default;
+        }
+    });
+    if value != old {
+        field.set(config, Value::Number(value));
+    }
+}
+
+/// Label, the answer that needs no number, and the number.
+fn optional(ui: &mut Ui, field: &Field, number: &Number, config: &mut FitConfig) {
+    let Some(unset) = number.unset else { return };
+    ui.horizontal(|ui| {
+        let tip = field.tip();
+        ui.label(field.label).on_hover_text(&tip);
+        let given = field.get(config);
+        let without = given == Value::Unset;
+        // What has no word is left out of FIT.toml.
+        let tip_without = match unset.form {
+            Some(_) => field.answer_tip(&unset.answer),
+            None => unset.answer.help.to_owned(),
+        };
+        if ui.selectable_label(without, unset.answer.label).on_hover_text(tip_without).clicked() {
+            field.set(config, Value::Unset);
+        }
+        if ui.selectable_label(!without, unset.number).on_hover_text(&tip).clicked() && without {
+            field.set(config, Value::Number(unset.first));
+        }
+        if let Value::Number(old) = field.get(config) {
+            let mut value = old;
+            typed(ui, field, number, &mut value).on_hover_text(&tip);
+            if value != old {
+                field.set(config, Value::Number(value));
+            }
+        }
+    });
+}
+
+/// The number itself, to be typed or dragged.
+fn typed(ui: &mut Ui, field: &Field, number: &Number, value: &mut f64) -> Response {
+    let (lo, hi) = number.offered;
+    let speed = if *value == 0.0 { 0.001 } else { value.abs() * 0.01 };
+    let drag = egui::DragValue::new(value)
+        .update_while_editing(false)
+        .range(lo..=hi)
+        .speed(speed)
+        .max_decimals(if number.whole { 0 } else { 6 })
+        .suffix(if number.unit == "m" { " m" } else { number.unit });
+    let response = ui.add_sized([62.0, 20.0], drag);
+    response.named(egui::Role::SpinButton, &format!("{} value", field.label))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui::epaint::Shape;
+
+    fn texts(shape: &Shape, into: &mut Vec<String>) {
+        match shape {
+            Shape::Vec(shapes) => shapes.iter().for_each(|shape| texts(shape, into)),
+            Shape::Text(text) => into.push(text.galley.text().to_owned()),
+            _ => {}
+        }
+    }
+
+    /// Each setting by its label, also one that only tests know; and drawing them changes none.
+    #[test]
+    fn every_row_of_the_table_is_drawn() {
+        for group in FieldGroup::ALL {
+            let mut config = FitConfig::default();
+            let size = egui::vec2(600.0, 2000.0);
+            let input = egui::RawInput {
+                screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size)),
+                ..egui::RawInput::default()
+            };
+            let output = egui::Context::default().run_ui(input, |ui| settings(ui, group, &mut config));
+            let mut drawn = Vec::new();
+            output.shapes.iter().for_each(|clipped| texts(&clipped.shape, &mut drawn));
+            for field in group.fields() {
+                assert!(drawn.iter().any(|text| text == field.label), "{} in {drawn:?}", field.key);
+            }
+            assert_eq!(config, FitConfig::default());
+        }
+    }
+}
