@@ -8,7 +8,7 @@
 //! The stages, each of which uses those above it only:
 //!
 //! 1. numbers: `types.rs`, `percentile.rs`, `fill.rs`, `scalar.rs`, `lanes.rs`, `batch.rs`, `floors.rs`
-//! 2. a joint in a view: `seen.rs`, `form.rs`, `splat.rs`, `adjoint.rs`
+//! 2. a joint in a view: `triad.rs`, `gaussian.rs`, `splat.rs`, `adjoint.rs`
 //! 3. cells: `kernel.rs`, `tiles/mod.rs`, `cell_box.rs`, and the masks over them, `em.rs`
 //! 4. what the maps of a frame and those around it show: `region.rs`, `template.rs`, `context/mod.rs`
 //! 5. a frame: `problem.rs`, `simulate.rs`
