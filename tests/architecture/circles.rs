@@ -7,12 +7,13 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The stages of a fit from the ground up, and the files and folders of `src/mhp/` in each: a stage uses itself and those
 /// before it.
 const STAGES: &[(&str, &[&str])] = &[
+    ("the terms of the loss", &["terms"]),
     ("numbers", &["types", "percentile", "fill", "scalar", "lanes", "batch", "floors"]),
     ("a joint in a view", &["triad", "gaussian", "splat", "adjoint"]),
     ("cells and masks", &["kernel", "tiles", "cell_box", "em"]),
     ("what maps and frames around show", &["region", "template", "context"]),
     ("a frame", &["problem", "simulate"]),
-    ("the objective", &["kinematic", "objective"]),
+    ("the objective", &["objective"]),
     ("the fit", &["convergence", "articulation", "adam", "fitter"]),
     ("the start", &["init"]),
 ];
