@@ -18,7 +18,7 @@ pub type Mat3<T = f64> = [[T; 3]; 3];
 pub const IDENTITY: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// A real number, or several that the machine computes at once: what a formula that needs no loop is written in.
-pub trait Number:
+pub trait Numeric:
     Copy
     + Neg<Output = Self>
     + Add<Output = Self>
@@ -57,7 +57,7 @@ pub trait Number:
     fn zip_map(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self;
 }
 
-impl Number for f64 {
+impl Numeric for f64 {
     #[inline(always)]
     fn splat(self, x: f64) -> Self {
         x
@@ -121,7 +121,7 @@ impl Number for f64 {
 
 /// a · b
 #[inline(always)]
-pub fn dot<T: Number>(a: Vec3<T>, b: Vec3<T>) -> T {
+pub fn dot<T: Numeric>(a: Vec3<T>, b: Vec3<T>) -> T {
     a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
 }
 
@@ -132,7 +132,7 @@ pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
 
 /// a + b
 #[inline(always)]
-pub fn add<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
+pub fn add<T: Numeric>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
@@ -143,13 +143,13 @@ pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
 
 /// k a
 #[inline(always)]
-pub fn scale<T: Number>(a: Vec3<T>, k: T) -> Vec3<T> {
+pub fn scale<T: Numeric>(a: Vec3<T>, k: T) -> Vec3<T> {
     [a[0] * k, a[1] * k, a[2] * k]
 }
 
 /// a += k b
 #[inline(always)]
-pub fn add_scaled<T: Number>(a: &mut Vec3<T>, b: Vec3<T>, k: T) {
+pub fn add_scaled<T: Numeric>(a: &mut Vec3<T>, b: Vec3<T>, k: T) {
     a[0] = k.mul_add(b[0], a[0]);
     a[1] = k.mul_add(b[1], a[1]);
     a[2] = k.mul_add(b[2], a[2]);
@@ -157,7 +157,7 @@ pub fn add_scaled<T: Number>(a: &mut Vec3<T>, b: Vec3<T>, k: T) {
 
 /// ‖a‖
 #[inline(always)]
-pub fn norm<T: Number>(a: Vec3<T>) -> T {
+pub fn norm<T: Numeric>(a: Vec3<T>) -> T {
     dot(a, a).sqrt()
 }
 
@@ -168,19 +168,19 @@ pub fn flat_distance(a: Vec3, b: Vec3) -> f64 {
 
 /// M a
 #[inline(always)]
-pub fn mat_vec<T: Number>(m: &Mat3<T>, a: Vec3<T>) -> Vec3<T> {
+pub fn mat_vec<T: Numeric>(m: &Mat3<T>, a: Vec3<T>) -> Vec3<T> {
     [dot(m[0], a), dot(m[1], a), dot(m[2], a)]
 }
 
 /// Mᵀ a
 #[inline(always)]
-pub fn mat_t_vec<T: Number>(m: &Mat3<T>, a: Vec3<T>) -> Vec3<T> {
+pub fn mat_t_vec<T: Numeric>(m: &Mat3<T>, a: Vec3<T>) -> Vec3<T> {
     mat_vec(&transpose(m), a)
 }
 
 /// A B
 #[inline(always)]
-pub fn mat_mul<T: Number>(a: &Mat3<T>, b: &Mat3<T>) -> Mat3<T> {
+pub fn mat_mul<T: Numeric>(a: &Mat3<T>, b: &Mat3<T>) -> Mat3<T> {
     [mat_t_vec(b, a[0]), mat_t_vec(b, a[1]), mat_t_vec(b, a[2])]
 }
 
@@ -192,7 +192,7 @@ pub fn transpose<T: Copy>(a: &Mat3<T>) -> Mat3<T> {
 
 /// ‖q‖ and q/‖q‖; that of the zero quaternion is the identity's, (1, 0, 0, 0).
 #[inline(always)]
-pub fn unit_quaternion<T: Number>(q: [T; 4]) -> (T, [T; 4]) {
+pub fn unit_quaternion<T: Numeric>(q: [T; 4]) -> (T, [T; 4]) {
     let n = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
     let (zero, one) = (n.splat(0.0), n.splat(1.0));
     let mut unit = [one, zero, zero, zero];
@@ -205,7 +205,7 @@ pub fn unit_quaternion<T: Number>(q: [T; 4]) -> (T, [T; 4]) {
 /// The rotation matrix of the quaternion `q` = (w, x, y, z), normalised here; SPEC section 2, paper section 4.1.
 /// The zero quaternion gives the identity.
 #[inline(always)]
-pub fn rotation_from_quaternion<T: Number>(q: [T; 4]) -> Mat3<T> {
+pub fn rotation_from_quaternion<T: Numeric>(q: [T; 4]) -> Mat3<T> {
     let (n, [w, x, y, z]) = unit_quaternion(q);
     let one = n.splat(1.0);
     [

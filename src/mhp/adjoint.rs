@@ -16,7 +16,7 @@ use super::gaussian::{WorldGaussian, WorldGaussianBars, WorldGaussians};
 use super::splat::{AxisJacobian, JointInView, ViewModel, Widths, feature_at};
 use super::triad::splat_matrix;
 use crate::body::{Group, Pppr};
-use crate::geometry::{Number, Vec3, add_scaled, dot, mat_t_vec, mat_vec, scale};
+use crate::geometry::{Numeric, Vec3, add_scaled, dot, mat_t_vec, mat_vec, scale};
 use crate::radar::{Axis, AxisKind};
 use geometry::Geometry;
 use std::ops::Range;
@@ -161,7 +161,7 @@ impl<const D: usize> JointTask for PullBack<'_, D> {
 
 /// ∂L/∂C = ½ P (Σ rΔΔᵀ) P − ½ P Σr and ∂L/∂b = P ΣrΔ − κ Σq.
 #[inline(always)]
-fn covariance_and_bin_bars<T: Number, const D: usize>(
+fn covariance_and_bin_bars<T: Numeric, const D: usize>(
     p: &[[T; D]; D],
     kappa: [T; D],
     sums: &Sums<T>,
@@ -195,7 +195,7 @@ fn covariance_and_bin_bars<T: Number, const D: usize>(
 /// C from how wide the joint and the point spread are along the axes: hands on what the axes' directions, lengths and
 /// the point spread want, and returns the adjoint of R S Sᵀ Rᵀ, its upper half row by row.
 #[inline(always)]
-fn spread_bars<T: Number, const D: usize>(
+fn spread_bars<T: Numeric, const D: usize>(
     geometry: &mut Geometry<T>,
     model: &ViewModel<'_>,
     gaussian: &WorldGaussian<T>,
@@ -249,7 +249,7 @@ fn spread_bars<T: Number, const D: usize>(
 
 /// κ_k = ω̄ v·D_k; returns ∂L/∂ω̄.
 #[inline(always)]
-fn ramp<T: Number, const D: usize>(
+fn ramp<T: Numeric, const D: usize>(
     geometry: &mut Geometry<T>,
     model: &ViewModel<'_>,
     (gaussian, in_view, jacobians): (&WorldGaussian<T>, &JointInView<T>, &[AxisJacobian<T>; D]),
@@ -277,7 +277,7 @@ fn ramp<T: Number, const D: usize>(
 }
 
 #[inline(always)]
-fn phases<T: Number>(geometry: &mut Geometry<T>, model: &ViewModel<'_>, in_view: &JointInView<T>, phase_bar: T) {
+fn phases<T: Numeric>(geometry: &mut Geometry<T>, model: &ViewModel<'_>, in_view: &JointInView<T>, phase_bar: T) {
     let [d, radial, azimuth, elevation] = model.phase_slopes(&in_view.triad);
     geometry.d += phase_bar * d;
     geometry.radial += phase_bar * radial;
@@ -287,7 +287,7 @@ fn phases<T: Number>(geometry: &mut Geometry<T>, model: &ViewModel<'_>, in_view:
 
 /// The point spread along e_az and e_el grows with distance; `bar` is ½ of what each wants times itself.
 #[inline(always)]
-fn blur<T: Number>(geometry: &mut Geometry<T>, model: &ViewModel<'_>, in_view: &JointInView<T>, bar: [T; 3]) {
+fn blur<T: Numeric>(geometry: &mut Geometry<T>, model: &ViewModel<'_>, in_view: &JointInView<T>, bar: [T; 3]) {
     let (triad, psf) = (&in_view.triad, &model.view.psf);
     if model.blurs[1] {
         let bar = in_view.blur[1] * 2.0 * bar[1] / triad.cos_az_floored.value;

@@ -1,6 +1,6 @@
 //! Joints one by one, or as many of them as the machine computes at once: the same formulas for both.
 //!
-//! What is computed a joint is written over [`Number`]. In f64 a [`JointTask`] sees one joint at a time, which is the oracle's
+//! What is computed a joint is written over [`Numeric`]. In f64 a [`JointTask`] sees one joint at a time, which is the oracle's
 //! own order of operations; in single precision it sees as many as `pulp` has f64 in a register, whose sums may round
 //! differently.
 #![expect(
@@ -9,7 +9,7 @@
 )]
 
 use super::Precision;
-use crate::geometry::{Mat3, Number};
+use crate::geometry::{Mat3, Numeric};
 use pulp::{Arch, Simd, WithSimd};
 use std::f64::consts::{LN_2, LOG2_E, SQRT_2};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -53,7 +53,7 @@ const fn series_of_artanh() -> [f64; 9] {
 /// Some joints beside each other, and how their numbers are read and written.
 pub(super) trait Batch: Copy {
     /// A number of each of them.
-    type Number: Number;
+    type Number: Numeric;
 
     /// `x` for each.
     fn splat(self, x: f64) -> Self::Number;
@@ -274,7 +274,7 @@ impl<S: Simd> F64Lanes<S> {
     }
 }
 
-impl<S: Simd> Number for F64Lanes<S> {
+impl<S: Simd> Numeric for F64Lanes<S> {
     #[inline(always)]
     fn splat(self, x: f64) -> Self {
         Self { simd: self.simd, value: self.simd.splat_f64s(x) }

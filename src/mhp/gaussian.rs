@@ -7,7 +7,7 @@
 use super::Precision;
 use super::batch::{Batch, Columns, JointTask, OneJoint, each_joint};
 use crate::body::{Group, Pppr};
-use crate::geometry::{Mat3, Number, Vec3, mat_mul, rotation_from_quaternion, scale, unit_quaternion};
+use crate::geometry::{Mat3, Numeric, Vec3, mat_mul, rotation_from_quaternion, scale, unit_quaternion};
 
 /// A joint's Gaussian: what does not depend on where it is seen from.
 #[derive(Debug, Clone, Copy)]
@@ -215,7 +215,7 @@ impl JointTask for PullBack<'_> {
 
 /// ∂L/∂q through the normalisation; the zero quaternion stands for the identity and has no gradient.
 #[inline(always)]
-fn quaternion_bar<T: Number>(q: [T; 4], m: &Mat3<T>) -> [T; 4] {
+fn quaternion_bar<T: Numeric>(q: [T; 4], m: &Mat3<T>) -> [T; 4] {
     let (length, unit) = unit_quaternion(q);
     let [w, x, y, z] = unit;
     let mut bar = [

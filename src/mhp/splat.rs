@@ -13,7 +13,7 @@ use super::gaussian::{WorldGaussian, WorldGaussians, mean};
 use super::triad::{DISTANCE_FLOOR_M, Floored, SphericalTriad, splat_matrix};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::{Number, Vec3, dot, mat_t_vec, mat_vec, norm, scale};
+use crate::geometry::{Numeric, Vec3, dot, mat_t_vec, mat_vec, norm, scale};
 use crate::radar::{AxisKind, RadarConfig, SPEED_OF_LIGHT, View};
 use std::f64::consts::TAU;
 
@@ -221,7 +221,7 @@ impl ViewModel<'_> {
 
     /// The factor of p that moves a joint to its skin: max(d − δ, floor)/d.
     #[inline(always)]
-    pub(super) fn surface_factor<T: Number>(&self, unmoved: Vec3<T>) -> (T, Floored<T>, Floored<T>) {
+    pub(super) fn surface_factor<T: Numeric>(&self, unmoved: Vec3<T>) -> (T, Floored<T>, Floored<T>) {
         let d = Floored::new(norm(unmoved), DISTANCE_FLOOR_M);
         let skin = Floored::new(d.value - self.config.surface_offset_m, DISTANCE_FLOOR_M);
         (skin.value / d.value, d, skin)
@@ -256,7 +256,7 @@ impl ViewModel<'_> {
 
     /// Where the view sees joints with this Gaussian.
     #[inline(always)]
-    pub(super) fn joint_in_view<T: Number>(&self, gaussian: &WorldGaussian<T>) -> JointInView<T> {
+    pub(super) fn joint_in_view<T: Numeric>(&self, gaussian: &WorldGaussian<T>) -> JointInView<T> {
         let pose = &self.view.pose;
         let turn = splat_matrix(gaussian.opacity, pose.rotation);
         let [x, y, z] = mat_vec(&turn, gaussian.position);
@@ -276,7 +276,7 @@ impl ViewModel<'_> {
 
     /// The view's axes there.
     #[inline(always)]
-    pub(super) fn jacobians<T: Number, const D: usize>(&self, triad: &SphericalTriad<T>) -> [AxisJacobian<T>; D] {
+    pub(super) fn jacobians<T: Numeric, const D: usize>(&self, triad: &SphericalTriad<T>) -> [AxisJacobian<T>; D] {
         let mut jacobians = [self.jacobian(triad, 0); D];
         for k in 1..D {
             jacobians[k] = self.jacobian(triad, k);
@@ -286,7 +286,7 @@ impl ViewModel<'_> {
 
     /// How wide joints with this Gaussian are along them.
     #[inline(always)]
-    pub(super) fn widths<T: Number, const D: usize>(
+    pub(super) fn widths<T: Numeric, const D: usize>(
         &self,
         gaussian: &WorldGaussian<T>,
         in_view: &JointInView<T>,
@@ -310,7 +310,7 @@ impl ViewModel<'_> {
 
     /// C of those widths, in its squares, and its determinant.
     #[inline(always)]
-    pub(super) fn squares<T: Number, const D: usize>(
+    pub(super) fn squares<T: Numeric, const D: usize>(
         &self,
         in_view: &JointInView<T>,
         widths: &[Widths<T>; D],
@@ -334,7 +334,7 @@ impl ViewModel<'_> {
 
     /// What the view makes of it.
     #[inline(always)]
-    pub(super) fn projected<T: Number, const D: usize>(
+    pub(super) fn projected<T: Numeric, const D: usize>(
         &self,
         gaussian: &WorldGaussian<T>,
         in_view: &JointInView<T>,
@@ -362,7 +362,7 @@ impl ViewModel<'_> {
 
     /// κ = ω̄ v·D, rad per bin; 0 where Doppler is off.
     #[inline(always)]
-    pub(super) fn kappa<T: Number, const D: usize>(
+    pub(super) fn kappa<T: Numeric, const D: usize>(
         &self,
         gaussian: &WorldGaussian<T>,
         in_view: &JointInView<T>,
@@ -378,7 +378,7 @@ impl ViewModel<'_> {
     }
 
     #[inline(always)]
-    fn jacobian<T: Number>(&self, triad: &SphericalTriad<T>, k: usize) -> AxisJacobian<T> {
+    fn jacobian<T: Numeric>(&self, triad: &SphericalTriad<T>, k: usize) -> AxisJacobian<T> {
         let axis = &self.view.axes[k];
         let (direction, arm) = triad.direction_and_arm(axis.kind);
         let slope = triad.slope(axis);
@@ -390,7 +390,7 @@ impl ViewModel<'_> {
     }
 
     #[inline(always)]
-    fn phase<T: Number>(&self, triad: &SphericalTriad<T>, radial_mps: T) -> T {
+    fn phase<T: Numeric>(&self, triad: &SphericalTriad<T>, radial_mps: T) -> T {
         let [by_tau_sq, by_radial, by_az, by_el] = self.phase;
         let tau = triad.d.value * PER_METRE_S;
         tau * by_tau_sq * tau + radial_mps * by_radial + triad.sin_az * by_az + triad.sin_el * by_el
@@ -398,14 +398,14 @@ impl ViewModel<'_> {
 
     /// (∂φ/∂d, ∂φ/∂v_r, ∂φ/∂θ_az, ∂φ/∂θ_el).
     #[inline(always)]
-    pub(super) fn phase_slopes<T: Number>(&self, triad: &SphericalTriad<T>) -> [T; 4] {
+    pub(super) fn phase_slopes<T: Numeric>(&self, triad: &SphericalTriad<T>) -> [T; 4] {
         let [by_tau_sq, by_radial, by_az, by_el] = self.phase;
         let tau = triad.d.value * PER_METRE_S;
         [tau * (2.0 * by_tau_sq) * PER_METRE_S, tau.splat(by_radial), triad.cos_az * by_az, triad.cos_el * by_el]
     }
 }
 
-impl<T: Number, const D: usize> Squares<T, D> {
+impl<T: Numeric, const D: usize> Squares<T, D> {
     /// Of the lower half of C, which is positive definite; and its determinant.
     #[inline(always)]
     fn new(c: &[[T; D]; D]) -> (Self, T) {

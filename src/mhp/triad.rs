@@ -4,7 +4,7 @@
     reason = "all of it belongs into the one function that is compiled for an instruction set"
 )]
 
-use crate::geometry::{Mat3, Number, Vec3, norm, scale};
+use crate::geometry::{Mat3, Numeric, Vec3, norm, scale};
 use crate::radar::{Axis, AxisKind, Spacing};
 
 /// Distances are held above this, m.
@@ -21,7 +21,7 @@ pub(super) struct Floored<T = f64> {
     pub pass: T,
 }
 
-impl<T: Number> Floored<T> {
+impl<T: Numeric> Floored<T> {
     #[inline(always)]
     pub(super) fn new(x: T, floor: f64) -> Self {
         // A NaN must stay visible, so the comparison lets it through.
@@ -60,13 +60,13 @@ pub(super) struct SphericalTriad<T = f64> {
 
 /// The direction of (a, b), whose length is given; at the origin that of a.
 #[inline(always)]
-fn direction<T: Number>(a: T, b: T, length: T) -> [T; 2] {
+fn direction<T: Numeric>(a: T, b: T, length: T) -> [T; 2] {
     let (zero, one) = (a.splat(0.0), a.splat(1.0));
     let by_length = one / length;
     [length.select_lt(f64::MIN_POSITIVE, one, a * by_length), length.select_lt(f64::MIN_POSITIVE, zero, b * by_length)]
 }
 
-impl<T: Number> SphericalTriad<T> {
+impl<T: Numeric> SphericalTriad<T> {
     #[inline(always)]
     pub(super) fn new(p: Vec3<T>) -> Self {
         let [x, y, z] = p;
@@ -163,7 +163,7 @@ impl<T: Number> SphericalTriad<T> {
 
 /// The same matrix for all that `like` stands for.
 #[inline(always)]
-pub(super) fn splat_matrix<T: Number>(like: T, of: Mat3) -> Mat3<T> {
+pub(super) fn splat_matrix<T: Numeric>(like: T, of: Mat3) -> Mat3<T> {
     let mut matrix = [[like; 3]; 3];
     for i in 0..3 {
         for k in 0..3 {

@@ -1,6 +1,6 @@
 //! Adjoints of where a joint is seen: collected by what they belong to, folded into those of position and velocity.
 
-use crate::geometry::{Number, Vec3, add_scaled, dot, norm, scale};
+use crate::geometry::{Numeric, Vec3, add_scaled, dot, norm, scale};
 use crate::mhp::splat::{JointInView, ViewModel};
 use crate::radar::{Axis, AxisKind, Spacing};
 
@@ -21,7 +21,7 @@ pub(super) struct Geometry<T> {
     pub(super) radial: T,
 }
 
-impl<T: Number> Geometry<T> {
+impl<T: Numeric> Geometry<T> {
     #[inline(always)]
     pub(super) fn nothing(zero: T) -> Self {
         let none = [zero; 3];
@@ -155,13 +155,13 @@ impl<T: Number> Geometry<T> {
 
 /// 1/length; 0 at the one point where an angle has no slope.
 #[inline(always)]
-fn inverse<T: Number>(length_m: T) -> T {
+fn inverse<T: Numeric>(length_m: T) -> T {
     length_m.select_lt(1e-12, length_m.splat(0.0), length_m.splat(1.0) / length_m)
 }
 
 /// p = p₀ max(d₀ − δ, floor)/d₀.
 #[inline(always)]
-fn unmove<T: Number>(model: &ViewModel<'_>, unmoved: Vec3<T>, p_bar: Vec3<T>) -> Vec3<T> {
+fn unmove<T: Numeric>(model: &ViewModel<'_>, unmoved: Vec3<T>, p_bar: Vec3<T>) -> Vec3<T> {
     if model.config.surface_offset_m == 0.0 {
         return p_bar;
     }

