@@ -17,7 +17,7 @@
 //! H_sim = |Σ_j A_j K_j e^{i(φ_j + κ_j·Δ)}|                           (coherent; or the root of the summed powers)
 //! m     = σ((ln H_sim − ln P_{100−τ}(H_sim))/T)                      soft mask
 //! L_EM  = 1 − Σ m B_ori / Σ (m + B_ori − m B_ori)                    one minus the soft IoU with H_ori's mask
-//! L     = w_EM L_EM + w_kine (L_bone + L_rigid + L_joint + L_sep + L_coll)
+//! L     = w_EM L_EM + w_kine (L_bone + L_rigid + L_joint + L_sep + L_coll) + w_time L_time
 //! ```
 //!
 //! Every gradient is written by hand, [`mhp`] holds them; the forward model and its derivatives are checked against
@@ -41,7 +41,7 @@
 //! | [`cli`] | one file a subcommand |
 //! | [`session`] | the state behind the window and the only function that changes it |
 //! | [`worker`] | the thread that runs a fit, and its protocol |
-//! | [`study`] | batch runs; studies, their tables and run folders; exports; which frames are hard |
+//! | [`study`] | batch runs; studies, their tables and run folders; exports; which frames are hard; shards of all of them |
 //! | [`labels`] | tags, notes, verdicts, the journal that keeps them, agreement |
 //! | [`diagnose`] | metrics: MAJPE, PA-MAJPE; evidence for each failure mode |
 //! | [`start`] | where a frame's fit begins: the problem with the frames around it, and for how many people a start is asked |

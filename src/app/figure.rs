@@ -1,6 +1,8 @@
 //! Captions for figures: what a picture shows, printed small under it, so that it can still be told apart in a year.
 
 use super::theme::{self, Tokens};
+use crate::config::FitConfig;
+use crate::mhp::Weight;
 use crate::session::Session;
 use egui::{FontId, Rect, Role, Ui, WidgetInfo, pos2};
 
@@ -15,14 +17,19 @@ fn caption(session: &Session) -> String {
     let config = session.fit.shown.as_ref().map_or(session.config, |shown| shown.config);
     // The fit draws no random number: it has no seed to print.
     format!(
-        "{} · iteration {} · τ_pct {} % · w_EM {} · w_kine {} · seed none (deterministic) · mhp-inspector {}",
+        "{} · iteration {} · τ_pct {} % · {} · seed none (deterministic) · mhp-inspector {}",
         frame.name,
         session.fit.shown.as_ref().map_or(0, |shown| shown.iteration),
         config.tau_pct,
-        config.w_em,
-        config.w_kine,
+        weights(&config),
         env!("CARGO_PKG_VERSION")
     )
+}
+
+/// The weights that are not left at a default of 0: `w_EM 0.5 · w_kine 0.5`.
+fn weights(config: &FitConfig) -> String {
+    let told = Weight::ALL.iter().filter(|weight| [config, &FitConfig::default()].iter().any(|c| weight.of(c) != 0.0));
+    told.map(|weight| format!("{} {}", weight.label(), weight.of(config))).collect::<Vec<_>>().join(" · ")
 }
 
 /// What a screen reader says of a picture: its name, and its caption where one is printed.

@@ -2,6 +2,7 @@
 
 use crate::body::Side;
 use crate::labels::Tag;
+use crate::mhp::{Hue, TermGroup, TermId};
 use crate::session::ThemeChoice;
 use crate::study::complexity::Stratum;
 use egui::{Color32, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Stroke, TextStyle, Visuals};
@@ -148,16 +149,29 @@ impl Tokens {
         let pick = |on_dark: u32, on_light: u32| rgb(if dark { on_dark } else { on_light });
         match name {
             "total" => self.text,
-            "em" => pick(0x4DA3FF, 0x1769C2),
-            "bone" => pick(0xFF9F45, 0xC25E00),
-            "rigid" => pick(0xC792EA, 0x7A3DB8),
-            "joint" => pick(0x5CC98B, 0x1E8A52),
-            "sep" => pick(0xF2B84B, 0xA66A00),
-            "coll" => pick(0xF2655C, 0xC6372E),
             "majpe" => pick(0x7FDBDA, 0x0B7A78),
             "iou 0" => pick(0x8BD17C, 0x2E7D1E),
-            _ => pick(0xE58FB1, 0xA33266),
+            name => self.hue(TermId::of(name).map_or(Hue::Rose, |term| term.hue)),
         }
+    }
+
+    /// The colour of what a group of terms contributes: that of its first.
+    pub(crate) fn group(&self, group: TermGroup) -> Color32 {
+        self.hue(group.terms().next().map_or(Hue::Rose, |term| term.hue))
+    }
+
+    /// The shade of a colour that a term of the loss has.
+    pub(crate) fn hue(&self, hue: Hue) -> Color32 {
+        let (on_dark, on_light) = match hue {
+            Hue::Blue => (0x4DA3FF, 0x1769C2),
+            Hue::Orange => (0xFF9F45, 0xC25E00),
+            Hue::Violet => (0xC792EA, 0x7A3DB8),
+            Hue::Green => (0x5CC98B, 0x1E8A52),
+            Hue::Amber => (0xF2B84B, 0xA66A00),
+            Hue::Red => (0xF2655C, 0xC6372E),
+            Hue::Rose => (0xE58FB1, 0xA33266),
+        };
+        rgb(if self.dark { on_dark } else { on_light })
     }
 }
 

@@ -152,10 +152,18 @@ impl Pppr {
         self.numbers.resize(shape.total(), 0.0);
     }
 
-    /// `own` · self + `share` · `other`, which has the same sizes.
-    pub fn mix(&mut self, own: f64, share: f64, other: &Self) {
-        for (x, other) in self.numbers.iter_mut().zip(&other.numbers) {
-            *x = own * *x + share * other;
+    /// Becomes a · x + b · y of two that have the same sizes.
+    pub fn set_mix(&mut self, (a, x): (f64, &Self), (b, y): (f64, &Self)) {
+        self.resize(x.shape);
+        for ((sum, x), y) in self.numbers.iter_mut().zip(&x.numbers).zip(&y.numbers) {
+            *sum = a * x + b * y;
+        }
+    }
+
+    /// Adds `share` · `other`, which has the same sizes.
+    pub fn add_scaled(&mut self, share: f64, other: &Self) {
+        for (sum, x) in self.numbers.iter_mut().zip(&other.numbers) {
+            *sum += share * x;
         }
     }
 

@@ -3,16 +3,22 @@
 mod report;
 
 use super::common::{CsvArgs, complain, inputs, open, print, print_json};
+use super::merge::MergeArgs;
+use super::shards::{ShardArgs, end};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::dataset::Dataset;
 use crate::study::StudyError;
-use crate::study::complexity::{Complexity, ComplexityJob, ComplexityOptions, cache_folder, json, write_csv};
-use crate::task::Progress;
+use crate::study::complexity::{
+    self, Complexity, ComplexityOptions, MeasuredFrame, cache_folder, measure, ranked, write_csv,
+};
+use crate::study::shard::{FrameCommand, ShardFolder, ShardSpec, Whole};
+use crate::task::{Job, Progress};
 use clap::Args;
 use crossbeam_channel::{RecvTimeoutError, bounded};
 use indicatif::{ProgressBar, ProgressStyle};
+use serde::{Deserialize, Serialize};
 use std::io::IsTerminal as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
@@ -36,7 +42,9 @@ Examples:
   mhp-inspector complexity data/mmvr
       How many frames are easy, medium, hard; and the ten hardest.
   mhp-inspector complexity data/mmvr --csv complexity.csv
-      The same, and a row a frame.";
+      The same, and a row a frame.
+  mhp-inspector complexity data/mmvr --shard 2/8 --out shards/2
+      Measures the second of eight parts; `mhp-inspector merge shards/* --out whole` ranks all frames.";
 
 /// What `complexity` is told.
 #[derive(Debug, Args)]
@@ -67,6 +75,8 @@ pub struct ComplexityArgs {
     /// Read every frame, and keep nothing in the cache folder.
     #[arg(long)]
     no_cache: bool,
+    #[command(flatten)]
+    part: ShardArgs,
 }
 
 /// Runs `complexity`.
@@ -78,20 +88,69 @@ pub(super) fn run(args: &ComplexityArgs) -> anyhow::Result<ExitCode> {
     let options = ComplexityOptions { kappa_pct: args.kappa, window: args.window, tau_pct: args.tau };
     let options = options.validated().map_err(|error| anyhow::anyhow!("--{error}"))?;
     let dataset = Arc::new(open(&args.path, args.manifest.as_deref())?);
-    if let Some(file) = &args.csv {
-        inputs(&dataset, &args.path, &[args.manifest.as_deref()]).check_file(file)?;
-    }
+    let inputs = inputs(&dataset, &args.path, &[args.manifest.as_deref()]);
     let cache = if args.no_cache { None } else { cache_folder() };
-    let complexity = compute(&dataset, options, cache)?;
+    if let Some((shard, out)) = args.part.asked() {
+        let (frames, settings) = (0..dataset.len(), Settings { options, sequences: dataset.sequences() });
+        let spec = ShardSpec::new(FrameCommand::Complexity, &dataset, &frames, shard, &settings)?;
+        let folder = ShardFolder::begin(out, &[], spec, &inputs)?;
+        let frames = shard.stretch(&frames);
+        let rows = watched(&dataset, frames.len(), move |dataset, progress| {
+            measure(dataset, frames, &options, cache.as_deref(), progress)
+        })?;
+        folder.finish(&rows)?;
+        return Ok(end(shard, out, &rows));
+    }
     if let Some(file) = &args.csv {
-        write_csv(file, &dataset, &complexity)?;
+        inputs.check_file(file)?;
     }
-    if args.json {
-        print_json(&json(&dataset, &complexity)?)?;
-    } else if complexity.counts.failed < dataset.len() {
-        print(&report::summary(&dataset, &complexity))?;
+    let complexity = compute(&dataset, options, cache)?;
+    let named =
+        Named { data_set: &dataset.info().name, sequences: dataset.sequences(), frame: &|i| dataset.frame_name(i) };
+    tell(&named, &complexity, args.csv.as_deref(), args.json)
+}
+
+/// Runs `merge` on shards of `complexity`: now that all frames are known, they are ranked.
+///
+/// # Errors
+/// Where they are not one whole, or the folder cannot be written.
+pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<ExitCode> {
+    let Whole { spec, rows, folders } = Whole::<MeasuredFrame>::read(&args.shards)?;
+    let Settings { options, sequences } = spec.settings()?;
+    let whole = args.begin(&spec, &folders, &[])?;
+    let file = whole.file("complexity.csv")?;
+    let (names, measured): (Vec<String>, Vec<_>) = rows.into_iter().map(|row| (row.frame, row.measured)).unzip();
+    let named = Named { data_set: &spec.data.name, sequences, frame: &|i| names.get(i).map_or("", String::as_str) };
+    tell(&named, &ranked(options, measured), Some(&file), args.json)
+}
+
+/// What the statistics and their summary depend on, besides the frames.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Settings {
+    sequences: usize,
+    options: ComplexityOptions,
+}
+
+/// What things are called.
+struct Named<'a> {
+    data_set: &'a str,
+    sequences: usize,
+    frame: &'a dyn Fn(usize) -> &'a str,
+}
+
+/// Writes the table, prints.
+fn tell<'a>(named: &Named<'a>, complexity: &'a Complexity, csv: Option<&Path>, json: bool) -> anyhow::Result<ExitCode> {
+    if let Some(file) = csv {
+        write_csv(file, named.frame, complexity)?;
     }
-    Ok(tell_failures(&dataset, &complexity))
+    let frames = complexity.frames.len();
+    if json {
+        print_json(&complexity::json(named.frame, complexity)?)?;
+    } else if complexity.counts.failed < frames {
+        print(&report::summary(named, complexity))?;
+    }
+    Ok(tell_failures(complexity))
 }
 
 /// Computes beside this thread, which moves the bar.
@@ -103,19 +162,31 @@ pub(super) fn compute(
     options: ComplexityOptions,
     cache: Option<PathBuf>,
 ) -> Result<Complexity, StudyError> {
+    watched(dataset, dataset.len(), move |dataset, progress| {
+        complexity::compute(dataset, &options, cache.as_deref(), progress)
+    })
+}
+
+/// Works beside this thread, which moves a bar of so many frames.
+fn watched<T: Send + 'static>(
+    dataset: &Arc<Dataset>,
+    frames: usize,
+    work: impl FnOnce(&Dataset, &Progress) -> Result<T, StudyError> + Send + 'static,
+) -> Result<T, StudyError> {
     let (sender, done) = bounded(1);
     let wake = move || {
         // The receiver lives until the answer is here.
         let _ = sender.send(());
     };
-    let mut job = ComplexityJob::start(Arc::clone(dataset), options, cache, wake);
-    let bar = progress_bar(dataset.len());
+    let dataset = Arc::clone(dataset);
+    let broken = |message| StudyError::Internal { message };
+    let mut job = Job::start("complexity", move |progress: &Progress| work(&dataset, progress), broken, wake);
+    let bar = progress_bar(frames);
     while let Err(RecvTimeoutError::Timeout) = done.recv_timeout(Duration::from_millis(100)) {
         show(&bar, job.progress());
     }
     bar.finish_and_clear();
-    let gone = || StudyError::Internal { message: "the computation ended without an answer".into() };
-    job.poll().unwrap_or_else(|| Err(gone()))
+    job.poll().unwrap_or_else(|| Err(broken("the computation ended without an answer".into())))
 }
 
 fn show(bar: &ProgressBar, progress: &Progress) {
@@ -136,8 +207,8 @@ fn progress_bar(frames: usize) -> ProgressBar {
 /// Failures that are told one by one.
 const TOLD: usize = 10;
 
-fn tell_failures(dataset: &Dataset, complexity: &Complexity) -> ExitCode {
-    let (failed, frames) = (complexity.failures.len(), dataset.len());
+fn tell_failures(complexity: &Complexity) -> ExitCode {
+    let (failed, frames) = (complexity.failures.len(), complexity.frames.len());
     if failed == 0 {
         return ExitCode::SUCCESS;
     }

@@ -2,20 +2,23 @@
 
 use super::common::{CsvArgs, PrecisionArg, complain, inputs, open, print, print_json, progress_bar, settings};
 use super::frames::{FrameRange, chosen};
+use super::merge::MergeArgs;
+use super::shards::{ShardArgs, end};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::body::Pppr;
-use crate::config::Preset;
+use crate::config::{FitConfig, Preset};
 use crate::dataset::{Dataset, read_pppr};
 use crate::diagnose::{Evidence, Finding, FindingPlace};
 use crate::escape::{one_line, to_cell};
 use crate::labels::Tag;
-use crate::mhp::Problem;
+use crate::mhp::{Precision, Problem};
 use crate::output::replace_file;
-use crate::radar::View;
+use crate::study::shard::{FrameCommand, ShardFolder, ShardSpec, Whole};
 use crate::study::{BatchOptions, FrameEvidence, frame_evidence};
 use anyhow::Context as _;
 use clap::Args;
 use rayon::prelude::*;
+use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -53,7 +56,9 @@ Examples:
   mhp-inspector evidence samples/walk --frames 7
       Fits frame 7, reads frames 3 to 6, prints four cards.
   mhp-inspector evidence data/d1s1 --frames 0..900 --csv evidence.csv
-      A minute of MMVR as a table; add --json for the findings.";
+      A minute of MMVR as a table; add --json for the findings.
+  mhp-inspector evidence data/d1s1 --shard 2/8 --out shards/2
+      The second of eight parts; `mhp-inspector merge shards/* --out whole` writes the table of all.";
 
 /// What `evidence` is told.
 #[derive(Debug, Args)]
@@ -65,7 +70,7 @@ pub struct EvidenceArgs {
     #[arg(long, value_name = "A..B")]
     frames: Option<FrameRange>,
     /// PPPR npz of the joints, for one frame; without it each frame is fitted.
-    #[arg(long, value_name = "P.npz", conflicts_with = "iterations")]
+    #[arg(long, value_name = "P.npz", conflicts_with_all = ["iterations", "shard"])]
     params: Option<PathBuf>,
     /// Adam steps of a frame, instead of the configuration's.
     #[arg(long, value_name = "N")]
@@ -87,6 +92,8 @@ pub struct EvidenceArgs {
     /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
     #[arg(long, value_name = "FILE")]
     manifest: Option<PathBuf>,
+    #[command(flatten)]
+    part: ShardArgs,
 }
 
 /// Runs `evidence`.
@@ -98,11 +105,8 @@ pub(super) fn run(args: &EvidenceArgs) -> anyhow::Result<ExitCode> {
     let config = settings(args.config.as_deref(), Preset::Default, args.iterations)?;
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
-    if let Some(file) = &args.csv {
-        let named = [args.params.as_deref(), args.config.as_deref(), args.manifest.as_deref()];
-        inputs(&dataset, &args.path, &named).check_file(file)?;
-    }
-    let params = args.params.as_deref().map(|path| params(path, &dataset, &frames)).transpose()?;
+    let named = [args.params.as_deref(), args.config.as_deref(), args.manifest.as_deref()];
+    let inputs = inputs(&dataset, &args.path, &named);
     let options = BatchOptions {
         config,
         precision: args.precision.into(),
@@ -111,26 +115,65 @@ pub(super) fn run(args: &EvidenceArgs) -> anyhow::Result<ExitCode> {
         ply: false,
         curves_folder: None,
     };
-    let bar = progress_bar(frames.len());
-    let judge = |index| {
-        let judged = frame_evidence(&dataset, index, &options, params.as_ref());
-        bar.inc(1);
+    let params = args.params.as_deref().map(|path| params(path, &dataset, &frames)).transpose()?;
+    let judge = |frames: Range<usize>| -> Vec<FrameEvidence> {
+        let bar = progress_bar(frames.len());
+        let judge = |index| {
+            let judged = frame_evidence(&dataset, index, &options, params.as_ref());
+            bar.inc(1);
+            judged
+        };
+        let judged = frames.into_par_iter().map(judge).collect();
+        bar.finish_and_clear();
         judged
     };
-    let judged: Vec<FrameEvidence> = frames.into_par_iter().map(judge).collect();
-    bar.finish_and_clear();
-    if let Some(path) = &args.csv {
-        let table = table(&judged).context("making the table")?;
+    if let Some((shard, out)) = args.part.asked() {
+        let settings = Settings { precision: options.precision, fit: config };
+        let spec = ShardSpec::new(FrameCommand::Evidence, &dataset, &frames, shard, &settings)?;
+        let folder = ShardFolder::begin(out, &[], spec, &inputs)?;
+        let judged = judge(shard.stretch(&frames));
+        folder.finish(&judged)?;
+        return Ok(end(shard, out, &judged));
+    }
+    if let Some(file) = &args.csv {
+        inputs.check_file(file)?;
+    }
+    let arrays: Vec<String> = dataset.info().views.iter().map(|view| view.array.clone()).collect();
+    tell(&judge(frames), &arrays, args.csv.as_deref(), args.json)
+}
+
+/// Runs `merge` on shards of `evidence`.
+///
+/// # Errors
+/// Where they are not one whole, or the folder cannot be written.
+pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<ExitCode> {
+    let Whole { spec, rows, folders } = Whole::<FrameEvidence>::read(&args.shards)?;
+    let whole = args.begin(&spec, &folders, &[])?;
+    let file = whole.file("evidence.csv")?;
+    tell(&rows, &spec.data.arrays, Some(&file), args.json)
+}
+
+/// What the evidence depends on, besides the frames.
+#[derive(Serialize)]
+struct Settings {
+    precision: Precision,
+    fit: FitConfig,
+}
+
+/// Writes the table, prints.
+fn tell(judged: &[FrameEvidence], arrays: &[String], csv: Option<&Path>, json: bool) -> anyhow::Result<ExitCode> {
+    if let Some(path) = csv {
+        let table = table(judged).context("making the table")?;
         let written = replace_file(path, |out| out.write_all(&table));
         written.with_context(|| format!("{}: cannot be written", path.display()))?;
     }
-    if args.json {
+    if json {
         let rows: Vec<Value> = judged.iter().map(json_row).collect();
         print_json(&(serde_json::to_string_pretty(&rows).context("writing JSON")? + "\n"))?;
     } else {
-        print(&cards(&judged, &dataset.info().views))?;
+        print(&cards(judged, arrays))?;
     }
-    Ok(end(&judged))
+    Ok(told(judged))
 }
 
 /// The parameters of the one frame that is asked for.
@@ -150,7 +193,7 @@ fn params(path: &Path, dataset: &Dataset, frames: &Range<usize>) -> anyhow::Resu
 }
 
 /// The exit code, and on standard error what failed.
-fn end(judged: &[FrameEvidence]) -> ExitCode {
+fn told(judged: &[FrameEvidence]) -> ExitCode {
     let mut errors = judged.iter().filter_map(|frame| frame.evidence.as_ref().err());
     let Some(first) = errors.next() else { return ExitCode::SUCCESS };
     let (failed, count) = (1 + errors.count(), judged.len());
@@ -202,7 +245,7 @@ fn table(judged: &[FrameEvidence]) -> Result<Vec<u8>, csv::Error> {
 }
 
 /// Four cards a frame.
-fn cards(judged: &[FrameEvidence], views: &[View]) -> String {
+fn cards(judged: &[FrameEvidence], arrays: &[String]) -> String {
     let mut text = String::new();
     for frame in judged {
         if !text.is_empty() {
@@ -213,29 +256,29 @@ fn cards(judged: &[FrameEvidence], views: &[View]) -> String {
             Err(why) => {
                 let _ = writeln!(text, "  cannot be judged: {}", one_line(why));
             }
-            Ok(modes) => modes.iter().for_each(|mode| card(&mut text, mode, views)),
+            Ok(modes) => modes.iter().for_each(|mode| card(&mut text, mode, arrays)),
         }
     }
     text
 }
 
-fn card(text: &mut String, mode: &Evidence, views: &[View]) {
+fn card(text: &mut String, mode: &Evidence, arrays: &[String]) {
     let score = mode.score.map_or_else(|| "-".to_owned(), |score| format!("{score:.2}"));
     let title = format!("{} {}", mode.mode, mode.mode.words());
     let _ = writeln!(text, "  {title:<36} {score:>4}  {}", one_line(&mode.summary));
     for finding in &mode.findings {
-        let _ = writeln!(text, "    · {}", one_line(&(finding.text.clone() + &place(finding, views))));
+        let _ = writeln!(text, "    · {}", one_line(&(finding.text.clone() + &place(finding, arrays))));
     }
 }
 
 /// Where a finding is seen, in words.
-fn place(finding: &Finding, views: &[View]) -> String {
+fn place(finding: &Finding, arrays: &[String]) -> String {
     match &finding.place {
         None => String::new(),
         Some(FindingPlace::Joint(joint)) => format!(" [joint {joint}]"),
         Some(FindingPlace::Frame(index)) => format!(" [frame {index}]"),
         Some(FindingPlace::Cells { view, lo, hi }) => {
-            let array = views.get(*view).map_or("", |view| view.array.as_str());
+            let array = arrays.get(*view).map_or("", String::as_str);
             let spans: Vec<String> = lo.iter().zip(hi).map(|(lo, hi)| format!("{lo}..={hi}")).collect();
             format!(" [{array}[{}]]", spans.join(", "))
         }

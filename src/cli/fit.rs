@@ -6,14 +6,20 @@ use super::common::{
     CsvArgs, PrecisionArg, complain, inputs, open, presets, print, print_json, progress_bar, settings,
 };
 use super::frames::{FrameRange, chosen};
+use super::merge::MergeArgs;
+use super::shards::{end, typed};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::config::{FitConfig, Preset, listing};
 use crate::dataset::Dataset;
-use crate::output::{FolderLock, replace_file};
+use crate::mhp::Precision;
+use crate::output::{FolderLock, Inputs, replace_file};
+use crate::study::shard::{FrameCommand, Shard, ShardFolder, ShardSpec, Whole};
 use crate::study::{BatchOptions, BatchRow, Means, Summary, columns, run_batch};
 use anyhow::Context as _;
 use clap::Args;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use table::Table;
@@ -33,13 +39,18 @@ Examples:
   mhp-inspector fit data/d1s1 --frames 0..900 --warm-start --out results
       A minute of MMVR, each frame from the one before; writes results/summary.csv, fit.toml, pppr/*.npz.
   mhp-inspector fit data/walk --frames 7 --out results --ply --curves
-      Also the Gaussians of the end as pppr/*.ply and every iteration as curves/*.csv.";
+      Also the Gaussians of the end as pppr/*.ply and every iteration as curves/*.csv.
+  mhp-inspector fit data/d1s1 --shard 2/8 --out shards/2
+      The second of eight parts, for as many machines; `mhp-inspector merge shards/* --out results` makes the whole.";
 
 /// Shown under them by `fit --help`, and not by `fit -h`: also every setting.
 pub(super) fn long_help() -> String {
     format!("{HELP}\n\n{}", listing())
 }
 
+/// The settings in force, and the table.
+const SETTINGS: &str = "fit.toml";
+const SUMMARY: &str = "summary.csv";
 /// The folders of parameters and of iterations.
 const PARAMS: &str = "pppr";
 const CURVES: &str = "curves";
@@ -78,6 +89,9 @@ pub struct FitArgs {
     /// With --out, also curves/NAME.csv: loss, terms, IoU and joint error of every iteration.
     #[arg(long, requires = "out")]
     curves: bool,
+    /// Do only part i of n, counted from 1, into the folder --out; `auto` inside a Slurm job array. `merge` makes the whole of all.
+    #[arg(long, value_name = "i/n", value_parser = typed, requires = "out", conflicts_with = "json")]
+    shard: Option<Shard>,
     #[command(flatten)]
     cells: CsvArgs,
     /// Start each frame from the result of the one before in its sequence; one frame at a time then.
@@ -103,8 +117,7 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
     let arrays: Vec<String> = dataset.info().views.iter().map(|view| view.array.clone()).collect();
-    let prepared = args.out.as_deref().map(|out| prepare(out, args, &dataset, &config, &arrays)).transpose()?;
-    let (_lock, mut summary) = prepared.unzip();
+    let inputs = inputs(&dataset, &args.path, &[args.config.as_deref(), args.manifest.as_deref()]);
     let options = BatchOptions {
         config,
         precision: args.precision.into(),
@@ -113,6 +126,11 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
         ply: args.ply,
         curves_folder: args.out.as_ref().filter(|_| args.curves).map(|out| out.join(CURVES)),
     };
+    if let (Some(shard), Some(out)) = (args.shard, &args.out) {
+        return part(shard, out, &dataset, &frames, &options, &inputs);
+    }
+    let prepared = args.out.as_deref().map(|out| prepare(out, &dataset, &options, &arrays, &inputs)).transpose()?;
+    let (_lock, mut summary) = prepared.unzip();
     let bar = progress_bar(frames.len());
     let mut report = Report::new(arrays, args.json);
     let done = run_batch(&dataset, frames, &options, |row| {
@@ -127,34 +145,108 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
     report.tell()
 }
 
+/// Fits a part of `frames` into the folder of a shard; with a warm start whole sequences of them.
+fn part(
+    shard: Shard,
+    out: &Path,
+    dataset: &Dataset,
+    frames: &Range<usize>,
+    options: &BatchOptions,
+    inputs: &Inputs<'_>,
+) -> anyhow::Result<ExitCode> {
+    let settings = Settings {
+        precision: options.precision,
+        warm_start: options.warm_start,
+        ply: options.ply,
+        curves: options.curves_folder.is_some(),
+        fit: options.config,
+    };
+    let spec = ShardSpec::new(FrameCommand::Fit, dataset, frames, shard, &settings)?;
+    let folder = ShardFolder::begin(out, shelves(settings.curves), spec, inputs)?;
+    write_settings(out, dataset, options, inputs)?;
+    let mine = if options.warm_start { shard.sequences(dataset, frames) } else { shard.stretch(frames) };
+    let bar = progress_bar(mine.len());
+    let mut rows = Vec::with_capacity(mine.len());
+    let done = run_batch(dataset, mine, options, |row| {
+        bar.inc(1);
+        rows.push(row);
+        Ok(())
+    });
+    bar.finish_and_clear();
+    done?;
+    folder.finish(&rows)?;
+    Ok(end(shard, out, &rows))
+}
+
+/// Runs `merge` on shards of `fit`.
+///
+/// # Errors
+/// Where they are not one whole, or the folder cannot be written.
+pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<ExitCode> {
+    let Whole { spec, rows, folders } = Whole::<BatchRow>::read(&args.shards)?;
+    let settings: Settings = spec.settings()?;
+    let whole = args.begin(&spec, &folders, shelves(settings.curves))?;
+    whole.copy_one(SETTINGS)?;
+    shelves(settings.curves).iter().try_for_each(|shelf| whole.copy_all(shelf))?;
+    let mut summary = Summary::create(&whole.file(SUMMARY)?, &spec.data.arrays)?;
+    let mut report = Report::new(spec.data.arrays, args.json);
+    for row in rows {
+        summary.add(&row)?;
+        report.add(row);
+    }
+    summary.finish()?;
+    report.tell()
+}
+
+/// What the fits and their files depend on, besides the frames.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Settings {
+    precision: Precision,
+    warm_start: bool,
+    ply: bool,
+    curves: bool,
+    fit: FitConfig,
+}
+
+/// The folders below that of the results.
+fn shelves(curves: bool) -> &'static [&'static str] {
+    if curves { &[PARAMS, CURVES] } else { &[PARAMS] }
+}
+
 /// Makes and holds the folders, writes the settings, and begins the table: what cannot be written is told before anything is
 /// fitted.
 fn prepare(
     out: &Path,
-    args: &FitArgs,
     dataset: &Dataset,
-    config: &FitConfig,
+    options: &BatchOptions,
     arrays: &[String],
+    inputs: &Inputs<'_>,
 ) -> anyhow::Result<(FolderLock, Summary)> {
-    let inputs = inputs(dataset, &args.path, &[args.config.as_deref(), args.manifest.as_deref()]);
-    let below = if args.curves { &[PARAMS, CURVES][..] } else { &[PARAMS] };
-    let lock = FolderLock::claim(out, below, &inputs)?;
-    let [settings, table] = ["fit.toml", "summary.csv"].map(|name| out.join(name));
-    [&settings, &table].into_iter().try_for_each(|file| inputs.check_replaced(file))?;
-    let precision = match args.precision {
-        PrecisionArg::F64 => "f64",
-        PrecisionArg::F32 => "f32",
+    let lock = FolderLock::claim(out, shelves(options.curves_folder.is_some()), inputs)?;
+    let table = out.join(SUMMARY);
+    inputs.check_replaced(&table)?;
+    write_settings(out, dataset, options, inputs)?;
+    Ok((lock, Summary::create(&table, arrays)?))
+}
+
+/// Writes the settings in force.
+fn write_settings(out: &Path, dataset: &Dataset, options: &BatchOptions, inputs: &Inputs<'_>) -> anyhow::Result<()> {
+    let settings = out.join(SETTINGS);
+    inputs.check_replaced(&settings)?;
+    let precision = match options.precision {
+        Precision::F64 => "f64",
+        Precision::F32 => "f32",
     };
     let head = format!(
         "# mhp-inspector {} fit of {}\n# precision {precision}, {}\n",
         env!("CARGO_PKG_VERSION"),
         dataset.info().root.display().to_string().escape_debug(),
-        if args.warm_start { "warm start" } else { "every frame from its own peaks" },
+        if options.warm_start { "warm start" } else { "every frame from its own peaks" },
     );
-    let text = head + &config.to_toml();
+    let text = head + &options.config.to_toml();
     let written = replace_file(&settings, |out| out.write_all(text.as_bytes()));
-    written.with_context(|| format!("{}: cannot be written", settings.display()))?;
-    Ok((lock, Summary::create(&table, arrays)?))
+    written.with_context(|| format!("{}: cannot be written", settings.display()))
 }
 
 /// What is printed at the end.

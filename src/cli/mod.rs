@@ -10,9 +10,11 @@ mod fit;
 mod frames;
 mod info;
 mod labels;
+mod merge;
 mod score;
 #[cfg(feature = "viewer")]
 mod screenshot;
+mod shards;
 pub mod simulate;
 mod study;
 #[cfg(feature = "train")]
@@ -167,12 +169,11 @@ pub enum CliCommand {
     /// Tag frames and list labels: what the window writes, for scripts.
     #[command(subcommand, after_help = labels::HELP)]
     Labels(labels::LabelsCommand),
+    /// Make one whole of the shards of `fit`, `complexity`, `count`, `evidence` or a study: what each did with --shard.
+    #[command(after_help = merge::HELP)]
+    Merge(merge::MergeArgs),
     /// Evaluate the objective at given parameters: simulated maps, losses and gradients.
-    ///
-    /// Writes an npz with `sim_<array>`, `iou_<array>`, `loss`, its terms `em bone rigid joint sep coll`, and the gradients
-    /// `grad_<group>` (of the total) and `grad_em_<group>` (of L_EM alone), all float64. Prints the scalars as one JSON
-    /// object; an IoU of two empty masks is null there and NaN in the npz. The EM region is that of the given positions.
-    #[command(after_help = score::HELP)]
+    #[command(long_about = score::about(), after_help = score::HELP)]
     Score(score::ScoreArgs),
     /// Draw the real window offscreen after a number of iterations, and save it as a PNG.
     #[cfg(feature = "viewer")]
@@ -223,6 +224,7 @@ pub fn run(command: CliCommand) -> anyhow::Result<ExitCode> {
         CliCommand::Fit(args) => fit::run(&args),
         CliCommand::Info(args) => info::run(&args),
         CliCommand::Labels(command) => labels::run(&command),
+        CliCommand::Merge(args) => merge::run(&args),
         CliCommand::Score(args) => score::run(&args),
         #[cfg(feature = "viewer")]
         CliCommand::Screenshot(args) => screenshot::run(&args),

@@ -4,7 +4,9 @@ use super::common::{PrecisionArg, config, inputs, open, print_json};
 use crate::body::{Group, Pppr};
 use crate::dataset::npz::{ArrayView, write};
 use crate::dataset::read_pppr;
-use crate::mhp::{Evaluation, Objective, Problem, simulate};
+use crate::mhp::{Evaluation, Objective, Problem, TERMS, simulate};
+use crate::radar::View;
+use crate::start::problem_of;
 use anyhow::Context as _;
 use clap::Args;
 use serde_json::{Map, Value};
@@ -21,6 +23,18 @@ Examples:
       Maps, losses and gradients at these parameters, with the default configuration.
   mhp-inspector score --dataset case --frame 0 --params p.npz --config fit.toml --precision f32 --out a.npz
       The same under other settings, in single precision.";
+
+/// What `score --help` says it does.
+pub(super) fn about() -> String {
+    let keys: Vec<&str> = TERMS.iter().map(|term| term.key).collect();
+    format!(
+        "Evaluate the objective at given parameters: simulated maps, losses and gradients.\n\nWrites an npz with \
+         `sim_<array>`, `iou_<array>`, `loss`, its terms `{}`, and the gradients `grad_<group>` (of the total) and \
+         `grad_em_<group>` (of L_EM alone), all float64. Prints the scalars as one JSON object; an IoU of two empty masks \
+         is null there and NaN in the npz. The EM region is that of the given positions.",
+        keys.join(" ")
+    )
+}
 
 /// What `score` is told.
 #[derive(Debug, Args)]
@@ -60,10 +74,8 @@ pub(super) fn run(args: &ScoreArgs) -> anyhow::Result<ExitCode> {
     inputs(&dataset, &args.dataset, &named).check_file(&args.out)?;
     let frame = dataset.load(args.frame)?;
     let params = read_pppr(&args.params, None)?;
-    let info = dataset.info();
-    let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-    let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps)
-        .with_context(|| dataset.frame_path(args.frame).display().to_string())?;
+    // With the frames around, which the temporal term is about.
+    let problem = problem_of(&dataset, &frame).with_context(|| dataset.frame_path(args.frame).display().to_string())?;
     problem.check(&params).with_context(|| args.params.display().to_string())?;
 
     let (problem, precision) = (Arc::new(problem), args.precision.into());
@@ -73,7 +85,7 @@ pub(super) fn run(args: &ScoreArgs) -> anyhow::Result<ExitCode> {
     }
     let evaluation = objective.evaluate(&params);
     let maps = simulate(&problem, &config, precision, &params);
-    let scalars = scalars(&problem, &evaluation);
+    let scalars = scalars(&problem.views, &evaluation);
     write_answer(args, &problem, &evaluation, &maps, &scalars)?;
     let json: Map<String, Value> = scalars.into_iter().map(|(key, x)| (key, Value::from(x))).collect();
     print_json(&format!("{}\n", Value::Object(json)))?;
@@ -81,20 +93,12 @@ pub(super) fn run(args: &ScoreArgs) -> anyhow::Result<ExitCode> {
 }
 
 /// Key and value; NaN where undefined.
-fn scalars(problem: &Problem, evaluation: &Evaluation) -> Vec<(String, f64)> {
-    let t = &evaluation.terms;
-    let losses = [
-        ("loss", evaluation.loss),
-        ("em", t.em),
-        ("bone", t.bone),
-        ("rigid", t.rigid),
-        ("joint", t.joint),
-        ("sep", t.sep),
-        ("coll", t.coll),
-    ];
-    let ious = problem.views.iter().zip(&evaluation.iou);
+fn scalars(views: &[View], evaluation: &Evaluation) -> Vec<(String, f64)> {
+    let terms = evaluation.terms.iter().map(|(term, value)| (term.key, value));
+    let losses = [("loss", evaluation.loss)].into_iter().chain(terms);
+    let ious = views.iter().zip(&evaluation.iou);
     let ious = ious.map(|(view, iou)| (format!("iou_{}", view.array), iou.unwrap_or(f64::NAN)));
-    losses.into_iter().map(|(key, x)| (key.to_owned(), x)).chain(ious).collect()
+    losses.map(|(key, x)| (key.to_owned(), x)).chain(ious).collect()
 }
 
 fn write_answer(
@@ -111,7 +115,7 @@ fn write_answer(
     for (key, value) in scalars {
         arrays.push((key.clone(), ArrayView::f64(&[], std::slice::from_ref(value))));
     }
-    let gradients: [(&str, &Pppr); 2] = [("grad", &evaluation.gradient), ("grad_em", &evaluation.em_gradient)];
+    let gradients: [(&str, &Pppr); 2] = [("grad", &evaluation.gradient), ("grad_em", evaluation.em_gradient())];
     for (prefix, gradient) in gradients {
         for group in Group::ALL {
             let shape = gradient.shape().array_shape(group);
@@ -121,4 +125,20 @@ fn write_answer(
     let named: Vec<(&str, ArrayView<'_>)> = arrays.iter().map(|(key, array)| (key.as_str(), array.clone())).collect();
     write(&args.out, &named)?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::PpprShape;
+    use crate::mhp::Terms;
+
+    #[test]
+    fn the_dummy_term_is_answered() {
+        let mut evaluation = Evaluation::zeros(PpprShape { persons: 1, joints: 0, doppler_features: 1 });
+        evaluation.terms = Terms::from_fn(|term| if term.key == "dummy" { 0.7 } else { 0.1 });
+        let answer = scalars(&[], &evaluation);
+        assert!(answer.contains(&("dummy".to_owned(), 0.7)), "{answer:?}");
+        assert!(about().contains(" dummy`"), "{}", about());
+    }
 }

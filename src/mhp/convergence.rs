@@ -1,8 +1,8 @@
 //! The convergence criterion of SPEC section 4, or of the paper's section 5.5.4 to the letter.
 
-use super::kinematic::bone_length_sq;
 use crate::body::{Pppr, Skeleton};
 use crate::config::Convergence;
+use crate::geometry::{dot, sub};
 
 /// How far back the loss is compared.
 pub(super) const LOOK_BACK: usize = 5;
@@ -29,7 +29,9 @@ fn bones_plausible(skeleton: &Skeleton, params: &Pppr) -> bool {
     (0..params.shape().persons).all(|person| {
         skeleton.bones.iter().zip(&skeleton.bone_lengths_m).all(|(bone, &reference)| {
             // Squares need neither root nor quotient.
-            let length_sq = bone_length_sq(params, bone.map(|j| person * joints + j));
+            let [m, n] = bone.map(|joint| params.position(person * joints + joint));
+            let e = sub(m, n);
+            let length_sq = dot(e, e);
             let bounds = BONE_RATIO.map(|ratio| (ratio * reference) * (ratio * reference));
             (bounds[0]..=bounds[1]).contains(&length_sq)
         })

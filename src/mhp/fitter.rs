@@ -214,21 +214,9 @@ fn evaluate_into(
         let term = format!("the gradient of {}", group.key());
         return Err(FitError::Diverged { iteration, joint: joint_name(objective, params, joint), term });
     }
-    let t = &evaluation.terms;
-    let terms = [
-        ("L_EM", t.em),
-        ("L_time", t.time),
-        ("L_bone", t.bone),
-        ("L_rigid", t.rigid),
-        ("L_joint", t.joint),
-        ("L_sep", t.sep),
-        ("L_coll", t.coll),
-        ("L", evaluation.loss),
-    ];
-    match terms.iter().find(|(_, value)| !value.is_finite()) {
-        Some((term, _)) => {
-            Err(FitError::Diverged { iteration, joint: "all joints".to_owned(), term: (*term).to_owned() })
-        }
+    let terms = evaluation.terms.iter().map(|(term, value)| (term.label, value));
+    match terms.chain([("L", evaluation.loss)]).find(|(_, value)| !value.is_finite()) {
+        Some((term, _)) => Err(FitError::Diverged { iteration, joint: "all joints".to_owned(), term: term.to_owned() }),
         None => Ok(()),
     }
 }

@@ -3,16 +3,17 @@
 //! [`Problem`] is one frame; [`Objective`] answers loss and gradient for parameters; [`Fitter`] takes Adam steps. The
 //! forward model goes from joints to cells in two steps, `splat.rs` (a joint in a view, f64; in `batch.rs` several at once)
 //! and `kernel.rs` (cells, plainly) or `tiles/mod.rs` (cells, f32, fast), and back in the same (moments) and
-//! `adjoint.rs`. `em.rs` compares the masks, `kinematic.rs` has the other terms, `objective.rs` adds them up.
+//! `adjoint.rs`. `em.rs` compares the masks, `terms/mod.rs` has the table of all terms, `objective.rs` adds them up.
 //!
 //! The stages, each of which uses those above it only:
 //!
-//! 1. numbers: `types.rs`, `percentile.rs`, `fill.rs`, `scalar.rs`, `lanes.rs`, `batch.rs`, `floors.rs`
+//! 1. the terms of the loss, `terms/mod.rs`; numbers: `types.rs`, `percentile.rs`, `fill.rs`, `scalar.rs`, `lanes.rs`,
+//!    `batch.rs`, `floors.rs`
 //! 2. a joint in a view: `seen.rs`, `form.rs`, `splat.rs`, `adjoint.rs`
 //! 3. cells: `kernel.rs`, `tiles/mod.rs`, `laid.rs`, and the masks over them, `em.rs`
 //! 4. what the maps of a frame and those around it show: `region.rs`, `template.rs`, `context/mod.rs`
 //! 5. a frame: `problem.rs`, `simulate.rs`
-//! 6. the objective: `kinematic.rs`, `objective.rs`
+//! 6. the objective: `objective.rs`
 //! 7. the fit: `convergence.rs`, `articulation.rs`, `adam.rs`, `fitter.rs`; and the start of one: `init/mod.rs`
 //!
 //! **What it does not do.** The fit moves the body onto its echo; it does not find the pose: yaw and left/right are hardly visible
@@ -34,7 +35,6 @@ mod floors;
 mod form;
 mod init;
 mod kernel;
-mod kinematic;
 mod laid;
 mod lanes;
 mod objective;
@@ -46,6 +46,7 @@ mod seen;
 mod simulate;
 mod splat;
 mod template;
+mod terms;
 mod tiles;
 mod types;
 
@@ -62,5 +63,6 @@ pub(crate) use percentile::{percentile, percentiles};
 pub use problem::Problem;
 pub use region::Region;
 pub use simulate::simulate;
+pub use terms::{Hue, Scope, TERMS, Term, TermGroup, TermId, Terms, Weight, formula};
 pub use tiles::simd_path;
-pub use types::{Evaluation, FitError, Ious, Precision, StepReport, StopReason, Terms};
+pub use types::{Evaluation, FitError, Ious, Precision, StepReport, StopReason};

@@ -7,10 +7,11 @@ use super::laid::Laid;
 use super::percentile::percentile;
 use super::region::{self, Region};
 use super::splat::Scene;
-use super::{Evaluation, FitError, Precision, Problem, kinematic};
-use crate::body::{Group, Pppr};
+use super::terms::{self, Inputs};
+use super::{Evaluation, FitError, Precision, Problem, TERMS, TermId, Weight};
+use crate::body::Pppr;
 use crate::config::FitConfig;
-use crate::geometry::{Vec3, add, add_scaled, dot, scale, sub};
+use crate::geometry::Vec3;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
@@ -142,9 +143,27 @@ impl Objective {
     /// As [`Self::evaluate`], into an evaluation of before: in single precision nothing is allocated from the second
     /// time on where there are no more than four views.
     pub fn evaluate_into(&mut self, params: &Pppr, evaluation: &mut Evaluation) {
-        let Evaluation { loss, terms, iou, gradient, em_gradient } = evaluation;
-        em_gradient.reset(params.shape());
-        gradient.reset(params.shape());
+        self.evaluate_gained(params, &terms::WHOLE, evaluation);
+    }
+
+    /// ∂L_t/∂Θ of a term alone, unweighted; 0 for one that is not evaluated, because its weight is 0.
+    pub fn term_gradient(&mut self, term: TermId, params: &Pppr) -> Pppr {
+        let mut evaluation = Evaluation::zeros(params.shape());
+        if term.is_of_maps() {
+            self.evaluate_gained(params, &term.alone(), &mut evaluation);
+        } else {
+            let Self { problem, config, anchors, .. } = &*self;
+            let inputs = Inputs { skeleton: &problem.skeleton, config, params, anchors };
+            terms::evaluate(&inputs, 0.0, &term.alone(), &mut evaluation.gradients);
+        }
+        evaluation.gradients[term.weight as usize].clone()
+    }
+
+    /// As [`Self::evaluate_into`], each term's gradient times its gain.
+    fn evaluate_gained(&mut self, params: &Pppr, gains: &[f64; TERMS.len()], evaluation: &mut Evaluation) {
+        let Evaluation { loss, terms, iou, gradient, gradients } = evaluation;
+        gradients.iter_mut().for_each(|gradient| gradient.reset(params.shape()));
+        let em_gradient = &mut gradients[Weight::Em as usize];
         iou.clear();
         let views = self.problem.views.len() as f64;
         let mut em = 0.0;
@@ -167,14 +186,10 @@ impl Objective {
             workspace.pull_back(scene, forms, (&mut *em_gradient, &mut *bars), *precision);
         }
         forms.pull_back(bars, em_gradient, *precision);
-        *terms = kinematic::evaluate(&problem.skeleton, config, params, gradient);
-        terms.em = em;
-        gradient.mix(config.w_kine, config.w_em, em_gradient);
-        if config.w_time > 0.0 {
-            terms.time = anchored(anchors, params, config.w_time, gradient);
-        }
-        let kinematic = terms.bone + terms.rigid + terms.joint + terms.sep + terms.coll;
-        *loss = config.w_em * em + config.w_time * terms.time + config.w_kine * kinematic;
+        let inputs = Inputs { skeleton: &problem.skeleton, config, params, anchors };
+        *terms = terms::evaluate(&inputs, em, gains, gradients);
+        *loss = terms.loss(config);
+        terms::weigh(config, gradients, gradient);
     }
 
     /// L_EM alone, without its gradient.
@@ -188,25 +203,6 @@ impl Objective {
         });
         losses.sum::<f64>() / self.problem.views.len() as f64
     }
-}
-
-/// L_time = Σ ‖c_s − ĉ_s‖² over the persons, m², with c_s the mean of a person's joints; adds `weight` times its gradient.
-fn anchored(anchors: &[Vec3], params: &Pppr, weight: f64, gradient: &mut Pppr) -> f64 {
-    let joints = params.shape().joints;
-    let share = 1.0 / joints.max(1) as f64;
-    let mut sum = 0.0;
-    for (person, anchor) in anchors.iter().enumerate().take(params.shape().persons) {
-        let own = person * joints..(person + 1) * joints;
-        let mean = scale(own.clone().fold([0.0; 3], |sum, joint| add(sum, params.position(joint))), share);
-        let off = sub(mean, *anchor);
-        sum += dot(off, off);
-        for joint in own {
-            let mut slope = gradient.vec3(Group::Position, joint);
-            add_scaled(&mut slope, off, 2.0 * weight * share);
-            gradient.set_vec3(Group::Position, joint, slope);
-        }
-    }
-    sum
 }
 
 /// B_ori over each region's cells.

@@ -1,8 +1,10 @@
 //! What an evaluation of the objective and a step of the fit answer.
 
-use crate::body::{Pppr, PpprShape};
+use super::{TermGroup, Terms, Weight};
+use crate::body::{Group, Pppr, PpprShape};
+use crate::config::FitConfig;
 use serde::{Deserialize, Serialize};
-use smallvec::SmallVec;
+use smallvec::{SmallVec, smallvec};
 
 /// One IoU a view; `None` where both masks are empty. Up to four views take no heap, so that a report allocates nothing.
 pub type Ious = SmallVec<[Option<f64>; 4]>;
@@ -18,30 +20,10 @@ pub enum Precision {
     F32,
 }
 
-/// The unweighted terms of the objective; SPEC section 4.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Terms {
-    /// L_EM, the mean over views of one minus the soft IoU.
-    pub em: f64,
-    /// Σ ‖c − ĉ‖² to where the frames around say that each person is, m²; 0 where they say nothing.
-    #[serde(default)]
-    pub time: f64,
-    /// Σ ψ(l − ℓ).
-    pub bone: f64,
-    /// Σ ψ of the relative velocity along the bone.
-    pub rigid: f64,
-    /// Σ max(0, θ − θ_max)².
-    pub joint: f64,
-    /// Centroid separation of several people.
-    pub sep: f64,
-    /// Joint collision of several people.
-    pub coll: f64,
-}
-
 /// The objective at one set of parameters, with its gradient.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
-    /// L = w_EM L_EM + w_kine (…).
+    /// L, the sum of the terms under their weights: [`super::formula`].
     pub loss: f64,
     /// The unweighted terms.
     pub terms: Terms,
@@ -49,8 +31,8 @@ pub struct Evaluation {
     pub iou: Ious,
     /// ∂L/∂Θ, the total.
     pub gradient: Pppr,
-    /// ∂L_EM/∂Θ, unweighted.
-    pub em_gradient: Pppr,
+    /// What it is made of, in the order of [`Weight::ALL`]: the gradient of the sum that each weighs, unweighted.
+    pub gradients: [Pppr; Weight::COUNT],
 }
 
 impl Evaluation {
@@ -61,8 +43,24 @@ impl Evaluation {
             terms: Terms::default(),
             iou: Ious::new(),
             gradient: Pppr::zeros(shape),
-            em_gradient: Pppr::zeros(shape),
+            gradients: std::array::from_fn(|_| Pppr::zeros(shape)),
         }
+    }
+
+    /// ∂L_EM/∂Θ, unweighted.
+    pub fn em_gradient(&self) -> &Pppr {
+        &self.gradients[Weight::Em as usize]
+    }
+
+    /// What a group of terms contributes to ∂L/∂Θ under the weights of `config`: the numbers of flat joint `joint` in
+    /// `of`. Those of all groups add up to the total.
+    pub fn joint_gradient(&self, group: TermGroup, config: &FitConfig, of: Group, joint: usize) -> SmallVec<[f64; 4]> {
+        let mut sum: SmallVec<[f64; 4]> = smallvec![0.0; self.gradient.shape().width(of)];
+        for weight in group.weights() {
+            let part = self.gradients[weight as usize].joint(of, joint);
+            sum.iter_mut().zip(part).for_each(|(sum, x)| *sum += weight.of(config) * x);
+        }
+        sum
     }
 }
 

@@ -41,7 +41,7 @@ pub use fit::{Fit, FitStatus};
 pub use history::{Branch, Flag, History, IterationRow};
 pub use labels::{LabelMode, LabelStatus, LabelTable, Labels};
 pub use pins::{MOST_PINS, Pin, PinRow, Pins, numbers};
-pub use queue::{FrameFilter, FrameNumber, FrameRow, Queue, Reads, SYNTAX, SavedView, Sort, SortKey};
+pub use queue::{FrameFilter, FrameNumber, FrameRow, Queue, Reads, SavedView, Sort, SortKey, syntax};
 pub use records::Records;
 pub use results::FoundResults;
 pub use runtime::{Picker, Runtime, Wake};

@@ -47,6 +47,7 @@ fn summary(row: SummaryRow) -> FrameSummary {
     FrameSummary {
         iterations: row.iterations,
         loss: row.loss,
+        terms: row.terms,
         iou: row.iou,
         converged: row.converged,
         majpe_mm: row.majpe_mm,

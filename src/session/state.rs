@@ -13,7 +13,7 @@ use super::study::StudyView;
 use super::view::ViewState;
 use crate::config::FitConfig;
 use crate::dataset::{BareCatalog, Dataset, Frame};
-use crate::mhp::Precision;
+use crate::mhp::{Precision, Terms};
 use crate::worker::JobId;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
@@ -102,6 +102,9 @@ pub struct FrameSummary {
     pub iterations: Option<usize>,
     /// L.
     pub loss: Option<f64>,
+    /// Its unweighted terms, as far as they are known.
+    #[serde(default)]
+    pub terms: Terms<Option<f64>>,
     /// Mean forward-consistency IoU over the views.
     pub iou: Option<f64>,
     /// The convergence criterion.

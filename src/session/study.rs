@@ -63,6 +63,7 @@ fn summary(row: &RunRow) -> FrameSummary {
     FrameSummary {
         iterations: fit.map(|fit| fit.iterations),
         loss: fit.map(|fit| fit.loss),
+        terms: fit.map(|fit| fit.terms).unwrap_or_default(),
         iou: fit.and_then(crate::study::run::RunNumbers::mean_iou),
         converged: fit.map(|fit| fit.converged),
         majpe_mm: fit.and_then(|fit| fit.majpe_mm),

@@ -152,6 +152,8 @@ pub struct ViewState {
     pub sort: Sort,
     /// Columns of the frame list that are not shown, by their keys.
     pub hidden_columns: Vec<String>,
+    /// Terms of the loss that have a column in the frame list, by their keys.
+    pub shown_terms: Vec<String>,
     /// Kept filters.
     pub saved_views: Vec<SavedView>,
     /// What the strip over the frames shows.
@@ -201,6 +203,7 @@ impl Default for ViewState {
             hidden_curves: Vec::new(),
             sort: Sort::default(),
             hidden_columns: ["peaks", "static", "saliency", "reason", "by"].map(str::to_owned).to_vec(),
+            shown_terms: Vec::new(),
             saved_views: Vec::new(),
             strip: TimelineStrip::default(),
             label_mode: LabelMode::default(),

@@ -1,10 +1,15 @@
-//! Counting the people of a data set: every frame with those before it in its sequence, on all cores.
+//! Counting the people of a data set: every frame with those before it in its sequence, on all cores. Who is who is told afterwards,
+//! over all frames.
 
 use crate::dataset::{Dataset, DatasetError, Frame, Heatmap};
 use crate::geometry::Vec3;
 use crate::mhp::fill_missing;
-use crate::people::{COMPARED, Confusion, Count, Counter, HISTORY, PeopleError, Scan, Tracker, TrackerOptions};
+use crate::people::{
+    CLASSES, COMPARED, Confusion, Count, Counter, HISTORY, PeopleError, Scan, Tracker, TrackerOptions,
+};
+use crate::study::shard::{FrameCommand, ShardRow};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::ops::Range;
 
@@ -15,22 +20,72 @@ const CHUNK: usize = 64;
 pub(super) const LEAD_IN: usize = HISTORY + 2 * COMPARED;
 
 /// One frame of a data set, counted.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FrameCount {
     /// Index in the data set.
-    pub frame: usize,
-    /// Number and clusters, or why there is none.
-    pub count: Result<Count, String>,
+    pub index: usize,
+    /// The frame's name.
+    pub frame: String,
+    /// The sequence that it is of.
+    pub sequence: String,
+    /// How many and where, or why nobody can tell.
+    pub count: Result<People, String>,
     /// Annotated number of people, where known.
     pub annotated: Option<usize>,
-    /// Place of each person, world frame, m.
-    pub places: Vec<Vec3>,
-    /// Who is who: the same number is the same person within a sequence.
+    /// Who is who, once [`identify`] has told: the same number is the same person within a sequence.
+    #[serde(skip)]
     pub identities: Vec<usize>,
 }
 
-/// Counts `frames`; `done` hears of every frame, in no order. A frame that cannot be read is a row without a count, and
-/// the frames after it begin anew.
+/// The people of a frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct People {
+    /// How many, most probably; 4 stands for 4 or more.
+    pub people: usize,
+    /// Probabilities of 0, 1, 2, 3, and 4 or more people.
+    pub probabilities: [f64; CLASSES],
+    /// Counted from this frame alone, and not clear.
+    pub uncertain: bool,
+    /// Place of each person, world frame, m.
+    pub places: Vec<Vec3>,
+}
+
+impl People {
+    fn of(count: &Count) -> Self {
+        let people = count.people();
+        let places = count.seeds(people);
+        Self { people, probabilities: count.probabilities, uncertain: count.is_uncertain(), places }
+    }
+
+    /// Of the number that is told.
+    pub fn probability(&self) -> f64 {
+        self.probabilities[self.people.min(CLASSES - 1)]
+    }
+}
+
+impl FrameCount {
+    /// Place of each person, world frame, m; none where nobody can tell.
+    pub fn places(&self) -> &[Vec3] {
+        self.count.as_ref().map_or(&[], |count| &count.places)
+    }
+}
+
+impl ShardRow for FrameCount {
+    const COMMAND: FrameCommand = FrameCommand::Count;
+
+    fn index(&self) -> usize {
+        self.index
+    }
+
+    fn failure(&self) -> Option<&str> {
+        self.count.as_ref().err().map(String::as_str)
+    }
+}
+
+/// Counts `frames`, each with those before it in its sequence, of the range or not; `done` hears of every frame, in no order. A
+/// frame that cannot be read is a row without a count, and the frames after it begin anew.
 ///
 /// # Errors
 /// [`PeopleError::NoPlace`] where the views tell no place, or where the weights are damaged.
@@ -44,9 +99,7 @@ pub fn count_frames(
         frames.clone().step_by(CHUNK).map(|start| start..(start + CHUNK).min(frames.end)).collect();
     let rows: Vec<Vec<FrameCount>> =
         chunks.into_par_iter().map(|chunk| count_chunk(dataset, &counter, chunk, &done)).collect();
-    let mut rows = rows.concat();
-    identify(dataset, &mut rows);
-    Ok(rows)
+    Ok(rows.concat())
 }
 
 fn count_chunk(dataset: &Dataset, counter: &Counter, chunk: Range<usize>, done: &impl Fn()) -> Vec<FrameCount> {
@@ -66,8 +119,9 @@ fn count_chunk(dataset: &Dataset, counter: &Counter, chunk: Range<usize>, done: 
         }
         let (annotated, maps) = labelled(dataset.load(frame));
         window.look_ahead(dataset, frame);
-        let count = window.push(maps);
-        rows.push(FrameCount { frame, count, annotated, places: Vec::new(), identities: Vec::new() });
+        let count = window.push(maps).map(|count| People::of(&count));
+        let (name, sequence) = (dataset.frame_name(frame).to_owned(), dataset.sequence(frame).to_owned());
+        rows.push(FrameCount { index: frame, frame: name, sequence, count, annotated, identities: Vec::new() });
         done();
     }
     rows
@@ -152,20 +206,14 @@ fn filled(mut maps: Vec<Heatmap>) -> Vec<Heatmap> {
     maps
 }
 
-/// Places, and who is who, in the order of the frames.
-fn identify(dataset: &Dataset, rows: &mut [FrameCount]) {
-    let between_s = dataset.info().frame_rate_hz.filter(|rate| *rate > 0.0).map_or(0.1, f64::recip);
-    let mut tracker = Tracker::new(TrackerOptions::default());
-    let mut last: Option<usize> = None;
-    for row in rows {
-        if last.is_none_or(|last| dataset.sequence(last) != dataset.sequence(row.frame)) {
-            tracker = Tracker::new(TrackerOptions::default());
+/// Tells who is who, in the order of the frames; 10 frames a second where nobody says.
+pub fn identify(rows: &mut [FrameCount], frame_rate_hz: Option<f64>) {
+    let between_s = frame_rate_hz.filter(|rate| *rate > 0.0).map_or(0.1, f64::recip);
+    for sequence in rows.chunk_by_mut(|a, b| a.sequence == b.sequence) {
+        let mut tracker = Tracker::new(TrackerOptions::default());
+        for row in sequence {
+            row.identities = tracker.step(row.places(), between_s);
         }
-        if let Ok(count) = &row.count {
-            row.places = count.seeds(count.people());
-        }
-        row.identities = tracker.step(&row.places, between_s);
-        last = Some(row.frame);
     }
 }
 
@@ -174,7 +222,7 @@ pub fn confusion(rows: &[FrameCount]) -> Confusion {
     let mut confusion = Confusion::default();
     for row in rows {
         if let (Some(annotated), Ok(count)) = (row.annotated, &row.count) {
-            confusion.add(annotated, count.people());
+            confusion.add(annotated, count.people);
         }
     }
     confusion

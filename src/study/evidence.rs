@@ -6,11 +6,14 @@ use crate::config::FitConfig;
 use crate::dataset::{Dataset, Frame};
 use crate::diagnose::{Annotated, EarlierFrame, Evidence, EvidenceInput, STATIC_FRAMES, evidence};
 use crate::mhp::{FitError, Masks, Objective, Precision, Problem, masks, simulate};
+use crate::study::shard::{FrameCommand, ShardRow};
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Arc;
 
 /// The evidence of one frame.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FrameEvidence {
     /// Index in the data set.
     pub index: usize,
@@ -18,6 +21,18 @@ pub struct FrameEvidence {
     pub frame: String,
     /// F1 to F4, or why the frame cannot be judged: one line that names the file.
     pub evidence: Result<Vec<Evidence>, String>,
+}
+
+impl ShardRow for FrameEvidence {
+    const COMMAND: FrameCommand = FrameCommand::Evidence;
+
+    fn index(&self) -> usize {
+        self.index
+    }
+
+    fn failure(&self) -> Option<&str> {
+        self.evidence.as_ref().err().map(String::as_str)
+    }
 }
 
 /// The frames right before frame `index` that are of its sequence, at most T − 1.

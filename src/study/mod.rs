@@ -2,7 +2,7 @@
 //!
 //! [`run_batch`] fits, [`Summary`] writes the rows to a CSV as they come and [`read_summary`] reads them back, [`Means`] sums them up. [`complexity`] says
 //! which frames are hard before anything is fitted, [`frame_evidence`] judges a fit; [`write_ply`] and [`write_curves`]
-//! export a state. Nothing here knows a window or a terminal.
+//! export a state. [`shard`] cuts what is done a frame into parts for several machines. Nothing here knows a window or a terminal.
 
 mod batch;
 #[cfg(feature = "train")]
@@ -14,6 +14,7 @@ mod export;
 mod results;
 mod row;
 pub mod run;
+pub mod shard;
 mod summary;
 
 pub use batch::{BatchOptions, fit_frame, run_batch};

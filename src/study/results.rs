@@ -6,6 +6,7 @@
 use super::StudyError;
 use crate::escape::from_cell;
 use crate::input::open_file;
+use crate::mhp::Terms;
 use std::path::Path;
 
 /// What a table says of one frame.
@@ -25,6 +26,8 @@ pub struct SummaryRow {
     pub annotated: Option<usize>,
     /// L.
     pub loss: Option<f64>,
+    /// Its unweighted terms, as far as they are known.
+    pub terms: Terms<Option<f64>>,
     /// Mean forward-consistency IoU over the views where it is known, 0..1.
     pub iou: Option<f64>,
     /// MAJPE, mm.
@@ -72,6 +75,7 @@ struct Columns {
     people: Option<usize>,
     annotated: Option<usize>,
     loss: Option<usize>,
+    terms: Terms<Option<usize>>,
     ious: Vec<usize>,
     majpe_mm: Option<usize>,
 }
@@ -101,6 +105,7 @@ impl Columns {
             people: place("people"),
             annotated: place("annotated"),
             loss: place("loss"),
+            terms: Terms::from_fn(|term| place(term.key)),
             ious: ious.map(|(k, _)| k).collect(),
             majpe_mm: place("majpe_mm"),
         };
@@ -130,6 +135,8 @@ impl Columns {
             people: line.parsed(self.people, "people", "a whole number")?,
             annotated: line.parsed(self.annotated, "annotated", "a whole number")?,
             loss: line.number(self.loss, "loss", f64::MIN..=f64::MAX)?,
+            // What another program calls `time` or `joint` may be anything.
+            terms: self.terms.map(|column| line.number(column, "", f64::MIN..=f64::MAX).ok().flatten()),
             iou,
             majpe_mm: line.number(self.majpe_mm, "majpe_mm", 0.0..=f64::MAX)?,
         })

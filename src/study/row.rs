@@ -1,14 +1,17 @@
 //! What is known of one fitted frame, and the means over many.
 
-use super::summary::{ERRORS, FIRST, LOSSES, NUMBERS};
+use super::summary::{ERRORS, FIRST, LOSSES, NUMBERS, loss_values};
 use crate::body::Pppr;
 use crate::dataset::Frame;
 use crate::escape::to_cell;
 use crate::mhp::{StepReport, StopReason};
+use crate::study::shard::{FrameCommand, ShardRow};
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 /// The numbers of a fit that worked.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FitNumbers {
     /// Iteration, loss, terms, IoU of each view and convergence at the end.
     pub report: StepReport,
@@ -52,7 +55,8 @@ pub struct FrameFit {
 }
 
 /// One row of a batch.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct BatchRow {
     /// Index in the data set.
     pub index: usize,
@@ -62,16 +66,27 @@ pub struct BatchRow {
     pub fit: Result<FitNumbers, String>,
 }
 
+impl ShardRow for BatchRow {
+    const COMMAND: FrameCommand = FrameCommand::Fit;
+
+    fn index(&self) -> usize {
+        self.index
+    }
+
+    fn failure(&self) -> Option<&str> {
+        self.fit.as_ref().err().map(String::as_str)
+    }
+}
+
 impl BatchRow {
-    /// The numbers, in the order of the columns between `annotated` and the end: loss, six terms, the IoU of `views`
+    /// The numbers, in the order of the columns between `annotated` and the end: loss, its terms, the IoU of `views`
     /// views, two joint errors, two times. `None` where unknown.
     pub fn values(&self, views: usize) -> Vec<Option<f64>> {
         let Ok(fit) = &self.fit else { return vec![None; views + NUMBERS] };
-        let (report, t) = (&fit.report, &fit.report.terms);
-        let losses = [report.loss, t.em, t.bone, t.rigid, t.joint, t.sep, t.coll].map(Some);
-        let ious = (0..views).map(|view| report.iou.get(view).copied().flatten());
+        let losses = loss_values(&fit.report).map(Some);
+        let ious = (0..views).map(|view| fit.report.iou.get(view).copied().flatten());
         let rest = [fit.majpe_mm, fit.pa_majpe_mm, fit.init_ms, Some(fit.fit_ms)];
-        losses.into_iter().chain(ious).chain(rest).map(|x| x.filter(|x| x.is_finite())).collect()
+        losses.chain(ious).chain(rest).map(|x| x.filter(|x| x.is_finite())).collect()
     }
 
     /// Why the run ended: `iterations`, `converged`, or `error: …`.
@@ -151,7 +166,7 @@ impl Means {
         let mut values = row.values(views);
         if row.fit.as_ref().is_ok_and(|fit| !fit.count_matched()) {
             self.count_mismatched += 1;
-            values.iter_mut().skip(LOSSES.len() + views).take(ERRORS).for_each(|error| *error = None);
+            values.iter_mut().skip(LOSSES + views).take(ERRORS).for_each(|error| *error = None);
         }
         for ((sum, count), value) in self.sums.iter_mut().zip(values) {
             if let Some(value) = value {
@@ -163,7 +178,7 @@ impl Means {
 
     /// Frames over which the mean joint error is.
     pub fn errors_over(&self) -> usize {
-        self.sums.iter().rev().nth(NUMBERS - LOSSES.len() - 1).map_or(0, |&(_, count)| count)
+        self.sums.iter().rev().nth(NUMBERS - LOSSES - 1).map_or(0, |&(_, count)| count)
     }
 
     /// Frames with a fit.
@@ -214,7 +229,7 @@ mod tests {
     use crate::mhp::Terms;
 
     fn row(loss: f64, iou: Option<f64>, converged: bool) -> BatchRow {
-        let terms = Terms { em: 0.5, time: 0.0, bone: 0.1, rigid: 0.2, joint: 0.3, sep: 0.0, coll: 0.0 };
+        let terms = Terms::from_fn(|term| if term.key == "dummy" { 0.7 } else { 0.1 });
         let report = StepReport { iteration: 10, loss, terms, iou: vec![iou].into(), converged };
         let fit = FitNumbers {
             report,
@@ -272,10 +287,21 @@ mod tests {
         assert_eq!(cells.len(), columns.len());
         assert_eq!(cells[..6], ["a/0", "10", "true", "iterations", "1", ""]);
         assert_eq!(cells[6].parse(), Ok(0.1 + 0.2));
-        assert_eq!(cells[13], "", "an undefined IoU");
-        assert_eq!(cells[14..], ["", "", "2", "5"]);
+        let cell = |name: &str| cells[columns.iter().position(|column| column == name).unwrap()].as_str();
+        assert_eq!(cell("iou_hm"), "", "an undefined IoU");
+        assert_eq!(["majpe_mm", "pa_majpe_mm", "init_ms", "fit_ms"].map(cell), ["", "", "2", "5"]);
         let failed = BatchRow { index: 0, frame: "b".into(), fit: Err("why".into()) };
         assert_eq!(failed.cells(1)[1..7], ["", "", "error: why", "", "", ""]);
         assert_eq!(failed.json(&columns)["loss"], Value::Null);
+    }
+    /// Head, row and mean of the term that only unit tests have.
+    #[test]
+    fn the_dummy_term_has_a_column() {
+        let columns = super::super::columns(&["hm".to_owned()]);
+        let place = columns.iter().position(|column| column == "dummy").unwrap();
+        assert_eq!(row(1.0, None, true).cells(1)[place], "0.7");
+        let mut means = Means::new(1);
+        means.add(&row(1.0, None, true));
+        assert_eq!(means.json(&columns)["dummy"], 0.7);
     }
 }

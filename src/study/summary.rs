@@ -1,17 +1,19 @@
 //! `summary.csv`: a row a frame; an interrupted run leaves a valid table of what it did ([`Growing`]).
 
 use super::BatchRow;
+use crate::mhp::{StepReport, TERMS};
 use crate::output::Growing;
 use std::path::{Path, PathBuf};
 
 /// The columns before the numbers.
 pub(super) const FIRST: [&str; 6] = ["frame", "iterations", "converged", "reason", "people", "annotated"];
-pub(super) const LOSSES: [&str; 7] = ["loss", "em", "bone", "rigid", "joint", "sep", "coll"];
+/// Columns of numbers before the IoUs: the loss and its terms.
+pub(super) const LOSSES: usize = 1 + TERMS.len();
 const LAST: [&str; 4] = ["majpe_mm", "pa_majpe_mm", "init_ms", "fit_ms"];
 /// Joint errors: the first of [`LAST`].
 pub(super) const ERRORS: usize = 2;
 /// Columns of numbers, besides one for the IoU of each view.
-pub(super) const NUMBERS: usize = LOSSES.len() + LAST.len();
+pub(super) const NUMBERS: usize = LOSSES + LAST.len();
 
 /// What can go wrong with a study as a whole.
 #[derive(Debug, thiserror::Error)]
@@ -69,12 +71,22 @@ pub enum StudyError {
     },
 }
 
-/// The columns of a batch, in order: `frame iterations converged reason people annotated loss em bone rigid joint sep coll iou_<array>…
-/// majpe_mm pa_majpe_mm init_ms fit_ms`, an IoU for each of `arrays`.
+/// The columns of a batch, in order: `frame iterations converged reason people annotated loss`, each of [`TERMS`],
+/// `iou_<array>…  majpe_mm pa_majpe_mm init_ms fit_ms`, an IoU for each of `arrays`.
 pub fn columns(arrays: &[String]) -> Vec<String> {
     let plain = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
     let ious = arrays.iter().map(|array| format!("iou_{array}")).collect();
-    [plain(&FIRST), plain(&LOSSES), ious, plain(&LAST)].concat()
+    [plain(&FIRST), losses().map(str::to_owned).collect(), ious, plain(&LAST)].concat()
+}
+
+/// The names of the columns of the loss and its terms.
+pub(super) fn losses() -> impl Iterator<Item = &'static str> {
+    ["loss"].into_iter().chain(TERMS.iter().map(|term| term.key))
+}
+
+/// The numbers of these columns.
+pub(super) fn loss_values(report: &StepReport) -> impl Iterator<Item = f64> {
+    [report.loss].into_iter().chain(report.terms.iter().map(|(_, value)| value))
 }
 
 /// An open `summary.csv`.

@@ -5,7 +5,7 @@ use crate::cases::Case;
 use crate::reading::case_folders;
 use mhp_inspector::body::Group;
 use mhp_inspector::config::{EmRegion, FitConfig};
-use mhp_inspector::mhp::{FitError, Fitter, Objective, Precision, Problem, Region, masks, simulate};
+use mhp_inspector::mhp::{FitError, Fitter, Objective, Precision, Problem, Region, TermId, masks, simulate};
 use mhp_inspector::radar::View;
 use std::sync::Arc;
 
@@ -97,8 +97,9 @@ fn a_changed_configuration_counts_from_the_current_parameters_on() {
     fitter.set_config(config).unwrap();
     let after = fitter.report();
     assert_eq!((after.iteration, fitter.config()), (1, &config));
-    assert_eq!(after.terms.bone, before.terms.bone);
-    assert!(after.loss != before.loss && after.terms.em != before.terms.em);
+    let [em, bone] = ["em", "bone"].map(|key| TermId::of(key).unwrap());
+    assert_eq!(after.terms[bone], before.terms[bone]);
+    assert!(after.loss != before.loss && after.terms[em] != before.terms[em]);
     assert_eq!(fitter.objective().regions(), region, "the region is that of the initial persons");
     fitter.set_config(FitConfig { em_region: EmRegion::Full, ..config }).unwrap();
     let whole: Vec<Region> = fitter.objective().problem().views.iter().map(Region::whole).collect();

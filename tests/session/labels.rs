@@ -7,7 +7,7 @@ use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::diagnose::Evidence;
 use mhp_inspector::labels::{Change, FrameId, Judged, Label, LabelPlace, Record, Tag};
-use mhp_inspector::mhp::{Evaluation, Problem, Terms, initialise};
+use mhp_inspector::mhp::{Evaluation, Problem, initialise};
 use mhp_inspector::session::{
     ActKind, Changes, Command, Commit, Done, Effect, FitHashes, LabelStatus, LabelTable, LogLevel, OpenedLabels,
     Session, SessionFile, StrataStatus, Written,
@@ -132,14 +132,8 @@ impl Bench {
 
     /// The worker shows these parameters; answers under which key evidence on them is asked for.
     fn draw(&mut self, params: Pppr) -> Option<FitHashes> {
-        let zeros = Pppr::zeros(params.shape());
-        let evaluation = Evaluation {
-            loss: 1.0,
-            terms: Terms::default(),
-            iou: vec![None; 2].into(),
-            gradient: zeros.clone(),
-            em_gradient: zeros,
-        };
+        let zeros = Evaluation::zeros(params.shape());
+        let evaluation = Evaluation { loss: 1.0, iou: vec![None; 2].into(), ..zeros };
         let (job, config) = (self.session.fit.job, FitConfig::default());
         let (h_sim, masks) = (Vec::new(), Vec::new());
         let (branch, iteration, live, iterations_per_s) = (0, 0, true, 0.0);

@@ -134,14 +134,8 @@ impl Bench {
 
     fn snapshot(&mut self, job: JobId, branch: u32, iteration: usize, live: bool) {
         let params = self.state(iteration).params.clone();
-        let zeros = Pppr::zeros(params.shape());
-        let evaluation = Evaluation {
-            loss: loss(iteration),
-            terms: Terms::default(),
-            iou: vec![None; 2].into(),
-            gradient: zeros.clone(),
-            em_gradient: zeros,
-        };
+        let zeros = Evaluation::zeros(params.shape());
+        let evaluation = Evaluation { loss: loss(iteration), iou: vec![None; 2].into(), ..zeros };
         let config = FitConfig::default();
         let (h_sim, masks) = (Vec::new(), Vec::new());
         let iterations_per_s = 0.0;

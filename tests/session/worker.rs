@@ -5,7 +5,7 @@ use crate::blob;
 use crossbeam_channel::{Receiver, unbounded};
 use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::{Dataset, Frame};
-use mhp_inspector::mhp::{FitState, Precision, StepReport, StopReason};
+use mhp_inspector::mhp::{FitState, Precision, StopReason, Terms};
 use mhp_inspector::task::Progress;
 use mhp_inspector::worker::{
     HistoryRow, JobId, Prepare, PreparedFit, Snapshot, Start, Worker, WorkerCommand, WorkerEvent, WorkerMessage,
@@ -140,15 +140,14 @@ fn iterations(rows: &[HistoryRow]) -> Vec<usize> {
     rows.iter().map(|row| row.report.iteration).collect()
 }
 
-/// L of a row's terms under these weights.
-fn weighted(report: &StepReport, config: &FitConfig) -> f64 {
-    let t = &report.terms;
-    config.w_em * t.em + config.w_kine * (t.bone + t.rigid + t.joint + t.sep + t.coll)
+/// L of these terms under these weights.
+fn weighted(terms: &Terms, config: &FitConfig) -> f64 {
+    terms.iter().map(|(term, value)| term.weight.of(config) * value).sum()
 }
 
 fn assert_weights(rows: &[HistoryRow], config: &FitConfig) {
     for row in rows {
-        let expected = weighted(&row.report, config);
+        let expected = weighted(&row.report.terms, config);
         let error = (row.report.loss - expected).abs();
         assert!(error <= 1e-12 * expected.abs(), "iteration {}: {error}", row.report.iteration);
     }
@@ -310,7 +309,10 @@ fn settings_changed_during_a_run_hold_from_the_next_step() {
     assert_eq!(after[0].report.iteration, k + 1);
     assert_weights(&rows, &old);
     assert_weights(&after, &new);
-    assert!((after[0].report.loss - weighted(&after[0].report, &old)).abs() > 1e-6, "the weights make a difference");
+    assert!(
+        (after[0].report.loss - weighted(&after[0].report.terms, &old)).abs() > 1e-6,
+        "the weights make a difference"
+    );
     let size = |row: &HistoryRow| state(row).losses.len();
     assert!(size(&after[0]) <= 6, "losses to look back on");
 }
@@ -462,8 +464,7 @@ fn looking_back_neither_disturbs_the_run_nor_is_lost() {
     let answer = rig.worker.take_snapshot().unwrap();
     assert!(!answer.live);
     assert_eq!((answer.iteration, &answer.params, answer.config.w_em), (3, &state.params, 7.0));
-    let t = answer.evaluation.terms;
-    let expected = 7.0 * t.em + 0.5 * (t.bone + t.rigid + t.joint + t.sep + t.coll);
+    let expected = weighted(&answer.evaluation.terms, &config);
     assert!((answer.evaluation.loss - expected).abs() < 1e-12);
     let live = rig.snapshot(|snapshot| snapshot.live && snapshot.iteration > 6);
     assert!(live.iterations_per_s > 0.0);

@@ -704,7 +704,7 @@ fn a_score_rises_with_every_measure_and_stays_within_bounds() {
                     .map(|(k, input)| {
                         let reach = input.range[1] - input.range[0];
                         let value = if k == moved { f64::from(step) / 20.0 } else { 0.5 };
-                        Measure { name: input.name.clone().leak(), value: input.range[0] + value * reach }
+                        Measure { name: input.name.clone().into(), value: input.range[0] + value * reach }
                     })
                     .collect();
                 assert_eq!(table.curve(curve.mode, &measures), Some(curve));

@@ -12,3 +12,6 @@ mod evidence;
 mod export;
 mod maps;
 mod runs;
+mod shards;
+#[cfg(unix)]
+mod slurm;

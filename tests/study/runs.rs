@@ -54,7 +54,7 @@ impl Case {
 
     fn merge(&self, runs: &[&str], out: &str) -> Output {
         let mut command = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"));
-        command.args(["study", "merge"]).args(runs.iter().map(|run| self.run(run)));
+        command.arg("merge").args(runs.iter().map(|run| self.run(run)));
         command.arg("--out").arg(self.run(out)).output().unwrap()
     }
 
@@ -146,10 +146,15 @@ fn threads_and_shards_make_no_difference() {
     same(&case, "one", "merged");
     let refused = |runs: &[&str]| text(&case.merge(runs, "other").stderr);
     assert!(refused(&names[..3]).contains("shard 1/4 is missing"), "{}", refused(&names[..3]));
+    assert!(refused(&names[1..3]).contains("shards 1/4, 4/4 are missing"), "{}", refused(&names[1..3]));
     assert!(refused(&[names[0], names[0]]).contains("comes twice"));
     assert!(refused(&["one"]).contains("is no shard"));
     std::fs::remove_file(case.run("shard2").join(TABLE_FILE)).unwrap();
-    assert!(refused(&names).contains("is not finished"));
+    let unfinished = refused(&names);
+    assert!(
+        unfinished.contains("shard 2/4 is missing") && unfinished.contains("shard2 is not finished"),
+        "{unfinished}"
+    );
 }
 
 #[test]
@@ -491,7 +496,7 @@ fn a_data_set_in_a_folder_that_is_no_text_is_studied() {
         assert!(study(&["--shard", &format!("{k}/2")], &format!("part{k}")).status.success());
     }
     let mut merge = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"));
-    merge.args(["study", "merge"]).args(["part1", "part2"].map(|part| runs.join(part)));
+    merge.arg("merge").args(["part1", "part2"].map(|part| runs.join(part)));
     let merged = merge.arg("--out").arg(runs.join("merged")).output().unwrap();
     assert!(merged.status.success(), "{}", text(&merged.stderr));
     for file in REPRODUCIBLE {

@@ -134,7 +134,8 @@ fn a_setting_changed_at_an_earlier_iteration_branches_and_discard_goes_back() {
     assert_eq!(branches, [(0, None, 20), (1, Some((0, 10)), 10)]);
     window.key(Key::Enter);
     window.paused_at(20);
-    let row = |branch: u32| window.fit().history.branch(branch).unwrap().row(20).unwrap().report.terms.em;
+    let row =
+        |branch: u32| window.fit().history.branch(branch).unwrap().row(20).unwrap().report.terms.get("em").unwrap();
     assert_ne!(row(0), row(1));
     window.click("Discard run");
     window.until("branch 0", |w| w.fit().history.active_id() == 0);

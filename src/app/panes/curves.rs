@@ -7,6 +7,7 @@ use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::CTRL;
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
+use crate::mhp::{Scope, TermId, Weight};
 use crate::session::{Branch, Command, FitStatus, IterationRow, PinRow, Session, numbers};
 use crate::worker::JobId;
 use egui::{Color32, Key, Ui};
@@ -231,19 +232,8 @@ fn curves(shared: &Shared<'_>, branch: &Branch, tab: Tab) -> Vec<Curve> {
         shared.session.fit.problem.iter().flat_map(|p| &p.views).map(|view| view.array.clone()).collect();
     match tab {
         Tab::Loss => {
-            let mut curves = vec![
-                curve("total", "L", 2.0, |r| Some(r.report.loss)),
-                curve("em", "L_EM", 1.5, |r| Some(r.report.terms.em)),
-                curve("bone", "L_bone", 1.5, |r| Some(r.report.terms.bone)),
-                curve("rigid", "L_rigid", 1.5, |r| Some(r.report.terms.rigid)),
-                curve("joint", "L_joint", 1.5, |r| Some(r.report.terms.joint)),
-            ];
-            let persons = shared.session.fit.initial.as_ref().map_or(1, |p| p.shape().persons);
-            if persons > 1 {
-                curves.push(curve("sep", "L_sep", 1.5, |r| Some(r.report.terms.sep)));
-                curves.push(curve("coll", "L_coll", 1.5, |r| Some(r.report.terms.coll)));
-            }
-            curves
+            let fit = &shared.session.fit;
+            loss_curves(fit.initial.as_ref().map_or(1, |p| p.shape().persons), fit.history.branches())
         }
         Tab::Quality => {
             let mut curves: Vec<Curve> = arrays
@@ -261,6 +251,21 @@ fn curves(shared: &Shared<'_>, branch: &Branch, tab: Tab) -> Vec<Curve> {
             curves
         }
     }
+}
+
+/// L, and each of its terms that can be other than 0 with so many persons under the settings of these branches.
+fn loss_curves(persons: usize, branches: &[Branch]) -> Vec<Curve> {
+    let weighed = |weight: Weight| {
+        let settings = branches.iter().flat_map(|b| b.flags.iter().map(|flag| &flag.config).chain([&b.config]));
+        settings.into_iter().any(|config| weight.of(config) > 0.0)
+    };
+    let shown = TermId::all().filter(|term| match term.scope {
+        Scope::Always => true,
+        Scope::People => persons > 1,
+        Scope::Weighed => weighed(term.weight),
+    });
+    let terms = shown.map(|term| curve(term.key, term.label, 1.5, move |r: &IterationRow| Some(r.report.terms[term])));
+    [curve("total", "L", 2.0, |r| Some(r.report.loss))].into_iter().chain(terms).collect()
 }
 
 fn label(hover: &egui_plot::HoverPosition<'_>, log: bool) -> Option<String> {
@@ -354,6 +359,26 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::FitConfig;
+    use crate::mhp::{StepReport, Terms};
+
+    /// The keys of the curves of a fit of one person, and what they show of a row.
+    fn shown(config: FitConfig) -> Vec<(String, Option<f64>)> {
+        let terms = Terms::from_fn(|term| if term.key == "dummy" { 0.7 } else { 0.1 });
+        let report = StepReport { iteration: 0, loss: 1.0, terms, iou: vec![None].into(), converged: false };
+        let row = IterationRow { report, state: None, majpe_mm: None };
+        let branch = Branch { id: 0, parent: None, config, rows: vec![row.clone()], flags: Vec::new() };
+        loss_curves(1, &[branch]).into_iter().map(|curve| (curve.key, (curve.value)(&row))).collect()
+    }
+
+    #[test]
+    fn the_dummy_term_has_a_curve_where_it_has_a_weight() {
+        let weighed = FitConfig { w_time: 8.0, w_dummy: 1.0, ..FitConfig::default() };
+        let keys = |config| shown(config).into_iter().map(|(key, _)| key).collect::<Vec<_>>();
+        assert_eq!(keys(FitConfig::default()), ["total", "em", "bone", "rigid", "joint"]);
+        assert_eq!(keys(weighed), ["total", "em", "bone", "rigid", "joint", "time", "dummy"]);
+        assert!(shown(weighed).contains(&("dummy".to_owned(), Some(0.7))));
+    }
 
     #[test]
     fn numbers_along_the_iterations_are_round_and_have_room() {

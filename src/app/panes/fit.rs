@@ -5,7 +5,7 @@ use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, chip, icon_button, iou_color, settings, value_row};
 use crate::config::{Convergence, FieldGroup, FitConfig, Preset, difference};
-use crate::mhp::Precision;
+use crate::mhp::{Precision, Scope, TERMS, TermId, Terms, formula};
 use crate::session::{Command, FitStatus};
 use egui::{Key, RichText, Ui};
 
@@ -149,8 +149,9 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
         // The same rows without numbers, so that nothing jumps while the next frame is prepared.
         let arrays =
             shared.session.data.dataset.iter().flat_map(|d| &d.info().views).map(|v| format!("IoU {}", v.array));
-        let names = ["Iteration", "L total", "L_EM", "L_bone", "L_rigid", "L_joint"].map(str::to_owned);
-        for name in names.into_iter().chain(arrays) {
+        let terms = TERMS.iter().filter(|term| term.scope == Scope::Always).map(|term| term.label);
+        let names = ["Iteration", "L total"].into_iter().chain(terms).map(str::to_owned);
+        for name in names.chain(arrays) {
             value_row(ui, &name, "—", "");
         }
         if let Some(error) = &shared.session.data.error {
@@ -173,23 +174,9 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
             fit.initial.as_ref().map_or(0, |initial| initial.shape().persons)
         ));
     }
-    value_row(ui, "L total", &format!("{loss:.5}"), "")
-        .on_hover_text("L = w_EM·L_EM + w_kine·(L_bone + L_rigid + L_joint + L_sep + L_coll)");
-    value_row(ui, "L_EM", &format!("{:.5}", terms.em), "")
-        .on_hover_text("Mean over the views of one minus the soft IoU.");
-    value_row(ui, "L_bone", &format!("{:.5}", terms.bone), "")
-        .on_hover_text("Σ ψ(l − ℓ) over the bones: length against reference.");
-    value_row(ui, "L_rigid", &format!("{:.5}", terms.rigid), "")
-        .on_hover_text("Σ ψ of the relative velocity along each bone.");
-    value_row(ui, "L_joint", &format!("{:.5}", terms.joint), "")
-        .on_hover_text("Σ max(0, θ − θ_max)² over elbows and knees, rad².");
-    if terms.time != 0.0 {
-        value_row(ui, "L_time", &format!("{:.5}", terms.time), "")
-            .on_hover_text("Σ ‖c − ĉ‖² to where the frames around say that each person is, m².");
-    }
-    if terms.sep != 0.0 || terms.coll != 0.0 {
-        value_row(ui, "L_sep", &format!("{:.5}", terms.sep), "");
-        value_row(ui, "L_coll", &format!("{:.5}", terms.coll), "");
+    value_row(ui, "L total", &format!("{loss:.5}"), "").on_hover_text(formula());
+    for (term, value) in shown_terms(&terms) {
+        value_row(ui, term.label, &format!("{value:.5}"), "").on_hover_text(term.tooltip());
     }
     let names = fit.problem.iter().flat_map(|p| &p.views).map(|v| v.array.as_str());
     for (name, iou) in names.zip(&iou) {
@@ -209,6 +196,12 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
         value_row(ui, "MAJPE", &format!("{majpe:.1}"), "mm")
             .on_hover_text("Mean absolute joint position error against the data set's joints.");
     }
+}
+
+/// The terms that every fit has, and of the others those of a scope where one of them is not 0.
+fn shown_terms(terms: &Terms) -> impl Iterator<Item = (TermId, f64)> {
+    let there = |scope: Scope| terms.iter().any(|(term, value)| term.scope == scope && value != 0.0);
+    terms.iter().filter(move |(term, _)| term.scope == Scope::Always || there(term.scope))
 }
 
 /// Every group but the weights, which stand above, each under its head.
@@ -277,5 +270,24 @@ fn presets(ui: &mut Ui, config: &mut FitConfig) {
             }
             ui.label(RichText::new(preset.help()).small().color(tokens.dim));
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_dummy_term_has_a_number_and_is_explained() {
+        let terms = Terms::from_fn(|term| if term.key == "dummy" { 0.7 } else { 0.0 });
+        let shown: Vec<(&str, f64)> = shown_terms(&terms).map(|(term, value)| (term.label, value)).collect();
+        assert!(shown.contains(&("L_dummy", 0.7)) && shown.contains(&("L_joint", 0.0)), "{shown:?}");
+        assert!(shown.iter().all(|(label, _)| !["L_sep", "L_coll"].contains(label)), "{shown:?}");
+        assert!(formula().ends_with(" + w_time·L_time + w_dummy·L_dummy"), "{}", formula());
+        let said: Vec<String> = TERMS.iter().map(|term| term.tooltip()).collect();
+        assert!(
+            said.contains(&"L_dummy = ½ Σ ‖p‖², m². How far the joints are from the radar.".to_owned()),
+            "{said:?}"
+        );
     }
 }

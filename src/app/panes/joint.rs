@@ -1,11 +1,13 @@
-//! The joint inspector: every parameter of the selected joint, its gradient split into the electromagnetic and the
-//! kinematic part, and fields to edit it by hand.
+//! The joint inspector: every parameter of the selected joint, its gradient split into what the maps, the body and the
+//! frames around contribute, and fields to edit it by hand.
 
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::body::{Group, Pppr};
+use crate::config::FitConfig;
+use crate::mhp::{Scope, TermGroup, Weight};
 use crate::session::{Command, Session};
 use egui::{Key, RichText, Ui};
 
@@ -63,7 +65,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     }
     let Some((.., edited)) = &mut state.edit else { return };
     let evaluation = &snapshot.evaluation;
-    let w_em = snapshot.config.w_em;
+    let parts = parts(&snapshot.config);
     let tokens = Tokens::of(ui);
     let editable = session.fit.is_ready() && !session.fit.is_running();
     let mut committed = false;
@@ -71,17 +73,22 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         derived(ui, &snapshot.params, joint, &tokens);
         ui.horizontal(|ui| {
             ui.label(RichText::new("gradient of").size(10.0).color(tokens.dim));
-            ui.label(RichText::new("■ w_EM·L_EM").size(10.0).color(tokens.curve("em")))
-                .on_hover_text("Gradient of the weighted electromagnetic term.");
-            ui.label(RichText::new("■ w_kine·L_kine").size(10.0).color(tokens.curve("bone")))
-                .on_hover_text("Gradient of the weighted kinematic terms.");
+            for part in &parts {
+                ui.label(RichText::new(format!("■ {}", part.label)).size(10.0).color(tokens.group(part.group)))
+                    .on_hover_text(format!("Gradient of the weighted {}.", part.words));
+            }
         });
-        egui::Grid::new("joint parameters").num_columns(4).spacing([8.0, 2.0]).min_col_width(58.0).show(ui, |ui| {
+        let grid = egui::Grid::new("joint parameters").num_columns(2 + parts.len());
+        grid.spacing([8.0, 2.0]).min_col_width(58.0).show(ui, |ui| {
             for group in Group::ALL.into_iter().filter(|g| *g != Group::Omega) {
                 let (title, names, unit, speed) = components(group);
                 let title_text = if unit.is_empty() { title.to_owned() } else { format!("{title} / {unit}") };
                 ui.label(RichText::new(title_text).small().color(tokens.text));
                 ui.end_row();
+                let slopes: Vec<_> = parts
+                    .iter()
+                    .map(|part| (part.group, evaluation.joint_gradient(part.group, &snapshot.config, group, joint)))
+                    .collect();
                 for (i, name) in names.iter().enumerate() {
                     ui.label(RichText::new(format!("   {name}")).color(tokens.dim));
                     let value = &mut edited.joint_mut(group, joint)[i];
@@ -93,10 +100,9 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
                         if editable { "Edit by hand. An edit starts a branch." } else { "Pause the run to edit." };
                     committed |= response.drag_stopped() || (response.changed() && !response.dragged());
                     response.on_hover_text(tip).on_disabled_hover_text(tip);
-                    let em = w_em * evaluation.em_gradient.joint(group, joint)[i];
-                    let kinematic = evaluation.gradient.joint(group, joint)[i] - em;
-                    ui.label(gradient(em, tokens.curve("em"), &tokens));
-                    ui.label(gradient(kinematic, tokens.curve("bone"), &tokens));
+                    for (part, slopes) in &slopes {
+                        ui.label(gradient(slopes[i], tokens.group(*part), &tokens));
+                    }
                     ui.end_row();
                 }
             }
@@ -110,6 +116,28 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         state.edit = None;
         shared.send(Command::EditParams(params));
     }
+}
+
+/// A part of the gradient that has a column of its own.
+struct Part {
+    group: TermGroup,
+    /// `w_EM·L_EM`.
+    label: String,
+    /// `kinematic terms`.
+    words: String,
+}
+
+/// The parts that a gradient under these settings has: the temporal one only where something of it is weighed.
+fn parts(config: &FitConfig) -> Vec<Part> {
+    let of_group = |group: TermGroup| {
+        let weights: Vec<Weight> =
+            group.weights().filter(|w| w.terms().any(|t| t.scope != Scope::Weighed) || w.of(config) > 0.0).collect();
+        let labels: Vec<String> = weights.iter().map(|w| format!("{}·{}", w.label(), w.sum_label())).collect();
+        let count = weights.iter().map(|w| w.terms().count()).sum::<usize>();
+        let words = format!("{} term{}", group.word(), if count == 1 { "" } else { "s" });
+        (count > 0).then(|| Part { group, label: labels.join(" + "), words })
+    };
+    TermGroup::ALL.into_iter().filter_map(of_group).collect()
 }
 
 /// A joint chosen by name, and the one before or after.
@@ -202,5 +230,26 @@ fn omega(ui: &mut Ui, params: &Pppr, total: &Pppr, joint: usize, tokens: &Tokens
             egui::pos2(x + (width - 1.0).max(1.0), rect.center().y - height),
         );
         ui.painter().rect_filled(bar, 0.0, tokens.accent);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::PpprShape;
+    use crate::mhp::Evaluation;
+
+    #[test]
+    fn the_dummy_term_is_part_of_the_temporal_gradient() {
+        let labels = |config: FitConfig| parts(&config).into_iter().map(|part| part.label).collect::<Vec<_>>();
+        assert_eq!(labels(FitConfig::default()), ["w_EM·L_EM", "w_kine·L_kine"]);
+        let config = FitConfig { w_time: 8.0, w_dummy: 2.0, ..FitConfig::default() };
+        assert_eq!(labels(config), ["w_EM·L_EM", "w_kine·L_kine", "w_time·L_time + w_dummy·L_dummy"]);
+        let mut evaluation = Evaluation::zeros(PpprShape { persons: 1, joints: 2, doppler_features: 1 });
+        evaluation.gradients[Weight::Dummy as usize].set_vec3(Group::Position, 1, [1.0, 2.0, 3.0]);
+        evaluation.gradients[Weight::Time as usize].set_vec3(Group::Position, 1, [1.0, 1.0, 1.0]);
+        let of = |group| evaluation.joint_gradient(group, &config, Group::Position, 1).to_vec();
+        assert_eq!(of(TermGroup::Temporal), [10.0, 12.0, 14.0]);
+        assert_eq!(of(TermGroup::Kinematic), [0.0; 3]);
     }
 }

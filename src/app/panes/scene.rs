@@ -332,7 +332,9 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
             ui.menu_button("Show", |ui| {
                 ui.checkbox(&mut view.show_velocity, "Velocity").on_hover_text("v of each joint, 0.3 s long.");
                 ui.checkbox(&mut view.show_gradients, "Descent directions")
-                    .on_hover_text("−∂L/∂p at each joint: blue the electromagnetic part, orange the kinematic part.");
+                    .on_hover_text(
+                        "−∂L/∂p at each joint: blue the electromagnetic part, orange the kinematic part, rose the temporal part.",
+                    );
                 ui.checkbox(&mut view.show_truth, "Truth")
                     .on_hover_text("The data set's joints in metres, where it has them.");
                 ui.checkbox(&mut view.show_initial, "Start pose");

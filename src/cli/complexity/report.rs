@@ -1,6 +1,6 @@
 //! What `complexity` prints and writes.
 
-use crate::dataset::Dataset;
+use super::Named;
 use crate::escape::one_line;
 use crate::study::complexity::{Complexity, FrameComplexity, Stratum};
 use std::fmt::Write as _;
@@ -12,11 +12,11 @@ const HARDEST: usize = 10;
 type Column = fn(&FrameComplexity) -> Option<f64>;
 
 /// Counts, quantiles and the hardest frames, for people.
-pub(super) fn summary(dataset: &Dataset, complexity: &Complexity) -> String {
+pub(super) fn summary(named: &Named<'_>, complexity: &Complexity) -> String {
     let counts = &complexity.counts;
     let counted = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
-    let (frames, sequences) = (counted(dataset.len(), "frame"), counted(dataset.sequences(), "sequence"));
-    let mut text = format!("{}: {frames} in {sequences}\n", one_line(&dataset.info().name));
+    let (frames, sequences) = (counted(complexity.frames.len(), "frame"), counted(named.sequences, "sequence"));
+    let mut text = format!("{}: {frames} in {sequences}\n", one_line(named.data_set));
     for stratum in Stratum::ALL {
         let _ = writeln!(text, "  {:<12}{:>8}", stratum.word(), counts.in_stratum(stratum));
     }
@@ -38,18 +38,18 @@ pub(super) fn summary(dataset: &Dataset, complexity: &Complexity) -> String {
         let cells = quantiles.map(|x| right(&number(Some(x).filter(|x| !x.is_nan())))).concat();
         let _ = writeln!(text, "{name:<18}{cells}  {:>7}", values.len());
     }
-    hardest(dataset, complexity, &mut text);
+    hardest(named, complexity, &mut text);
     text
 }
 
-fn hardest(dataset: &Dataset, complexity: &Complexity, text: &mut String) {
+fn hardest(named: &Named<'_>, complexity: &Complexity, text: &mut String) {
     let hardness = |(i, frame): (usize, &Option<FrameComplexity>)| Some((frame.as_ref()?.hardness?, i));
     let mut order: Vec<(f64, usize)> = complexity.frames.iter().enumerate().filter_map(hardness).collect();
     order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     let lines: Vec<(String, &FrameComplexity)> = order
         .iter()
         .take(HARDEST)
-        .filter_map(|&(_, i)| Some((one_line(dataset.frame_name(i)).into_owned(), complexity.frame(i)?)))
+        .filter_map(|&(_, i)| Some((one_line((named.frame)(i)).into_owned(), complexity.frame(i)?)))
         .collect();
     let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).max("the hardest".len());
     let head = ["hardness", "peaks", "static", "human"].map(right).concat();

@@ -4,11 +4,16 @@ mod report;
 
 use super::common::{CsvArgs, complain, inputs, open, print, print_json, progress_bar};
 use super::frames::{FrameRange, chosen};
+use super::merge::MergeArgs;
+use super::shards::{ShardArgs, end};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
-use crate::study::count::{FrameCount, count_frames};
+use crate::study::count::{FrameCount, count_frames, identify};
+use crate::study::shard::{FrameCommand, ShardFolder, ShardSpec, Whole};
 use anyhow::Context as _;
 use clap::Args;
-use std::path::PathBuf;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Shown under the options of `count --help`.
@@ -29,7 +34,9 @@ Examples:
   mhp-inspector count data/mmvr
       A line a frame, and how often the count is that of the labels.
   mhp-inspector count data/mmvr --frames 0..100 --csv counts.csv
-      The first hundred frames, and a table of them.";
+      The first hundred frames, and a table of them.
+  mhp-inspector count data/mmvr --shard 2/8 --out shards/2
+      The second of eight parts; `mhp-inspector merge shards/* --out whole` writes the table of all.";
 
 /// What `count` is told.
 #[derive(Debug, Args)]
@@ -50,6 +57,8 @@ pub struct CountArgs {
     /// One JSON object instead of the table: an array `frames`, and `confusion` where counts are annotated.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    part: ShardArgs,
 }
 
 /// Runs `count`.
@@ -60,19 +69,62 @@ pub(super) fn run(args: &CountArgs) -> anyhow::Result<ExitCode> {
     args.cells.apply();
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
-    if let Some(file) = &args.csv {
-        inputs(&dataset, &args.path, &[args.manifest.as_deref()]).check_file(file)?;
+    let inputs = inputs(&dataset, &args.path, &[args.manifest.as_deref()]);
+    let settings = Settings { frame_rate_hz: dataset.info().frame_rate_hz };
+    let count = |frames: Range<usize>| {
+        let bar = progress_bar(frames.len());
+        let rows = count_frames(&dataset, frames, || bar.inc(1)).with_context(|| args.path.display().to_string());
+        bar.finish_and_clear();
+        rows
+    };
+    if let Some((shard, out)) = args.part.asked() {
+        let spec = ShardSpec::new(FrameCommand::Count, &dataset, &frames, shard, &settings)?;
+        let folder = ShardFolder::begin(out, &[], spec, &inputs)?;
+        let rows = count(shard.stretch(&frames))?;
+        folder.finish(&rows)?;
+        return Ok(end(shard, out, &rows));
     }
-    let bar = progress_bar(frames.len());
-    let rows = count_frames(&dataset, frames, || bar.inc(1)).with_context(|| args.path.display().to_string())?;
-    bar.finish_and_clear();
     if let Some(file) = &args.csv {
-        report::write_csv(file, &dataset, &rows)?;
+        inputs.check_file(file)?;
     }
-    if args.json {
-        print_json(&report::json(&dataset, &rows)?)?;
+    tell(&dataset.info().name, count(frames)?, &settings, args.csv.as_deref(), args.json)
+}
+
+/// Runs `merge` on shards of `count`.
+///
+/// # Errors
+/// Where they are not one whole, or the folder cannot be written.
+pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<ExitCode> {
+    let Whole { spec, rows, folders } = Whole::<FrameCount>::read(&args.shards)?;
+    let whole = args.begin(&spec, &folders, &[])?;
+    let file = whole.file("count.csv")?;
+    tell(&spec.data.name, rows, &spec.settings()?, Some(&file), args.json)
+}
+
+/// What the identities depend on, besides the frames.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Settings {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    frame_rate_hz: Option<f64>,
+}
+
+/// Tells who is who, writes the table, prints.
+fn tell(
+    data_set: &str,
+    mut rows: Vec<FrameCount>,
+    settings: &Settings,
+    csv: Option<&Path>,
+    json: bool,
+) -> anyhow::Result<ExitCode> {
+    identify(&mut rows, settings.frame_rate_hz);
+    if let Some(file) = csv {
+        report::write_csv(file, &rows)?;
+    }
+    if json {
+        print_json(&report::json(data_set, &rows)?)?;
     } else {
-        print(&report::table(&dataset, &rows))?;
+        print(&report::table(&rows))?;
     }
     Ok(tell_failures(&rows))
 }

@@ -1,31 +1,30 @@
 //! What `count` prints and writes.
 
-use crate::dataset::Dataset;
 use crate::escape::{one_line, to_cell};
 use crate::output::{Sink, replace_file};
-use crate::people::{CLASSES, Confusion, Count};
-use crate::study::count::{FrameCount, confusion};
+use crate::people::{CLASSES, Confusion};
+use crate::study::count::{FrameCount, People, confusion};
 use anyhow::Context as _;
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::Path;
 
 /// A line a frame, then how often the count is the annotated one.
-pub(super) fn table(dataset: &Dataset, rows: &[FrameCount]) -> String {
-    let name = |row: &FrameCount| one_line(dataset.frame_name(row.frame)).into_owned();
+pub(super) fn table(rows: &[FrameCount]) -> String {
+    let name = |row: &FrameCount| one_line(&row.frame).into_owned();
     let width = rows.iter().map(|row| name(row).chars().count()).max().unwrap_or(0).max("frame".len());
     let mut text = format!("{:<width$}  people      p  annotated  places (x y z, m)\n", "frame");
     for row in rows {
         let annotated = row.annotated.map_or_else(|| "-".into(), |n| n.to_string());
         let (people, p) = match &row.count {
-            Ok(count) => (told(count), format!("{:.3}", count.probability(count.people()))),
+            Ok(count) => (told(count), format!("{:.3}", count.probability())),
             Err(_) => ("-".into(), "-".into()),
         };
-        let places: Vec<String> = row.places.iter().map(|[x, y, z]| format!("{x:.2} {y:.2} {z:.2}")).collect();
+        let places: Vec<String> = row.places().iter().map(|[x, y, z]| format!("{x:.2} {y:.2} {z:.2}")).collect();
         let line = format!("{:<width$}  {people:>6}  {p:>5}  {annotated:>9}  {}", name(row), places.join("; "));
         let _ = writeln!(text, "{}", line.trim_end());
     }
-    if rows.iter().any(|row| row.count.as_ref().is_ok_and(Count::is_uncertain)) {
+    if rows.iter().any(|row| row.count.as_ref().is_ok_and(|count| count.uncertain)) {
         text +=
             "\n? counted from one frame alone, and uncertain: without frames around it furniture looks like people\n";
     }
@@ -34,8 +33,8 @@ pub(super) fn table(dataset: &Dataset, rows: &[FrameCount]) -> String {
 }
 
 /// The number, with a question mark where it may well be wrong.
-fn told(count: &Count) -> String {
-    shown(count.people()) + if count.is_uncertain() { "?" } else { "" }
+fn told(count: &People) -> String {
+    shown(count.people) + if count.uncertain { "?" } else { "" }
 }
 
 fn summary(confusion: &Confusion, text: &mut String) {
@@ -91,31 +90,30 @@ struct Document {
 }
 
 /// One JSON document.
-pub(super) fn json(dataset: &Dataset, rows: &[FrameCount]) -> anyhow::Result<String> {
+pub(super) fn json(data_set: &str, rows: &[FrameCount]) -> anyhow::Result<String> {
     let confusion = confusion(rows);
     let document = Document {
-        data_set: dataset.info().name.clone(),
-        frames: rows.iter().map(|row| of(dataset, row)).collect(),
+        data_set: data_set.to_owned(),
+        frames: rows.iter().map(of).collect(),
         confusion: confusion.overall().map(|_| confusion.frames),
         weighted_accuracy: confusion.weighted(),
     };
     Ok(serde_json::to_string_pretty(&document)? + "\n")
 }
 
-fn of(dataset: &Dataset, row: &FrameCount) -> Row {
+fn of(row: &FrameCount) -> Row {
     let count = row.count.as_ref().ok();
-    let people = count.map(Count::people);
     Row {
-        frame: dataset.frame_name(row.frame).to_owned(),
-        people,
-        probability: count.zip(people).map(|(count, people)| count.probability(people)),
+        frame: row.frame.clone(),
+        people: count.map(|count| count.people),
+        probability: count.map(People::probability),
         probabilities: count.map(|count| count.probabilities),
-        uncertain: count.map(Count::is_uncertain),
+        uncertain: count.map(|count| count.uncertain),
         annotated: row.annotated,
         persons: row
             .identities
             .iter()
-            .zip(&row.places)
+            .zip(row.places())
             .map(|(&identity, &place_m)| Person { identity, place_m })
             .collect(),
         error: row.count.as_ref().err().cloned(),
@@ -126,12 +124,12 @@ fn of(dataset: &Dataset, row: &FrameCount) -> Row {
 ///
 /// # Errors
 /// Where the file cannot be written.
-pub(super) fn write_csv(file: &Path, dataset: &Dataset, rows: &[FrameCount]) -> anyhow::Result<()> {
-    let written = replace_file(file, |out| table_csv(out, dataset, rows).map_err(std::io::Error::other));
+pub(super) fn write_csv(file: &Path, rows: &[FrameCount]) -> anyhow::Result<()> {
+    let written = replace_file(file, |out| table_csv(out, rows).map_err(std::io::Error::other));
     written.with_context(|| format!("{}: cannot be written", file.display()))
 }
 
-fn table_csv(out: &mut dyn Sink, dataset: &Dataset, rows: &[FrameCount]) -> csv::Result<()> {
+fn table_csv(out: &mut dyn Sink, rows: &[FrameCount]) -> csv::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     csv.write_record([
         "frame",
@@ -146,7 +144,7 @@ fn table_csv(out: &mut dyn Sink, dataset: &Dataset, rows: &[FrameCount]) -> csv:
         "persons",
         "uncertain",
     ])?;
-    for row in rows.iter().map(|row| of(dataset, row)) {
+    for row in rows.iter().map(of) {
         let number = |n: Option<usize>| n.map_or_else(String::new, |n| n.to_string());
         let mut record = vec![
             to_cell(&row.frame).into_owned(),

@@ -1,7 +1,7 @@
 //! The table for people: the first rows, and the means of all.
 
 use crate::escape::one_line;
-use crate::study::{BatchRow, Means};
+use crate::study::{BatchRow, Means, columns};
 
 /// Rows that are shown; the rest is in the means and in summary.csv.
 const SHOWN: usize = 20;
@@ -27,7 +27,7 @@ impl Table {
 
     /// Head, rows, how many more there are, means.
     pub(super) fn text(&self, means: &Means) -> String {
-        let views = self.arrays.len();
+        let (views, places) = (self.arrays.len(), self.places());
         let mut lines = vec![self.head()];
         lines.extend(self.rows.iter().map(|row| {
             let fit = row.fit.as_ref().ok();
@@ -38,21 +38,36 @@ impl Table {
                 fit.map(|fit| fit.people.to_string()),
                 fit.and_then(|fit| fit.annotated).map(|n| n.to_string()),
             ];
-            line(&row.frame, first, &row.values(views), views, row.reason())
+            line(&row.frame, first, &row.values(views), &places, row.reason())
         }));
         let share = means.converged_share().map(|share| format!("{:.0} %", 100.0 * share));
         let first = [means.iterations().map(|n| format!("{n:.0}")), share, None, None];
-        let mean = line("mean", first, &means.values(), views, told(means));
+        let mean = line("mean", first, &means.values(), &places, told(means));
         lines.push(mean);
         let more = means.frames - self.rows.len();
         aligned(&lines, (more > 0).then(|| format!("... and {more} more frames")))
     }
 
+    /// The columns of numbers that people read, with their digits.
+    fn shown(&self) -> Vec<(String, usize)> {
+        let first = [("loss", 4), ("em", 4)].map(|(name, digits)| (name.to_owned(), digits));
+        let ious = self.arrays.iter().map(|array| (format!("iou_{array}"), 3));
+        let last = [("majpe_mm", 1), ("pa_majpe_mm", 1), ("init_ms", 0), ("fit_ms", 0)];
+        first.into_iter().chain(ious).chain(last.map(|(name, digits)| (name.to_owned(), digits))).collect()
+    }
+
     fn head(&self) -> Vec<String> {
-        let ious = self.arrays.iter().map(|array| format!("iou_{array}"));
-        let first = ["frame", "iterations", "converged", "people", "annotated", "loss", "em"].map(String::from);
-        let last = ["majpe_mm", "pa_majpe_mm", "init_ms", "fit_ms", "reason"].map(String::from);
-        first.into_iter().chain(ious).chain(last).collect()
+        let first = ["frame", "iterations", "converged", "people", "annotated"].map(String::from);
+        let shown = self.shown().into_iter().map(|(name, _)| name);
+        first.into_iter().chain(shown).chain(["reason".to_owned()]).collect()
+    }
+
+    /// Where these columns are among the values of a row.
+    fn places(&self) -> Vec<(usize, usize)> {
+        let columns = columns(&self.arrays);
+        let before = columns.iter().position(|column| column == "loss").unwrap_or(0);
+        let place = |name: &str| columns.iter().position(|column| column == name).map(|at| at - before);
+        self.shown().iter().filter_map(|(name, digits)| Some((place(name)?, *digits))).collect()
     }
 }
 
@@ -68,16 +83,22 @@ fn told(means: &Means) -> String {
     }
 }
 
-/// One line's cells. `first` are iterations, convergence and people, fitted and annotated; `values` are loss, six terms, the IoUs, two errors and two times.
-fn line(frame: &str, first: [Option<String>; 4], values: &[Option<f64>], views: usize, reason: String) -> Vec<String> {
+/// One line's cells. `first` are iterations, convergence and people, fitted and annotated; `values` are those of the
+/// columns of a batch, of which it has `shown`: where, and with how many digits.
+fn line(
+    frame: &str,
+    first: [Option<String>; 4],
+    values: &[Option<f64>],
+    shown: &[(usize, usize)],
+    reason: String,
+) -> Vec<String> {
     let text = |x: Option<String>| x.unwrap_or_else(|| UNKNOWN.into());
-    let number =
-        |k: usize, digits: usize| text(values.get(k).copied().flatten().map(|value| format!("{value:.digits$}")));
+    let number = |&(place, digits): &(usize, usize)| {
+        text(values.get(place).copied().flatten().map(|value| format!("{value:.digits$}")))
+    };
     let mut cells = vec![frame.to_owned()];
     cells.extend(first.map(text));
-    cells.extend([number(0, 4), number(1, 4)]);
-    cells.extend((7..7 + views).map(|k| number(k, 3)));
-    cells.extend([(7, 1), (8, 1), (9, 0), (10, 0)].map(|(k, digits)| number(views + k, digits)));
+    cells.extend(shown.iter().map(number));
     cells.push(reason);
     cells
 }

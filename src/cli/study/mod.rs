@@ -1,9 +1,10 @@
 //! `study`: variants of a configuration over many frames, as a run folder with its table.
 
-mod merge;
 mod run;
 
+use crate::study::run::merge_runs;
 use clap::Subcommand;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Shown under the options of `study --help`.
@@ -26,9 +27,9 @@ Examples:
       The hard frames, from starts that are perturbed on purpose.
   mhp-inspector study sweep data/walk --grid w_em=0.1,0.5,1 --grid tau_pct=5,10,20 --out runs/sweep
       Nine configurations; keys are those of FIT.toml.
-  mhp-inspector study threshold data/mmvr --shard $SLURM_ARRAY_TASK_ID/8 --out runs/threshold-$SLURM_ARRAY_TASK_ID
-      One of eight parts, as a job of a Slurm array with --array=1-8.
-  mhp-inspector study merge runs/threshold-* --out runs/threshold
+  mhp-inspector study threshold data/mmvr --shard auto --out runs/threshold-$SLURM_ARRAY_TASK_ID
+      One part of eight, as a task of a Slurm array with --array=1-8.
+  mhp-inspector merge runs/threshold-* --out runs/threshold
       The whole.";
 
 /// The studies, and what is done with their folders.
@@ -57,8 +58,6 @@ pub enum StudyCommand {
     /// Any grid over the configuration: numbers, switches and choices.
     #[command(after_long_help = crate::config::listing())]
     Sweep(run::SweepArgs),
-    /// Make one run of the shards of a study.
-    Merge(merge::MergeArgs),
 }
 
 /// Runs `study`.
@@ -78,6 +77,13 @@ pub(super) fn run(command: &StudyCommand) -> anyhow::Result<ExitCode> {
         StudyCommand::Switches(args) => run::run(Kind::Switches, args, None, &[]),
         StudyCommand::Counting(args) => run::run(Kind::Counting, args, None, &[]),
         StudyCommand::Sweep(args) => run::run(Kind::Sweep, &args.run, None, &args.grid),
-        StudyCommand::Merge(args) => merge::run(args),
     }
+}
+
+/// Makes one run of the shards of a study.
+///
+/// # Errors
+/// As [`merge_runs`], or where no row was fitted.
+pub(super) fn merge(shards: &[PathBuf], out: &Path, json: bool) -> anyhow::Result<ExitCode> {
+    run::tell(&merge_runs(shards, out)?, json)
 }

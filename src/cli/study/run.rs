@@ -3,11 +3,13 @@
 use crate::cli::common::{CsvArgs, PrecisionArg, complain, inputs, open, presets, print, print_json};
 use crate::cli::complexity::compute;
 use crate::cli::frames::{FrameRange, chosen};
+use crate::cli::shards::typed;
 use crate::cli::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::config::{FitConfig, Preset};
 use crate::dataset::Dataset;
 use crate::study::complexity::{ComplexityOptions, cache_folder};
-use crate::study::run::{GridAxis, Run, RunPlan, RunRequest, Shard, StudyKind, Subset, check_run_folder, execute_run};
+use crate::study::run::{GridAxis, Run, RunPlan, RunRequest, StudyKind, check_run_folder, execute_run};
+use crate::study::shard::{Shard, Subset};
 use crate::task::Progress;
 use clap::Args;
 use crossbeam_channel::{RecvTimeoutError, bounded};
@@ -47,8 +49,8 @@ pub struct RunArgs {
     /// Seed of the perturbations, instead of the configuration's.
     #[arg(long, value_name = "S")]
     seed: Option<u64>,
-    /// Do only part i of n; `study merge` makes one run of all.
-    #[arg(long, value_name = "i/n")]
+    /// Do only part i of n, counted from 1; `auto` inside a Slurm job array. `merge` makes one run of all.
+    #[arg(long, value_name = "i/n", value_parser = typed)]
     shard: Option<Shard>,
     /// Threads; default: one for each core. The result is the same with any number.
     #[arg(long, value_name = "N")]

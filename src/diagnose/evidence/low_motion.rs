@@ -50,7 +50,7 @@ pub(super) fn judge(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Found {
         let (rms_mps, cells) = (clearest.rms_mps, clearest.cells);
         let summary =
             format!("The joints' radial velocity is {rms_mps:.2} m/s (root mean square), {cells:.1} Doppler cells.");
-        measures.push(Measure { name: "slowness", value: -cells.max(f64::MIN_POSITIVE).ln() });
+        measures.push(Measure { name: "slowness".into(), value: -cells.max(f64::MIN_POSITIVE).ln() });
         let findings = seen.into_iter().map(|found| found.finding).chain(change.into_iter().flat_map(|c| c.findings));
         let findings = findings.chain(variation_told(&measures)).collect();
         return Found { mode: Tag::F4, raw: Some(falling(cells)), measures, summary, findings };
@@ -83,7 +83,7 @@ fn measures(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Vec<Measure> {
         names
             .into_iter()
             .enumerate()
-            .filter_map(|(k, name)| Some(Measure { name, value: value(k)? }))
+            .filter_map(|(k, name)| Some(Measure { name: name.into(), value: value(k)? }))
             .collect::<Vec<_>>()
     };
     all.into_iter().chain(pair).flat_map(of).collect()

@@ -38,7 +38,7 @@ use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::labels::Tag;
 use crate::mhp::{Masks, Problem, fill_missing};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
 /// T: frames of one sequence over which a cell must stay bright to be static; paper section 5.4.1.
@@ -47,7 +47,7 @@ pub const STATIC_FRAMES: usize = 5;
 pub const STATIC_KAPPA_PCT: f64 = 5.0;
 
 /// What speaks for one failure mode.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// F1 to F4.
     pub mode: Tag,
@@ -65,10 +65,10 @@ pub struct Evidence {
 }
 
 /// A number that rises with what speaks for a mode.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Measure {
     /// As in the calibration's table.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// In units of its own.
     pub value: f64,
 }
@@ -99,7 +99,7 @@ impl Found {
 }
 
 /// One number or comparison.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// Plain words, numbers with units.
     pub text: String,
@@ -108,7 +108,7 @@ pub struct Finding {
 }
 
 /// Where a finding is seen.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FindingPlace {
     /// A box of cells of one view's map.

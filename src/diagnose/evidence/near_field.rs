@@ -63,7 +63,7 @@ pub(super) fn judge(input: &EvidenceInput<'_>) -> Found {
     let mut findings: Vec<Finding> = seen.iter().flat_map(|seen| [nearest(input, seen), smear(input, seen)]).collect();
     findings.extend(widths(&seen, wavelength_m));
     let nearness = (worst.fraunhofer_m / worst.range_m.max(NEAREST_M)).ln();
-    let measures = vec![Measure { name: "nearness", value: nearness }];
+    let measures = vec![Measure { name: "nearness".into(), value: nearness }];
     Found { mode: Tag::F2, raw: Some(worst.raw), measures, summary, findings }
 }
 

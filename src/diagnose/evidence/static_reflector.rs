@@ -70,7 +70,7 @@ pub(super) fn judge(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Found {
 fn measures(seen: &[Seen<'_>]) -> Vec<Measure> {
     let names = ["persistence", "static_level"].into_iter().enumerate();
     let of = |k: usize| mean(seen.iter().filter_map(|seen| seen.beside).map(|beside| beside[k]));
-    names.filter_map(|(k, name)| Some(Measure { name, value: of(k)? })).collect()
+    names.filter_map(|(k, name)| Some(Measure { name: name.into(), value: of(k)? })).collect()
 }
 
 /// `, most of it at …`: the largest patch of all views.

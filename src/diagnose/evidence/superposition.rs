@@ -85,7 +85,7 @@ fn counted(count: Option<&Count>, fine: bool) -> (Vec<Measure>, Finding) {
         return (Vec::new(), Finding::new(text, None));
     };
     let name = if fine { "close_pair" } else { "close_pair_coarse" };
-    let measures = vec![Measure { name, value: several * falling(apart_m / CLOSE_M) }];
+    let measures = vec![Measure { name: name.into(), value: several * falling(apart_m / CLOSE_M) }];
     let text =
         format!("Two people or more are counted with probability {several:.2}, the nearest {} apart.", length(apart_m));
     (measures, Finding::new(text, None))

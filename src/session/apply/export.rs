@@ -98,7 +98,7 @@ impl Session {
         let check = self.output_check();
         Some(BackgroundTask::new(move || {
             check.file(&path)?;
-            complexity::write_csv(&path, &dataset, &strata).map_err(|error| error.to_string())?;
+            complexity::write_csv(&path, |i| dataset.frame_name(i), &strata).map_err(|error| error.to_string())?;
             Ok(written(&path))
         }))
     }

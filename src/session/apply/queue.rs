@@ -142,6 +142,7 @@ impl Session {
         {
             row.iou = summary.iou;
             row.loss = summary.loss;
+            row.terms = Some(&summary.terms);
             row.iterations = summary.iterations;
             row.converged = summary.converged;
             row.reason = summary.reason.as_deref();

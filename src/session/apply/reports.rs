@@ -50,6 +50,7 @@ impl Session {
             hashes,
             iterations: Some(row.report.iteration),
             loss: Some(row.report.loss),
+            terms: row.report.terms.map(Some),
             iou: mean_known(&row.report.iou),
             converged: Some(row.report.converged),
             majpe_mm: row.majpe_mm,
@@ -163,6 +164,7 @@ impl Session {
             && let Some(summary) = self.own_summary()
         {
             summary.loss = Some(snapshot.evaluation.loss);
+            summary.terms = snapshot.evaluation.terms.map(Some);
             summary.iou = mean_known(&snapshot.evaluation.iou);
             self.summarised += 1;
         }

@@ -5,6 +5,7 @@
 
 use super::row::{FrameNumber, FrameRow, Reads};
 use crate::labels::{Tag, Verdict};
+use crate::mhp::TERMS;
 use crate::study::complexity::Stratum;
 
 /// A parsed filter. The empty text matches every frame.
@@ -66,11 +67,18 @@ const WORDS: [(&str, Word); 9] = [
 ];
 
 /// What a filter may say, for the tooltip of its field.
-pub const SYNTAX: &str = "Terms that must all hold, separated by spaces; - negates, | means either:\n\
-    stratum:hard · tag:F1 · tag:F1|F2 · tag:none · tag:any · by:ada · note:word · scene:d5s1\n\
-    iou<0.5 · majpe>200 · hardness>=0.7 · peaks static saliency loss iterations index\n\
-    converged:no · fitted:yes · reason:diverged · verdict:detection-error · readable:no\n\
-    A bare word is looked for in the frame's name.";
+pub fn syntax() -> String {
+    let of_loss: Vec<&str> = TERMS.iter().map(|term| term.key).collect();
+    format!(
+        "Terms that must all hold, separated by spaces; - negates, | means either:\n\
+        stratum:hard · tag:F1 · tag:F1|F2 · tag:none · tag:any · by:ada · note:word · scene:d5s1\n\
+        iou<0.5 · majpe>200 · hardness>=0.7 · peaks static saliency loss iterations index\n\
+        {}: the terms of the loss\n\
+        converged:no · fitted:yes · reason:diverged · verdict:detection-error · readable:no\n\
+        A bare word is looked for in the frame's name.",
+        of_loss.join(" ")
+    )
+}
 
 impl FrameFilter {
     /// Parses a filter.
@@ -253,7 +261,7 @@ fn tags(values: &[String]) -> Result<Test, String> {
 
 fn compare(key: &str, rest: &str) -> Result<Test, String> {
     let number = FrameNumber::of(&key.to_lowercase()).ok_or_else(|| {
-        let names: Vec<&str> = FrameNumber::ALL.iter().map(|number| number.key()).collect();
+        let names: Vec<&str> = FrameNumber::all().map(FrameNumber::key).collect();
         format!("`{key}` is no number of a frame; expected {}", names.join(", "))
     })?;
     let (comparison, digits) = [
@@ -277,6 +285,7 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests")]
     use super::*;
     use crate::labels::{Tags, Verdict};
+    use crate::mhp::Terms;
     use crate::study::complexity::Stratum;
 
     fn row() -> FrameRow<'static> {
@@ -339,6 +348,15 @@ mod tests {
             let error = FrameFilter::parse(text).unwrap_err();
             assert!(error.contains(expected), "{text}: {error}");
         }
+    }
+
+    #[test]
+    fn frames_are_found_by_the_dummy_term() {
+        let terms = Terms::from_fn(|term| (term.key == "dummy").then_some(0.7));
+        let row = FrameRow { terms: Some(&terms), ..row() };
+        let holds = |text: &str| FrameFilter::parse(text).unwrap().matches(&row);
+        assert!(holds("dummy>0.5 -dummy>0.8") && !holds("dummy<0.5") && !holds("bone>=0"));
+        assert!(syntax().contains(" dummy:"), "{}", syntax());
     }
 
     #[test]

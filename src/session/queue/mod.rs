@@ -6,10 +6,11 @@
 mod filter;
 mod row;
 
-pub use filter::{FrameFilter, SYNTAX};
+pub use filter::{FrameFilter, syntax};
 pub use row::{FrameNumber, FrameRow, Reads};
 
 use crate::labels::Tags;
+use crate::mhp::TermId;
 use serde::{Deserialize, Serialize};
 
 /// What the list is ordered by.
@@ -38,6 +39,8 @@ pub enum SortKey {
     Tags,
     /// Who labelled it.
     Annotator,
+    /// An unweighted term of the loss.
+    Term(TermId),
 }
 
 impl SortKey {
@@ -49,7 +52,7 @@ impl SortKey {
             Self::Stratum | Self::Hardness | Self::PeakDensity | Self::StaticDominance | Self::HumanSaliency => {
                 Reads { strata: true, ..none }
             }
-            Self::Iou | Self::Converged | Self::Majpe => Reads { fit: true, ..none },
+            Self::Iou | Self::Converged | Self::Majpe | Self::Term(_) => Reads { fit: true, ..none },
             Self::Tags => Reads { tags: true, ..none },
             Self::Annotator => Reads { annotators: true, ..none },
         }
@@ -221,6 +224,7 @@ fn key(sort: Sort, row: &FrameRow<'_>) -> u64 {
         SortKey::Majpe => row.majpe_mm.and_then(ordered),
         SortKey::Tags => Some(tag_rank(row.tags)).filter(|&rank| rank > 0),
         SortKey::Annotator => row.annotators.first().map(|name| letters(name)),
+        SortKey::Term(term) => row.number(FrameNumber::Term(term)).and_then(ordered),
     };
     // Nothing but NaN, which is left out, comes near the ends of the range.
     rising.map_or(NOTHING, |rising| if sort.descending { NOTHING - 1 - rising } else { rising })
@@ -246,13 +250,28 @@ fn letters(name: &str) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+
     use super::*;
+    use crate::mhp::Terms;
 
     fn queue(text: &str, sort: Sort, iou: &[Option<f64>]) -> Queue {
         let mut queue = Queue::default();
         queue.set_text(text.into());
         queue.fill(iou.len(), sort, |index| FrameRow { index, iou: iou[index], ..FrameRow::default() });
         queue
+    }
+
+    #[test]
+    fn frames_are_ordered_by_the_dummy_term() {
+        let key = SortKey::Term(TermId::of("dummy").unwrap());
+        let sort = Sort { key, descending: false };
+        let terms = [0.5, 0.1, 0.3].map(|value| Terms::from_fn(|term| (term.key == "dummy").then_some(value)));
+        let mut queue = Queue::default();
+        queue.fill(terms.len(), sort, |index| FrameRow { index, terms: Some(&terms[index]), ..FrameRow::default() });
+        assert_eq!(queue.rows(), [1, 2, 0]);
+        let text = serde_json::to_string(&sort).unwrap();
+        assert_eq!((text.contains("\"dummy\""), serde_json::from_str(&text).unwrap()), (true, sort));
     }
 
     const IOU: [Option<f64>; 6] = [Some(0.5), None, Some(0.1), Some(0.5), None, Some(0.3)];

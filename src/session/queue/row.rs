@@ -1,6 +1,7 @@
 //! What the frame list knows of one frame, gathered for filtering and sorting.
 
 use crate::labels::{Tags, Verdict};
+use crate::mhp::{TermId, Terms};
 use crate::study::complexity::Stratum;
 
 /// One frame's row.
@@ -28,6 +29,8 @@ pub struct FrameRow<'a> {
     pub iou: Option<f64>,
     /// L.
     pub loss: Option<f64>,
+    /// Its unweighted terms.
+    pub terms: Option<&'a Terms<Option<f64>>>,
     /// Iterations done.
     pub iterations: Option<usize>,
     /// The convergence criterion.
@@ -62,6 +65,7 @@ impl Default for FrameRow<'_> {
             human_saliency: None,
             iou: None,
             loss: None,
+            terms: None,
             iterations: None,
             converged: None,
             reason: None,
@@ -140,21 +144,26 @@ pub enum FrameNumber {
     Iterations,
     /// MAJPE, mm.
     Majpe,
+    /// An unweighted term of the loss.
+    Term(TermId),
 }
 
 impl FrameNumber {
     /// Every number.
-    pub const ALL: [Self; 9] = [
-        Self::Index,
-        Self::Hardness,
-        Self::PeakDensity,
-        Self::StaticDominance,
-        Self::HumanSaliency,
-        Self::Iou,
-        Self::Loss,
-        Self::Iterations,
-        Self::Majpe,
-    ];
+    pub fn all() -> impl Iterator<Item = Self> {
+        let own = [
+            Self::Index,
+            Self::Hardness,
+            Self::PeakDensity,
+            Self::StaticDominance,
+            Self::HumanSaliency,
+            Self::Iou,
+            Self::Loss,
+            Self::Iterations,
+            Self::Majpe,
+        ];
+        own.into_iter().chain(TermId::all().map(Self::Term))
+    }
 
     /// As written in a filter.
     pub fn key(self) -> &'static str {
@@ -168,12 +177,13 @@ impl FrameNumber {
             Self::Loss => "loss",
             Self::Iterations => "iterations",
             Self::Majpe => "majpe",
+            Self::Term(term) => term.key,
         }
     }
 
     /// The number called `key`.
     pub fn of(key: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|number| number.key() == key)
+        Self::all().find(|number| number.key() == key)
     }
 
     /// What it is read from.
@@ -184,7 +194,7 @@ impl FrameNumber {
             Self::Hardness | Self::PeakDensity | Self::StaticDominance | Self::HumanSaliency => {
                 Reads { strata: true, ..none }
             }
-            Self::Iou | Self::Loss | Self::Iterations | Self::Majpe => Reads { fit: true, ..none },
+            Self::Iou | Self::Loss | Self::Iterations | Self::Majpe | Self::Term(_) => Reads { fit: true, ..none },
         }
     }
 }
@@ -202,6 +212,7 @@ impl FrameRow<'_> {
             FrameNumber::Loss => self.loss,
             FrameNumber::Iterations => self.iterations.map(|n| n as f64),
             FrameNumber::Majpe => self.majpe_mm,
+            FrameNumber::Term(term) => self.terms.and_then(|terms| terms[term]),
         }
     }
 }

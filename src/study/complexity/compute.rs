@@ -1,13 +1,14 @@
 //! The whole answer: what is on disk, what has to be read, and the ranking.
 
 use super::super::StudyError;
-use super::cache::CacheFile;
+use super::cache::{CacheFile, CachedStatistics};
 use super::plan::{Sequences, chunk_length, chunks};
 use super::scan::{Scanned, scan};
 use super::stamps::{Key, keys};
-use super::{Complexity, ComplexityOptions, rank};
+use super::{Complexity, ComplexityOptions, MeasuredFrame, Statistics, rank};
 use crate::dataset::Dataset;
 use crate::task::Progress;
+use std::ops::Range;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -30,14 +31,53 @@ pub fn compute(
     compute_telling(dataset, options, cache, progress, |_| {})
 }
 
+/// As [`compute`], of `frames` alone and without ranks: those before them are read for what stays.
+///
+/// # Errors
+/// As [`compute`].
+pub fn measure(
+    dataset: &Dataset,
+    frames: Range<usize>,
+    options: &ComplexityOptions,
+    cache: Option<&Path>,
+    progress: &Progress,
+) -> Result<Vec<MeasuredFrame>, StudyError> {
+    let (kept, _) = measure_telling(dataset, frames.clone(), options, cache, progress, |_| {})?;
+    let named = |(index, measured)| MeasuredFrame { index, frame: dataset.frame_name(index).to_owned(), measured };
+    Ok(frames.zip(kept).map(named).collect())
+}
+
+/// Ranks the frames of a data set, all of them and in its order: statistics, or why there are none.
+pub fn ranked(options: ComplexityOptions, frames: impl IntoIterator<Item = Result<Statistics, String>>) -> Complexity {
+    let (mut statistics, mut failures) = (Vec::new(), Vec::new());
+    for (i, measured) in frames.into_iter().enumerate() {
+        statistics.push(measured.as_ref().ok().copied());
+        failures.extend(measured.err().map(|why| (i, why)));
+    }
+    Complexity { failures, ..rank(options, &statistics) }
+}
+
 /// As [`compute`]; `told` is called with every frame that was read.
 fn compute_telling(
     dataset: &Dataset,
     options: &ComplexityOptions,
     cache: Option<&Path>,
     progress: &Progress,
-    mut told: impl FnMut(usize),
+    told: impl FnMut(usize),
 ) -> Result<Complexity, StudyError> {
+    let (kept, scanned) = measure_telling(dataset, 0..dataset.len(), options, cache, progress, told)?;
+    Ok(Complexity { scanned, ..ranked(*options, kept) })
+}
+
+/// What is known of each of `frames`, and how many of them were read for it.
+fn measure_telling(
+    dataset: &Dataset,
+    wanted: Range<usize>,
+    options: &ComplexityOptions,
+    cache: Option<&Path>,
+    progress: &Progress,
+    mut told: impl FnMut(usize),
+) -> Result<(Vec<CachedStatistics>, usize), StudyError> {
     let options = options.validated()?;
     let sequences = Sequences::of(dataset);
     let mut found = match cache {
@@ -47,29 +87,23 @@ fn compute_telling(
         }
         None => Found::nothing(dataset.len()),
     };
-    let unknown = found.unknown();
-    progress.begin("measuring maps", dataset.len() as u64);
-    progress.advance((dataset.len() - unknown) as u64);
+    let unknown = found.unknown(&wanted);
+    progress.begin("measuring maps", wanted.len() as u64);
+    progress.advance((wanted.len() - unknown) as u64);
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let length = chunk_length(unknown, threads, options.window, dataset.maps_at_once());
-    let chunks = chunks(&sequences, options.window, length, |i| found.is_known(i));
+    let chunks = chunks(&sequences, options.window, length, |i| !wanted.contains(&i) || found.is_known(i));
     scan(dataset, &options, &chunks, threads, progress, |i, scanned| {
         found.add(i, scanned);
         progress.advance(1);
         told(i);
     })?;
     found.keep();
-    if found.unknown() > 0 {
+    if found.unknown(&wanted) > 0 {
         return Err(StudyError::Cancelled);
     }
-    let Found { frames, .. } = found;
-    let (mut statistics, mut failures) = (Vec::with_capacity(frames.len()), Vec::new());
-    for (i, scanned) in frames.into_iter().enumerate() {
-        let kept = scanned.map(|scanned| scanned.kept);
-        statistics.push(kept.as_ref().and_then(|kept| kept.as_ref().ok().copied()));
-        failures.extend(kept.and_then(Result::err).map(|why| (i, why)));
-    }
-    Ok(Complexity { failures, scanned: unknown, ..rank(options, &statistics) })
+    let kept = found.frames.drain(wanted).flatten().map(|scanned| scanned.kept).collect();
+    Ok((kept, unknown))
 }
 
 /// What is known so far of each frame, and where it is kept.
@@ -99,8 +133,8 @@ impl Found {
         matches!(self.frames.get(i), Some(Some(_)))
     }
 
-    fn unknown(&self) -> usize {
-        self.frames.iter().filter(|frame| frame.is_none()).count()
+    fn unknown(&self, wanted: &Range<usize>) -> usize {
+        wanted.clone().filter(|&i| !self.is_known(i)).count()
     }
 
     fn add(&mut self, i: usize, scanned: Scanned) {

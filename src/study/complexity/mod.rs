@@ -6,7 +6,8 @@
 //! human saliency r_human = the sum over the top-τ mask over the sum of the map. Hardness is the mean of their
 //! normalised ranks, r_human reversed; its terciles are the strata.
 //!
-//! [`compute`] scans with all cores and keeps what it found on disk, [`ComplexityJob`] does so off the window's thread,
+//! [`compute`] scans with all cores and keeps what it found on disk, [`measure`] does so for some frames, which [`ranked`] ranks
+//! when all are there, [`ComplexityJob`] does so off the window's thread,
 //! [`rank`] is the pure part. From the inside out: `map.rs` is one map, `history.rs` the last T frames, `scan.rs` the
 //! threads, `plan.rs` who reads what, `cache.rs` the file, `prune.rs` how many there are, `stamps.rs` what makes a cached frame stale.
 
@@ -25,9 +26,9 @@ mod table;
 mod types;
 
 pub use cache::{cache_folder, cached_share};
-pub use compute::compute;
+pub use compute::{compute, measure, ranked};
 pub use job::ComplexityJob;
 pub use options::ComplexityOptions;
 pub use rank::rank;
 pub use table::{json, write_csv};
-pub use types::{Complexity, Counts, FrameComplexity, Statistics, Stratum};
+pub use types::{Complexity, Counts, FrameComplexity, MeasuredFrame, Statistics, Stratum};

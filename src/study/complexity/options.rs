@@ -2,9 +2,11 @@
 
 use super::super::StudyError;
 use crate::diagnose::{STATIC_FRAMES, STATIC_KAPPA_PCT};
+use serde::{Deserialize, Serialize};
 
 /// What counts as a peak, as static and as human.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ComplexityOptions {
     /// κ, %: a bin is strong above the percentile 100 − κ of its map.
     pub kappa_pct: f64,

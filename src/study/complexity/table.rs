@@ -2,7 +2,6 @@
 
 use super::super::StudyError;
 use super::{Complexity, FrameComplexity, Stratum};
-use crate::dataset::Dataset;
 use crate::escape::to_cell;
 use crate::output::replace_file;
 use serde::Serialize;
@@ -19,11 +18,11 @@ struct Row {
     stratum: Option<&'static str>,
 }
 
-fn rows<'a>(dataset: &'a Dataset, complexity: &'a Complexity) -> impl Iterator<Item = Row> + 'a {
-    complexity.frames.iter().enumerate().map(|(i, frame)| {
+fn rows<'a>(name: impl Fn(usize) -> &'a str, complexity: &'a Complexity) -> impl Iterator<Item = Row> {
+    complexity.frames.iter().enumerate().map(move |(i, frame)| {
         let FrameComplexity { statistics, hardness, stratum } = frame.unwrap_or_default();
         Row {
-            frame: dataset.frame_name(i).to_owned(),
+            frame: name(i).to_owned(),
             peak_density: statistics.peak_density,
             static_dominance: statistics.static_dominance,
             human_saliency: statistics.human_saliency,
@@ -33,13 +32,13 @@ fn rows<'a>(dataset: &'a Dataset, complexity: &'a Complexity) -> impl Iterator<I
     })
 }
 
-/// A JSON array, a line a frame, in the order of the data set: `frame peak_density static_dominance human_saliency
+/// A JSON array, a line a frame, in the order of the data set, whose frames `name` tells: `frame peak_density static_dominance human_saliency
 /// hardness stratum`, null where undefined.
 ///
 /// # Errors
 /// As `serde_json`; none is known for these rows.
-pub fn json(dataset: &Dataset, complexity: &Complexity) -> serde_json::Result<String> {
-    let lines = rows(dataset, complexity).map(|row| serde_json::to_string(&row));
+pub fn json<'a>(name: impl Fn(usize) -> &'a str, complexity: &'a Complexity) -> serde_json::Result<String> {
+    let lines = rows(name, complexity).map(|row| serde_json::to_string(&row));
     let lines = lines.collect::<serde_json::Result<Vec<_>>>()?;
     Ok(format!("[\n{}\n]\n", lines.join(",\n")))
 }
@@ -48,10 +47,14 @@ pub fn json(dataset: &Dataset, complexity: &Complexity) -> serde_json::Result<St
 ///
 /// # Errors
 /// Where the file cannot be written.
-pub fn write_csv(file: &Path, dataset: &Dataset, complexity: &Complexity) -> Result<(), StudyError> {
+pub fn write_csv<'a>(
+    file: &Path,
+    name: impl Fn(usize) -> &'a str,
+    complexity: &'a Complexity,
+) -> Result<(), StudyError> {
     let written = replace_file(file, |out| {
         let mut table = csv::Writer::from_writer(out);
-        for row in rows(dataset, complexity) {
+        for row in rows(name, complexity) {
             let row = Row { frame: to_cell(&row.frame).into_owned(), ..row };
             table.serialize(row).map_err(std::io::Error::other)?;
         }

@@ -1,6 +1,8 @@
 //! What is known of a frame's complexity.
 
 use super::ComplexityOptions;
+use crate::study::shard::{FrameCommand, ShardRow};
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
@@ -57,7 +59,8 @@ impl FromStr for Stratum {
 }
 
 /// The three statistics of one frame, each the mean over the views where it is defined; `None` where it is in none.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Statistics {
     /// ρ_peak, peaks a cell, 0..1.
     pub peak_density: Option<f64>,
@@ -65,6 +68,30 @@ pub struct Statistics {
     pub static_dominance: Option<f64>,
     /// r_human; in 0..1 where no cell is negative; undefined where the map's sum is 0.
     pub human_saliency: Option<f64>,
+}
+
+/// One frame by itself: what its hardness is told from, once all others are known.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeasuredFrame {
+    /// Index in the data set.
+    pub index: usize,
+    /// The frame's name.
+    pub frame: String,
+    /// Its statistics, or why it cannot be read: one line that names the file.
+    pub measured: Result<Statistics, String>,
+}
+
+impl ShardRow for MeasuredFrame {
+    const COMMAND: FrameCommand = FrameCommand::Complexity;
+
+    fn index(&self) -> usize {
+        self.index
+    }
+
+    fn failure(&self) -> Option<&str> {
+        self.measured.as_ref().err().map(String::as_str)
+    }
 }
 
 /// One frame among the others.

@@ -1,6 +1,7 @@
 //! What can go wrong with a run as a whole. What goes wrong with one frame is a row.
 
 use super::super::StudyError;
+use super::super::shard::ShardError;
 use crate::output::OutputError;
 use std::path::PathBuf;
 
@@ -38,7 +39,7 @@ pub enum RunError {
     #[error("{path}: holds a run with another {what}: {there}, not {here}; give another --out, or remove the folder", path = path.display())]
     OtherRun {
         /// What differs.
-        what: &'static str,
+        what: String,
         /// What the folder says.
         there: String,
         /// What was asked for.
@@ -49,14 +50,9 @@ pub enum RunError {
     /// The folder must not be written, or another process writes it.
     #[error(transparent)]
     Output(#[from] OutputError),
-    /// Runs that do not make one.
-    #[error("{path}: {message}", path = path.display())]
-    Merge {
-        /// What does not fit.
-        message: String,
-        /// The run folder.
-        path: PathBuf,
-    },
+    /// Shards that do not make a run.
+    #[error(transparent)]
+    Shard(#[from] ShardError),
     /// A parameter grid that makes no sense.
     #[error("--grid {text}: {message}")]
     Grid {

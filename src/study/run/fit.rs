@@ -112,7 +112,6 @@ impl<'a> LoadedFrame<'a> {
 
     fn numbers(&self, fitter: &Fitter, start: &TimedStart, ended: bool) -> RunNumbers {
         let (report, params) = (fitter.report(), fitter.params());
-        let t = report.terms;
         let reason = if ended { StopReason::Converged } else { StopReason::Iterations };
         let now = self.measured(params);
         let before = self.measured(&start.unrefined);
@@ -121,7 +120,7 @@ impl<'a> LoadedFrame<'a> {
             converged: report.converged,
             reason: reason.word().to_owned(),
             loss: report.loss,
-            terms: [t.em, t.bone, t.rigid, t.joint, t.sep, t.coll],
+            terms: report.terms.map(Some),
             iou: report.iou.into_vec(),
             init_majpe_mm: before.majpe_mm,
             init_pa_majpe_mm: before.pa_majpe_mm,

@@ -11,6 +11,7 @@ use super::spec::{RUN_FILE, RunSpec};
 use super::table::{TableRow, table};
 use crate::dataset::Dataset;
 use crate::output::{FolderLock, Inputs};
+use crate::study::shard::{Part as _, gather};
 use crate::task::Progress;
 use std::path::Path;
 
@@ -116,37 +117,10 @@ fn claim(folder: &Path, inputs: &Inputs<'_>) -> Result<FolderLock, RunError> {
 /// # Errors
 /// Where a folder is no complete shard, they are not of one run, one is missing or comes twice, or `out` cannot be written.
 pub fn merge_runs(folders: &[impl AsRef<Path>], out: &Path) -> Result<Run, RunError> {
-    let mut whole: Option<(RunSpec, usize)> = None;
-    let mut seen = std::collections::BTreeSet::new();
+    let (spec, parts) = gather::<RunSpec>(folders)?;
     let mut rows = Rows::new();
-    for folder in folders.iter().map(AsRef::as_ref) {
-        let wrong = |message: String| RunError::Merge { message, path: folder.to_owned() };
-        let spec = RunSpec::read(folder)?;
-        let shard = spec.shard.ok_or_else(|| wrong("is no shard: it was run without --shard".into()))?;
-        if !folder.join(TABLE_FILE).is_file() {
-            return Err(wrong("is not finished; run its command again, it goes on where it stopped".into()));
-        }
-        match &whole {
-            None => whole = Some((spec.whole(), shard.count)),
-            Some((first, count)) => {
-                if let Some((what, there, here)) = spec.whole().difference(first) {
-                    return Err(wrong(format!("has another {what} than the first: {there}, not {here}")));
-                }
-                if shard.count != *count {
-                    return Err(wrong(format!("is one of {} shards, the first one of {count}", shard.count)));
-                }
-            }
-        }
-        if !seen.insert(shard.index) {
-            return Err(wrong(format!("shard {shard} comes twice")));
-        }
-        rows.extend(read(folder, &spec)?);
-    }
-    let nothing = || RunError::Merge { message: "nothing to merge".into(), path: out.to_owned() };
-    let (spec, count) = whole.ok_or_else(nothing)?;
-    if let Some(missing) = (1..=count).find(|index| !seen.contains(index)) {
-        let message = format!("shard {missing}/{count} is missing");
-        return Err(RunError::Merge { message, path: out.to_owned() });
+    for (folder, part) in &parts {
+        rows.extend(read(folder, part)?);
     }
     let _lock = claim(out, &Inputs::default().with_folder(&spec.data.root))?;
     if is_run_folder(out) {

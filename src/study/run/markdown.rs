@@ -2,11 +2,12 @@
 
 use super::StudyKind;
 use super::journal::Rows;
-use super::spec::{RunSpec, Subset};
+use super::spec::RunSpec;
 use super::table::{self, Spread, TableRow};
 use crate::escape::one_line;
 use crate::mhp::Precision;
 use crate::people::CLASSES;
+use crate::study::shard::Subset;
 use std::fmt::Write as _;
 
 /// The text of a row's cell; `None` where nothing is known.

@@ -4,7 +4,7 @@
 //! killed run stopped; [`merge_runs`] makes one run of its shards; [`Run`] reads it back. From the inside out: `variant.rs` is one
 //! configuration, `plans.rs` the studies' rows, `grid.rs` and `switches.rs` two ways to make them, `kind.rs` their names,
 //! `paper.rs` the paper's figures beside them and `reach.rs` whether what they perturb can act; `spec.rs` is the file that says
-//! what a run is, `stamp.rs` what its data are known by, `plan.rs` its units of work, `fit.rs` one frame, `counting.rs` the
+//! what a run is, `plan.rs` its units of work, `fit.rs` one frame, `counting.rs` the
 //! people of a frame, `row.rs` what is known of either, `journal.rs` what is done, `engine.rs` the threads, `table.rs` the sums,
 //! `output.rs`, `markdown.rs` and `parquet_rows.rs` the files, `folder.rs` all of them together.
 //!
@@ -43,7 +43,6 @@ mod plans;
 mod reach;
 mod row;
 mod spec;
-mod stamp;
 mod switches;
 mod table;
 mod variant;
@@ -56,6 +55,6 @@ pub use kind::StudyKind;
 pub use output::TABLE_FILE;
 pub use plan::{RunPlan, RunRequest};
 pub use row::{RunNumbers, RunRow};
-pub use spec::{DataSpec, RUN_FILE, RunSpec, Shard, Subset};
+pub use spec::{RUN_FILE, RunSpec};
 pub use table::{CountShares, Spread, TableRow, mark, notes};
 pub use variant::{Method, PaperRow, StartFrom, Variant};

@@ -5,13 +5,14 @@
 
 use super::fit::start_key;
 use super::grid::GridAxis;
-use super::spec::{DataSpec, RunSpec, Shard, Subset};
+use super::spec::RunSpec;
 use super::variant::{Method, StartFrom, Variant};
-use super::{RunError, StudyKind, counting, plans, stamp};
+use super::{RunError, StudyKind, counting, plans};
 use crate::config::FitConfig;
 use crate::dataset::Dataset;
 use crate::mhp::Precision;
 use crate::study::complexity::{Complexity, Stratum};
+use crate::study::shard::{DataSpec, Shard, Subset};
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -104,18 +105,7 @@ impl RunPlan {
             let Range { start, end } = request.frames;
             return Err(RunError::NoFrames { message: format!("{start}..{end} holds no frame to study") });
         }
-        let data = DataSpec {
-            name: info.name.clone(),
-            root: std::path::absolute(&info.root).unwrap_or_else(|_| info.root.clone()),
-            layout: layout.to_owned(),
-            fingerprint: dataset.fingerprint().to_owned(),
-            content: stamp::content(dataset, &request.frames),
-            arrays: info.views.iter().map(|view| view.array.clone()).collect(),
-            first: request.frames.start,
-            end: request.frames.end,
-            frames: frames.len(),
-            subset,
-        };
+        let data = DataSpec::of(dataset, &request.frames, frames.len(), subset);
         let spec = RunSpec {
             id: String::new(),
             study: request.study,
@@ -146,7 +136,7 @@ impl RunPlan {
 
 /// The units of a run, or of its shard; the long ones first, so that no thread is left alone with one at the end.
 fn units(dataset: &Dataset, spec: &RunSpec, frames: &[usize]) -> Vec<Unit> {
-    let mine = |number: usize| spec.shard.is_none_or(|shard| number % shard.count == shard.index - 1);
+    let mine = |number: usize| spec.shard.is_none_or(|shard| shard.takes(number));
     let chains = chains(dataset, spec, frames).into_iter().enumerate();
     let mut units: Vec<Unit> = chains.filter(|(number, _)| mine(*number)).map(|(_, chain)| chain).collect();
     let counted = counts(dataset, spec, frames).into_iter().enumerate();

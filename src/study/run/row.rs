@@ -2,6 +2,7 @@
 
 use super::spec::RunSpec;
 use crate::escape::to_cell;
+use crate::mhp::{TermId, Terms};
 use crate::study::complexity::Stratum;
 use serde::{Deserialize, Serialize};
 
@@ -17,8 +18,8 @@ pub struct RunNumbers {
     pub reason: String,
     /// L.
     pub loss: f64,
-    /// Unweighted terms: EM, bone, rigid, joint, sep, coll.
-    pub terms: [f64; 6],
+    /// Unweighted terms; `None` where nothing was fitted, and for one that the program that wrote the row did not know.
+    pub terms: Terms<Option<f64>>,
     /// Forward-consistency IoU of each view.
     pub iou: Vec<Option<f64>>,
     /// Against truth, mm; persons paired best.
@@ -157,8 +158,8 @@ pub(super) fn cells(spec: &RunSpec, row: &RunRow) -> Vec<(String, Cell)> {
     add("converged", Cell::Flag(fit.map(|fit| fit.converged)));
     add("reason", Cell::Text(Some(reason)));
     add("loss", number(&|fit| Some(fit.loss)));
-    for (k, name) in ["em", "bone", "rigid", "joint", "sep", "coll"].into_iter().enumerate() {
-        add(name, number(&|fit| fit.terms.get(k).copied()));
+    for term in TermId::all() {
+        add(term.key, number(&|fit| fit.terms[term]));
     }
     add("iou", number(&RunNumbers::mean_iou));
     for (view, array) in spec.data.arrays.iter().enumerate() {
@@ -175,4 +176,59 @@ pub(super) fn cells(spec: &RunSpec, row: &RunRow) -> Vec<(String, Cell)> {
     add("box_coverage", number(&|fit| fit.box_coverage));
     add("map_box_coverage", number(&|fit| fit.map_box_coverage));
     cells
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+
+    use super::*;
+
+    fn spec() -> RunSpec {
+        let text = "id = ''\nstudy = 'sweep'\nversion = ''\nprecision = 'f32'\nbase = ''\nseed = 1\ncolumns = []\n\
+            [data]\nname = ''\nroot = ''\nfingerprint = ''\ncontent = ''\narrays = ['hm']\nfirst = 0\nend = 1\n\
+            frames = 1\nsubset = 'all'\n[[variant]]\nlabels = []\n[variant.config]\n";
+        toml::from_str(text).unwrap()
+    }
+
+    fn cell(row: &RunRow, name: &str) -> Cell {
+        let found = cells(&spec(), row).into_iter().find(|(column, _)| column == name);
+        found.map(|(_, cell)| cell).unwrap()
+    }
+
+    fn row(fit: RunNumbers) -> RunRow {
+        RunRow {
+            variant: 0,
+            frame: 0,
+            name: "a/0".into(),
+            sequence: "a".into(),
+            stratum: None,
+            passing: false,
+            fit: Ok(fit),
+            init_ms: None,
+            fit_ms: None,
+        }
+    }
+
+    #[test]
+    fn the_dummy_term_has_a_column() {
+        let terms = Terms::from_fn(|term| (term.key == "dummy").then_some(0.7));
+        assert_eq!(cell(&row(RunNumbers { terms, ..RunNumbers::default() }), "dummy"), Cell::Number(Some(0.7)));
+    }
+
+    /// A journal from before L_time was told has six terms by their places; the seventh is not known.
+    #[test]
+    fn a_row_of_an_older_journal_is_read() {
+        let now = row(RunNumbers { terms: Terms::from_fn(|_| Some(0.5)), ..RunNumbers::default() });
+        let line = serde_json::to_string(&now).unwrap();
+        assert_eq!(serde_json::from_str::<RunRow>(&line).unwrap(), now);
+        let (before, after) = line.split_once("\"terms\":{").unwrap();
+        let (_, after) = after.split_once('}').unwrap();
+        let older = format!("{before}\"terms\":[0.5,1,2,3,4,5]{after}");
+        let older: RunRow = serde_json::from_str(&older).unwrap();
+        assert_eq!(
+            ["em", "coll", "time"].map(|key| cell(&older, key)),
+            [Cell::Number(Some(0.5)), Cell::Number(Some(5.0)), Cell::Number(None)]
+        );
+    }
 }

@@ -3,85 +3,20 @@
 
 use super::error::RunError;
 use super::kind::StudyKind;
+use super::output::TABLE_FILE;
 use super::paper;
 use super::variant::Variant;
 use crate::digest;
 use crate::input::{MOST_TEXT, read_text};
 use crate::mhp::Precision;
 use crate::output::replace_file;
+use crate::study::shard::{DataSpec, Difference, Part, Shard};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use std::path::{Path, PathBuf};
 
 /// The name of the file in a run folder.
 pub const RUN_FILE: &str = "run.toml";
-
-/// Part `index` of `count`, counted from 1.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Shard {
-    /// Which part, from 1.
-    pub index: usize,
-    /// Parts in all.
-    pub count: usize,
-}
-
-impl std::str::FromStr for Shard {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is no shard; expected i/n with 1 ≤ i ≤ n, for example 2/4");
-        let (index, count) = text.split_once('/').ok_or_else(wrong)?;
-        let number = |part: &str| part.trim().parse::<usize>().map_err(|_| wrong());
-        let shard = Self { index: number(index)?, count: number(count)? };
-        let sound = (1..=100_000).contains(&shard.count) && (1..=shard.count).contains(&shard.index);
-        sound.then_some(shard).ok_or_else(wrong)
-    }
-}
-
-impl std::fmt::Display for Shard {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}/{}", self.index, self.count)
-    }
-}
-
-/// Which frames of the range are studied.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Subset {
-    /// All.
-    All,
-    /// The hard stratum.
-    Hard,
-}
-
-/// The data that a run is about.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DataSpec {
-    /// Name of the data set.
-    pub name: String,
-    /// Where it lay; the only part that may differ between shards.
-    #[serde(with = "crate::folders::portable_path")]
-    pub root: PathBuf,
-    /// How it lies on disk, as [`crate::dataset::Layout::word`] says it; "" in a run of an older program.
-    #[serde(default)]
-    pub layout: String,
-    /// [`crate::dataset::Dataset::fingerprint`]: layout, arrays, shapes, names.
-    pub fingerprint: String,
-    /// Of the files' sizes and of the maps of three frames.
-    pub content: String,
-    /// Arrays of the views, in order.
-    pub arrays: Vec<String>,
-    /// First frame of the range.
-    pub first: usize,
-    /// One past the last frame of the range.
-    pub end: usize,
-    /// Frames that are studied.
-    pub frames: usize,
-    /// Which of the range.
-    pub subset: Subset,
-}
 
 /// One part of a specification, in words.
 type Told<'a> = &'a dyn Fn(&RunSpec) -> String;
@@ -159,21 +94,31 @@ impl RunSpec {
     pub fn paper_missing(&self) -> Option<String> {
         paper::missing(self.study, &self.data.layout)
     }
+}
 
-    /// The whole that this is a shard of.
-    pub(super) fn whole(&self) -> Self {
+impl Part for RunSpec {
+    type Error = RunError;
+    const FILE: &'static str = RUN_FILE;
+
+    fn read(folder: &Path) -> Result<Self, RunError> {
+        Self::read(folder)
+    }
+
+    fn is_finished(folder: &Path) -> bool {
+        folder.join(TABLE_FILE).is_file()
+    }
+
+    fn shard(&self) -> Option<Shard> {
+        self.shard
+    }
+
+    fn whole(&self) -> Self {
         let whole = Self { shard: None, ..self.clone() };
         Self { id: whole.digest(), ..whole }
     }
 
-    /// The first thing, in words, in which another specification differs, with both values; where the data lay may.
-    pub(super) fn difference(&self, other: &Self) -> Option<(&'static str, String, String)> {
+    fn difference(&self, other: &Self) -> Option<Difference> {
         let shard = |spec: &Self| spec.shard.map_or_else(|| "the whole".to_owned(), |shard| shard.to_string());
-        let data = |spec: &Self| format!("{} {} {}", spec.data.name, spec.data.fingerprint, spec.data.content);
-        let frames = |spec: &Self| {
-            let DataSpec { first, end, frames, subset, .. } = &spec.data;
-            format!("{frames} of {first}..{end} ({})", if *subset == Subset::Hard { "hard" } else { "all" })
-        };
         let precision = |spec: &Self| format!("{:?}", spec.precision).to_lowercase();
         let named: [(&str, Told<'_>); 8] = [
             ("study", &|spec| spec.study.to_string()),
@@ -182,12 +127,12 @@ impl RunSpec {
             ("preset or configuration file", &|spec| spec.base.clone()),
             ("seed", &|spec| spec.seed.to_string()),
             ("shard", &shard),
-            ("data set", &data),
-            ("choice of frames", &frames),
+            ("data set", &|spec| spec.data.told()),
+            ("choice of frames", &|spec| spec.data.told_frames()),
         ];
         let found = named.into_iter().find(|(_, text)| text(self) != text(other));
         if let Some((what, text)) = found {
-            return Some((what, text(self), text(other)));
+            return Some((what.to_owned(), text(self), text(other)));
         }
         // A variant that both have may be set otherwise; what else there is differs as a whole.
         let pairs = || self.variants.iter().zip(&other.variants);
@@ -196,21 +141,8 @@ impl RunSpec {
             && pairs().all(|(a, b)| a.labels == b.labels)
         {
             let text = |variant: &Variant| field.text(field.get(&variant.config));
-            return Some((field.key, text(a), text(b)));
+            return Some((field.key.to_owned(), text(a), text(b)));
         }
-        (self.digest() != other.digest()).then(|| ("configuration", self.digest(), other.digest()))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn shards_are_written_as_i_of_n() {
-        assert_eq!("2/4".parse(), Ok(Shard { index: 2, count: 4 }));
-        for text in ["0/4", "5/4", "1", "a/b", "1/0", "-1/2", "1/99999999"] {
-            assert!(text.parse::<Shard>().is_err_and(|why| why.contains("expected i/n")), "{text}");
-        }
+        (self.digest() != other.digest()).then(|| ("configuration".to_owned(), self.digest(), other.digest()))
     }
 }

@@ -3,8 +3,10 @@
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::iou_color;
 use crate::labels::Verdict;
-use crate::session::{FrameRow, SortKey};
+use crate::mhp::TermId;
+use crate::session::{FrameNumber, FrameRow, SortKey, ViewState};
 use egui::{Align2, Color32, FontId, Painter, Rect, pos2};
+use std::sync::LazyLock;
 
 /// One column.
 pub(super) struct Column {
@@ -24,8 +26,47 @@ pub(super) struct Column {
     pub(super) right: bool,
 }
 
-/// Every column, from left to right.
-pub(super) const COLUMNS: &[Column] = &[
+/// Every column, from left to right: at the end one for each term of the loss.
+pub(super) fn columns() -> impl Iterator<Item = &'static Column> {
+    static OF_TERMS: LazyLock<Vec<Column>> = LazyLock::new(|| TermId::all().map(Column::of).collect());
+    COLUMNS.iter().chain(OF_TERMS.iter())
+}
+
+impl Column {
+    fn of(term: TermId) -> Self {
+        Self {
+            key: term.key,
+            title: term.label,
+            name: term.label,
+            tip: term.tooltip().leak(),
+            sort: SortKey::Term(term),
+            width: 50.0,
+            right: true,
+        }
+    }
+
+    /// Whether it is in the list: a term of the loss where it is asked for, the others unless they are not wanted.
+    pub(super) fn is_shown(&self, view: &ViewState) -> bool {
+        let named = |keys: &[String]| keys.iter().any(|key| key == self.key);
+        if self.is_of_term() { named(&view.shown_terms) } else { !named(&view.hidden_columns) }
+    }
+
+    /// Takes it into the list, or out of it.
+    pub(super) fn show(&self, view: &mut ViewState, on: bool) {
+        let of_term = self.is_of_term();
+        let keys = if of_term { &mut view.shown_terms } else { &mut view.hidden_columns };
+        keys.retain(|key| key != self.key);
+        if on == of_term {
+            keys.push(self.key.to_owned());
+        }
+    }
+
+    fn is_of_term(&self) -> bool {
+        matches!(self.sort, SortKey::Term(_))
+    }
+}
+
+const COLUMNS: &[Column] = &[
     Column {
         key: "index",
         title: "#",
@@ -155,6 +196,10 @@ fn number(value: Option<f64>, digits: usize) -> String {
 fn text(column: &Column, row: &FrameRow<'_>, tokens: &Tokens) -> (String, Color32) {
     let dim = |text: String| (text, tokens.dim);
     let fitted = row.iterations.is_some();
+    if let SortKey::Term(term) = column.sort {
+        let value = row.number(FrameNumber::Term(term));
+        return (value.map_or_else(String::new, |x| format!("{x:.4}")), tokens.text);
+    }
     match column.key {
         "index" => dim(row.index.to_string()),
         "frame" => {
@@ -234,4 +279,26 @@ pub(super) fn spoken(row: &FrameRow<'_>) -> String {
     }
     parts.extend(row.verdict.map(|verdict| format!("verdict {verdict}")));
     parts.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+
+    use super::*;
+    use crate::mhp::Terms;
+
+    #[test]
+    fn the_dummy_term_has_a_column_for_who_asks() {
+        let column = columns().find(|column| column.key == "dummy").unwrap();
+        let mut view = ViewState::default();
+        assert!(!column.is_shown(&view));
+        column.show(&mut view, true);
+        assert!(column.is_shown(&view));
+        let terms = Terms::from_fn(|term| (term.key == "dummy").then_some(0.7));
+        let row = FrameRow { terms: Some(&terms), ..FrameRow::default() };
+        assert_eq!(text(column, &row, &crate::app::theme::DARK).0, "0.7000");
+        column.show(&mut view, false);
+        assert_eq!(view, ViewState::default());
+    }
 }

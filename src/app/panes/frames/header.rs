@@ -1,11 +1,11 @@
 //! Over the rows: the filter, kept views, what is found, how far the grading is, and the columns' titles.
 
-use super::columns::{COLUMNS, Column};
+use super::columns::{Column, columns};
 use super::{GAP, ROW, State};
 use crate::app::panes::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
-use crate::session::{Command, SYNTAX, Sort, SortKey, StrataStatus};
+use crate::session::{Command, Sort, SortKey, StrataStatus, syntax};
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Align2, RichText, Role, Sense, Ui, pos2, vec2};
 use std::collections::BTreeSet;
@@ -40,7 +40,7 @@ fn filter(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Toke
         shared.send(Command::SetFilter(text.clone()));
     }
     state.filter = response.has_focus().then_some(text);
-    response.on_hover_text(SYNTAX);
+    response.on_hover_text(syntax());
     if let Some(wrong) = wrong {
         ui.label(RichText::new(wrong).small().color(tokens.bad));
     }
@@ -111,15 +111,10 @@ fn views(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
 
 fn column_menu(ui: &mut Ui, shared: &mut Shared<'_>) {
     let (button, _) = staying("Columns").ui(ui, |ui| {
-        for column in COLUMNS.iter().filter(|column| column.key != "frame") {
-            let mut on = !shared.session.view.hidden_columns.iter().any(|key| key == column.key);
+        for column in columns().filter(|column| column.key != "frame") {
+            let mut on = column.is_shown(&shared.session.view);
             if ui.checkbox(&mut on, column.name).on_hover_text(column.tip).changed() {
-                shared.set_view(|view| {
-                    view.hidden_columns.retain(|key| key != column.key);
-                    if !on {
-                        view.hidden_columns.push(column.key.to_owned());
-                    }
-                });
+                shared.set_view(|view| column.show(view, on));
             }
         }
     });

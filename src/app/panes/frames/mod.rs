@@ -7,7 +7,7 @@ use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::{CTRL, CommandRow, Menu, UiAction, has_frame};
 use crate::app::theme::{self, Tokens};
 use crate::session::{Command, Session};
-use columns::{COLUMNS, Column, cell, spoken};
+use columns::{Column, cell, spoken};
 use egui::{Key, RichText, Sense, Ui, pos2, vec2};
 use std::collections::BTreeSet;
 
@@ -62,8 +62,7 @@ fn blank(session: &Session) -> Option<Blank> {
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let session = shared.session;
     let tokens = Tokens::of(ui);
-    let columns: Vec<&Column> =
-        COLUMNS.iter().filter(|column| !session.view.hidden_columns.iter().any(|key| key == column.key)).collect();
+    let columns: Vec<&Column> = columns::columns().filter(|column| column.is_shown(&session.view)).collect();
     let wanted: f32 = columns.iter().map(|column| column.width + GAP).sum::<f32>() + 4.0;
     let width = wanted.max(ui.available_width());
     // The name takes what the numbers leave.

@@ -3,10 +3,12 @@
 use crate::app::theme::Tokens;
 use crate::body::{Group, Pppr, Side, Skeleton};
 use crate::geometry::{self, rotation_from_quaternion};
+use crate::mhp::TermGroup;
 use crate::radar::AxisKind;
 use crate::render::shapes::{self, Stroke};
 use crate::render::{Camera, LineInstance, Scene, SceneMode, SplatInstance, Vec3};
 use crate::session::{Session, SplatMode};
+use crate::worker::Snapshot;
 use egui::Color32;
 
 /// Seconds of motion that a velocity arrow shows.
@@ -44,17 +46,7 @@ pub(super) fn scene(session: &Session, camera: &Camera, tokens: &Tokens, px: f32
             velocities(&mut scene, &snapshot.params, skeleton, camera, tokens, px);
         }
         if look.show_gradients {
-            let total = &snapshot.evaluation.gradient;
-            gradients(
-                &mut scene,
-                &snapshot.params,
-                total,
-                &snapshot.evaluation.em_gradient,
-                &snapshot.config,
-                camera,
-                tokens,
-                px,
-            );
+            gradients(&mut scene, snapshot, camera, tokens, px);
         }
     }
     if look.show_initial
@@ -190,32 +182,22 @@ fn velocities(scene: &mut Scene, params: &Pppr, skeleton: &Skeleton, camera: &Ca
     }
 }
 
-/// −∂L/∂p split into its parts: what each term wants of each joint. The longest is [`GRADIENT_M`] long.
-#[expect(clippy::too_many_arguments, reason = "a picture of six inputs")]
-fn gradients(
-    scene: &mut Scene,
-    params: &Pppr,
-    total: &Pppr,
-    em: &Pppr,
-    config: &crate::config::FitConfig,
-    camera: &Camera,
-    tokens: &Tokens,
-    px: f32,
-) {
-    let parts: Vec<[geometry::Vec3; 2]> = (0..params.shape().total_joints())
-        .map(|joint| {
-            let em = geometry::scale(em.vec3(Group::Position, joint), -config.w_em);
-            let all = geometry::scale(total.vec3(Group::Position, joint), -1.0);
-            [em, geometry::sub(all, em)]
-        })
-        .collect();
+/// −∂L/∂p split into its parts: what each group of terms wants of each joint. The longest is [`GRADIENT_M`] long.
+fn gradients(scene: &mut Scene, snapshot: &Snapshot, camera: &Camera, tokens: &Tokens, px: f32) {
+    let Snapshot { params, evaluation, config, .. } = snapshot;
+    let descent = |group: TermGroup, joint: usize| -> geometry::Vec3 {
+        let slope = evaluation.joint_gradient(group, config, Group::Position, joint);
+        std::array::from_fn(|axis| -slope[axis])
+    };
+    let joints = 0..params.shape().total_joints();
+    let parts: Vec<_> = joints.map(|joint| TermGroup::ALL.map(|group| descent(group, joint))).collect();
     let longest = parts.iter().flatten().map(|v| geometry::norm(*v)).fold(0.0, f64::max);
     if longest <= 0.0 || !longest.is_finite() {
         return;
     }
     for (joint, part) in parts.iter().enumerate() {
         let from = vec3(params.position(joint));
-        for (v, color) in part.iter().zip([tokens.curve("em"), tokens.curve("bone")]) {
+        for (v, color) in part.iter().zip(TermGroup::ALL.map(|group| tokens.group(group))) {
             let arrow = vec3(geometry::scale(*v, GRADIENT_M / longest));
             if arrow.length() > 0.01 {
                 let stroke = Stroke { color: rgba(color, 1.0), width_px: 2.0 * px };

@@ -12,7 +12,8 @@ use crate::app::commands::AppAct;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::session::{Command, Session};
-use crate::study::run::{Run, StudyKind, Subset};
+use crate::study::run::{Run, StudyKind};
+use crate::study::shard::Subset;
 use egui::{RichText, Role, Ui};
 use measure::{PlottedQuantity, Values};
 
