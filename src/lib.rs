@@ -46,7 +46,7 @@
 //! | [`diagnose`] | metrics: MAJPE, PA-MAJPE; evidence for each failure mode |
 //! | [`start`] | where a frame's fit begins: the problem with the frames around it, and for how many people a start is asked |
 //! | [`mhp`] | start poses, forward model, objective, Adam, convergence, the fitter's one `step` |
-//! | [`dataset`] | frames, the generic manifest, MMVR, HuPR, XRF55, npz; lazy loading and a cache with a byte budget |
+//! | [`dataset`] | frames and their layouts on disk, one file each; manifests, npz; lazy loading and a cache with a byte budget |
 //! | [`simulate`] | the synthetic source: people and rooms before a radar, as frames with truth |
 //! | [`people`] | counting, places and identities of several people |
 //! | [`body`] | skeleton topologies, the PPPR parameters, bodies that move |

@@ -9,24 +9,23 @@ use std::alloc::System;
 use std::io::IsTerminal as _;
 use std::process::ExitCode;
 use tracing_subscriber::field::MakeExt as _;
+use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::fmt::FormatFields;
 use tracing_subscriber::fmt::format::debug_fn;
+use tracing_subscriber::layer::SubscriberExt as _;
+use tracing_subscriber::util::SubscriberInitExt as _;
 
 /// Counts bytes for `bench`, and limits nothing.
 #[global_allocator]
 static ALLOCATOR: Cap<System> = Cap::new(System, usize::MAX);
 
 fn main() -> ExitCode {
-    tracing_subscriber::fmt()
-        .with_env_filter(
-            tracing_subscriber::EnvFilter::try_from_default_env()
-                .unwrap_or_else(|_| "warn,winit=error,wgpu_hal=error,mhp_inspector=info".into()),
-        )
+    let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
         .with_target(false)
-        .fmt_fields(fields())
-        .init();
+        .fmt_fields(fields());
+    tracing_subscriber::registry().with(lines).with(told()).init();
     count_bytes_with(Meter { total_bytes: || ALLOCATOR.total_allocated(), peak_bytes: || ALLOCATOR.max_allocated() });
     if let Err(error) = output::survive_size_limit() {
         tracing::warn!("a file that reaches the limit of its size will end the program: {error}");
@@ -45,6 +44,18 @@ fn main() -> ExitCode {
     done.unwrap_or_else(|error| {
         eprintln!("{}", escape::one_line(&format!("error: {error:#}")));
         ExitCode::from(EXIT_BAD_INPUT)
+    })
+}
+
+/// What the log tells: as `RUST_LOG` says, `level` and `target=level`, else warnings and what this program informs of.
+fn told() -> Targets {
+    let asked = std::env::var("RUST_LOG").ok().and_then(|text| text.parse().ok());
+    asked.unwrap_or_else(|| {
+        let quiet = ["winit", "wgpu_hal"].map(|target| (target, LevelFilter::ERROR));
+        Targets::new()
+            .with_default(LevelFilter::WARN)
+            .with_targets(quiet)
+            .with_target("mhp_inspector", LevelFilter::INFO)
     })
 }
 

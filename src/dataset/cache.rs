@@ -1,6 +1,6 @@
 //! Frames, or parts of them, in memory within a byte budget.
 
-use std::collections::{BTreeMap, HashMap};
+use lru::LruCache;
 use std::sync::Arc;
 
 /// The budget where nobody sets another: 512 MiB.
@@ -9,10 +9,8 @@ pub const DEFAULT_BUDGET: usize = 512 << 20;
 /// Least recently used frames go first, so that what is held never exceeds the budget.
 #[derive(Debug)]
 pub struct Cache<T> {
-    frames: HashMap<usize, (Arc<T>, usize, u64)>,
-    /// Index by time of last use.
-    order: BTreeMap<u64, usize>,
-    clock: u64,
+    /// Each with its bytes.
+    frames: LruCache<usize, (Arc<T>, usize)>,
     bytes: usize,
     budget: usize,
 }
@@ -29,22 +27,17 @@ impl<T> Default for Cache<T> {
 impl<T> Cache<T> {
     /// An empty cache that will hold at most `budget` bytes of frames.
     pub fn new(budget: usize) -> Self {
-        Self { frames: HashMap::new(), order: BTreeMap::new(), clock: 0, bytes: 0, budget }
+        Self { frames: LruCache::unbounded(), bytes: 0, budget }
     }
 
     /// The frame `index`, which is now the most recently used.
     pub fn get(&mut self, index: usize) -> Option<Arc<T>> {
-        let (frame, _, used) = self.frames.get_mut(&index)?;
-        self.order.remove(used);
-        self.clock += 1;
-        *used = self.clock;
-        self.order.insert(self.clock, index);
-        Some(Arc::clone(frame))
+        self.frames.get(&index).map(|(frame, _)| Arc::clone(frame))
     }
 
     /// True where the frame is held; its time of last use stays.
     pub fn contains(&self, index: usize) -> bool {
-        self.frames.contains_key(&index)
+        self.frames.contains(&index)
     }
 
     /// Keeps a frame of `bytes`, dropping old ones for it. A frame larger than the whole budget is not kept.
@@ -54,21 +47,16 @@ impl<T> Cache<T> {
             return;
         }
         while self.bytes + bytes > self.budget {
-            let Some((_, oldest)) = self.order.pop_first() else { break };
-            if let Some((_, freed, _)) = self.frames.remove(&oldest) {
-                self.bytes -= freed;
-            }
+            let Some((_, (_, freed))) = self.frames.pop_lru() else { break };
+            self.bytes -= freed;
         }
-        self.clock += 1;
-        self.order.insert(self.clock, index);
-        self.frames.insert(index, (frame, bytes, self.clock));
+        self.frames.put(index, (frame, bytes));
         self.bytes += bytes;
     }
 
     /// Forgets a frame.
     pub fn remove(&mut self, index: usize) {
-        if let Some((_, bytes, used)) = self.frames.remove(&index) {
-            self.order.remove(&used);
+        if let Some((_, bytes)) = self.frames.pop(&index) {
             self.bytes -= bytes;
         }
     }

@@ -38,7 +38,7 @@ pub use cache::{Cache, DEFAULT_BUDGET, FrameCache};
 pub use error::DatasetError;
 pub use frame::{Frame, Heatmap, ImageAnnotations, Truth};
 pub use job::OpenJob;
-pub use layout::{BareCatalog, BareChoice, LAYOUTS, Layout, MapArray, Remembered, Stored, XRF55_STEPS};
+pub use layout::{BareCatalog, BareChoice, LAYOUTS, Layout, MapArray, Remembered, Stored};
 pub use loader::{Loaded, Loader};
 pub use manifest::Manifest;
 pub use maps::MapReader;

@@ -7,6 +7,7 @@ use crate::radar::{
     AdcCube, Axis, AxisKind, Chain, FftSetup, Fmcw, MimoArray, PointSpread, Quantity, RadarConfig, SPEED_OF_LIGHT,
     Spacing, View, Window,
 };
+use num_complex::Complex64;
 
 /// Taper over the elements: level sidelobes, as a calibrated array leaves them.
 const ANGLE_WINDOW: Window = Window::Chebyshev { sidelobe_db: 30.0 };
@@ -93,6 +94,11 @@ impl Device {
                 }
             })
             .collect()
+    }
+
+    /// The complex cubes of a frame, one a view, where the layout stores those and no maps; else none.
+    pub fn cubes(&self, cubes: &[AdcCube]) -> Vec<Vec<Complex64>> {
+        if self.layout == SimulatedLayout::Hupr { cubes.iter().map(hupr_cube).collect() } else { Vec::new() }
     }
 }
 

@@ -40,6 +40,16 @@ impl SimulatedLayout {
         }
     }
 
+    /// The layout of its files, as a data set's manifest says it.
+    pub fn files(self) -> &'static str {
+        match self {
+            Self::Mmvr | Self::Xrf55 | Self::Generic => "npz",
+            Self::MmvrTree => "mmvr",
+            Self::Hupr => "hupr",
+            Self::Xrf55Stack => "xrf55",
+        }
+    }
+
     /// Frames a second.
     pub fn frame_rate_hz(self) -> f64 {
         match self {

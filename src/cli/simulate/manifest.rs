@@ -1,10 +1,10 @@
 //! `dataset.toml` of a simulated data set, SPEC section 6, with how it was made as a comment.
 
 use super::Style;
-use super::npz_frames::MANTISSA_BITS;
 use crate::body::Skeleton;
+use crate::dataset::layout::{FrameWriter, MANTISSA_BITS};
 use crate::radar::{Axis, PointSpread, Quantity, RadarConfig};
-use crate::simulate::{Recording, SimulatedLayout};
+use crate::simulate::Recording;
 use serde::Serialize;
 use std::fmt::Write as _;
 
@@ -40,28 +40,20 @@ fn name(recording: &Recording) -> String {
 }
 
 /// The whole file.
-pub(super) fn text(recording: &Recording, style: Style<'_>) -> anyhow::Result<String> {
+pub(super) fn text(recording: &Recording, writer: &dyn FrameWriter, style: Style<'_>) -> anyhow::Result<String> {
     let view = |view: &crate::radar::View| ManifestView {
         array: view.array.clone(),
         quantity: view.quantity,
         psf: view.psf,
         axes: view.axes.clone(),
     };
-    let layout = recording.options().layout;
-    let own = match layout {
-        SimulatedLayout::Mmvr | SimulatedLayout::Xrf55 | SimulatedLayout::Generic => "npz",
-        SimulatedLayout::MmvrTree => "mmvr",
-        SimulatedLayout::Hupr => "hupr",
-        SimulatedLayout::Xrf55Stack => "xrf55",
-    };
-    // HuPR's files and axes are those of its preset; its bones differ from COCO's.
     let manifest = Manifest {
         name: style.name.map_or_else(|| name(recording), str::to_owned),
-        layout: own,
-        frames: (own == "npz").then_some(if recording.sequences() == 1 { "frames/*.npz" } else { "frames/*/*.npz" }),
+        layout: recording.options().layout.files(),
+        frames: writer.pattern(recording.sequences()),
         frame_rate_hz: recording.frame_rate_hz(),
         // Bones of a person of 1.70 m: the people of a recording differ in height.
-        skeleton: (layout != SimulatedLayout::Hupr).then(|| crate::body::Build::default().skeleton()),
+        skeleton: (!writer.has_own_joints()).then(|| crate::body::Build::default().skeleton()),
         radar: recording.radar(),
         view: recording.device().views.iter().map(view).collect(),
     };

@@ -1,22 +1,18 @@
 //! `mhp-inspector simulate`: writes a synthetic data set with truth, from scatterers to ADC samples to maps.
 //!
 //! Sequences are made side by side, frames are named by sequence and number, and the same options give the same bytes whatever
-//! the number of threads. `plan.rs` knows which files there will be; one file a layout writes them.
+//! the number of threads. `plan.rs` sees to the files that there will be; the layout of the data set writes them.
 
 mod args;
-mod hupr_tree;
-mod image;
 mod manifest;
-mod mmvr_tree;
-mod npz_frames;
 mod plan;
-mod stacks;
 
 pub use args::{HELP, SimulateArgs};
 
 use crate::dataset::MANIFEST_NAME;
+use crate::dataset::layout::{FrameWriter, NewFrame, NewPlace};
 use crate::output::{FolderLock, Inputs, replace_file};
-use crate::simulate::{Recording, Sequence, SimulatedLayout};
+use crate::simulate::{Recording, Sequence};
 use anyhow::Context as _;
 use rayon::prelude::*;
 use std::path::Path;
@@ -62,16 +58,15 @@ pub fn write_data_set(
 ) -> anyhow::Result<()> {
     refuse_another(out)?;
     let _lock = FolderLock::claim(out, &[], &Inputs::default())?;
-    plan::prepare(out, recording)?;
+    let writer = plan::writer(recording)?;
+    plan::prepare(out, recording, writer)?;
     let sequences: Vec<usize> = (0..recording.sequences()).collect();
-    let labels = sequences
+    let kept = sequences
         .par_iter()
-        .map(|&number| write_sequence(out, recording, &recording.sequence(number), style.narrow, &done))
-        .collect::<anyhow::Result<Vec<hupr_tree::Annotations>>>()?;
-    if recording.options().layout == SimulatedLayout::Hupr {
-        hupr_tree::write_annotations(out, &labels)?;
-    }
-    let (path, text) = (out.join(MANIFEST_NAME), manifest::text(recording, style)?);
+        .map(|&number| write_sequence(out, recording, &recording.sequence(number), (writer, style.narrow), &done))
+        .collect::<anyhow::Result<Vec<Vec<String>>>>()?;
+    writer.finish(out, &kept)?;
+    let (path, text) = (out.join(MANIFEST_NAME), manifest::text(recording, writer, style)?);
     let written = replace_file(&path, |out| out.write_all(text.as_bytes()));
     written.with_context(|| format!("{}: cannot be written", path.display()))
 }
@@ -86,31 +81,36 @@ fn refuse_another(out: &Path) -> anyhow::Result<()> {
     }
 }
 
-/// Writes the frames of a sequence; the labels are those of HuPR's annotation file, else empty.
+/// Writes the frames of a sequence, file by file; answers what the writer keeps of them.
 fn write_sequence(
     out: &Path,
     recording: &Recording,
     sequence: &Sequence,
-    narrow: bool,
+    (writer, narrow): (&dyn FrameWriter, bool),
     done: &(impl Fn() + Sync),
-) -> anyhow::Result<hupr_tree::Annotations> {
-    let numbers: Vec<usize> = (0..recording.frames_of(sequence.index()).len()).collect();
-    let views = &recording.device().views;
-    if recording.options().layout == SimulatedLayout::Xrf55Stack {
-        return stacks::write(out, sequence, numbers.len(), narrow, done).map(|()| Vec::new());
-    }
-    let write = |&number: &usize| -> anyhow::Result<Option<hupr_tree::Block>> {
-        let raw = sequence.raw(number);
-        let frame = sequence.processed(number, &raw);
-        let place = (out, sequence.index(), number);
-        let labels = match recording.options().layout {
-            SimulatedLayout::Hupr => hupr_tree::write(place, recording.device(), &raw, &frame, narrow)?,
-            SimulatedLayout::MmvrTree => mmvr_tree::write(place, views, &frame).map(|()| None)?,
-            _ => npz_frames::write(&plan::npz_path(place, recording.sequences() == 1), views, &frame).map(|()| None)?,
+) -> anyhow::Result<Vec<String>> {
+    let (length, a_file) = (recording.frames_of(sequence.index()).len(), writer.frames_a_file());
+    let device = recording.device();
+    let write = |first: usize| -> anyhow::Result<Option<String>> {
+        let made = |number| {
+            let raw = sequence.raw(number);
+            let frame = (sequence.processed(number, &raw), device.cubes(&raw.cubes));
+            done();
+            frame
         };
-        done();
-        Ok(labels)
+        let made: Vec<_> = (first..first + a_file).into_par_iter().map(made).collect();
+        let new = made.iter().map(|(frame, cubes)| NewFrame {
+            maps: &frame.maps,
+            cubes,
+            joints: &frame.joints,
+            velocities: &frame.velocities,
+            timestamp_s: frame.timestamp_s,
+            scenario: &frame.scenario,
+        });
+        let at = NewPlace { root: out, sequence: sequence.index(), sequences: recording.sequences(), number: first };
+        Ok(writer.write(&at, &device.views, &new.collect::<Vec<_>>(), narrow)?)
     };
-    let blocks: Vec<Option<hupr_tree::Block>> = numbers.par_iter().map(write).collect::<anyhow::Result<_>>()?;
-    Ok(blocks.into_iter().flatten().collect())
+    let files: Vec<usize> = (0..length).step_by(a_file).collect();
+    let kept: Vec<Option<String>> = files.into_par_iter().map(write).collect::<anyhow::Result<_>>()?;
+    Ok(kept.into_iter().flatten().collect())
 }

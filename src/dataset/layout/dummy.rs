@@ -2,12 +2,12 @@
 //! `NNN.dummy`, whose bytes become a map when it is asked for.
 
 use super::index::{Folders, Segment};
-use super::{FrameSource, Layout, Opened, Place, manifest_beside, no_single_file};
+use super::{FrameSource, FrameWriter, Layout, NewFrame, NewPlace, Opened, Place, manifest_beside, no_single_file};
 use crate::dataset::manifest::Manifest;
 use crate::dataset::set::{DatasetInfo, parent};
 use crate::dataset::walk::Walk;
 use crate::dataset::{DatasetError, Frame, Heatmap};
-use crate::radar::PinholeCamera;
+use crate::radar::{PinholeCamera, View};
 use crate::task::Progress;
 use std::fmt::{self, Write};
 use std::ops::Range;
@@ -54,6 +54,10 @@ impl Layout for Dummy {
         open(&Place { root: parent(file), manifest: &manifest, allow_outside: false }, Some(stem), progress)
     }
 
+    fn writer(&self) -> Option<&dyn FrameWriter> {
+        Some(self)
+    }
+
     fn camera(&self) -> Option<PinholeCamera> {
         Some(PinholeCamera { focal_px: [1.0; 2], centre_px: [0.0; 2] })
     }
@@ -73,6 +77,26 @@ fn open(place: &Place<'_>, named: Option<&str>, progress: &Progress) -> Result<O
     let named = named.and_then(|named| (0..frames.count()).find(|&i| frames.find(i).is_some_and(|f| f.1 == named)));
     let info = DatasetInfo { notes, ..place.info(&place.manifest.layout.preset()?) };
     Ok(Opened { info, frames: Box::new(Frames(frames)), named })
+}
+
+impl FrameWriter for Dummy {
+    fn files(&self, at: &NewPlace<'_>) -> Vec<PathBuf> {
+        vec![at.root.join(format!("take_{}", at.sequence)).join(format!("{}.dummy", at.number))]
+    }
+
+    fn write(
+        &self,
+        at: &NewPlace<'_>,
+        _views: &[View],
+        frames: &[NewFrame<'_>],
+        _narrow: bool,
+    ) -> Result<Option<String>, DatasetError> {
+        for (path, frame) in self.files(at).iter().zip(frames) {
+            let bytes: Vec<u8> = frame.maps.iter().flatten().map(|&cell| cell as u8).collect();
+            std::fs::write(path, bytes).map_err(|reason| DatasetError::Write { reason, path: path.clone() })?;
+        }
+        Ok(None)
+    }
 }
 
 fn stem_of(file: &Path) -> Option<&str> {
@@ -122,6 +146,7 @@ impl FrameSource for Frames {
 #[cfg(test)]
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+    use crate::dataset::layout::{NewFrame, NewPlace};
     use crate::dataset::{Dataset, DatasetError, LAYOUTS, Layout, Manifest};
     use crate::task::Progress;
     use std::path::Path;
@@ -130,12 +155,19 @@ mod tests {
         Dataset::open(path, &Progress::new())
     }
 
+    /// Three frames in two sequences, as the registry's own writer puts them.
     fn written() -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
-        for (path, byte) in [("take_2/1.dummy", b'a'), ("take_10/7.dummy", b'c'), ("take_10/8.dummy", b'd')] {
-            let path = folder.path().join(path);
-            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-            std::fs::write(path, [byte; 6]).unwrap();
+        let writer = <dyn Layout>::named("dummy").unwrap().writer().unwrap();
+        for (sequence, number, cell) in [(2, 1, 97.0), (10, 7, 99.0), (10, 8, 100.0)] {
+            let at = NewPlace { root: folder.path(), sequence, sequences: 11, number };
+            for file in writer.files(&at) {
+                std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+            }
+            let maps = [vec![cell; 6]];
+            let frame =
+                NewFrame { maps: &maps, cubes: &[], joints: &[], velocities: &[], timestamp_s: 0.0, scenario: "" };
+            writer.write(&at, &[], &[frame], false).unwrap();
         }
         folder
     }

@@ -3,11 +3,13 @@
 use super::arrays::{read_map, read_truth, scalar};
 use super::index::{folder_of, folders_of};
 use super::pattern::{leads_out, matching};
-use super::{FrameSource, Layout, Opened, Place, bare, no_single_file};
+use super::write::{COCO_JOINTS, NewFrame, NewPlace, TruthArrays, named, rounded_maps};
+use super::{FrameSource, FrameWriter, Layout, Opened, Place, bare, no_single_file};
 use crate::dataset::manifest::Manifest;
-use crate::dataset::npz::{NpzArchive, NpzError};
+use crate::dataset::npz::{NpzArchive, NpzError, write_deflated};
 use crate::dataset::set::DatasetInfo;
 use crate::dataset::{DatasetError, Frame, Heatmap};
+use crate::radar::View;
 use crate::task::Progress;
 use std::fmt::{self, Write};
 use std::ops::Range;
@@ -44,10 +46,42 @@ impl Layout for Generic {
         Ok(Opened { info, frames: Box::new(Frames(files)), named: None })
     }
 
+    fn writer(&self) -> Option<&dyn FrameWriter> {
+        Some(self)
+    }
+
     /// A bare file whose axes the manifest tells.
     fn open_file(&self, file: &Path, manifest: Option<&Manifest>, _: &Progress) -> Result<Opened, DatasetError> {
         let manifest = manifest.ok_or_else(|| no_single_file(WORD, file, manifest))?;
         bare::open_described(file, manifest)
+    }
+}
+
+impl FrameWriter for Generic {
+    /// `frames/s000/000000.npz`, or `frames/000000.npz` where there is one sequence only.
+    fn files(&self, at: &NewPlace<'_>) -> Vec<PathBuf> {
+        let folder = at.root.join("frames");
+        let folder = if at.sequences == 1 { folder } else { folder.join(format!("s{:03}", at.sequence)) };
+        vec![folder.join(format!("{:06}.npz", at.number))]
+    }
+
+    fn write(
+        &self,
+        at: &NewPlace<'_>,
+        views: &[View],
+        frames: &[NewFrame<'_>],
+        _narrow: bool,
+    ) -> Result<Option<String>, DatasetError> {
+        for (path, frame) in self.files(at).iter().zip(frames) {
+            let (maps, truth) = (rounded_maps(frame), TruthArrays::of(frame, COCO_JOINTS));
+            let arrays: Vec<_> = named(views, &maps).into_iter().chain(truth.arrays()).collect();
+            write_deflated(path, &arrays)?;
+        }
+        Ok(None)
+    }
+
+    fn pattern(&self, sequences: usize) -> Option<&'static str> {
+        Some(if sequences == 1 { "frames/*.npz" } else { "frames/*/*.npz" })
     }
 }
 

@@ -1,10 +1,11 @@
 //! The layouts of data sets. A layout is one file (or folder) here that implements [`Layout`], and one line in [`LAYOUTS`]:
 //! nothing else in the program knows it by name.
 //!
-//! A layout says what it is called ([`Layout::word`]), what its data set publishes ([`Layout::preset_text`]), how a path is
-//! told to be of it ([`Layout::signs`], [`Layout::claims`]), and opens it: names of files only, which become a
-//! [`FrameSource`]. That gives sequences and names, and reads a frame when it is asked for. [`index`] and [`arrays`] hold what
-//! layouts have in common.
+//! A layout says what it is called ([`Layout::word`]), what its data set publishes ([`Layout::preset_text`]), how a path is told
+//! to be of it ([`Layout::signs`], [`Layout::claims`]), and opens it: by names of files, which become a [`FrameSource`]. That
+//! gives names and sequences, says which files a frame is made of (one, one a view, or one for many frames), and reads or computes
+//! the frame when it is asked for. [`Layout::writer`] writes new frames in the same files. What layouts have in common lies
+//! beside them: `index.rs` (folders of frames, lists of files), `arrays.rs` (maps and truth), `write.rs`.
 
 mod arrays;
 mod bare;
@@ -16,11 +17,12 @@ mod hupr;
 mod index;
 mod mmvr;
 mod pattern;
+mod write;
 mod xrf55;
 
 pub use bare::{BareCatalog, BareChoice, Remembered};
 pub use frames::{FrameSource, MapArray, Stored};
-pub use xrf55::STEPS as XRF55_STEPS;
+pub use write::{FrameWriter, MANTISSA_BITS, NewFrame, NewPlace};
 
 use super::DatasetError;
 use super::axes_text::axes_badge;
@@ -87,6 +89,11 @@ pub trait Layout: Debug + Sync {
         _progress: &Progress,
     ) -> Result<Opened, DatasetError> {
         Err(no_single_file(self.word(), file, manifest))
+    }
+
+    /// Writes new frames in this layout's files, where it can.
+    fn writer(&self) -> Option<&dyn FrameWriter> {
+        None
     }
 
     /// The camera whose pixels its image labels are, where its calibration is published.

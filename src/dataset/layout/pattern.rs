@@ -4,6 +4,7 @@ use crate::dataset::DatasetError;
 use crate::dataset::walk::is_special;
 use crate::task::Progress;
 use std::path::{Component, Path, PathBuf};
+use wildmatch::WildMatch;
 
 /// Files that match a pattern at most.
 const MAX_MATCHES: usize = 1_000_000;
@@ -47,13 +48,14 @@ pub(super) fn matching(root: &Path, pattern: &str, progress: &Progress) -> Resul
 fn matches_in(root: &Path, base: &Path, part: &str, file: bool) -> Result<Vec<PathBuf>, DatasetError> {
     let folder = root.join(base);
     let failed = |reason| DatasetError::Read { reason, path: folder.clone() };
+    let wanted = WildMatch::new(part);
     let mut names = Vec::new();
     for entry in std::fs::read_dir(&folder).map_err(failed)? {
         let entry = entry.map_err(failed)?;
         let name = entry.file_name();
         let text = name.to_string_lossy();
         let hidden = text.starts_with('.') && !part.starts_with('.');
-        if hidden || !fits(part.as_bytes(), text.as_bytes()) {
+        if hidden || !wanted.matches(&text) {
             continue;
         }
         let kind = entry.file_type().map_err(failed)?;
@@ -70,41 +72,21 @@ fn matches_in(root: &Path, base: &Path, part: &str, file: bool) -> Result<Vec<Pa
     Ok(names)
 }
 
-/// `*` is any run of characters, `?` any one. Greedy with one point to return to: linear for one `*`, never exponential.
-fn fits(pattern: &[u8], text: &[u8]) -> bool {
-    let (mut p, mut t, mut back) = (0, 0, None);
-    while t < text.len() {
-        match pattern.get(p) {
-            Some(b'*') => {
-                back = Some((p + 1, t));
-                p += 1;
-            }
-            Some(&c) if c == b'?' || text.get(t) == Some(&c) => {
-                p += 1;
-                t += 1;
-            }
-            _ => {
-                let Some((after_star, start)) = back else { return false };
-                back = Some((after_star, start + 1));
-                (p, t) = (after_star, start + 1);
-            }
-        }
-    }
-    pattern.get(p..).unwrap_or_default().iter().all(|&c| c == b'*')
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// The patterns that manifests have, as they are meant: names with brackets and braces are names.
     #[test]
-    fn matches_stars_and_question_marks() {
-        assert!(fits(b"*.npz", b"000000.npz"));
-        assert!(fits(b"a*b*c", b"a_b_b_c"));
-        assert!(fits(b"f?", b"f1"));
-        assert!(fits(b"*", b""));
-        assert!(!fits(b"*.npz", b"000000.npy"));
-        assert!(!fits(b"a*b", b"abc"));
-        assert!(!fits(b"f?", b"f"));
+    fn stars_and_question_marks_are_all_that_is_special() {
+        let fits = |pattern: &str, name: &str| WildMatch::new(pattern).matches(name);
+        for (pattern, name) in
+            [("*.npz", "000000.npz"), ("a*b*c", "a_b_b_c"), ("f?", "f1"), ("*", ""), ("[a]{b}*", "[a]{b}7")]
+        {
+            assert!(fits(pattern, name), "{pattern} {name}");
+        }
+        for (pattern, name) in [("*.npz", "000000.npy"), ("a*b", "abc"), ("f?", "f"), ("[a]*", "a7")] {
+            assert!(!fits(pattern, name), "{pattern} {name}");
+        }
     }
 }

@@ -36,7 +36,7 @@ pub struct Entry {
 }
 
 enum Kind {
-    Npz(npyz::npz::NpzArchive<BufReader<File>>),
+    Npz(zip::ZipArchive<BufReader<File>>),
     Npy(File),
 }
 
@@ -63,10 +63,10 @@ impl NpzArchive {
         let (kind, keys) = if magic.is_empty() {
             return Err(NpzError::Empty { path: path.to_owned() });
         } else if magic.starts_with(b"PK") {
-            let bad =
-                |error: std::io::Error| NpzError::BadArchive { message: error.to_string(), path: path.to_owned() };
-            let archive = npyz::npz::NpzArchive::new(BufReader::new(file)).map_err(bad)?;
-            let mut keys: Vec<String> = archive.array_names().map(str::to_owned).collect();
+            let archive = zip::ZipArchive::new(BufReader::new(file))
+                .map_err(|error| NpzError::BadArchive { message: error.to_string(), path: path.to_owned() })?;
+            let arrays = archive.file_names().filter_map(npyz::npz::array_name_from_file_name);
+            let mut keys: Vec<String> = arrays.map(str::to_owned).collect();
             keys.sort();
             (Kind::Npz(archive), keys)
         } else if magic.starts_with(b"\x93NUMPY") {
@@ -296,7 +296,6 @@ impl NpzArchive {
             Kind::Npz(archive) => {
                 let name = npyz::npz::file_name_from_array_name(key);
                 let mut entry = archive
-                    .zip_archive()
                     .by_name(&name)
                     .map_err(|error| NpzError::BadArchive { message: error.to_string(), path: path.to_owned() })?;
                 let packed = entry.compressed_size().min(file_bytes);

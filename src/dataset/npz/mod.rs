@@ -1,6 +1,6 @@
 //! Arrays on disk: `.npy` files and `.npz` archives of them.
 //!
-//! The container and the header are read by `npyz`; what is added here is distrust. A header is checked before it is
+//! The container is read by `zip`, the header by `npyz`; what is added here is distrust. A header is checked before it is
 //! parsed (length, nesting, a product of the shape that fits), a declared size is checked against what the file can
 //! hold before anything is allocated, and every array is read to its very end, because only there does the archive
 //! compare its checksum. Numbers of every width and byte order become `f64`; Fortran order is transposed to C order.

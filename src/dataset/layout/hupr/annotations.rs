@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 /// Width and height of the images, px.
-const IMAGE_SIZE: [usize; 2] = [256, 256];
+pub(super) const IMAGE_SIZE: [usize; 2] = [256, 256];
 const JOINTS: usize = 14;
 /// Bytes of a file that are read: the largest that is published has 50 MB.
 const MOST_BYTES: u64 = 128 << 20;

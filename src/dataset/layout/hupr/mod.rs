@@ -5,10 +5,11 @@
 //! A cube is 8 MiB; it is read in pieces, and only the map is held.
 
 mod annotations;
+mod write;
 
 use super::arrays::truth_beside;
 use super::index::{Folders, Segment};
-use super::{FrameSource, Layout, MapArray, Opened, Place, Stored};
+use super::{FrameSource, FrameWriter, Layout, MapArray, Opened, Place, Stored};
 use crate::dataset::natural::natural;
 use crate::dataset::npz::{NPY_KEY, NpzArchive, shape_text};
 use crate::dataset::set::DatasetInfo;
@@ -45,6 +46,10 @@ impl Layout for Hupr {
 
     fn signs(&self) -> Option<&'static str> {
         Some("HuPR's hori/ and vert/")
+    }
+
+    fn writer(&self) -> Option<&dyn FrameWriter> {
+        Some(self)
     }
 
     fn open(&self, place: &Place<'_>, progress: &Progress) -> Result<Opened, DatasetError> {

@@ -3,9 +3,11 @@
 //! What the axes are is not published. A view of two axes takes each of the 17 as a frame, a view of three takes a file as one;
 //! the preset (`assets/xrf55.toml`) says which is assumed. XX_YY_ZZ are volunteer, action and repetition, however they are padded.
 
+mod write;
+
 use super::arrays::truth_beside;
 use super::index::{folder_of, folders_of};
-use super::{FrameSource, Layout, Opened, Place};
+use super::{FrameSource, FrameWriter, Layout, Opened, Place};
 use crate::dataset::natural::natural;
 use crate::dataset::npz::{NPY_KEY, NpzArchive, shape_text};
 use crate::dataset::set::DatasetInfo;
@@ -17,7 +19,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Maps of a file.
-pub const STEPS: usize = 17;
+const STEPS: usize = 17;
 /// Folders inside each other that are looked into.
 const MAX_DEPTH: usize = 6;
 /// The other sensors' folders, whose files have the same names.
@@ -33,11 +35,15 @@ impl Layout for Xrf55 {
     }
 
     fn preset_text(&self) -> Option<(&'static str, &'static str)> {
-        Some((include_str!("../../../assets/xrf55.toml"), "assets/xrf55.toml"))
+        Some((include_str!("../../../../assets/xrf55.toml"), "assets/xrf55.toml"))
     }
 
     fn signs(&self) -> Option<&'static str> {
         Some("XRF55's XX_YY_ZZ.npy")
+    }
+
+    fn writer(&self) -> Option<&dyn FrameWriter> {
+        Some(self)
     }
 
     fn open(&self, place: &Place<'_>, progress: &Progress) -> Result<Opened, DatasetError> {
@@ -82,6 +88,12 @@ fn is_stack(stem: &str) -> bool {
     parts.len() == 3 && parts.into_iter().all(number)
 }
 
+/// The truth beside a file, one for each of its maps.
+fn truth_path(file: &Path, step: usize) -> PathBuf {
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    file.with_file_name(format!("{stem}_truth_{step:02}.npz"))
+}
+
 /// The frames of files relative to the root, each of so many.
 #[derive(Debug)]
 struct Frames {
@@ -96,11 +108,8 @@ impl Frames {
         self.files.get(i / self.steps).map_or_else(|| info.root.clone(), |file| info.root.join(file))
     }
 
-    /// The truth beside the file, one for each of its maps.
     fn truth_path(&self, i: usize, info: &DatasetInfo) -> PathBuf {
-        let path = self.path(i, info);
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        path.with_file_name(format!("{stem}_truth_{:02}.npz", i % self.steps))
+        truth_path(&self.path(i, info), i % self.steps)
     }
 }
 
