@@ -3,7 +3,7 @@
 
 use crate::common;
 use mhp_inspector::body::{Group, Pppr, PpprShape, Skeleton};
-use mhp_inspector::config::FitConfig;
+use mhp_inspector::config::{FIELDS, FitConfig};
 use mhp_inspector::dataset::npz::{ArrayView, write};
 use mhp_inspector::dataset::{Dataset, Manifest, read_pppr};
 use mhp_inspector::diagnose::joint_errors;
@@ -330,6 +330,23 @@ fn frames_of_one_flat_name_do_not_overwrite_each_other() {
     let files = ["a_b_c-ab14be7080849174.npz", "a_b_c-02d7306b94c0342a.npz"].map(|name| out.join("pppr").join(name));
     let [first, second] = files.map(|file| read_pppr(&file, None).unwrap());
     assert_ne!(first, second);
+}
+
+/// All of them, with their defaults, and no page of them under `-h`.
+#[test]
+fn the_long_help_lists_every_setting() {
+    let help = |args: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_mhp-inspector")).args(args).output().unwrap();
+        text(&output.stdout)
+    };
+    for args in [&["fit", "--help"][..], &["study", "sweep", "--help"]] {
+        let told = help(args);
+        for field in FIELDS {
+            let row = format!("{} = {}", field.key, field.text(field.default()));
+            assert!(told.contains(&row), "{args:?}: {row}");
+        }
+    }
+    assert!(!help(&["fit", "-h"]).contains("scale_max_m"));
 }
 
 /// What is out of range is named; what is in range and strange ends.

@@ -141,7 +141,7 @@ impl Part for RunSpec {
             && pairs().all(|(a, b)| a.labels == b.labels)
         {
             let text = |variant: &Variant| field.text(field.get(&variant.config));
-            return Some((field.key.to_owned(), text(a), text(b)));
+            return Some((format!("value of {}", field.key), text(a), text(b)));
         }
         (self.digest() != other.digest()).then(|| ("configuration".to_owned(), self.digest(), other.digest()))
     }
