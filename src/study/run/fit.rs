@@ -191,7 +191,7 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
     use super::*;
     use crate::body::{Group, PpprShape, Skeleton};
-    use crate::config::{Background, InitConfig, Place};
+    use crate::config::{Background, InitConfig, StartPlace};
     use crate::geometry::Pose;
     use crate::mhp::simulate;
     use crate::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
@@ -251,7 +251,7 @@ mod tests {
             FitConfig { tau_pct: 40.0, ..base },
             FitConfig { surface_offset_m: 0.1, ..base },
             FitConfig { w_time: 3.0, ..base },
-            FitConfig { place: Place::Cluster, ..base },
+            FitConfig { place: StartPlace::Cluster, ..base },
             FitConfig { init: InitConfig { background: Background::Map, ..base.init }, ..base },
         ];
         for other in others {

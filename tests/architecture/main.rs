@@ -1,6 +1,10 @@
 //! Dependencies point down only: what each room may use of the others, read from the sources.
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
+mod circles;
+mod imports;
+mod types;
+
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
