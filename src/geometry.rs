@@ -155,6 +155,13 @@ pub fn add_scaled<T: Numeric>(a: &mut Vec3<T>, b: Vec3<T>, k: T) {
     a[2] = k.mul_add(b[2], a[2]);
 }
 
+/// The mean of points; the origin where there are none.
+#[inline]
+pub fn mean(points: &[Vec3]) -> Vec3 {
+    let sum = points.iter().fold([0.0; 3], |sum, &p| add(sum, p));
+    scale(sum, 1.0 / points.len().max(1) as f64)
+}
+
 /// ‖a‖
 #[inline(always)]
 pub fn norm<T: Numeric>(a: Vec3<T>) -> T {

@@ -95,10 +95,13 @@ impl<'a> LoadedFrame<'a> {
         let mut ended = false;
         let mut answers = Vec::with_capacity(stops.len());
         for &stop in stops {
-            if let Ok(running) = &mut fitter
-                && let Err(why) = advance(running, stop, &mut ended)
+            if let Ok(running) = fitter.as_mut()
+                && !ended
             {
-                fitter = Err(self.told(&why));
+                match running.run_to(stop, |_, _| {}) {
+                    Ok(reason) => ended = reason == StopReason::Converged,
+                    Err(why) => fitter = Err(self.told(&why)),
+                }
             }
             let fit_ms = milliseconds(began);
             answers.push(fitter.as_ref().map_err(Clone::clone).map(|fitter| Stop {
@@ -170,15 +173,6 @@ impl<'a> LoadedFrame<'a> {
     fn told(&self, error: &dyn std::fmt::Display) -> String {
         format!("{}: {error}", self.frame.name)
     }
-}
-
-/// Steps until `stop` or until the configuration says to end.
-fn advance(fitter: &mut Fitter, stop: usize, ended: &mut bool) -> Result<(), crate::mhp::FitError> {
-    while fitter.iteration() < stop && !*ended {
-        let report = fitter.step()?;
-        *ended = report.converged && fitter.config().stop_when_converged;
-    }
-    Ok(())
 }
 
 /// An error text without the folder of the data set, which may lie elsewhere on another machine.
