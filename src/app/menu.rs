@@ -14,8 +14,10 @@ pub(super) fn bar(ui: &mut Ui, shared: &mut Shared<'_>) {
             egui::MenuBar::new().ui(ui, |ui| {
                 for menu in Menu::ALL {
                     ui.menu_button(menu.title(), |ui| {
+                        // As high as its items, and no higher than the window.
                         let height = ui.ctx().content_rect().height() - 48.0;
-                        egui::ScrollArea::vertical().max_height(height).show(ui, |ui| items(ui, shared, menu));
+                        let area = egui::ScrollArea::vertical().max_height(height).min_scrolled_height(height);
+                        area.show(ui, |ui| items(ui, shared, menu));
                     });
                 }
                 status(ui, shared, &tokens);

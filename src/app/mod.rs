@@ -292,7 +292,9 @@ impl eframe::App for InspectorApp {
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         let mut acts: Vec<UiAction> = Vec::new();
         {
-            let mut shared = Shared { session: self.runtime.session(), acts: &mut acts, gpu: self.gpu.as_ref() };
+            let gpu = self.gpu.as_ref();
+            let mut shared =
+                Shared { session: self.runtime.session(), acts: &mut acts, gpu, pane: egui::Rect::NOTHING };
             menu::bar(ui, &mut shared);
             timeline::show(ui, &mut shared, &mut self.timeline);
             self.layout.show(ui, &mut shared, &mut self.panes);

@@ -162,7 +162,9 @@ impl Objective {
     /// As [`Self::evaluate_into`], each term's gradient times its gain.
     fn evaluate_gained(&mut self, params: &Pppr, gains: &[f64; TERMS.len()], evaluation: &mut Evaluation) {
         let Evaluation { loss, terms, iou, gradient, gradients } = evaluation;
-        gradients.iter_mut().for_each(|gradient| gradient.reset(params.shape()));
+        for gradient in gradients.iter_mut() {
+            gradient.reset(params.shape());
+        }
         let em_gradient = &mut gradients[Weight::Em as usize];
         iou.clear();
         let views = self.problem.views.len() as f64;

@@ -253,7 +253,9 @@ pub(crate) fn command(label: &str) -> Option<UserCommand> {
 pub(crate) fn shortcut_text((modifiers, key): Shortcut) -> String {
     // Words for the modifiers, signs for the keys that have one.
     const NAMES: ModifierNames<'_> = ModifierNames { is_short: true, ..ModifierNames::NAMES };
-    KeyboardShortcut::new(modifiers, key).format(&NAMES, cfg!(target_os = "macos"))
+    let text = KeyboardShortcut::new(modifiers, key).format(&NAMES, cfg!(target_os = "macos"));
+    // The arrows of egui are in none of the window's fonts.
+    text.replace('⏴', "←").replace('⏵', "→")
 }
 
 /// The commands whose keys were pressed in this pass; their key events are taken out of the input.

@@ -363,21 +363,21 @@ mod tests {
     use crate::mhp::{StepReport, Terms};
 
     /// The keys of the curves of a fit of one person, and what they show of a row.
-    fn shown(config: FitConfig) -> Vec<(String, Option<f64>)> {
+    fn shown(config: &FitConfig) -> Vec<(String, Option<f64>)> {
         let terms = Terms::from_fn(|term| if term.key == "dummy" { 0.7 } else { 0.1 });
         let report = StepReport { iteration: 0, loss: 1.0, terms, iou: vec![None].into(), converged: false };
         let row = IterationRow { report, state: None, majpe_mm: None };
-        let branch = Branch { id: 0, parent: None, config, rows: vec![row.clone()], flags: Vec::new() };
+        let branch = Branch { id: 0, parent: None, config: *config, rows: vec![row.clone()], flags: Vec::new() };
         loss_curves(1, &[branch]).into_iter().map(|curve| (curve.key, (curve.value)(&row))).collect()
     }
 
     #[test]
     fn the_dummy_term_has_a_curve_where_it_has_a_weight() {
         let weighed = FitConfig { w_time: 8.0, w_dummy: 1.0, ..FitConfig::default() };
-        let keys = |config| shown(config).into_iter().map(|(key, _)| key).collect::<Vec<_>>();
-        assert_eq!(keys(FitConfig::default()), ["total", "em", "bone", "rigid", "joint"]);
-        assert_eq!(keys(weighed), ["total", "em", "bone", "rigid", "joint", "time", "dummy"]);
-        assert!(shown(weighed).contains(&("dummy".to_owned(), Some(0.7))));
+        let keys = |config: &FitConfig| shown(config).into_iter().map(|(key, _)| key).collect::<Vec<_>>();
+        assert_eq!(keys(&FitConfig::default()), ["total", "em", "bone", "rigid", "joint"]);
+        assert_eq!(keys(&weighed), ["total", "em", "bone", "rigid", "joint", "time", "dummy"]);
+        assert!(shown(&weighed).contains(&("dummy".to_owned(), Some(0.7))));
     }
 
     #[test]

@@ -82,10 +82,10 @@ fn a_pane_of_the_list_is_drawn_where_it_is_in_front() {
     theme::install(&ctx);
     let (mut layout, mut states, mut acts) = (PaneLayout::default(), PaneStates::default(), Vec::new());
     let mut pass = |layout: &mut PaneLayout| {
-        let mut shared = Shared { session: &session, acts: &mut acts, gpu: None };
+        let mut shared = Shared { session: &session, acts: &mut acts, gpu: None, pane: egui::Rect::NOTHING };
         let size = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(1440.0, 900.0));
         let input = egui::RawInput { screen_rect: Some(size), ..Default::default() };
-        let _ = ctx.run_ui(input, |ui| layout.show(ui, &mut shared, &mut states));
+        ctx.run_ui(input, |ui| layout.show(ui, &mut shared, &mut states)).textures_delta.clear();
         states.of::<State>().drawn
     };
     assert_eq!(pass(&mut layout), 0, "another tab is in front");

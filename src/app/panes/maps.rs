@@ -203,7 +203,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColu
         return Blank::new("No fit", why.clone()).show(ui);
     }
     // A toolbar that is wider than the pane must not push the maps out of it.
-    let area = ui.available_rect_before_wrap().intersect(ui.clip_rect());
+    let area = ui.available_rect_before_wrap().intersect(shared.pane);
     let pointer = ui.input(|i| i.pointer.hover_pos().filter(|_| i.modifiers.shift));
     state.flipped = column != MapColumn::Masks && pointer.is_some_and(|p| area.contains(p));
     for (i, rect) in arrange(area, views, session.view.true_proportions).into_iter().enumerate() {

@@ -62,6 +62,8 @@ pub(super) struct Shared<'a> {
     pub(super) acts: &'a mut Vec<UiAction>,
     /// What pictures of the scene are drawn with; `None` without a graphics adapter.
     pub(super) gpu: Option<&'a eframe::egui_wgpu::RenderState>,
+    /// The pane that is drawn, its toolbar included.
+    pub(super) pane: egui::Rect,
 }
 
 impl Shared<'_> {

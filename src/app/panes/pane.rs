@@ -136,6 +136,7 @@ impl Pane {
             if let Some(blank) = (self.blank)(shared.session) {
                 return blank.show(ui);
             }
+            shared.pane = ui.max_rect();
             if let Some(toolbar) = self.toolbar {
                 toolbar(ui, shared, states);
             }

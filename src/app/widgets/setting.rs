@@ -144,7 +144,8 @@ mod tests {
                 screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size)),
                 ..egui::RawInput::default()
             };
-            let output = egui::Context::default().run_ui(input, |ui| settings(ui, group, &mut config));
+            let mut output = egui::Context::default().run_ui(input, |ui| settings(ui, group, &mut config));
+            output.textures_delta.clear();
             let mut drawn = Vec::new();
             output.shapes.iter().for_each(|clipped| texts(&clipped.shape, &mut drawn));
             for field in group.fields() {

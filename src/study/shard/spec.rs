@@ -43,7 +43,8 @@ impl FrameCommand {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ShardSpec {
-    /// [`Self::digest`], as the program that wrote it computed it; the rows bear it too.
+    /// 16 hexadecimal digits over everything else but where the data lay, as the program that wrote it computed them; the rows bear
+    /// them too.
     pub id: String,
     /// Whose rows they are.
     pub command: FrameCommand,
