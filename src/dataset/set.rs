@@ -1,7 +1,7 @@
 //! `Dataset`: what was opened, and its frames one at a time.
 
 use super::cache::Cache;
-use super::layout::{FrameSource, LAYOUTS, Layout, Opened, Place, open_unknown};
+use super::layout::{DataFolder, FrameSource, LAYOUTS, Layout, Opened, open_unknown};
 use super::manifest::Manifest;
 use super::names::Names;
 use super::{DatasetError, Frame, Heatmap};
@@ -201,7 +201,7 @@ fn open_folder(
     options: OpenOptions<'_>,
     progress: &Progress,
 ) -> Result<Opened, DatasetError> {
-    manifest.layout.open(&Place { root, manifest, allow_outside: options.allow_outside }, progress)
+    manifest.layout.open(&DataFolder { root, manifest, allow_outside: options.allow_outside }, progress)
 }
 
 fn is_folder(path: &Path) -> Result<bool, DatasetError> {

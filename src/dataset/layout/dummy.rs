@@ -2,7 +2,9 @@
 //! `NNN.dummy`, whose bytes become a map when it is asked for.
 
 use super::index::{Folders, Segment};
-use super::{FrameSource, FrameWriter, Layout, NewFrame, NewPlace, Opened, Place, manifest_beside, no_single_file};
+use super::{
+    DataFolder, FrameSource, FrameWriter, Layout, NewFrame, NewPlace, Opened, manifest_beside, no_single_file,
+};
 use crate::dataset::manifest::Manifest;
 use crate::dataset::set::{DatasetInfo, parent};
 use crate::dataset::walk::Walk;
@@ -44,14 +46,14 @@ impl Layout for Dummy {
         stem_of(file).is_some()
     }
 
-    fn open(&self, place: &Place<'_>, progress: &Progress) -> Result<Opened, DatasetError> {
+    fn open(&self, place: &DataFolder<'_>, progress: &Progress) -> Result<Opened, DatasetError> {
         open(place, None, progress)
     }
 
     fn open_file(&self, file: &Path, manifest: Option<&Manifest>, progress: &Progress) -> Result<Opened, DatasetError> {
         let stem = stem_of(file).ok_or_else(|| no_single_file(self.word(), file, manifest))?;
         let manifest = manifest.map_or_else(|| manifest_beside(file, &Self), |manifest| Ok(manifest.clone()))?;
-        open(&Place { root: parent(file), manifest: &manifest, allow_outside: false }, Some(stem), progress)
+        open(&DataFolder { root: parent(file), manifest: &manifest, allow_outside: false }, Some(stem), progress)
     }
 
     fn writer(&self) -> Option<&dyn FrameWriter> {
@@ -63,7 +65,7 @@ impl Layout for Dummy {
     }
 }
 
-fn open(place: &Place<'_>, named: Option<&str>, progress: &Progress) -> Result<Opened, DatasetError> {
+fn open(place: &DataFolder<'_>, named: Option<&str>, progress: &Progress) -> Result<Opened, DatasetError> {
     let walk = Walk { depth: 2, stem: |name| name.strip_suffix(".dummy"), skip: |_| false, progress };
     let (folders, notes) = walk.of(place.root)?;
     let segment = |folder: crate::dataset::walk::Folder| {

@@ -4,7 +4,7 @@ use super::arrays::{read_map, read_truth, scalar};
 use super::index::{folder_of, folders_of};
 use super::pattern::{leads_out, matching};
 use super::write::{COCO_JOINTS, NewFrame, NewPlace, TruthArrays, named, rounded_maps};
-use super::{FrameSource, FrameWriter, Layout, Opened, Place, bare, no_single_file};
+use super::{DataFolder, FrameSource, FrameWriter, Layout, Opened, bare, no_single_file};
 use crate::dataset::manifest::Manifest;
 use crate::dataset::npz::{NpzArchive, NpzError, write_deflated};
 use crate::dataset::set::DatasetInfo;
@@ -27,7 +27,7 @@ impl Layout for Generic {
         WORD
     }
 
-    fn open(&self, place: &Place<'_>, progress: &Progress) -> Result<Opened, DatasetError> {
+    fn open(&self, place: &DataFolder<'_>, progress: &Progress) -> Result<Opened, DatasetError> {
         let (root, manifest) = (place.root, place.manifest);
         let Some(pattern) = &manifest.frames else {
             let message = format!("missing key `frames`; layout \"{WORD}\" needs it, for example \"frames/*.npz\"");

@@ -75,7 +75,7 @@ pub trait Layout: Debug + Sync {
     ///
     /// # Errors
     /// [`DatasetError::NoFrames`] where the folder is not of this layout, and what else can be wrong with it.
-    fn open(&self, place: &Place<'_>, progress: &Progress) -> Result<Opened, DatasetError>;
+    fn open(&self, place: &DataFolder<'_>, progress: &Progress) -> Result<Opened, DatasetError>;
 
     /// Opens a file: the data set that it is, or the folder that it is a frame of. `manifest` is what describes it, where
     /// somebody said so.
@@ -132,7 +132,7 @@ impl Display for dyn Layout {
 
 /// A folder that is to be opened.
 #[derive(Debug, Clone, Copy)]
-pub struct Place<'a> {
+pub struct DataFolder<'a> {
     /// The folder.
     pub root: &'a Path,
     /// What describes it: its own manifest, another that was given, or the preset.
@@ -141,7 +141,7 @@ pub struct Place<'a> {
     pub allow_outside: bool,
 }
 
-impl Place<'_> {
+impl DataFolder<'_> {
     /// What the manifest says, filled up from its layout's `preset`; what neither says is assumed, and told.
     fn info(&self, preset: &Manifest) -> DatasetInfo {
         let manifest = self.manifest;
@@ -194,7 +194,7 @@ pub(super) fn open_unknown(root: &Path, progress: &Progress) -> Result<Opened, D
     for &layout in LAYOUTS {
         let Some(signs) = layout.signs() else { continue };
         let manifest = layout.preset()?;
-        match layout.open(&Place { root, manifest: &manifest, allow_outside: false }, progress) {
+        match layout.open(&DataFolder { root, manifest: &manifest, allow_outside: false }, progress) {
             // The first says what it left out, and that there is no manifest.
             Err(DatasetError::NoFrames { expected, .. }) => {
                 wanted = Some(wanted.map_or(expected, |wanted| format!("{wanted}, or {signs}")));

@@ -7,7 +7,7 @@ mod choice;
 pub use choice::{BareCatalog, BareChoice, Remembered};
 
 use super::arrays::read_map;
-use super::{FrameSource, Layout, Opened, Place, default_skeleton};
+use super::{DataFolder, FrameSource, Layout, Opened, default_skeleton};
 use crate::body::Skeleton;
 use crate::dataset::axes_text::axes_badge;
 use crate::dataset::manifest::Manifest;
@@ -44,7 +44,7 @@ impl Layout for Bare {
         true
     }
 
-    fn open(&self, place: &Place<'_>, _progress: &Progress) -> Result<Opened, DatasetError> {
+    fn open(&self, place: &DataFolder<'_>, _progress: &Progress) -> Result<Opened, DatasetError> {
         let message = format!("layout \"{}\" is for single files", self.word());
         Err(DatasetError::Manifest { message, line: None, path: place.manifest.path.clone() })
     }
@@ -109,7 +109,7 @@ pub(super) fn open_described(path: &Path, manifest: &Manifest) -> Result<Opened,
     let axes = |array: &str| catalog.arrays.iter().find(|entry| entry.key == array).map(|entry| entry.shape.len());
     let stacked = manifest.views.iter().all(|view| axes(&view.array) == Some(view.axes.len() + 1));
     let count = frames_of(&manifest.views, stacked, &catalog)?;
-    let mut info = Place { root: path, manifest, allow_outside: false }.info(manifest);
+    let mut info = DataFolder { root: path, manifest, allow_outside: false }.info(manifest);
     info.name = manifest.name.clone().unwrap_or_else(|| file_stem(path));
     info.layout = &Bare;
     opened(info, count, stacked)

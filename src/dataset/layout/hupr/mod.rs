@@ -9,7 +9,7 @@ mod write;
 
 use super::arrays::truth_beside;
 use super::index::{Folders, Segment};
-use super::{FrameSource, FrameWriter, Layout, MapArray, Opened, Place, Stored};
+use super::{DataFolder, FrameSource, FrameWriter, Layout, MapArray, Opened, Stored};
 use crate::dataset::natural::natural;
 use crate::dataset::npz::{NPY_KEY, NpzArchive, shape_text};
 use crate::dataset::set::DatasetInfo;
@@ -52,7 +52,7 @@ impl Layout for Hupr {
         Some(self)
     }
 
-    fn open(&self, place: &Place<'_>, progress: &Progress) -> Result<Opened, DatasetError> {
+    fn open(&self, place: &DataFolder<'_>, progress: &Progress) -> Result<Opened, DatasetError> {
         progress.begin("listing folders", 0);
         let (segments, notes) = sequences(place.root, progress)?;
         if segments.is_empty() {

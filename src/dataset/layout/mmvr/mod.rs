@@ -8,7 +8,7 @@ mod write;
 
 use super::arrays::{read_map, truth_beside};
 use super::index::{Folders, Segment};
-use super::{FrameSource, FrameWriter, Layout, Opened, Place, manifest_beside, no_single_file};
+use super::{DataFolder, FrameSource, FrameWriter, Layout, Opened, manifest_beside, no_single_file};
 use crate::dataset::manifest::Manifest;
 use crate::dataset::npz::{NpzArchive, shape_text};
 use crate::dataset::set::{DatasetInfo, MANIFEST_NAME, parent};
@@ -54,14 +54,14 @@ impl Layout for Mmvr {
         stem_of(file).is_some()
     }
 
-    fn open(&self, place: &Place<'_>, progress: &Progress) -> Result<Opened, DatasetError> {
+    fn open(&self, place: &DataFolder<'_>, progress: &Progress) -> Result<Opened, DatasetError> {
         open(place, None, progress)
     }
 
     fn open_file(&self, file: &Path, manifest: Option<&Manifest>, progress: &Progress) -> Result<Opened, DatasetError> {
         let Some(stem) = stem_of(file) else { return Err(no_single_file(self.word(), file, manifest)) };
         let manifest = manifest.map_or_else(|| manifest_beside(file, &Self), |manifest| Ok(manifest.clone()))?;
-        open(&Place { root: parent(file), manifest: &manifest, allow_outside: false }, Some(stem), progress)
+        open(&DataFolder { root: parent(file), manifest: &manifest, allow_outside: false }, Some(stem), progress)
     }
 
     fn writer(&self) -> Option<&dyn FrameWriter> {
@@ -74,7 +74,7 @@ impl Layout for Mmvr {
 }
 
 /// All frames at or below a folder; those of the folder alone where it is opened for one of them, that of the stem `named`.
-fn open(place: &Place<'_>, named: Option<&str>, progress: &Progress) -> Result<Opened, DatasetError> {
+fn open(place: &DataFolder<'_>, named: Option<&str>, progress: &Progress) -> Result<Opened, DatasetError> {
     let depth = if named.is_some() { 0 } else { MAX_DEPTH };
     let (segments, notes) = segments(place.root, depth, progress)?;
     if segments.is_empty() {

@@ -7,7 +7,7 @@ mod write;
 
 use super::arrays::truth_beside;
 use super::index::{folder_of, folders_of};
-use super::{FrameSource, FrameWriter, Layout, Opened, Place};
+use super::{DataFolder, FrameSource, FrameWriter, Layout, Opened};
 use crate::dataset::natural::natural;
 use crate::dataset::npz::{NPY_KEY, NpzArchive, shape_text};
 use crate::dataset::set::DatasetInfo;
@@ -46,7 +46,7 @@ impl Layout for Xrf55 {
         Some(self)
     }
 
-    fn open(&self, place: &Place<'_>, progress: &Progress) -> Result<Opened, DatasetError> {
+    fn open(&self, place: &DataFolder<'_>, progress: &Progress) -> Result<Opened, DatasetError> {
         progress.begin("listing files", 0);
         let (files, notes) = stacks(place.root, progress)?;
         if files.is_empty() {
