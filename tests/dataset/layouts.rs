@@ -259,7 +259,7 @@ fn the_committed_samples_load_with_truth_and_stay_small() {
     let mut count = 0;
     for entry in std::fs::read_dir(&home).unwrap() {
         let path = entry.unwrap().path();
-        if path.is_dir() {
+        if path.join("dataset.toml").is_file() {
             let dataset = open(&path);
             let frame = dataset.load(0).unwrap();
             assert_eq!(frame.person_count, Some(frame.truth.unwrap().persons), "{}", path.display());
