@@ -18,7 +18,7 @@ pub type Mat3<T = f64> = [[T; 3]; 3];
 pub const IDENTITY: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// A real number, or several that the machine computes at once: what a formula that needs no loop is written in.
-pub trait Number:
+pub trait Numeric:
     Copy
     + Neg<Output = Self>
     + Add<Output = Self>
@@ -32,19 +32,19 @@ pub trait Number:
     + SubAssign
 {
     /// `x`, as many times as `self` is.
-    fn like(self, x: f64) -> Self;
+    fn splat(self, x: f64) -> Self;
     /// `yes` where self < limit, else `no`.
-    fn below(self, limit: f64, yes: Self, no: Self) -> Self;
-    /// self + a · b: several round once, one number twice, as the formulas are written.
-    fn plus(self, a: Self, b: Self) -> Self;
+    fn select_lt(self, limit: f64, yes: Self, no: Self) -> Self;
+    /// self · a + b: several round once, one number twice, as the formulas are written (`f64::mul_add` rounds once).
+    fn mul_add(self, a: Self, b: Self) -> Self;
     /// The larger of the two.
-    fn at_least(self, limit: f64) -> Self;
+    fn max(self, limit: f64) -> Self;
     /// The smaller of the two.
-    fn at_most(self, limit: f64) -> Self;
-    /// √
-    fn root(self) -> Self;
+    fn min(self, limit: f64) -> Self;
+    /// √x
+    fn sqrt(self) -> Self;
     /// The whole number at or below.
-    fn whole(self) -> Self;
+    fn floor(self) -> Self;
     /// eˣ
     fn exp(self) -> Self;
     /// ln x of a positive normal x; no finite number where x has no logarithm.
@@ -52,45 +52,45 @@ pub trait Number:
     /// ln(1 + x) of a positive x, to 1e-16 of 1 at least.
     fn ln_1p(self) -> Self;
     /// `of` each.
-    fn each(self, of: impl Fn(f64) -> f64) -> Self;
+    fn map(self, of: impl Fn(f64) -> f64) -> Self;
     /// `of` each and what is in its place in `other`.
-    fn each_with(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self;
+    fn zip_map(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self;
 }
 
-impl Number for f64 {
+impl Numeric for f64 {
     #[inline(always)]
-    fn like(self, x: f64) -> Self {
+    fn splat(self, x: f64) -> Self {
         x
     }
 
     #[inline(always)]
-    fn below(self, limit: f64, yes: Self, no: Self) -> Self {
+    fn select_lt(self, limit: f64, yes: Self, no: Self) -> Self {
         if self < limit { yes } else { no }
     }
 
     #[inline(always)]
-    fn plus(self, a: Self, b: Self) -> Self {
-        self + a * b
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        self * a + b
     }
 
     #[inline(always)]
-    fn at_least(self, limit: f64) -> Self {
-        self.max(limit)
+    fn max(self, limit: f64) -> Self {
+        Self::max(self, limit)
     }
 
     #[inline(always)]
-    fn at_most(self, limit: f64) -> Self {
-        self.min(limit)
+    fn min(self, limit: f64) -> Self {
+        Self::min(self, limit)
     }
 
     #[inline(always)]
-    fn root(self) -> Self {
-        self.sqrt()
+    fn sqrt(self) -> Self {
+        Self::sqrt(self)
     }
 
     #[inline(always)]
-    fn whole(self) -> Self {
-        self.floor()
+    fn floor(self) -> Self {
+        Self::floor(self)
     }
 
     #[inline(always)]
@@ -109,20 +109,20 @@ impl Number for f64 {
     }
 
     #[inline(always)]
-    fn each(self, of: impl Fn(f64) -> f64) -> Self {
+    fn map(self, of: impl Fn(f64) -> f64) -> Self {
         of(self)
     }
 
     #[inline(always)]
-    fn each_with(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
+    fn zip_map(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
         of(self, other)
     }
 }
 
 /// a · b
 #[inline(always)]
-pub fn dot<T: Number>(a: Vec3<T>, b: Vec3<T>) -> T {
-    (a[0] * b[0]).plus(a[1], b[1]).plus(a[2], b[2])
+pub fn dot<T: Numeric>(a: Vec3<T>, b: Vec3<T>) -> T {
+    a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
 }
 
 /// a × b
@@ -132,7 +132,7 @@ pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
 
 /// a + b
 #[inline(always)]
-pub fn add<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
+pub fn add<T: Numeric>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
@@ -143,22 +143,29 @@ pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
 
 /// k a
 #[inline(always)]
-pub fn scale<T: Number>(a: Vec3<T>, k: T) -> Vec3<T> {
+pub fn scale<T: Numeric>(a: Vec3<T>, k: T) -> Vec3<T> {
     [a[0] * k, a[1] * k, a[2] * k]
 }
 
 /// a += k b
 #[inline(always)]
-pub fn add_scaled<T: Number>(a: &mut Vec3<T>, b: Vec3<T>, k: T) {
-    a[0] = a[0].plus(k, b[0]);
-    a[1] = a[1].plus(k, b[1]);
-    a[2] = a[2].plus(k, b[2]);
+pub fn add_scaled<T: Numeric>(a: &mut Vec3<T>, b: Vec3<T>, k: T) {
+    a[0] = k.mul_add(b[0], a[0]);
+    a[1] = k.mul_add(b[1], a[1]);
+    a[2] = k.mul_add(b[2], a[2]);
+}
+
+/// The mean of points; the origin where there are none.
+#[inline]
+pub fn mean(points: &[Vec3]) -> Vec3 {
+    let sum = points.iter().fold([0.0; 3], |sum, &p| add(sum, p));
+    scale(sum, 1.0 / points.len().max(1) as f64)
 }
 
 /// ‖a‖
 #[inline(always)]
-pub fn norm<T: Number>(a: Vec3<T>) -> T {
-    dot(a, a).root()
+pub fn norm<T: Numeric>(a: Vec3<T>) -> T {
+    dot(a, a).sqrt()
 }
 
 /// Distance of two points on the floor, whatever their heights.
@@ -168,19 +175,19 @@ pub fn flat_distance(a: Vec3, b: Vec3) -> f64 {
 
 /// M a
 #[inline(always)]
-pub fn mat_vec<T: Number>(m: &Mat3<T>, a: Vec3<T>) -> Vec3<T> {
+pub fn mat_vec<T: Numeric>(m: &Mat3<T>, a: Vec3<T>) -> Vec3<T> {
     [dot(m[0], a), dot(m[1], a), dot(m[2], a)]
 }
 
 /// Mᵀ a
 #[inline(always)]
-pub fn mat_t_vec<T: Number>(m: &Mat3<T>, a: Vec3<T>) -> Vec3<T> {
+pub fn mat_t_vec<T: Numeric>(m: &Mat3<T>, a: Vec3<T>) -> Vec3<T> {
     mat_vec(&transpose(m), a)
 }
 
 /// A B
 #[inline(always)]
-pub fn mat_mul<T: Number>(a: &Mat3<T>, b: &Mat3<T>) -> Mat3<T> {
+pub fn mat_mul<T: Numeric>(a: &Mat3<T>, b: &Mat3<T>) -> Mat3<T> {
     [mat_t_vec(b, a[0]), mat_t_vec(b, a[1]), mat_t_vec(b, a[2])]
 }
 
@@ -192,12 +199,12 @@ pub fn transpose<T: Copy>(a: &Mat3<T>) -> Mat3<T> {
 
 /// ‖q‖ and q/‖q‖; that of the zero quaternion is the identity's, (1, 0, 0, 0).
 #[inline(always)]
-pub fn unit_quaternion<T: Number>(q: [T; 4]) -> (T, [T; 4]) {
-    let n = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).root();
-    let (zero, one) = (n.like(0.0), n.like(1.0));
+pub fn unit_quaternion<T: Numeric>(q: [T; 4]) -> (T, [T; 4]) {
+    let n = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
+    let (zero, one) = (n.splat(0.0), n.splat(1.0));
     let mut unit = [one, zero, zero, zero];
     for k in 0..4 {
-        unit[k] = n.below(f64::MIN_POSITIVE, unit[k], q[k] / n);
+        unit[k] = n.select_lt(f64::MIN_POSITIVE, unit[k], q[k] / n);
     }
     (n, unit)
 }
@@ -205,9 +212,9 @@ pub fn unit_quaternion<T: Number>(q: [T; 4]) -> (T, [T; 4]) {
 /// The rotation matrix of the quaternion `q` = (w, x, y, z), normalised here; SPEC section 2, paper section 4.1.
 /// The zero quaternion gives the identity.
 #[inline(always)]
-pub fn rotation_from_quaternion<T: Number>(q: [T; 4]) -> Mat3<T> {
+pub fn rotation_from_quaternion<T: Numeric>(q: [T; 4]) -> Mat3<T> {
     let (n, [w, x, y, z]) = unit_quaternion(q);
-    let one = n.like(1.0);
+    let one = n.splat(1.0);
     [
         [one - (y * y + z * z) * 2.0, (x * y - w * z) * 2.0, (x * z + w * y) * 2.0],
         [(x * y + w * z) * 2.0, one - (x * x + z * z) * 2.0, (y * z - w * x) * 2.0],

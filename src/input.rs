@@ -10,6 +10,11 @@ use std::path::Path;
 /// Bytes of a manifest or a configuration that are read.
 pub const MOST_TEXT: u64 = 4 << 20;
 
+/// Where in a file something is, as errors name it: its path, and the line where one is known.
+pub(crate) fn place(path: &Path, line: Option<usize>) -> String {
+    line.map_or_else(|| path.display().to_string(), |line| format!("{}:{line}", path.display()))
+}
+
 /// Opens a regular file, or a link to one; `expected` is what it should have been, for the message.
 ///
 /// # Errors

@@ -57,7 +57,7 @@
 //! | [`escape`] | text from data on its way to a terminal or a table |
 //! | [`folders`] | where the user's settings, labels and caches lie |
 //! | [`input`] | opening what others made: regular files only, bounded |
-//! | [`geometry`] | 3-vectors, 3×3 matrices, quaternions, the spherical triad |
+//! | [`geometry`] | 3-vectors, 3×3 matrices, quaternions, poses |
 
 pub mod body;
 pub mod cli;

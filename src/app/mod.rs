@@ -16,7 +16,7 @@ mod timeline;
 mod widgets;
 
 use crate::config::FitConfig;
-use crate::session::{Command, LogLevel, Runtime, Session, StartAt, ViewState};
+use crate::session::{Command, LogLevel, Report, Runtime, Session, StartAt, ViewState, Wake};
 use commands::{AppAct, UiAction};
 use layout::PaneLayout;
 use overlay::Overlay;
@@ -55,7 +55,6 @@ pub struct Begin {
 
 /// The application behind the window.
 pub struct InspectorApp {
-    session: Session,
     runtime: Runtime,
     layout: PaneLayout,
     panes: PaneStates,
@@ -78,23 +77,23 @@ impl InspectorApp {
     /// The window's application, begun as the command line says.
     pub fn begin(cc: &eframe::CreationContext<'_>, begin: &Begin) -> Self {
         theme::install(&cc.egui_ctx);
-        let mut session = Session::default();
+        let (mut view, mut recent) = (ViewState::default(), Vec::new());
         let mut layout = PaneLayout::default();
         let mut annotator = crate::folders::user_name();
         if let Some(storage) = cc.storage {
             annotator = eframe::get_value(storage, ANNOTATOR_KEY).unwrap_or(annotator);
-            session.view = eframe::get_value::<ViewState>(storage, VIEW_KEY).unwrap_or_default();
-            session.data.recent = eframe::get_value(storage, RECENT_KEY).unwrap_or_default();
+            view = eframe::get_value(storage, VIEW_KEY).unwrap_or_default();
+            recent = eframe::get_value(storage, RECENT_KEY).unwrap_or_default();
             if let Some(stored) = eframe::get_value(storage, LAYOUT_KEY) {
                 layout = PaneLayout::restored(stored);
             }
         }
-        session.apply(Command::SetAnnotator(annotator));
         let ctx = cc.egui_ctx.clone();
-        let runtime = Runtime::new(Arc::new(move || ctx.request_repaint()), Some(Arc::new(overlay::pick)))
+        let wake: Wake = Arc::new(move || ctx.request_repaint());
+        let mut runtime = Runtime::new(Session::remembered(view, recent), wake, Some(Arc::new(overlay::pick)))
             .allow_outside(begin.allow_outside);
+        runtime.apply(Command::SetAnnotator(annotator));
         let mut app = Self {
-            session,
             runtime,
             layout,
             panes: PaneStates::default(),
@@ -116,7 +115,7 @@ impl InspectorApp {
         }
         match begin.paths.first().cloned().or_else(crate::dataset::bundled_sample) {
             Some(path) => app.apply(Command::OpenAt(path, begin.aim.clone())),
-            None => app.apply(Command::Log(
+            None => app.runtime.report(Report::Log(
                 LogLevel::Info,
                 "the bundled sample was not found; open a data set with File > Open folder".into(),
             )),
@@ -127,20 +126,18 @@ impl InspectorApp {
         if let Some(run) = &begin.study {
             app.open_run(run.clone());
         }
-        for extra in begin.paths.iter().skip(1) {
-            app.session.data.recent.push(extra.clone());
-        }
+        app.apply(Command::OfferPaths(begin.paths.iter().skip(1).cloned().collect()));
         app
     }
 
     /// The state behind the window, to be read by tests and by `screenshot`.
     pub fn session(&self) -> &Session {
-        &self.session
+        self.runtime.session()
     }
 
     /// Applies a command as if a person had given it.
     pub fn apply(&mut self, command: Command) {
-        self.runtime.apply(&mut self.session, command);
+        self.runtime.apply(command);
     }
 
     /// Brings a pane to the front.
@@ -155,7 +152,7 @@ impl InspectorApp {
 
     /// Zooms the maps to the person and the camera to the selection.
     pub fn focus(&mut self) {
-        self.panes.focus(&self.session);
+        self.panes.focus(self.runtime.session());
     }
 
     fn act(&mut self, ctx: &egui::Context, act: UiAction) {
@@ -168,7 +165,7 @@ impl InspectorApp {
                 if let Some(pane) = front {
                     self.layout.show_pane(pane);
                 }
-                change(&mut self.panes, &self.session);
+                change(&mut self.panes, self.runtime.session());
             }
         }
     }
@@ -179,13 +176,13 @@ impl InspectorApp {
             AppAct::Palette => self.overlay.toggle_palette(),
             AppAct::Help => self.overlay.toggle_help(),
             AppAct::About => self.overlay.toggle_about(),
-            AppAct::GotoFrame => self.overlay.open_goto(self.session.data.frame_index),
-            AppAct::OpenPath => self.overlay.open_path(self.session.data.recent.first()),
+            AppAct::GotoFrame => self.overlay.open_goto(self.session().data.frame_index),
+            AppAct::OpenPath => self.overlay.open_path(self.runtime.session().data.recent.first()),
             AppAct::ResetLayout => self.layout = PaneLayout::default(),
             AppAct::ResetViews => self.panes.reset_views(),
-            AppAct::Focus => self.panes.focus(&self.session),
-            AppAct::ZoomIn => self.set_zoom(self.session.view.zoom + 0.1),
-            AppAct::ZoomOut => self.set_zoom(self.session.view.zoom - 0.1),
+            AppAct::Focus => self.panes.focus(self.runtime.session()),
+            AppAct::ZoomIn => self.set_zoom(self.session().view.zoom + 0.1),
+            AppAct::ZoomOut => self.set_zoom(self.session().view.zoom - 0.1),
             AppAct::ZoomReset => self.set_zoom(1.0),
             AppAct::Save(kind) => self.ask_save(kind),
             AppAct::SaveSession => self.save_session_again(ctx),
@@ -203,7 +200,7 @@ impl InspectorApp {
     }
 
     fn set_zoom(&mut self, zoom: f32) {
-        let mut view = self.session.view.clone();
+        let mut view = self.session().view.clone();
         view.zoom = (zoom.clamp(0.7, 2.0) * 10.0).round() / 10.0;
         self.apply(Command::SetView(Box::new(view)));
     }
@@ -237,19 +234,19 @@ impl InspectorApp {
 
     /// Plays frames at the data set's rate, never faster than they can be read.
     fn play(&mut self, ctx: &egui::Context) {
-        if !self.session.data.playing {
+        if !self.session().data.playing {
             self.last_play = None;
             return;
         }
-        let rate = self.session.data.dataset.as_ref().and_then(|d| d.info().frame_rate_hz).unwrap_or(10.0);
+        let rate = self.session().data.dataset.as_ref().and_then(|d| d.info().frame_rate_hz).unwrap_or(10.0);
         let pause = 1.0 / rate.clamp(0.1, 60.0);
         let now = ctx.input(|i| i.time);
         let since = self.last_play.map_or(f64::INFINITY, |last| now - last);
-        if since >= pause && self.session.data.loading.is_none() {
+        if since >= pause && self.session().data.loading.is_none() {
             self.last_play = Some(now);
             self.apply(Command::StepFrames(1));
         }
-        if self.session.data.playing {
+        if self.session().data.playing {
             let wait = (pause - since).clamp(0.001, pause);
             ctx.request_repaint_after(std::time::Duration::from_secs_f64(wait));
         }
@@ -257,7 +254,7 @@ impl InspectorApp {
 
     /// Errors and warnings that appeared since the last pass become notifications.
     fn take_notices(&mut self, ctx: &egui::Context) {
-        if let Some((count, level, text)) = &self.session.notice
+        if let Some((count, level, text)) = &self.runtime.session().notice
             && *count > self.notices_seen
         {
             self.notices_seen = *count;
@@ -268,12 +265,12 @@ impl InspectorApp {
 
 impl eframe::App for InspectorApp {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
-        theme::apply(ctx, self.session.view.theme);
-        if self.applied_zoom != self.session.view.zoom {
-            self.applied_zoom = self.session.view.zoom;
+        theme::apply(ctx, self.session().view.theme);
+        if self.applied_zoom != self.session().view.zoom {
+            self.applied_zoom = self.session().view.zoom;
             ctx.set_zoom_factor(self.applied_zoom);
         }
-        self.runtime.poll(&mut self.session);
+        self.runtime.poll();
         self.take_restored();
         self.take_pictures(ctx);
         self.take_drops(ctx);
@@ -283,8 +280,8 @@ impl eframe::App for InspectorApp {
         }
         if !self.overlay.is_modal() {
             for command in commands::pressed(ctx) {
-                if command.enabled(&self.session) {
-                    let act = command.action(&self.session);
+                if command.enabled(self.runtime.session()) {
+                    let act = command.action(self.runtime.session());
                     self.act(ctx, act);
                 }
             }
@@ -295,7 +292,7 @@ impl eframe::App for InspectorApp {
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         let mut acts: Vec<UiAction> = Vec::new();
         {
-            let mut shared = Shared { session: &self.session, acts: &mut acts, gpu: self.gpu.as_ref() };
+            let mut shared = Shared { session: self.runtime.session(), acts: &mut acts, gpu: self.gpu.as_ref() };
             menu::bar(ui, &mut shared);
             timeline::show(ui, &mut shared, &mut self.timeline);
             self.layout.show(ui, &mut shared, &mut self.panes);
@@ -311,9 +308,9 @@ impl eframe::App for InspectorApp {
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
-        eframe::set_value(storage, VIEW_KEY, &self.session.view);
-        eframe::set_value(storage, RECENT_KEY, &self.session.data.recent);
-        eframe::set_value(storage, ANNOTATOR_KEY, &self.session.labels.annotator);
+        eframe::set_value(storage, VIEW_KEY, &self.session().view);
+        eframe::set_value(storage, RECENT_KEY, &self.session().data.recent);
+        eframe::set_value(storage, ANNOTATOR_KEY, &self.session().labels.annotator);
         eframe::set_value(storage, LAYOUT_KEY, self.layout.stored());
     }
 }

@@ -5,7 +5,7 @@ use super::commands::SaveKind;
 use super::layout::PaneLayout;
 use super::panes::Pane;
 use crate::output::{Sink, portable, replace_file};
-use crate::session::{BackgroundTask, Command, Export, LogLevel, OutputCheck, Session};
+use crate::session::{BackgroundTask, Command, Export, LogLevel, OutputCheck, Report, Session};
 use egui::{ColorImage, Context, Rect};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -100,13 +100,13 @@ fn suggestion(session: &Session, kind: SaveKind) -> PathBuf {
 impl InspectorApp {
     /// Asks where to write something.
     pub(super) fn ask_save(&mut self, kind: SaveKind) {
-        let path = suggestion(&self.session, kind);
+        let path = suggestion(self.runtime.session(), kind);
         self.overlay.open_save(kind, &path);
     }
 
     /// Writes the session where it was last, or asks.
     pub(super) fn save_session_again(&mut self, ctx: &Context) {
-        match self.session.session_path.clone() {
+        match self.session().session_path.clone() {
             Some(path) => self.save(ctx, SaveKind::Session, path),
             None => self.ask_save(SaveKind::Session),
         }
@@ -122,7 +122,8 @@ impl InspectorApp {
                 match window.and_then(serde_json::to_value) {
                     Ok(window) => self.apply(Command::SaveSession(path, window)),
                     Err(error) => {
-                        self.apply(Command::Log(LogLevel::Error, format!("the session was not saved: {error}")));
+                        self.runtime
+                            .report(Report::Log(LogLevel::Error, format!("the session was not saved: {error}")));
                     }
                 }
             }
@@ -141,7 +142,7 @@ impl InspectorApp {
 
     /// Puts the path of the frame's file on the clipboard.
     pub(super) fn copy_path(&mut self, ctx: &Context) {
-        if let (Some(dataset), Some(frame)) = (&self.session.data.dataset, &self.session.data.frame) {
+        if let (Some(dataset), Some(frame)) = (&self.session().data.dataset, &self.session().data.frame) {
             ctx.copy_text(dataset.frame_path(frame.index).display().to_string());
             self.overlay.notify(LogLevel::Info, "path copied".into(), ctx.input(|i| i.time));
         }
@@ -154,7 +155,7 @@ impl InspectorApp {
             match wanted {
                 Wanted::File(path, rect) => {
                     let image = cropped(&image, rect, scale);
-                    let check = self.session.output_check();
+                    let check = self.session().output_check();
                     self.apply(Command::RunTask(BackgroundTask::new(move || write_png(&image, &path, &check))));
                 }
                 Wanted::Clipboard(rect) => {
@@ -167,16 +168,16 @@ impl InspectorApp {
 
     /// Puts back what a session file says of the window.
     pub(super) fn take_restored(&mut self) {
-        let Some(window) = self.session.take_restored_window() else { return };
+        let Some(window) = self.runtime.take_restored_window() else { return };
         let restored = serde_json::from_value::<WindowState>(window).and_then(|state| {
-            self.panes.restore(state.panes, &self.session)?;
+            self.panes.restore(state.panes, self.runtime.session())?;
             Ok(state.layout)
         });
         match restored {
             Ok(layout) => self.layout = PaneLayout::restored(layout),
             Err(error) => {
                 let text = format!("camera and layout of the session could not be put back: {error}");
-                self.apply(Command::Log(LogLevel::Warning, text));
+                self.runtime.report(Report::Log(LogLevel::Warning, text));
             }
         }
     }

@@ -6,6 +6,7 @@
 //!
 //! The body rests on the floor with whatever is lowest: the feet of somebody who stands, the whole side of somebody who fell.
 
+use super::skeletons::{COCO_BONES, COCO_JOINTS};
 use super::{BodyPose, Segment, SegmentFrame, Skeleton};
 use crate::geometry::{IDENTITY, Mat3, Vec3, add, mat_mul, mat_vec, norm, scale, sub};
 
@@ -27,46 +28,6 @@ const SUPPORTS: [(usize, f64); 11] = [
     (9, 0.025),
     (10, 0.025),
     (0, 0.050),
-];
-const BONES: [[usize; 2]; 19] = [
-    [15, 13],
-    [13, 11],
-    [16, 14],
-    [14, 12],
-    [11, 12],
-    [5, 11],
-    [6, 12],
-    [5, 6],
-    [5, 7],
-    [6, 8],
-    [7, 9],
-    [8, 10],
-    [1, 2],
-    [0, 1],
-    [0, 2],
-    [1, 3],
-    [2, 4],
-    [3, 5],
-    [4, 6],
-];
-const JOINTS: [&str; 17] = [
-    "nose",
-    "left_eye",
-    "right_eye",
-    "left_ear",
-    "right_ear",
-    "left_shoulder",
-    "right_shoulder",
-    "left_elbow",
-    "right_elbow",
-    "left_wrist",
-    "right_wrist",
-    "left_hip",
-    "right_hip",
-    "left_knee",
-    "right_knee",
-    "left_ankle",
-    "right_ankle",
 ];
 
 /// Height and build of a body.
@@ -201,9 +162,9 @@ impl Build {
     pub fn skeleton(&self) -> Skeleton {
         let joints = self.pose(&Posture::upright(0.0, Anchor::Pelvis([0.0; 2])), 0.0).joints;
         Skeleton {
-            joints: JOINTS.map(str::to_owned).to_vec(),
-            bones: BONES.to_vec(),
-            bone_lengths_m: BONES.map(|[a, b]| norm(sub(joints[a], joints[b]))).to_vec(),
+            joints: COCO_JOINTS.map(str::to_owned).to_vec(),
+            bones: COCO_BONES.map(|(a, b, _)| [a, b]).to_vec(),
+            bone_lengths_m: COCO_BONES.map(|(a, b, _)| norm(sub(joints[a], joints[b]))).to_vec(),
             angles: vec![[5, 7, 9], [6, 8, 10], [11, 13, 15], [12, 14, 16]],
         }
     }

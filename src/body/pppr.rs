@@ -234,6 +234,12 @@ impl Pppr {
         [before[positions].as_chunks_mut().0, after[..velocities.len()].as_chunks_mut().0]
     }
 
+    /// Positions p of a person's joints, m, world frame; none of somebody who is not there.
+    pub fn person(&self, person: usize) -> &[Vec3] {
+        let joints = self.shape().joints;
+        self.positions().get(person * joints..(person + 1) * joints).unwrap_or_default()
+    }
+
     /// Position p of flat joint `joint`, m, world frame.
     pub fn position(&self, joint: usize) -> Vec3 {
         self.vec3(Group::Position, joint)

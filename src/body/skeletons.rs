@@ -16,6 +16,49 @@ const HALF_HIPS: f64 = 0.0955 * HEIGHT_M;
 const TRUNK: f64 = (0.818 - 0.530) * HEIGHT_M;
 const NECK_TO_TOP: f64 = (1.0 - 0.818) * HEIGHT_M;
 
+/// The joints of COCO's 17 keypoints.
+pub(super) const COCO_JOINTS: [&str; 17] = [
+    "nose",
+    "left_eye",
+    "right_eye",
+    "left_ear",
+    "right_ear",
+    "left_shoulder",
+    "right_shoulder",
+    "left_elbow",
+    "right_elbow",
+    "left_wrist",
+    "right_wrist",
+    "left_hip",
+    "right_hip",
+    "left_knee",
+    "right_knee",
+    "left_ankle",
+    "right_ankle",
+];
+/// Its bones with the reference cases' lengths, m.
+pub(super) const COCO_BONES: [(usize, usize, f64); 19] = [
+    (15, 13, 0.4318564576337837),
+    (13, 11, 0.4305810028322197),
+    (16, 14, 0.4318564576337837),
+    (14, 12, 0.4305810028322197),
+    (11, 12, 0.22),
+    (5, 11, 0.5048762224545735),
+    (6, 12, 0.5048762224545735),
+    (5, 6, 0.36),
+    (5, 7, 0.2989983277545211),
+    (6, 8, 0.2989983277545211),
+    (7, 9, 0.25079872407968895),
+    (8, 10, 0.25079872407968895),
+    (1, 2, 0.06),
+    (0, 1, 0.053851648071344904),
+    (0, 2, 0.053851648071344904),
+    (1, 3, 0.0806225774829855),
+    (2, 4, 0.0806225774829855),
+    (3, 5, 0.2156385865284782),
+    (4, 6, 0.2156385865284782),
+];
+
 /// Name, joints, bones with lengths in metres, angles.
 struct Preset {
     name: &'static str,
@@ -27,46 +70,8 @@ struct Preset {
 const PRESETS: [Preset; 3] = [
     Preset {
         name: "coco17",
-        joints: &[
-            "nose",
-            "left_eye",
-            "right_eye",
-            "left_ear",
-            "right_ear",
-            "left_shoulder",
-            "right_shoulder",
-            "left_elbow",
-            "right_elbow",
-            "left_wrist",
-            "right_wrist",
-            "left_hip",
-            "right_hip",
-            "left_knee",
-            "right_knee",
-            "left_ankle",
-            "right_ankle",
-        ],
-        bones: &[
-            (15, 13, 0.4318564576337837),
-            (13, 11, 0.4305810028322197),
-            (16, 14, 0.4318564576337837),
-            (14, 12, 0.4305810028322197),
-            (11, 12, 0.22),
-            (5, 11, 0.5048762224545735),
-            (6, 12, 0.5048762224545735),
-            (5, 6, 0.36),
-            (5, 7, 0.2989983277545211),
-            (6, 8, 0.2989983277545211),
-            (7, 9, 0.25079872407968895),
-            (8, 10, 0.25079872407968895),
-            (1, 2, 0.06),
-            (0, 1, 0.053851648071344904),
-            (0, 2, 0.053851648071344904),
-            (1, 3, 0.0806225774829855),
-            (2, 4, 0.0806225774829855),
-            (3, 5, 0.2156385865284782),
-            (4, 6, 0.2156385865284782),
-        ],
+        joints: &COCO_JOINTS,
+        bones: &COCO_BONES,
         angles: &[[5, 7, 9], [6, 8, 10], [11, 13, 15], [12, 14, 16]],
     },
     Preset {

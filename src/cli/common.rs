@@ -153,3 +153,12 @@ fn write_out(bytes: &[u8]) -> anyhow::Result<()> {
 pub(super) fn complain(text: &str) {
     eprintln!("{}", escape::one_line(text));
 }
+
+/// Reads a count that is not 0.
+///
+/// # Errors
+/// In words.
+#[cfg(feature = "train")]
+pub(super) fn at_least_one(text: &str) -> Result<usize, String> {
+    text.parse::<usize>().ok().filter(|&n| n > 0).ok_or_else(|| "expected a whole number, 1 or more".to_owned())
+}

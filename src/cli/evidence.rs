@@ -11,8 +11,9 @@ use crate::dataset::{Dataset, read_pppr};
 use crate::diagnose::{Evidence, Finding, FindingPlace};
 use crate::escape::{one_line, to_cell};
 use crate::labels::Tag;
-use crate::mhp::{Precision, Problem};
+use crate::mhp::Precision;
 use crate::output::replace_file;
+use crate::start::problem_alone;
 use crate::study::shard::{FrameCommand, ShardFolder, ShardSpec, Whole};
 use crate::study::{BatchOptions, FrameEvidence, frame_evidence};
 use anyhow::Context as _;
@@ -183,11 +184,9 @@ fn params(path: &Path, dataset: &Dataset, frames: &Range<usize>) -> anyhow::Resu
         anyhow::bail!("{}: --params is of one frame, {count} were asked for; expected --frames N", path.display());
     }
     let params = read_pppr(path, None)?;
-    let info = dataset.info();
     let frame = dataset.load(frames.start)?;
-    let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-    let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps)
-        .with_context(|| dataset.frame_path(frames.start).display().to_string())?;
+    let problem =
+        problem_alone(dataset, &frame).with_context(|| dataset.frame_path(frames.start).display().to_string())?;
     problem.check(&params).with_context(|| path.display().to_string())?;
     Ok(params)
 }

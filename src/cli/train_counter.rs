@@ -1,6 +1,6 @@
 //! `train-counter`: makes the weights of the person counter anew, from synthetic recordings.
 
-use super::common::{print, progress_bar};
+use super::common::{at_least_one, print, progress_bar};
 use crate::people::train::{CounterExample, CounterLesson, TrainOptions, examples, pooled, recordings, train};
 use crate::people::{CLASSES, COMPARED, Confusion, Counter, CounterOptions, FEATURES, HISTORY, Network};
 use crate::simulate::{Recording, ScenePreset};
@@ -50,10 +50,6 @@ pub struct TrainCounterArgs {
     /// Passes over the lessons.
     #[arg(long, default_value_t = TrainOptions::default().epochs, value_parser = at_least_one)]
     epochs: usize,
-}
-
-fn at_least_one(text: &str) -> Result<usize, String> {
-    text.parse::<usize>().ok().filter(|&n| n > 0).ok_or_else(|| "expected a whole number, 1 or more".to_owned())
 }
 
 /// Runs `train-counter`.

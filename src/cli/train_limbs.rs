@@ -2,9 +2,9 @@
 
 use super::common::{print, progress_bar};
 use crate::config::{FitConfig, Limbs, Preset};
-use crate::dataset::{Dataset, Frame};
+use crate::dataset::Dataset;
 use crate::mhp::{LimbLesson, LimbMap, Problem, learn_limbs};
-use crate::start::{find_start, problem_of};
+use crate::start::{find_start, problem_alone, problem_of};
 use crate::task::Progress;
 use anyhow::Context as _;
 use clap::Args;
@@ -91,20 +91,13 @@ fn lessons(paths: &[PathBuf]) -> anyhow::Result<Vec<LimbLesson>> {
                 LimbLesson::of(&problem, &found.initialisation.params, &truth.joints)
             };
             // Some without the frames around, which not every data set has.
-            let alone = index.is_multiple_of(ALONE).then(|| alone(&dataset, &frame)).into_iter();
+            let alone = index.is_multiple_of(ALONE).then(|| problem_alone(&dataset, &frame).ok()).into_iter();
             problem_of(&dataset, &frame).into_iter().chain(alone.flatten()).filter_map(lesson).collect()
         };
         lessons.par_extend((0..dataset.len()).into_par_iter().flat_map_iter(of_frame));
         bar.finish_and_clear();
     }
     Ok(lessons)
-}
-
-/// A frame without those around it.
-fn alone(dataset: &Dataset, frame: &Frame) -> Option<Problem> {
-    let info = dataset.info();
-    let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-    Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).ok()
 }
 
 /// What the map reaches, for people.

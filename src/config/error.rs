@@ -1,6 +1,7 @@
 //! What is wrong with a configuration: always the key, what was found and what was expected, and the line where there is one.
 
 use super::{FIELDS, FitConfig};
+use crate::input::place;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -37,10 +38,6 @@ pub enum ConfigError {
         /// The file.
         path: PathBuf,
     },
-}
-
-fn place(path: &Path, line: Option<usize>) -> String {
-    line.map_or_else(|| path.display().to_string(), |line| format!("{}:{line}", path.display()))
 }
 
 /// Reads the text of a `FIT.toml`.

@@ -6,7 +6,7 @@ use super::field::{Access, Answer, Field, FieldGroup, ReadBy, Unset, Value};
 use super::rows::{choice, count_at, flag_at, maybe_at, number, number_at, one_of_at, switch};
 use super::{
     Background, Convergence, EM_REGION_FORM, EmRegion, FitConfig, FramesAround, GradientVelocity, Height, Limbs,
-    Parameterization, Place, Scatterers, Still, Summation, WarmStart, Yaw, answers,
+    Parameterization, Scatterers, StartPlace, Still, Summation, WarmStart, Yaw, answers,
 };
 use FieldGroup::{Limits, Model, Optimiser, Perturbation, Radar, Start as Starting, StepSizes, Weights};
 use ReadBy::{Run, Start, Steps, StepsAndStart};
@@ -203,7 +203,7 @@ pub const FIELDS: &[Field] = &[
             "Place",
             Start,
             answers::PLACE,
-            one_of_at!(place, [Place::Peaks, Place::Cluster, Place::Counted]),
+            one_of_at!(place, [StartPlace::Peaks, StartPlace::Cluster, StartPlace::Counted]),
         )
         .row("place")
     },

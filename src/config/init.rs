@@ -29,7 +29,7 @@ pub enum Scatterers {
 /// What tells where the one person stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Place {
+pub enum StartPlace {
     /// Where the views' peaks agree best, in the frame alone.
     #[default]
     Peaks,

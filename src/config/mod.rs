@@ -23,7 +23,7 @@ pub use difference::{difference, from_preset, listing};
 pub use error::ConfigError;
 pub use field::{Answer, Field, FieldGroup, FieldKind, Number, ReadBy, Unset, Value};
 pub use fields::FIELDS;
-pub use init::{Height, InitConfig, LearningRates, Limbs, Parameterization, Place, Scatterers, Yaw};
+pub use init::{Height, InitConfig, LearningRates, Limbs, Parameterization, Scatterers, StartPlace, Yaw};
 pub use preset::Preset;
 pub use reading::{Background, Convergence, FramesAround, GradientVelocity, Still, WarmStart};
 
@@ -152,7 +152,7 @@ pub struct FitConfig {
     /// What the start's Gaussians look like.
     pub scatterers: Scatterers,
     /// What tells where the start of one person stands.
-    pub place: Place,
+    pub place: StartPlace,
     /// Where the start looks.
     pub yaw: Yaw,
     /// Persons that are fitted; 0: as many as are counted.
@@ -201,7 +201,7 @@ impl Default for FitConfig {
             bone_tolerance_m: 0.0,
             parameterization: Parameterization::default(),
             scatterers: Scatterers::default(),
-            place: Place::default(),
+            place: StartPlace::default(),
             yaw: Yaw::default(),
             people: 1,
             frames_around: FramesAround::default(),

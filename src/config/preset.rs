@@ -2,7 +2,7 @@
 
 use super::{
     Background, Convergence, EmRegion, FitConfig, FramesAround, GradientVelocity, Height, InitConfig, LearningRates,
-    Limbs, Parameterization, Place, Scatterers, Still, Summation, WarmStart, Yaw,
+    Limbs, Parameterization, Scatterers, StartPlace, Still, Summation, WarmStart, Yaw,
 };
 
 /// A whole [`FitConfig`] with a name.
@@ -53,7 +53,7 @@ impl Preset {
                 em_region: EmRegion::Full,
                 bone_tolerance_m: 0.05,
                 convergence: Convergence::Improvement,
-                place: Place::Cluster,
+                place: StartPlace::Cluster,
                 frames_around: FramesAround::Past,
                 warm_start: WarmStart::AsLeft,
                 init: InitConfig {
@@ -67,7 +67,7 @@ impl Preset {
             Self::Recommended => FitConfig {
                 parameterization: Parameterization::Bones,
                 scatterers: Scatterers::BodyParts,
-                place: Place::Counted,
+                place: StartPlace::Counted,
                 yaw: Yaw::Motion,
                 height: Height::Floor,
                 limbs: Limbs::Learned,

@@ -3,6 +3,7 @@
 use super::BareCatalog;
 use super::names::MAX_NAME_BYTES;
 use super::npz::NpzError;
+use crate::input::place;
 use std::path::{Path, PathBuf};
 
 /// Why a data set could not be opened or a frame not loaded.
@@ -130,10 +131,6 @@ impl DatasetError {
     pub(super) fn too_long_names(root: &Path) -> Self {
         Self::TooMany { what: "bytes in the names of all frames", most: MAX_NAME_BYTES, path: root.to_owned() }
     }
-}
-
-fn place(path: &Path, line: Option<usize>) -> String {
-    line.map_or_else(|| path.display().to_string(), |line| format!("{}:{line}", path.display()))
 }
 
 impl From<crate::task::Cancelled> for DatasetError {

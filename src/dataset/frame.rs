@@ -64,6 +64,11 @@ pub struct Frame {
     pub notes: Vec<String>,
 }
 
+/// The cells of each map, C order.
+pub fn map_cells(maps: &[Heatmap]) -> Vec<&[f64]> {
+    maps.iter().map(|map| map.data.as_slice()).collect()
+}
+
 impl Frame {
     /// Memory that this frame holds, bytes; small parts rounded up.
     pub fn bytes(&self) -> usize {

@@ -36,7 +36,7 @@ pub const MAX_PERSONS: usize = 256;
 pub use axes_text::{axes_badge, axis_position, axis_words, system_words, view_words};
 pub use cache::{Cache, DEFAULT_BUDGET, FrameCache};
 pub use error::DatasetError;
-pub use frame::{Frame, Heatmap, ImageAnnotations, Truth};
+pub use frame::{Frame, Heatmap, ImageAnnotations, Truth, map_cells};
 pub use job::OpenJob;
 pub use layout::{BareCatalog, BareChoice, LAYOUTS, Layout, MapArray, Remembered, Stored};
 pub use loader::{Loaded, Loader};

@@ -4,7 +4,7 @@
 //! a symmetric 4×4 matrix, found by Jacobi rotations. It cannot reflect, so a mirrored skeleton stays wrong.
 
 use super::assign::assign;
-use crate::geometry::{Vec3, add, dot, mat_vec, norm, rotation_from_quaternion, scale, sub};
+use crate::geometry::{Vec3, add, dot, mat_vec, mean, norm, rotation_from_quaternion, scale, sub};
 
 const MM_PER_M: f64 = 1000.0;
 
@@ -52,16 +52,12 @@ pub fn joint_errors(estimate: &[Vec3], truth: &[Vec3], joints: usize) -> Option<
     (!pairs.is_empty()).then_some(errors)
 }
 
-fn centroid(points: &[Vec3]) -> Vec3 {
-    scale(points.iter().fold([0.0; 3], |sum, &p| add(sum, p)), 1.0 / points.len() as f64)
-}
-
 /// `estimate` after the similarity transform (no reflection) that brings it closest to `truth`.
 fn aligned(estimate: &[Vec3], truth: &[Vec3]) -> Option<Vec<Vec3>> {
     if estimate.is_empty() || estimate.len() != truth.len() {
         return None;
     }
-    let (from, to) = (centroid(estimate), centroid(truth));
+    let (from, to) = (mean(estimate), mean(truth));
     let centred: Vec<Vec3> = estimate.iter().map(|&p| sub(p, from)).collect();
     let target: Vec<Vec3> = truth.iter().map(|&p| sub(p, to)).collect();
     let rotation = rotation_from_quaternion(horn_quaternion(&centred, &target));
@@ -156,7 +152,7 @@ mod tests {
                 let mut q = [1.0, 0.0, 0.0, 0.0];
                 q[axis + 1] = amount;
                 let turn = rotation_from_quaternion(q);
-                let middle = centroid(&BODY);
+                let middle = mean(&BODY);
                 let turned: Vec<Vec3> = best.iter().map(|&p| add(mat_vec(&turn, sub(p, middle)), middle)).collect();
                 assert!(cost(&turned) > cost(&best));
                 let grown: Vec<Vec3> = best.iter().map(|&p| add(scale(sub(p, middle), 1.0 + amount), middle)).collect();

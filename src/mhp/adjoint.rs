@@ -11,12 +11,12 @@
 mod geometry;
 
 use super::Precision;
-use super::batch::{Batch, Columns, One, Task, each_joint};
-use super::form::{Form, FormBars, Forms};
-use super::seen::uniform;
-use super::splat::{Look, Row, Scene, Widths, feature_at};
+use super::batch::{Batch, Columns, JointTask, OneJoint, each_joint};
+use super::gaussian::{WorldGaussian, WorldGaussianBars, WorldGaussians};
+use super::splat::{AxisJacobian, JointInView, ViewModel, Widths, feature_at};
+use super::triad::splat_matrix;
 use crate::body::{Group, Pppr};
-use crate::geometry::{Number, Vec3, add_scaled, dot, mat_t_vec, mat_vec, scale};
+use crate::geometry::{Numeric, Vec3, add_scaled, dot, mat_t_vec, mat_vec, scale};
 use crate::radar::{Axis, AxisKind};
 use geometry::Geometry;
 use std::ops::Range;
@@ -71,7 +71,7 @@ impl Moments {
     #[inline(never)]
     pub(super) fn add(&mut self, joint: usize, sums: &Sums) {
         let Sums { r, q, r_delta: [x, y, z], q_delta: [u, v, w], r_delta_delta: [a, b, c, d, e, f] } = *sums;
-        One(joint).add([r, q, x, y, z, u, v, w, a, b, c, d, e, f], &mut self.numbers);
+        OneJoint(joint).add([r, q, x, y, z, u, v, w, a, b, c, d, e, f], &mut self.numbers);
     }
 
     /// Σ r of one joint in each bin of an axis, to be added to; empty unless that is a Doppler axis.
@@ -98,21 +98,21 @@ impl Moments {
 
 /// Adds what `moments` imply to `bars`, and to `gradient` what they say of single features; SPEC section 3.
 pub(super) fn pull_back(
-    scene: &Scene<'_>,
-    forms: &Forms,
+    model: &ViewModel<'_>,
+    gaussians: &WorldGaussians,
     moments: &Moments,
-    (gradient, bars): (&mut Pppr, &mut FormBars),
+    (gradient, bars): (&mut Pppr, &mut WorldGaussianBars),
     precision: Precision,
 ) {
-    match scene.dims() {
-        1 => each_joint(precision, forms.joints(), &mut PullBack::<1> { scene, forms, moments, bars }),
-        2 => each_joint(precision, forms.joints(), &mut PullBack::<2> { scene, forms, moments, bars }),
-        _ => each_joint(precision, forms.joints(), &mut PullBack::<3> { scene, forms, moments, bars }),
+    match model.dims() {
+        1 => each_joint(precision, gaussians.joints(), &mut PullBack::<1> { model, gaussians, moments, bars }),
+        2 => each_joint(precision, gaussians.joints(), &mut PullBack::<2> { model, gaussians, moments, bars }),
+        _ => each_joint(precision, gaussians.joints(), &mut PullBack::<3> { model, gaussians, moments, bars }),
     }
-    for (k, axis) in scene.view.axes.iter().enumerate().take(3) {
+    for (k, axis) in model.view.axes.iter().enumerate().take(3) {
         if axis.kind == AxisKind::Doppler {
-            for joint in 0..forms.joints() {
-                let by_bin = moments.of_bins(joint, 3 - scene.dims() + k);
+            for joint in 0..gaussians.joints() {
+                let by_bin = moments.of_bins(joint, 3 - model.dims() + k);
                 features(by_bin, gradient.joint_mut(Group::Omega, joint));
                 bars.add_omega_mean(joint, -by_bin.iter().sum::<f64>());
             }
@@ -121,39 +121,39 @@ pub(super) fn pull_back(
 }
 
 struct PullBack<'a, const D: usize> {
-    scene: &'a Scene<'a>,
-    forms: &'a Forms,
+    model: &'a ViewModel<'a>,
+    gaussians: &'a WorldGaussians,
     moments: &'a Moments,
-    bars: &'a mut FormBars,
+    bars: &'a mut WorldGaussianBars,
 }
 
-impl<const D: usize> Task for PullBack<'_, D> {
+impl<const D: usize> JointTask for PullBack<'_, D> {
     #[inline(always)]
     fn run<B: Batch>(&mut self, batch: B) {
-        let Self { scene, forms, moments, bars } = self;
-        let (form, sums) = (forms.of(batch), moments.of(batch));
+        let Self { model, gaussians, moments, bars } = self;
+        let (gaussian, sums) = (gaussians.of(batch), moments.of(batch));
         // The way there once more: that costs less than to keep it.
-        let look = scene.look(&form);
-        let rows: [Row<B::Number>; D] = scene.rows(&look.seen);
-        let widths = scene.widths(&form, &look, &rows);
-        let kappa = scene.kappa(&form, &look, &rows);
-        let (squares, _) = scene.squares(&look, &widths);
-        let mut geometry = Geometry::nothing(batch.all(0.0));
-        let (c_bar, b_bar) = gaussian(&squares.precision(), kappa, &sums);
-        let covariance_bar = covariance(&mut geometry, scene, &form, (&look, &rows, &widths), &c_bar);
+        let in_view = model.joint_in_view(&gaussian);
+        let jacobians: [AxisJacobian<B::Number>; D] = model.jacobians(&in_view.triad);
+        let widths = model.widths(&gaussian, &in_view, &jacobians);
+        let kappa = model.kappa(&gaussian, &in_view, &jacobians);
+        let (squares, _) = model.squares(&in_view, &widths);
+        let mut geometry = Geometry::nothing(batch.splat(0.0));
+        let (c_bar, b_bar) = covariance_and_bin_bars(&squares.precision(), kappa, &sums);
+        let covariance_bar = spread_bars(&mut geometry, model, &gaussian, (&in_view, &jacobians, &widths), &c_bar);
         for k in 0..D {
-            let axis = &scene.view.axes[k];
-            if scene.sees(axis.kind) {
-                geometry.coordinate(&look, axis, b_bar[k] * scene.by_step[k]);
+            let axis = &model.view.axes[k];
+            if model.sees(axis.kind) {
+                geometry.coordinate(&in_view, axis, b_bar[k] * model.by_step[k]);
             }
         }
-        let omega_mean_bar = ramp(&mut geometry, scene, (&form, &look, &rows), &sums);
-        phases(&mut geometry, scene, &look, sums.q);
-        if scene.config.operators.attenuation {
-            geometry.d -= sums.r * 4.0 / look.seen.d.value;
+        let omega_mean_bar = ramp(&mut geometry, model, (&gaussian, &in_view, &jacobians), &sums);
+        phases(&mut geometry, model, &in_view, sums.q);
+        if model.config.operators.attenuation {
+            geometry.d -= sums.r * 4.0 / in_view.triad.d.value;
         }
-        let (p_bar, v_bar) = geometry.fold(scene, &look);
-        let turn = uniform(sums.r, scene.view.pose.rotation);
+        let (p_bar, v_bar) = geometry.fold(model, &in_view);
+        let turn = splat_matrix(sums.r, model.view.pose.rotation);
         let motion = [mat_t_vec(&turn, p_bar), mat_t_vec(&turn, v_bar)];
         bars.add(batch, motion, covariance_bar, [sums.r, omega_mean_bar]);
     }
@@ -161,17 +161,21 @@ impl<const D: usize> Task for PullBack<'_, D> {
 
 /// ∂L/∂C = ½ P (Σ rΔΔᵀ) P − ½ P Σr and ∂L/∂b = P ΣrΔ − κ Σq.
 #[inline(always)]
-fn gaussian<T: Number, const D: usize>(p: &[[T; D]; D], kappa: [T; D], sums: &Sums<T>) -> ([[T; D]; D], [T; D]) {
-    let zero = sums.r.like(0.0);
+fn covariance_and_bin_bars<T: Numeric, const D: usize>(
+    p: &[[T; D]; D],
+    kappa: [T; D],
+    sums: &Sums<T>,
+) -> ([[T; D]; D], [T; D]) {
+    let zero = sums.r.splat(0.0);
     let (mut half, mut c_bar, mut b_bar) = ([[zero; D]; D], [[zero; D]; D], [zero; D]);
     let first = 3 - D;
     for k in 0..D {
         b_bar[k] = -(kappa[k] * sums.q);
         for l in 0..D {
-            b_bar[k] = b_bar[k].plus(p[k][l], sums.r_delta[first + l]);
+            b_bar[k] = p[k][l].mul_add(sums.r_delta[first + l], b_bar[k]);
             for m in 0..D {
                 let r_delta_delta = sums.r_delta_delta[lower(first + m.max(l), first + m.min(l))];
-                half[k][l] = half[k][l].plus(p[k][m], r_delta_delta);
+                half[k][l] = p[k][m].mul_add(r_delta_delta, half[k][l]);
             }
         }
     }
@@ -179,7 +183,7 @@ fn gaussian<T: Number, const D: usize>(p: &[[T; D]; D], kappa: [T; D], sums: &Su
         for l in 0..=k {
             let mut sum = -(p[k][l] * sums.r);
             for m in 0..D {
-                sum = sum.plus(half[k][m], p[m][l]);
+                sum = half[k][m].mul_add(p[m][l], sum);
             }
             c_bar[k][l] = sum * 0.5;
             c_bar[l][k] = c_bar[k][l];
@@ -191,90 +195,90 @@ fn gaussian<T: Number, const D: usize>(p: &[[T; D]; D], kappa: [T; D], sums: &Su
 /// C from how wide the joint and the point spread are along the axes: hands on what the axes' directions, lengths and
 /// the point spread want, and returns the adjoint of R S Sᵀ Rᵀ, its upper half row by row.
 #[inline(always)]
-fn covariance<T: Number, const D: usize>(
+fn spread_bars<T: Numeric, const D: usize>(
     geometry: &mut Geometry<T>,
-    scene: &Scene<'_>,
-    form: &Form<T>,
-    (look, rows, widths): (&Look<T>, &[Row<T>; D], &[Widths<T>; D]),
+    model: &ViewModel<'_>,
+    gaussian: &WorldGaussian<T>,
+    (in_view, jacobians, widths): (&JointInView<T>, &[AxisJacobian<T>; D], &[Widths<T>; D]),
     c_bar: &[[T; D]; D],
 ) -> [T; 6] {
-    let zero = form.opacity.like(0.0);
-    let turn = uniform(zero, scene.view.pose.rotation);
-    let directions = [look.seen.u, look.seen.e_az, look.seen.e_el];
+    let zero = gaussian.opacity.splat(0.0);
+    let turn = splat_matrix(zero, model.view.pose.rotation);
+    let directions = [in_view.triad.u, in_view.triad.e_az, in_view.triad.e_el];
     let (mut covariance_bar, mut blur_bar) = ([zero; 6], [zero; 3]);
     for k in 0..D {
         // What C̅ makes of all axes for this one.
-        let mut mixed = Widths { gradient: [zero; 3], own: [zero; 3], seen: [zero; 3] };
+        let mut mixed = Widths { gradient: [zero; 3], own: [zero; 3], along_triad: [zero; 3] };
         for l in 0..D {
             add_scaled(&mut mixed.gradient, widths[l].gradient, c_bar[k][l]);
             add_scaled(&mut mixed.own, widths[l].own, c_bar[k][l]);
-            add_scaled(&mut mixed.seen, widths[l].seen, c_bar[k][l]);
+            add_scaled(&mut mixed.along_triad, widths[l].along_triad, c_bar[k][l]);
         }
         let mut entry = 0;
         for i in 0..3 {
             for j in i..3 {
-                covariance_bar[entry] = covariance_bar[entry].plus(widths[k].gradient[i], mixed.gradient[j]);
+                covariance_bar[entry] = widths[k].gradient[i].mul_add(mixed.gradient[j], covariance_bar[entry]);
                 entry += 1;
             }
         }
         // ½ ∂L/∂(∂b/∂p), view frame.
-        let mut gradient_bar = mat_vec(&turn, mat_vec(&form.spread, mixed.own));
+        let mut gradient_bar = mat_vec(&turn, mat_vec(&gaussian.spread, mixed.own));
         for i in 0..3 {
-            if scene.blurs[i] {
-                let pull = look.blur[i] * look.blur[i] * mixed.seen[i];
+            if model.blurs[i] {
+                let pull = in_view.blur[i] * in_view.blur[i] * mixed.along_triad[i];
                 add_scaled(&mut gradient_bar, directions[i], pull);
-                geometry.blurred(i, scale(rows[k].gradient, pull * 2.0));
-                blur_bar[i] = blur_bar[i].plus(widths[k].seen[i], mixed.seen[i]);
+                geometry.blurred(i, scale(jacobians[k].gradient, pull * 2.0));
+                blur_bar[i] = widths[k].along_triad[i].mul_add(mixed.along_triad[i], blur_bar[i]);
             }
         }
-        let axis = &scene.view.axes[k];
-        if scene.sees(axis.kind) {
-            let row = &rows[k];
-            let row_bar = scale(gradient_bar, zero.like(2.0 * scene.by_step[k]));
-            geometry.direction(look, axis, scale(row_bar, row.ratio));
+        let axis = &model.view.axes[k];
+        if model.sees(axis.kind) {
+            let jacobian = &jacobians[k];
+            let jacobian_bar = scale(gradient_bar, zero.splat(2.0 * model.by_step[k]));
+            geometry.direction(in_view, axis, scale(jacobian_bar, jacobian.ratio));
             if axis.kind.is_angular() {
-                let along = dot(row_bar, row.direction);
-                geometry.arm(axis.kind, -along * row.ratio / row.arm);
-                geometry.slope(look, axis, along / row.arm);
+                let along = dot(jacobian_bar, jacobian.direction);
+                geometry.arm(axis.kind, -along * jacobian.ratio / jacobian.arm);
+                geometry.slope(in_view, axis, along / jacobian.arm);
             }
         }
     }
-    blur(geometry, scene, look, blur_bar);
+    blur(geometry, model, in_view, blur_bar);
     covariance_bar
 }
 
 /// κ_k = ω̄ v·D_k; returns ∂L/∂ω̄.
 #[inline(always)]
-fn ramp<T: Number, const D: usize>(
+fn ramp<T: Numeric, const D: usize>(
     geometry: &mut Geometry<T>,
-    scene: &Scene<'_>,
-    (form, look, rows): (&Form<T>, &Look<T>, &[Row<T>; D]),
+    model: &ViewModel<'_>,
+    (gaussian, in_view, jacobians): (&WorldGaussian<T>, &JointInView<T>, &[AxisJacobian<T>; D]),
     sums: &Sums<T>,
 ) -> T {
-    let mut omega_mean_bar = sums.q.like(0.0);
-    if !scene.config.operators.doppler {
+    let mut omega_mean_bar = sums.q.splat(0.0);
+    if !model.config.operators.doppler {
         return omega_mean_bar;
     }
     for k in 0..D {
-        let (row, axis) = (&rows[k], &scene.view.axes[k]);
+        let (jacobian, axis) = (&jacobians[k], &model.view.axes[k]);
         let kappa_bar = sums.q_delta[3 - D + k];
-        let by_omega_mean = kappa_bar * form.omega_mean;
-        omega_mean_bar = omega_mean_bar.plus(kappa_bar, dot(look.velocity, row.displacement));
-        add_scaled(&mut geometry.v, row.displacement, by_omega_mean);
-        let displacement_bar = scale(look.velocity, by_omega_mean * scene.step[k]);
-        geometry.direction(look, axis, scale(displacement_bar, row.by_ratio));
+        let by_omega_mean = kappa_bar * gaussian.omega_mean;
+        omega_mean_bar = kappa_bar.mul_add(dot(in_view.velocity, jacobian.displacement), omega_mean_bar);
+        add_scaled(&mut geometry.v, jacobian.displacement, by_omega_mean);
+        let displacement_bar = scale(in_view.velocity, by_omega_mean * model.step[k]);
+        geometry.direction(in_view, axis, scale(displacement_bar, jacobian.by_ratio));
         if axis.kind.is_angular() {
-            let along = dot(displacement_bar, row.direction) / row.slope;
+            let along = dot(displacement_bar, jacobian.direction) / jacobian.slope;
             geometry.arm(axis.kind, along);
-            geometry.slope(look, axis, -along * row.by_ratio);
+            geometry.slope(in_view, axis, -along * jacobian.by_ratio);
         }
     }
     omega_mean_bar
 }
 
 #[inline(always)]
-fn phases<T: Number>(geometry: &mut Geometry<T>, scene: &Scene<'_>, look: &Look<T>, phase_bar: T) {
-    let [d, radial, azimuth, elevation] = scene.phase_slopes(&look.seen);
+fn phases<T: Numeric>(geometry: &mut Geometry<T>, model: &ViewModel<'_>, in_view: &JointInView<T>, phase_bar: T) {
+    let [d, radial, azimuth, elevation] = model.phase_slopes(&in_view.triad);
     geometry.d += phase_bar * d;
     geometry.radial += phase_bar * radial;
     geometry.azimuth += phase_bar * azimuth;
@@ -283,17 +287,17 @@ fn phases<T: Number>(geometry: &mut Geometry<T>, scene: &Scene<'_>, look: &Look<
 
 /// The point spread along e_az and e_el grows with distance; `bar` is ½ of what each wants times itself.
 #[inline(always)]
-fn blur<T: Number>(geometry: &mut Geometry<T>, scene: &Scene<'_>, look: &Look<T>, bar: [T; 3]) {
-    let (seen, psf) = (&look.seen, &scene.view.psf);
-    if scene.blurs[1] {
-        let bar = look.blur[1] * 2.0 * bar[1] / seen.cos_az_floored.value;
+fn blur<T: Numeric>(geometry: &mut Geometry<T>, model: &ViewModel<'_>, in_view: &JointInView<T>, bar: [T; 3]) {
+    let (triad, psf) = (&in_view.triad, &model.view.psf);
+    if model.blurs[1] {
+        let bar = in_view.blur[1] * 2.0 * bar[1] / triad.cos_az_floored.value;
         geometry.rho += bar * psf.azimuth_rad;
-        geometry.azimuth += bar * look.blur[1] * seen.sin_az * seen.cos_az_floored.pass;
+        geometry.azimuth += bar * in_view.blur[1] * triad.sin_az * triad.cos_az_floored.pass;
     }
-    if scene.blurs[2] {
-        let bar = look.blur[2] * 2.0 * bar[2] / seen.cos_el_floored.value;
+    if model.blurs[2] {
+        let bar = in_view.blur[2] * 2.0 * bar[2] / triad.cos_el_floored.value;
         geometry.d += bar * psf.elevation_rad;
-        geometry.elevation += bar * look.blur[2] * seen.sin_el * seen.cos_el_floored.pass;
+        geometry.elevation += bar * in_view.blur[2] * triad.sin_el * triad.cos_el_floored.pass;
     }
 }
 

@@ -1,6 +1,6 @@
 //! Joints one by one, or as many of them as the machine computes at once: the same formulas for both.
 //!
-//! What is computed a joint is written over [`Number`]. In f64 a [`Task`] sees one joint at a time, which is the oracle's
+//! What is computed a joint is written over [`Numeric`]. In f64 a [`JointTask`] sees one joint at a time, which is the oracle's
 //! own order of operations; in single precision it sees as many as `pulp` has f64 in a register, whose sums may round
 //! differently.
 #![expect(
@@ -9,24 +9,24 @@
 )]
 
 use super::Precision;
-use crate::geometry::{Mat3, Number};
+use crate::geometry::{Mat3, Numeric};
 use pulp::{Arch, Simd, WithSimd};
 use std::f64::consts::{LN_2, LOG2_E, SQRT_2};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// Joints of a row of [`Columns`]: as many as the largest register has.
-const ROW: usize = 8;
+const ROW_JOINTS: usize = 8;
 /// 1.5 · 2⁵²: adding it rounds to a whole number.
-const WHOLE: f64 = 6_755_399_441_055_744.0;
+const ROUND_TO_INTEGER: f64 = 6_755_399_441_055_744.0;
 /// 2⁵²: holds a whole number in its lowest bits.
-const HOLDER: f64 = 4_503_599_627_370_496.0;
+const INTEGER_IN_MANTISSA: f64 = 4_503_599_627_370_496.0;
 /// Of an f64's exponent, and the bits of its mantissa.
-const BIAS: f64 = 1023.0;
-const MANTISSA: u32 = 52;
+const EXPONENT_BIAS: f64 = 1023.0;
+const MANTISSA_BITS: u32 = 52;
 /// 2ᶠ on |f| ≤ ½ by Taylor, relative error 1e-14.
-const EXP2: [f64; 12] = series_of_exp2();
+const EXP2_SERIES: [f64; 12] = series_of_exp2();
 /// 2 artanh(s)/s by s² on |s| ≤ 0.172, relative error 1e-14.
-const ATANH: [f64; 9] = series_of_artanh();
+const ATANH_SERIES: [f64; 9] = series_of_artanh();
 
 /// (ln 2)ᵏ/k!
 const fn series_of_exp2() -> [f64; 12] {
@@ -53,10 +53,10 @@ const fn series_of_artanh() -> [f64; 9] {
 /// Some joints beside each other, and how their numbers are read and written.
 pub(super) trait Batch: Copy {
     /// A number of each of them.
-    type Number: Number;
+    type Number: Numeric;
 
     /// `x` for each.
-    fn all(self, x: f64) -> Self::Number;
+    fn splat(self, x: f64) -> Self::Number;
 
     /// What `of` says of each.
     fn gather(self, of: impl Fn(usize) -> f64) -> Self::Number;
@@ -82,15 +82,15 @@ pub(super) trait Batch: Copy {
 }
 
 /// What is done a joint.
-pub(super) trait Task {
+pub(super) trait JointTask {
     /// Does it for these.
     fn run<B: Batch>(&mut self, batch: B);
 }
 
 /// Does `task` for `joints` joints.
-pub(super) fn each_joint(precision: Precision, joints: usize, task: &mut impl Task) {
+pub(super) fn each_joint(precision: Precision, joints: usize, task: &mut impl JointTask) {
     match precision {
-        Precision::F64 => (0..joints).for_each(|joint| task.run(One(joint))),
+        Precision::F64 => (0..joints).for_each(|joint| task.run(OneJoint(joint))),
         Precision::F32 => Arch::new().dispatch(Together { joints, task }),
     }
 }
@@ -100,7 +100,7 @@ struct Together<'a, T> {
     task: &'a mut T,
 }
 
-impl<T: Task> WithSimd for Together<'_, T> {
+impl<T: JointTask> WithSimd for Together<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -108,9 +108,9 @@ impl<T: Task> WithSimd for Together<'_, T> {
         for first in (0..self.joints).step_by(S::F64_LANES) {
             if first + 1 == self.joints {
                 // A register for one joint, as the last of seventeen is, would divide and take roots for eight.
-                self.task.run(One(first));
+                self.task.run(OneJoint(first));
             } else {
-                self.task.run(Several { simd, first, end: self.joints });
+                self.task.run(JointLanes { simd, first, end: self.joints });
             }
         }
     }
@@ -118,11 +118,11 @@ impl<T: Task> WithSimd for Together<'_, T> {
 
 /// `N` numbers a joint, in rows of eight joints.
 #[derive(Debug, Clone)]
-pub(super) struct Columns<const N: usize>(Vec<[Row; N]>);
+pub(super) struct Columns<const N: usize>(Vec<[JointRow; N]>);
 
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
-struct Row([f64; ROW]);
+struct JointRow([f64; ROW_JOINTS]);
 
 impl<const N: usize> Default for Columns<N> {
     fn default() -> Self {
@@ -133,7 +133,7 @@ impl<const N: usize> Default for Columns<N> {
 impl<const N: usize> Columns<N> {
     /// Makes room for so many joints.
     pub(super) fn hold(&mut self, joints: usize) {
-        self.0.resize(joints.div_ceil(ROW), [Row([0.0; ROW]); N]);
+        self.0.resize(joints.div_ceil(ROW_JOINTS), [JointRow([0.0; ROW_JOINTS]); N]);
     }
 
     /// Zeros for so many joints.
@@ -160,12 +160,12 @@ impl Columns<9> {
 
 /// A joint.
 #[derive(Clone, Copy)]
-pub(super) struct One(pub usize);
+pub(super) struct OneJoint(pub usize);
 
-impl Batch for One {
+impl Batch for OneJoint {
     type Number = f64;
 
-    fn all(self, x: f64) -> f64 {
+    fn splat(self, x: f64) -> f64 {
         x
     }
 
@@ -178,7 +178,7 @@ impl Batch for One {
     }
 
     fn load<const N: usize>(self, from: &Columns<N>) -> [f64; N] {
-        let (rows, lane) = (&from.0[self.0 / ROW], self.0 % ROW);
+        let (rows, lane) = (&from.0[self.0 / ROW_JOINTS], self.0 % ROW_JOINTS);
         let mut x = [0.0; N];
         for k in 0..N {
             x[k] = rows[k].0[lane];
@@ -187,31 +187,31 @@ impl Batch for One {
     }
 
     fn store<const N: usize>(self, x: [f64; N], into: &mut Columns<N>) {
-        for (row, x) in into.0[self.0 / ROW].iter_mut().zip(x) {
-            row.0[self.0 % ROW] = x;
+        for (row, x) in into.0[self.0 / ROW_JOINTS].iter_mut().zip(x) {
+            row.0[self.0 % ROW_JOINTS] = x;
         }
     }
 }
 
 /// A register of joints from `first` on; beyond the last, what is gathered are copies of it, and what is stored nobody reads.
 #[derive(Clone, Copy)]
-struct Several<S: Simd> {
+struct JointLanes<S: Simd> {
     simd: S,
     first: usize,
     end: usize,
 }
 
-impl<S: Simd> Batch for Several<S> {
-    type Number = Wide<S>;
+impl<S: Simd> Batch for JointLanes<S> {
+    type Number = F64Lanes<S>;
 
     #[inline(always)]
-    fn all(self, x: f64) -> Wide<S> {
-        Wide { simd: self.simd, value: self.simd.splat_f64s(x) }
+    fn splat(self, x: f64) -> F64Lanes<S> {
+        F64Lanes { simd: self.simd, value: self.simd.splat_f64s(x) }
     }
 
     #[inline(always)]
-    fn gather(self, of: impl Fn(usize) -> f64) -> Wide<S> {
-        let mut x = self.all(0.0);
+    fn gather(self, of: impl Fn(usize) -> f64) -> F64Lanes<S> {
+        let mut x = self.splat(0.0);
         for (lane, x) in x.lanes().iter_mut().enumerate() {
             *x = of((self.first + lane).min(self.end - 1));
         }
@@ -219,54 +219,51 @@ impl<S: Simd> Batch for Several<S> {
     }
 
     #[inline(always)]
-    fn scatter(self, mut x: Wide<S>, mut to: impl FnMut(usize, f64)) {
+    fn scatter(self, mut x: F64Lanes<S>, mut to: impl FnMut(usize, f64)) {
         for (joint, &mut x) in (self.first..self.end).zip(x.lanes()) {
             to(joint, x);
         }
     }
 
     #[inline(always)]
-    fn load<const N: usize>(self, from: &Columns<N>) -> [Wide<S>; N] {
-        let mut x = [self.all(0.0); N];
-        let rows = &from.0[self.first / ROW];
+    fn load<const N: usize>(self, from: &Columns<N>) -> [F64Lanes<S>; N] {
+        let mut x = [self.splat(0.0); N];
+        let rows = &from.0[self.first / ROW_JOINTS];
         for k in 0..N {
-            x[k].value = S::as_simd_f64s(&rows[k].0).0[self.first % ROW / S::F64_LANES];
+            x[k].value = S::as_simd_f64s(&rows[k].0).0[self.first % ROW_JOINTS / S::F64_LANES];
         }
         x
     }
 
     #[inline(always)]
-    fn store<const N: usize>(self, x: [Wide<S>; N], into: &mut Columns<N>) {
-        let rows = &mut into.0[self.first / ROW];
+    fn store<const N: usize>(self, x: [F64Lanes<S>; N], into: &mut Columns<N>) {
+        let rows = &mut into.0[self.first / ROW_JOINTS];
         for k in 0..N {
-            S::as_mut_simd_f64s(&mut rows[k].0).0[self.first % ROW / S::F64_LANES] = x[k].value;
+            S::as_mut_simd_f64s(&mut rows[k].0).0[self.first % ROW_JOINTS / S::F64_LANES] = x[k].value;
         }
     }
 }
 
 /// A register of f64.
 #[derive(Clone, Copy)]
-pub(super) struct Wide<S: Simd> {
+pub(super) struct F64Lanes<S: Simd> {
     simd: S,
     value: S::f64s,
 }
 
-impl<S: Simd> Wide<S> {
+impl<S: Simd> F64Lanes<S> {
     /// `of` the bits of each.
     #[inline(always)]
     fn bits(self, of: impl Fn(u64) -> u64) -> Self {
-        self.each(|x| f64::from_bits(of(x.to_bits())))
+        self.map(|x| f64::from_bits(of(x.to_bits())))
     }
 
     /// The polynomial with these coefficients, the constant one first.
     #[inline(always)]
     fn series<const N: usize>(self, coefficients: &[f64; N]) -> Self {
-        let mut sum = self.like(coefficients[N - 1]);
+        let mut sum = self.splat(coefficients[N - 1]);
         for k in (0..N - 1).rev() {
-            sum = Self {
-                simd: self.simd,
-                value: self.simd.mul_add_f64s(sum.value, self.value, self.like(coefficients[k]).value),
-            };
+            sum = sum.mul_add(self, self.splat(coefficients[k]));
         }
         sum
     }
@@ -277,61 +274,62 @@ impl<S: Simd> Wide<S> {
     }
 }
 
-impl<S: Simd> Number for Wide<S> {
+impl<S: Simd> Numeric for F64Lanes<S> {
     #[inline(always)]
-    fn like(self, x: f64) -> Self {
+    fn splat(self, x: f64) -> Self {
         Self { simd: self.simd, value: self.simd.splat_f64s(x) }
     }
 
     #[inline(always)]
-    fn below(self, limit: f64, yes: Self, no: Self) -> Self {
+    fn select_lt(self, limit: f64, yes: Self, no: Self) -> Self {
         let mask = self.simd.less_than_f64s(self.value, self.simd.splat_f64s(limit));
         Self { simd: self.simd, value: self.simd.select_f64s(mask, yes.value, no.value) }
     }
 
     #[inline(always)]
-    fn plus(self, a: Self, b: Self) -> Self {
-        Self { simd: self.simd, value: self.simd.mul_add_f64s(a.value, b.value, self.value) }
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        Self { simd: self.simd, value: self.simd.mul_add_f64s(self.value, a.value, b.value) }
     }
 
     #[inline(always)]
-    fn at_least(self, limit: f64) -> Self {
+    fn max(self, limit: f64) -> Self {
         Self { simd: self.simd, value: self.simd.max_f64s(self.value, self.simd.splat_f64s(limit)) }
     }
 
     #[inline(always)]
-    fn at_most(self, limit: f64) -> Self {
+    fn min(self, limit: f64) -> Self {
         Self { simd: self.simd, value: self.simd.min_f64s(self.value, self.simd.splat_f64s(limit)) }
     }
 
     #[inline(always)]
-    fn root(self) -> Self {
+    fn sqrt(self) -> Self {
         Self { simd: self.simd, value: self.simd.sqrt_f64s(self.value) }
     }
 
     #[inline(always)]
-    fn whole(self) -> Self {
-        let nearest = (self + WHOLE) - WHOLE;
-        nearest - (self - nearest).below(0.0, self.like(1.0), self.like(0.0))
+    fn floor(self) -> Self {
+        let nearest = (self + ROUND_TO_INTEGER) - ROUND_TO_INTEGER;
+        nearest - (self - nearest).select_lt(0.0, self.splat(1.0), self.splat(0.0))
     }
 
     #[inline(always)]
     fn exp(self) -> Self {
         // 2ⁿ · 2ᶠ; the sum holds n, biased as an exponent, in its lowest bits.
-        let x = (self * LOG2_E).at_least(-1022.0).at_most(1023.0);
-        let biased = x + (WHOLE + BIAS);
-        let f = x - (biased - (WHOLE + BIAS));
-        biased.bits(|bits| bits << MANTISSA) * f.series(&EXP2)
+        let x = (self * LOG2_E).max(-1022.0).min(1023.0);
+        let biased = x + (ROUND_TO_INTEGER + EXPONENT_BIAS);
+        let f = x - (biased - (ROUND_TO_INTEGER + EXPONENT_BIAS));
+        biased.bits(|bits| bits << MANTISSA_BITS) * f.series(&EXP2_SERIES)
     }
 
     #[inline(always)]
     fn ln(self) -> Self {
-        let exponent = self.bits(|bits| (bits >> MANTISSA) | HOLDER.to_bits()) - (HOLDER + BIAS);
+        let exponent = self.bits(|bits| (bits >> MANTISSA_BITS) | INTEGER_IN_MANTISSA.to_bits())
+            - (INTEGER_IN_MANTISSA + EXPONENT_BIAS);
         let m = self.bits(|bits| bits & (u64::MAX >> 12) | 1.0_f64.to_bits());
         let s = (m - SQRT_2) / (m + SQRT_2);
-        let ln = s * (s * s).series(&ATANH) + (exponent + 0.5) * LN_2;
+        let ln = s * (s * s).series(&ATANH_SERIES) + (exponent + 0.5) * LN_2;
         // What has no logarithm, and what is not finite, must stay visible.
-        self.below(f64::MIN_POSITIVE, self.like(f64::NAN), ln + self * 0.0)
+        self.select_lt(f64::MIN_POSITIVE, self.splat(f64::NAN), ln + self * 0.0)
     }
 
     #[inline(always)]
@@ -340,7 +338,7 @@ impl<S: Simd> Number for Wide<S> {
     }
 
     #[inline(always)]
-    fn each(mut self, of: impl Fn(f64) -> f64) -> Self {
+    fn map(mut self, of: impl Fn(f64) -> f64) -> Self {
         for x in self.lanes() {
             *x = of(*x);
         }
@@ -348,7 +346,7 @@ impl<S: Simd> Number for Wide<S> {
     }
 
     #[inline(always)]
-    fn each_with(mut self, mut other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
+    fn zip_map(mut self, mut other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
         for (x, &mut y) in self.lanes().iter_mut().zip(other.lanes()) {
             *x = of(*x, y);
         }
@@ -359,7 +357,7 @@ impl<S: Simd> Number for Wide<S> {
 /// An operator between two registers, and between a register and a number.
 macro_rules! operator {
     ($operator:ident, $name:ident, $of:ident) => {
-        impl<S: Simd> $operator for Wide<S> {
+        impl<S: Simd> $operator for F64Lanes<S> {
             type Output = Self;
             #[inline(always)]
             fn $name(self, b: Self) -> Self {
@@ -367,11 +365,11 @@ macro_rules! operator {
             }
         }
 
-        impl<S: Simd> $operator<f64> for Wide<S> {
+        impl<S: Simd> $operator<f64> for F64Lanes<S> {
             type Output = Self;
             #[inline(always)]
             fn $name(self, b: f64) -> Self {
-                self.$name(self.like(b))
+                self.$name(self.splat(b))
             }
         }
     };
@@ -382,7 +380,7 @@ operator!(Sub, sub, sub_f64s);
 operator!(Mul, mul, mul_f64s);
 operator!(Div, div, div_f64s);
 
-impl<S: Simd> Neg for Wide<S> {
+impl<S: Simd> Neg for F64Lanes<S> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -390,14 +388,14 @@ impl<S: Simd> Neg for Wide<S> {
     }
 }
 
-impl<S: Simd> AddAssign for Wide<S> {
+impl<S: Simd> AddAssign for F64Lanes<S> {
     #[inline(always)]
     fn add_assign(&mut self, b: Self) {
         *self = *self + b;
     }
 }
 
-impl<S: Simd> SubAssign for Wide<S> {
+impl<S: Simd> SubAssign for F64Lanes<S> {
     #[inline(always)]
     fn sub_assign(&mut self, b: Self) {
         *self = *self - b;
@@ -414,11 +412,11 @@ mod tests {
         found: Vec<[f64; 4]>,
     }
 
-    impl Task for Functions {
+    impl JointTask for Functions {
         #[inline(always)]
         fn run<B: Batch>(&mut self, batch: B) {
             let x = batch.gather(|k| self.of[k]);
-            for (which, y) in [x.exp(), x.ln(), x.ln_1p(), x.whole()].into_iter().enumerate() {
+            for (which, y) in [x.exp(), x.ln(), x.ln_1p(), x.floor()].into_iter().enumerate() {
                 batch.scatter(y, |k, y| self.found[k][which] = y);
             }
         }

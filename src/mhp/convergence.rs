@@ -39,11 +39,12 @@ fn bones_plausible(skeleton: &Skeleton, params: &Pppr) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::body::PpprShape;
 
-    fn two_joints(distance_m: f64) -> (Skeleton, Pppr) {
+    /// A skeleton of one bone of 0.4 m, and one person whose joints are so far apart.
+    pub(in crate::mhp) fn two_joints(distance_m: f64) -> (Skeleton, Pppr) {
         let skeleton = Skeleton {
             joints: vec!["a".into(), "b".into()],
             bones: vec![[0, 1]],

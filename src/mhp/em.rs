@@ -2,14 +2,14 @@
 
 use super::Precision;
 use super::adjoint::{Moments, pull_back};
+use super::cell_box::CellBox;
 use super::floors::{EPSILON, SOFT_FLOOR, ViewLoss, floored, hard_iou, ln_floored};
-use super::form::{FormBars, Forms};
+use super::gaussian::{WorldGaussianBars, WorldGaussians};
 use super::kernel::Kernel;
-use super::laid::Laid;
 use super::percentile::percentile;
 use super::scalar::Real;
-use super::splat::{Scene, Splats};
-use super::tiles::{self, Question, Tiles};
+use super::splat::{Splats, ViewModel};
+use super::tiles::{self, EmQuery, Tiles};
 use crate::body::Pppr;
 use crate::config::FitConfig;
 
@@ -22,68 +22,74 @@ pub(super) struct Workspace {
 }
 
 /// Where L_view is evaluated, and B_ori there.
-pub(super) struct Aim {
+pub(super) struct EmTarget {
     /// B_ori over the region's cells in C order.
-    pub target: Vec<bool>,
+    pub ori: Vec<bool>,
     /// The region as it is summed, marked by B_ori.
-    pub laid: Laid,
+    pub cell_box: CellBox,
 }
 
 impl Workspace {
-    /// Sees the joints of `params`, which have these forms.
-    pub(super) fn project(&mut self, scene: &Scene<'_>, of: (&Pppr, &Forms), precision: Precision) {
-        scene.splats(of, precision, &mut self.splats);
+    /// Projects the joints of `params`, which have these Gaussians.
+    pub(super) fn project(&mut self, model: &ViewModel<'_>, of: (&Pppr, &WorldGaussians), precision: Precision) {
+        model.splats(of, precision, &mut self.splats);
     }
 
-    /// Evaluates L_view at `aim`, of whose view `scene` is, for the joints last seen, and where a gradient is wanted what the cells say of them, times
-    /// `factor`.
+    /// Evaluates L_view at `target`, of whose view `model` is, for the joints last projected, and where a gradient is wanted
+    /// what the cells say of them, times `factor`.
     pub(super) fn compare(
         &mut self,
-        scene: &Scene<'_>,
-        aim: &Aim,
+        model: &ViewModel<'_>,
+        target: &EmTarget,
         factor: Option<f64>,
         precision: Precision,
     ) -> ViewLoss {
         let Self { splats, moments, tiles } = self;
-        moments.reset(splats.joints(), &scene.view.axes);
+        moments.reset(splats.joints(), &model.view.axes);
         match precision {
-            Precision::F64 => plain::<f64>(scene, splats, &aim.laid, factor, moments),
-            Precision::F32 if tiles::reaches(scene.config.softness) => {
-                let FitConfig { summation, tau_pct, softness, .. } = *scene.config;
-                let question =
-                    Question { splats, tiling: &aim.laid.tiling, summation, tau_pct, softness, scale: factor };
-                tiles.evaluate(&question, moments)
+            Precision::F64 => plain::<f64>(model, splats, &target.cell_box, factor, moments),
+            Precision::F32 if tiles::holds(model.config.softness) => {
+                let FitConfig { summation, tau_pct, softness, .. } = *model.config;
+                let query = EmQuery {
+                    splats,
+                    grid: &target.cell_box.grid,
+                    summation,
+                    tau_pct,
+                    softness,
+                    gradient_factor: factor,
+                };
+                tiles.evaluate(&query, moments)
             }
-            Precision::F32 => plain::<f32>(scene, splats, &aim.laid, factor, moments),
+            Precision::F32 => plain::<f32>(model, splats, &target.cell_box, factor, moments),
         }
     }
 
-    /// Hands what the cells said to the joints' forms and features.
+    /// Hands what the cells said to the joints' Gaussians and features.
     pub(super) fn pull_back(
         &self,
-        scene: &Scene<'_>,
-        forms: &Forms,
-        onto: (&mut Pppr, &mut FormBars),
+        model: &ViewModel<'_>,
+        gaussians: &WorldGaussians,
+        onto: (&mut Pppr, &mut WorldGaussianBars),
         precision: Precision,
     ) {
-        pull_back(scene, forms, &self.moments, onto, precision);
+        pull_back(model, gaussians, &self.moments, onto, precision);
     }
 }
 
 /// Every cell by itself, as SPEC reads: the oracle, and the way out for masks softer than f32's range.
 fn plain<T: Real>(
-    scene: &Scene<'_>,
+    model: &ViewModel<'_>,
     splats: &Splats,
-    laid: &Laid,
+    cell_box: &CellBox,
     scale: Option<f64>,
     moments: &mut Moments,
 ) -> ViewLoss {
-    let mut kernel = Kernel::<T>::new(splats, &laid.bins, scene.config.summation);
-    let mut ln_s = vec![f64::NEG_INFINITY; laid.marked.len()];
+    let mut kernel = Kernel::<T>::new(splats, &cell_box.bins, model.config.summation);
+    let mut ln_s = vec![f64::NEG_INFINITY; cell_box.marked.len()];
     kernel.forward(&mut ln_s);
-    let mask = SoftMask::new(&ln_s, &laid.marked, scene.config.tau_pct, scene.config.softness);
+    let mask = SoftMask::new(&ln_s, &cell_box.marked, model.config.tau_pct, model.config.softness);
     if let Some(scale) = scale {
-        kernel.backward(&mask.weight(&ln_s, &laid.marked, scale), moments);
+        kernel.backward(&mask.weight(&ln_s, &cell_box.marked, scale), moments);
     }
     ViewLoss { loss: mask.loss(), iou: mask.iou }
 }

@@ -3,7 +3,7 @@
 use super::adam::Adam;
 use super::articulation::Articulation;
 use super::convergence::{LOOK_BACK, converged};
-use super::{Evaluation, FitError, Objective, Precision, Problem, StepReport};
+use super::{Evaluation, FitError, Objective, Precision, Problem, StepReport, StopReason};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use serde::{Deserialize, Serialize};
@@ -56,6 +56,24 @@ impl Fitter {
         let state = FitState { iteration: 0, params: initial, adam, losses };
         let (state, next, next_evaluation) = (Arc::new(state.clone()), Arc::new(state), evaluation.clone());
         Ok(Self { objective, body, state, evaluation, next, next_evaluation, turns: Vec::new() })
+    }
+
+    /// Steps until iteration `last`, or until the loss has converged where the settings stop there; `watch` sees every
+    /// iteration, the one that it stands at included.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn run_to(&mut self, last: usize, mut watch: impl FnMut(StepReport, &Pppr)) -> Result<StopReason, FitError> {
+        watch(self.report(), self.params());
+        while self.iteration() < last {
+            let report = self.step()?;
+            let converged = report.converged;
+            watch(report, self.params());
+            if converged && self.config().stop_when_converged {
+                return Ok(StopReason::Converged);
+            }
+        }
+        Ok(StopReason::Iterations)
     }
 
     /// One Adam step from the current parameters, then their evaluation.

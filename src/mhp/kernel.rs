@@ -52,7 +52,7 @@ pub(super) struct Kernel<'a, T> {
 
 fn split<T: Real>(x: f64) -> (f64, T) {
     let whole = x.floor();
-    (whole, T::of(x - whole))
+    (whole, T::from_f64(x - whole))
 }
 
 /// The cells of the outer axes in C order: two indices (those of missing axes, which come first, are 0).
@@ -94,7 +94,7 @@ impl<'a, T: Real> Kernel<'a, T> {
         for (outer, out) in outer_cells(self.bins).zip(ln_s.chunks_exact_mut(width)) {
             let row_top = self.row(outer);
             for (i, value) in out.iter_mut().enumerate() {
-                *value = row_top + self.reference[i].wide() + 0.5 * self.power(i).wide().ln();
+                *value = row_top + self.reference[i].into_f64() + 0.5 * self.power(i).into_f64().ln();
             }
         }
     }
@@ -110,7 +110,7 @@ impl<'a, T: Real> Kernel<'a, T> {
             self.row(outer);
             for (i, scaled) in scaled.iter_mut().enumerate() {
                 let power = self.power(i);
-                *scaled = if power > T::zero() { T::of(weight[i] / power.wide()) } else { T::zero() };
+                *scaled = if power > T::zero() { T::from_f64(weight[i] / power.into_f64()) } else { T::zero() };
             }
             for joint in 0..self.splats.len() {
                 self.collect(joint, outer, &scaled, moments);
@@ -138,7 +138,7 @@ impl<'a, T: Real> Kernel<'a, T> {
             for (amplitude, &reference) in amplitudes.iter_mut().zip(&self.reference) {
                 let below = reference - *amplitude;
                 // A NaN goes through: it must reach the loss.
-                *amplitude = if below > T::CUTOFF { T::zero() } else { (-below).exp() };
+                *amplitude = if below > T::CUTOFF_LN { T::zero() } else { (-below).exp() };
             }
             let inner = &self.inner[joint];
             match self.summation {
@@ -168,9 +168,9 @@ impl<'a, T: Real> Kernel<'a, T> {
         let row_top = tops.iter().map(|t| t.0).fold(f64::NEG_INFINITY, f64::max);
         self.on_row.clear();
         self.on_row.extend(tops.iter().map(|&(top, centre, phase)| OnRow {
-            top: T::of(top - row_top),
+            top: T::from_f64(top - row_top),
             centre: split(centre),
-            turn: (T::of(phase.cos()), T::of(phase.sin())),
+            turn: (T::from_f64(phase.cos()), T::from_f64(phase.sin())),
         }));
         row_top
     }
@@ -183,7 +183,7 @@ impl<'a, T: Real> Kernel<'a, T> {
             let (on_row, inner) = (&self.on_row[joint], &self.inner[joint]);
             let (start, fraction) = (lo as f64 - on_row.centre.0, on_row.centre.1);
             for (i, exponent) in exponents.iter_mut().enumerate() {
-                let x = T::of(start + i as f64) - fraction;
+                let x = T::from_f64(start + i as f64) - fraction;
                 *exponent = on_row.top - inner.half_precision * x * x;
             }
             for (exponent, &spectrum) in exponents.iter_mut().zip(&inner.spectrum) {
@@ -205,7 +205,7 @@ impl<'a, T: Real> Kernel<'a, T> {
         let [mut r0, mut r1, mut r2, mut q0, mut q1] = [T::zero(); 5];
         let by_bin = moments.by_bin(joint, LAST);
         for (i, &a) in self.amplitude[joint * width..(joint + 1) * width].iter().enumerate() {
-            let delta = T::of(start + i as f64) - inner.bin.1;
+            let delta = T::from_f64(start + i as f64) - inner.bin.1;
             let r = if coherent {
                 let (re, im) = (inner.turn.0[i], inner.turn.1[i]);
                 let (z_re, z_im) = (a * (c * re - s * im), a * (c * im + s * re));
@@ -221,10 +221,10 @@ impl<'a, T: Real> Kernel<'a, T> {
             r1 += r * delta;
             r2 += r * delta * delta;
             if let Some(sum) = by_bin.get_mut(lo + i) {
-                *sum += r.wide();
+                *sum += r.into_f64();
             }
         }
-        let row = [r0, r1, r2, q0, q1].map(T::wide);
+        let row = [r0, r1, r2, q0, q1].map(T::into_f64);
         let splat = &self.splats[joint];
         moments.add(joint, &row_sums(splat, outer, row));
         for k in 0..LAST {
@@ -266,10 +266,10 @@ impl<T: Real> Inner<T> {
     fn new(splat: &Splat<'_>, lo: usize, hi: usize) -> Self {
         let turns = (lo..hi).map(|i| splat.kappa[LAST] * (i as f64 - splat.bin[LAST]));
         Self {
-            half_precision: T::of(0.5 * splat.weight[LAST]),
+            half_precision: T::from_f64(0.5 * splat.weight[LAST]),
             bin: split(splat.bin[LAST]),
-            turn: turns.map(|psi| (T::of(psi.cos()), T::of(psi.sin()))).unzip(),
-            spectrum: splat.spectrum[LAST].get(lo..hi).unwrap_or(&[]).iter().map(|&x| T::of(x)).collect(),
+            turn: turns.map(|psi| (T::from_f64(psi.cos()), T::from_f64(psi.sin()))).unzip(),
+            spectrum: splat.spectrum[LAST].get(lo..hi).unwrap_or(&[]).iter().map(|&x| T::from_f64(x)).collect(),
         }
     }
 }

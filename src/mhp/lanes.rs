@@ -11,15 +11,16 @@ use pulp::Simd;
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
 /// 1.5 · 2²³ + 127: adding it rounds to a whole number and leaves that number, biased as an exponent, in the low bits.
-const ROUND: f32 = 12_583_039.0;
+const ROUND_TO_EXPONENT: f32 = 12_583_039.0;
 /// 2ᶠ on |f| ≤ ½, relative error 3e-6 (least squares at Chebyshev points).
-const EXP2: [f32; 5] = [0.999_999_2, 0.693_121_97, 0.240_249_81, 0.055_917_04, 0.009_560_51];
+const EXP2_SERIES: [f32; 5] = [0.999_999_2, 0.693_121_97, 0.240_249_81, 0.055_917_04, 0.009_560_51];
 
 /// 1.5 · 2²³: adding it rounds to a whole number.
-const WHOLE: f32 = 12_582_912.0;
+const ROUND_TO_INTEGER: f32 = 12_582_912.0;
 /// Series of cos πt and sin(πt)/t by t².
-const COS_PI: [f32; 7] = [1.0, -4.934_802, 4.058_712, -1.335_262_8, 0.235_330_63, -0.025_806_89, 0.001_929_6];
-const SIN_PI: [f32; 6] = [std::f32::consts::PI, -5.167_712_8, 2.550_164, -0.599_264_5, 0.082_145_89, -0.007_370_43];
+const COS_PI_SERIES: [f32; 7] = [1.0, -4.934_802, 4.058_712, -1.335_262_8, 0.235_330_63, -0.025_806_89, 0.001_929_6];
+const SIN_PI_SERIES: [f32; 6] =
+    [std::f32::consts::PI, -5.167_712_8, 2.550_164, -0.599_264_5, 0.082_145_89, -0.007_370_43];
 
 /// A register of f32.
 #[derive(Clone, Copy)]
@@ -40,16 +41,16 @@ impl<S: Simd> Lanes<S> {
         Self { simd, value }
     }
 
-    /// self · b + c
+    /// self · a + b
     #[inline(always)]
-    pub(super) fn mul_add(self, b: Self, c: Self) -> Self {
-        Self::new(self.simd, self.simd.mul_add_f32s(self.value, b.value, c.value))
+    pub(super) fn mul_add(self, a: Self, b: Self) -> Self {
+        Self::new(self.simd, self.simd.mul_add_f32s(self.value, a.value, b.value))
     }
 
-    /// self − a · b
+    /// b − self · a
     #[inline(always)]
-    pub(super) fn minus(self, a: Self, b: Self) -> Self {
-        Self::new(self.simd, self.simd.negate_mul_add_f32s(a.value, b.value, self.value))
+    pub(super) fn neg_mul_add(self, a: Self, b: Self) -> Self {
+        Self::new(self.simd, self.simd.negate_mul_add_f32s(self.value, a.value, b.value))
     }
 
     #[inline(always)]
@@ -75,7 +76,7 @@ impl<S: Simd> Lanes<S> {
 
     /// `yes` where self > b, else `no`.
     #[inline(always)]
-    pub(super) fn choose(self, b: Self, yes: Self, no: Self) -> Self {
+    pub(super) fn select_gt(self, b: Self, yes: Self, no: Self) -> Self {
         let mask = self.simd.less_than_f32s(b.value, self.value);
         Self::new(self.simd, self.simd.select_f32s(mask, yes.value, no.value))
     }
@@ -88,7 +89,7 @@ impl<S: Simd> Lanes<S> {
 
     /// A bit a lane that is positive, the first lane's the lowest.
     #[inline(always)]
-    pub(super) fn positive(self) -> u32 {
+    pub(super) fn positive_bits(self) -> u32 {
         let simd = self.simd;
         let mask = simd.less_than_f32s(simd.splat_f32s(0.0), self.value);
         let bytes = bytemuck::bytes_of(&mask);
@@ -103,25 +104,27 @@ impl<S: Simd> Lanes<S> {
         bits
     }
 
+    /// The largest lane.
     #[inline(always)]
-    pub(super) fn largest(self) -> f32 {
+    pub(super) fn reduce_max(self) -> f32 {
         self.simd.reduce_max_f32s(self.value)
     }
 
+    /// Σ of the lanes.
     #[inline(always)]
-    pub(super) fn sum(self) -> f32 {
+    pub(super) fn reduce_sum(self) -> f32 {
         self.simd.reduce_sum_f32s(self.value)
     }
 
     /// cos and sin of a number of turns, absolute error 3e-7 and what rounding leaves of whole turns.
     #[inline(always)]
-    pub(super) fn turn(self) -> [Self; 2] {
+    pub(super) fn cos_sin_turns(self) -> [Self; 2] {
         let of = |x: f32| splat(self.simd, x);
-        let t = self - ((self + of(WHOLE)) - of(WHOLE));
+        let t = self - ((self + of(ROUND_TO_INTEGER)) - of(ROUND_TO_INTEGER));
         let t2 = t * t;
         let polynomial = |of_t2: &[f32]| of_t2.iter().rev().fold(of(0.0), |sum, &c| sum.mul_add(t2, of(c)));
         // Of half the angle, −π/2 to π/2.
-        let (c, s) = (polynomial(&COS_PI), t * polynomial(&SIN_PI));
+        let (c, s) = (polynomial(&COS_PI_SERIES), t * polynomial(&SIN_PI_SERIES));
         let twice = s + s;
         [of(1.0) - twice * s, twice * c]
     }
@@ -130,11 +133,11 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub(super) fn exp2(self) -> Self {
         let simd = self.simd;
-        let rounded = self + splat(simd, ROUND);
-        let f = self - (rounded - splat(simd, ROUND));
-        let mut power = splat(simd, EXP2[4]);
+        let rounded = self + splat(simd, ROUND_TO_EXPONENT);
+        let f = self - (rounded - splat(simd, ROUND_TO_EXPONENT));
+        let mut power = splat(simd, EXP2_SERIES[4]);
         for k in (0..4).rev() {
-            power = power.mul_add(f, splat(simd, EXP2[k]));
+            power = power.mul_add(f, splat(simd, EXP2_SERIES[k]));
         }
         let bits = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(rounded.value), simd.splat_u32s(23));
         power * Self::new(simd, simd.transmute_f32s_u32s(bits))
@@ -198,5 +201,98 @@ impl<S: Simd> Div for Lanes<S> {
     #[inline(always)]
     fn div(self, b: Self) -> Self {
         Self::new(self.simd, self.simd.div_f32s(self.value, b.value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pulp::{Arch, WithSimd};
+
+    /// Sixteen numbers, of which every register holds a part.
+    type Sixteen = [f32; 16];
+
+    /// 2ˣ, log₂ x, cosine and sine of turns, |x|, 5 − 3x, and 2 where x > 1, else 3.
+    struct Functions<'a>(&'a [Sixteen]);
+
+    impl WithSimd for Functions<'_> {
+        type Output = Vec<[Sixteen; 7]>;
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+            let of = |x: f32| splat(simd, x);
+            let mut found = vec![[[0.0; 16]; 7]; self.0.len()];
+            for (x, found) in self.0.iter().zip(&mut found) {
+                for part in 0..16 / S::F32_LANES {
+                    let x = Lanes::new(simd, S::as_simd_f32s(x).0[part]);
+                    let [cos, sin] = x.cos_sin_turns();
+                    let chosen = x.select_gt(of(1.0), of(2.0), of(3.0));
+                    let all = [x.exp2(), x.log2(), cos, sin, x.abs(), x.neg_mul_add(of(3.0), of(5.0)), chosen];
+                    for (found, y) in found.iter_mut().zip(all) {
+                        S::as_mut_simd_f32s(found).0[part] = y.value;
+                    }
+                }
+            }
+            found
+        }
+    }
+
+    /// Each number with what is found of it.
+    fn functions(of: impl Iterator<Item = f32>) -> Vec<(f64, [f64; 7])> {
+        let of: Vec<f32> = of.collect();
+        let rows: Vec<Sixteen> = of.chunks_exact(16).map(|row| std::array::from_fn(|k| row[k])).collect();
+        let found = Arch::new().dispatch(Functions(&rows));
+        let pairs = rows.iter().zip(&found);
+        pairs.flat_map(|(x, y)| (0..16).map(|k| (f64::from(x[k]), y.map(|y| f64::from(y[k]))))).collect()
+    }
+
+    #[test]
+    fn powers_turns_and_choices_are_those_of_double_precision() {
+        for (x, [exp2, _, cos, sin, abs, plane, chosen]) in functions((-16 * 63..16 * 63).map(|k| 0.123 * k as f32)) {
+            assert!((exp2 / x.exp2() - 1.0).abs() < 4e-6, "2^{x}: {exp2}");
+            let (wanted_sin, wanted_cos) = (std::f64::consts::TAU * x).sin_cos();
+            assert!((cos - wanted_cos).abs() < 1e-6 && (sin - wanted_sin).abs() < 1e-6, "{x} turns: {cos}, {sin}");
+            assert!(abs == x.abs() && chosen == if x > 1.0 { 2.0 } else { 3.0 }, "{x}: {abs}, {chosen}");
+            assert!((plane - (5.0 - 3.0 * x)).abs() < 1e-6 * (5.0 + x.abs()), "5 - 3 {x}: {plane}");
+        }
+    }
+
+    #[test]
+    fn logarithms_are_those_of_double_precision() {
+        let largest = 2.0_f32.powi(126);
+        let of = (0..16 * 64).map(|k| (1.0 + 0.37 * k as f32) * 1.187_f32.powi(k % 400 - 200)).chain([largest; 16]);
+        for (x, [_, log2, ..]) in functions(of) {
+            let wanted = x.log2();
+            assert!((log2 - wanted).abs() < 3e-7 * wanted.abs().max(1.0), "log2 {x}: {log2}, not {wanted}");
+        }
+    }
+
+    /// A bit a lane, the largest lane and Σ of the lanes.
+    struct Reductions(Sixteen);
+
+    impl WithSimd for Reductions {
+        type Output = (u32, f32, f32, bool);
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+            let (mut bits, mut largest, mut sum, mut any) = (0, f32::MIN, 0.0, false);
+            for part in 0..16 / S::F32_LANES {
+                let x = Lanes::new(simd, S::as_simd_f32s(&self.0).0[part]);
+                bits |= x.positive_bits() << (part * S::F32_LANES);
+                (largest, sum) = (x.reduce_max().max(largest), sum + x.reduce_sum());
+                any |= x.any_positive();
+            }
+            (bits, largest, sum, any)
+        }
+    }
+
+    #[test]
+    fn lanes_are_marked_from_the_first_on() {
+        let mut x = [-1.0; 16];
+        assert_eq!(Arch::new().dispatch(Reductions(x)), (0, -1.0, -16.0, false));
+        (x[0], x[5], x[15]) = (2.0, 0.5, 7.0);
+        assert_eq!(Arch::new().dispatch(Reductions(x)), (1 | 1 << 5 | 1 << 15, 7.0, -3.5, true));
+        x[5] = 0.0;
+        assert_eq!(Arch::new().dispatch(Reductions(x)).0, 1 | 1 << 15, "nothing is not positive");
     }
 }

@@ -9,8 +9,8 @@
 //!
 //! 1. the terms of the loss, `terms/mod.rs`; numbers: `types.rs`, `percentile.rs`, `fill.rs`, `scalar.rs`, `lanes.rs`,
 //!    `batch.rs`, `floors.rs`
-//! 2. a joint in a view: `seen.rs`, `form.rs`, `splat.rs`, `adjoint.rs`
-//! 3. cells: `kernel.rs`, `tiles/mod.rs`, `laid.rs`, and the masks over them, `em.rs`
+//! 2. a joint in a view: `triad.rs`, `gaussian.rs`, `splat.rs`, `adjoint.rs`
+//! 3. cells: `kernel.rs`, `tiles/mod.rs`, `cell_box.rs`, and the masks over them, `em.rs`
 //! 4. what the maps of a frame and those around it show: `region.rs`, `template.rs`, `context/mod.rs`
 //! 5. a frame: `problem.rs`, `simulate.rs`
 //! 6. the objective: `objective.rs`
@@ -26,28 +26,28 @@ mod adam;
 mod adjoint;
 mod articulation;
 mod batch;
+mod cell_box;
 mod context;
 mod convergence;
 mod em;
 mod fill;
 mod fitter;
 mod floors;
-mod form;
+mod gaussian;
 mod init;
 mod kernel;
-mod laid;
 mod lanes;
 mod objective;
 mod percentile;
 mod problem;
 mod region;
 mod scalar;
-mod seen;
 mod simulate;
 mod splat;
 mod template;
 mod terms;
 mod tiles;
+mod triad;
 mod types;
 
 pub use adam::Adam;

@@ -1,12 +1,12 @@
 //! L(Θ) and ∂L/∂Θ; SPEC section 4.
 
-use super::em::{Aim, Workspace};
+use super::cell_box::CellBox;
+use super::em::{EmTarget, Workspace};
 use super::floors::hard_iou;
-use super::form::{FormBars, Forms};
-use super::laid::Laid;
+use super::gaussian::{WorldGaussianBars, WorldGaussians};
 use super::percentile::percentile;
 use super::region::{self, Region};
-use super::splat::Scene;
+use super::splat::ViewModel;
 use super::terms::{self, Inputs};
 use super::{Evaluation, FitError, Precision, Problem, TERMS, TermId, Weight};
 use crate::body::Pppr;
@@ -23,11 +23,11 @@ pub struct Objective {
     centres: Vec<Vec3>,
     regions: Vec<Region>,
     /// Each view's region with B_ori over its cells.
-    aims: Vec<Aim>,
+    targets: Vec<EmTarget>,
     workspaces: Vec<Workspace>,
-    /// Scratch a joint: its form, and the form's adjoint.
-    forms: Forms,
-    bars: FormBars,
+    /// Scratch a joint: its Gaussian, and that one's adjoint.
+    gaussians: WorldGaussians,
+    bars: WorldGaussianBars,
     initial: Pppr,
     /// Where the frames around say that each person's middle is, m; empty where they say nothing.
     anchors: Vec<Vec3>,
@@ -66,7 +66,7 @@ impl Objective {
         problem.check(initial)?;
         let centres = region::centres(initial);
         let (regions, warnings) = region::regions(&problem.views, config.em_region, &centres)?;
-        let aims = aims(&problem, &regions, config.tau_pct, precision);
+        let targets = targets(&problem, &regions, config.tau_pct, precision);
         let workspaces = regions.iter().map(|_| Workspace::default()).collect();
         let mut objective = Self {
             problem,
@@ -74,10 +74,10 @@ impl Objective {
             precision,
             centres,
             regions,
-            aims,
+            targets,
             workspaces,
-            forms: Forms::default(),
-            bars: FormBars::default(),
+            gaussians: WorldGaussians::default(),
+            bars: WorldGaussianBars::default(),
             initial: initial.clone(),
             anchors: Vec::new(),
             warnings,
@@ -102,7 +102,7 @@ impl Objective {
             (self.regions, self.warnings) = (regions, warnings);
         }
         if config.em_region != before.em_region || config.tau_pct != before.tau_pct {
-            self.aims = aims(&self.problem, &self.regions, config.tau_pct, self.precision);
+            self.targets = targets(&self.problem, &self.regions, config.tau_pct, self.precision);
         }
         self.anchor();
     }
@@ -167,25 +167,25 @@ impl Objective {
         iou.clear();
         let views = self.problem.views.len() as f64;
         let mut em = 0.0;
-        let Self { problem, config, precision, aims, workspaces, forms, bars, anchors, .. } = self;
+        let Self { problem, config, precision, targets, workspaces, gaussians, bars, anchors, .. } = self;
         let config = &*config;
-        forms.fill(params, *precision);
-        bars.reset(forms.joints());
+        gaussians.fill(params, *precision);
+        bars.reset(gaussians.joints());
         // Stage by stage rather than view by view: each stage's instructions then stay at hand.
-        let scenes: SmallVec<[Scene<'_>; 4]> =
-            aims.iter().map(|aim| Scene::new(&problem.radar, &aim.laid.view, config)).collect();
-        for (scene, workspace) in scenes.iter().zip(&mut *workspaces) {
-            workspace.project(scene, (params, &*forms), *precision);
+        let models: SmallVec<[ViewModel<'_>; 4]> =
+            targets.iter().map(|target| ViewModel::new(&problem.radar, &target.cell_box.view, config)).collect();
+        for (model, workspace) in models.iter().zip(&mut *workspaces) {
+            workspace.project(model, (params, &*gaussians), *precision);
         }
-        for ((scene, aim), workspace) in scenes.iter().zip(&*aims).zip(&mut *workspaces) {
-            let answer = workspace.compare(scene, aim, Some(1.0 / views), *precision);
+        for ((model, target), workspace) in models.iter().zip(&*targets).zip(&mut *workspaces) {
+            let answer = workspace.compare(model, target, Some(1.0 / views), *precision);
             em += answer.loss / views;
             iou.push(answer.iou);
         }
-        for (scene, workspace) in scenes.iter().zip(&*workspaces) {
-            workspace.pull_back(scene, forms, (&mut *em_gradient, &mut *bars), *precision);
+        for (model, workspace) in models.iter().zip(&*workspaces) {
+            workspace.pull_back(model, gaussians, (&mut *em_gradient, &mut *bars), *precision);
         }
-        forms.pull_back(bars, em_gradient, *precision);
+        gaussians.pull_back(bars, em_gradient, *precision);
         let inputs = Inputs { skeleton: &problem.skeleton, config, params, anchors };
         *terms = terms::evaluate(&inputs, em, gains, gradients);
         *loss = terms.loss(config);
@@ -194,25 +194,25 @@ impl Objective {
 
     /// L_EM alone, without its gradient.
     pub fn em_loss(&self, params: &Pppr) -> f64 {
-        let (mut workspace, mut forms) = (Workspace::default(), Forms::default());
-        forms.fill(params, self.precision);
-        let losses = self.aims.iter().map(|aim| {
-            let scene = Scene::new(&self.problem.radar, &aim.laid.view, &self.config);
-            workspace.project(&scene, (params, &forms), self.precision);
-            workspace.compare(&scene, aim, None, self.precision).loss
+        let (mut workspace, mut gaussians) = (Workspace::default(), WorldGaussians::default());
+        gaussians.fill(params, self.precision);
+        let losses = self.targets.iter().map(|target| {
+            let model = ViewModel::new(&self.problem.radar, &target.cell_box.view, &self.config);
+            workspace.project(&model, (params, &gaussians), self.precision);
+            workspace.compare(&model, target, None, self.precision).loss
         });
         losses.sum::<f64>() / self.problem.views.len() as f64
     }
 }
 
 /// B_ori over each region's cells.
-fn aims(problem: &Problem, regions: &[Region], tau_pct: f64, precision: Precision) -> Vec<Aim> {
+fn targets(problem: &Problem, regions: &[Region], tau_pct: f64, precision: Precision) -> Vec<EmTarget> {
     let of_view = |(view, region): (usize, &Region)| {
         let map = problem.map(view);
         let cells: Vec<f64> = region.indices(&problem.views[view].shape()).iter().map(|&i| map[i]).collect();
         let threshold = percentile(&cells, 100.0 - tau_pct);
         let target: Vec<bool> = cells.iter().map(|&h| h > threshold).collect();
-        Aim { laid: Laid::new(&problem.views[view], &region.bins, &target, precision), target }
+        EmTarget { cell_box: CellBox::new(&problem.views[view], &region.bins, &target, precision), ori: target }
     };
     regions.iter().enumerate().map(of_view).collect()
 }
@@ -230,7 +230,7 @@ pub fn masks(objective: &Objective, view: usize, sim_map: &[f64]) -> Masks {
     let simulated: Vec<f64> = indices.iter().filter_map(|&i| sim_map.get(i).copied()).collect();
     let threshold = percentile(&simulated, 100.0 - objective.config.tau_pct);
     let mut masks = Masks { ori: vec![false; cells], sim: vec![false; cells], inside: vec![false; cells] };
-    for (&cell, &ori) in indices.iter().zip(&objective.aims[view].target) {
+    for (&cell, &ori) in indices.iter().zip(&objective.targets[view].ori) {
         masks.inside[cell] = true;
         masks.ori[cell] = ori;
         masks.sim[cell] = sim_map.get(cell).is_some_and(|&h| h > threshold);

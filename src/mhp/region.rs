@@ -1,7 +1,7 @@
 //! The EM region: the box of cells over which the masks are compared; SPEC section 4.
 
 use super::FitError;
-use super::seen::Seen;
+use super::triad::SphericalTriad;
 use crate::body::Pppr;
 use crate::config::EmRegion;
 use crate::geometry::Vec3;
@@ -79,14 +79,15 @@ pub(super) fn regions(
 }
 
 fn around(view: &View, half_width_m: f64, centres: &[Vec3], warnings: &mut Vec<String>) -> Region {
-    let seen: Vec<Seen> = centres.iter().map(|&c| Seen::new(view.pose.view_from_world(c))).collect();
+    let triads: Vec<SphericalTriad> =
+        centres.iter().map(|&c| SphericalTriad::new(view.pose.view_from_world(c))).collect();
     let bins = view.axes.iter().map(|axis| {
         if axis.kind == AxisKind::Doppler {
             return [0, axis.bins];
         }
         let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
-        for seen in &seen {
-            let [from, to] = span(axis, seen, half_width_m);
+        for triad in &triads {
+            let [from, to] = span(axis, triad, half_width_m);
             (lo, hi) = (lo.min(from), hi.max(to));
         }
         bins_between(axis, lo, hi).unwrap_or_else(|| {
@@ -102,13 +103,13 @@ fn around(view: &View, half_width_m: f64, centres: &[Vec3], warnings: &mut Vec<S
 }
 
 /// The interval of an axis, in axis units, around one person.
-fn span(axis: &Axis, seen: &Seen, half_width_m: f64) -> [f64; 2] {
+fn span(axis: &Axis, triad: &SphericalTriad, half_width_m: f64) -> [f64; 2] {
     let linear = Axis { spacing: Spacing::Linear, ..axis.clone() };
-    let middle = seen.coordinate(&linear, 0.0);
+    let middle = triad.coordinate(&linear, 0.0);
     if !axis.kind.is_angular() {
         return [middle - half_width_m, middle + half_width_m];
     }
-    let half = (half_width_m / seen.d.value).atan();
+    let half = (half_width_m / triad.d.value).atan();
     let bounds = [middle - half, middle + half].map(|angle| angle.clamp(-FRAC_PI_2, FRAC_PI_2));
     if axis.spacing == Spacing::Sine { bounds.map(f64::sin) } else { bounds }
 }

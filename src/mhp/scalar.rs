@@ -6,39 +6,39 @@ use std::ops::AddAssign;
 /// f64, the oracle, or f32, the fast one.
 pub(super) trait Real: Float + AddAssign + Send + Sync + 'static {
     /// A return this much weaker (in ln) than the strongest at its cell is dropped; SPEC section 3, Numerics.
-    const CUTOFF: Self;
+    const CUTOFF_LN: Self;
 
     /// Rounds to this precision.
-    fn of(x: f64) -> Self;
+    fn from_f64(x: f64) -> Self;
 
     /// Widens.
-    fn wide(self) -> f64;
+    fn into_f64(self) -> f64;
 }
 
 impl Real for f64 {
-    const CUTOFF: Self = 50.0;
+    const CUTOFF_LN: Self = 50.0;
 
     #[inline]
-    fn of(x: f64) -> Self {
+    fn from_f64(x: f64) -> Self {
         x
     }
 
     #[inline]
-    fn wide(self) -> f64 {
+    fn into_f64(self) -> f64 {
         self
     }
 }
 
 impl Real for f32 {
-    const CUTOFF: Self = 32.0;
+    const CUTOFF_LN: Self = 32.0;
 
     #[inline]
-    fn of(x: f64) -> Self {
+    fn from_f64(x: f64) -> Self {
         x as Self
     }
 
     #[inline]
-    fn wide(self) -> f64 {
+    fn into_f64(self) -> f64 {
         f64::from(self)
     }
 }

@@ -1,12 +1,12 @@
 //! H_sim over whole maps; SPEC section 3.
 
+use super::cell_box::CellBox;
 use super::floors::floored;
-use super::form::Forms;
+use super::gaussian::WorldGaussians;
 use super::kernel::Kernel;
-use super::laid::Laid;
 use super::region::Region;
 use super::scalar::Real;
-use super::splat::{Scene, Splats};
+use super::splat::{Splats, ViewModel};
 use super::tiles::Tiles;
 use super::{Precision, Problem};
 use crate::body::Pppr;
@@ -15,28 +15,28 @@ use crate::radar::View;
 
 /// H_sim of every view over its whole map, C order, f64; SPEC section 3.
 pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, params: &Pppr) -> Vec<Vec<f64>> {
-    let mut forms = Forms::default();
-    forms.fill(params, precision);
+    let mut gaussians = WorldGaussians::default();
+    gaussians.fill(params, precision);
     let mut splats = Splats::default();
     let of_view = |view: &View| {
         let region = Region::whole(view);
-        let laid = Laid::new(view, &region.bins, &vec![false; region.cells()], precision);
-        Scene::new(&problem.radar, &laid.view, config).splats((params, &forms), precision, &mut splats);
+        let cell_box = CellBox::new(view, &region.bins, &vec![false; region.cells()], precision);
+        ViewModel::new(&problem.radar, &cell_box.view, config).splats((params, &gaussians), precision, &mut splats);
         let map = match precision {
-            Precision::F64 => map::<f64>(&splats, &laid, config.summation),
+            Precision::F64 => map::<f64>(&splats, &cell_box, config.summation),
             Precision::F32 => {
-                let tiled = Tiles::default().map(&splats, &laid.tiling, config.summation);
-                tiled.unwrap_or_else(|| map::<f32>(&splats, &laid, config.summation))
+                let tiled = Tiles::default().map(&splats, &cell_box.grid, config.summation);
+                tiled.unwrap_or_else(|| map::<f32>(&splats, &cell_box, config.summation))
             }
         };
-        laid.in_order_of_view(map)
+        cell_box.in_order_of_view(map)
     };
     problem.views.iter().map(of_view).collect()
 }
 
-fn map<T: Real>(splats: &Splats, laid: &Laid, summation: Summation) -> Vec<f64> {
-    let mut map = vec![f64::NEG_INFINITY; laid.marked.len()];
-    Kernel::<T>::new(splats, &laid.bins, summation).forward(&mut map);
+fn map<T: Real>(splats: &Splats, cell_box: &CellBox, summation: Summation) -> Vec<f64> {
+    let mut map = vec![f64::NEG_INFINITY; cell_box.marked.len()];
+    Kernel::<T>::new(splats, &cell_box.bins, summation).forward(&mut map);
     for value in &mut map {
         *value = floored(*value);
     }

@@ -1,6 +1,6 @@
 //! One joint seen by one view: its Gaussian in bin coordinates, its weight, its phases. All in f64; SPEC section 3.
 //!
-//! What is kept is what the per-cell kernel needs ([`Splats`]); what the derivative needs besides ([`Look`], [`Row`],
+//! What is kept is what the per-cell kernel needs ([`Splats`]); what the derivative needs besides ([`JointInView`], [`AxisJacobian`],
 //! [`Widths`]) it computes once more, and `adjoint.rs` reads like this file from bottom to top.
 #![expect(
     clippy::inline_always,
@@ -8,12 +8,12 @@
 )]
 
 use super::Precision;
-use super::batch::{Batch, Columns, One, Task, each_joint};
-use super::form::{Form, Forms, mean};
-use super::seen::{DISTANCE_FLOOR_M, Floored, Seen, uniform};
+use super::batch::{Batch, Columns, JointTask, OneJoint, each_joint};
+use super::gaussian::{WorldGaussian, WorldGaussians, mean};
+use super::triad::{DISTANCE_FLOOR_M, Floored, SphericalTriad, splat_matrix};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::{Number, Vec3, dot, mat_t_vec, mat_vec, norm, scale};
+use crate::geometry::{Numeric, Vec3, dot, mat_t_vec, mat_vec, norm, scale};
 use crate::radar::{AxisKind, RadarConfig, SPEED_OF_LIGHT, View};
 use std::f64::consts::TAU;
 
@@ -22,9 +22,9 @@ const PER_METRE_S: f64 = 2.0 / SPEED_OF_LIGHT;
 /// ln 2π
 const LN_TAU: f64 = 1.837_877_066_409_345_3;
 
-/// One axis at one joint.
+/// One axis at one joint: ∂b/∂p and what it is made of.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Row<T> {
+pub(super) struct AxisJacobian<T> {
     pub slope: T,
     pub arm: T,
     /// slope/arm and arm/slope.
@@ -47,9 +47,9 @@ pub(super) struct Squares<T, const D: usize> {
     pub skew: [T; 3],
 }
 
-/// A joint as a view of `D` axes sees it: its splat, but for spectra.
+/// A joint's Gaussian as a view of `D` axes sees it: its splat, but for spectra.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Image<T, const D: usize> {
+pub(super) struct ProjectedGaussian<T, const D: usize> {
     /// Bin coordinates b.
     pub bin: [T; D],
     pub squares: Squares<T, D>,
@@ -61,7 +61,7 @@ pub(super) struct Image<T, const D: usize> {
     pub kappa: [T; D],
 }
 
-/// Numbers of an [`Image`] of three axes.
+/// Numbers of a [`ProjectedGaussian`] of three axes.
 const NUMBERS: usize = 14;
 
 /// What the per-cell kernel needs of all joints in one view.
@@ -95,7 +95,7 @@ impl Splats {
 
     #[inline(always)]
     pub(super) fn of(&self, joint: usize) -> Splat<'_> {
-        let [b0, b1, b2, w0, w1, w2, s0, s1, s2, ln_weight, phase, k0, k1, k2] = One(joint).load(&self.numbers);
+        let [b0, b1, b2, w0, w1, w2, s0, s1, s2, ln_weight, phase, k0, k1, k2] = OneJoint(joint).load(&self.numbers);
         let mut spectrum = [&[] as &[f64]; 3];
         for (of, all) in spectrum.iter_mut().zip(&self.spectra) {
             let bins = all.len() / self.joints;
@@ -105,6 +105,17 @@ impl Splats {
         Splat { bin, weight, skew, ln_weight, phase, kappa, spectrum }
     }
 
+    /// Of these numbers a joint, in the order of [`Self::of`]; no axis has a spectrum.
+    #[cfg(test)]
+    pub(super) fn from_numbers(joints: &[[f64; NUMBERS]]) -> Self {
+        let mut splats = Self { joints: joints.len(), ..Self::default() };
+        splats.numbers.hold(joints.len());
+        for (joint, numbers) in joints.iter().enumerate() {
+            OneJoint(joint).store(*numbers, &mut splats.numbers);
+        }
+        splats
+    }
+
     pub(super) fn iter(&self) -> impl Iterator<Item = Splat<'_>> {
         (0..self.joints).map(|joint| self.of(joint))
     }
@@ -112,10 +123,10 @@ impl Splats {
 
 /// Where a view sees a joint.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Look<T> {
+pub(super) struct JointInView<T> {
     /// The joint before the surface offset, view frame.
     pub unmoved: Vec3<T>,
-    pub seen: Seen<T>,
+    pub triad: SphericalTriad<T>,
     /// v in the view frame, m/s.
     pub velocity: Vec3<T>,
     /// The point spread along u, e_az and e_el, m.
@@ -130,11 +141,11 @@ pub(super) struct Widths<T> {
     /// That along the columns of R S, bins.
     pub own: Vec3<T>,
     /// ∂b/∂p along u, e_az and e_el, bins a metre; zero where the point spread is.
-    pub seen: [T; 3],
+    pub along_triad: [T; 3],
 }
 
-/// A view, a radar and a configuration, and what is the same for all joints.
-pub(super) struct Scene<'a> {
+/// The forward model of one view: view, radar and configuration, and what is the same for all joints.
+pub(super) struct ViewModel<'a> {
     pub view: &'a View,
     pub config: &'a FitConfig,
     /// A bin of each axis in axis units, and bins a unit.
@@ -174,7 +185,7 @@ fn own_width(config: &FitConfig, view: &View, kind: AxisKind) -> f64 {
     }
 }
 
-impl<'a> Scene<'a> {
+impl<'a> ViewModel<'a> {
     pub(super) fn new(radar: &'a RadarConfig, view: &'a View, config: &'a FitConfig) -> Self {
         let (mut step, mut by_step, mut own_variance) = ([1.0; 3], [1.0; 3], [0.0; 3]);
         for (k, axis) in view.axes.iter().take(3).enumerate() {
@@ -197,7 +208,7 @@ impl<'a> Scene<'a> {
     }
 }
 
-impl Scene<'_> {
+impl ViewModel<'_> {
     /// Number of axes, 1 to 3.
     pub(super) fn dims(&self) -> usize {
         self.view.axes.len().min(3)
@@ -210,21 +221,26 @@ impl Scene<'_> {
 
     /// The factor of p that moves a joint to its skin: max(d − δ, floor)/d.
     #[inline(always)]
-    pub(super) fn surface_factor<T: Number>(&self, unmoved: Vec3<T>) -> (T, Floored<T>, Floored<T>) {
+    pub(super) fn surface_factor<T: Numeric>(&self, unmoved: Vec3<T>) -> (T, Floored<T>, Floored<T>) {
         let d = Floored::new(norm(unmoved), DISTANCE_FLOOR_M);
         let skin = Floored::new(d.value - self.config.surface_offset_m, DISTANCE_FLOOR_M);
         (skin.value / d.value, d, skin)
     }
 
-    /// Projects every joint of `params`, which has these forms, into this view: overwrites `splats`.
-    pub(super) fn splats(&self, (params, forms): (&Pppr, &Forms), precision: Precision, splats: &mut Splats) {
-        let (joints, axes) = (forms.joints(), &self.view.axes);
+    /// Projects every joint of `params`, which has these Gaussians, into this view: overwrites `splats`.
+    pub(super) fn splats(
+        &self,
+        (params, gaussians): (&Pppr, &WorldGaussians),
+        precision: Precision,
+        splats: &mut Splats,
+    ) {
+        let (joints, axes) = (gaussians.joints(), &self.view.axes);
         splats.joints = joints;
         splats.numbers.hold(joints);
         match self.dims() {
-            1 => each_joint(precision, joints, &mut Project::<1> { scene: self, forms, splats }),
-            2 => each_joint(precision, joints, &mut Project::<2> { scene: self, forms, splats }),
-            _ => each_joint(precision, joints, &mut Project::<3> { scene: self, forms, splats }),
+            1 => each_joint(precision, joints, &mut Project::<1> { model: self, gaussians, splats }),
+            2 => each_joint(precision, joints, &mut Project::<2> { model: self, gaussians, splats }),
+            _ => each_joint(precision, joints, &mut Project::<3> { model: self, gaussians, splats }),
         }
         for spectra in &mut splats.spectra {
             spectra.clear();
@@ -238,54 +254,54 @@ impl Scene<'_> {
         }
     }
 
-    /// Where the view sees joints of this form.
+    /// Where the view sees joints with this Gaussian.
     #[inline(always)]
-    pub(super) fn look<T: Number>(&self, form: &Form<T>) -> Look<T> {
+    pub(super) fn joint_in_view<T: Numeric>(&self, gaussian: &WorldGaussian<T>) -> JointInView<T> {
         let pose = &self.view.pose;
-        let turn = uniform(form.opacity, pose.rotation);
-        let [x, y, z] = mat_vec(&turn, form.position);
+        let turn = splat_matrix(gaussian.opacity, pose.rotation);
+        let [x, y, z] = mat_vec(&turn, gaussian.position);
         let unmoved = [x + pose.translation[0], y + pose.translation[1], z + pose.translation[2]];
         let moved = self.config.surface_offset_m != 0.0;
-        let seen = Seen::new(if moved { scale(unmoved, self.surface_factor(unmoved).0) } else { unmoved });
+        let triad = SphericalTriad::new(if moved { scale(unmoved, self.surface_factor(unmoved).0) } else { unmoved });
         let psf = &self.view.psf;
-        let mut blur = [x.like(psf.range_m), x.like(0.0), x.like(0.0)];
+        let mut blur = [x.splat(psf.range_m), x.splat(0.0), x.splat(0.0)];
         if self.blurs[1] {
-            blur[1] = seen.rho.value * psf.azimuth_rad / seen.cos_az_floored.value;
+            blur[1] = triad.rho.value * psf.azimuth_rad / triad.cos_az_floored.value;
         }
         if self.blurs[2] {
-            blur[2] = seen.d.value * psf.elevation_rad / seen.cos_el_floored.value;
+            blur[2] = triad.d.value * psf.elevation_rad / triad.cos_el_floored.value;
         }
-        Look { unmoved, seen, velocity: mat_vec(&turn, form.velocity), blur }
+        JointInView { unmoved, triad, velocity: mat_vec(&turn, gaussian.velocity), blur }
     }
 
     /// The view's axes there.
     #[inline(always)]
-    pub(super) fn rows<T: Number, const D: usize>(&self, seen: &Seen<T>) -> [Row<T>; D] {
-        let mut rows = [self.row(seen, 0); D];
+    pub(super) fn jacobians<T: Numeric, const D: usize>(&self, triad: &SphericalTriad<T>) -> [AxisJacobian<T>; D] {
+        let mut jacobians = [self.jacobian(triad, 0); D];
         for k in 1..D {
-            rows[k] = self.row(seen, k);
+            jacobians[k] = self.jacobian(triad, k);
         }
-        rows
+        jacobians
     }
 
-    /// How wide joints of this form are along them.
+    /// How wide joints with this Gaussian are along them.
     #[inline(always)]
-    pub(super) fn widths<T: Number, const D: usize>(
+    pub(super) fn widths<T: Numeric, const D: usize>(
         &self,
-        form: &Form<T>,
-        look: &Look<T>,
-        rows: &[Row<T>; D],
+        gaussian: &WorldGaussian<T>,
+        in_view: &JointInView<T>,
+        jacobians: &[AxisJacobian<T>; D],
     ) -> [Widths<T>; D] {
-        let (zero, seen) = (form.opacity.like(0.0), &look.seen);
-        let turn = uniform(zero, self.view.pose.rotation);
-        let mut widths = [Widths { gradient: [zero; 3], own: [zero; 3], seen: [zero; 3] }; D];
+        let (zero, triad) = (gaussian.opacity.splat(0.0), &in_view.triad);
+        let turn = splat_matrix(zero, self.view.pose.rotation);
+        let mut widths = [Widths { gradient: [zero; 3], own: [zero; 3], along_triad: [zero; 3] }; D];
         for k in 0..D {
-            let gradient = mat_t_vec(&turn, rows[k].gradient);
-            widths[k].own = mat_t_vec(&form.spread, gradient);
+            let gradient = mat_t_vec(&turn, jacobians[k].gradient);
+            widths[k].own = mat_t_vec(&gaussian.spread, gradient);
             widths[k].gradient = gradient;
-            for (i, direction) in [seen.u, seen.e_az, seen.e_el].into_iter().enumerate() {
+            for (i, direction) in [triad.u, triad.e_az, triad.e_el].into_iter().enumerate() {
                 if self.blurs[i] {
-                    widths[k].seen[i] = dot(rows[k].gradient, direction);
+                    widths[k].along_triad[i] = dot(jacobians[k].gradient, direction);
                 }
             }
         }
@@ -294,20 +310,20 @@ impl Scene<'_> {
 
     /// C of those widths, in its squares, and its determinant.
     #[inline(always)]
-    pub(super) fn squares<T: Number, const D: usize>(
+    pub(super) fn squares<T: Numeric, const D: usize>(
         &self,
-        look: &Look<T>,
+        in_view: &JointInView<T>,
         widths: &[Widths<T>; D],
     ) -> (Squares<T, D>, T) {
-        let zero = look.seen.h.like(0.0);
+        let zero = in_view.triad.h.splat(0.0);
         let mut covariance = [[zero; D]; D];
         for k in 0..D {
             for l in 0..=k {
                 covariance[k][l] = dot(widths[k].own, widths[l].own);
                 for i in 0..3 {
                     if self.blurs[i] {
-                        let reach = look.blur[i] * look.blur[i] * widths[k].seen[i];
-                        covariance[k][l] = covariance[k][l].plus(reach, widths[l].seen[i]);
+                        let reach = in_view.blur[i] * in_view.blur[i] * widths[k].along_triad[i];
+                        covariance[k][l] = reach.mul_add(widths[l].along_triad[i], covariance[k][l]);
                     }
                 }
             }
@@ -318,95 +334,95 @@ impl Scene<'_> {
 
     /// What the view makes of it.
     #[inline(always)]
-    pub(super) fn image<T: Number, const D: usize>(
+    pub(super) fn projected<T: Numeric, const D: usize>(
         &self,
-        form: &Form<T>,
-        look: &Look<T>,
-        rows: &[Row<T>; D],
-    ) -> Image<T, D> {
-        let Look { seen, velocity, .. } = look;
-        let zero = seen.h.like(0.0);
-        let radial = dot(*velocity, seen.u);
+        gaussian: &WorldGaussian<T>,
+        in_view: &JointInView<T>,
+        jacobians: &[AxisJacobian<T>; D],
+    ) -> ProjectedGaussian<T, D> {
+        let JointInView { triad, velocity, .. } = in_view;
+        let zero = triad.h.splat(0.0);
+        let radial = dot(*velocity, triad.u);
         let mut bin = [zero; D];
         for k in 0..D {
             let axis = &self.view.axes[k];
-            let coordinate = if self.sees(axis.kind) { seen.coordinate(axis, radial) } else { zero };
+            let coordinate = if self.sees(axis.kind) { triad.coordinate(axis, radial) } else { zero };
             bin[k] = (coordinate - axis.lo) * self.by_step[k];
         }
-        let (squares, mut inverse_weight_sq) = self.squares(look, &self.widths(form, look, rows));
+        let (squares, mut inverse_weight_sq) = self.squares(in_view, &self.widths(gaussian, in_view, jacobians));
         if self.config.operators.attenuation {
-            let d_sq = seen.d.value * seen.d.value;
+            let d_sq = triad.d.value * triad.d.value;
             inverse_weight_sq = inverse_weight_sq * (d_sq * d_sq) * (d_sq * d_sq);
         }
-        let ln_weight = form.ln_opacity - inverse_weight_sq.ln() * 0.5 + self.ln_share;
-        let phase = self.phase(seen, radial);
-        let phase = phase - (phase * (1.0 / TAU)).whole() * TAU;
-        Image { bin, squares, ln_weight, phase, kappa: self.kappa(form, look, rows) }
+        let ln_weight = gaussian.ln_opacity - inverse_weight_sq.ln() * 0.5 + self.ln_share;
+        let phase = self.phase(triad, radial);
+        let phase = phase - (phase * (1.0 / TAU)).floor() * TAU;
+        ProjectedGaussian { bin, squares, ln_weight, phase, kappa: self.kappa(gaussian, in_view, jacobians) }
     }
 
     /// κ = ω̄ v·D, rad per bin; 0 where Doppler is off.
     #[inline(always)]
-    pub(super) fn kappa<T: Number, const D: usize>(
+    pub(super) fn kappa<T: Numeric, const D: usize>(
         &self,
-        form: &Form<T>,
-        look: &Look<T>,
-        rows: &[Row<T>; D],
+        gaussian: &WorldGaussian<T>,
+        in_view: &JointInView<T>,
+        jacobians: &[AxisJacobian<T>; D],
     ) -> [T; D] {
-        let mut kappa = [form.omega_mean.like(0.0); D];
+        let mut kappa = [gaussian.omega_mean.splat(0.0); D];
         if self.config.operators.doppler {
             for k in 0..D {
-                kappa[k] = form.omega_mean * dot(look.velocity, rows[k].displacement);
+                kappa[k] = gaussian.omega_mean * dot(in_view.velocity, jacobians[k].displacement);
             }
         }
         kappa
     }
 
     #[inline(always)]
-    fn row<T: Number>(&self, seen: &Seen<T>, k: usize) -> Row<T> {
+    fn jacobian<T: Numeric>(&self, triad: &SphericalTriad<T>, k: usize) -> AxisJacobian<T> {
         let axis = &self.view.axes[k];
-        let (direction, arm) = seen.direction_and_arm(axis.kind);
-        let slope = seen.slope(axis);
-        let (zero, one) = (arm.like(0.0), arm.like(1.0));
+        let (direction, arm) = triad.direction_and_arm(axis.kind);
+        let slope = triad.slope(axis);
+        let (zero, one) = (arm.splat(0.0), arm.splat(1.0));
         let (ratio, by_ratio) = if axis.kind.is_angular() { (slope / arm, arm / slope) } else { (one, one) };
         let gradient = if self.sees(axis.kind) { scale(direction, ratio * self.by_step[k]) } else { [zero; 3] };
         let displacement = scale(direction, by_ratio * self.step[k]);
-        Row { slope, arm, ratio, by_ratio, direction, gradient, displacement }
+        AxisJacobian { slope, arm, ratio, by_ratio, direction, gradient, displacement }
     }
 
     #[inline(always)]
-    fn phase<T: Number>(&self, seen: &Seen<T>, radial_mps: T) -> T {
+    fn phase<T: Numeric>(&self, triad: &SphericalTriad<T>, radial_mps: T) -> T {
         let [by_tau_sq, by_radial, by_az, by_el] = self.phase;
-        let tau = seen.d.value * PER_METRE_S;
-        tau * by_tau_sq * tau + radial_mps * by_radial + seen.sin_az * by_az + seen.sin_el * by_el
+        let tau = triad.d.value * PER_METRE_S;
+        tau * by_tau_sq * tau + radial_mps * by_radial + triad.sin_az * by_az + triad.sin_el * by_el
     }
 
     /// (∂φ/∂d, ∂φ/∂v_r, ∂φ/∂θ_az, ∂φ/∂θ_el).
     #[inline(always)]
-    pub(super) fn phase_slopes<T: Number>(&self, seen: &Seen<T>) -> [T; 4] {
+    pub(super) fn phase_slopes<T: Numeric>(&self, triad: &SphericalTriad<T>) -> [T; 4] {
         let [by_tau_sq, by_radial, by_az, by_el] = self.phase;
-        let tau = seen.d.value * PER_METRE_S;
-        [tau * (2.0 * by_tau_sq) * PER_METRE_S, tau.like(by_radial), seen.cos_az * by_az, seen.cos_el * by_el]
+        let tau = triad.d.value * PER_METRE_S;
+        [tau * (2.0 * by_tau_sq) * PER_METRE_S, tau.splat(by_radial), triad.cos_az * by_az, triad.cos_el * by_el]
     }
 }
 
-impl<T: Number, const D: usize> Squares<T, D> {
+impl<T: Numeric, const D: usize> Squares<T, D> {
     /// Of the lower half of C, which is positive definite; and its determinant.
     #[inline(always)]
     fn new(c: &[[T; D]; D]) -> (Self, T) {
-        let one = c[0][0].like(1.0);
-        let mut squares = Self { weight: [one / c[0][0]; D], skew: [one.like(0.0); 3] };
+        let one = c[0][0].splat(1.0);
+        let mut squares = Self { weight: [one / c[0][0]; D], skew: [one.splat(0.0); 3] };
         let mut determinant = c[0][0];
         if D > 1 {
             let s_10 = -c[1][0] * squares.weight[0];
-            let d_1 = c[1][1].plus(s_10, c[1][0]);
+            let d_1 = s_10.mul_add(c[1][0], c[1][1]);
             (squares.weight[1], squares.skew[0]) = (one / d_1, s_10);
             determinant = determinant * d_1;
             if D > 2 {
-                let (l_20, mixed) = (c[2][0] * squares.weight[0], c[2][1].plus(s_10, c[2][0]));
+                let (l_20, mixed) = (c[2][0] * squares.weight[0], s_10.mul_add(c[2][0], c[2][1]));
                 let s_21 = -mixed * squares.weight[1];
-                let d_2 = (c[2][2] - l_20 * c[2][0]).plus(s_21, mixed);
+                let d_2 = s_21.mul_add(mixed, c[2][2] - l_20 * c[2][0]);
                 squares.weight[2] = one / d_2;
-                (squares.skew[1], squares.skew[2]) = ((-l_20).plus(s_21, s_10), s_21);
+                (squares.skew[1], squares.skew[2]) = (s_21.mul_add(s_10, -l_20), s_21);
                 determinant = determinant * d_2;
             }
         }
@@ -421,14 +437,14 @@ impl<T: Number, const D: usize> Squares<T, D> {
         if D > 1 {
             let s_10 = skew[0];
             precision[1][0] = s_10 * weight[1];
-            precision[0][0] = weight[0].plus(s_10, precision[1][0]);
+            precision[0][0] = s_10.mul_add(precision[1][0], weight[0]);
             precision[1][1] = weight[1];
             if D > 2 {
                 let (s_20, s_21) = (skew[1], skew[2]);
                 let (by_0, by_1) = (s_20 * weight[2], s_21 * weight[2]);
-                precision[0][0] = precision[0][0].plus(s_20, by_0);
-                precision[1][0] = precision[1][0].plus(s_21, by_0);
-                precision[1][1] = precision[1][1].plus(s_21, by_1);
+                precision[0][0] = s_20.mul_add(by_0, precision[0][0]);
+                precision[1][0] = s_21.mul_add(by_0, precision[1][0]);
+                precision[1][1] = s_21.mul_add(by_1, precision[1][1]);
                 (precision[2][0], precision[2][1], precision[2][2]) = (by_0, by_1, weight[2]);
             }
         }
@@ -442,27 +458,29 @@ impl<T: Number, const D: usize> Squares<T, D> {
 }
 
 struct Project<'a, const D: usize> {
-    scene: &'a Scene<'a>,
-    forms: &'a Forms,
+    model: &'a ViewModel<'a>,
+    gaussians: &'a WorldGaussians,
     splats: &'a mut Splats,
 }
 
-impl<const D: usize> Task for Project<'_, D> {
+impl<const D: usize> JointTask for Project<'_, D> {
     #[inline(always)]
     fn run<B: Batch>(&mut self, batch: B) {
-        let form = self.forms.of(batch);
-        let look = self.scene.look(&form);
-        let image: Image<B::Number, D> = self.scene.image(&form, &look, &self.scene.rows(&look.seen));
-        let (zero, one) = (batch.all(0.0), batch.all(1.0));
+        let gaussian = self.gaussians.of(batch);
+        let in_view = self.model.joint_in_view(&gaussian);
+        let projected: ProjectedGaussian<B::Number, D> =
+            self.model.projected(&gaussian, &in_view, &self.model.jacobians(&in_view.triad));
+        let (zero, one) = (batch.splat(0.0), batch.splat(1.0));
         let (mut bin, mut weight, mut kappa) = ([zero; 3], [one; 3], [zero; 3]);
         for k in 0..D {
             let axis = 3 - D + k;
-            (bin[axis], weight[axis], kappa[axis]) = (image.bin[k], image.squares.weight[k], image.kappa[k]);
+            (bin[axis], weight[axis], kappa[axis]) =
+                (projected.bin[k], projected.squares.weight[k], projected.kappa[k]);
         }
-        let [s10, s20, s21] = image.squares.skew;
+        let [s10, s20, s21] = projected.squares.skew;
         let skew = if D == 2 { [zero, zero, s10] } else { [s10, s20, s21] };
         let ([b0, b1, b2], [w0, w1, w2], [s0, s1, s2], [k0, k1, k2]) = (bin, weight, skew, kappa);
-        let numbers = [b0, b1, b2, w0, w1, w2, s0, s1, s2, image.ln_weight, image.phase, k0, k1, k2];
+        let numbers = [b0, b1, b2, w0, w1, w2, s0, s1, s2, projected.ln_weight, projected.phase, k0, k1, k2];
         batch.store(numbers, &mut self.splats.numbers);
     }
 }

@@ -1,6 +1,6 @@
-//! The only mutator: a command in, effects out.
+//! The only two mutators: a command or a report in, effects out.
 //!
-//! Here is the table from commands to functions; `data` opens and loads, `queue` filters and orders the frames, `labels`
+//! Here are the tables from both to functions; `data` opens and loads, `queue` filters and orders the frames, `labels`
 //! writes what people say, `diagnosis` takes in strata and evidence, `fit` steers the optimiser, `reports` takes in what the
 //! worker says.
 
@@ -19,20 +19,33 @@ mod study;
 pub use export::OutputCheck;
 pub(super) use reports::mean_known;
 
-use super::command::{Command, Effect};
+use super::command::Command;
+use super::effect::Effect;
+use super::report::Report;
 use super::state::{LOG_LINES, LogLevel, LogLine, Session};
 use super::strata::StrataStatus;
 
 impl Session {
-    /// Applies one command and answers what the outside has to do for it.
+    /// Does what a person asks, and answers what the outside has to do for it.
     pub fn apply(&mut self, command: Command) -> Vec<Effect> {
-        let mut effects = self.dispatch(command);
+        let effects = self.act(command);
+        self.settle(effects)
+    }
+
+    /// Takes in what a thread tells, and answers what the outside has to do for it.
+    pub fn report(&mut self, report: Report) -> Vec<Effect> {
+        let effects = self.learn(report);
+        self.settle(effects)
+    }
+
+    /// What follows from any change.
+    fn settle(&mut self, mut effects: Vec<Effect>) -> Vec<Effect> {
         effects.extend(self.ask_evidence());
         self.refresh_queue();
         effects
     }
 
-    fn dispatch(&mut self, command: Command) -> Vec<Effect> {
+    fn act(&mut self, command: Command) -> Vec<Effect> {
         match command {
             Command::Open(path) => {
                 // Asked for by a person: what a session file said of another data set is void.
@@ -61,13 +74,6 @@ impl Session {
                 self.data.opening = None;
                 vec![Effect::CancelOpen]
             }
-            Command::OpenProgress { stage, done, total } => {
-                if let Some(opening) = &mut self.data.opening {
-                    (opening.stage, opening.done, opening.total) = (stage, done, total);
-                }
-                Vec::new()
-            }
-            Command::Opened(path, result) => self.opened(path, result),
             Command::GotoFrame(index) => self.goto_frame(index),
             Command::StepFrames(by) => self.step_frames(by),
             Command::StepQueue(by) => self.step_queue(by),
@@ -96,28 +102,13 @@ impl Session {
             Command::Undo => self.undo(),
             Command::Redo => self.redo(),
             Command::SetAnnotator(name) => self.set_annotator(&name),
-            Command::LabelsOpened(id, result) => self.labels_opened(id, result),
-            Command::LabelsWritten(written) => self.labels_written(written),
-            Command::LabelsRefreshed(table) => self.labels_refreshed(table),
-            Command::LabelsWarned(warnings) => self.labels_warned(warnings),
-            Command::LabelsPlaced(place) => self.labels_placed(place),
             Command::RefreshLabels => vec![Effect::RefreshLabels],
             Command::ComputeStrata => self.compute_strata(),
             Command::CancelStrata => vec![Effect::CancelStrata],
-            Command::StrataProgress { done, total } => {
-                if let StrataStatus::Running { done: shown, total: of } = &mut self.strata.status {
-                    (*shown, *of) = (done, total);
-                }
-                Vec::new()
-            }
-            Command::StrataDone(result) => self.strata_done(result),
             Command::PinFit => self.pin_fit(),
             Command::RemovePin(id) => self.remove_pin(id),
             Command::RenamePin(id, name) => self.rename_pin(id, &name),
             Command::SetBaseline(id) => self.set_baseline(id),
-            Command::PinDrawn(id, result) => self.pin_drawn(id, result),
-            Command::EvidenceFound(frame, fit, result) => self.evidence_found(frame, fit, result),
-            Command::FrameLoaded(index, result) => self.frame_loaded(index, result),
             Command::TogglePlay => {
                 self.data.playing = !self.data.playing && self.data.len() > 1;
                 Vec::new()
@@ -146,35 +137,21 @@ impl Session {
                 Vec::new()
             }
             Command::EditParams(params) => self.edit(*params),
-            Command::Worker(message) => self.worker_message(message),
-            Command::Snapshot(snapshot) => {
-                self.snapshot(*snapshot);
-                Vec::new()
-            }
             Command::SelectJoint(joint) => {
                 self.joint = joint;
                 Vec::new()
             }
             Command::SetView(view) => {
-                self.stale |= view.sort != self.view.sort || view.label_mode != self.view.label_mode;
                 self.view = *view;
                 Vec::new()
             }
             Command::Export(what, path) => self.export(what, path),
             Command::SaveSession(path, window) => self.save_session(path, window),
             Command::OpenSession(path) => vec![Effect::ReadSession(path)],
-            Command::SessionRead(path, result) => self.session_read(path, result),
             Command::LoadResults(path) => self.load_results(path),
-            Command::ResultsRead(path, result) => self.results_read(&path, result),
             Command::OpenRun(folder) => self.open_run(&folder),
-            Command::RunRead(folder, result) => self.run_read(folder, result),
             Command::ShowStudyRow(row) => self.show_study_row(row),
-            Command::TaskDone(result) => self.task_done(result),
             Command::RunTask(task) => vec![Effect::Run(task)],
-            Command::Log(level, text) => {
-                self.note(level, text);
-                Vec::new()
-            }
             Command::ClearLog => {
                 self.log.clear();
                 Vec::new()
@@ -183,22 +160,73 @@ impl Session {
                 self.data.recent.clear();
                 Vec::new()
             }
+            Command::OfferPaths(paths) => {
+                self.data.recent.extend(paths);
+                Vec::new()
+            }
+        }
+    }
+
+    fn learn(&mut self, report: Report) -> Vec<Effect> {
+        match report {
+            Report::Picked(path) => {
+                self.restoring = None;
+                self.open(path)
+            }
+            Report::OpenProgress { stage, done, total } => {
+                if let Some(opening) = &mut self.data.opening {
+                    (opening.stage, opening.done, opening.total) = (stage, done, total);
+                }
+                Vec::new()
+            }
+            Report::Opened(path, result) => self.opened(path, result),
+            Report::LabelsOpened(id, result) => self.labels_opened(id, result),
+            Report::LabelsWritten(written) => self.labels_written(written),
+            Report::LabelsRefreshed(table) => self.labels_refreshed(table),
+            Report::LabelsWarned(warnings) => self.labels_warned(warnings),
+            Report::LabelsPlaced(place) => self.labels_placed(place),
+            Report::StrataProgress { done, total } => {
+                if let StrataStatus::Running { done: shown, total: of } = &mut self.strata.status {
+                    (*shown, *of) = (done, total);
+                }
+                Vec::new()
+            }
+            Report::StrataDone(result) => self.strata_done(result),
+            Report::PinDrawn(id, result) => self.pin_drawn(id, result),
+            Report::EvidenceFound(frame, fit, result) => self.evidence_found(frame, fit, result),
+            Report::FrameLoaded(index, result) => self.frame_loaded(index, result),
+            Report::Worker(message) => self.worker_message(message),
+            Report::Snapshot(snapshot) => {
+                self.snapshot(*snapshot);
+                Vec::new()
+            }
+            Report::SessionRead(path, result) => self.session_read(path, result),
+            Report::ResultsRead(path, result) => self.results_read(&path, result),
+            Report::RunRead(folder, result) => self.run_read(folder, result),
+            Report::TaskDone(result) => self.task_done(result),
+            Report::Log(level, text) => {
+                self.note(level, text);
+                Vec::new()
+            }
         }
     }
 
     /// Tells something that needs no attention later: a line of the log and a notification.
     pub(super) fn hint(&mut self, text: String) {
         self.note(LogLevel::Info, text.clone());
+        self.notify(LogLevel::Info, text);
+    }
+
+    fn notify(&mut self, level: LogLevel, text: String) {
         let count = self.notice.as_ref().map_or(0, |(count, ..)| *count);
-        self.notice = Some((count + 1, LogLevel::Info, text));
+        self.notice = Some((count + 1, level, text));
     }
 
     /// Writes a line to the log; warnings and errors also become the notice.
     pub(super) fn note(&mut self, level: LogLevel, text: String) {
         tracing::debug!("{text}");
         if level != LogLevel::Info {
-            let count = self.notice.as_ref().map_or(0, |(count, ..)| *count);
-            self.notice = Some((count + 1, level, text.clone()));
+            self.notify(level, text.clone());
         }
         if self.log.len() == LOG_LINES {
             self.log.pop_front();

@@ -2,7 +2,7 @@
 
 use super::Session;
 use crate::body::Pppr;
-use crate::geometry::Vec3;
+use crate::geometry::{Vec3, mean};
 use crate::people::Tracker;
 
 /// Frames apart at which persons are still followed; farther away everybody is counted anew.
@@ -48,14 +48,5 @@ impl Session {
 
 /// The middle of each person's joints, m.
 fn middles(params: &Pppr) -> Vec<Vec3> {
-    let shape = params.shape();
-    let joints = shape.joints.max(1);
-    let middle = |person: usize| {
-        let sum = (0..joints).map(|joint| params.position(person * joints + joint));
-        sum.fold([0.0; 3], |mut sum, p| {
-            crate::geometry::add_scaled(&mut sum, p, 1.0 / joints as f64);
-            sum
-        })
-    };
-    (0..shape.persons).map(middle).collect()
+    (0..params.shape().persons).map(|person| mean(params.person(person))).collect()
 }

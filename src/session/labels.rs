@@ -5,6 +5,7 @@
 
 use super::acts::{ActKind, Asked, Changes, Done, LabelAct};
 use super::records::Records;
+use super::tracked::Tracked;
 use crate::labels::{Label, LabelPlace, Record, Tag, Tags};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -88,7 +89,7 @@ pub struct Labels {
     pub(super) next_act: u64,
     /// Number of the reading of the journals that is waited for.
     pub(super) opening: u64,
-    pub(super) table: LabelTable,
+    pub(super) table: Tracked<LabelTable>,
     pub(super) undo: Vec<LabelAct>,
     pub(super) redo: Vec<LabelAct>,
     /// The frame that this annotator labelled last.
@@ -97,13 +98,14 @@ pub struct Labels {
     pub selection: BTreeSet<usize>,
     /// The same in a row, to be shared with acts.
     pub(super) targets: Arc<[u32]>,
-    /// Counts up with every change of the selection.
-    pub selection_revision: u64,
-    /// Counts up with every change of the table.
-    pub revision: u64,
 }
 
 impl Labels {
+    /// Another number after every change of the table.
+    pub fn revision(&self) -> u64 {
+        self.table.revision()
+    }
+
     /// Everybody's labels.
     pub fn table(&self) -> &LabelTable {
         &self.table
@@ -188,7 +190,6 @@ impl Labels {
     pub(super) fn select(&mut self, frames: BTreeSet<usize>) {
         self.targets = frames.iter().map(|&frame| frame as u32).collect();
         self.selection = frames;
-        self.selection_revision += 1;
     }
 
     /// The act that would be undone, in words.
@@ -214,8 +215,7 @@ impl Labels {
     pub(super) fn close(&mut self) -> Self {
         let kept = Self {
             annotator: self.annotator.clone(),
-            revision: self.revision + 1,
-            selection_revision: self.selection_revision + 1,
+            table: self.table.emptied(),
             next_act: self.next_act,
             ..Self::default()
         };
@@ -225,13 +225,12 @@ impl Labels {
     /// Takes in what a commit wrote; gives the records that were replaced.
     pub(super) fn written(&mut self, kind: ActKind, name: String, done: Done) -> Vec<Arc<Record>> {
         let Done { changes, records, scored } = done;
-        let mine = self.table.entry(self.annotator.clone()).or_default();
+        let mine = self.table.change().entry(self.annotator.clone()).or_default();
         let mut replaced = Vec::new();
         for ((frame, _, after), record) in changes.iter().zip(records) {
             self.last_edited = Some(frame);
             replaced.extend(mine.insert(frame, record, after, scored.contains(&frame)));
         }
-        self.revision += 1;
         if changes.is_empty() {
             self.forget(kind);
         } else {

@@ -1,11 +1,12 @@
-//! The state behind the window, and the only function that changes it.
+//! The state behind the window, and the only two functions that change it.
 //!
-//! [`Session::apply`] takes a [`Command`] and answers [`Effect`]s, requests to the outside: open, load, run. It needs no
-//! thread, no window and no GPU, so every behaviour of the window can be tested without one. Panes read the session and
-//! send commands; threads report back by commands too.
+//! [`Session::apply`] takes a [`Command`], what a person asks; [`Session::report`] takes a [`Report`], what a thread tells. Both
+//! answer [`Effect`]s, requests to the outside: open, load, run. They need no thread, no window and no GPU, so every
+//! behaviour of the window can be tested without one. The [`Runtime`] owns the session and carries the effects out: the window
+//! gets it to read and can only send commands.
 //!
 //! **Time.** A pass of the window has 16 ms of its thread, also on 100,000 frames. What takes longer is an [`Effect`]: it
-//! is done by a thread of the [`Runtime`] and comes back as a command. `tests/window/large` measures it.
+//! is done by a thread of the [`Runtime`] and comes back as a report. `tests/window/large` measures it.
 //!
 //! **Memory.** A window on 100,000 frames, all of them labelled, graded and with results, takes less than 1 GiB besides
 //! the pictures: frames that were read up to 512 MiB ([`crate::dataset::DEFAULT_BUDGET`]), the states of one fit up to
@@ -14,6 +15,7 @@
 mod acts;
 mod apply;
 mod command;
+mod effect;
 mod evidence;
 mod file;
 mod fit;
@@ -23,18 +25,19 @@ mod labels;
 mod pins;
 mod queue;
 mod records;
+mod report;
 mod results;
 mod runtime;
 mod state;
 mod strata;
 mod study;
+mod tracked;
 mod view;
 
 pub use acts::{ActKind, Asked, Changes, Done, LabelAct};
 pub use apply::OutputCheck;
-pub use command::{
-    BackgroundTask, Command, Commit, Effect, Export, OpenedLabels, PickKind, PinRequest, StartAt, Trash, Written,
-};
+pub use command::{Command, Export, PickKind, StartAt};
+pub use effect::{BackgroundTask, Commit, Effect, PinRequest, Trash};
 pub use evidence::EvidenceRequest;
 pub use file::{SavedChange, SavedDataset, SavedFit, SavedFrame, SavedPin, SessionFile, SessionFileError};
 pub use fit::{Fit, FitStatus};
@@ -43,9 +46,11 @@ pub use labels::{LabelMode, LabelStatus, LabelTable, Labels};
 pub use pins::{MOST_PINS, Pin, PinRow, Pins, numbers};
 pub use queue::{FrameFilter, FrameNumber, FrameRow, Queue, Reads, SavedView, Sort, SortKey, syntax};
 pub use records::Records;
+pub use report::{OpenedLabels, Report, Written};
 pub use results::FoundResults;
 pub use runtime::{Picker, Runtime, Wake};
 pub use state::{Data, FitHashes, FrameSummary, LogLevel, LogLine, Opening, Session};
 pub use strata::{Strata, StrataStatus};
 pub use study::StudyView;
+pub use tracked::Tracked;
 pub use view::{Against, ColorRange, Compare, MapScale, SplatMode, ThemeChoice, TimelineStrip, ViewState};

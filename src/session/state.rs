@@ -7,9 +7,10 @@ use super::fit::Fit;
 use super::identity::Identities;
 use super::labels::Labels;
 use super::pins::Pins;
-use super::queue::Queue;
+use super::queue::{ListedFrom, Queue};
 use super::strata::Strata;
 use super::study::StudyView;
+use super::tracked::Tracked;
 use super::view::ViewState;
 use crate::config::FitConfig;
 use crate::dataset::{BareCatalog, Dataset, Frame};
@@ -140,13 +141,11 @@ pub struct Session {
     /// Frames in the order they were left, oldest first: the oldest fits are forgotten first.
     pub(super) left: VecDeque<usize>,
     /// One line a fitted frame.
-    pub summaries: BTreeMap<usize, FrameSummary>,
-    /// Counts up with every change of them.
-    pub(super) summarised: u64,
+    pub summaries: Tracked<BTreeMap<usize, FrameSummary>>,
     /// The frame list.
     pub queue: Queue,
-    /// The list must be filled again.
-    pub(super) stale: bool,
+    /// What the list was filled from.
+    pub(super) listed: Option<ListedFrom>,
     /// How hard the frames are.
     pub strata: Strata,
     /// What people say of the frames.
@@ -181,14 +180,12 @@ pub struct Session {
     pub(super) restoring: Option<(PathBuf, Box<SessionFile>)>,
     /// A table of results whose data set is being opened.
     pub(super) waiting_results: Option<PathBuf>,
-    /// What a session file says of the window, for the window to take.
-    pub(super) restored_window: Option<serde_json::Value>,
     pub(super) jobs: JobId,
 }
 
 impl Session {
-    /// Counts up with every change of [`Self::summaries`].
-    pub fn summaries_revision(&self) -> u64 {
-        self.summarised
+    /// Nothing open yet; shown as in an earlier session, and with what was opened in it, newest first.
+    pub fn remembered(view: ViewState, recent: Vec<PathBuf>) -> Self {
+        Self { view, data: Data { recent, ..Data::default() }, ..Self::default() }
     }
 }

@@ -1,5 +1,6 @@
 //! How hard the frames are, as far as it has been computed.
 
+use super::tracked::Tracked;
 use crate::study::complexity::{Complexity, FrameComplexity, Stratum};
 use std::sync::Arc;
 
@@ -31,10 +32,27 @@ pub enum StrataStatus {
 pub struct Strata {
     /// How far it is.
     pub status: StrataStatus,
-    pub(super) result: Option<Arc<Complexity>>,
+    result: Tracked<Option<Arc<Complexity>>>,
 }
 
 impl Strata {
+    /// Nothing is known any more, as of a data set that was just opened.
+    pub(super) fn clear(&mut self) {
+        self.status = StrataStatus::Absent;
+        *self.result.change() = None;
+    }
+
+    /// The statistics are there.
+    pub(super) fn set(&mut self, complexity: Arc<Complexity>) {
+        self.status = StrataStatus::Ready;
+        *self.result.change() = Some(complexity);
+    }
+
+    /// Another number whenever other statistics are there.
+    pub fn revision(&self) -> u64 {
+        self.result.revision()
+    }
+
     /// The statistics of all frames.
     pub fn result(&self) -> Option<&Arc<Complexity>> {
         self.result.as_ref()

@@ -2,6 +2,7 @@
 
 use super::results::FoundResults;
 use super::state::FrameSummary;
+use super::tracked::Tracked;
 use crate::dataset::Dataset;
 use crate::study::run::{Run, RunRow};
 use std::collections::{BTreeMap, HashMap};
@@ -12,13 +13,11 @@ use std::sync::Arc;
 #[derive(Debug, Default)]
 pub struct StudyView {
     /// What was read, and where.
-    pub run: Option<(PathBuf, Arc<Run>)>,
+    pub run: Tracked<Option<(PathBuf, Arc<Run>)>>,
     /// A folder that is being read.
     pub reading: Option<PathBuf>,
     /// The row of the table whose frames are in the list.
     pub row: Option<usize>,
-    /// Counts up with every run that was read.
-    pub revision: u64,
 }
 
 impl StudyView {

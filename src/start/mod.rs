@@ -5,4 +5,4 @@ mod people;
 mod problem;
 
 pub use people::{FoundStart, find_start};
-pub use problem::problem_of;
+pub use problem::{problem_alone, problem_of};

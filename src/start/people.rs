@@ -1,6 +1,6 @@
 //! How many persons a fit has: as many as the settings say, or as many as are counted (paper section 4.4).
 
-use crate::config::{FitConfig, Place};
+use crate::config::{FitConfig, StartPlace};
 use crate::geometry::Vec3;
 use crate::mhp::{FitError, Initialisation, Neighbour, Problem, initialise_people};
 use crate::people::{Count, Counter, Scan};
@@ -23,7 +23,7 @@ pub struct FoundStart {
 pub fn find_start(problem: &Arc<Problem>, config: &FitConfig) -> Result<FoundStart, FitError> {
     if config.people == 1 {
         // The paper looks for one person without a count, and so it goes where nothing can be counted, or nobody is.
-        let asked = config.place == Place::Counted && !problem.neighbours_in(config.frames_around).is_empty();
+        let asked = config.place == StartPlace::Counted && !problem.neighbours_in(config.frames_around).is_empty();
         let counted = asked.then(|| count(problem, config).ok()).flatten().filter(|count| count.people() > 0);
         let seeds = counted.map_or_else(Vec::new, |count| count.seeds(1));
         return Ok(FoundStart { initialisation: initialise_people(problem, config, &seeds)?, count: None });

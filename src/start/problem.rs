@@ -3,7 +3,7 @@
 //! A start reads heading and velocity from them. They are those of the frame's own sequence, whatever range of frames is
 //! worked on: what a frame starts from does not depend on which others are fitted with it.
 
-use crate::dataset::{Dataset, Frame};
+use crate::dataset::{Dataset, Frame, map_cells};
 use crate::mhp::{FitError, Problem};
 
 /// Frames looked at on each side.
@@ -11,22 +11,28 @@ const REACH: usize = 4;
 /// Frames a second where a data set does not say.
 const USUAL_RATE_HZ: f64 = 10.0;
 
+/// The problem of `frame` without the frames around it: to look at a fit that began elsewhere.
+///
+/// # Errors
+/// As [`Problem::new`].
+pub fn problem_alone(dataset: &Dataset, frame: &Frame) -> Result<Problem, FitError> {
+    let info = dataset.info();
+    Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &map_cells(&frame.maps))
+}
+
 /// The problem of `frame`. A neighbour that cannot be read, or does not fit, is left out.
 ///
 /// # Errors
 /// As [`Problem::new`].
 pub fn problem_of(dataset: &Dataset, frame: &Frame) -> Result<Problem, FitError> {
-    let info = dataset.info();
-    let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-    let mut problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps)?;
-    let rate_hz = info.frame_rate_hz.filter(|rate| *rate > 0.0).unwrap_or(USUAL_RATE_HZ);
+    let mut problem = problem_alone(dataset, frame)?;
+    let rate_hz = dataset.info().frame_rate_hz.filter(|rate| *rate > 0.0).unwrap_or(USUAL_RATE_HZ);
     let sequence = dataset.sequence(frame.index);
     let around = frame.index.saturating_sub(REACH)..(frame.index + REACH + 1).min(dataset.len());
     for other in around.filter(|&other| other != frame.index && dataset.sequence(other) == sequence) {
         let Ok(maps) = dataset.recent_maps(other) else { continue };
-        let maps: Vec<&[f64]> = maps.iter().map(|map| map.data.as_slice()).collect();
         let offset_s = (other as f64 - frame.index as f64) / rate_hz;
-        if let Err(error) = problem.add_neighbour(offset_s, &maps) {
+        if let Err(error) = problem.add_neighbour(offset_s, &map_cells(&maps)) {
             tracing::debug!("{}: not looked at: {error}", dataset.frame_name(other));
         }
     }

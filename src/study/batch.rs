@@ -10,7 +10,7 @@ use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::{Dataset, Truth, write_pppr};
 use crate::diagnose::{JointErrors, joint_errors};
-use crate::mhp::{FitError, Fitter, Precision, StepReport, StopReason, predict};
+use crate::mhp::{Fitter, Precision, StepReport, predict};
 use crate::output::{FileNames, Inputs};
 use crate::start::{find_start, problem_of};
 use crate::task::{milliseconds, panic_as_error};
@@ -75,8 +75,8 @@ fn fit_watched(
     let mut fitter =
         Fitter::new(problem, options.config, options.precision, initial.clone()).map_err(|error| in_file(&error))?;
     let errors = |params: &Pppr| errors(params, frame.truth.as_ref()?, info.skeleton.joints.len());
-    let reason = run(&mut fitter, |report, params| watch(report, errors(params).map(|e| e.majpe_mm)));
-    let reason = reason.map_err(|error| in_file(&error))?;
+    let watched = |report, params: &Pppr| watch(report, errors(params).map(|e| e.majpe_mm));
+    let reason = fitter.run_to(options.config.iterations, watched).map_err(|error| in_file(&error))?;
     let fit_ms = milliseconds(began);
     let (report, params) = (fitter.report(), fitter.params().clone());
     let errors = errors(&params);
@@ -88,21 +88,6 @@ fn fit_watched(
 
 fn errors(params: &Pppr, truth: &Truth, joints: usize) -> Option<JointErrors> {
     joint_errors(params.positions(), &truth.joints, joints)
-}
-
-/// Steps until the configuration says to stop; `watch` sees every iteration, the start included.
-pub(super) fn run(fitter: &mut Fitter, mut watch: impl FnMut(StepReport, &Pppr)) -> Result<StopReason, FitError> {
-    let config = *fitter.config();
-    watch(fitter.report(), fitter.params());
-    while fitter.iteration() < config.iterations {
-        let report = fitter.step()?;
-        let converged = report.converged;
-        watch(report, fitter.params());
-        if converged && config.stop_when_converged {
-            return Ok(StopReason::Converged);
-        }
-    }
-    Ok(StopReason::Iterations)
 }
 
 /// Fits `frames` and hands every row to `sink`, in the order of the data set, as soon as it and those before it are

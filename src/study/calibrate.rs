@@ -5,7 +5,6 @@
 //! Two people 0.6 to 2 m apart are among them, so that F3 learns to tell several people who stand close from several who
 //! do not. Of every sequence one frame is judged, with the four before it.
 
-use super::batch::run;
 use super::evidence::masks_around;
 use crate::body::Skeleton;
 use crate::config::{FitConfig, Preset};
@@ -149,7 +148,7 @@ fn problem(recording: &Recording, skeleton: Skeleton, frames: &[Vec<Vec<f64>>]) 
 fn measured(problem: &Arc<Problem>, frames: &[Vec<Vec<f64>>], config: &FitConfig) -> Result<Measured, FitError> {
     let initial = find_start(problem, config)?.initialisation.params;
     let mut fitter = Fitter::new(Arc::clone(problem), *config, Precision::F32, initial.clone())?;
-    run(&mut fitter, |_, _| {})?;
+    fitter.run_to(config.iterations, |_, _| {})?;
     let masks = masks_around(problem, &initial, fitter.params(), config, Precision::F32)?;
     let before = frames.iter().take(frames.len().saturating_sub(1)).enumerate();
     let before: Vec<EarlierFrame<'_>> =

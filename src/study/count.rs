@@ -1,7 +1,7 @@
 //! Counting the people of a data set: every frame with those before it in its sequence, on all cores. Who is who is told afterwards,
 //! over all frames.
 
-use crate::dataset::{Dataset, DatasetError, Frame, Heatmap};
+use crate::dataset::{Dataset, DatasetError, Frame, Heatmap, map_cells};
 use crate::geometry::Vec3;
 use crate::mhp::fill_missing;
 use crate::people::{
@@ -189,9 +189,8 @@ impl<'a> ScanWindow<'a> {
     }
 
     fn count(&self, maps: &[Heatmap], known: &VecDeque<Scan>) -> Result<(Scan, Count), String> {
-        let maps: Vec<&[f64]> = maps.iter().map(|map| map.data.as_slice()).collect();
         let before: Vec<&Scan> = known.iter().collect();
-        let scan = self.counter.scan(&maps, &before).map_err(|error| error.to_string())?;
+        let scan = self.counter.scan(&map_cells(maps), &before).map_err(|error| error.to_string())?;
         let count = self.counter.count(&scan, &before);
         Ok((scan, count))
     }

@@ -3,9 +3,10 @@
 use super::{BatchOptions, fit_frame};
 use crate::body::Pppr;
 use crate::config::FitConfig;
-use crate::dataset::{Dataset, Frame};
+use crate::dataset::{Dataset, Frame, map_cells};
 use crate::diagnose::{Annotated, EarlierFrame, Evidence, EvidenceInput, STATIC_FRAMES, evidence};
 use crate::mhp::{FitError, Masks, Objective, Precision, Problem, masks, simulate};
+use crate::start::problem_alone;
 use crate::study::shard::{FrameCommand, ShardRow};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -56,10 +57,8 @@ fn judge(
     params: Option<&Pppr>,
 ) -> Result<Vec<Evidence>, String> {
     let in_file = |error: &dyn std::fmt::Display| format!("{}: {error}", dataset.frame_path(index).display());
-    let info = dataset.info();
     let frame = dataset.load(index).map_err(|error| error.to_string())?;
-    let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps_of(&frame));
-    let problem = Arc::new(problem.map_err(|error| in_file(&error))?);
+    let problem = Arc::new(problem_alone(dataset, &frame).map_err(|error| in_file(&error))?);
     let (initial, params) = match params {
         Some(params) => (params.clone(), params.clone()),
         None => fit_frame(dataset, index, options, None).map(|fit| (fit.initial, fit.params))?,
@@ -94,17 +93,13 @@ pub fn state_evidence(
 ) -> Vec<Evidence> {
     let frames = earlier(dataset, frame.index);
     let before: Vec<EarlierFrame<'_>> =
-        frames.iter().map(|frame| EarlierFrame { index: frame.index, maps: maps_of(frame) }).collect();
+        frames.iter().map(|frame| EarlierFrame { index: frame.index, maps: map_cells(&frame.maps) }).collect();
     let annotated = Annotated {
         persons: frame.person_count,
         map_boxes: &frame.map_boxes,
         image_boxes: frame.image.as_ref().map(|image| image.boxes.len()),
     };
     evidence(&EvidenceInput { problem, config, params, masks, before: &before, annotated })
-}
-
-fn maps_of(frame: &Frame) -> Vec<&[f64]> {
-    frame.maps.iter().map(|map| map.data.as_slice()).collect()
 }
 
 /// The frames before `index`, oldest first; from one that cannot be read only those after it.

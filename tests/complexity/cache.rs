@@ -106,6 +106,25 @@ fn a_changed_file_gives_itself_and_the_window_after_it_anew() {
     assert_eq!(kept.compute().scanned, 0);
 }
 
+/// A frame of HuPR is two files: the second counts too.
+#[test]
+fn every_file_of_a_frame_makes_it_stale() {
+    let (data, home) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/hupr");
+    for inside in ["dataset.toml", "single_1/hori/000000000.npy", "single_1/vert/000000000.npy"] {
+        let to = data.path().join(inside);
+        std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+        std::fs::copy(sample.join(inside), to).unwrap();
+    }
+    let scanned = || {
+        let options = ComplexityOptions::default();
+        compute(&open(data.path()), &options, Some(home.path()), &Progress::new()).unwrap().scanned
+    };
+    assert_eq!([scanned(), scanned()], [1, 0]);
+    touch(&data.path().join("single_1/vert/000000000.npy"), SystemTime::now() + Duration::from_secs(5));
+    assert_eq!([scanned(), scanned()], [1, 0]);
+}
+
 #[test]
 fn a_removed_or_added_file_changes_the_windows_after_it_only() {
     let kept = Kept::new(&Set::mixed(&[12, 6], 2));

@@ -6,7 +6,7 @@ use crate::cases::Case;
 use crate::reading::{case_folders, read};
 use mhp_inspector::body::Skeleton;
 use mhp_inspector::body::{Group, Pppr, PpprShape};
-use mhp_inspector::config::{FitConfig, FramesAround, Place, Preset, WarmStart};
+use mhp_inspector::config::{FitConfig, FramesAround, Preset, StartPlace, WarmStart};
 use mhp_inspector::diagnose::{Annotated, EarlierFrame, EvidenceInput, evidence};
 use mhp_inspector::geometry::{Pose, norm, sub};
 use mhp_inspector::mhp::{
@@ -93,7 +93,7 @@ fn counting_tells_where_the_peaks_alone_are_wrong() {
         .collect();
     let slices: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
     let problem = Arc::new(Problem::new(case.problem.radar, case.problem.skeleton, views, &slices).unwrap());
-    let config = FitConfig { place: Place::Counted, ..case.config };
+    let config = FitConfig { place: StartPlace::Counted, ..case.config };
     let across = |params: &Pppr, place: [f64; 2]| {
         let [x, y, _] = centroid(params.group(Group::Position));
         (x - place[0]).hypot(y - place[1])

@@ -6,6 +6,7 @@ use mhp_inspector::body::{Group, Pppr};
 use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::{Dataset, Frame};
 use mhp_inspector::mhp::{Fitter, Initialisation, Precision, Problem, StepReport, initialise};
+use mhp_inspector::start::problem_alone;
 use mhp_inspector::task::Progress;
 use std::sync::Arc;
 
@@ -13,9 +14,7 @@ fn frame() -> Option<(Arc<Problem>, Frame)> {
     let path = common::shared()?.join("data/mmvr/00383_radar.npz");
     let dataset = Dataset::open(&path, &Progress::new()).unwrap();
     let frame = dataset.load(dataset.start_index()).unwrap();
-    let info = dataset.info();
-    let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-    let problem = Arc::new(Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap());
+    let problem = Arc::new(problem_alone(&dataset, &frame).unwrap());
     Some((problem, frame))
 }
 

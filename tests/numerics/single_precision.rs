@@ -10,6 +10,7 @@ use mhp_inspector::dataset::Dataset;
 use mhp_inspector::geometry::{Pose, norm, rotation_from_quaternion, sub};
 use mhp_inspector::mhp::{Evaluation, Fitter, Objective, Precision, Problem, initialise, simulate};
 use mhp_inspector::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
+use mhp_inspector::start::problem_alone;
 use mhp_inspector::task::Progress;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
@@ -207,12 +208,9 @@ fn single_precision_agrees_on_the_largest_maps() {
 /// A hundred iterations of a data set's first frames, from their own start; mean distance of the joints between precisions.
 fn fits_end_together(folder: &Path) {
     let dataset = Dataset::open(folder, &Progress::new()).unwrap();
-    let info = dataset.info();
     for index in 0..dataset.len().min(FRAMES) {
         let frame = dataset.load(index).unwrap();
-        let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-        let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap();
-        let problem = Arc::new(problem);
+        let problem = Arc::new(problem_alone(&dataset, &frame).unwrap());
         let config = FitConfig::default();
         let start = initialise(&problem, &config).unwrap().params;
         let [a, b] = [Precision::F64, Precision::F32].map(|precision| {

@@ -7,7 +7,8 @@ use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::diagnose::joint_errors;
 use mhp_inspector::geometry::{Vec3, add, scale, sub};
-use mhp_inspector::mhp::{Problem, initialise};
+use mhp_inspector::mhp::initialise;
+use mhp_inspector::start::problem_alone;
 use mhp_inspector::task::Progress;
 use std::path::Path;
 use std::sync::Arc;
@@ -24,9 +25,7 @@ fn starts_near_the_walker() {
     let (mut across, mut up, mut majpe) = (0.0, 0.0, 0.0);
     for index in 0..dataset.len() {
         let frame = dataset.load(index).unwrap();
-        let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-        let problem =
-            Arc::new(Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap());
+        let problem = Arc::new(problem_alone(&dataset, &frame).unwrap());
         let start = initialise(&problem, &FitConfig::default()).unwrap();
         let found: Vec<Vec3> =
             start.params.group(Group::Position).chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();

@@ -5,7 +5,7 @@ use crate::blob;
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::labels::{FrameId, Judged, Label, LabelPlace, Record, Tag, Tags};
 use mhp_inspector::session::{
-    ActKind, Asked, Changes, Command, Commit, Done, Effect, LabelTable, OpenedLabels, Session, Written,
+    ActKind, Asked, Changes, Command, Commit, Done, Effect, LabelTable, OpenedLabels, Report, Session, Written,
 };
 use mhp_inspector::task::Progress;
 use std::collections::BTreeSet;
@@ -25,14 +25,14 @@ impl Bench {
         let dataset = Arc::new(Dataset::open(folder.path(), &Progress::new()).unwrap());
         let mut session = Session::default();
         session.apply(Command::SetAnnotator("ada".into()));
-        let effects = session.apply(Command::Opened(folder.path().into(), Ok(dataset)));
+        let effects = session.report(Report::Opened(folder.path().into(), Ok(dataset)));
         let reading = effects.iter().find_map(|effect| match effect {
             Effect::OpenLabels { id, .. } => Some(*id),
             _ => None,
         });
         let place = LabelPlace::in_folder(folder.path());
         let opened = OpenedLabels { place, table: LabelTable::new(), last_edited: None, warnings: Vec::new() };
-        session.apply(Command::LabelsOpened(reading.unwrap(), Ok(Box::new(opened))));
+        session.report(Report::LabelsOpened(reading.unwrap(), Ok(Box::new(opened))));
         Self { session, held: vec![Label::default(); 100], _folder: folder }
     }
 
@@ -59,7 +59,7 @@ impl Bench {
             self.held[index] = after;
         }
         let result = Ok(Done { changes: Changes::of(changes), records, scored: BTreeSet::new() });
-        self.session.apply(Command::LabelsWritten(Written { id, kind, act, result }));
+        self.session.report(Report::LabelsWritten(Written { id, kind, act, result }));
     }
 
     fn tags(&self, frame: usize) -> String {

@@ -1,22 +1,21 @@
 //! Labels, evidence and strata in `Session::apply` without threads: what a window meets only when answers come late.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
-use crate::blob;
+use crate::dataset;
 use mhp_inspector::body::Pppr;
 use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::diagnose::Evidence;
 use mhp_inspector::labels::{Change, FrameId, Judged, Label, LabelPlace, Record, Tag};
-use mhp_inspector::mhp::{Evaluation, Problem, initialise};
+use mhp_inspector::mhp::{Evaluation, initialise};
 use mhp_inspector::session::{
     ActKind, Changes, Command, Commit, Done, Effect, FitHashes, LabelStatus, LabelTable, LogLevel, OpenedLabels,
-    Session, SessionFile, StrataStatus, Written,
+    Report, Session, SessionFile, StrataStatus, Written,
 };
+use mhp_inspector::start::problem_alone;
 use mhp_inspector::study::complexity::Complexity;
-use mhp_inspector::task::Progress;
 use mhp_inspector::worker::{PreparedFit, Snapshot, WorkerCommand, WorkerEvent, WorkerMessage};
 use std::collections::{BTreeSet, HashMap};
-use std::path::Path;
 use std::sync::Arc;
 
 /// A session on a data set, and a journal that answers when it is told to.
@@ -25,11 +24,6 @@ struct Bench {
     dataset: Arc<Dataset>,
     journal: HashMap<usize, Label>,
     folder: tempfile::TempDir,
-}
-
-fn dataset(folder: &Path, frames: usize) -> Arc<Dataset> {
-    blob::write_dataset(folder, frames);
-    Arc::new(Dataset::open(folder, &Progress::new()).unwrap())
 }
 
 impl Bench {
@@ -47,14 +41,14 @@ impl Bench {
     /// Opens the data set; answers the number under which its journals are read.
     fn open(&mut self) -> u64 {
         let path = self.folder.path().to_path_buf();
-        let effects = self.session.apply(Command::Opened(path, Ok(Arc::clone(&self.dataset))));
+        let effects = self.session.report(Report::Opened(path, Ok(Arc::clone(&self.dataset))));
         reading(&effects)
     }
 
     fn opened(&mut self, id: u64, table: LabelTable) {
         let place = LabelPlace::in_folder(&self.folder.path().join("mhp-labels"));
         let opened = OpenedLabels { place, table, last_edited: None, warnings: Vec::new() };
-        self.session.apply(Command::LabelsOpened(id, Ok(Box::new(opened))));
+        self.session.report(Report::LabelsOpened(id, Ok(Box::new(opened))));
     }
 
     /// Applies a command that asks the journal for one act.
@@ -94,7 +88,7 @@ impl Bench {
 
     fn answer(&mut self, commit: &Commit, result: Result<Done, String>) {
         let Commit { id, kind, act, .. } = commit.clone();
-        self.session.apply(Command::LabelsWritten(Written { id, kind, act, result }));
+        self.session.report(Report::LabelsWritten(Written { id, kind, act, result }));
     }
 
     fn tags(&self, frame: usize) -> String {
@@ -112,21 +106,18 @@ impl Bench {
     /// Frame `index` is read, prepared and drawn at its start pose.
     fn show(&mut self, index: usize) {
         let frame = Arc::new(self.dataset.load(index).unwrap());
-        let effects = self.session.apply(Command::FrameLoaded(index, Ok(frame)));
+        let effects = self.session.report(Report::FrameLoaded(index, Ok(frame)));
         let prepare = effects.into_iter().find_map(|effect| match effect {
             Effect::Send(WorkerCommand::Prepare(prepare)) => Some(*prepare),
             _ => None,
         });
         let prepare = prepare.unwrap();
-        let maps: Vec<&[f64]> = prepare.frame.maps.iter().map(|map| map.data.as_slice()).collect();
-        let info = prepare.dataset.info();
-        let (radar, skeleton, views) = (info.radar.clone(), info.skeleton.clone(), info.views.clone());
-        let problem = Arc::new(Problem::new(radar, skeleton, views, &maps).unwrap());
+        let problem = Arc::new(problem_alone(&prepare.dataset, &prepare.frame).unwrap());
         let params = initialise(&problem, &FitConfig::default()).unwrap().params;
         let initial = params.clone();
         let prepared = PreparedFit { problem, found_start: None, initial, warnings: Vec::new(), init_ms: 1.0 };
         let event = WorkerEvent::Prepared(Box::new(prepared));
-        self.session.apply(Command::Worker(WorkerMessage::Event(prepare.job, event)));
+        self.session.report(Report::Worker(WorkerMessage::Event(prepare.job, event)));
         self.draw(params);
     }
 
@@ -139,7 +130,7 @@ impl Bench {
         let (branch, iteration, live, iterations_per_s) = (0, 0, true, 0.0);
         let snapshot =
             Snapshot { job, branch, iteration, live, config, params, evaluation, h_sim, masks, iterations_per_s };
-        let effects = self.session.apply(Command::Snapshot(Box::new(snapshot)));
+        let effects = self.session.report(Report::Snapshot(Box::new(snapshot)));
         effects.into_iter().find_map(|effect| match effect {
             Effect::Evidence(request) => Some(request.fit),
             _ => None,
@@ -258,7 +249,7 @@ fn an_undo_that_changes_nothing_any_more_is_dropped() {
     let mut bench = Bench::new();
     let commit = bench.asks(Command::ToggleTag(Tag::F1));
     bench.write(&commit);
-    bench.session.apply(Command::LabelsRefreshed(LabelTable::new()));
+    bench.session.report(Report::LabelsRefreshed(LabelTable::new()));
     assert!(bench.asks_nothing(Command::Undo));
     assert_eq!(bench.names(), (None, None));
     assert!(bench.told(LogLevel::Info, "another window changed the same labels"));
@@ -299,7 +290,7 @@ fn answers_for_a_data_set_that_was_left_change_nothing() {
     bench.write(&late);
     assert_eq!((bench.tags(0).as_str(), bench.names()), ("", (None, None)), "an act for the data set before");
     let others = || LabelTable::from([("eve".to_owned(), [tagged("eve", 3, Tag::F3)].into_iter().collect())]);
-    bench.session.apply(Command::LabelsRefreshed(others()));
+    bench.session.report(Report::LabelsRefreshed(others()));
     bench.opened(old, others());
     assert_eq!(bench.session.labels.status, LabelStatus::Opening);
     assert!(bench.session.labels.table().is_empty(), "labels of the data set before");
@@ -327,7 +318,7 @@ fn an_act_of_one_annotator_never_becomes_another_ones() {
 fn journals_that_cannot_be_opened_take_no_tag() {
     let mut bench = Bench::new();
     let id = bench.open();
-    bench.session.apply(Command::LabelsOpened(id, Err("ada.labels.jsonl: is a folder".into())));
+    bench.session.report(Report::LabelsOpened(id, Err("ada.labels.jsonl: is a folder".into())));
     assert!(bench.asks_nothing(Command::ToggleTag(Tag::F1)));
     assert_eq!(bench.tags(0), "");
     assert!(bench.told(LogLevel::Error, "nothing was tagged: ada.labels.jsonl: is a folder"));
@@ -344,7 +335,7 @@ fn a_list_that_is_filtered_by_tags_follows_them() {
     bench.write(&commit);
     assert_eq!(bench.session.queue.rows(), [0, 1, 3, 4, 5]);
     let table = LabelTable::from([("eve".to_owned(), [tagged("eve", 5, Tag::F3)].into_iter().collect())]);
-    bench.session.apply(Command::LabelsRefreshed(table));
+    bench.session.report(Report::LabelsRefreshed(table));
     assert_eq!(bench.session.queue.rows(), [0, 1, 2, 3, 4], "what others wrote counts too");
     // The next one is what took its place.
     bench.session.apply(Command::StepQueue(1));
@@ -356,7 +347,7 @@ fn evidence_of_an_older_fit_is_dropped_and_not_recorded() {
     let mut bench = Bench::new();
     bench.show(0);
     let first = bench.draw_moved(0.1);
-    bench.session.apply(Command::EvidenceFound(0, first.clone(), Ok(evidence(0.9))));
+    bench.session.report(Report::EvidenceFound(0, first.clone(), Ok(evidence(0.9))));
     let judged = |commit: &Commit| asked(commit)[0].2.clone();
     let commit = bench.asks(Command::ToggleTag(Tag::F1));
     assert_eq!(judged(&commit).machine.get(&Tag::F1), Some(&0.9));
@@ -368,9 +359,9 @@ fn evidence_of_an_older_fit_is_dropped_and_not_recorded() {
     assert!(judged(&commit).machine.is_empty(), "a score of another fit is no score of this one");
     assert_eq!(judged(&commit).fit, bench.session.shown_hashes().map(|hashes| hashes.fit.clone()));
     bench.write(&commit);
-    bench.session.apply(Command::EvidenceFound(0, first, Ok(evidence(0.8))));
+    bench.session.report(Report::EvidenceFound(0, first, Ok(evidence(0.8))));
     assert!(bench.session.evidence_is_stale(), "a late answer on the fit before");
-    bench.session.apply(Command::EvidenceFound(0, second, Ok(evidence(0.2))));
+    bench.session.report(Report::EvidenceFound(0, second, Ok(evidence(0.2))));
     assert_eq!(bench.session.evidence_of(0).unwrap()[0].score, Some(0.2));
     assert!(!bench.session.evidence_is_stale());
 
@@ -383,7 +374,7 @@ fn a_frame_that_is_still_being_read_is_not_judged_on_the_fit_before() {
     let mut bench = Bench::new();
     bench.show(0);
     let key = bench.draw_moved(0.1);
-    bench.session.apply(Command::EvidenceFound(0, key, Ok(evidence(0.9))));
+    bench.session.report(Report::EvidenceFound(0, key, Ok(evidence(0.9))));
     let shown = bench.session.shown_hashes().cloned().unwrap();
     bench.session.apply(Command::GotoFrame(1));
     let commit = bench.asks(Command::ToggleTag(Tag::F1));
@@ -398,14 +389,14 @@ fn a_frame_that_is_still_being_read_is_not_judged_on_the_fit_before() {
 fn strata_of_another_data_set_are_dropped() {
     let mut bench = Bench::new();
     let of = |frames: usize| Arc::new(Complexity { frames: vec![None; frames], ..Complexity::default() });
-    bench.session.apply(Command::StrataDone(Ok(Some(of(5)))));
+    bench.session.report(Report::StrataDone(Ok(Some(of(5)))));
     assert!(matches!(bench.session.strata.status, StrataStatus::Running { .. }), "five are not six");
     assert!(bench.session.strata.result().is_none());
-    bench.session.apply(Command::StrataDone(Ok(Some(of(6)))));
+    bench.session.report(Report::StrataDone(Ok(Some(of(6)))));
     assert_eq!(bench.session.strata.status, StrataStatus::Ready);
     bench.open();
     assert!(bench.session.strata.result().is_none() && bench.session.strata.status != StrataStatus::Ready);
-    bench.session.apply(Command::StrataDone(Err("disk gone".into())));
+    bench.session.report(Report::StrataDone(Err("disk gone".into())));
     assert_eq!(bench.session.strata.status, StrataStatus::Failed("disk gone".into()));
     assert!(bench.told(LogLevel::Error, "the strata could not be computed: disk gone"));
 }
@@ -419,14 +410,14 @@ fn a_session_file_is_not_put_back_onto_a_data_set_opened_by_hand() {
     let path = other.folder.path().to_path_buf();
     for by_hand in [Command::Open(path.clone()), Command::CancelOpen] {
         let mut session = Session::default();
-        let effects = session.apply(Command::SessionRead("kept.mhp-session".into(), Ok(file())));
+        let effects = session.report(Report::SessionRead("kept.mhp-session".into(), Ok(file())));
         assert!(matches!(&effects[..], [Effect::Open(path)] if *path == bench.folder.path()), "{effects:?}");
         session.apply(by_hand);
-        session.apply(Command::Opened(path.clone(), Ok(Arc::clone(&other.dataset))));
+        session.report(Report::Opened(path.clone(), Ok(Arc::clone(&other.dataset))));
         assert_eq!((session.queue.text.as_str(), session.session_path.as_ref()), ("", None));
     }
     let mut session = Session::default();
-    session.apply(Command::SessionRead("kept.mhp-session".into(), Ok(file())));
-    session.apply(Command::Opened(bench.folder.path().into(), Ok(Arc::clone(&bench.dataset))));
+    session.report(Report::SessionRead("kept.mhp-session".into(), Ok(file())));
+    session.report(Report::Opened(bench.folder.path().into(), Ok(Arc::clone(&bench.dataset))));
     assert_eq!(session.queue.text, "hardness>0.5");
 }

@@ -1,4 +1,5 @@
 //! The state behind the window and the worker thread, without a window.
+#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
 #[path = "../common/blob.rs"]
 mod blob;
@@ -7,3 +8,14 @@ mod acts;
 mod labels;
 mod state;
 mod worker;
+
+use mhp_inspector::dataset::Dataset;
+use mhp_inspector::task::Progress;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A data set of blobs, made in `folder` and opened.
+fn dataset(folder: &Path, frames: usize) -> Arc<Dataset> {
+    blob::write_dataset(folder, frames);
+    Arc::new(Dataset::open(folder, &Progress::new()).unwrap())
+}

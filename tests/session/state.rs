@@ -1,15 +1,15 @@
 //! `Session::apply` without threads: commands and reports in, effects and state out.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
-use crate::blob;
+use crate::dataset;
 use mhp_inspector::body::{Group, Pppr};
 use mhp_inspector::config::{FIELDS, Field, FieldKind, FitConfig, Number, ReadBy, Value};
 use mhp_inspector::dataset::{BareCatalog, BareChoice, Dataset, DatasetError};
-use mhp_inspector::mhp::{Adam, Evaluation, FitState, Problem, StepReport, StopReason, Terms, initialise};
+use mhp_inspector::mhp::{Adam, Evaluation, FitState, StepReport, StopReason, Terms, initialise};
 use mhp_inspector::session::{
-    Command, Effect, FitStatus, History, IterationRow, LogLevel, PickKind, Session, ThemeChoice, ViewState,
+    Command, Effect, FitStatus, History, IterationRow, LogLevel, PickKind, Report, Session, ThemeChoice, ViewState,
 };
-use mhp_inspector::task::Progress;
+use mhp_inspector::start::problem_alone;
 use mhp_inspector::worker::{
     HistoryRow, JobId, Kept, Prepare, PreparedFit, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
 };
@@ -24,9 +24,19 @@ struct Bench {
     folder: tempfile::TempDir,
 }
 
-fn dataset(folder: &Path, frames: usize) -> Arc<Dataset> {
-    blob::write_dataset(folder, frames);
-    Arc::new(Dataset::open(folder, &Progress::new()).unwrap())
+/// Labels, strata and evidence are tested elsewhere.
+fn of_data_and_fit(mut effects: Vec<Effect>) -> Vec<Effect> {
+    effects.retain(|effect| {
+        !matches!(
+            effect,
+            Effect::OpenLabels { .. }
+                | Effect::RefreshLabels
+                | Effect::ComputeStrata { .. }
+                | Effect::CancelStrata
+                | Effect::Evidence(_)
+        )
+    });
+    effects
 }
 
 impl Bench {
@@ -35,39 +45,30 @@ impl Bench {
         let folder = tempfile::tempdir().unwrap();
         let dataset = dataset(folder.path(), 4);
         let frame = dataset.load(0).unwrap();
-        let info = dataset.info();
-        let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-        let problem =
-            Arc::new(Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap());
+        let problem = Arc::new(problem_alone(&dataset, &frame).unwrap());
         let params = initialise(&problem, &FitConfig::default()).unwrap().params;
         let mut bench = Self { session: Session::default(), dataset, params, folder };
-        let effects = bench.apply(Command::Opened(bench.folder.path().into(), Ok(Arc::clone(&bench.dataset))));
+        let effects = bench.report(Report::Opened(bench.folder.path().into(), Ok(Arc::clone(&bench.dataset))));
         assert!(matches!(&effects[..], [Effect::UseDataset(_), Effect::Load(0)]), "{effects:?}");
         let prepare = bench.load(0);
         bench.answer(prepare);
         bench
     }
 
-    /// What follows for data and fit; labels, strata and evidence are tested elsewhere.
+    /// What follows for data and fit of what a person asks.
     fn apply(&mut self, command: Command) -> Vec<Effect> {
-        let mut effects = self.session.apply(command);
-        effects.retain(|effect| {
-            !matches!(
-                effect,
-                Effect::OpenLabels { .. }
-                    | Effect::RefreshLabels
-                    | Effect::ComputeStrata { .. }
-                    | Effect::CancelStrata
-                    | Effect::Evidence(_)
-            )
-        });
-        effects
+        of_data_and_fit(self.session.apply(command))
+    }
+
+    /// What follows for data and fit of what a thread tells.
+    fn report(&mut self, report: Report) -> Vec<Effect> {
+        of_data_and_fit(self.session.report(report))
     }
 
     /// The frame that was asked for arrives; answers what the worker is told.
     fn load(&mut self, index: usize) -> Prepare {
         let frame = Arc::new(self.dataset.load(index).unwrap());
-        let effects = self.apply(Command::FrameLoaded(index, Ok(frame)));
+        let effects = self.report(Report::FrameLoaded(index, Ok(frame)));
         prepare_of(effects)
     }
 
@@ -80,10 +81,7 @@ impl Bench {
     /// The worker answers a preparation.
     fn answer(&mut self, prepare: Prepare) {
         let Prepare { job, branch, dataset, frame, start, .. } = prepare;
-        let info = dataset.info();
-        let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-        let problem =
-            Arc::new(Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap());
+        let problem = Arc::new(problem_alone(&dataset, &frame).unwrap());
         let (initial, resumed) = match start {
             Start::Initialise => (self.params.clone(), false),
             Start::Warm(params) => (params, false),
@@ -107,11 +105,11 @@ impl Bench {
     fn rows(&mut self, job: JobId, branch: u32, iterations: std::ops::RangeInclusive<usize>) {
         let rows =
             iterations.map(|k| HistoryRow { branch, report: report(k), kept: Kept::State(self.state(k)) }).collect();
-        assert!(self.apply(Command::Worker(WorkerMessage::Rows(job, rows))).is_empty());
+        assert!(self.report(Report::Worker(WorkerMessage::Rows(job, rows))).is_empty());
     }
 
     fn event(&mut self, job: JobId, event: WorkerEvent) -> Vec<Effect> {
-        self.apply(Command::Worker(WorkerMessage::Event(job, event)))
+        self.report(Report::Worker(WorkerMessage::Event(job, event)))
     }
 
     fn job(&self) -> JobId {
@@ -141,7 +139,7 @@ impl Bench {
         let iterations_per_s = 0.0;
         let snapshot =
             Snapshot { job, branch, iteration, live, config, params, evaluation, h_sim, masks, iterations_per_s };
-        assert!(self.apply(Command::Snapshot(Box::new(snapshot))).is_empty());
+        assert!(self.report(Report::Snapshot(Box::new(snapshot))).is_empty());
     }
 
     fn shown(&self) -> Option<(u32, usize)> {
@@ -185,12 +183,12 @@ fn opening_shows_progress_and_then_the_first_frame() {
     assert!(matches!(effects[..], [Effect::Pick(PickKind::Folder)]));
     let effects = session.apply(Command::Open("/somewhere".into()));
     assert!(matches!(&effects[..], [Effect::Open(path)] if path == Path::new("/somewhere")));
-    session.apply(Command::OpenProgress { stage: "listing".into(), done: 3, total: 9 });
+    session.report(Report::OpenProgress { stage: "listing".into(), done: 3, total: 9 });
     let opening = session.data.opening.as_ref().unwrap();
     assert_eq!((opening.stage.as_str(), opening.done, opening.total), ("listing", 3, 9));
     assert!(matches!(session.apply(Command::CancelOpen)[..], [Effect::CancelOpen]));
     assert_eq!(session.data.opening, None);
-    session.apply(Command::OpenProgress { stage: "late".into(), done: 4, total: 9 });
+    session.report(Report::OpenProgress { stage: "late".into(), done: 4, total: 9 });
     assert_eq!(session.data.opening, None, "late progress of what was cancelled");
 
     let bench = Bench::new();
@@ -209,14 +207,14 @@ fn an_error_while_opening_keeps_what_is_on_screen() {
     let job = bench.job();
     bench.apply(Command::Open("/gone".into()));
     assert!(bench.session.data.frame.is_some() && bench.session.data.dataset.is_some());
-    let effects = bench.apply(Command::Opened("/gone".into(), Err(DatasetError::NotFound { path: "/gone".into() })));
+    let effects = bench.report(Report::Opened("/gone".into(), Err(DatasetError::NotFound { path: "/gone".into() })));
     assert!(effects.is_empty());
     assert_eq!(bench.errors(), ["/gone: no such file or folder"]);
     let (count, level, text) = bench.session.notice.clone().unwrap();
     assert_eq!((level, text.as_str()), (LogLevel::Error, "/gone: no such file or folder"));
     assert_eq!((bench.session.data.opening.clone(), bench.job(), bench.session.fit.head()), (None, job, 3));
     assert!(!bench.session.data.recent.contains(&PathBuf::from("/gone")), "what cannot be opened is not remembered");
-    bench.apply(Command::Opened("/gone".into(), Err(DatasetError::NotFound { path: "/gone".into() })));
+    bench.report(Report::Opened("/gone".into(), Err(DatasetError::NotFound { path: "/gone".into() })));
     assert_eq!(bench.session.notice.unwrap().0, count + 1, "the same text again is told again");
 }
 
@@ -224,7 +222,7 @@ fn an_error_while_opening_keeps_what_is_on_screen() {
 fn a_cancelled_opening_is_no_error() {
     let mut bench = Bench::new();
     bench.apply(Command::Open("/slow".into()));
-    bench.apply(Command::Opened("/slow".into(), Err(DatasetError::Cancelled)));
+    bench.report(Report::Opened("/slow".into(), Err(DatasetError::Cancelled)));
     assert!(bench.errors().is_empty() && bench.session.notice.is_none());
     assert!(bench.session.log.back().unwrap().text.contains("/slow was cancelled"));
 }
@@ -240,7 +238,7 @@ fn a_bare_file_asks_for_its_axes() {
     let mut bench = Bench::new();
     let asks = |bench: &mut Bench| {
         bench.apply(Command::Open(path.clone()));
-        bench.apply(Command::Opened(path.clone(), Err(DatasetError::NeedsAxes(catalog.clone()))));
+        bench.report(Report::Opened(path.clone(), Err(DatasetError::NeedsAxes(catalog.clone()))));
     };
     asks(&mut bench);
     assert_eq!(bench.session.data.bare, Some((path.clone(), catalog.clone())));
@@ -259,12 +257,12 @@ fn recents_are_newest_first_without_repeats_and_few() {
     let mut bench = Bench::new();
     bench.apply(Command::ClearRecent);
     for path in ["/a", "/b", "/a", "/c"] {
-        bench.apply(Command::Opened(path.into(), Ok(Arc::clone(&bench.dataset))));
+        bench.report(Report::Opened(path.into(), Ok(Arc::clone(&bench.dataset))));
     }
     let recent: Vec<_> = bench.session.data.recent.iter().map(|path| path.display().to_string()).collect();
     assert_eq!(recent, ["/c", "/a", "/b"]);
     for i in 0..40 {
-        bench.apply(Command::Opened(format!("/many/{i}").into(), Ok(Arc::clone(&bench.dataset))));
+        bench.report(Report::Opened(format!("/many/{i}").into(), Ok(Arc::clone(&bench.dataset))));
     }
     assert_eq!(bench.session.data.recent.len(), 12);
     assert_eq!(bench.session.data.recent[0], Path::new("/many/39"));
@@ -306,12 +304,12 @@ fn a_frame_that_arrives_too_late_is_dropped() {
     bench.apply(Command::GotoFrame(1));
     bench.apply(Command::GotoFrame(2));
     let stale = Arc::new(bench.dataset.load(1).unwrap());
-    assert!(bench.apply(Command::FrameLoaded(1, Ok(stale))).is_empty());
+    assert!(bench.report(Report::FrameLoaded(1, Ok(stale))).is_empty());
     assert_eq!((bench.session.data.frame.as_ref().unwrap().index, bench.session.data.loading), (0, Some(2)));
     let prepare = bench.load(2);
     assert_eq!((prepare.frame.index, bench.session.data.loading), (2, None));
     let again = Arc::new(bench.dataset.load(2).unwrap());
-    assert!(bench.apply(Command::FrameLoaded(2, Ok(again))).is_empty(), "nobody asked twice");
+    assert!(bench.report(Report::FrameLoaded(2, Ok(again))).is_empty(), "nobody asked twice");
 }
 
 #[test]
@@ -321,7 +319,7 @@ fn a_frame_that_cannot_be_read_is_told_and_the_next_one_is_fine() {
     bench.apply(Command::TogglePlay);
     bench.apply(Command::GotoFrame(1));
     let error = DatasetError::NotFound { path: "frames/001.npz".into() };
-    let effects = bench.apply(Command::FrameLoaded(1, Err(error)));
+    let effects = bench.report(Report::FrameLoaded(1, Err(error)));
     assert!(matches!(sent(&effects), WorkerCommand::Discard));
     let data = &bench.session.data;
     assert!(data.frame.is_none() && !data.playing && data.error.as_ref().unwrap().contains("001.npz"));
@@ -694,7 +692,7 @@ fn another_data_set_begins_anew_and_keeps_how_things_are_shown() {
     bench.apply(Command::SetConfig(Box::new(config)));
     let other = tempfile::tempdir().unwrap();
     let dataset = dataset(other.path(), 2);
-    bench.apply(Command::Opened(other.path().into(), Ok(dataset)));
+    bench.report(Report::Opened(other.path().into(), Ok(dataset)));
     let session = &bench.session;
     assert_eq!((session.data.len(), session.data.frame_index, session.data.loading), (2, 0, Some(0)));
     assert!(session.fits.is_empty() && session.summaries.is_empty() && session.data.frame.is_none());
@@ -706,7 +704,7 @@ fn only_so_many_left_fits_are_kept() {
     let folder = tempfile::tempdir().unwrap();
     let many = dataset(folder.path(), 20);
     let mut bench = Bench::new();
-    bench.apply(Command::Opened(folder.path().into(), Ok(Arc::clone(&many))));
+    bench.report(Report::Opened(folder.path().into(), Ok(Arc::clone(&many))));
     bench.dataset = many;
     let mut prepare = bench.load(0);
     for index in 1..20 {
@@ -742,15 +740,7 @@ fn a_run_begins_by_itself_only_where_asked() {
     let job = prepare.job;
     bench.rows(job, 0, 0..=0);
     let prepared = PreparedFit {
-        problem: Arc::new(
-            Problem::new(
-                prepare.dataset.info().radar.clone(),
-                prepare.dataset.info().skeleton.clone(),
-                prepare.dataset.info().views.clone(),
-                &prepare.frame.maps.iter().map(|m| m.data.as_slice()).collect::<Vec<_>>(),
-            )
-            .unwrap(),
-        ),
+        problem: Arc::new(problem_alone(&prepare.dataset, &prepare.frame).unwrap()),
         found_start: None,
         initial: bench.params.clone(),
         warnings: vec!["the region has no cell".into()],
@@ -772,7 +762,7 @@ fn a_long_history_thins_its_states_and_keeps_every_row() {
     let rows = (1..=count)
         .map(|k| HistoryRow { branch: 0, report: report(k), kept: Kept::State(Arc::clone(&state)) })
         .collect();
-    bench.apply(Command::Worker(WorkerMessage::Rows(job, rows)));
+    bench.report(Report::Worker(WorkerMessage::Rows(job, rows)));
     let branch = bench.session.fit.branch().unwrap();
     assert_eq!((branch.rows.len(), branch.head()), (count + 1, count));
     let kept = |row: &IterationRow| row.state.is_some();
@@ -800,7 +790,7 @@ fn a_long_history_thins_its_states_and_keeps_every_row() {
 fn the_log_is_bounded() {
     let mut session = Session::default();
     for i in 0..2500 {
-        session.apply(Command::Log(LogLevel::Info, format!("line {i}")));
+        session.report(Report::Log(LogLevel::Info, format!("line {i}")));
     }
     assert_eq!((session.log.len(), session.log.front().unwrap().text.as_str()), (2000, "line 500"));
     assert_eq!(session.notice, None, "information is not a notification");

@@ -6,8 +6,8 @@ use half::f16;
 use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::npz::{NpzArchive, read_array};
 use mhp_inspector::dataset::{Dataset, read_pppr};
-use mhp_inspector::mhp::{Precision, Problem, simulate};
-use mhp_inspector::start::problem_of;
+use mhp_inspector::mhp::{Precision, simulate};
+use mhp_inspector::start::{problem_alone, problem_of};
 use mhp_inspector::study::{ExportScale, scaled_maps};
 use mhp_inspector::task::Progress;
 use std::collections::BTreeMap;
@@ -109,9 +109,7 @@ fn one_frame(forms: [Form; 2], unit: f64, method: zip::CompressionMethod) -> (te
 /// What the forward model gives at the exported parameters.
 fn simulated(folder: &Path, params: &Path) -> Vec<Vec<f64>> {
     let dataset = Dataset::open(folder, &Progress::new()).unwrap();
-    let (info, frame) = (dataset.info(), dataset.load(0).unwrap());
-    let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-    let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps).unwrap();
+    let problem = problem_alone(&dataset, &dataset.load(0).unwrap()).unwrap();
     simulate(&problem, &FitConfig::default(), Precision::default(), &read_pppr(params, None).unwrap())
 }
 
@@ -256,7 +254,7 @@ fn cube(file: &Path) -> Vec<[f32; 2]> {
 fn every_sample_is_exported_and_reads_back_as_a_data_set() {
     let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples");
     let folders = std::fs::read_dir(samples).unwrap().map(|entry| entry.unwrap().path());
-    let mut folders: Vec<PathBuf> = folders.filter(|path| path.is_dir()).collect();
+    let mut folders: Vec<PathBuf> = folders.filter(|path| path.join("dataset.toml").is_file()).collect();
     folders.sort();
     assert_eq!(folders.len(), 10);
     for folder in folders {

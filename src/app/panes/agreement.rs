@@ -106,7 +106,7 @@ fn choose(ui: &mut Ui, shared: &Shared<'_>, state: &mut State) {
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let labels = &shared.session.labels;
     let tokens = Tokens::of(ui);
-    let key = (labels.revision, state.pair.clone());
+    let key = (labels.revision(), state.pair.clone());
     if state.found.as_ref().is_none_or(|(known, _)| *known != key) {
         state.found = Some((key, compute(labels, &state.pair)));
     }

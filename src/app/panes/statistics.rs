@@ -64,7 +64,7 @@ fn show(ui: &mut Ui, shared: &Shared<'_>, state: &mut State) {
     let session = shared.session;
     let tokens = Tokens::of(ui);
     let graded = session.strata.result().is_some();
-    let key = (session.labels.revision, state.group, state.annotator.clone(), graded, session.view.label_mode);
+    let key = (session.labels.revision(), state.group, state.annotator.clone(), graded, session.view.label_mode);
     if state.rows.as_ref().is_none_or(|(known, _)| *known != key) {
         state.rows = Some((key, rows(session, state.group, state.annotator.as_deref())));
     }

@@ -99,13 +99,14 @@ impl Strips {
             }
             TimelineStrip::Iou => {
                 let known = session.summaries.iter().filter_map(|(&frame, summary)| Some((frame, summary.iou?)));
-                let key = (size, session.summaries_revision());
+                let key = (size, session.summaries.revision());
                 self.iou.update(size, key, known, |sum, iou| *sum = (sum.0 + iou, sum.1 + 1));
             }
             TimelineStrip::Tags => {
                 let mode = session.view.label_mode;
                 let seen = session.labels.seen(mode).flat_map(|(_, records)| records.said_tags());
-                self.tags.update(size, (size, session.labels.revision, mode), seen, |sum, tags| *sum = sum.union(tags));
+                self.tags
+                    .update(size, (size, session.labels.revision(), mode), seen, |sum, tags| *sum = sum.union(tags));
             }
         }
     }

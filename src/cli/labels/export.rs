@@ -30,7 +30,7 @@ Examples:
 /// What `labels export` is told.
 #[derive(Debug, clap::Args)]
 #[command(group(clap::ArgGroup::new("out").required(true).multiple(true)))]
-pub struct ExportArgs {
+pub struct LabelExportArgs {
     /// A data set, a journal (*.labels.jsonl), or labels exported before.
     path: PathBuf,
     /// Write CSV; without F to standard output.
@@ -53,7 +53,7 @@ pub struct ExportArgs {
 ///
 /// # Errors
 /// Where PATH cannot be read, the annotator has no labels, or a file cannot be written.
-pub(super) fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &LabelExportArgs) -> anyhow::Result<ExitCode> {
     args.cells.apply();
     for file in [&args.csv, &args.json].into_iter().flatten().filter(|file| !is_stdout(file)) {
         check(args, file)?;
@@ -72,7 +72,7 @@ pub(super) fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
 }
 
 /// Refuses what would replace an input, or lie in the data set.
-fn check(args: &ExportArgs, file: &Path) -> anyhow::Result<()> {
+fn check(args: &LabelExportArgs, file: &Path) -> anyhow::Result<()> {
     let named = [Some(args.path.as_path()), args.manifest.as_deref()];
     if is_table(&args.path) {
         return Ok(Inputs::default().with_named(named).check_file(file)?);

@@ -37,7 +37,7 @@ pub enum LabelsCommand {
     Agreement(agreement::AgreementArgs),
     /// Write labels as CSV or JSON.
     #[command(after_help = export::HELP)]
-    Export(export::ExportArgs),
+    Export(export::LabelExportArgs),
     /// Bring labels from CSV into the journals of a data set.
     #[command(after_help = import::HELP)]
     Import(import::ImportArgs),

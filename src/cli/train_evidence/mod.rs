@@ -2,7 +2,7 @@
 
 mod report;
 
-use super::common::{print, progress_bar};
+use super::common::{at_least_one, print, progress_bar};
 use crate::diagnose::{Calibration, EvidenceExample, FrameSet, learn_curves};
 use crate::study::calibrate::{JudgedFit, frame_count, judged};
 use anyhow::Context as _;
@@ -37,10 +37,6 @@ pub struct TrainEvidenceArgs {
     /// Seeds of what is reported.
     #[arg(long, value_name = "SEED", value_delimiter = ',', default_values_t = [9061, 9062])]
     test_seeds: Vec<u64>,
-}
-
-fn at_least_one(text: &str) -> Result<usize, String> {
-    text.parse::<usize>().ok().filter(|&n| n > 0).ok_or_else(|| "expected a whole number, 1 or more".to_owned())
 }
 
 /// Runs `train-evidence`.

@@ -30,7 +30,7 @@ use super::resolution::{FWHM, Resolution};
 use super::{EvidenceInput, Finding, FindingPlace, Found, Measure, Past, falling};
 use crate::body::{Group, Pppr, PpprShape};
 use crate::config::{FitConfig, Summation};
-use crate::geometry::{Vec3, add, flat_distance, norm, scale, sub};
+use crate::geometry::{flat_distance, mean, norm, sub};
 use crate::labels::Tag;
 use crate::mhp::{Precision, simulate};
 use crate::people::Count;
@@ -162,7 +162,7 @@ fn by_maps(input: &EvidenceInput<'_>) -> Judged {
     let Some((share, a, b, shares)) = judged.max_by(|x, y| x.0.total_cmp(&y.0)) else {
         return (None, "No view shows the echoes of two of the fitted people.".to_owned(), Vec::new());
     };
-    let apart_m = norm(sub(centre(input.params, a), centre(input.params, b)));
+    let apart_m = norm(sub(mean(input.params.person(a)), mean(input.params.person(b))));
     let pair = format!("Persons {} and {}, {} apart,", a + 1, b + 1, length(apart_m));
     let summary = format!("{pair} share {} of their echo in the view that parts them best.", percent(share));
     let views = input.problem.views.iter().enumerate().zip(shares);
@@ -223,17 +223,10 @@ fn overlap(index: usize, view: &View, p: &[f64], q: &[f64]) -> Option<FindingPla
     place(index, &view.shape(), &members(&strong))
 }
 
-/// Mean of a person's joints, m, world frame.
-fn centre(params: &Pppr, person: usize) -> Vec3 {
-    let joints = params.shape().joints;
-    let sum = (person * joints..(person + 1) * joints).fold([0.0; 3], |sum, joint| add(sum, params.position(joint)));
-    scale(sum, 1.0 / joints.max(1) as f64)
-}
-
 /// `2.1 range cells and 0.4 azimuth cells apart`: between the middles of two people, in half-value widths of the point
 /// spread.
 fn apart(view: &View, params: &Pppr, a: usize, b: usize) -> String {
-    let [a, b] = [a, b].map(|person| Resolution::new(view, view.pose.view_from_world(centre(params, person))));
+    let [a, b] = [a, b].map(|person| Resolution::new(view, view.pose.view_from_world(mean(params.person(person)))));
     let width = |k: usize| f64::midpoint(a.sigma_m[k], b.sigma_m[k]) * FWHM;
     let turn = |k: usize| {
         let angle = (a.angles[k] - b.angles[k]).abs();

@@ -5,7 +5,7 @@ use super::temporal::TemporalContext;
 use super::track::{Sighting, track};
 use crate::body::{Pppr, Skeleton};
 use crate::config::{FitConfig, Height};
-use crate::geometry::{Vec3, add, scale};
+use crate::geometry::{Vec3, mean};
 use crate::mhp::region::centres;
 use crate::mhp::template::Template;
 use crate::radar::RadarConfig;
@@ -18,18 +18,18 @@ pub(in crate::mhp) fn anchors(
     config: &FitConfig,
     params: &Pppr,
 ) -> Vec<Vec3> {
-    let (joints, template) = (params.shape().joints.max(1), Template::new(skeleton));
+    let template = Template::new(skeleton);
     let middles = centres(params);
     let of_person = |person: usize| {
-        let own: Vec<Vec3> = (person * joints..(person + 1) * joints).map(|joint| params.position(joint)).collect();
-        let mean = scale(own.iter().fold([0.0; 3], |sum, &p| add(sum, p)), 1.0 / joints as f64);
+        let own = params.person(person);
+        let middle = mean(own);
         let (lit, expected) = near(context.views(), &context.now, &middles, person);
         let here = Sighting { t_s: 0.0, at: lit, lit_m: expected.lit };
-        let Some(track) = track(context, here, apart_m(&middles, person)) else { return mean };
-        let at = if template.is_bent(&own) { track.at } else { behind_skin(config, track.at) };
+        let Some(track) = track(context, here, apart_m(&middles, person)) else { return middle };
+        let at = if template.is_bent(own) { track.at } else { behind_skin(config, track.at) };
         // Where the floor is known, the start stands as high as it should.
         let floor = radar.height_m.filter(|_| config.height == Height::Floor);
-        [at[0], at[1], floor.map_or(at[2] + template.mean_over_middle_m(), |_| mean[2])]
+        [at[0], at[1], floor.map_or(at[2] + template.mean_over_middle_m(), |_| middle[2])]
     };
     (0..middles.len()).map(of_person).collect()
 }

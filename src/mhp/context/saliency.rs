@@ -11,7 +11,7 @@ use crate::config::Background;
 use crate::geometry::{Vec3, dot, mat_t_vec};
 use crate::mhp::fill::all_neighbours;
 use crate::mhp::for_neighbours;
-use crate::mhp::seen::Seen;
+use crate::mhp::triad::SphericalTriad;
 use crate::radar::{AxisKind, NEAREST_M, SpatialGrid, unravel};
 use smallvec::SmallVec;
 use std::collections::HashSet;
@@ -218,9 +218,9 @@ impl SaliencyMap {
 
     /// Whether some axis of this view tells positions along `direction` (unit vector, world frame) near a world point.
     pub(in crate::mhp) fn resolves(&self, p_world: Vec3, direction: Vec3) -> bool {
-        let seen = Seen::new(self.grid.view.pose.view_from_world(p_world));
+        let triad = SphericalTriad::new(self.grid.view.pose.view_from_world(p_world));
         self.grid.axes.iter().any(|(_, axis)| {
-            let along = mat_t_vec(&self.grid.view.pose.rotation, seen.direction_and_arm(axis.kind).0);
+            let along = mat_t_vec(&self.grid.view.pose.rotation, triad.direction_and_arm(axis.kind).0);
             dot(along, direction).abs() > 0.7
         })
     }
@@ -328,17 +328,17 @@ impl SaliencyMap {
     /// are the salience's excess over [`DEPTH_LN`] below the strongest cell there, so that the whole body counts and not
     /// its brightest part, and the sidelobes do not. `None` where nothing is lit.
     pub(super) fn centroid(&self, p_world: Vec3, [floor_m, up_m]: [f64; 2]) -> Option<Mark> {
-        let seen = Seen::new(self.grid.view.pose.view_from_world(p_world));
+        let triad = SphericalTriad::new(self.grid.view.pose.view_from_world(p_world));
         let window: Vec<[usize; 2]> = self
             .grid
             .axes
             .iter()
             .map(|(_, axis)| {
-                let (direction, arm) = seen.direction_and_arm(axis.kind);
+                let (direction, arm) = triad.direction_and_arm(axis.kind);
                 let up = mat_t_vec(&self.grid.view.pose.rotation, direction)[2].abs();
                 let reach_m = floor_m + (up_m - floor_m) * up;
-                let half = reach_m * seen.slope(axis) / (arm * axis.step().abs());
-                let middle = axis.bin(seen.coordinate(axis, 0.0));
+                let half = reach_m * triad.slope(axis) / (arm * axis.step().abs());
+                let middle = axis.bin(triad.coordinate(axis, 0.0));
                 let clamp = |bin: f64| bin.clamp(0.0, axis.bins as f64) as usize;
                 [clamp((middle - half).round()), clamp((middle + half).round() + 1.0)]
             })

@@ -1,7 +1,7 @@
 //! The point in space that the echoes of several views agree on.
 
 use crate::geometry::{Vec3, add_scaled, dot, mat_t_vec, scale};
-use crate::mhp::seen::Seen;
+use crate::mhp::triad::SphericalTriad;
 use crate::radar::{AxisKind, View};
 use smallvec::SmallVec;
 
@@ -60,11 +60,11 @@ pub(in crate::mhp) fn triangulate_from(mut p: Vec3, tolerated_m: f64, views: &[V
 /// Tells for each spatial axis of the mark's view the unit direction in which the coordinate grows (world) and the gap
 /// between the mark's coordinate and that of `p`, m.
 fn equations(view: &View, mark: &Mark, p: Vec3, mut tell: impl FnMut(Vec3, f64)) {
-    let seen = Seen::new(view.pose.view_from_world(p));
+    let triad = SphericalTriad::new(view.pose.view_from_world(p));
     let spatial = view.axes.iter().filter(|axis| axis.kind != AxisKind::Doppler);
     for (axis, &bin) in spatial.zip(&mark.bin) {
-        let (direction, arm) = seen.direction_and_arm(axis.kind);
-        let gap = (axis.at(bin) - seen.coordinate(axis, 0.0)) * arm / seen.slope(axis);
+        let (direction, arm) = triad.direction_and_arm(axis.kind);
+        let gap = (axis.at(bin) - triad.coordinate(axis, 0.0)) * arm / triad.slope(axis);
         tell(mat_t_vec(&view.pose.rotation, direction), gap);
     }
 }

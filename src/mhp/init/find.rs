@@ -15,17 +15,17 @@ const DISTINCT_M: f64 = 0.7;
 const MOST_PLACES: usize = 8;
 /// A place with less than this share of the strongest place's echo is no rival to it.
 const WEAKEST_RIVAL: f64 = 0.3;
-/// The strongest place where somebody stands; with [`config::Place::Cluster`] the strongest cluster of peaks, whatever stands there.
+/// The strongest place where somebody stands; with [`config::StartPlace::Cluster`] the strongest cluster of peaks, whatever stands there.
 pub(super) fn find_one(
     problem: &Problem,
-    how: config::Place,
+    how: config::StartPlace,
     maps: &[SaliencyMap],
     template: &Template,
     peaks: &[Peak],
     notes: &mut Vec<String>,
 ) -> Result<(Vec3, Expectation), FitError> {
     let places = place::places(problem, maps, peaks);
-    if how == config::Place::Cluster {
+    if how == config::StartPlace::Cluster {
         let strongest = places.first().map(|place| place.at).ok_or_else(|| dark(peaks))?;
         notes.push(format!("{} peaks in {} clusters: the middle of the strongest", peaks.len(), places.len()));
         return Ok((strongest, Expectation { middle_m: strongest[2], ..Expectation::new(maps, strongest) }));

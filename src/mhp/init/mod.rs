@@ -42,7 +42,7 @@ use super::context::{
 use super::template::Template;
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
-use crate::config::{FitConfig, Height, Limbs, Place, Summation, Yaw};
+use crate::config::{FitConfig, Height, Limbs, StartPlace, Summation, Yaw};
 use crate::geometry::{Vec3, flat_distance, norm, sub};
 use find::{find_one, middle_of_views};
 use notes::notes_of;
@@ -165,7 +165,7 @@ pub fn initialise(problem: &Arc<Problem>, config: &FitConfig) -> Result<Initiali
 }
 
 /// Finds one person near each of `seeds` (world frame, m), or one anywhere where there are none. One seed is where counting
-/// found the one person: with [`Place::Counted`] it decides only where the frame's own peaks show that person elsewhere.
+/// found the one person: with [`StartPlace::Counted`] it decides only where the frame's own peaks show that person elsewhere.
 ///
 /// # Errors
 /// [`FitError::NoStart`] where no view shows anything above its background.
@@ -187,7 +187,7 @@ pub fn initialise_people(
     let found = match seeds {
         _ if !config.init.position => vec![(middle_of_views(problem), None)],
         [] => vec![alone()?],
-        [_] if config.place == Place::Counted => vec![alone().unwrap_or_else(|_| nearby(0))],
+        [_] if config.place == StartPlace::Counted => vec![alone().unwrap_or_else(|_| nearby(0))],
         seeds => (0..seeds.len()).map(nearby).collect(),
     };
     let places: Vec<Vec3> = found.iter().map(|(at, _)| *at).collect();
@@ -314,7 +314,7 @@ fn followed(config: &FitConfig) -> bool {
 /// The settings under which a start is what this frame's peaks alone say.
 fn unrefined(config: &FitConfig) -> FitConfig {
     FitConfig {
-        place: Place::Peaks,
+        place: StartPlace::Peaks,
         yaw: Yaw::Radar,
         height: Height::Echo,
         limbs: Limbs::Posture,

@@ -82,19 +82,13 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests")]
 
     use super::*;
-    use crate::body::{Group, PpprShape, Skeleton};
+    use crate::body::Group;
     use crate::config::FitConfig;
+    use crate::mhp::convergence::tests::two_joints;
 
     /// L_bone of a bone of 0.4 m that is `length_m` long, and its slope by the length.
     fn bone(length_m: f64, bone_tolerance_m: f64) -> (f64, f64) {
-        let skeleton = Skeleton {
-            joints: vec!["a".into(), "b".into()],
-            bones: vec![[0, 1]],
-            bone_lengths_m: vec![0.4],
-            angles: vec![],
-        };
-        let mut params = Pppr::zeros(PpprShape { persons: 1, joints: 2, doppler_features: 1 });
-        params.set_vec3(Group::Position, 1, [length_m, 0.0, 0.0]);
+        let (skeleton, params) = two_joints(length_m);
         let mut gradient = Pppr::zeros(params.shape());
         let config = FitConfig { bone_tolerance_m, ..FitConfig::default() };
         let inputs = Inputs { skeleton: &skeleton, config: &config, params: &params, anchors: &[] };

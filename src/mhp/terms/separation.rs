@@ -3,7 +3,7 @@
 use super::penalties::repulsion;
 use super::{Evaluate, Hue, Inputs, Scope, Term, Weight};
 use crate::body::Pppr;
-use crate::geometry::{Vec3, add, add_scaled, scale, sub};
+use crate::geometry::{Vec3, add_scaled, mean, sub};
 use smallvec::SmallVec;
 
 pub(super) const SEP: Term = Term {
@@ -23,8 +23,7 @@ fn evaluate(inputs: &Inputs<'_>, gain: f64, gradient: &mut Pppr) -> f64 {
     let [bars, _] = gradient.motion_mut();
     let share = 1.0 / joints as f64;
     let bodies = inputs.params.positions().chunks_exact(joints.max(1));
-    let centroids: SmallVec<[Vec3; 4]> =
-        bodies.map(|body| scale(body.iter().fold([0.0; 3], |sum, &p| add(sum, p)), share)).collect();
+    let centroids: SmallVec<[Vec3; 4]> = bodies.map(mean).collect();
     let mut total = 0.0;
     for s in 0..centroids.len() {
         for t in 0..s {

@@ -2,7 +2,7 @@
 
 use super::{Evaluate, Hue, Inputs, Scope, Term, Weight};
 use crate::body::Pppr;
-use crate::geometry::{add, add_scaled, dot, scale, sub};
+use crate::geometry::{add_scaled, dot, mean, sub};
 
 pub(super) const TIME: Term = Term {
     key: "time",
@@ -23,8 +23,7 @@ fn evaluate(inputs: &Inputs<'_>, gain: f64, gradient: &mut Pppr) -> f64 {
     let bodies = inputs.params.positions().chunks_exact(joints.max(1)).zip(bars.chunks_exact_mut(joints.max(1)));
     let mut sum = 0.0;
     for ((body, bars), &anchor) in bodies.zip(inputs.anchors) {
-        let mean = scale(body.iter().fold([0.0; 3], |sum, &joint| add(sum, joint)), share);
-        let off = sub(mean, anchor);
+        let off = sub(mean(body), anchor);
         sum += dot(off, off);
         for bar in bars {
             add_scaled(bar, off, 2.0 * gain * share);

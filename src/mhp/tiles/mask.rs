@@ -3,17 +3,19 @@
 use super::strip::bits;
 use super::sum::clear;
 use super::{
-    BLOCK, FAINTEST, Lanes, Mask, NO_SLOPE, Question, Scale, Simd, Threshold, Tiles, between, cell_parts, lanes, place,
-    splat, store,
+    BLOCK_TILES, EmQuery, F32Range, Lanes, MIN_RETURN_LOG2, Mask, Simd, Threshold, Tiles, between, cell_parts, lanes,
+    place, splat, store,
 };
 
+/// m(1 − m)/T below which a tile has no slope.
+const MIN_MASK_SLOPE: f32 = 3e-7;
 /// The square of the threshold is looked for between these multiples of the last one, and then between those.
-const NEAR: [f64; 2] = [0.93, 1.07];
-const FAR: [f64; 2] = [0.5, 2.0];
+const NEAR_LEVELS: [f64; 2] = [0.93, 1.07];
+const FAR_LEVELS: [f64; 2] = [0.5, 2.0];
 /// log₂ of m/(1 − m) is cut off here, both ways; there is no slope so far up.
-const ODDS: f32 = 60.0;
+const MAX_ODDS_LOG2: f32 = 60.0;
 /// Tiles whose soft masks are added up in single precision.
-const FEW: usize = 64;
+const TILES_OF_F32_SUM: usize = 64;
 
 impl Tiles {
     /// H² of every cell that is summed, and the percentile of H over all cells.
@@ -21,13 +23,13 @@ impl Tiles {
     pub(super) fn threshold<S: Simd, const COHERENT: bool>(
         &mut self,
         simd: S,
-        question: &Question<'_>,
-        scale: &Scale,
+        query: &EmQuery<'_>,
+        range: &F32Range,
     ) -> Threshold {
-        let grid = question.tiling;
-        let square = self.last.map_or(f64::NAN, |last| (2.0 * (last - scale.log2)).exp2());
-        let levels = NEAR.map(|level| (level * square) as f32);
-        let (zero, one, faint) = (splat(simd, 0.0), splat(simd, 1.0), splat(simd, FAINTEST.exp2()));
+        let grid = query.grid;
+        let square = self.last.map_or(f64::NAN, |last| (2.0 * (last - range.log2)).exp2());
+        let levels = NEAR_LEVELS.map(|level| (level * square) as f32);
+        let (zero, one, faint) = (splat(simd, 0.0), splat(simd, 1.0), splat(simd, MIN_RETURN_LOG2.exp2()));
         let mut above = [zero; 2];
         for &tile in &self.lit {
             let tile = tile as usize;
@@ -41,17 +43,17 @@ impl Tiles {
                 } else {
                     re
                 };
-                let value = square + splat(simd, scale.epsilon_sq);
+                let value = square + splat(simd, range.epsilon_sq);
                 // What lies beyond the box ranks below all.
-                let value = lanes(simd, target, part).choose(splat(simd, -0.5), value, splat(simd, -1.0));
+                let value = lanes(simd, target, part).select_gt(splat(simd, -0.5), value, splat(simd, -1.0));
                 store(power, part, value);
                 for (above, level) in above.iter_mut().zip(levels) {
-                    *above += value.choose(splat(simd, level), one, zero);
+                    *above += value.select_gt(splat(simd, level), one, zero);
                 }
             }
         }
         let last = grid.cells.saturating_sub(1);
-        let (lower_index, weight) = place(last, 100.0 - question.tau_pct);
+        let (lower_index, weight) = place(last, 100.0 - query.tau_pct);
         // Counted from the strongest.
         let rank = last - lower_index;
         // A level that fewer than these lie above, with their upper neighbour, is beyond the threshold.
@@ -66,8 +68,8 @@ impl Tiles {
             }
             low > 0.0 && high < f32::MAX
         };
-        if !bound(levels, [above[0].sum() as usize, above[1].sum() as usize]) {
-            let levels = FAR.map(|level| (level * square) as f32);
+        if !bound(levels, [above[0].reduce_sum() as usize, above[1].reduce_sum() as usize]) {
+            let levels = FAR_LEVELS.map(|level| (level * square) as f32);
             bound(levels, self.above(simd, levels));
         }
         let above = stronger;
@@ -76,14 +78,14 @@ impl Tiles {
         // Where only the upper neighbour is summed, the lower one is nothing beside it.
         let split = || {
             let least = self.ranked.iter().copied().min().filter(|_| self.ranked.len() + above == rank && weight > 0.0);
-            least.map(|upper| [scale.epsilon_sq, f32::from_bits(upper)])
+            least.map(|upper| [range.epsilon_sq, f32::from_bits(upper)])
         };
         let found = found.or_else(split);
         let among_lit = found.is_some();
-        let [lower, upper] = found.unwrap_or([scale.epsilon_sq; 2]);
+        let [lower, upper] = found.unwrap_or([range.epsilon_sq; 2]);
         let upper = if upper.is_nan() { lower } else { upper };
         let value = between(f64::from(lower).sqrt(), f64::from(upper).sqrt(), weight);
-        Threshold { lower, value, log2: value.log2() + scale.log2, among_lit }
+        Threshold { lower, value, log2: value.log2() + range.log2, among_lit }
     }
 
     /// How many squares lie above each level.
@@ -94,7 +96,7 @@ impl Tiles {
             for part in 0..cell_parts::<S>() {
                 let value = lanes(simd, &self.power[tile as usize], part);
                 for (above, level) in above.iter_mut().zip(levels) {
-                    *above += (value - splat(simd, level)).positive().count_ones() as usize;
+                    *above += (value - splat(simd, level)).positive_bits().count_ones() as usize;
                 }
             }
         }
@@ -109,8 +111,8 @@ impl Tiles {
             let power = &self.power[tile as usize];
             for part in 0..cell_parts::<S>() {
                 let value = lanes(simd, power, part);
-                let above = (value - splat(simd, low)).positive();
-                for cell in bits(above & !(value - splat(simd, high)).positive()) {
+                let above = (value - splat(simd, low)).positive_bits();
+                for cell in bits(above & !(value - splat(simd, high)).positive_bits()) {
                     self.ranked.push(power[part * S::F32_LANES + cell].to_bits());
                 }
             }
@@ -122,21 +124,21 @@ impl Tiles {
     pub(super) fn mask<S: Simd, const COHERENT: bool>(
         &mut self,
         simd: S,
-        question: &Question<'_>,
-        scale: &Scale,
+        query: &EmQuery<'_>,
+        range: &F32Range,
         threshold: &Threshold,
     ) -> Mask {
-        let grid = question.tiling;
+        let grid = query.grid;
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
-        let flat = splat(simd, (f64::from(NO_SLOPE) * question.softness) as f32);
-        let centre = (threshold.value + f64::from(scale.soft_floor)).log2();
-        let odds = Odds::new(question.softness, scale.soft_floor, threshold.value);
+        let flat = splat(simd, (f64::from(MIN_MASK_SLOPE) * query.softness) as f32);
+        let centre = (threshold.value + f64::from(range.soft_floor)).log2();
+        let odds = Odds::new(query.softness, range.soft_floor, threshold.value);
         self.sloped.clear();
         self.sloped.resize(self.lit_bits.len(), 0);
         let mut mask = Mask::default();
         let (mut common, mut soft) = (0.0, 0.0);
         let (mut both, mut hard, mut marked, mut lit_cells) = (zero, zero, zero, zero);
-        for tiles in self.lit.chunks(FEW) {
+        for tiles in self.lit.chunks(TILES_OF_F32_SUM) {
             let (mut few_common, mut few_soft) = (zero, zero);
             for &tile in tiles {
                 let tile = tile as usize;
@@ -144,7 +146,7 @@ impl Tiles {
                 let mut steep = false;
                 for part in 0..cell_parts::<S>() {
                     let (target, power) = (lanes(simd, target, part), lanes(simd, cells, part));
-                    let inside = target.choose(splat(simd, -0.5), one, zero);
+                    let inside = target.select_gt(splat(simd, -0.5), one, zero);
                     let b = target.max(zero);
                     let [odds, by_power] = odds.at(simd, power.max(splat(simd, f32::MIN_POSITIVE)));
                     let share = one / (one + odds);
@@ -153,23 +155,24 @@ impl Tiles {
                     few_soft += m;
                     steep |= (m * share - flat).any_positive();
                     store(cells, part, by_power * share * share * inside);
-                    let sim = power.choose(splat(simd, threshold.lower), inside, zero);
+                    let sim = power.select_gt(splat(simd, threshold.lower), inside, zero);
                     both = sim.mul_add(b, both);
                     hard += sim;
                     marked += b;
                     lit_cells += inside;
                 }
-                self.sloped[tile / BLOCK] |= u32::from(steep) << (tile % BLOCK);
+                self.sloped[tile / BLOCK_TILES] |= u32::from(steep) << (tile % BLOCK_TILES);
             }
-            common += f64::from(few_common.sum());
-            soft += f64::from(few_soft.sum());
+            common += f64::from(few_common.reduce_sum());
+            soft += f64::from(few_soft.reduce_sum());
         }
         // Cells that were not summed are at the floor, and alike.
-        let [both, hard, marked, lit_cells] = [both.sum(), hard.sum(), marked.sum(), lit_cells.sum()];
+        let [both, hard, marked, lit_cells] =
+            [both.reduce_sum(), hard.reduce_sum(), marked.reduce_sum(), lit_cells.reduce_sum()];
         let idle_marked = grid.marked as f64 - f64::from(marked);
         let idle = grid.cells as f64 - f64::from(lit_cells);
-        let floor = f64::from(scale.epsilon_sq.sqrt()) + f64::from(scale.soft_floor);
-        let idle_soft = 1.0 / (1.0 + ((centre - floor.log2()) / question.softness).exp2());
+        let floor = f64::from(range.epsilon_sq.sqrt()) + f64::from(range.soft_floor);
+        let idle_soft = 1.0 / (1.0 + ((centre - floor.log2()) / query.softness).exp2());
         mask.common = common + idle_soft * idle_marked;
         mask.union = soft + idle_soft * idle + grid.marked as f64 - mask.common;
         mask.both = both as usize;
@@ -179,26 +182,26 @@ impl Tiles {
 
     /// Turns the sums into w S*/|S|² (or w/Σ(AK)² where the sum is incoherent), w = ∂L/∂ln|S|.
     #[inline(always)]
-    pub(super) fn weigh<S: Simd, const COHERENT: bool>(
+    pub(super) fn weight_sums<S: Simd, const COHERENT: bool>(
         &mut self,
         simd: S,
-        question: &Question<'_>,
+        query: &EmQuery<'_>,
         mask: &Mask,
         factor: f64,
     ) {
-        let grid = question.tiling;
+        let grid = query.grid;
         let inside = splat(simd, (-factor / mask.union) as f32);
         let outside = splat(simd, (factor * mask.common / (mask.union * mask.union)) as f32);
         for (block, (&tiles, &lit)) in self.sloped.iter().zip(&self.lit_bits).enumerate() {
             // Strips go through tiles without a slope, too.
             for tile in bits(lit & !tiles) {
-                clear(simd, &mut self.sums[block * BLOCK + tile]);
+                clear(simd, &mut self.sums[block * BLOCK_TILES + tile]);
             }
             for tile in bits(tiles) {
-                let tile = block * BLOCK + tile;
+                let tile = block * BLOCK_TILES + tile;
                 let (target, [re, im], soft) = (&grid.target[tile], &mut self.sums[tile], &self.power[tile]);
                 for part in 0..cell_parts::<S>() {
-                    let by_m = lanes(simd, target, part).choose(splat(simd, 0.5), inside, outside);
+                    let by_m = lanes(simd, target, part).select_gt(splat(simd, 0.5), inside, outside);
                     let weight = lanes(simd, soft, part) * by_m;
                     if COHERENT {
                         let (weighed_re, weighed_im) = (lanes(simd, re, part) * weight, lanes(simd, im, part) * weight);
@@ -242,12 +245,15 @@ impl Odds {
         let of = |x: f32| splat(simd, x);
         if self.soft_floor == 0.0 && self.sharpness == 2.0 {
             // T = ½ takes no powers.
-            let (odds, most) = (power * of(self.square), of(ODDS.exp2()));
-            return [odds.min(most), odds.choose(most, of(0.0), of(self.square))];
+            let (odds, most) = (power * of(self.square), of(MAX_ODDS_LOG2.exp2()));
+            return [odds.min(most), odds.select_gt(most, of(0.0), of(self.square))];
         }
         let h = power.sqrt();
         let raised = h + of(self.soft_floor);
-        let odds = ((raised.log2() - of(self.centre)) * of(self.sharpness)).min(of(ODDS)).max(of(-ODDS)).exp2();
+        let odds = ((raised.log2() - of(self.centre)) * of(self.sharpness))
+            .min(of(MAX_ODDS_LOG2))
+            .max(of(-MAX_ODDS_LOG2))
+            .exp2();
         [odds, odds / (raised * h)]
     }
 }

@@ -1,5 +1,24 @@
 //! The fast path of L_EM: f32, in tiles of 4 × 8 cells, each summed over the joints that matter there.
 //!
+//! ```text
+//!            last axis, "along" →
+//!            ┌───────┬───────┬───────┬─ … ─┬───────┐
+//!  the axis  │ tile  │ tile  │ tile  │     │ tile  │   a block: sixteen tiles beside each other,
+//!  before,   │   0   │   1   │   2   │     │  15   │   64 bins along, 8 across (`grid.rs`, `cells.rs`)
+//!  "across"  └───────┴───────┴───────┴─ … ─┴───────┘
+//!     ↓      a row of tiles is as many blocks as the box is wide; the last may reach beyond it
+//!
+//!  a tile: 4 × 8 cells               strips of a block: a joint in the tiles that it matters to (`strip.rs`)
+//!  ┌───┬───┬───┬───┐                  tile     0 1 2 3 4 5 6 7 8 9 …
+//!  │ 0 │ 1 │ 2 │ 3 │                  joint 3  · ■ ■ ■ ■ · · · · ·   first 1, count 4
+//!  │ 4 │ 5 │ 6 │ 7 │                  joint 7  · · · ■ ■ ■ ■ ■ ■ ·   first 3, count 6
+//!  │ … │   │   │   │                  joint 8  · · · · · · · · · ·   dropped: no strip
+//!  │28 │29 │30 │31 │                  summed     ■ ■ ■ ■ ■ ■ ■ ■     "lit" tiles; the others are at the floor
+//!  └───┴───┴───┴───┘
+//!  32 f32: two registers             in a chained strip the cells of tile k + 1 are those of tile k times `gain`, and the
+//!  of AVX-512, four of AVX2          middle of each tile is a complex number: a product a cell, no exponential
+//! ```
+//!
 //! One view goes through five stages, none of which allocates once its buffers have grown:
 //! 1. [`Joint`]: a splat in powers of two, its quadratic form and phase within a tile as tables, and what is the same
 //!    along a row of tiles.
@@ -17,208 +36,51 @@
     reason = "all of it belongs into the one function that is compiled for an instruction set"
 )]
 
+mod cells;
 mod collect;
+mod f32_range;
+mod grid;
 mod joint;
 mod mask;
 mod strip;
 mod sum;
+#[cfg(test)]
+mod tests;
+
+pub(super) use grid::{TileGrid, blocks_of};
 
 use super::adjoint::{self, Moments};
-use super::floors::{EPSILON, SOFT_FLOOR, ViewLoss, share};
+use super::floors::{EPSILON, ViewLoss, share};
 use super::lanes::{Lanes, splat};
 use super::percentile::{between, place};
 use super::splat::Splats;
 use crate::config::Summation;
+use cells::{
+    Aligned, BLOCK_TILES, CELL_ACROSS_BINS, CELL_ALONG_BINS, ComplexPerCell, HALF_TILE_ACROSS_BINS,
+    HALF_TILE_ALONG_BINS, PerCell, PerTile, TILE_ACROSS_BINS, TILE_ALONG_BINS, TILE_CELLS, TILE_STEPS_BINS, cell_parts,
+    lanes, store, tile_parts,
+};
 use collect::Gathered;
+use f32_range::{F32Range, MAX_GUESS_TOO_HIGH_LN, MAX_GUESS_TOO_LOW_LN, MAX_RETURN_LOG2, MIN_RETURN_LOG2};
+use grid::Block;
 use joint::Joint;
 use pulp::{Arch, Simd, WithSimd};
 use std::f64::consts::LOG2_E;
-use std::ops::{Deref, DerefMut};
 use strip::Strip;
 
-/// Bins of a tile along the last axis and along the one before.
-const ALONG_BINS: usize = 4;
-const ACROSS_BINS: usize = 8;
-const CELLS: usize = ALONG_BINS * ACROSS_BINS;
-/// Tiles of a block.
-const BLOCK: usize = 16;
-/// From a tile's middle to its outermost cells.
-const REACH_ALONG: f32 = 0.5 * (ALONG_BINS - 1) as f32;
-const REACH_ACROSS: f32 = 0.5 * (ACROSS_BINS - 1) as f32;
-/// Cells of a tile relative to its middle.
-const ALONG: Cells = from_middle(1, ALONG_BINS);
-const ACROSS: Cells = from_middle(ALONG_BINS, ACROSS_BINS);
-/// From the first tile of a block to each of its sixteen, bins.
-const STEPS: Sixteen = {
-    let mut steps = [0.0; BLOCK];
-    let mut tile = 0;
-    while tile < BLOCK {
-        steps[tile] = (tile * ALONG_BINS) as f32;
-        tile += 1;
-    }
-    Row(steps)
-};
-
-/// Numbers that lie as registers want them.
-#[derive(Debug, Clone, Copy)]
-#[repr(align(64))]
-struct Row<const N: usize>([f32; N]);
-
-/// A number a cell of a tile.
-type Cells = Row<CELLS>;
-/// Re and Im.
-type Pair = [Cells; 2];
-/// A number a tile of a block, or a row of tiles of sixteen.
-type Sixteen = Row<BLOCK>;
-
-impl<const N: usize> Row<N> {
-    const ZERO: Self = Self::all(0.0);
-
-    const fn all(x: f32) -> Self {
-        Self([x; N])
-    }
-}
-
-impl<const N: usize> Default for Row<N> {
-    fn default() -> Self {
-        Self::ZERO
-    }
-}
-
-impl<const N: usize> Deref for Row<N> {
-    type Target = [f32; N];
-    #[inline(always)]
-    fn deref(&self) -> &[f32; N] {
-        &self.0
-    }
-}
-
-impl<const N: usize> DerefMut for Row<N> {
-    #[inline(always)]
-    fn deref_mut(&mut self) -> &mut [f32; N] {
-        &mut self.0
-    }
-}
-
-/// Each cell's bin, of those that are `stride` cells apart, from the middle of `bins`.
-const fn from_middle(stride: usize, bins: usize) -> Cells {
-    let mut from = [0.0; CELLS];
-    let mut cell = 0;
-    while cell < CELLS {
-        from[cell] = (cell / stride % bins) as f32 - 0.5 * (bins - 1) as f32;
-        cell += 1;
-    }
-    Row(from)
-}
-
 /// Softest mask, T, whose reach the powers of two of f32 hold; softer ones take the plain kernel.
-const SOFTEST: f64 = 1.5;
-/// Below e^−15T of the threshold, `GUESS` included, a cell neither counts nor pulls (3e-7).
-const MASK_REACH: f64 = 14.0;
-/// A joint this much weaker (in ln) than the threshold is dropped, and at least `MARGIN` under the weakest cell that counts.
-const BELOW: f64 = 13.0;
-const MARGIN: f64 = 3.0;
-/// The guess of ln threshold may be this much too high.
-const GUESS: f64 = 1.0;
-/// And this much too low: beyond it the strongest returns would leave f32's range.
-const HIGH: f64 = 12.0;
+const MAX_SOFTNESS: f64 = 1.5;
 /// Guesses of the threshold at most.
-const TRIES: usize = 40;
-/// A joint this much weaker (in ln) than the strongest at its cells is dropped: from the objective (3e-4), whose mask is
-/// soft, and from a map (5e-5).
-const RELATIVE: f64 = 8.0;
-const RELATIVE_IN_MAPS: f64 = 10.0;
-/// ln of the weakest return that counts relative to the view's scale.
-const WEAKEST: f64 = -36.0;
-/// log₂ below which no return is taken: squares of its parts are normal f32, for others cost a hundred cycles.
-const FAINTEST: f32 = -54.0;
-/// log₂ of the strongest return relative to the view's scale; what is stronger is far above any threshold.
-const STRONGEST: f32 = 54.0;
-/// log₂ of how far the strongest joint of a map stays under what is strongest in f32, for the sum of all.
-const ROOM: f64 = 8.0;
+const MAX_GUESSES: usize = 40;
 /// log₂ of how far a map may stay under its strongest joint.
-const OUTSIDE: f64 = 30.0;
-/// m(1 − m)/T below which a tile has no slope.
-const NO_SLOPE: f32 = 3e-7;
-
-/// A box of cells in tiles, and B_ori over it: fixed for a fit. Sixteen tiles beside each other are a block; the last
-/// block of a row may reach beyond the box, as may the last row and column of tiles.
-#[derive(Debug, Clone)]
-pub(super) struct Tiling {
-    /// First bin of the last three axes (outermost first; missing axes have one bin, 0).
-    lo: [usize; 3],
-    size: [usize; 3],
-    /// Tiles across and along.
-    rows: usize,
-    columns: usize,
-    blocks: Vec<Block>,
-    /// Sixteen tiles a block: B_ori as 0 or 1, −1 beyond the box.
-    target: Vec<Cells>,
-    cells: usize,
-    marked: usize,
-}
-
-/// Sixteen tiles beside each other: its slice, its row, and its first column of tiles.
-#[derive(Debug, Clone, Copy)]
-struct Block {
-    slice: usize,
-    row: usize,
-    column: usize,
-}
-
-/// Blocks of a box of these sizes, the last axis last.
-pub(super) fn blocks_of(sizes: impl DoubleEndedIterator<Item = usize>) -> usize {
-    let in_block = [BLOCK * ALONG_BINS, ACROSS_BINS, 1];
-    sizes.rev().zip(in_block).fold(1, |blocks, (size, bins)| blocks * size.div_ceil(bins))
-}
-
-impl Tiling {
-    /// Cuts the box `bins` ([lo, hi) per axis), with B_ori in C order.
-    pub(super) fn new(bins: &[[usize; 2]], ori: &[bool]) -> Self {
-        let (mut lo, mut size) = ([0; 3], [1; 3]);
-        for (k, &[from, to]) in bins.iter().rev().take(3).enumerate() {
-            (lo[2 - k], size[2 - k]) = (from, to.saturating_sub(from));
-        }
-        let (rows, columns) = (size[1].div_ceil(ACROSS_BINS), size[2].div_ceil(ALONG_BINS));
-        let marked = ori.iter().filter(|&&b| b).count();
-        let of_line = |line| {
-            let (slice, row) = (line / rows, line % rows);
-            (0..columns).step_by(BLOCK).map(move |column| Block { slice, row, column })
-        };
-        let blocks = (0..size[0] * rows).flat_map(of_line).collect();
-        let mut tiling = Self { lo, size, rows, columns, blocks, target: Vec::new(), cells: ori.len(), marked };
-        let mut target = vec![Cells::all(-1.0); size[0] * rows * columns.div_ceil(BLOCK) * BLOCK];
-        let mut ori = ori.iter();
-        tiling.for_places(|tile, cell| target[tile][cell] = ori.next().map_or(-1.0, |&ori| f32::from(u8::from(ori))));
-        tiling.target = target;
-        tiling
-    }
-
-    /// Calls `each` with the tile of every cell of the box and which of its cells it is, in C order.
-    fn for_places(&self, mut each: impl FnMut(usize, usize)) {
-        let ([slices, height, width], row_tiles) = (self.size, self.columns.div_ceil(BLOCK) * BLOCK);
-        for slice in 0..slices {
-            for y in 0..height {
-                let first = (slice * self.rows + y / ACROSS_BINS) * row_tiles;
-                for x in 0..width {
-                    each(first + x / ALONG_BINS, y % ACROSS_BINS * ALONG_BINS + x % ALONG_BINS);
-                }
-            }
-        }
-    }
-
-    /// Bins of the first tile's middle, across and along.
-    fn middle(&self) -> [f64; 2] {
-        [self.lo[1] as f64 + f64::from(REACH_ACROSS), self.lo[2] as f64 + f64::from(REACH_ALONG)]
-    }
-}
+const MAX_MAP_BELOW_JOINTS_LOG2: f64 = 30.0;
 
 /// Buffers of one view.
 #[derive(Debug, Default)]
 pub(super) struct Tiles {
     joints: Vec<Joint>,
     /// log₂ of the strongest joint in the middles of some blocks' tiles.
-    middles: Vec<Sixteen>,
+    middles: Vec<PerTile>,
     /// Those that reach a row.
     present: Vec<u32>,
     /// Block by block, the first `used` of them; `ends` tells where each block's strips end.
@@ -232,9 +94,9 @@ pub(super) struct Tiles {
     lit: Vec<u32>,
     /// The sum over joints a tile (Σ(AK)² where the sum is incoherent); later times w/|S|². This and what follows holds
     /// where tiles are lit.
-    sums: Vec<Pair>,
+    sums: Vec<ComplexPerCell>,
     /// H² relative to the scale, −1 beyond the box; later m(1 − m)/|S|² · d ln(H + h)/d ln|S|.
-    power: Vec<Cells>,
+    power: Vec<PerCell>,
     /// Tiles where the mask has a slope: a bit each, a block's in one number.
     sloped: Vec<u32>,
     /// Each joint's moments over the blocks, a number a cell of a tile; zeros when they have been collected.
@@ -246,20 +108,20 @@ pub(super) struct Tiles {
     last_level: f64,
 }
 
-/// What one view asks.
-pub(super) struct Question<'a> {
+/// L_EM of one view, as it is asked for.
+pub(super) struct EmQuery<'a> {
     pub splats: &'a Splats,
-    pub tiling: &'a Tiling,
+    pub grid: &'a TileGrid,
     pub summation: Summation,
     pub tau_pct: f64,
     pub softness: f64,
     /// Factor of the gradient; `None` where none is wanted.
-    pub scale: Option<f64>,
+    pub gradient_factor: Option<f64>,
 }
 
-/// Whether f32 reaches as far as a soft mask of this temperature.
-pub(super) fn reaches(softness: f64) -> bool {
-    softness <= SOFTEST
+/// Whether f32 holds a soft mask of this temperature.
+pub(super) fn holds(softness: f64) -> bool {
+    softness <= MAX_SOFTNESS
 }
 
 /// The instruction set that the tiles run on here.
@@ -281,29 +143,29 @@ pub fn simd_path() -> &'static str {
 }
 
 impl Tiles {
-    /// Answers `question`, and fills `moments` (one a joint, zeroed) where a gradient is wanted.
-    pub(super) fn evaluate(&mut self, question: &Question<'_>, moments: &mut Moments) -> ViewLoss {
-        match question.summation {
-            Summation::Coherent => Arch::new().dispatch(Run::<true> { tiles: self, question, moments }),
-            Summation::Incoherent => Arch::new().dispatch(Run::<false> { tiles: self, question, moments }),
+    /// Answers `query`, and fills `moments` (one a joint, zeroed) where a gradient is wanted.
+    pub(super) fn evaluate(&mut self, query: &EmQuery<'_>, moments: &mut Moments) -> ViewLoss {
+        match query.summation {
+            Summation::Coherent => Arch::new().dispatch(EvaluateQuery::<true> { tiles: self, query, moments }),
+            Summation::Incoherent => Arch::new().dispatch(EvaluateQuery::<false> { tiles: self, query, moments }),
         }
     }
 }
 
 impl Tiles {
     /// H_sim of every cell in C order, f64; `None` where f32's range does not hold it.
-    pub(super) fn map(&mut self, splats: &Splats, tiling: &Tiling, summation: Summation) -> Option<Vec<f64>> {
+    pub(super) fn map(&mut self, splats: &Splats, grid: &TileGrid, summation: Summation) -> Option<Vec<f64>> {
         match summation {
-            Summation::Coherent => Arch::new().dispatch(Whole::<true> { tiles: self, splats, tiling }),
-            Summation::Incoherent => Arch::new().dispatch(Whole::<false> { tiles: self, splats, tiling }),
+            Summation::Coherent => Arch::new().dispatch(EvaluateMap::<true> { tiles: self, splats, grid }),
+            Summation::Incoherent => Arch::new().dispatch(EvaluateMap::<false> { tiles: self, splats, grid }),
         }
     }
 
-    fn values<const COHERENT: bool>(&self, tiling: &Tiling, log2: f64) -> Vec<f64> {
+    fn values<const COHERENT: bool>(&self, grid: &TileGrid, log2: f64) -> Vec<f64> {
         let (unit, floor) = ((2.0 * log2).exp2(), EPSILON * EPSILON);
-        let mut values = Vec::with_capacity(tiling.cells);
-        tiling.for_places(|tile, cell| {
-            let lit = self.lit_bits[tile / BLOCK] >> (tile % BLOCK) & 1 == 1;
+        let mut values = Vec::with_capacity(grid.cells);
+        grid.for_places(|tile, cell| {
+            let lit = self.lit_bits[tile / BLOCK_TILES] >> (tile % BLOCK_TILES) & 1 == 1;
             let [re, im] = [0, 1].map(|part| f64::from(self.sums[tile][part][cell]));
             let square = if COHERENT { re * re + im * im } else { re };
             values.push(if lit { (unit * square + floor).sqrt() } else { EPSILON });
@@ -312,41 +174,41 @@ impl Tiles {
     }
 }
 
-struct Run<'a, const COHERENT: bool> {
+struct EvaluateQuery<'a, const COHERENT: bool> {
     tiles: &'a mut Tiles,
-    question: &'a Question<'a>,
+    query: &'a EmQuery<'a>,
     moments: &'a mut Moments,
 }
 
-impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
+impl<const COHERENT: bool> WithSimd for EvaluateQuery<'_, COHERENT> {
     type Output = ViewLoss;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> ViewLoss {
-        let Self { tiles, question, moments } = self;
-        if !tiles.fill::<S, COHERENT>(simd, question.splats, question.tiling) {
+        let Self { tiles, query, moments } = self;
+        if !tiles.fill::<S, COHERENT>(simd, query.splats, query.grid) {
             return ViewLoss { loss: f64::NAN, iou: None };
         }
         let floor = EPSILON.log2();
-        let mut guess = tiles.guess(simd, question);
-        let mut tries = 0..TRIES;
+        let mut guess = tiles.guess(simd, query);
+        let mut tries = 0..MAX_GUESSES;
         loop {
-            let scale = Scale::new(guess, question.softness);
-            tiles.sum::<S, COHERENT>(simd, question.tiling, &scale);
-            let threshold = tiles.threshold::<S, COHERENT>(simd, question, &scale);
-            let low = guess > floor && threshold.log2 < guess - GUESS * LOG2_E;
-            let high = threshold.log2 > guess + HIGH * LOG2_E;
+            let range = F32Range::new(guess, query.softness);
+            tiles.sum::<S, COHERENT>(simd, query.grid, &range);
+            let threshold = tiles.threshold::<S, COHERENT>(simd, query, &range);
+            let low = guess > floor && threshold.log2 < guess - MAX_GUESS_TOO_HIGH_LN * LOG2_E;
+            let high = threshold.log2 > guess + MAX_GUESS_TOO_LOW_LN * LOG2_E;
             if (low || high) && tries.next().is_some() {
                 guess = if threshold.among_lit { threshold.log2 } else { guess - 30.0 }.max(floor);
                 continue;
             }
             tiles.last = Some(threshold.log2);
-            let mask = tiles.mask::<S, COHERENT>(simd, question, &scale, &threshold);
-            if let Some(factor) = question.scale
+            let mask = tiles.mask::<S, COHERENT>(simd, query, &range, &threshold);
+            if let Some(factor) = query.gradient_factor
                 && mask.union > 0.0
             {
-                tiles.weigh::<S, COHERENT>(simd, question, &mask, factor / question.softness);
-                tiles.collect::<S, COHERENT>(simd, question.tiling, moments);
+                tiles.weight_sums::<S, COHERENT>(simd, query, &mask, factor / query.softness);
+                tiles.collect::<S, COHERENT>(simd, query.grid, moments);
             }
             return mask.answer();
         }
@@ -354,68 +216,27 @@ impl<const COHERENT: bool> WithSimd for Run<'_, COHERENT> {
 }
 
 /// H_sim over a box.
-struct Whole<'a, const COHERENT: bool> {
+struct EvaluateMap<'a, const COHERENT: bool> {
     tiles: &'a mut Tiles,
     splats: &'a Splats,
-    tiling: &'a Tiling,
+    grid: &'a TileGrid,
 }
 
-impl<const COHERENT: bool> WithSimd for Whole<'_, COHERENT> {
+impl<const COHERENT: bool> WithSimd for EvaluateMap<'_, COHERENT> {
     type Output = Option<Vec<f64>>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Option<Vec<f64>> {
-        let Self { tiles, splats, tiling } = self;
-        if !tiles.fill::<S, COHERENT>(simd, splats, tiling) {
+        let Self { tiles, splats, grid } = self;
+        if !tiles.fill::<S, COHERENT>(simd, splats, grid) {
             return None;
         }
         let loudest = tiles.joints.iter().map(|joint| joint.top + f64::from(joint.spectrum())).fold(f64::MIN, f64::max);
-        let scale = Scale::below(loudest);
-        tiles.sum::<S, COHERENT>(simd, tiling, &scale);
+        let range = F32Range::below(loudest);
+        tiles.sum::<S, COHERENT>(simd, grid, &range);
         // A map that none of the joints reaches in its own cells has its largest values elsewhere in f32's range.
-        let within = f64::from(tiles.highest) >= loudest - OUTSIDE;
-        within.then(|| tiles.values::<COHERENT>(tiling, scale.log2))
-    }
-}
-
-/// Where f32's range lies in this view.
-struct Scale {
-    /// log₂ of what 1 stands for.
-    log2: f64,
-    /// log₂ relative to it below which nothing counts.
-    cut: f32,
-    /// ε and h of SPEC section 3 and 4 relative to it.
-    epsilon_sq: f32,
-    soft_floor: f32,
-    /// log₂ of the lowest threshold that the guess allows, and by how many powers a cell below it pulls less than a joint
-    /// that is as strong as the threshold: 1/T − 1.
-    low: f32,
-    fading: f32,
-    /// log₂ of how much weaker than the strongest a joint counts.
-    relative: f32,
-}
-
-impl Scale {
-    /// For a whole map whose strongest joint has `log2` at its middle: all that f32's range holds below it.
-    fn below(log2: f64) -> Self {
-        let relative = (RELATIVE_IN_MAPS * LOG2_E) as f32;
-        Self { log2: log2 - f64::from(STRONGEST) + ROOM, fading: 0.0, relative, ..Self::new(0.0, 1.0) }
-    }
-
-    fn new(guess: f64, softness: f64) -> Self {
-        let below = ((MASK_REACH * softness + MARGIN).max(BELOW) + GUESS) * LOG2_E;
-        let log2 = guess - below - WEAKEST * LOG2_E;
-        let epsilon = (EPSILON.log2() - log2).exp2();
-        let soft_floor = (SOFT_FLOOR.log2() - log2).exp2() as f32;
-        Self {
-            log2,
-            cut: (WEAKEST * LOG2_E) as f32,
-            epsilon_sq: (epsilon * epsilon) as f32,
-            soft_floor,
-            low: (guess - GUESS * LOG2_E) as f32,
-            fading: (1.0 / softness - 1.0).max(0.0) as f32,
-            relative: (RELATIVE * LOG2_E) as f32,
-        }
+        let within = f64::from(tiles.highest) >= loudest - MAX_MAP_BELOW_JOINTS_LOG2;
+        within.then(|| tiles.values::<COHERENT>(grid, range.log2))
     }
 }
 
@@ -443,29 +264,10 @@ impl Mask {
     }
 }
 
-/// Parts of a tile's cells, and of a block's tiles.
-const fn cell_parts<S: Simd>() -> usize {
-    CELLS / S::F32_LANES
-}
-
-const fn tile_parts<S: Simd>() -> usize {
-    BLOCK / S::F32_LANES
-}
-
-#[inline(always)]
-fn lanes<S: Simd, const N: usize>(simd: S, of: &Row<N>, part: usize) -> Lanes<S> {
-    Lanes::new(simd, S::as_simd_f32s(&of.0).0[part])
-}
-
-#[inline(always)]
-fn store<S: Simd, const N: usize>(into: &mut Row<N>, part: usize, x: Lanes<S>) {
-    S::as_mut_simd_f32s(&mut into.0).0[part] = x.value;
-}
-
 impl Tiles {
     /// Takes the splats in; false where one is not finite.
     #[inline(always)]
-    fn fill<S: Simd, const COHERENT: bool>(&mut self, simd: S, splats: &Splats, grid: &Tiling) -> bool {
+    fn fill<S: Simd, const COHERENT: bool>(&mut self, simd: S, splats: &Splats, grid: &TileGrid) -> bool {
         self.joints.resize_with(splats.joints(), Joint::default);
         for (joint, splat) in self.joints.iter_mut().zip(splats.iter()) {
             joint.fill::<S, COHERENT>(simd, &splat, grid);

@@ -2,7 +2,8 @@
 
 use crate::body::Pppr;
 use crate::dataset::{Dataset, DatasetError, Frame};
-use crate::session::command::{Effect, StartAt};
+use crate::session::command::StartAt;
+use crate::session::effect::Effect;
 use crate::session::evidence::EvidenceState;
 use crate::session::fit::{Fit, FitStatus};
 use crate::session::history::History;
@@ -59,8 +60,7 @@ impl Session {
         let mut effects = self.leave_frame();
         self.fits.clear();
         self.left.clear();
-        self.summaries.clear();
-        self.summarised += 1;
+        self.summaries.change().clear();
         self.pins = Pins::default();
         self.evidence = EvidenceState::default();
         self.data.frame = None;

@@ -4,11 +4,11 @@ use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::diagnose::Evidence;
 use crate::digest;
-use crate::session::command::Effect;
+use crate::session::effect::Effect;
 use crate::session::evidence::EvidenceRequest;
 use crate::session::fit::FitStatus;
 use crate::session::state::{FitHashes, LogLevel, Session};
-use crate::session::strata::{AT_ONCE, Strata, StrataStatus};
+use crate::session::strata::{AT_ONCE, StrataStatus};
 use crate::study::complexity::{Complexity, Stratum};
 use sha2::{Digest as _, Sha256};
 use std::sync::Arc;
@@ -16,8 +16,7 @@ use std::sync::Arc;
 impl Session {
     /// Grades a data set that was opened: small ones at once, large ones from what an earlier run left.
     pub(super) fn begin_strata(&mut self) -> Vec<Effect> {
-        self.strata = Strata::default();
-        self.stale = true;
+        self.strata.clear();
         self.grade(self.data.len() > AT_ONCE)
     }
 
@@ -41,7 +40,7 @@ impl Session {
                     return Vec::new();
                 }
                 let failures = complexity.failures.len();
-                self.strata = Strata { status: StrataStatus::Ready, result: Some(complexity) };
+                self.strata.set(complexity);
                 let [easy, medium, hard] =
                     [Stratum::Easy, Stratum::Medium, Stratum::Hard].map(|stratum| self.strata.count(stratum));
                 self.note(LogLevel::Info, format!("strata: {easy} easy, {medium} medium, {hard} hard"));
@@ -55,7 +54,6 @@ impl Session {
                 self.strata.status = StrataStatus::Failed(why);
             }
         }
-        self.stale = true;
         Vec::new()
     }
 

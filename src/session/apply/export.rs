@@ -4,7 +4,8 @@
 use crate::dataset::{Dataset, write_pppr};
 use crate::labels::{Record, write_csv, write_json};
 use crate::output::replace_file;
-use crate::session::command::{BackgroundTask, Effect, Export};
+use crate::session::command::Export;
+use crate::session::effect::{BackgroundTask, Effect};
 use crate::session::file::SessionFile;
 use crate::session::state::{LogLevel, Session};
 use crate::study::{CurveRow, complexity, write_curves, write_ply};

@@ -2,7 +2,7 @@
 
 use crate::body::Pppr;
 use crate::config::{FitConfig, ReadBy, difference};
-use crate::session::command::Effect;
+use crate::session::effect::Effect;
 use crate::session::fit::FitStatus;
 use crate::session::state::{LogLevel, Session};
 use crate::worker::WorkerCommand;

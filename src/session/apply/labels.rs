@@ -2,8 +2,9 @@
 
 use crate::labels::{CellRegion, Change, Judged, LabelPlace, Record, Tag, Verdict};
 use crate::session::acts::{ActKind, Asked};
-use crate::session::command::{Commit, Effect, OpenedLabels, Trash, Written};
+use crate::session::effect::{Commit, Effect, Trash};
 use crate::session::labels::{LabelMode, LabelStatus, LabelTable};
+use crate::session::report::{OpenedLabels, Written};
 use crate::session::state::{FitHashes, LogLevel, Session};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -174,14 +175,13 @@ impl Session {
                 self.labels_warned(opened.warnings);
                 self.labels_placed(opened.place);
                 self.labels.last_edited = opened.last_edited;
-                self.labels.table = opened.table;
+                *self.labels.table.change() = opened.table;
             }
             Err(why) => {
                 self.note(LogLevel::Error, format!("labels cannot be kept: {why}"));
                 self.labels.status = LabelStatus::Failed(why);
             }
         }
-        self.labels_changed();
         Vec::new()
     }
 
@@ -205,12 +205,6 @@ impl Session {
         Vec::new()
     }
 
-    /// A list that asks for labels is filled again.
-    fn labels_changed(&mut self) {
-        self.labels.revision += 1;
-        self.stale |= self.list_reads().labels();
-    }
-
     /// The journal acknowledged an act, or could not write it.
     pub(super) fn labels_written(&mut self, written: Written) -> Vec<Effect> {
         let Written { id, kind, act, result } = written;
@@ -228,7 +222,6 @@ impl Session {
                     self.hint(format!("{act}{on}"));
                 }
                 let replaced = self.labels.written(kind, act, done);
-                self.labels_changed();
                 free(replaced.len(), (asked, replaced))
             }
             Err(why) => {
@@ -243,8 +236,7 @@ impl Session {
         if self.labels.status != LabelStatus::Ready {
             return Vec::new();
         }
-        let old = std::mem::replace(&mut self.labels.table, table);
-        self.labels_changed();
+        let old = std::mem::replace(self.labels.table.change(), table);
         free(old.values().map(super::super::Records::count).sum(), old)
     }
 

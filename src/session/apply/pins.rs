@@ -1,6 +1,6 @@
 //! Pinning the state on screen, and going back to where a pin was made.
 
-use crate::session::command::Effect;
+use crate::session::effect::Effect;
 use crate::session::pins::{MOST_PINS, Pin, PinRow};
 use crate::session::state::{LogLevel, Session};
 use crate::worker::Snapshot;

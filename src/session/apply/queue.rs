@@ -1,21 +1,17 @@
 //! The frame list: filter, order, and what "next" means.
 
-use crate::session::command::Effect;
-use crate::session::queue::{FrameRow, Reads, SavedView, Sort};
+use crate::session::effect::Effect;
+use crate::session::queue::{FrameRow, ListedFrom, Reads, SavedView, Sort};
 use crate::session::state::{FrameSummary, LogLevel, Session};
 
 impl Session {
     pub(super) fn set_filter(&mut self, text: String) -> Vec<Effect> {
         self.queue.set_text(text);
-        self.stale = true;
         Vec::new()
     }
 
     pub(super) fn set_sort(&mut self, sort: Sort) -> Vec<Effect> {
-        if self.view.sort != sort {
-            self.view.sort = sort;
-            self.stale = true;
-        }
+        self.view.sort = sort;
         Vec::new()
     }
 
@@ -91,10 +87,11 @@ impl Session {
     /// Fills the list again where something it depends on changed. While a fit runs, the order stays as it is: nothing
     /// jumps under the pointer.
     pub(super) fn refresh_queue(&mut self) {
-        if !self.stale || self.fit.is_running() {
+        let from = self.listed_from();
+        if self.listed == Some(from) || self.fit.is_running() {
             return;
         }
-        self.stale = false;
+        self.listed = Some(from);
         if let Some(at) = self.queue.position(self.data.frame_index) {
             self.queue.last_position = at;
         }
@@ -113,9 +110,18 @@ impl Session {
         }
     }
 
-    /// What of a row the list depends on.
-    pub(super) fn list_reads(&self) -> Reads {
-        self.queue.reads(self.view.sort)
+    /// What the list would be filled from now.
+    fn listed_from(&self) -> ListedFrom {
+        let reads = self.queue.reads(self.view.sort);
+        ListedFrom {
+            frames: self.data.len(),
+            filter: self.queue.filter.revision(),
+            strata: self.strata.revision(),
+            fits: reads.fit.then(|| self.summaries.revision()),
+            labels: reads.labels().then(|| self.labels.revision()),
+            sort: self.view.sort,
+            label_mode: self.view.label_mode,
+        }
     }
 
     /// Everything that the list knows of a frame.

@@ -2,7 +2,7 @@
 
 use super::diagnosis::hashes;
 use crate::diagnose::joint_errors;
-use crate::session::command::Effect;
+use crate::session::effect::Effect;
 use crate::session::fit::FitStatus;
 use crate::session::history::IterationRow;
 use crate::session::state::{FrameSummary, LogLevel, Session};
@@ -36,7 +36,6 @@ impl Session {
 
     pub(super) fn summarise(&mut self) {
         let Some(row) = self.fit.branch().and_then(|branch| branch.rows.last()) else { return };
-        self.summarised += 1;
         if row.report.iteration == 0 {
             self.forget_summary(self.fit.frame);
             return;
@@ -55,22 +54,28 @@ impl Session {
             converged: Some(row.report.converged),
             majpe_mm: row.majpe_mm,
         };
-        self.summaries.insert(self.fit.frame, summary);
-        self.stale = true;
+        self.summaries.change().insert(self.fit.frame, summary);
     }
 
-    /// What a fit in this session says of the frame on screen; not what a table of results says of it.
-    fn own_summary(&mut self) -> Option<&mut FrameSummary> {
-        self.summaries.get_mut(&self.fit.frame).filter(|summary| summary.hashes.is_some())
+    /// True where a fit in this session said something of a frame, not only a table of results.
+    fn is_summarised(&self, frame: usize) -> bool {
+        self.summaries.get(&frame).is_some_and(|summary| summary.hashes.is_some())
+    }
+
+    /// Changes what a fit in this session says of the frame on screen; not what a table of results says of it.
+    fn change_summary(&mut self, change: impl FnOnce(&mut FrameSummary)) {
+        if self.is_summarised(self.fit.frame)
+            && let Some(summary) = self.summaries.change().get_mut(&self.fit.frame)
+        {
+            change(summary);
+        }
     }
 
     /// Forgets what a fit in this session said of a frame; what a table of results says of it stays.
     pub(super) fn forget_summary(&mut self, frame: usize) {
-        if self.summaries.get(&frame).is_some_and(|summary| summary.hashes.is_some()) {
-            self.summaries.remove(&frame);
+        if self.is_summarised(frame) {
+            self.summaries.change().remove(&frame);
         }
-        self.summarised += 1;
-        self.stale = true;
     }
 
     pub(super) fn worker_event(&mut self, event: WorkerEvent) -> Vec<Effect> {
@@ -85,10 +90,7 @@ impl Session {
                     self.fit.status = FitStatus::Paused;
                     self.fit.run_ms = Some(run_ms);
                     self.fit.reason = Some(reason.text());
-                    if let Some(summary) = self.own_summary() {
-                        summary.reason = Some(reason.text().to_owned());
-                    }
-                    self.stale = true;
+                    self.change_summary(|summary| summary.reason = Some(reason.text().to_owned()));
                     // A single step is seen on the screen; the log is for runs.
                     if iteration > self.fit.run.1 + 1 {
                         self.note(
@@ -159,14 +161,12 @@ impl Session {
             Some(cursor) => !snapshot.live && snapshot.iteration == cursor,
         };
         // Settings may have changed since the newest row was made; the list tells what holds now.
-        if snapshot.live
-            && snapshot.iteration == self.fit.head()
-            && let Some(summary) = self.own_summary()
-        {
-            summary.loss = Some(snapshot.evaluation.loss);
-            summary.terms = snapshot.evaluation.terms.map(Some);
-            summary.iou = mean_known(&snapshot.evaluation.iou);
-            self.summarised += 1;
+        if snapshot.live && snapshot.iteration == self.fit.head() {
+            self.change_summary(|summary| {
+                summary.loss = Some(snapshot.evaluation.loss);
+                summary.terms = snapshot.evaluation.terms.map(Some);
+                summary.iou = mean_known(&snapshot.evaluation.iou);
+            });
         }
         if wanted {
             self.fit.shown_hashes = Some(hashes(&snapshot.params, &snapshot.config, snapshot.iteration));

@@ -3,7 +3,7 @@
 use crate::config::FitConfig;
 use crate::dataset::Dataset;
 use crate::mhp::Precision;
-use crate::session::command::{Effect, PinRequest};
+use crate::session::effect::{Effect, PinRequest};
 use crate::session::file::{SavedFit, SavedFrame, SessionFile};
 use crate::session::fit::{Fit, FitStatus};
 use crate::session::history::History;
@@ -28,18 +28,14 @@ impl Session {
         }
     }
 
-    /// What a session file says of the window, once.
-    pub fn take_restored_window(&mut self) -> Option<serde_json::Value> {
-        self.restored_window.take()
-    }
-
     /// Puts back what a session file says, once its data set is open. Answers the frame to show.
     pub(super) fn restore(&mut self, dataset: &Arc<Dataset>) -> Option<(usize, Vec<Effect>)> {
         let (path, file) = self.restoring.take()?;
         let same = dataset.fingerprint() == file.dataset.fingerprint;
         if same {
-            self.summaries = file.summaries;
-            self.summaries.retain(|&frame, _| frame < dataset.len());
+            let summaries = self.summaries.change();
+            *summaries = file.summaries;
+            summaries.retain(|&frame, _| frame < dataset.len());
         } else {
             let text = "the data set is not the one that the session was saved with; frames are found by their names";
             self.note(LogLevel::Warning, text.into());
@@ -55,7 +51,6 @@ impl Session {
         self.warm_start = file.warm_start;
         self.joint = file.joint;
         self.queue.set_text(file.filter);
-        self.stale = true;
         match file.fit.map(|fit| resumed(fit, frame, &path)) {
             Some(Some(fit)) => {
                 self.fits.insert(frame, fit);
@@ -68,8 +63,7 @@ impl Session {
             }
             None => {}
         }
-        self.restored_window = Some(file.window);
-        let mut effects = Vec::new();
+        let mut effects = vec![Effect::RestoreWindow(file.window)];
         for (k, saved) in file.pins.into_iter().enumerate() {
             let (Some(at), Some(config)) = (find(dataset, &saved.frame), config(&saved.config, &path)) else {
                 self.note(

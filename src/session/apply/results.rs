@@ -1,6 +1,6 @@
 //! Results of a batch that was fitted elsewhere come into the frame list.
 
-use crate::session::command::{Effect, Trash};
+use crate::session::effect::{Effect, Trash};
 use crate::session::results::FoundResults;
 use crate::session::state::{LogLevel, Session};
 use std::fmt::Write as _;
@@ -45,9 +45,7 @@ impl Session {
         for (&frame, summary) in own {
             kept += usize::from(summaries.insert(frame, summary.clone()).is_some());
         }
-        let old = std::mem::replace(&mut self.summaries, summaries);
-        self.summarised += 1;
-        self.stale |= self.list_reads().fit;
+        let old = std::mem::replace(self.summaries.change(), summaries);
         self.tell_results(&path.display().to_string(), [matched, kept, unknown], first_unknown.as_deref());
         if old.len() > kept { vec![Effect::Free(Trash::new(old))] } else { Vec::new() }
     }

@@ -1,6 +1,6 @@
 //! Studies: a run folder comes on screen, the frames of a row of its table come into the list.
 
-use crate::session::command::{Effect, Trash};
+use crate::session::effect::{Effect, Trash};
 use crate::session::state::{LogLevel, Session};
 use crate::session::study::ROW_FILTER;
 use crate::study::run::Run;
@@ -27,8 +27,7 @@ impl Session {
                 self.hint(format!("{}: {}, {variants} variants, {rows} fits{state}", folder.display(), run.spec.study));
                 let again = self.study.run.as_ref().is_some_and(|(old, _)| *old == folder);
                 self.study.row = self.study.row.filter(|row| again && *row < run.table.len());
-                self.study.revision += 1;
-                let old = self.study.run.replace((folder, run));
+                let old = self.study.run.change().replace((folder, run));
                 old.map_or_else(Vec::new, |old| vec![Effect::Free(Trash::new(old))])
             }
             Err(why) => {

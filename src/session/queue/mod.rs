@@ -6,6 +6,8 @@
 mod filter;
 mod row;
 
+use super::labels::LabelMode;
+use super::tracked::Tracked;
 pub use filter::{FrameFilter, syntax};
 pub use row::{FrameNumber, FrameRow, Reads};
 
@@ -80,6 +82,19 @@ pub struct SavedView {
     pub sort: Sort,
 }
 
+/// What a list is filled from: it is filled again when that is another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ListedFrom {
+    pub(super) frames: usize,
+    /// Revisions: of the filter, of the strata, which are others for every data set, and of what else the list reads.
+    pub(super) filter: u64,
+    pub(super) strata: u64,
+    pub(super) fits: Option<u64>,
+    pub(super) labels: Option<u64>,
+    pub(super) sort: Sort,
+    pub(super) label_mode: LabelMode,
+}
+
 /// The frames of the list.
 #[derive(Debug, Default)]
 pub struct Queue {
@@ -88,7 +103,7 @@ pub struct Queue {
     /// Why the text is no filter; the list then keeps the last one that was.
     pub error: Option<String>,
     /// The filter in force.
-    pub filter: FrameFilter,
+    pub filter: Tracked<FrameFilter>,
     /// Frames in the order of the list.
     rows: Vec<u32>,
     /// The same frames in the order of the data set.
@@ -127,7 +142,10 @@ impl Queue {
     /// Takes a new filter. One that cannot be understood leaves the last one in force.
     pub(super) fn set_text(&mut self, text: String) {
         match FrameFilter::parse(&text) {
-            Ok(filter) => (self.filter, self.error) = (filter, None),
+            Ok(filter) => {
+                *self.filter.change() = filter;
+                self.error = None;
+            }
             Err(error) => self.error = Some(error),
         }
         self.text = text;

@@ -3,9 +3,11 @@
 
 use super::Wake;
 use crate::body::Pppr;
-use crate::mhp::{Objective, Precision, Problem, masks, simulate};
-use crate::session::command::{Command, PinRequest};
+use crate::mhp::{Objective, Precision, masks, simulate};
+use crate::session::effect::PinRequest;
 use crate::session::evidence::EvidenceRequest;
+use crate::session::report::Report;
+use crate::start::problem_alone;
 use crate::task::panic_as_error;
 use crate::worker::Snapshot;
 use crossbeam_channel::{Receiver, Sender, unbounded};
@@ -20,7 +22,7 @@ pub(super) enum Ask {
 /// The window's end.
 pub(super) struct EvidenceKeeper {
     requests: Sender<Ask>,
-    answers: Receiver<Command>,
+    answers: Receiver<Report>,
 }
 
 impl EvidenceKeeper {
@@ -52,7 +54,7 @@ impl EvidenceKeeper {
         let _ = self.requests.send(ask);
     }
 
-    pub(super) fn poll(&self) -> Option<Command> {
+    pub(super) fn poll(&self) -> Option<Report> {
         self.answers.try_recv().ok()
     }
 }
@@ -69,25 +71,22 @@ fn newest(asks: Vec<Ask>) -> Vec<Ask> {
     evidence.into_iter().chain(pins).collect()
 }
 
-fn answer(ask: Ask) -> Command {
+fn answer(ask: Ask) -> Report {
     match ask {
         Ask::Evidence(request) => {
             let found = panic_as_error(|| Ok(request.gather()));
-            Command::EvidenceFound(request.frame.index, request.fit, found)
+            Report::EvidenceFound(request.frame.index, request.fit, found)
         }
-        Ask::Pin(request) => Command::PinDrawn(request.pin.id, panic_as_error(|| drawn(&request).map(Box::new))),
+        Ask::Pin(request) => Report::PinDrawn(request.pin.id, panic_as_error(|| drawn(&request).map(Box::new))),
     }
 }
 
 /// The maps and masks of a pin.
 fn drawn(request: &PinRequest) -> Result<Snapshot, String> {
     let PinRequest { dataset, pin } = request;
-    let info = dataset.info();
     let frame = dataset.load(pin.frame).map_err(|error| error.to_string())?;
     let in_file = |error: &dyn std::fmt::Display| format!("{}: {error}", dataset.frame_path(pin.frame).display());
-    let maps: Vec<&[f64]> = frame.maps.iter().map(|map| map.data.as_slice()).collect();
-    let problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps);
-    let problem = Arc::new(problem.map_err(|error| in_file(&error))?);
+    let problem = Arc::new(problem_alone(dataset, &frame).map_err(|error| in_file(&error))?);
     let check = |params: &Pppr| problem.check(params).map_err(|error| in_file(&error));
     check(&pin.initial)?;
     check(&pin.params)?;

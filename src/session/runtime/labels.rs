@@ -5,9 +5,10 @@ use super::Wake;
 use crate::dataset::Dataset;
 use crate::labels::{Change, FrameId, Journal, Judged, LabelError, LabelPlace, LabelStore, Record};
 use crate::session::acts::{Changes, Done};
-use crate::session::command::{Command, Commit, OpenedLabels, Written};
+use crate::session::effect::Commit;
 use crate::session::labels::LabelTable;
 use crate::session::records::Records;
+use crate::session::report::{OpenedLabels, Report, Written};
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
@@ -27,8 +28,8 @@ pub(super) struct LabelKeeper {
     /// `None` once it is being dropped.
     requests: Option<Sender<Request>>,
     thread: Option<JoinHandle<()>>,
-    answers: Receiver<Command>,
-    told: Sender<Command>,
+    answers: Receiver<Report>,
+    told: Sender<Report>,
     wake: Wake,
 }
 
@@ -41,8 +42,8 @@ impl LabelKeeper {
         let spawned = std::thread::Builder::new().name("labels".into()).spawn(move || {
             let mut keeper = Keeper::default();
             while let Ok(request) = inbox.recv() {
-                for command in keeper.answer(request) {
-                    if answer.send(command).is_err() {
+                for report in keeper.answer(request) {
+                    if answer.send(report).is_err() {
                         return;
                     }
                     waker();
@@ -55,14 +56,14 @@ impl LabelKeeper {
 
     pub(super) fn open(&self, id: u64, dataset: Arc<Dataset>, annotator: String) {
         if self.ask(Request::Open(id, dataset, annotator)).is_some() {
-            self.tell(Command::LabelsOpened(id, Err("the thread that keeps labels does not answer".into())));
+            self.tell(Report::LabelsOpened(id, Err("the thread that keeps labels does not answer".into())));
         }
     }
 
     pub(super) fn commit(&self, commit: Commit) {
         if let Some(Request::Commit(Commit { id, kind, act, .. })) = self.ask(Request::Commit(commit)) {
             let result = Err("the disk does not keep up with the acts before it".into());
-            self.tell(Command::LabelsWritten(Written { id, kind, act, result }));
+            self.tell(Report::LabelsWritten(Written { id, kind, act, result }));
         }
     }
 
@@ -80,13 +81,13 @@ impl LabelKeeper {
         }
     }
 
-    pub(super) fn poll(&self) -> Option<Command> {
+    pub(super) fn poll(&self) -> Option<Report> {
         self.answers.try_recv().ok()
     }
 
-    fn tell(&self, command: Command) {
+    fn tell(&self, report: Report) {
         // The other end is held by this very keeper.
-        let _ = self.told.send(command);
+        let _ = self.told.send(report);
         (self.wake)();
     }
 }
@@ -122,11 +123,11 @@ struct Open {
 }
 
 impl Keeper {
-    fn answer(&mut self, request: Request) -> Vec<Command> {
+    fn answer(&mut self, request: Request) -> Vec<Report> {
         match request {
             Request::Open(id, dataset, annotator) => {
                 self.open = None;
-                vec![Command::LabelsOpened(id, self.begin(dataset, &annotator))]
+                vec![Report::LabelsOpened(id, self.begin(dataset, &annotator))]
             }
             Request::Commit(commit) => {
                 let tried = self.open.as_ref().is_some_and(|open| open.tried);
@@ -135,9 +136,9 @@ impl Keeper {
                     None => Err("the journal is not open".into()),
                 };
                 let Commit { id, kind, act, .. } = commit;
-                let mut answers = vec![Command::LabelsWritten(Written { id, kind, act, result })];
+                let mut answers = vec![Report::LabelsWritten(Written { id, kind, act, result })];
                 let open = self.open.as_ref().filter(|open| open.tried && !tried);
-                answers.extend(open.map(|open| Command::LabelsPlaced(open.store.place().clone())));
+                answers.extend(open.map(|open| Report::LabelsPlaced(open.store.place().clone())));
                 answers
             }
             Request::Refresh => self.open.as_mut().map_or_else(Vec::new, Open::refresh),
@@ -162,7 +163,7 @@ impl Keeper {
 
 impl Open {
     /// What others wrote, and what is to be told of it.
-    fn refresh(&mut self) -> Vec<Command> {
+    fn refresh(&mut self) -> Vec<Report> {
         let news = self.store.refresh().map(|more| more | std::mem::take(&mut self.unseen));
         let news = news.inspect_err(|error| tracing::warn!("{error}"));
         if !news.is_ok_and(|news| news) {
@@ -171,8 +172,8 @@ impl Open {
         let new: Vec<String> =
             self.store.warnings().iter().filter(|warning| !self.warned.contains(*warning)).cloned().collect();
         self.warned.extend(new.iter().cloned());
-        let warned = (!new.is_empty()).then_some(Command::LabelsWarned(new));
-        [Command::LabelsRefreshed(self.table())].into_iter().chain(warned).collect()
+        let warned = (!new.is_empty()).then_some(Report::LabelsWarned(new));
+        [Report::LabelsRefreshed(self.table())].into_iter().chain(warned).collect()
     }
 
     /// Before the first act: where can be written. The folders that are read are the same.
@@ -308,18 +309,18 @@ axes = [ { kind = "range", bins = 16, lo = 0.5, hi = 6.0 }, { kind = "azimuth", 
         let before = state(folder.path())?;
         let mut keeper = Keeper::default();
         let opened = keeper.answer(Request::Open(1, Arc::clone(&dataset), "ada".into()));
-        assert!(matches!(opened[..], [Command::LabelsOpened(1, Ok(_))]), "{opened:?}");
+        assert!(matches!(opened[..], [Report::LabelsOpened(1, Ok(_))]), "{opened:?}");
         assert!(keeper.answer(Request::Refresh).is_empty());
         assert_eq!(state(folder.path())?, before);
         // The first act finds the place and tells it, once.
         let told = keeper.answer(tag(&dataset, 1));
-        let [Command::LabelsWritten(written), Command::LabelsPlaced(place)] = &told[..] else {
+        let [Report::LabelsWritten(written), Report::LabelsPlaced(place)] = &told[..] else {
             return Err(format!("{told:?}").into());
         };
         assert_eq!(written.result.as_ref().map(|done| done.changes.len()).ok(), Some(1));
         assert_eq!(place.folder, folder.path().join("mhp-labels"));
         let again = keeper.answer(tag(&dataset, 2));
-        assert!(matches!(again[..], [Command::LabelsWritten(_)]), "{again:?}");
+        assert!(matches!(again[..], [Report::LabelsWritten(_)]), "{again:?}");
         Ok(())
     }
 
@@ -335,7 +336,7 @@ axes = [ { kind = "range", bins = 16, lo = 0.5, hi = 6.0 }, { kind = "azimuth", 
         let own = std::fs::read_to_string(labels.join("ada.labels.jsonl"))?;
         std::fs::write(labels.join("copy.labels.jsonl"), own.replace("\"time\":\"2", "\"time\":\"9"))?;
         let told = keeper.answer(Request::Refresh);
-        let [Command::LabelsRefreshed(table), Command::LabelsWarned(warnings)] = &told[..] else {
+        let [Report::LabelsRefreshed(table), Report::LabelsWarned(warnings)] = &told[..] else {
             return Err(format!("{told:?}").into());
         };
         assert!(table["ada"].get(0).is_some_and(|record| record.time.starts_with('2')), "ada's own file counts");

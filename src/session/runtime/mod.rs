@@ -1,10 +1,12 @@
-//! The threads behind a session: carries effects out, and brings reports back as commands.
+//! The session with the threads behind it: carries effects out, and brings back what the threads tell.
 
 mod evidence;
 mod labels;
 
-use super::command::{Command, Effect, PickKind, Trash};
+use super::command::{Command, PickKind};
+use super::effect::{Effect, Trash};
 use super::file::SessionFile;
+use super::report::Report;
 use super::results::FoundResults;
 use super::state::{LogLevel, Session};
 use super::strata::StrataStatus;
@@ -27,40 +29,43 @@ pub type Picker = Arc<dyn Fn(PickKind) -> Option<PathBuf> + Send + Sync>;
 /// Smaller data sets are graded faster than a cache is worth.
 const CACHE_FROM: usize = 200;
 
-/// The worker, the loader, the opener, and those that keep labels, grade frames and gather evidence.
+/// The session, and its threads: the worker, the loader, the opener, and those that keep labels, grade frames and gather
+/// evidence.
 pub struct Runtime {
+    session: Session,
     wake: Wake,
     picker: Option<Picker>,
     worker: Option<Worker>,
     loader: Option<Loader>,
     opening: Option<(PathBuf, OpenJob)>,
-    picked: (Sender<PathBuf>, Receiver<PathBuf>),
-    answers: (Sender<Command>, Receiver<Command>),
+    answers: (Sender<Report>, Receiver<Report>),
     startup_error: Option<String>,
     allow_outside: bool,
     labels: LabelKeeper,
     evidence: EvidenceKeeper,
     grading: Option<ComplexityJob>,
+    restored_window: Option<serde_json::Value>,
 }
 
 impl Runtime {
-    /// Starts the worker. `picker` shows file dialogs, where there are any.
-    pub fn new(wake: Wake, picker: Option<Picker>) -> Self {
+    /// Starts the worker of a session. `picker` shows file dialogs, where there are any.
+    pub fn new(session: Session, wake: Wake, picker: Option<Picker>) -> Self {
         let waker = Arc::clone(&wake);
         let (worker, startup_error) = match Worker::spawn(move || waker()) {
             Ok(worker) => (Some(worker), None),
             Err(error) => (None, Some(format!("no thread for the fit: {error}"))),
         };
         Self {
+            session,
             labels: LabelKeeper::start(&wake),
             evidence: EvidenceKeeper::start(&wake),
             grading: None,
+            restored_window: None,
             wake,
             picker,
             worker,
             loader: None,
             opening: None,
-            picked: unbounded(),
             answers: unbounded(),
             startup_error,
             allow_outside: false,
@@ -72,68 +77,84 @@ impl Runtime {
         Self { allow_outside, ..self }
     }
 
-    /// Applies a command and carries out what follows from it.
-    pub fn apply(&mut self, session: &mut Session, command: Command) {
-        for effect in session.apply(command) {
-            self.carry_out(effect);
-        }
+    /// The state, to be read.
+    pub fn session(&self) -> &Session {
+        &self.session
     }
 
-    /// Applies every report that waits. True where there was one.
-    pub fn poll(&mut self, session: &mut Session) -> bool {
+    /// Does what a person asks, with what follows from it.
+    pub fn apply(&mut self, command: Command) {
+        let effects = self.session.apply(command);
+        self.carry_out(effects);
+    }
+
+    /// Takes in what the window has to tell, with what follows from it.
+    pub fn report(&mut self, report: Report) {
+        let effects = self.session.report(report);
+        self.carry_out(effects);
+    }
+
+    /// Takes in every report that waits. True where there was one.
+    pub fn poll(&mut self) -> bool {
         let mut any = false;
         if let Some(text) = self.startup_error.take() {
-            self.apply(session, Command::Log(LogLevel::Error, text));
+            self.report(Report::Log(LogLevel::Error, text));
         }
-        while let Some(command) = self.next_report(session) {
-            self.apply(session, command);
+        while let Some(report) = self.next_report() {
+            self.report(report);
             any = true;
         }
         any
     }
 
-    fn next_report(&mut self, session: &Session) -> Option<Command> {
-        if let Ok(command) = self.answers.1.try_recv() {
-            return Some(command);
+    /// What a session file says of the window, once.
+    pub fn take_restored_window(&mut self) -> Option<serde_json::Value> {
+        self.restored_window.take()
+    }
+
+    fn next_report(&mut self) -> Option<Report> {
+        if let Ok(report) = self.answers.1.try_recv() {
+            return Some(report);
         }
-        if let Ok(path) = self.picked.1.try_recv() {
-            return Some(Command::Open(path));
-        }
-        if let Some(command) = self.opening_report(session) {
-            return Some(command);
+        if let Some(report) = self.opening_report() {
+            return Some(report);
         }
         if let Some((index, result)) = self.loader.as_ref().and_then(Loader::poll) {
-            return Some(Command::FrameLoaded(index, result));
+            return Some(Report::FrameLoaded(index, result));
         }
-        if let Some(command) =
-            self.labels.poll().or_else(|| self.evidence.poll()).or_else(|| self.grading_report(session))
-        {
-            return Some(command);
+        if let Some(report) = self.labels.poll().or_else(|| self.evidence.poll()).or_else(|| self.grading_report()) {
+            return Some(report);
         }
         let worker = self.worker.as_ref()?;
         // Rows and events first: a snapshot may be of a branch that an event announces.
         if let Some(message) = worker.poll() {
-            return Some(Command::Worker(message));
+            return Some(Report::Worker(message));
         }
-        worker.take_snapshot().map(|snapshot| Command::Snapshot(Box::new(snapshot)))
+        worker.take_snapshot().map(|snapshot| Report::Snapshot(Box::new(snapshot)))
     }
 
-    fn opening_report(&mut self, session: &Session) -> Option<Command> {
+    fn opening_report(&mut self) -> Option<Report> {
         let (_, job) = self.opening.as_mut()?;
         if let Some(result) = job.poll() {
             let (path, _) = self.opening.take()?;
-            return Some(Command::Opened(path, result.map(Arc::new)));
+            return Some(Report::Opened(path, result.map(Arc::new)));
         }
         let crate::task::ProgressState { stage, done, total } = job.progress().state();
-        let shown = session.data.opening.as_ref()?;
-        (shown.stage != stage || shown.done != done || shown.total != total).then_some(Command::OpenProgress {
+        let shown = self.session.data.opening.as_ref()?;
+        (shown.stage != stage || shown.done != done || shown.total != total).then_some(Report::OpenProgress {
             stage,
             done,
             total,
         })
     }
 
-    fn carry_out(&mut self, effect: Effect) {
+    fn carry_out(&mut self, effects: Vec<Effect>) {
+        for effect in effects {
+            self.carry_out_one(effect);
+        }
+    }
+
+    fn carry_out_one(&mut self, effect: Effect) {
         match effect {
             Effect::Open(path) => {
                 let wake = Arc::clone(&self.wake);
@@ -142,7 +163,7 @@ impl Runtime {
             }
             Effect::OpenBare(path, choice) => self.on_thread("open-bare", move || {
                 let result = Dataset::open_bare(&path, &choice).map(Arc::new);
-                Command::Opened(path, result)
+                Report::Opened(path, result)
             }),
             Effect::CancelOpen => {
                 if let Some((_, job)) = self.opening.take() {
@@ -171,22 +192,23 @@ impl Runtime {
             Effect::Evidence(request) => self.evidence.ask(Ask::Evidence(request)),
             Effect::DrawPin(request) => self.evidence.ask(Ask::Pin(request)),
             Effect::Free(trash) => Self::free(trash),
-            Effect::Run(task) => self.on_thread("export", move || Command::TaskDone((task.0)())),
+            Effect::RestoreWindow(window) => self.restored_window = Some(window),
+            Effect::Run(task) => self.on_thread("export", move || Report::TaskDone((task.0)())),
             Effect::ReadSession(path) => self.on_thread("session-file", move || {
                 let read = SessionFile::read(&path).map(Box::new).map_err(|error| error.to_string());
-                Command::SessionRead(path, read)
+                Report::SessionRead(path, read)
             }),
             Effect::ReadResults(path, dataset) => self.on_thread("results", move || {
                 let read = FoundResults::read(&path, &dataset).map(Box::new);
-                Command::ResultsRead(path, read)
+                Report::ResultsRead(path, read)
             }),
             Effect::ReadRun(folder) => self.on_thread("study", move || {
                 let read = crate::study::run::Run::read(&folder).map(Arc::new).map_err(|error| error.to_string());
-                Command::RunRead(folder, read)
+                Report::RunRead(folder, read)
             }),
             Effect::FindStudyRow(folder, run, row, dataset) => self.on_thread("results", move || {
                 let found = super::study::frames_of_row(&run, row, &dataset);
-                Command::ResultsRead(folder, Ok(Box::new(found)))
+                Report::ResultsRead(folder, Ok(Box::new(found)))
             }),
             Effect::Send(command) => {
                 if let Some(worker) = &self.worker {
@@ -202,27 +224,27 @@ impl Runtime {
         let cache = cache_folder().filter(|_| dataset.len() >= CACHE_FROM);
         if only_kept && cached_share(&dataset, &options, cache.as_deref()) < 1.0 {
             self.grading = None;
-            let _ = self.answers.0.send(Command::StrataDone(Ok(None)));
+            let _ = self.answers.0.send(Report::StrataDone(Ok(None)));
             return (self.wake)();
         }
         let wake = Arc::clone(&self.wake);
         self.grading = Some(ComplexityJob::start(dataset, options, cache, move || wake()));
     }
 
-    fn grading_report(&mut self, session: &Session) -> Option<Command> {
+    fn grading_report(&mut self) -> Option<Report> {
         let job = self.grading.as_mut()?;
         if let Some(result) = job.poll() {
             self.grading = None;
-            return Some(Command::StrataDone(match result {
+            return Some(Report::StrataDone(match result {
                 Ok(complexity) => Ok(Some(Arc::new(complexity))),
                 Err(StudyError::Cancelled) => Ok(None),
                 Err(error) => Err(error.to_string()),
             }));
         }
         let state = job.progress().state();
-        let StrataStatus::Running { done, total } = session.strata.status else { return None };
+        let StrataStatus::Running { done, total } = self.session.strata.status else { return None };
         ((done, total) != (state.done, state.total))
-            .then_some(Command::StrataProgress { done: state.done, total: state.total })
+            .then_some(Report::StrataProgress { done: state.done, total: state.total })
     }
 
     /// Frees something on a thread of its own; here, where there is none.
@@ -233,7 +255,7 @@ impl Runtime {
     }
 
     /// Does something that may be slow on a thread of its own; its answer comes back as a report.
-    fn on_thread(&self, name: &str, work: impl FnOnce() -> Command + Send + 'static) {
+    fn on_thread(&self, name: &str, work: impl FnOnce() -> Report + Send + 'static) {
         let (answer, wake) = (self.answers.0.clone(), Arc::clone(&self.wake));
         let spawned = std::thread::Builder::new().name(name.into()).spawn(move || {
             let _ = answer.send(work());
@@ -247,11 +269,11 @@ impl Runtime {
     /// A dialog blocks its thread until it is answered, so it gets one of its own.
     fn pick(&self, kind: PickKind) {
         let Some(picker) = self.picker.clone() else { return };
-        let (answer, wake) = (self.picked.0.clone(), Arc::clone(&self.wake));
+        let (answer, wake) = (self.answers.0.clone(), Arc::clone(&self.wake));
         let thread = std::thread::Builder::new().name("file-dialog".into());
         let spawned = thread.spawn(move || {
             if let Some(path) = picker(kind) {
-                let _ = answer.send(path);
+                let _ = answer.send(Report::Picked(path));
                 wake();
             }
         });

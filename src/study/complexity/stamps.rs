@@ -51,21 +51,22 @@ pub(super) fn keys(
     Ok(keys)
 }
 
-/// Path below the root, name, size and time of the file of one frame.
+/// Path below the root, name, size and time of each file that the maps of one frame are made of.
 fn stamp(dataset: &Dataset, i: usize) -> Option<Key> {
-    let (path, root) = (dataset.frame_path(i), &dataset.info().root);
-    let meta = std::fs::metadata(&path).ok()?;
-    let modified = meta.modified().ok()?;
-    let nanoseconds = modified
-        .duration_since(UNIX_EPOCH)
-        .map_or_else(|before| -(before.duration().as_nanos() as i128), |after| after.as_nanos() as i128);
     let mut hash = Sha256::new();
-    hash.update(below(&path, root).as_os_str().as_encoded_bytes());
-    hash.update([0]);
-    hash.update(dataset.frame_name(i));
-    hash.update([0]);
-    hash.update(meta.len().to_le_bytes());
-    hash.update(nanoseconds.to_le_bytes());
+    for path in dataset.map_paths(i) {
+        let meta = std::fs::metadata(&path).ok()?;
+        let modified = meta.modified().ok()?;
+        let nanoseconds = modified
+            .duration_since(UNIX_EPOCH)
+            .map_or_else(|before| -(before.duration().as_nanos() as i128), |after| after.as_nanos() as i128);
+        hash.update(below(&path, &dataset.info().root).as_os_str().as_encoded_bytes());
+        hash.update([0]);
+        hash.update(dataset.frame_name(i));
+        hash.update([0]);
+        hash.update(meta.len().to_le_bytes());
+        hash.update(nanoseconds.to_le_bytes());
+    }
     Some(Key::of(hash))
 }
 

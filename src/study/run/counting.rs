@@ -2,7 +2,7 @@
 
 use super::row::RunNumbers;
 use super::variant::Method;
-use crate::dataset::{Dataset, Heatmap};
+use crate::dataset::{Dataset, Heatmap, map_cells};
 use crate::mhp::fill_missing;
 use crate::people::{CLASSES, Counter, Network, map_statistics};
 use crate::study::count::{LEAD_IN, ScanWindow};
@@ -71,8 +71,7 @@ fn alone(dataset: &Dataset, network: &Network, frame: usize) -> CountOutcome {
     for map in &mut maps {
         let _ = fill_missing(&mut map.data, &map.shape);
     }
-    let maps: Vec<&[f64]> = maps.iter().map(|map| map.data.as_slice()).collect();
-    let probabilities = network.probabilities(&map_statistics(&maps));
+    let probabilities = network.probabilities(&map_statistics(&map_cells(&maps)));
     let people = (0..CLASSES).fold(0, |best, n| if probabilities[n] > probabilities[best] { n } else { best });
     (Ok(numbers(people, annotated)), Some(milliseconds(began)))
 }

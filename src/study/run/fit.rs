@@ -95,10 +95,13 @@ impl<'a> LoadedFrame<'a> {
         let mut ended = false;
         let mut answers = Vec::with_capacity(stops.len());
         for &stop in stops {
-            if let Ok(running) = &mut fitter
-                && let Err(why) = advance(running, stop, &mut ended)
+            if let Ok(running) = fitter.as_mut()
+                && !ended
             {
-                fitter = Err(self.told(&why));
+                match running.run_to(stop, |_, _| {}) {
+                    Ok(reason) => ended = reason == StopReason::Converged,
+                    Err(why) => fitter = Err(self.told(&why)),
+                }
             }
             let fit_ms = milliseconds(began);
             answers.push(fitter.as_ref().map_err(Clone::clone).map(|fitter| Stop {
@@ -172,15 +175,6 @@ impl<'a> LoadedFrame<'a> {
     }
 }
 
-/// Steps until `stop` or until the configuration says to end.
-fn advance(fitter: &mut Fitter, stop: usize, ended: &mut bool) -> Result<(), crate::mhp::FitError> {
-    while fitter.iteration() < stop && !*ended {
-        let report = fitter.step()?;
-        *ended = report.converged && fitter.config().stop_when_converged;
-    }
-    Ok(())
-}
-
 /// An error text without the folder of the data set, which may lie elsewhere on another machine.
 pub(super) fn portable(dataset: &Dataset, text: &str) -> String {
     text.replace(&format!("{}{}", dataset.info().root.display(), std::path::MAIN_SEPARATOR), "")
@@ -191,7 +185,7 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
     use super::*;
     use crate::body::{Group, PpprShape, Skeleton};
-    use crate::config::{Background, InitConfig, Place};
+    use crate::config::{Background, InitConfig, StartPlace};
     use crate::geometry::Pose;
     use crate::mhp::simulate;
     use crate::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
@@ -251,7 +245,7 @@ mod tests {
             FitConfig { tau_pct: 40.0, ..base },
             FitConfig { surface_offset_m: 0.1, ..base },
             FitConfig { w_time: 3.0, ..base },
-            FitConfig { place: Place::Cluster, ..base },
+            FitConfig { place: StartPlace::Cluster, ..base },
             FitConfig { init: InitConfig { background: Background::Map, ..base.init }, ..base },
         ];
         for other in others {

@@ -313,8 +313,8 @@ impl Window {
             let sort = Sort { key, descending: true };
             self.measured(&format!("sorting {sort:?}"), |s| s.view.sort == sort, Some(Command::SetSort(sort)));
         }
-        let before = self.session().summaries_revision();
-        let again = |s: &Session| s.summaries_revision() > before;
+        let before = self.session().summaries.revision();
+        let again = |s: &Session| s.summaries.revision() > before;
         self.measured("loading them again, sorted by MAJPE", again, Some(Command::LoadResults(table)));
         self.strips();
         self.scroll();

@@ -66,7 +66,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let study = &shared.session.study;
     let Some((_, run)) = study.run.clone() else { return };
     let tokens = Tokens::of(ui);
-    let revision = study.revision;
+    let revision = study.run.revision();
     if state.values.as_ref().is_none_or(|(known, _)| *known != revision) {
         state.values = Some((revision, measure::of_run(&run)));
     }

@@ -105,7 +105,7 @@ impl LimbMap {
 pub(super) fn moved(problem: &Problem, reading: Reading, joints: &[Vec3]) -> Option<Vec<Vec3>> {
     let map = LimbMap::bundled()?;
     let parts = Parts::of(&problem.skeleton)?;
-    let frame = Frame::around(&parts.places(joints), joints);
+    let frame = BodyFrame::around(&parts.places(joints), joints);
     let by_part = map.apply(&inputs(problem, reading, &frame, &parts, joints)?);
     let by_part = by_part.map(|way| scale(way, (FARTHEST_M / norm(way).max(f64::MIN_POSITIVE)).min(1.0)));
     let ways = parts.of_joints(&by_part);
@@ -116,14 +116,14 @@ pub(super) fn moved(problem: &Problem, reading: Reading, joints: &[Vec3]) -> Opt
 
 /// Away from the radar, to the left as it sees it, and up, around a person.
 #[derive(Debug, Clone, Copy)]
-struct Frame {
+struct BodyFrame {
     /// The middle of the parts, on the height of the lowest joint.
     at: Vec3,
     /// Unit vector on the floor.
     away: [f64; 2],
 }
 
-impl Frame {
+impl BodyFrame {
     fn around(parts: &[Vec3; PARTS], joints: &[Vec3]) -> Self {
         let sum = parts.iter().fold([0.0; 3], |sum, &part| add(sum, part));
         let [x, y, _] = scale(sum, 1.0 / PARTS as f64);
@@ -150,7 +150,7 @@ impl Frame {
 }
 
 /// What the linear map is given; `None` where no view tells sides, or none heights.
-fn inputs(problem: &Problem, reading: Reading, frame: &Frame, parts: &Parts, joints: &[Vec3]) -> Option<Vec<f32>> {
+fn inputs(problem: &Problem, reading: Reading, frame: &BodyFrame, parts: &Parts, joints: &[Vec3]) -> Option<Vec<f32>> {
     let context = problem.context(reading);
     let (now, around): (_, Vec<&[SaliencyMap]>) = (&context.now, context.around().map(|(_, maps)| maps()).collect());
     let times = || std::iter::once(now.as_slice()).chain(around.iter().copied());
@@ -209,7 +209,7 @@ impl Lattice {
     }
 
     /// The cells of a view around a point of the lattice; `whole` where the view tells sides and heights.
-    fn spot(self, view: &SaliencyMap, frame: &Frame, [away, second]: [f64; 2], whole: bool) -> Spot {
+    fn spot(self, view: &SaliencyMap, frame: &BodyFrame, [away, second]: [f64; 2], whole: bool) -> Spot {
         let beside = |k: usize| STEP_M / FINE as f64 * (k as f64 - 0.5 * (FINE - 1) as f64);
         let third: &[f64] = match (self, whole) {
             (Self::Floor, true) => &HEIGHTS_M,

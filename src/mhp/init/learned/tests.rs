@@ -50,7 +50,7 @@ fn every_skeleton_has_the_parts_and_its_joints_go_with_them() {
 #[test]
 fn a_frame_goes_there_and_back() {
     let joints = [[2.0, 1.0, -1.0], [2.2, 1.4, 0.5]];
-    let frame = Frame::around(&[[2.1, 1.2, 0.0]; PARTS], &joints);
+    let frame = BodyFrame::around(&[[2.1, 1.2, 0.0]; PARTS], &joints);
     assert!((frame.at[2] + 1.0).abs() < 1e-12, "the lowest joint is at height 0");
     for p in [[0.3, -0.2, 1.1], [-0.5, 0.4, 0.0]] {
         let back = frame.local(frame.world(p));

@@ -1,6 +1,6 @@
 //! Ridge regression of the limbs over people with truth.
 
-use super::{ACROSS, AWAY, Frame, INPUTS, LimbMap, PARTS, Parts, Reading, UP, inputs};
+use super::{ACROSS, AWAY, BodyFrame, INPUTS, LimbMap, PARTS, Parts, Reading, UP, inputs};
 use crate::body::Pppr;
 use crate::geometry::{Vec3, add, norm, sub};
 use crate::mhp::Problem;
@@ -27,7 +27,7 @@ impl LimbLesson {
             return None;
         }
         let before = parts.places(&joints);
-        let frame = Frame::around(&before, &joints);
+        let frame = BodyFrame::around(&before, &joints);
         let (before, after) = (before.map(|p| frame.local(p)), parts.places(truth).map(|p| frame.local(p)));
         let ways: [Vec3; PARTS] = std::array::from_fn(|part| sub(after[part], before[part]));
         let whole = ways.iter().fold([0.0; 3], |sum, &way| add(sum, way));

@@ -1,6 +1,10 @@
 //! Dependencies point down only: what each room may use of the others, read from the sources.
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
+mod circles;
+mod imports;
+mod types;
+
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -202,5 +206,46 @@ fn every_path_that_a_module_names_exists() {
         }
     }
     assert!(seen > 50, "{seen} paths are named");
+    assert_eq!(wrong, Vec::<String>::new());
+}
+
+/// Files that say whose maps are imitated, or whose figures the paper has: names of data sets, not of their files.
+const NAME_DATA_SETS: [&str; 5] = [
+    "src/simulate/",
+    "src/cli/simulate/",
+    "src/study/calibrate.rs",
+    "src/study/run/paper.rs",
+    "src/study/run/plans.rs",
+];
+
+/// The layouts of published data sets, read from the files that implement them: `mmvr`, `hupr`…
+fn published_layouts(root: &Path) -> Vec<String> {
+    let code = files(&root.join("src/dataset/layout")).into_iter().map(|path| code(&path));
+    let word = |code: String| {
+        let after = code.split_once("fn word(&self)")?.1;
+        code.contains("fn preset_text").then(|| after.split('"').nth(1).map(str::to_owned)).flatten()
+    };
+    code.filter_map(word).collect()
+}
+
+/// What is asked of a layout is a method of its trait: another one is a file and a line in the registry.
+#[test]
+fn layouts_are_known_by_name_in_their_own_files_alone() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let layouts = published_layouts(root);
+    assert!(["mmvr", "hupr", "xrf55", "dummy"].iter().all(|word| layouts.iter().any(|l| l == word)), "{layouts:?}");
+    let mut wrong = Vec::new();
+    for (_, path) in sources() {
+        let place = path.strip_prefix(root).unwrap().display().to_string();
+        if place.starts_with("src/dataset/layout/") || NAME_DATA_SETS.iter().any(|known| place.starts_with(known)) {
+            continue;
+        }
+        let code = code(&path);
+        for word in layouts.iter().filter(|word| *word != "dummy") {
+            let (head, tail) = word.split_at(1);
+            let named = [format!("\"{word}\""), format!("{}{tail}", head.to_uppercase()), format!("{word}::")];
+            wrong.extend(named.iter().filter(|name| code.contains(*name)).map(|name| format!("{place}: {name}")));
+        }
+    }
     assert_eq!(wrong, Vec::<String>::new());
 }

@@ -1,17 +1,17 @@
-//! A joint's own shape and strength, which every view shares: forward and back; SPEC sections 2 and 3.
+//! A joint's Gaussian in the world, which every view shares: forward and back; SPEC sections 2 and 3.
 #![expect(
     clippy::inline_always,
     reason = "all of it belongs into the one function that is compiled for an instruction set"
 )]
 
 use super::Precision;
-use super::batch::{Batch, Columns, One, Task, each_joint};
+use super::batch::{Batch, Columns, JointTask, OneJoint, each_joint};
 use crate::body::{Group, Pppr};
-use crate::geometry::{Mat3, Number, Vec3, mat_mul, rotation_from_quaternion, scale, unit_quaternion};
+use crate::geometry::{Mat3, Numeric, Vec3, mat_mul, rotation_from_quaternion, scale, unit_quaternion};
 
-/// What does not depend on where the joint is seen from.
+/// A joint's Gaussian: what does not depend on where it is seen from.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Form<T = f64> {
+pub(super) struct WorldGaussian<T = f64> {
     /// World frame, m and m/s.
     pub position: Vec3<T>,
     pub velocity: Vec3<T>,
@@ -28,9 +28,9 @@ pub(super) fn mean(omega: &[f64]) -> f64 {
     omega.iter().sum::<f64>() / omega.len().max(1) as f64
 }
 
-/// ∂L/∂ what [`Forms`] say, summed over the views.
+/// Adjoints of [`WorldGaussians`]: ∂L by what they say, summed over the views.
 #[derive(Debug, Default)]
-pub(super) struct FormBars {
+pub(super) struct WorldGaussianBars {
     /// Of p and v, world frame.
     motion: Columns<6>,
     /// Of R S Sᵀ Rᵀ, world frame: xx, xy, xz, yy, yz, zz.
@@ -39,7 +39,7 @@ pub(super) struct FormBars {
     strength: Columns<2>,
 }
 
-impl FormBars {
+impl WorldGaussianBars {
     /// Zeros for so many joints.
     pub(super) fn reset(&mut self, joints: usize) {
         self.motion.reset(joints);
@@ -63,13 +63,13 @@ impl FormBars {
 
     /// Adds to ∂L/∂ω̄ of one joint.
     pub(super) fn add_omega_mean(&mut self, joint: usize, bar: f64) {
-        One(joint).add([0.0, bar], &mut self.strength);
+        OneJoint(joint).add([0.0, bar], &mut self.strength);
     }
 }
 
-/// The forms of all joints, and what their derivatives need besides.
+/// The Gaussians of all joints, and what their derivatives need besides.
 #[derive(Debug, Default)]
-pub(super) struct Forms {
+pub(super) struct WorldGaussians {
     joints: usize,
     position: Columns<3>,
     velocity: Columns<3>,
@@ -81,7 +81,7 @@ pub(super) struct Forms {
     scale: Columns<3>,
 }
 
-impl Forms {
+impl WorldGaussians {
     /// Of every joint of `params`, over what was there.
     pub(super) fn fill(&mut self, params: &Pppr, precision: Precision) {
         let joints = params.shape().total_joints();
@@ -91,7 +91,7 @@ impl Forms {
         }
         self.spread.hold(joints);
         self.quaternion.hold(joints);
-        each_joint(precision, joints, &mut Fill { params, forms: self });
+        each_joint(precision, joints, &mut Fill { params, gaussians: self });
     }
 
     pub(super) fn joints(&self) -> usize {
@@ -99,9 +99,9 @@ impl Forms {
     }
 
     #[inline(always)]
-    pub(super) fn of<B: Batch>(&self, batch: B) -> Form<B::Number> {
+    pub(super) fn of<B: Batch>(&self, batch: B) -> WorldGaussian<B::Number> {
         let [opacity, ln_opacity, omega_mean] = batch.load(&self.strength);
-        Form {
+        WorldGaussian {
             position: batch.load(&self.position),
             velocity: batch.load(&self.velocity),
             spread: self.spread.matrix(batch),
@@ -112,30 +112,30 @@ impl Forms {
     }
 
     /// Adds to `gradient` what `bars` imply.
-    pub(super) fn pull_back(&self, bars: &FormBars, gradient: &mut Pppr, precision: Precision) {
-        each_joint(precision, self.joints, &mut PullBack { forms: self, bars, gradient });
+    pub(super) fn pull_back(&self, bars: &WorldGaussianBars, gradient: &mut Pppr, precision: Precision) {
+        each_joint(precision, self.joints, &mut PullBack { gaussians: self, bars, gradient });
     }
 }
 
 struct Fill<'a> {
     params: &'a Pppr,
-    forms: &'a mut Forms,
+    gaussians: &'a mut WorldGaussians,
 }
 
-impl Task for Fill<'_> {
+impl JointTask for Fill<'_> {
     #[inline(always)]
     fn run<B: Batch>(&mut self, batch: B) {
-        let Self { params, forms } = self;
+        let Self { params, gaussians } = self;
         let numbers = |group: Group, width: usize, k: usize| {
             let of = params.group(group);
             move |joint: usize| of[width * joint + k]
         };
         let beta = batch.gather(numbers(Group::Beta, 1, 0));
         // Of e^−|β| alone: exact for large |β|.
-        let (one, fading) = (beta.like(1.0), (-beta.at_least(0.0) + beta.at_most(0.0)).exp());
+        let (one, fading) = (beta.splat(1.0), (-beta.max(0.0) + beta.min(0.0)).exp());
         let omega_mean = batch.gather(|joint| mean(params.joint(Group::Omega, joint)));
-        let opacity = beta.below(0.0, fading, one) / (one + fading);
-        let ln_opacity = beta.at_most(0.0) - fading.ln_1p();
+        let opacity = beta.select_lt(0.0, fading, one) / (one + fading);
+        let ln_opacity = beta.min(0.0) - fading.ln_1p();
         let (mut position, mut velocity, mut scale, mut quaternion) = ([one; 3], [one; 3], [one; 3], [one; 4]);
         for k in 0..3 {
             position[k] = batch.gather(numbers(Group::Position, 3, k));
@@ -151,29 +151,29 @@ impl Task for Fill<'_> {
                 row[k] = row[k] * scale[k];
             }
         }
-        batch.store(position, &mut forms.position);
-        batch.store(velocity, &mut forms.velocity);
-        batch.store(scale, &mut forms.scale);
-        batch.store(quaternion, &mut forms.quaternion);
-        batch.store([opacity, ln_opacity, omega_mean], &mut forms.strength);
-        forms.spread.set_matrix(batch, spread);
+        batch.store(position, &mut gaussians.position);
+        batch.store(velocity, &mut gaussians.velocity);
+        batch.store(scale, &mut gaussians.scale);
+        batch.store(quaternion, &mut gaussians.quaternion);
+        batch.store([opacity, ln_opacity, omega_mean], &mut gaussians.strength);
+        gaussians.spread.set_matrix(batch, spread);
     }
 }
 
 struct PullBack<'a> {
-    forms: &'a Forms,
-    bars: &'a FormBars,
+    gaussians: &'a WorldGaussians,
+    bars: &'a WorldGaussianBars,
     gradient: &'a mut Pppr,
 }
 
-impl Task for PullBack<'_> {
+impl JointTask for PullBack<'_> {
     #[inline(always)]
     fn run<B: Batch>(&mut self, batch: B) {
-        let Self { forms, bars, gradient } = self;
+        let Self { gaussians, bars, gradient } = self;
         let [ln_opacity_bar, omega_mean_bar] = batch.load(&bars.strength);
-        let [opacity, ..] = batch.load(&forms.strength);
+        let [opacity, ..] = batch.load(&gaussians.strength);
         let beta = gradient.group_mut(Group::Beta);
-        batch.scatter(ln_opacity_bar * (opacity.like(1.0) - opacity), |joint, x| beta[joint] += x);
+        batch.scatter(ln_opacity_bar * (opacity.splat(1.0) - opacity), |joint, x| beta[joint] += x);
         let motion = batch.load(&bars.motion);
         for (group, first) in [(Group::Position, 0), (Group::Velocity, 3)] {
             let numbers = gradient.group_mut(group);
@@ -189,18 +189,18 @@ impl Task for PullBack<'_> {
             }
         });
 
-        let (quaternion, widths) = (batch.load(&forms.quaternion), batch.load(&forms.scale));
+        let (quaternion, widths) = (batch.load(&gaussians.quaternion), batch.load(&gaussians.scale));
         let rotation = rotation_from_quaternion(quaternion);
         let [xx, xy, xz, yy, yz, zz] = batch.load(&bars.covariance);
         let covariance_bar = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
-        let mut bar = mat_mul(&covariance_bar, &forms.spread.matrix(batch));
+        let mut bar = mat_mul(&covariance_bar, &gaussians.spread.matrix(batch));
         for row in &mut bar {
-            *row = scale(*row, widths[0].like(2.0));
+            *row = scale(*row, widths[0].splat(2.0));
         }
         let log_scale = gradient.group_mut(Group::LogScale);
         for k in 0..3 {
             let width_bar =
-                (rotation[0][k] * bar[0][k]).plus(rotation[1][k], bar[1][k]).plus(rotation[2][k], bar[2][k]);
+                rotation[2][k].mul_add(bar[2][k], rotation[1][k].mul_add(bar[1][k], rotation[0][k] * bar[0][k]));
             batch.scatter(width_bar * widths[k], |joint, x| log_scale[3 * joint + k] += x);
             for row in &mut bar {
                 row[k] = row[k] * widths[k];
@@ -215,7 +215,7 @@ impl Task for PullBack<'_> {
 
 /// ∂L/∂q through the normalisation; the zero quaternion stands for the identity and has no gradient.
 #[inline(always)]
-fn quaternion_bar<T: Number>(q: [T; 4], m: &Mat3<T>) -> [T; 4] {
+fn quaternion_bar<T: Numeric>(q: [T; 4], m: &Mat3<T>) -> [T; 4] {
     let (length, unit) = unit_quaternion(q);
     let [w, x, y, z] = unit;
     let mut bar = [
@@ -229,7 +229,7 @@ fn quaternion_bar<T: Number>(q: [T; 4], m: &Mat3<T>) -> [T; 4] {
     ];
     let along = w * bar[0] + x * bar[1] + y * bar[2] + z * bar[3];
     for k in 0..4 {
-        bar[k] = length.below(f64::MIN_POSITIVE, w.like(0.0), (bar[k] - unit[k] * along) / length);
+        bar[k] = length.select_lt(f64::MIN_POSITIVE, w.splat(0.0), (bar[k] - unit[k] * along) / length);
     }
     bar
 }

@@ -1,4 +1,4 @@
-//! How a box of a view's cells is laid out for the sum over joints.
+//! The order in which a box of a view's cells is summed over joints.
 //!
 //! Tiles are four bins along the last axis and eight along the one before, sixteen beside each other a block: made for maps
 //! that are wide both ways. On a grid of 100000 × 1 cells nearly all of every block would lie beyond the box, which costs its
@@ -6,17 +6,17 @@
 //! axes in any order. A grid that tiles fit is left as it is, and double precision, which has no tiles, always.
 
 use super::Precision;
-use super::tiles::{Tiling, blocks_of};
+use super::tiles::{TileGrid, blocks_of};
 use crate::radar::View;
 use smallvec::SmallVec;
 
 /// Axes change places where that leaves at most one of so many blocks,
-const SAVES: usize = 4;
+const MIN_SAVING: usize = 4;
 /// of at least so many: fewer cost nothing.
-const FEW_BLOCKS: usize = 64;
+const MIN_BLOCKS: usize = 64;
 
 /// A box of cells as it is summed.
-pub(super) struct Laid {
+pub(super) struct CellBox {
     /// The view with its axes in the order of the sum.
     pub view: View,
     /// `[lo, hi)` along these axes.
@@ -24,12 +24,12 @@ pub(super) struct Laid {
     /// Marks of the cells, in C order of these axes.
     pub marked: Vec<bool>,
     /// The same in tiles; empty in double precision.
-    pub tiling: Tiling,
+    pub grid: TileGrid,
     /// The place among the view's own axes of each.
     order: SmallVec<[usize; 3]>,
 }
 
-impl Laid {
+impl CellBox {
     /// Of the box `bins` of `view` whose cells are `marked` (C order).
     pub(super) fn new(view: &View, bins: &[[usize; 2]], marked: &[bool], precision: Precision) -> Self {
         let order = match precision {
@@ -37,13 +37,13 @@ impl Laid {
             Precision::F32 => order_of(bins),
         };
         let axes = order.iter().filter_map(|&k| view.axes.get(k).cloned()).collect();
-        let laid: Vec<[usize; 2]> = order.iter().map(|&k| bins[k]).collect();
+        let bins_in_order: Vec<[usize; 2]> = order.iter().map(|&k| bins[k]).collect();
         let marked = into_order(&order, bins, marked);
-        let tiling = match precision {
-            Precision::F64 => Tiling::new(&[], &[]),
-            Precision::F32 => Tiling::new(&laid, &marked),
+        let grid = match precision {
+            Precision::F64 => TileGrid::new(&[], &[]),
+            Precision::F32 => TileGrid::new(&bins_in_order, &marked),
         };
-        Self { view: View { axes, region: None, ..view.clone() }, bins: laid, marked, tiling, order }
+        Self { view: View { axes, region: None, ..view.clone() }, bins: bins_in_order, marked, grid, order }
     }
 
     /// Values of the cells in C order of the view's own axes, from those in the order of the sum.
@@ -64,7 +64,7 @@ fn order_of(bins: &[[usize; 2]]) -> SmallVec<[usize; 3]> {
     sorted.sort_by_key(|&k| size(k));
     let blocks = |order: &[usize]| blocks_of(order.iter().map(|&k| size(k)));
     let (now, least) = (blocks(&own), blocks(&sorted));
-    if now >= FEW_BLOCKS && least <= now / SAVES { sorted } else { own }
+    if now >= MIN_BLOCKS && least <= now / MIN_SAVING { sorted } else { own }
 }
 
 /// `values` of a box (C order) in C order of its axes `order`.
@@ -105,7 +105,7 @@ mod tests {
         let turned = into_order(&[1, 2, 0], &bins, &values);
         // The cell (2, 1, 0) of the box is number 14, and (1, 0, 2) of the turned one 10.
         assert_eq!(turned[10], 14.0);
-        let laid: Vec<[usize; 2]> = [1, 2, 0].map(|k: usize| bins[k]).to_vec();
-        assert_eq!(into_order(&[2, 0, 1], &laid, &turned), values);
+        let bins_in_order: Vec<[usize; 2]> = [1, 2, 0].map(|k: usize| bins[k]).to_vec();
+        assert_eq!(into_order(&[2, 0, 1], &bins_in_order, &turned), values);
     }
 }

@@ -4,7 +4,7 @@
     reason = "all of it belongs into the one function that is compiled for an instruction set"
 )]
 
-use crate::geometry::{Mat3, Number, Vec3, norm, scale};
+use crate::geometry::{Mat3, Numeric, Vec3, norm, scale};
 use crate::radar::{Axis, AxisKind, Spacing};
 
 /// Distances are held above this, m.
@@ -21,17 +21,17 @@ pub(super) struct Floored<T = f64> {
     pub pass: T,
 }
 
-impl<T: Number> Floored<T> {
+impl<T: Numeric> Floored<T> {
     #[inline(always)]
     pub(super) fn new(x: T, floor: f64) -> Self {
         // A NaN must stay visible, so the comparison lets it through.
-        Self { value: x.below(floor, x.like(floor), x), pass: x.below(floor, x.like(0.0), x.like(1.0)) }
+        Self { value: x.select_lt(floor, x.splat(floor), x), pass: x.select_lt(floor, x.splat(0.0), x.splat(1.0)) }
     }
 }
 
 /// A point in the view frame and the directions around it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Seen<T = f64> {
+pub(super) struct SphericalTriad<T = f64> {
     /// The point after the surface offset, m.
     pub p: Vec3<T>,
     /// d = ‖p‖, m.
@@ -60,18 +60,18 @@ pub(super) struct Seen<T = f64> {
 
 /// The direction of (a, b), whose length is given; at the origin that of a.
 #[inline(always)]
-fn direction<T: Number>(a: T, b: T, length: T) -> [T; 2] {
-    let (zero, one) = (a.like(0.0), a.like(1.0));
+fn direction<T: Numeric>(a: T, b: T, length: T) -> [T; 2] {
+    let (zero, one) = (a.splat(0.0), a.splat(1.0));
     let by_length = one / length;
-    [length.below(f64::MIN_POSITIVE, one, a * by_length), length.below(f64::MIN_POSITIVE, zero, b * by_length)]
+    [length.select_lt(f64::MIN_POSITIVE, one, a * by_length), length.select_lt(f64::MIN_POSITIVE, zero, b * by_length)]
 }
 
-impl<T: Number> Seen<T> {
+impl<T: Numeric> SphericalTriad<T> {
     #[inline(always)]
     pub(super) fn new(p: Vec3<T>) -> Self {
         let [x, y, z] = p;
-        let zero = x.like(0.0);
-        let (rho, h, d) = ((x * x + y * y).root(), (x * x + z * z).root(), norm(p));
+        let zero = x.splat(0.0);
+        let (rho, h, d) = ((x * x + y * y).sqrt(), (x * x + z * z).sqrt(), norm(p));
         // At the origin and above it, angles are 0.
         let ([cos_az, sin_az], [cos_el, sin_el]) = (direction(x, y, rho), direction(rho, z, d));
         let u = [cos_el * cos_az, cos_el * sin_az, sin_el];
@@ -99,14 +99,14 @@ impl<T: Number> Seen<T> {
     #[inline(always)]
     pub(super) fn cos_cone(&self) -> Floored<T> {
         let s = self.u[1];
-        Floored::new((s.like(1.0) - s * s).at_least(0.0).root(), COSINE_FLOOR)
+        Floored::new((s.splat(1.0) - s * s).max(0.0).sqrt(), COSINE_FLOOR)
     }
 
     /// (ŷ − s u)/cos.
     #[inline(always)]
     pub(super) fn e_cone(&self) -> Vec3<T> {
         let [x, s, z] = self.u;
-        let one = s.like(1.0);
+        let one = s.splat(1.0);
         scale([-s * x, one - s * s, -s * z], one / self.cos_cone().value)
     }
 
@@ -117,11 +117,11 @@ impl<T: Number> Seen<T> {
         match axis.kind {
             AxisKind::Range => self.d.value,
             AxisKind::Azimuth if sine => self.sin_az,
-            AxisKind::Azimuth => self.sin_az.each_with(self.cos_az, f64::atan2),
+            AxisKind::Azimuth => self.sin_az.zip_map(self.cos_az, f64::atan2),
             AxisKind::Elevation if sine => self.sin_el,
-            AxisKind::Elevation => self.sin_el.each_with(self.cos_el, f64::atan2),
+            AxisKind::Elevation => self.sin_el.zip_map(self.cos_el, f64::atan2),
             AxisKind::Cone if sine => self.u[1],
-            AxisKind::Cone => self.u[1].each(|s| s.clamp(-1.0, 1.0).asin()),
+            AxisKind::Cone => self.u[1].map(|s| s.clamp(-1.0, 1.0).asin()),
             AxisKind::Doppler => radial_mps,
             AxisKind::X => self.p[0],
             AxisKind::Y => self.p[1],
@@ -138,14 +138,14 @@ impl<T: Number> Seen<T> {
             (Spacing::Sine, AxisKind::Azimuth) => self.cos_az_floored.value,
             (Spacing::Sine, AxisKind::Elevation) => self.cos_el_floored.value,
             (Spacing::Sine, AxisKind::Cone) => self.cos_cone().value,
-            _ => self.h.like(1.0),
+            _ => self.h.splat(1.0),
         }
     }
 
     /// The unit direction along ∂ξ/∂p, and the arm: ∂ξ/∂p = direction · slope / arm. A Doppler axis has none.
     #[inline(always)]
     pub(super) fn direction_and_arm(&self, kind: AxisKind) -> (Vec3<T>, T) {
-        let (zero, one) = (self.h.like(0.0), self.h.like(1.0));
+        let (zero, one) = (self.h.splat(0.0), self.h.splat(1.0));
         match kind {
             AxisKind::Range => (self.u, one),
             AxisKind::Azimuth => (self.e_az, self.rho.value),
@@ -163,11 +163,11 @@ impl<T: Number> Seen<T> {
 
 /// The same matrix for all that `like` stands for.
 #[inline(always)]
-pub(super) fn uniform<T: Number>(like: T, of: Mat3) -> Mat3<T> {
+pub(super) fn splat_matrix<T: Numeric>(like: T, of: Mat3) -> Mat3<T> {
     let mut matrix = [[like; 3]; 3];
     for i in 0..3 {
         for k in 0..3 {
-            matrix[i][k] = like.like(of[i][k]);
+            matrix[i][k] = like.splat(of[i][k]);
         }
     }
     matrix
