@@ -82,7 +82,7 @@ pub(crate) fn several(bed: &Bed) -> String {
 }
 
 pub(crate) fn counting(bed: &Bed) -> String {
-    let options = "--preset easy,medium,hard --frames 1000 --people 0..=4 --seed 9051";
+    let options = "--preset easy,medium,hard --frames 500 --people 0..=4 --seed 9051";
     let data = bed.simulated("counted", options);
     let run = bed.study("counting", &data, "counting", &[]);
     format!(

@@ -204,7 +204,7 @@ impl FrameSource for Frames {
 fn stacked_maps(frames: &Range<usize>, path: &Path, info: &DatasetInfo) -> Result<Vec<Vec<Heatmap>>, NpzError> {
     let mut file = NpzArchive::open(path)?;
     let mut maps: Vec<Vec<Heatmap>> = frames.clone().map(|_| Vec::with_capacity(info.views.len())).collect();
-    for view in info.views.iter() {
+    for view in &info.views {
         let shape = view.shape();
         require_stack(&mut file, view)?;
         let slabs = file.read_slabs(&view.array, frames.clone())?;
