@@ -12,7 +12,7 @@ pub enum Preset {
     Default,
     /// The paper to the letter, as far as its words say one thing; [`super::deviations`] lists what they do not.
     Paper,
-    /// What fits best on synthetic data with truth; the README tells by how much each switch helps.
+    /// What fits best on synthetic data with truth; `study switches` tells by how much each switch helps.
     Recommended,
 }
 

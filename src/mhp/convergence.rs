@@ -39,22 +39,9 @@ fn bones_plausible(skeleton: &Skeleton, params: &Pppr) -> bool {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
+    use super::super::terms::tests::two_joints;
     use super::*;
-    use crate::body::PpprShape;
-
-    /// A skeleton of one bone of 0.4 m, and one person whose joints are so far apart.
-    pub(in crate::mhp) fn two_joints(distance_m: f64) -> (Skeleton, Pppr) {
-        let skeleton = Skeleton {
-            joints: vec!["a".into(), "b".into()],
-            bones: vec![[0, 1]],
-            bone_lengths_m: vec![0.4],
-            angles: vec![],
-        };
-        let mut params = Pppr::zeros(PpprShape { persons: 1, joints: 2, doppler_features: 1 });
-        params.set_vec3(crate::body::Group::Position, 1, [distance_m, 0.0, 0.0]);
-        (skeleton, params)
-    }
 
     #[test]
     fn needs_a_small_or_settled_loss() {

@@ -102,11 +102,13 @@ pub struct Axis {
 
 impl Axis {
     /// Step between bin centres, in axis units (may be negative).
+    #[inline]
     pub fn step(&self) -> f64 {
         (self.hi - self.lo) / self.bins as f64
     }
 
     /// Axis coordinate ξ of a point at rest in the view frame, m (0 on a Doppler axis); SPEC section 1.
+    #[inline]
     pub fn coordinate(&self, p_view: Vec3) -> f64 {
         let [x, y, z] = p_view;
         let angle = match self.kind {
@@ -128,16 +130,19 @@ impl Axis {
     }
 
     /// Axis coordinate at bin coordinate `bin` (an integer is a bin centre).
+    #[inline]
     pub fn at(&self, bin: f64) -> f64 {
         self.lo + bin * self.step()
     }
 
     /// Bin coordinate of the axis coordinate `xi`.
+    #[inline]
     pub fn bin(&self, xi: f64) -> f64 {
         (xi - self.lo) / self.step()
     }
 
     /// The physical value at a bin coordinate: metres, m/s or radians (the arcsine is taken on a sine axis).
+    #[inline]
     pub fn value_at(&self, bin: f64) -> f64 {
         match self.spacing {
             Spacing::Linear => self.at(bin),

@@ -249,3 +249,16 @@ fn layouts_are_known_by_name_in_their_own_files_alone() {
     }
     assert_eq!(wrong, Vec::<String>::new());
 }
+
+/// The front page leads only to what is there.
+#[test]
+fn every_link_of_the_readme_leads_somewhere() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(root.join("README.md")).unwrap();
+    let links: Vec<&str> = text.split("](").skip(1).filter_map(|rest| rest.split(')').next()).collect();
+    let inside: Vec<&str> = links.into_iter().filter(|link| !link.contains("://")).collect();
+    let broken: Vec<&&str> = inside.iter().filter(|link| !root.join(link).exists()).collect();
+    assert!(inside.len() > 10, "{inside:?}");
+    assert!(broken.is_empty(), "{broken:?}");
+    assert!(text.len() <= 9 * 1024, "{} bytes", text.len());
+}

@@ -141,6 +141,7 @@ impl SaliencyMap {
     }
 
     /// H over the background.
+    #[inline]
     fn over_background(&self, cell: usize) -> f32 {
         let place = self.grid.place(cell, self.compared_with);
         self.value[cell] * self.background[place].get_or_init(|| self.grid.background(&self.value, place))
@@ -202,6 +203,7 @@ impl SaliencyMap {
     }
 
     /// The spatial cell at a world point; `None` outside the map.
+    #[inline]
     pub(in crate::mhp) fn cell(&self, p_world: Vec3) -> Option<usize> {
         let p = self.grid.view.pose.view_from_world(p_world);
         self.grid.axes.iter().try_fold(0, |flat, (_, axis)| {

@@ -81,10 +81,10 @@ impl Joints<'_> {
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests")]
 
+    use super::super::tests::two_joints;
     use super::*;
     use crate::body::Group;
     use crate::config::FitConfig;
-    use crate::mhp::convergence::tests::two_joints;
 
     /// L_bone of a bone of 0.4 m that is `length_m` long, and its slope by the length.
     fn bone(length_m: f64, bone_tolerance_m: f64) -> (f64, f64) {

@@ -24,7 +24,7 @@ mod electromagnetic;
 mod penalties;
 mod separation;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 mod time;
 mod values;
 mod weight;

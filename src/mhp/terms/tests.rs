@@ -17,6 +17,19 @@ fn skeleton() -> Skeleton {
     }
 }
 
+/// A skeleton of one bone of 0.4 m, and one person whose joints are so far apart.
+pub(in super::super) fn two_joints(distance_m: f64) -> (Skeleton, Pppr) {
+    let skeleton = Skeleton {
+        joints: vec!["a".into(), "b".into()],
+        bones: vec![[0, 1]],
+        bone_lengths_m: vec![0.4],
+        angles: vec![],
+    };
+    let mut params = Pppr::zeros(PpprShape { persons: 1, joints: 2, doppler_features: 1 });
+    params.set_vec3(Group::Position, 1, [distance_m, 0.0, 0.0]);
+    (skeleton, params)
+}
+
 /// Two people in each other's way, with every term above 0.
 fn params() -> Pppr {
     let mut params = Pppr::zeros(SHAPE);
