@@ -188,7 +188,9 @@ fn another_configuration_or_other_data_are_refused() {
     assert!(refusal(&words(&["--precision", "f64"])).contains("another precision: f32, not f64"));
     assert!(refusal(&words(&["--shard", "1/2"])).contains("another shard: the whole, not 1/2"));
     assert!(refusal(&["threshold", "--iterations", "2"]).contains("another study: init, not threshold"));
-    assert!(refusal(&["init", "--iterations", "3", "--frames", "0..2"]).contains("another value of iterations: 2, not 3"));
+    assert!(
+        refusal(&["init", "--iterations", "3", "--frames", "0..2"]).contains("another value of iterations: 2, not 3")
+    );
     assert!(refusal(&["init", "--iterations", "2", "--frames", "0..3"]).contains("another"));
     let frame = case.data().join("frames/easy/001.npz");
     blob::write_frame(&frame, 1, &|depth, _| if depth > 5.0 { 9.0 } else { 0.0 });
