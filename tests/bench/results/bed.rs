@@ -76,8 +76,11 @@ impl Bed {
     /// Another bench of this project: what it printed, as a block.
     pub(crate) fn bench(name: &str) -> String {
         let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
+        // As this one was built: another choice of features would build everything once more.
+        let features: &[&str] = if cfg!(feature = "viewer") { &[] } else { &["--no-default-features"] };
         let output = Command::new(cargo)
-            .args(["bench", "--locked", "--no-default-features", "--bench", name])
+            .args(["bench", "--locked", "--bench", name])
+            .args(features)
             .current_dir(env!("CARGO_MANIFEST_DIR"))
             .output()
             .unwrap();
