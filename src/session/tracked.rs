@@ -2,7 +2,7 @@
 
 use std::ops::Deref;
 
-/// A value that can be changed through [`Self::change`] alone, which counts.
+/// A value that can be changed through `change` alone, which counts.
 #[derive(Debug, Default)]
 pub struct Tracked<T> {
     value: T,
