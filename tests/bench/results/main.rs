@@ -58,19 +58,20 @@ fn main() {
         panic!("no section `{wrong}`; expected one of {}", keys.join(", "));
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/RESULTS.md");
-    let file = std::fs::read_to_string(&path).unwrap_or_default();
+    let mut file = std::fs::read_to_string(&path).unwrap_or_default();
     let bed = Bed::new();
-    let mut text = TITLE.to_owned();
-    for section in SECTIONS {
-        let measured = asked.is_empty() || asked.iter().any(|word| word == section.key);
-        let body = if measured {
-            eprintln!("{} ...", section.key);
-            format!("{}\n\n{}", bed.machine(), (section.write)(&bed).trim())
-        } else {
-            before(&file, section.heading).unwrap_or_else(|| "Not measured yet.".to_owned())
-        };
-        writeln!(text, "\n## {}\n\n{body}", section.heading).unwrap();
+    // Written after each section: a measurement that is stopped leaves those before it.
+    for section in SECTIONS.iter().filter(|section| asked.is_empty() || asked.iter().any(|word| word == section.key)) {
+        eprintln!("{} ...", section.key);
+        let measured = format!("{}\n\n{}", bed.machine(), (section.write)(&bed).trim());
+        let mut text = TITLE.to_owned();
+        for each in SECTIONS {
+            let body = if each.key == section.key { Some(measured.clone()) } else { before(&file, each.heading) };
+            let body = body.unwrap_or_else(|| "Not measured yet.".to_owned());
+            writeln!(text, "\n## {}\n\n{body}", each.heading).unwrap();
+        }
+        std::fs::write(&path, &text).unwrap();
+        file = text;
     }
-    std::fs::write(&path, text).unwrap();
     eprintln!("{}", path.display());
 }
