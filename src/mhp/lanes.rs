@@ -210,13 +210,13 @@ mod tests {
     use pulp::{Arch, WithSimd};
 
     /// Sixteen numbers, of which every register holds a part.
-    type Sixteen = [f32; 16];
+    type F32x16 = [f32; 16];
 
     /// 2ˣ, log₂ x, cosine and sine of turns, |x|, 5 − 3x, and 2 where x > 1, else 3.
-    struct Functions<'a>(&'a [Sixteen]);
+    struct Functions<'a>(&'a [F32x16]);
 
     impl WithSimd for Functions<'_> {
-        type Output = Vec<[Sixteen; 7]>;
+        type Output = Vec<[F32x16; 7]>;
 
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
@@ -240,7 +240,7 @@ mod tests {
     /// Each number with what is found of it.
     fn functions(of: impl Iterator<Item = f32>) -> Vec<(f64, [f64; 7])> {
         let of: Vec<f32> = of.collect();
-        let rows: Vec<Sixteen> = of.chunks_exact(16).map(|row| std::array::from_fn(|k| row[k])).collect();
+        let rows: Vec<F32x16> = of.chunks_exact(16).map(|row| std::array::from_fn(|k| row[k])).collect();
         let found = Arch::new().dispatch(Functions(&rows));
         let pairs = rows.iter().zip(&found);
         pairs.flat_map(|(x, y)| (0..16).map(|k| (f64::from(x[k]), y.map(|y| f64::from(y[k]))))).collect()
@@ -268,7 +268,7 @@ mod tests {
     }
 
     /// A bit a lane, the largest lane and Σ of the lanes.
-    struct Reductions(Sixteen);
+    struct Reductions(F32x16);
 
     impl WithSimd for Reductions {
         type Output = (u32, f32, f32, bool);

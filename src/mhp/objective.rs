@@ -191,7 +191,7 @@ impl Objective {
         let inputs = Inputs { skeleton: &problem.skeleton, config, params, anchors };
         *terms = terms::evaluate(&inputs, em, gains, gradients);
         *loss = terms.loss(config);
-        terms::weigh(config, gradients, gradient);
+        terms::weighted_sum_into(config, gradients, gradient);
     }
 
     /// L_EM alone, without its gradient.

@@ -11,6 +11,7 @@ pub mod complexity;
 pub mod count;
 mod evidence;
 mod export;
+mod file_error;
 mod results;
 mod row;
 pub mod run;
@@ -23,6 +24,7 @@ pub use export::{
     CloudPoint, CurveRow, ExportError, ExportScale, HeatmapExport, curve_columns, curves_csv, ply, point_cloud,
     scaled_maps, write_cloud_npz, write_cloud_pcd, write_cloud_ply, write_curves, write_ply,
 };
+pub use file_error::FileError;
 pub use results::{SummaryRow, read_summary};
 pub use row::{BatchRow, FitNumbers, FrameFit, Means};
 pub use summary::{StudyError, Summary, columns};

@@ -30,7 +30,7 @@ mod values;
 mod weight;
 
 pub use values::Terms;
-pub(super) use weight::weigh;
+pub(super) use weight::weighted_sum_into;
 pub use weight::{TermGroup, Weight};
 
 use crate::body::{Pppr, Skeleton};

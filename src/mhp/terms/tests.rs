@@ -1,7 +1,7 @@
 //! What every line of the table keeps, the term that only unit tests have among them.
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
-use super::{Inputs, Scope, TERMS, TermGroup, TermId, Terms, WHOLE, Weight, evaluate, formula, weigh};
+use super::{Inputs, Scope, TERMS, TermGroup, TermId, Terms, WHOLE, Weight, evaluate, formula, weighted_sum_into};
 use crate::body::{Group, Pppr, PpprShape, Skeleton};
 use crate::config::{Field, FitConfig, Value};
 use crate::geometry::Vec3;
@@ -108,7 +108,7 @@ fn loss_and_gradient_are_the_weighted_sums_the_dummy_term_among_them() {
     let (fewer, _) = evaluated(&params, &without, &WHOLE);
     assert!(fewer.get("dummy") == Some(0.0) && fewer.loss(&without) < values.loss(&config) - 1.0);
     let mut total = Pppr::zeros(SHAPE);
-    weigh(&config, &gradients, &mut total);
+    weighted_sum_into(&config, &gradients, &mut total);
     assert_close("L", &total, &differences(&params, |params| evaluated(params, &config, &WHOLE).0.loss(&config)));
 }
 

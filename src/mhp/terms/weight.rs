@@ -133,7 +133,7 @@ impl Terms {
 }
 
 /// ∂L/∂Θ from the gradients by weight.
-pub(in crate::mhp) fn weigh(config: &FitConfig, gradients: &[Pppr; Weight::COUNT], total: &mut Pppr) {
+pub(in crate::mhp) fn weighted_sum_into(config: &FitConfig, gradients: &[Pppr; Weight::COUNT], total: &mut Pppr) {
     let part = |weight: Weight| (weight.of(config), &gradients[weight as usize]);
     total.set_mix(part(Weight::Kine), part(Weight::Em));
     for &weight in Weight::ALL.iter().filter(|weight| !matches!(weight, Weight::Kine | Weight::Em)) {

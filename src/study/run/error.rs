@@ -1,7 +1,7 @@
 //! What can go wrong with a run as a whole. What goes wrong with one frame is a row.
 
-use super::super::StudyError;
 use super::super::shard::ShardError;
+use super::super::{FileError, StudyError};
 use crate::output::OutputError;
 use std::path::PathBuf;
 
@@ -11,30 +11,9 @@ pub enum RunError {
     /// A study underneath.
     #[error(transparent)]
     Study(#[from] StudyError),
-    /// A file cannot be written.
-    #[error("{path}: cannot be written: {reason}", path = path.display())]
-    Write {
-        /// What the operating system said.
-        reason: std::io::Error,
-        /// The file or folder.
-        path: PathBuf,
-    },
-    /// A file cannot be read.
-    #[error("{path}: cannot be read: {reason}", path = path.display())]
-    Read {
-        /// What the operating system said.
-        reason: std::io::Error,
-        /// The file or folder.
-        path: PathBuf,
-    },
-    /// A file of a run folder is not what it should be.
-    #[error("{path}: {message}", path = path.display())]
-    Damaged {
-        /// What is wrong, and what was expected.
-        message: String,
-        /// The file.
-        path: PathBuf,
-    },
+    /// A file of its own.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The folder holds another run.
     #[error("{path}: holds a run with another {what}: {there}, not {here}; give another --out, or remove the folder", path = path.display())]
     OtherRun {
@@ -73,16 +52,4 @@ pub enum RunError {
         /// What it said.
         reason: std::io::Error,
     },
-}
-
-impl RunError {
-    /// For `map_err`: a file that cannot be written.
-    pub(super) fn writing(path: &std::path::Path) -> impl Fn(std::io::Error) -> Self + '_ {
-        |reason| Self::Write { reason, path: path.to_owned() }
-    }
-
-    /// For `map_err`: a file that cannot be read.
-    pub(super) fn reading(path: &std::path::Path) -> impl Fn(std::io::Error) -> Self + '_ {
-        |reason| Self::Read { reason, path: path.to_owned() }
-    }
 }

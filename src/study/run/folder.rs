@@ -1,5 +1,6 @@
 //! Run folders: begun or gone on with, merged, read back.
 
+use super::super::FileError;
 use super::engine::execute;
 use super::error::RunError;
 use super::journal::{JOURNAL_FILE, Rows, RunJournal, read, rewrite};
@@ -87,7 +88,7 @@ pub fn execute_run(
         }
     } else if folder.join(JOURNAL_FILE).exists() {
         let message = format!("there is a journal without {RUN_FILE}; give another folder, or remove it");
-        return Err(RunError::Damaged { message, path: folder.to_owned() });
+        return Err(FileError::Damaged { message, path: folder.to_owned() }.into());
     } else {
         plan.spec.write(folder)?;
     }

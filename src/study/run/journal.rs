@@ -3,6 +3,7 @@
 //! The first line names the run. A torn or damaged line is dropped, its row is done again. One process writes it: whoever holds
 //! the folder ([`crate::output::FolderLock`]).
 
+use super::super::FileError;
 use super::error::RunError;
 use super::row::RunRow;
 use super::spec::RunSpec;
@@ -42,7 +43,7 @@ impl RunJournal {
         if !sound {
             rewrite(&path, spec, &rows)?;
         }
-        let file = OpenOptions::new().append(true).open(&path).map_err(RunError::writing(&path))?;
+        let file = OpenOptions::new().append(true).open(&path).map_err(FileError::writing(&path))?;
         Ok((Self { file, path }, rows))
     }
 
@@ -51,8 +52,8 @@ impl RunJournal {
     /// # Errors
     /// Where the file cannot be written.
     pub(super) fn add(&mut self, row: &RunRow) -> Result<(), RunError> {
-        let line = line(row).map_err(RunError::writing(&self.path))?;
-        self.file.write_all(line.as_bytes()).map_err(RunError::writing(&self.path))
+        let line = line(row).map_err(FileError::writing(&self.path))?;
+        Ok(self.file.write_all(line.as_bytes()).map_err(FileError::writing(&self.path))?)
     }
 }
 
@@ -72,7 +73,7 @@ pub(super) fn rewrite(path: &Path, spec: &RunSpec, rows: &Rows) -> Result<(), Ru
         writeln!(out, "{head}")?;
         rows.values().try_for_each(|row| out.write_all(line(row)?.as_bytes()))
     });
-    written.map_err(RunError::writing(path))
+    Ok(written.map_err(FileError::writing(path))?)
 }
 
 fn line(row: &RunRow) -> std::io::Result<String> {
@@ -84,7 +85,7 @@ const MOST_BYTES: u64 = 4 << 30;
 
 /// The rows, and whether every line was whole.
 fn read_lines(path: &Path, spec: &RunSpec) -> Result<(Rows, bool), RunError> {
-    let bytes = read_bytes(path, "the journal of a run", MOST_BYTES).map_err(RunError::reading(path))?;
+    let bytes = read_bytes(path, "the journal of a run", MOST_BYTES).map_err(FileError::reading(path))?;
     let whole = bytes.is_empty() || bytes.ends_with(b"\n");
     let mut lines = bytes.split(|&byte| byte == b'\n').filter(|line| !line.is_empty());
     let Some(head) = lines.next() else { return Ok((Rows::new(), false)) };
@@ -92,13 +93,13 @@ fn read_lines(path: &Path, spec: &RunSpec) -> Result<(Rows, bool), RunError> {
         // Killed while the first line was written: nothing is lost. Anything more is not ours to drop.
         if whole {
             let message = "line 1 does not name a run; expected {\"run\": …}".to_owned();
-            return Err(RunError::Damaged { message, path: path.to_owned() });
+            return Err(FileError::Damaged { message, path: path.to_owned() }.into());
         }
         return Ok((Rows::new(), false));
     };
     if head.run != spec.id {
         let message = format!("is the journal of run {}; run.toml is {}", head.run, spec.id);
-        return Err(RunError::Damaged { message, path: path.to_owned() });
+        return Err(FileError::Damaged { message, path: path.to_owned() }.into());
     }
     let (mut rows, mut sound) = (Rows::new(), whole);
     for line in lines {

@@ -1,5 +1,6 @@
 //! What a finished run leaves: rows, table, times.
 
+use super::super::FileError;
 use super::error::RunError;
 use super::journal::Rows;
 use super::row::{Cell, RunRow, cells};
@@ -68,11 +69,12 @@ fn write_rows(folder: &Path, spec: &RunSpec, rows: &[&RunRow]) -> Result<(), Run
         }
         table.flush()
     });
-    written.map_err(RunError::writing(&csv_file))?;
+    written.map_err(FileError::writing(&csv_file))?;
     let mut bytes = Vec::new();
     let file = folder.join("rows.parquet");
     let made = parquet_rows::write(&mut bytes, &columns, &kinds, &all).map_err(std::io::Error::other);
-    made.and_then(|()| replace_file(&file, |out| out.write_all(&bytes))).map_err(RunError::writing(&file))
+    let written = made.and_then(|()| replace_file(&file, |out| out.write_all(&bytes)));
+    Ok(written.map_err(FileError::writing(&file))?)
 }
 
 fn write_times(folder: &Path, spec: &RunSpec, rows: &[&RunRow]) -> Result<(), RunError> {
@@ -94,9 +96,9 @@ fn write_times(folder: &Path, spec: &RunSpec, rows: &[&RunRow]) -> Result<(), Ru
         }
         table.flush()
     });
-    written.map_err(RunError::writing(&file))
+    Ok(written.map_err(FileError::writing(&file))?)
 }
 
 fn write_text(file: &Path, text: &str) -> Result<(), RunError> {
-    replace_file(file, |out| out.write_all(text.as_bytes())).map_err(RunError::writing(file))
+    Ok(replace_file(file, |out| out.write_all(text.as_bytes())).map_err(FileError::writing(file))?)
 }

@@ -1,6 +1,7 @@
 //! `run.toml`: what a run is. Two runs with the same specification give the same rows, on any machine, in any number of
 //! shards; a folder is gone on with only where its specification is the one asked for.
 
+use super::super::FileError;
 use super::error::RunError;
 use super::kind::StudyKind;
 use super::output::TABLE_FILE;
@@ -56,25 +57,25 @@ impl RunSpec {
     /// Where it cannot be read or is not one.
     pub fn read(folder: &Path) -> Result<Self, RunError> {
         let file = folder.join(RUN_FILE);
-        let text = read_text(&file, "what a run is (TOML)", MOST_TEXT).map_err(RunError::reading(&file))?;
-        let wrong = |message: String| RunError::Damaged { message, path: file.clone() };
+        let text = read_text(&file, "what a run is (TOML)", MOST_TEXT).map_err(FileError::reading(&file))?;
+        let wrong = |message: String| FileError::Damaged { message, path: file.clone() };
         let spec: Self = toml::from_str(&text).map_err(|error| wrong(error.message().replace('\n', "; ")))?;
         let lengths = spec.variants.iter().all(|variant| variant.labels.len() == spec.columns.len());
         if spec.variants.is_empty() || !lengths {
-            return Err(wrong("expected one [[variant]] or more, with a label for each of `columns`".into()));
+            return Err(wrong("expected one [[variant]] or more, with a label for each of `columns`".into()).into());
         }
         Ok(spec)
     }
 
     pub(super) fn write(&self, folder: &Path) -> Result<(), RunError> {
         let file = folder.join(RUN_FILE);
-        let text = toml::to_string(self).map_err(|error| RunError::Damaged {
+        let text = toml::to_string(self).map_err(|error| FileError::Damaged {
             message: format!("cannot be written: {error}"),
             path: file.clone(),
         })?;
         let head =
             format!("# mhp-inspector study {}; `table.md` is its table, `rows.csv` a row a frame.\n", self.study);
-        replace_file(&file, |out| out.write_all((head + &text).as_bytes())).map_err(RunError::writing(&file))
+        Ok(replace_file(&file, |out| out.write_all((head + &text).as_bytes())).map_err(FileError::writing(&file))?)
     }
 
     /// Names the run: 16 hexadecimal digits over everything but where the data lay.

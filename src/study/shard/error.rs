@@ -1,8 +1,9 @@
 //! What can go wrong with shards as such.
 
+use super::super::FileError;
 use super::Shard;
 use crate::output::OutputError;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Shards that are named one by one where many are missing.
 const NAMED: usize = 12;
@@ -10,30 +11,9 @@ const NAMED: usize = 12;
 /// Why a shard cannot begin or end, or shards do not make a whole.
 #[derive(Debug, thiserror::Error)]
 pub enum ShardError {
-    /// A file cannot be written.
-    #[error("{path}: cannot be written: {reason}", path = path.display())]
-    Write {
-        /// What the operating system said.
-        reason: std::io::Error,
-        /// The file.
-        path: PathBuf,
-    },
-    /// A file cannot be read.
-    #[error("{path}: cannot be read: {reason}", path = path.display())]
-    Read {
-        /// What the operating system said.
-        reason: std::io::Error,
-        /// The file.
-        path: PathBuf,
-    },
-    /// A file of a shard is not what it should be.
-    #[error("{path}: {message}", path = path.display())]
-    Damaged {
-        /// What is wrong, and what was expected.
-        message: String,
-        /// The file.
-        path: PathBuf,
-    },
+    /// A file of its own.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The folder must not be written, or another process writes it.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -71,18 +51,6 @@ pub enum ShardError {
         /// The folders, and what they hold.
         folders: Vec<String>,
     },
-}
-
-impl ShardError {
-    /// For `map_err`: a file that cannot be written.
-    pub(super) fn writing(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
-        |reason| Self::Write { reason, path: path.to_owned() }
-    }
-
-    /// For `map_err`: a file that cannot be read.
-    pub(super) fn reading(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
-        |reason| Self::Read { reason, path: path.to_owned() }
-    }
 }
 
 /// Which are missing, what was found instead, and what to do.

@@ -1,5 +1,6 @@
 //! The folder of a shard that is under way: held by one process, said what it is before the first frame, finished by its rows.
 
+use super::super::FileError;
 use super::gather::Part as _;
 use super::rows::{ShardRow, write_rows};
 use super::{ShardError, ShardSpec};
@@ -44,14 +45,14 @@ impl ShardFolder {
             below.iter().try_for_each(|name| check_empty(&folder.join(name)))?;
         }
         match std::fs::remove_file(&rows) {
-            Err(error) if error.kind() != ErrorKind::NotFound => return Err(ShardError::writing(&rows)(error)),
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(FileError::writing(&rows)(error).into()),
             _ => {}
         }
-        let text = spec.text().map_err(|error| ShardError::Damaged {
+        let text = spec.text().map_err(|error| FileError::Damaged {
             message: format!("cannot be written: {error}"),
             path: file.clone(),
         })?;
-        replace_file(&file, |out| out.write_all(text.as_bytes())).map_err(ShardError::writing(&file))?;
+        replace_file(&file, |out| out.write_all(text.as_bytes())).map_err(FileError::writing(&file))?;
         Ok(Self { folder: folder.to_owned(), spec, _lock: lock })
     }
 
@@ -66,7 +67,7 @@ impl ShardFolder {
 
 /// Refuses a folder with files that a merge would take for the shard's.
 fn check_empty(folder: &Path) -> Result<(), ShardError> {
-    let mut entries = std::fs::read_dir(folder).map_err(ShardError::reading(folder))?;
+    let mut entries = std::fs::read_dir(folder).map_err(FileError::reading(folder))?;
     let message = "holds other results already; give another --out, or remove it".to_owned();
-    entries.next().map_or(Ok(()), |_| Err(ShardError::Damaged { message, path: folder.to_owned() }))
+    entries.next().map_or(Ok(()), |_| Err(FileError::Damaged { message, path: folder.to_owned() }.into()))
 }

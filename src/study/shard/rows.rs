@@ -1,5 +1,6 @@
 //! `rows.jsonl`: a line that names the shard, then a line a frame. Numbers read back as they were, bit by bit.
 
+use super::super::FileError;
 use super::folder::ROWS_FILE;
 use super::gather::gather;
 use super::{FrameCommand, ShardError, ShardSpec};
@@ -39,14 +40,14 @@ pub(super) fn write_rows(file: &Path, spec: &ShardSpec, rows: &[impl ShardRow]) 
         writeln!(out, "{}", serde_json::to_string(&Head { shard: spec.id.clone() })?)?;
         rows.iter().try_for_each(|row| writeln!(out, "{}", serde_json::to_string(row)?))
     });
-    written.map_err(ShardError::writing(file))
+    Ok(written.map_err(FileError::writing(file))?)
 }
 
 /// The rows of a finished shard.
 fn read_rows<R: ShardRow>(folder: &Path, spec: &ShardSpec) -> Result<Vec<R>, ShardError> {
     let path = folder.join(ROWS_FILE);
-    let bytes = read_bytes(&path, "the rows of a shard", MOST_BYTES).map_err(ShardError::reading(&path))?;
-    let wrong = |line: usize, why: String| ShardError::Damaged {
+    let bytes = read_bytes(&path, "the rows of a shard", MOST_BYTES).map_err(FileError::reading(&path))?;
+    let wrong = |line: usize, why: String| FileError::Damaged {
         message: format!("line {line}: {why}; do the shard again"),
         path: path.clone(),
     };
@@ -54,11 +55,11 @@ fn read_rows<R: ShardRow>(folder: &Path, spec: &ShardSpec) -> Result<Vec<R>, Sha
     let head = lines.next().and_then(|(line, _)| serde_json::from_slice::<Head>(line).ok());
     match head {
         Some(head) if head.shard == spec.id => {}
-        Some(head) => return Err(wrong(1, format!("names shard {}, expected {}", head.shard, spec.id))),
-        None => return Err(wrong(1, "does not name a shard".into())),
+        Some(head) => return Err(wrong(1, format!("names shard {}, expected {}", head.shard, spec.id)).into()),
+        None => return Err(wrong(1, "does not name a shard".into()).into()),
     }
     let row = |(line, number)| serde_json::from_slice::<R>(line).map_err(|error| wrong(number, error.to_string()));
-    lines.map(row).collect()
+    Ok(lines.map(row).collect::<Result<_, _>>()?)
 }
 
 /// All rows of a command, put together of its shards.
@@ -81,9 +82,11 @@ impl<R: ShardRow> Whole<R> {
         let (spec, parts) = gather::<ShardSpec>(folders)?;
         let mut rows = Vec::with_capacity(spec.data.frames);
         for (folder, part) in &parts {
-            let wrong = |message: String| ShardError::Damaged { message, path: folder.clone() };
+            let wrong = |message: String| FileError::Damaged { message, path: folder.clone() };
             if part.command != R::COMMAND {
-                return Err(wrong(format!("is a shard of {}, not of {}", part.command.word(), R::COMMAND.word())));
+                return Err(
+                    wrong(format!("is a shard of {}, not of {}", part.command.word(), R::COMMAND.word())).into()
+                );
             }
             rows.extend(read_rows::<R>(folder, part)?);
         }
@@ -91,7 +94,7 @@ impl<R: ShardRow> Whole<R> {
         if !rows.iter().map(R::index).eq(spec.data.first..spec.data.end) {
             let message =
                 format!("the rows of all shards are not those of frames {}..{}", spec.data.first, spec.data.end);
-            return Err(ShardError::Damaged { message, path: folders.first().cloned().unwrap_or_default() });
+            return Err(FileError::Damaged { message, path: folders.first().cloned().unwrap_or_default() }.into());
         }
         Ok(Self { spec, folders, rows })
     }

@@ -1,6 +1,7 @@
 //! `shard.toml`: what a shard of a command over frames belongs to. Shards with the same specification, their number apart, make
 //! one whole.
 
+use super::super::FileError;
 use super::folder::{ROWS_FILE, SHARD_FILE};
 use super::gather::{Difference, Part};
 use super::{DataSpec, Shard, ShardError, Subset};
@@ -71,7 +72,7 @@ impl ShardSpec {
         shard: Shard,
         settings: &impl Serialize,
     ) -> Result<Self, ShardError> {
-        let wrong = |error: toml::ser::Error| ShardError::Damaged {
+        let wrong = |error: toml::ser::Error| FileError::Damaged {
             message: format!("settings cannot be written: {error}"),
             path: SHARD_FILE.into(),
         };
@@ -91,11 +92,11 @@ impl ShardSpec {
     /// # Errors
     /// Where it is not what the command tells.
     pub fn settings<S: DeserializeOwned>(&self) -> Result<S, ShardError> {
-        let wrong = |error: toml::de::Error| ShardError::Damaged {
+        let wrong = |error: toml::de::Error| FileError::Damaged {
             message: format!("settings: {}", error.message().replace('\n', "; ")),
             path: SHARD_FILE.into(),
         };
-        self.settings.clone().try_into().map_err(wrong)
+        Ok(self.settings.clone().try_into().map_err(wrong)?)
     }
 
     /// 16 hexadecimal digits over everything but where the data lay.
@@ -128,9 +129,10 @@ impl Part for ShardSpec {
 
     fn read(folder: &Path) -> Result<Self, ShardError> {
         let file = folder.join(SHARD_FILE);
-        let text = read_text(&file, "what a shard is (TOML)", MOST_TEXT).map_err(ShardError::reading(&file))?;
-        toml::from_str(&text)
-            .map_err(|error| ShardError::Damaged { message: error.message().replace('\n', "; "), path: file })
+        let text = read_text(&file, "what a shard is (TOML)", MOST_TEXT).map_err(FileError::reading(&file))?;
+        let wrong =
+            |error: toml::de::Error| FileError::Damaged { message: error.message().replace('\n', "; "), path: file };
+        Ok(toml::from_str(&text).map_err(wrong)?)
     }
 
     fn is_finished(folder: &Path) -> bool {
