@@ -32,7 +32,8 @@
 //!                          └───────────────────────────────────────────────────────────────────────────┘
 //! ```
 //!
-//! **The rooms**, dependencies pointing down only:
+//! **The rooms**, dependencies pointing down only; those marked * are the crate `mhp-engine` (`src/engine`), which is optimised in
+//! every profile and compiled once for the program, its tests and its benches:
 //!
 //! | room | what is in it |
 //! |---|---|
@@ -45,35 +46,28 @@
 //! | [`labels`] | tags, notes, verdicts, the journal that keeps them, agreement |
 //! | [`diagnose`] | metrics: MAJPE, PA-MAJPE; evidence for each failure mode |
 //! | [`start`] | where a frame's fit begins: the problem with the frames around it, and for how many people a start is asked |
-//! | [`mhp`] | start poses, forward model, objective, Adam, convergence, the fitter's one `step` |
+//! | [`mhp`] * | start poses, forward model, objective, Adam, convergence, the fitter's one `step` |
 //! | [`dataset`] | frames and their layouts on disk, one file each; manifests, npz; lazy loading and a cache with a byte budget |
-//! | [`simulate`] | the synthetic source: people and rooms before a radar, as frames with truth |
-//! | [`people`] | counting, places and identities of several people |
-//! | [`body`] | skeleton topologies, the PPPR parameters, bodies that move |
-//! | [`radar`] | chirp, axes, views, point-spread functions, FMCW synthesis of a MIMO array and the FFT chain |
-//! | [`config`] | `FitConfig`: defaults, ranges, help text; the only source for files, command line and sliders; [where the program differs from the paper](config::deviations) |
+//! | [`simulate`] * | the synthetic source: people and rooms before a radar, as frames with truth |
+//! | [`people`] * | counting, places and identities of several people |
+//! | [`body`] * | skeleton topologies, the PPPR parameters, bodies that move |
+//! | [`radar`] * | chirp, axes, views, point-spread functions, FMCW synthesis of a MIMO array and the FFT chain |
+//! | [`config`] * | `FitConfig`: defaults, ranges, help text; the only source for files, command line and sliders; [where the program differs from the paper](config::deviations) |
 //! | [`output`] | where results are written: safe names, guarded and locked folders, files whole or not at all |
 //! | [`task`] | work off the caller's thread: progress, cancelling, panics that become errors |
 //! | [`escape`] | text from data on its way to a terminal or a table |
 //! | [`folders`] | where the user's settings, labels and caches lie |
-//! | [`input`] | opening what others made: regular files only, bounded |
-//! | [`geometry`] | 3-vectors, 3×3 matrices, quaternions, poses |
+//! | [`input`] * | opening what others made: regular files only, bounded |
+//! | [`geometry`] * | 3-vectors, 3×3 matrices, quaternions, poses |
 
-pub mod body;
 pub mod cli;
-pub mod config;
 pub mod dataset;
 pub mod diagnose;
 mod digest;
 pub mod escape;
 pub mod folders;
-pub mod geometry;
-pub mod input;
 pub mod labels;
-pub mod mhp;
 pub mod output;
-pub mod people;
-pub mod radar;
 pub mod study;
 pub mod task;
 pub mod worker;
@@ -83,5 +77,6 @@ pub mod app;
 #[cfg(feature = "viewer")]
 pub mod render;
 pub mod session;
-pub mod simulate;
 pub mod start;
+
+pub use mhp_engine::{body, config, geometry, input, mhp, people, radar, simulate};

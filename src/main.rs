@@ -56,6 +56,7 @@ fn told() -> Targets {
             .with_default(LevelFilter::WARN)
             .with_targets(quiet)
             .with_target("mhp_inspector", LevelFilter::INFO)
+            .with_target("mhp_engine", LevelFilter::INFO)
     })
 }
 

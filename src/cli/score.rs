@@ -127,7 +127,7 @@ fn write_answer(
     Ok(())
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "dummies"))]
 mod tests {
     use super::*;
     use crate::body::PpprShape;

@@ -1,6 +1,6 @@
 //! Which file of `src/` takes names from which other, followed through what modules hand on.
 
-use crate::{code, files};
+use crate::{code, files, inside};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -22,12 +22,13 @@ impl Sources {
         let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
         let mut files_of = BTreeMap::new();
         for path in files(&src) {
-            let inner = path.strip_prefix(&src).unwrap().with_extension("");
+            let inner = inside(&path).with_extension("");
             let mut module: Module = inner.iter().map(|part| part.to_str().unwrap().to_owned()).collect();
             if module.last().is_some_and(|last| last == "mod") || module == ["lib"] {
                 module.pop();
             }
-            if module != ["main"] {
+            // The program's root hands the engine's rooms on; the engine's own root adds nothing to it.
+            if module != ["main"] && path != src.join("engine/lib.rs") {
                 files_of.insert(module, path);
             }
         }
@@ -38,8 +39,7 @@ impl Sources {
 
     /// The file of a module, from `src/` on.
     pub(crate) fn shown(&self, module: &Module) -> String {
-        let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-        self.files[module].strip_prefix(src).unwrap().to_str().unwrap().replace('\\', "/")
+        inside(&self.files[module]).to_str().unwrap().replace('\\', "/")
     }
 
     /// Each file with those from which it takes names.
@@ -110,7 +110,7 @@ impl Sources {
 /// The code of a file without its own tests.
 fn code_of_the_program(path: &Path) -> String {
     let code = code(path);
-    code.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default().to_owned()
+    code.split("\nmod tests {").next().unwrap_or_default().to_owned()
 }
 
 /// Every path in `use` items, and every one in the code that begins with `crate::` or `super::`, with the name it is known by.

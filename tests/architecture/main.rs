@@ -112,13 +112,19 @@ fn used_rooms(code: &str) -> BTreeSet<String> {
     rooms
 }
 
+/// A file's path from its crate's root on: the program's is `src/`, the engine's `src/engine/`.
+fn inside(path: &Path) -> &Path {
+    let inner = path.strip_prefix(Path::new(env!("CARGO_MANIFEST_DIR")).join("src")).unwrap();
+    inner.strip_prefix("engine").unwrap_or(inner)
+}
+
+/// Every source file with its room. The rooms of the two crates are one house: the program hands the engine's on.
 fn sources() -> Vec<(String, PathBuf)> {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let room = |path: &Path| {
-        let first = path.strip_prefix(&src).unwrap().components().next().unwrap();
+        let first = inside(path).components().next().unwrap();
         first.as_os_str().to_str().unwrap().trim_end_matches(".rs").to_owned()
     };
-    files(&src).into_iter().map(|path| (room(&path), path)).collect()
+    files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src")).into_iter().map(|path| (room(&path), path)).collect()
 }
 
 #[test]
@@ -196,7 +202,8 @@ fn every_path_that_a_module_names_exists() {
         let text = std::fs::read_to_string(&file).unwrap();
         let docs: Vec<&str> = text.lines().filter_map(|line| line.trim_start().strip_prefix("//!")).collect();
         let folder = file.parent().unwrap();
-        let places = [folder.to_owned(), file.with_extension(""), root.join("src"), root.to_owned()];
+        let roots = ["src", "src/engine", ""].map(|place| root.join(place));
+        let places = [&[folder.to_owned(), file.with_extension("")], roots.as_slice()].concat();
         for path in named_paths(&docs.join("\n")) {
             seen += 1;
             let there = |place: &PathBuf| place.join(&path).exists() || place.join(format!("{path}.rs")).exists();
@@ -211,7 +218,7 @@ fn every_path_that_a_module_names_exists() {
 
 /// Files that say whose maps are imitated, or whose figures the paper has: names of data sets, not of their files.
 const NAME_DATA_SETS: [&str; 5] = [
-    "src/simulate/",
+    "src/engine/simulate/",
     "src/cli/simulate/",
     "src/study/calibrate.rs",
     "src/study/run/paper.rs",

@@ -8,7 +8,7 @@ const SHARED: &[(&str, &str)] = &[];
 
 /// The public types and traits that a file's code declares, but for those of its tests.
 fn declared(code: &str) -> Vec<String> {
-    let program = code.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+    let program = code.split("\nmod tests {").next().unwrap_or_default();
     let name_of = |line: &str| -> Option<String> {
         let mut words = line.trim_start().strip_prefix("pub ")?.split_whitespace();
         let kind = words.next()?;

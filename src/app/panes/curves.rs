@@ -359,10 +359,14 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::FitConfig;
-    use crate::mhp::{StepReport, Terms};
+    #[cfg(feature = "dummies")]
+    use crate::{
+        config::FitConfig,
+        mhp::{StepReport, Terms},
+    };
 
     /// The keys of the curves of a fit of one person, and what they show of a row.
+    #[cfg(feature = "dummies")]
     fn shown(config: &FitConfig) -> Vec<(String, Option<f64>)> {
         let terms = Terms::from_fn(|term| if term.key == "dummy" { 0.7 } else { 0.1 });
         let report = StepReport { iteration: 0, loss: 1.0, terms, iou: vec![None].into(), converged: false };
@@ -371,6 +375,7 @@ mod tests {
         loss_curves(1, &[branch]).into_iter().map(|curve| (curve.key, (curve.value)(&row))).collect()
     }
 
+    #[cfg(feature = "dummies")]
     #[test]
     fn the_dummy_term_has_a_curve_where_it_has_a_weight() {
         let weighed = FitConfig { w_time: 8.0, w_dummy: 1.0, ..FitConfig::default() };

@@ -273,7 +273,7 @@ fn presets(ui: &mut Ui, config: &mut FitConfig) {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "dummies"))]
 mod tests {
     use super::*;
 

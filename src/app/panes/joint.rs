@@ -233,7 +233,7 @@ fn omega(ui: &mut Ui, params: &Pppr, total: &Pppr, joint: usize, tokens: &Tokens
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "dummies"))]
 mod tests {
     use super::*;
     use crate::body::PpprShape;

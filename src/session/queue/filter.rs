@@ -285,6 +285,7 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests")]
     use super::*;
     use crate::labels::{Tags, Verdict};
+    #[cfg(feature = "dummies")]
     use crate::mhp::Terms;
     use crate::study::complexity::Stratum;
 
@@ -350,6 +351,7 @@ mod tests {
         }
     }
 
+    #[cfg(feature = "dummies")]
     #[test]
     fn frames_are_found_by_the_dummy_term() {
         let terms = Terms::from_fn(|term| (term.key == "dummy").then_some(0.7));

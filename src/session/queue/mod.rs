@@ -268,9 +268,10 @@ fn letters(name: &str) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+    #![cfg_attr(feature = "dummies", expect(clippy::unwrap_used, reason = "tests fail by panicking"))]
 
     use super::*;
+    #[cfg(feature = "dummies")]
     use crate::mhp::Terms;
 
     fn queue(text: &str, sort: Sort, iou: &[Option<f64>]) -> Queue {
@@ -280,6 +281,7 @@ mod tests {
         queue
     }
 
+    #[cfg(feature = "dummies")]
     #[test]
     fn frames_are_ordered_by_the_dummy_term() {
         let key = SortKey::Term(TermId::of("dummy").unwrap());

@@ -64,7 +64,7 @@ pub fn write_curves<'a>(
     written.map_err(|reason| StudyError::Write { reason, path: path.to_owned() })
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "dummies"))]
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 

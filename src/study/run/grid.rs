@@ -119,7 +119,7 @@ mod tests {
         assert!(refusal(&[]).contains("at least one"));
     }
 
-    /// Numbers, switches and choices, the words for no number among them, and a setting that only tests know.
+    /// Numbers, switches and choices, the words for no number among them.
     #[test]
     fn any_setting_can_be_swept() {
         for field in FIELDS {
@@ -130,6 +130,11 @@ mod tests {
             let swept: Vec<_> = rows.iter().map(|row| field.get(&row.config)).collect();
             assert_eq!((swept, rows.iter().map(Variant::name).collect::<Vec<_>>()), (values, texts), "{}", field.key);
         }
+    }
+
+    #[cfg(feature = "dummies")]
+    #[test]
+    fn the_dummy_setting_can_be_swept() {
         assert_eq!(grid(&["w_dummy=0,2"]).unwrap()[1].config.w_dummy, 2.0);
     }
 }

@@ -166,6 +166,12 @@ mod tests {
                 rows.iter().filter(|row| row.fields.iter().any(|of| of.key == field.key)).map(|row| row.name).collect();
             assert_eq!(of.len(), usize::from(field.group != FieldGroup::Perturbation), "{}: {of:?}", field.key);
         }
+    }
+
+    #[cfg(feature = "dummies")]
+    #[test]
+    fn the_dummy_setting_is_in_the_row_of_the_weights() {
+        let rows = switches();
         let (plain, other) = (FitConfig::default(), FitConfig { w_dummy: 2.0, ..FitConfig::default() });
         let changed: Vec<&str> =
             rows.iter().filter(|row| with(&plain, &other, row).is_some()).map(|row| row.name).collect();

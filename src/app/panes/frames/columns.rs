@@ -281,7 +281,7 @@ pub(super) fn spoken(row: &FrameRow<'_>) -> String {
     parts.join(", ")
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "dummies"))]
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 

@@ -53,13 +53,13 @@ mod types;
 pub use adam::Adam;
 pub use context::{Neighbour, Peak};
 pub use fill::fill_missing;
-pub(crate) use fill::for_neighbours;
+pub use fill::for_neighbours;
 pub use fitter::{FitState, Fitter};
 pub use init::{Initialisation, LimbMap, initialise, initialise_people, predict};
 #[cfg(feature = "train")]
 pub use init::{LimbLesson, learn_limbs};
 pub use objective::{Masks, Objective, masks};
-pub(crate) use percentile::{percentile, percentiles};
+pub use percentile::{percentile, percentiles};
 pub use problem::Problem;
 pub use region::Region;
 pub use simulate::simulate;

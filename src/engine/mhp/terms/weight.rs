@@ -14,7 +14,7 @@ pub enum Weight {
     /// w_time, of L_time.
     Time,
     /// Of the term that unit tests have.
-    #[cfg(test)]
+    #[cfg(any(test, feature = "dummies"))]
     Dummy,
 }
 
@@ -59,7 +59,7 @@ impl Weight {
         Self::Em,
         Self::Kine,
         Self::Time,
-        #[cfg(test)]
+        #[cfg(any(test, feature = "dummies"))]
         Self::Dummy,
     ];
     /// Number of weights.
@@ -71,7 +71,7 @@ impl Weight {
             Self::Em => ("w_em", TermGroup::Electromagnetic),
             Self::Kine => ("w_kine", TermGroup::Kinematic),
             Self::Time => ("w_time", TermGroup::Temporal),
-            #[cfg(test)]
+            #[cfg(any(test, feature = "dummies"))]
             Self::Dummy => ("w_dummy", TermGroup::Temporal),
         }
     }
@@ -82,7 +82,7 @@ impl Weight {
             Self::Em => config.w_em,
             Self::Kine => config.w_kine,
             Self::Time => config.w_time,
-            #[cfg(test)]
+            #[cfg(any(test, feature = "dummies"))]
             Self::Dummy => config.w_dummy,
         }
     }

@@ -32,13 +32,13 @@ pub(super) fn between(a: f64, b: f64, t: f64) -> f64 {
 }
 
 /// The `q_pct` percentile of `values` (q in 0 ..= 100); NaN where there are none.
-pub(crate) fn percentile(values: &[f64], q_pct: f64) -> f64 {
+pub fn percentile(values: &[f64], q_pct: f64) -> f64 {
     neighbours(values, q_pct).map_or(f64::NAN, |(a, b, t)| between(a, b, t))
 }
 
 /// Several percentiles of `values` in one go, each as [`percentile`] gives it; `q_pct` must not fall. `scratch` is
 /// overwritten and may be handed in again, so that a scan of many maps allocates once.
-pub(crate) fn percentiles<const N: usize>(values: &[f64], q_pct: [f64; N], scratch: &mut Vec<i64>) -> [f64; N] {
+pub fn percentiles<const N: usize>(values: &[f64], q_pct: [f64; N], scratch: &mut Vec<i64>) -> [f64; N] {
     let Some(last) = values.len().checked_sub(1) else { return [f64::NAN; N] };
     scratch.clear();
     scratch.extend(values.iter().map(|&x| ordered(x)));

@@ -45,7 +45,7 @@ fn neighbour_mean(map: &[f64], shape: &[usize], cell: usize) -> Option<f64> {
 }
 
 /// Calls `visit` with the flat index of each of the up to 3^D − 1 neighbours of `cell`.
-pub(crate) fn for_neighbours(shape: &[usize], cell: usize, mut visit: impl FnMut(usize)) {
+pub fn for_neighbours(shape: &[usize], cell: usize, mut visit: impl FnMut(usize)) {
     all_neighbours(shape, cell, |other| {
         visit(other);
         true

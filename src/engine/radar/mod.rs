@@ -22,7 +22,7 @@ pub use fft::{Chain, PolarMap, RadarCube, RangeDoppler};
 pub use fmcw::{AdcCube, Echo, Fmcw, PointMotion, Receiver, add_leakage, path_gain};
 pub use psf::{FftSetup, doppler_sigma_mps, first_null_bins, main_lobe_sigma_bins, range_sigma_m, sine_sigma};
 pub(crate) use spatial::{NEAREST_M, SpatialGrid};
-pub(crate) use view::unravel;
+pub use view::unravel;
 pub use view::{PointSpread, Quantity, View};
 pub use view_set::ViewSet;
 pub use window::Window;

@@ -73,7 +73,7 @@ impl LimbMap {
     /// The map that comes with the program; `None` where it is damaged.
     fn bundled() -> Option<&'static Self> {
         static READ: OnceLock<Option<LimbMap>> = OnceLock::new();
-        let read = || Self::from_json(include_str!("../../../../assets/limbs.json"));
+        let read = || Self::from_json(include_str!("../../../../../assets/limbs.json"));
         READ.get_or_init(|| read().inspect_err(|error| tracing::error!("assets/limbs.json: {error}")).ok()).as_ref()
     }
 

@@ -11,7 +11,7 @@ use std::path::Path;
 pub const MOST_TEXT: u64 = 4 << 20;
 
 /// Where in a file something is, as errors name it: its path, and the line where one is known.
-pub(crate) fn place(path: &Path, line: Option<usize>) -> String {
+pub fn place(path: &Path, line: Option<usize>) -> String {
     line.map_or_else(|| path.display().to_string(), |line| format!("{}:{line}", path.display()))
 }
 

@@ -14,8 +14,8 @@ mod init;
 mod preset;
 mod reading;
 mod rows;
-#[cfg(test)]
-pub(crate) mod samples;
+#[cfg(any(test, feature = "samples"))]
+pub mod samples;
 #[cfg(test)]
 mod tests;
 
@@ -166,7 +166,7 @@ pub struct FitConfig {
     /// Weight of the temporal term.
     pub w_time: f64,
     /// Weight of a term that only tests know.
-    #[cfg(test)]
+    #[cfg(any(test, feature = "dummies"))]
     pub w_dummy: f64,
     /// What tells how high a start stands.
     pub height: Height,
@@ -208,7 +208,7 @@ impl Default for FitConfig {
             warm_start: WarmStart::default(),
             starts: 1,
             w_time: 0.0,
-            #[cfg(test)]
+            #[cfg(any(test, feature = "dummies"))]
             w_dummy: 0.0,
             height: Height::default(),
             limbs: Limbs::default(),

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 impl Field {
     /// Values that it may have: both ends of a range and what lies between, each answer, on and off, nothing.
-    pub(crate) fn legal(&self) -> Vec<Value> {
+    pub fn legal(&self) -> Vec<Value> {
         match &self.kind {
             FieldKind::Number(number) => {
                 let (lo, hi) = number.range;
@@ -20,14 +20,14 @@ impl Field {
     }
 
     /// A legal value other than that of a configuration.
-    pub(crate) fn another(&self, config: &FitConfig, choice: usize) -> Value {
+    pub fn another(&self, config: &FitConfig, choice: usize) -> Value {
         let mut values = self.legal();
         values.retain(|value| *value != self.get(config));
         values[choice % values.len()]
     }
 
     /// Numbers just outside of its range.
-    pub(crate) fn illegal(&self) -> Vec<f64> {
+    pub fn illegal(&self) -> Vec<f64> {
         let FieldKind::Number(number) = &self.kind else { return Vec::new() };
         let (lo, hi) = number.range;
         let step = if number.whole { 1.0 } else { 0.01 };
@@ -36,7 +36,7 @@ impl Field {
 }
 
 /// Any legal configuration.
-pub(crate) fn configs() -> impl Strategy<Value = FitConfig> {
+pub fn configs() -> impl Strategy<Value = FitConfig> {
     prop::collection::vec(any::<prop::sample::Index>(), FIELDS.len()).prop_map(|picks| {
         let mut config = FitConfig::default();
         for (field, pick) in FIELDS.iter().zip(picks) {
@@ -47,7 +47,7 @@ pub(crate) fn configs() -> impl Strategy<Value = FitConfig> {
 }
 
 /// A legal configuration, another that differs from it in some settings, and these, in the order of the table.
-pub(crate) fn changed() -> impl Strategy<Value = (FitConfig, FitConfig, Vec<&'static Field>)> {
+pub fn changed() -> impl Strategy<Value = (FitConfig, FitConfig, Vec<&'static Field>)> {
     let picks = prop::collection::vec(prop::option::weighted(0.1, any::<usize>()), FIELDS.len());
     (configs(), picks).prop_map(|(old, picks)| {
         let (mut new, mut changed) = (old, Vec::new());

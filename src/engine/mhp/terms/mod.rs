@@ -18,7 +18,7 @@
 mod angles;
 mod bones;
 mod collision;
-#[cfg(test)]
+#[cfg(any(test, feature = "dummies"))]
 mod dummy;
 mod electromagnetic;
 mod penalties;
@@ -48,7 +48,7 @@ pub const TERMS: &[Term] = &[
     separation::SEP,
     collision::COLL,
     time::TIME,
-    #[cfg(test)]
+    #[cfg(any(test, feature = "dummies"))]
     dummy::DUMMY,
 ];
 

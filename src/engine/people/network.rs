@@ -62,7 +62,7 @@ impl Network {
         if let Some(network) = READ.get() {
             return Ok(network.clone());
         }
-        let network = Self::from_json(include_str!("../../assets/counter.json"), FEATURES)?;
+        let network = Self::from_json(include_str!("../../../assets/counter.json"), FEATURES)?;
         Ok(READ.get_or_init(|| network).clone())
     }
 
@@ -71,7 +71,7 @@ impl Network {
     /// # Errors
     /// Where they are damaged.
     pub fn alone() -> Result<Self, PeopleError> {
-        Self::from_json(include_str!("../../assets/counter-alone.json"), STATISTICS)
+        Self::from_json(include_str!("../../../assets/counter-alone.json"), STATISTICS)
     }
 
     fn check(&self, inputs: usize) -> Result<(), PeopleError> {

@@ -54,7 +54,7 @@ pub const FIELDS: &[Field] = &[
             .unit("%")
             .row("threshold")
     },
-    #[cfg(test)]
+    #[cfg(any(test, feature = "dummies"))]
     Field {
         help: "Weight of a term that only tests know.",
         ..number(Weights, "w_dummy", "w_dummy", Steps, (0.0, 1000.0), number_at!(w_dummy)).logarithmic().row("weights")

@@ -64,7 +64,7 @@ pub(super) struct Scanner {
 
 impl Scan {
     /// Lets go of the maps, which only the [`COMPARED`] frames after it ask for.
-    pub(crate) fn forget_maps(&mut self) {
+    pub fn forget_maps(&mut self) {
         self.amplitudes = Vec::new();
     }
 }

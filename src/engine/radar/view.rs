@@ -58,7 +58,7 @@ pub struct View {
 }
 
 /// The bin on each axis of a cell in C order; `shape` is the axes' bins.
-pub(crate) fn unravel(mut cell: usize, shape: &[usize]) -> SmallVec<[usize; 3]> {
+pub fn unravel(mut cell: usize, shape: &[usize]) -> SmallVec<[usize; 3]> {
     let mut bins = SmallVec::from_elem(0, shape.len());
     for (bin, &size) in bins.iter_mut().zip(shape).rev() {
         *bin = cell % size.max(1);
