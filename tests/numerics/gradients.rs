@@ -11,7 +11,7 @@
 #![expect(clippy::unwrap_used, reason = "a test stops where its material is missing")]
 
 use mhp_inspector::body::{Group, Pppr, PpprShape, Skeleton};
-use mhp_inspector::config::{EmRegion, FitConfig, Operators, Summation};
+use mhp_inspector::config::{EmLoss, EmRegion, FitConfig, Operators, Summation};
 use mhp_inspector::geometry::{Pose, rotation_from_quaternion};
 use mhp_inspector::mhp::{Evaluation, Objective, Precision, Problem, TermId, simulate};
 use mhp_inspector::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
@@ -162,9 +162,13 @@ impl Scene {
         self.maps(&self.params).iter().map(|map| percentile(map, 100.0 - self.config.tau_pct)).collect()
     }
 
-    /// L_EM by its formula, with the thresholds given.
+    /// L_EM by its formula, with the thresholds given where it compares masks.
     fn em(&self, params: &Pppr, thresholds: &[f64]) -> f64 {
         let views = self.maps(params);
+        if self.config.objective != EmLoss::Iou {
+            let losses = views.iter().enumerate().map(|(view, map)| self.levels(self.problem.map(view), map));
+            return losses.sum::<f64>() / views.len() as f64;
+        }
         let losses = views.iter().zip(thresholds).enumerate().map(|(view, (map, threshold))| {
             let ori = self.problem.map(view);
             let level = percentile(ori, 100.0 - self.config.tau_pct);
@@ -178,6 +182,29 @@ impl Scene {
             1.0 - common / union
         });
         losses.sum::<f64>() / views.len() as f64
+    }
+
+    /// L_view by levels; SPEC section 8, word for word.
+    fn levels(&self, ori: &[f64], sim: &[f64]) -> f64 {
+        let largest = ori.iter().copied().fold(0.0, f64::max);
+        let measured: Vec<f64> = ori.iter().map(|h| (h / largest).powi(2)).collect();
+        let (noise, count) = (percentile(&measured, 30.0), measured.len() as f64);
+        let power: Vec<f64> = sim.iter().map(|h| h * h).collect();
+        let above: f64 = measured.iter().map(|i| i - noise).sum();
+        let gain = above.max(1e-6 * measured.iter().sum::<f64>()) / (power.iter().sum::<f64>() + 1e-20);
+        let model: Vec<f64> = power.iter().map(|s| gain * s + noise).collect();
+        if self.config.objective == EmLoss::Gamma {
+            let cell = |(i, m): (&f64, &f64)| m.ln() + i.max(1e-12) / m - i.max(1e-12).ln() - 1.0;
+            return measured.iter().zip(&model).map(cell).sum::<f64>() / count;
+        }
+        let centred = |values: Vec<f64>| {
+            let mean = values.iter().sum::<f64>() / count;
+            values.into_iter().map(|x| x - mean).collect::<Vec<f64>>()
+        };
+        let a = centred(measured.iter().map(|i| (i + noise).ln()).collect());
+        let b = centred(model.iter().map(|m| (m + noise).ln()).collect());
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        1.0 - product(&a, &b) / (product(&a, &a) * product(&b, &b) + 1e-20).sqrt()
     }
 
     /// The smallest |S| relative to the incoherent sum: near 0 the scene has a null that differences cannot resolve.
@@ -321,9 +348,11 @@ proptest! {
         coherent in prop::bool::weighted(0.7),
         operators in operators(),
         offset_m in prop::sample::select(vec![0.0, 0.08]),
+        objective in prop::sample::select(vec![EmLoss::Iou, EmLoss::NccDb, EmLoss::Gamma]),
     ) {
         let summation = if coherent { Summation::Coherent } else { Summation::Incoherent };
-        let scene = scene(seed, &kinds, summation, operators, offset_m);
+        let mut scene = scene(seed, &kinds, summation, operators, offset_m);
+        scene.config.objective = objective;
         prop_assume!(scene.depth_of_nulls() > NULL_DEPTH);
         scene.check()?;
     }

@@ -5,7 +5,7 @@
 
 use crate::common;
 use mhp_inspector::body::{Group, Pppr, PpprShape, Skeleton};
-use mhp_inspector::config::{EmRegion, FitConfig, Operators, Summation};
+use mhp_inspector::config::{EmLoss, EmRegion, FitConfig, Operators, Summation};
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::geometry::{Pose, norm, rotation_from_quaternion, sub};
 use mhp_inspector::mhp::{Evaluation, Fitter, Objective, Precision, Problem, initialise, simulate};
@@ -108,7 +108,7 @@ fn skeleton() -> Skeleton {
 }
 
 /// Loss and gradients of one scene in both precisions; `None` beside a coherent null.
-fn scene(seed: u64, bins: &Range<usize>) -> Option<[Evaluation; 2]> {
+fn scene(seed: u64, bins: &Range<usize>, objective: EmLoss) -> Option<[Evaluation; 2]> {
     let rng = &mut StdRng::seed_from_u64(seed);
     let views: Vec<View> = (0..rng.random_range(1..3)).map(|k| view(k, bins, rng)).collect();
     let maps: Vec<Vec<f64>> =
@@ -116,6 +116,7 @@ fn scene(seed: u64, bins: &Range<usize>) -> Option<[Evaluation; 2]> {
     let maps: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
     let on = |rng: &mut StdRng| rng.random_bool(0.85);
     let config = FitConfig {
+        objective,
         summation: if rng.random_bool(0.5) { Summation::Coherent } else { Summation::Incoherent },
         em_region: if rng.random_bool(0.5) { EmRegion::Full } else { EmRegion::HalfWidth(1.25) },
         softness: *[0.1, 0.5, 0.5, 1.0, 1.5, 4.0].get(rng.random_range(0..6_usize)).unwrap(),
@@ -125,6 +126,13 @@ fn scene(seed: u64, bins: &Range<usize>) -> Option<[Evaluation; 2]> {
     };
     let params = params(rng.random_range(1..4), rng);
     let problem = Arc::new(Problem::new(radar(), skeleton(), views, &maps).unwrap());
+    // Where nobody is in a view, SPEC's regularisers of levels decide, and they are beyond f32.
+    let powers = |map: &Vec<f64>| map.iter().map(|h| h * h).sum::<f64>();
+    if objective != EmLoss::Iou
+        && simulate(&problem, &config, Precision::F64, &params).iter().any(|map| powers(map) < 1e-18)
+    {
+        return None;
+    }
     if config.summation == Summation::Coherent {
         let incoherent = FitConfig { summation: Summation::Incoherent, ..config };
         let [sum, most] =
@@ -140,8 +148,10 @@ fn scene(seed: u64, bins: &Range<usize>) -> Option<[Evaluation; 2]> {
     )
 }
 
-/// What the reference cases ask of single precision, by group.
-fn misses([want, got]: &[Evaluation; 2]) -> Vec<String> {
+/// What the reference cases ask of single precision, by group; levels are sums of logarithms, of which the gain takes away
+/// most, and have a digit less.
+fn misses([want, got]: &[Evaluation; 2], objective: EmLoss) -> Vec<String> {
+    let share = if objective == EmLoss::Iou { 2e-3 } else { 5e-3 };
     let mut misses = Vec::new();
     let [got_em, want_em] = [got, want].map(|evaluation| evaluation.terms.get("em").unwrap());
     let (off, limit) = ((got_em - want_em).abs(), (1e-4 * want_em).max(1e-6));
@@ -152,18 +162,18 @@ fn misses([want, got]: &[Evaluation; 2]) -> Vec<String> {
         let (got, want) = (got.em_gradient().group(group), want.em_gradient().group(group));
         let largest = want.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let worst = got.iter().zip(want).map(|(g, w)| (g - w).abs()).fold(0.0, f64::max);
-        if worst > (2e-3 * largest).max(1e-6) {
+        if worst > (share * largest).max(1e-6) {
             misses.push(format!("{}: {worst:.2e} of {largest:.2e}", group.key()));
         }
     }
     misses
 }
 
-fn check(seeds: Range<u64>, bins: &Range<usize>) {
+fn check(seeds: Range<u64>, bins: &Range<usize>, objective: EmLoss) {
     let scenes = seeds.end - seeds.start;
     let wrong: Vec<String> = seeds
         .filter_map(|seed| {
-            let misses = misses(&scene(seed, bins)?);
+            let misses = misses(&scene(seed, bins, objective)?, objective);
             (!misses.is_empty()).then(|| format!("scene {seed}: {}", misses.join("; ")))
         })
         .collect();
@@ -197,12 +207,16 @@ fn a_strong_spectrum_along_any_axis_is_not_cut_off() {
 fn single_precision_agrees_on_random_scenes() {
     let number = |key: &str| std::env::var(key).ok().and_then(|text| text.parse::<u64>().ok());
     let (first, scenes) = (number("PROPTEST_RNG_SEED").unwrap_or(0) << 32, number("PROPTEST_CASES").unwrap_or(SCENES));
-    check(first..first + scenes, &BINS);
+    check(first..first + scenes, &BINS, EmLoss::Iou);
+    for objective in [EmLoss::NccDb, EmLoss::Gamma] {
+        check(first..first + scenes / 4, &BINS, objective);
+    }
 }
 
 #[test]
 fn single_precision_agrees_on_the_largest_maps() {
-    check(0..LARGE_SCENES, &MANY_BINS);
+    check(0..LARGE_SCENES, &MANY_BINS, EmLoss::Iou);
+    check(0..LARGE_SCENES / 4, &MANY_BINS, EmLoss::NccDb);
 }
 
 /// A hundred iterations of a data set's first frames, from their own start; mean distance of the joints between precisions.

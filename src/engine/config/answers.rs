@@ -19,6 +19,20 @@ pub(super) const CONVERGENCE: &[Answer] = &[
     ),
 ];
 
+pub(super) const OBJECTIVE: &[Answer] = &[
+    answer("iou", "masks (IoU)", "One minus the soft IoU of the masks of the strongest τ_pct: the paper (4.3)."),
+    answer(
+        "ncc_db",
+        "levels (NCC)",
+        "One minus the correlation of the levels above the noise, dB: knows the pose better.",
+    ),
+    answer(
+        "gamma",
+        "levels (speckle)",
+        "The Itakura–Saito divergence of the powers, the likelihood under speckle: sharpest, and of the narrowest basin.",
+    ),
+];
+
 pub(super) const SUMMATION: &[Answer] = &[
     answer("coherent", "coherent", "H_sim = |Σ A K e^{iψ}|: joints interfere. The paper."),
     answer("incoherent", "incoherent", "H_sim = √Σ (A K)²: powers add."),

@@ -5,8 +5,8 @@
 use super::field::{Access, Answer, Field, FieldGroup, ReadBy, Unset, Value};
 use super::rows::{choice, count_at, flag_at, maybe_at, number, number_at, one_of_at, switch};
 use super::{
-    Background, Convergence, EM_REGION_FORM, EmRegion, FitConfig, FramesAround, GradientVelocity, Height, Limbs,
-    Parameterization, Scatterers, StartPlace, Still, Summation, WarmStart, Yaw, answers,
+    Background, Convergence, EM_REGION_FORM, EmLoss, EmRegion, FitConfig, FramesAround, GradientVelocity, Height,
+    Limbs, Parameterization, Scatterers, StartPlace, Still, Summation, WarmStart, Yaw, answers,
 };
 use FieldGroup::{Limits, Model, Optimiser, Perturbation, Radar, Start as Starting, StepSizes, Weights};
 use ReadBy::{Run, Start, Steps, StepsAndStart};
@@ -46,6 +46,18 @@ pub const FIELDS: &[Field] = &[
     Field {
         help: "Weight of the kinematic terms: bone lengths, rigid motion, joint angles, and for several people separation and collision.",
         ..number(Weights, "w_kine", "w_kine", Steps, (0.0, 1000.0), number_at!(w_kine)).logarithmic().row("weights")
+    },
+    Field {
+        help: "What L_EM compares of H_sim and H_ori.",
+        ..choice(
+            Weights,
+            "objective",
+            "Objective",
+            StepsAndStart,
+            answers::OBJECTIVE,
+            one_of_at!(objective, [EmLoss::Iou, EmLoss::NccDb, EmLoss::Gamma]),
+        )
+        .row("objective")
     },
     Field {
         help: "Share of the EM region's cells that a mask holds: B = [H > P_{100−τ}(H)]. At 100 % all but the smallest cell: no masking.",

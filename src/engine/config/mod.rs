@@ -42,6 +42,19 @@ pub enum Summation {
     Incoherent,
 }
 
+/// How L_EM compares the simulated map with the measured one; SPEC sections 4 and 8.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EmLoss {
+    /// One minus the soft IoU of their masks: the paper.
+    #[default]
+    Iou,
+    /// One minus the correlation of their levels, dB.
+    NccDb,
+    /// The divergence of the measured from the simulated power that is likeliest under speckle (Itakura–Saito).
+    Gamma,
+}
+
 /// Where the electromagnetic term is evaluated; SPEC section 4. A view's own `region` wins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum EmRegion {
@@ -119,6 +132,8 @@ pub struct FitConfig {
     pub w_em: f64,
     /// Weight of the kinematic terms.
     pub w_kine: f64,
+    /// What L_EM compares.
+    pub objective: EmLoss,
     /// Share of cells in a mask, percent.
     pub tau_pct: f64,
     /// Temperature T of the soft mask.
@@ -185,6 +200,7 @@ impl Default for FitConfig {
         Self {
             w_em: 0.5,
             w_kine: 0.5,
+            objective: EmLoss::default(),
             tau_pct: 10.0,
             softness: 0.5,
             theta_max_deg: 170.0,

@@ -27,6 +27,7 @@ pub(super) struct CellBox {
     pub grid: TileGrid,
     /// The place among the view's own axes of each.
     order: SmallVec<[usize; 3]>,
+    own_bins: SmallVec<[[usize; 2]; 3]>,
 }
 
 impl CellBox {
@@ -43,7 +44,13 @@ impl CellBox {
             Precision::F64 => TileGrid::new(&[], &[]),
             Precision::F32 => TileGrid::new(&bins_in_order, &marked),
         };
-        Self { view: View { axes, region: None, ..view.clone() }, bins: bins_in_order, marked, grid, order }
+        let view = View { axes, region: None, ..view.clone() };
+        Self { view, bins: bins_in_order, marked, grid, order, own_bins: bins.into() }
+    }
+
+    /// Values of the cells in the order of the sum, from those in C order of the view's own axes.
+    pub(super) fn in_order_of_sum(&self, values: &[f64]) -> Vec<f64> {
+        into_order(&self.order, &self.own_bins, values)
     }
 
     /// Values of the cells in C order of the view's own axes, from those in the order of the sum.

@@ -6,10 +6,11 @@ use super::cell_box::CellBox;
 use super::floors::{EPSILON, SOFT_FLOOR, ViewLoss, floored, hard_iou, ln_floored};
 use super::gaussian::{WorldGaussianBars, WorldGaussians};
 use super::kernel::Kernel;
+use super::levels::Levels;
 use super::percentile::percentile;
 use super::scalar::Real;
 use super::splat::{Splats, ViewModel};
-use super::tiles::{self, EmQuery, Tiles};
+use super::tiles::{self, EmQuery, LevelQuery, Tiles};
 use crate::body::Pppr;
 use crate::config::FitConfig;
 
@@ -27,6 +28,8 @@ pub(super) struct EmTarget {
     pub ori: Vec<bool>,
     /// The region as it is summed, marked by B_ori.
     pub cell_box: CellBox,
+    /// What is measured there, where levels are compared; `None` where masks are.
+    pub levels: Option<Levels>,
 }
 
 impl Workspace {
@@ -41,13 +44,13 @@ impl Workspace {
         &mut self,
         model: &ViewModel<'_>,
         target: &EmTarget,
-        factor: Option<f64>,
+        (factor, with_iou): (Option<f64>, bool),
         precision: Precision,
     ) -> ViewLoss {
         let Self { splats, moments, tiles } = self;
         moments.reset(splats.joints(), &model.view.axes);
         match precision {
-            Precision::F64 => plain::<f64>(model, splats, &target.cell_box, factor, moments),
+            Precision::F64 => plain::<f64>(model, splats, target, factor, moments),
             Precision::F32 if tiles::holds(model.config.softness) => {
                 let FitConfig { summation, tau_pct, softness, .. } = *model.config;
                 let query = EmQuery {
@@ -57,10 +60,15 @@ impl Workspace {
                     tau_pct,
                     softness,
                     gradient_factor: factor,
+                    levels: target
+                        .levels
+                        .as_ref()
+                        .map(|levels| LevelQuery { tiles: &levels.tiles, totals: &levels.totals }),
+                    with_iou,
                 };
                 tiles.evaluate(&query, moments)
             }
-            Precision::F32 => plain::<f32>(model, splats, &target.cell_box, factor, moments),
+            Precision::F32 => plain::<f32>(model, splats, target, factor, moments),
         }
     }
 
@@ -80,7 +88,7 @@ impl Workspace {
 fn plain<T: Real>(
     model: &ViewModel<'_>,
     splats: &Splats,
-    cell_box: &CellBox,
+    EmTarget { cell_box, levels, .. }: &EmTarget,
     scale: Option<f64>,
     moments: &mut Moments,
 ) -> ViewLoss {
@@ -88,10 +96,17 @@ fn plain<T: Real>(
     let mut ln_s = vec![f64::NEG_INFINITY; cell_box.marked.len()];
     kernel.forward(&mut ln_s);
     let mask = SoftMask::new(&ln_s, &cell_box.marked, model.config.tau_pct, model.config.softness);
-    if let Some(scale) = scale {
-        kernel.backward(&mask.weight(&ln_s, &cell_box.marked, scale), moments);
+    let (loss, weight) = match levels {
+        None => (mask.loss(), scale.map(|scale| mask.weight(&ln_s, &cell_box.marked, scale))),
+        Some(levels) => {
+            let power: Vec<f64> = ln_s.iter().map(|&x| floored(x).powi(2)).collect();
+            levels.compare(&power, scale)
+        }
+    };
+    if let Some(weight) = weight {
+        kernel.backward(&weight, moments);
     }
-    ViewLoss { loss: mask.loss(), iou: mask.iou }
+    ViewLoss { loss, iou: mask.iou }
 }
 
 /// The soft mask of H_sim and what it has in common with the hard mask of H_ori.

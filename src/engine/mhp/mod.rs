@@ -37,6 +37,7 @@ mod gaussian;
 mod init;
 mod kernel;
 mod lanes;
+mod levels;
 mod objective;
 mod percentile;
 mod problem;

@@ -4,13 +4,14 @@ use super::cell_box::CellBox;
 use super::em::{EmTarget, Workspace};
 use super::floors::hard_iou;
 use super::gaussian::{WorldGaussianBars, WorldGaussians};
+use super::levels::Levels;
 use super::percentile::percentile;
 use super::region::{self, Region};
 use super::splat::ViewModel;
 use super::terms::{self, Inputs};
 use super::{Evaluation, FitError, Precision, Problem, TERMS, TermId, Weight};
 use crate::body::Pppr;
-use crate::config::FitConfig;
+use crate::config::{EmLoss, FitConfig};
 use crate::geometry::Vec3;
 use smallvec::SmallVec;
 use std::sync::Arc;
@@ -66,7 +67,7 @@ impl Objective {
         problem.check(initial)?;
         let centres = region::centres(initial);
         let (regions, warnings) = region::regions(&problem.views, config.em_region, &centres)?;
-        let targets = targets(&problem, &regions, config.tau_pct, precision);
+        let targets = targets(&problem, &regions, &config, precision);
         let workspaces = regions.iter().map(|_| Workspace::default()).collect();
         let mut objective = Self {
             problem,
@@ -101,8 +102,9 @@ impl Objective {
         {
             (self.regions, self.warnings) = (regions, warnings);
         }
-        if config.em_region != before.em_region || config.tau_pct != before.tau_pct {
-            self.targets = targets(&self.problem, &self.regions, config.tau_pct, self.precision);
+        let asked = |config: &FitConfig| (config.em_region, config.tau_pct, config.objective);
+        if asked(&config) != asked(&before) {
+            self.targets = targets(&self.problem, &self.regions, &config, self.precision);
         }
         self.anchor();
     }
@@ -180,7 +182,7 @@ impl Objective {
             workspace.project(model, (params, &*gaussians), *precision);
         }
         for ((model, target), workspace) in models.iter().zip(&*targets).zip(&mut *workspaces) {
-            let answer = workspace.compare(model, target, Some(1.0 / views), *precision);
+            let answer = workspace.compare(model, target, (Some(1.0 / views), true), *precision);
             em += answer.loss / views;
             iou.push(answer.iou);
         }
@@ -201,20 +203,23 @@ impl Objective {
         let losses = self.targets.iter().map(|target| {
             let model = ViewModel::new(&self.problem.radar, &target.cell_box.view, &self.config);
             workspace.project(&model, (params, &gaussians), self.precision);
-            workspace.compare(&model, target, None, self.precision).loss
+            workspace.compare(&model, target, (None, false), self.precision).loss
         });
         losses.sum::<f64>() / self.problem.views.len() as f64
     }
 }
 
-/// B_ori over each region's cells.
-fn targets(problem: &Problem, regions: &[Region], tau_pct: f64, precision: Precision) -> Vec<EmTarget> {
+/// What is measured over each region's cells.
+fn targets(problem: &Problem, regions: &[Region], config: &FitConfig, precision: Precision) -> Vec<EmTarget> {
     let of_view = |(view, region): (usize, &Region)| {
         let map = problem.map(view);
         let cells: Vec<f64> = region.indices(&problem.views[view].shape()).iter().map(|&i| map[i]).collect();
-        let threshold = percentile(&cells, 100.0 - tau_pct);
+        let threshold = percentile(&cells, 100.0 - config.tau_pct);
         let target: Vec<bool> = cells.iter().map(|&h| h > threshold).collect();
-        EmTarget { cell_box: CellBox::new(&problem.views[view], &region.bins, &target, precision), ori: target }
+        let cell_box = CellBox::new(&problem.views[view], &region.bins, &target, precision);
+        let levels = (config.objective != EmLoss::Iou)
+            .then(|| Levels::new(config.objective, problem.views[view].quantity, &cell_box, (&cells, map), None));
+        EmTarget { cell_box, ori: target, levels }
     };
     regions.iter().enumerate().map(of_view).collect()
 }

@@ -30,6 +30,9 @@
 //! 4. Mask: percentile, soft mask, its slope. Where the threshold was guessed too high, back to 3 with a lower guess.
 //! 5. Collect: the strips once more, in the tiles where the mask has a slope, into each joint's moments.
 //!
+//! Where levels are compared instead of masks (`levels.rs`), the guess is one of the gain, and a joint is dropped where it is
+//! nothing beside the noise.
+//!
 //! The answer depends on the parameters alone: what is kept from the last evaluation only speeds the percentile up.
 #![expect(
     clippy::inline_always,
@@ -41,6 +44,7 @@ mod collect;
 mod f32_range;
 mod grid;
 mod joint;
+mod levels;
 mod mask;
 mod strip;
 mod sum;
@@ -48,6 +52,7 @@ mod sum;
 mod tests;
 
 pub(super) use grid::{TileGrid, blocks_of};
+pub(super) use levels::{LevelQuery, LevelTiles};
 
 use super::adjoint::{self, Moments};
 use super::floors::{EPSILON, ViewLoss, share};
@@ -97,6 +102,8 @@ pub(super) struct Tiles {
     sums: Vec<ComplexPerCell>,
     /// H² relative to the scale, −1 beyond the box; later m(1 − m)/|S|² · d ln(H + h)/d ln|S|.
     power: Vec<PerCell>,
+    /// Where levels are compared: ∂L/∂(g S).
+    slopes: Vec<PerCell>,
     /// Tiles where the mask has a slope: a bit each, a block's in one number.
     sloped: Vec<u32>,
     /// Each joint's moments over the blocks, a number a cell of a tile; zeros when they have been collected.
@@ -109,6 +116,7 @@ pub(super) struct Tiles {
 }
 
 /// L_EM of one view, as it is asked for.
+#[derive(Clone, Copy)]
 pub(super) struct EmQuery<'a> {
     pub splats: &'a Splats,
     pub grid: &'a TileGrid,
@@ -117,6 +125,10 @@ pub(super) struct EmQuery<'a> {
     pub softness: f64,
     /// Factor of the gradient; `None` where none is wanted.
     pub gradient_factor: Option<f64>,
+    /// What levels are compared with; `None` compares masks.
+    pub levels: Option<LevelQuery<'a>>,
+    /// Whether the IoU is asked for where levels are compared.
+    pub with_iou: bool,
 }
 
 /// Whether f32 holds a soft mask of this temperature.
@@ -189,26 +201,42 @@ impl<const COHERENT: bool> WithSimd for EvaluateQuery<'_, COHERENT> {
         if !tiles.fill::<S, COHERENT>(simd, query.splats, query.grid) {
             return ViewLoss { loss: f64::NAN, iou: None };
         }
+        match query.levels {
+            Some(levels) => tiles.compare_levels::<S, COHERENT>(simd, query, levels, moments),
+            None => tiles.compare_masks::<S, COHERENT>(simd, query, moments),
+        }
+    }
+}
+
+impl Tiles {
+    /// Compares masks.
+    #[inline(always)]
+    fn compare_masks<S: Simd, const COHERENT: bool>(
+        &mut self,
+        simd: S,
+        query: &EmQuery<'_>,
+        moments: &mut Moments,
+    ) -> ViewLoss {
         let floor = EPSILON.log2();
-        let mut guess = tiles.guess(simd, query);
+        let mut guess = self.guess(simd, query);
         let mut tries = 0..MAX_GUESSES;
         loop {
             let range = F32Range::new(guess, query.softness);
-            tiles.sum::<S, COHERENT>(simd, query.grid, &range);
-            let threshold = tiles.threshold::<S, COHERENT>(simd, query, &range);
+            self.sum::<S, COHERENT>(simd, query.grid, &range);
+            let threshold = self.threshold::<S, COHERENT>(simd, query, &range);
             let low = guess > floor && threshold.log2 < guess - MAX_GUESS_TOO_HIGH_LN * LOG2_E;
             let high = threshold.log2 > guess + MAX_GUESS_TOO_LOW_LN * LOG2_E;
             if (low || high) && tries.next().is_some() {
                 guess = if threshold.among_lit { threshold.log2 } else { guess - 30.0 }.max(floor);
                 continue;
             }
-            tiles.last = Some(threshold.log2);
-            let mask = tiles.mask::<S, COHERENT>(simd, query, &range, &threshold);
+            self.last = Some(threshold.log2);
+            let mask = self.mask::<S, COHERENT>(simd, query, &range, &threshold);
             if let Some(factor) = query.gradient_factor
                 && mask.union > 0.0
             {
-                tiles.weight_sums::<S, COHERENT>(simd, query, &mask, factor / query.softness);
-                tiles.collect::<S, COHERENT>(simd, query.grid, moments);
+                self.weight_sums::<S, COHERENT>(simd, query, &mask, factor / query.softness);
+                self.collect::<S, COHERENT>(simd, query.grid, moments);
             }
             return mask.answer();
         }
