@@ -124,6 +124,9 @@ fn scene(seed: u64, bins: &Range<usize>, objective: EmLoss) -> Option<[Evaluatio
         operators: Operators { attenuation: on(rng), range: on(rng), doppler: on(rng), angle: on(rng) },
         ..FitConfig::default()
     };
+    // Over a region the powers of a whole map do not tell whether somebody is in it.
+    let em_region = if objective == EmLoss::Iou { config.em_region } else { EmRegion::Full };
+    let config = FitConfig { em_region, ..config };
     let params = params(rng.random_range(1..4), rng);
     let problem = Arc::new(Problem::new(radar(), skeleton(), views, &maps).unwrap());
     // Where nobody is in a view, SPEC's regularisers of levels decide, and they are beyond f32.
