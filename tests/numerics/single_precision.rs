@@ -165,7 +165,7 @@ fn misses([want, got]: &[Evaluation; 2], objective: EmLoss) -> Vec<String> {
         let (got, want) = (got.em_gradient().group(group), want.em_gradient().group(group));
         let largest = want.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let worst = got.iter().zip(want).map(|(g, w)| (g - w).abs()).fold(0.0, f64::max);
-        if worst > (share * largest).max(1e-6) {
+        if worst > (share * largest).max(if objective == EmLoss::Iou { 1e-6 } else { 5e-6 }) {
             misses.push(format!("{}: {worst:.2e} of {largest:.2e}", group.key()));
         }
     }
