@@ -9,10 +9,10 @@ use std::collections::{BTreeMap, BTreeSet};
 const STAGES: &[(&str, &[&str])] = &[
     ("the terms of the loss", &["terms"]),
     ("numbers", &["types", "percentile", "fill", "scalar", "lanes", "batch", "floors"]),
-    ("a joint in a view", &["triad", "gaussian", "splat", "adjoint"]),
-    ("cells and masks", &["kernel", "tiles", "cell_box", "em"]),
+    ("a joint in a view", &["triad", "gaussian", "splat", "adjoint", "skin"]),
+    ("cells and masks", &["kernel", "tiles", "cell_box", "levels", "em"]),
     ("what maps and frames around show", &["region", "template", "context"]),
-    ("a frame", &["problem", "simulate"]),
+    ("a frame", &["frame_em", "problem", "simulate"]),
     ("the objective", &["objective"]),
     ("the fit", &["convergence", "articulation", "adam", "fitter"]),
     ("the start", &["init"]),

@@ -3,6 +3,7 @@
 mod figure;
 mod gait;
 mod motion;
+mod parts;
 mod pppr;
 mod segment;
 mod skeleton;
@@ -12,6 +13,7 @@ mod surface;
 pub use figure::{Anchor, Build, Posture};
 pub use gait::{Gait, Path};
 pub use motion::{Motion, Performer};
+pub use parts::{HEAD, PARTS, Parts, Scatterer, is_named, scatterer};
 pub use pppr::{Group, Pppr, PpprShape};
 pub use segment::{BodyPose, Segment, SegmentFrame};
 pub use skeleton::{Side, Skeleton};

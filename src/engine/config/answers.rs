@@ -33,6 +33,15 @@ pub(super) const OBJECTIVE: &[Answer] = &[
     ),
 ];
 
+pub(super) const BODY: &[Answer] = &[
+    answer("joints", "joints", "A Gaussian a joint: the paper."),
+    answer(
+        "skin",
+        "skin",
+        "Points on the side of trunk and limbs that faces the radar, as bright as what is seen of them.",
+    ),
+];
+
 pub(super) const SUMMATION: &[Answer] = &[
     answer("coherent", "coherent", "H_sim = |Σ A K e^{iψ}|: joints interfere. The paper."),
     answer("incoherent", "incoherent", "H_sim = √Σ (A K)²: powers add."),

@@ -5,8 +5,8 @@
 use super::field::{Access, Answer, Field, FieldGroup, ReadBy, Unset, Value};
 use super::rows::{choice, count_at, flag_at, maybe_at, number, number_at, one_of_at, switch};
 use super::{
-    Background, Convergence, EM_REGION_FORM, EmLoss, EmRegion, FitConfig, FramesAround, GradientVelocity, Height,
-    Limbs, Parameterization, Scatterers, StartPlace, Still, Summation, WarmStart, Yaw, answers,
+    Background, BodyModel, Convergence, EM_REGION_FORM, EmLoss, EmRegion, FitConfig, FramesAround, GradientVelocity,
+    Height, Limbs, Parameterization, Scatterers, StartPlace, Still, Summation, WarmStart, Yaw, answers,
 };
 use FieldGroup::{Limits, Model, Optimiser, Perturbation, Radar, Start as Starting, StepSizes, Weights};
 use ReadBy::{Run, Start, Steps, StepsAndStart};
@@ -58,6 +58,18 @@ pub const FIELDS: &[Field] = &[
             one_of_at!(objective, [EmLoss::Iou, EmLoss::NccDb, EmLoss::Gamma]),
         )
         .row("objective")
+    },
+    Field {
+        help: "What returns the simulated echo.",
+        ..choice(
+            Model,
+            "body",
+            "Body",
+            StepsAndStart,
+            answers::BODY,
+            one_of_at!(body, [BodyModel::Joints, BodyModel::Skin]),
+        )
+        .row("body")
     },
     Field {
         help: "Share of the EM region's cells that a mask holds: B = [H > P_{100−τ}(H)]. At 100 % all but the smallest cell: no masking.",

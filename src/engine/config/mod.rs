@@ -55,6 +55,17 @@ pub enum EmLoss {
     Gamma,
 }
 
+/// What the forward model takes for the body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BodyModel {
+    /// The Gaussians of the joints: the paper.
+    #[default]
+    Joints,
+    /// Points of the skin that faces the radar, between the joints.
+    Skin,
+}
+
 /// Where the electromagnetic term is evaluated; SPEC section 4. A view's own `region` wins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum EmRegion {
@@ -134,6 +145,8 @@ pub struct FitConfig {
     pub w_kine: f64,
     /// What L_EM compares.
     pub objective: EmLoss,
+    /// What returns an echo.
+    pub body: BodyModel,
     /// Share of cells in a mask, percent.
     pub tau_pct: f64,
     /// Temperature T of the soft mask.
@@ -201,6 +214,7 @@ impl Default for FitConfig {
             w_em: 0.5,
             w_kine: 0.5,
             objective: EmLoss::default(),
+            body: BodyModel::default(),
             tau_pct: 10.0,
             softness: 0.5,
             theta_max_deg: 170.0,

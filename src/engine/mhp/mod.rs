@@ -9,10 +9,10 @@
 //!
 //! 1. the terms of the loss, `terms/mod.rs`; numbers: `types.rs`, `percentile.rs`, `fill.rs`, `scalar.rs`, `lanes.rs`,
 //!    `batch.rs`, `floors.rs`
-//! 2. a joint in a view: `triad.rs`, `gaussian.rs`, `splat.rs`, `adjoint.rs`
-//! 3. cells: `kernel.rs`, `tiles/mod.rs`, `cell_box.rs`, and the masks over them, `em.rs`
+//! 2. a joint in a view: `triad.rs`, `gaussian.rs`, `splat.rs`, `adjoint.rs`; the skin between the joints, `skin.rs`
+//! 3. cells: `kernel.rs`, `tiles/mod.rs`, `cell_box.rs`; masks and levels over them, `levels.rs`, `em.rs`
 //! 4. what the maps of a frame and those around it show: `region.rs`, `template.rs`, `context/mod.rs`
-//! 5. a frame: `problem.rs`, `simulate.rs`
+//! 5. a frame: `frame_em.rs`, `problem.rs`, `simulate.rs`
 //! 6. the objective: `objective.rs`
 //! 7. the fit: `convergence.rs`, `articulation.rs`, `adam.rs`, `fitter.rs`; and the start of one: `init/mod.rs`
 //!
@@ -33,6 +33,7 @@ mod em;
 mod fill;
 mod fitter;
 mod floors;
+mod frame_em;
 mod gaussian;
 mod init;
 mod kernel;
@@ -44,6 +45,7 @@ mod problem;
 mod region;
 mod scalar;
 mod simulate;
+mod skin;
 mod splat;
 mod template;
 mod terms;

@@ -1,19 +1,14 @@
 //! L(Θ) and ∂L/∂Θ; SPEC section 4.
 
-use super::cell_box::CellBox;
-use super::em::{EmTarget, Workspace};
 use super::floors::hard_iou;
-use super::gaussian::{WorldGaussianBars, WorldGaussians};
-use super::levels::Levels;
+use super::frame_em::FrameEm;
 use super::percentile::percentile;
 use super::region::{self, Region};
-use super::splat::ViewModel;
 use super::terms::{self, Inputs};
 use super::{Evaluation, FitError, Precision, Problem, TERMS, TermId, Weight};
 use crate::body::Pppr;
-use crate::config::{EmLoss, FitConfig};
+use crate::config::FitConfig;
 use crate::geometry::Vec3;
-use smallvec::SmallVec;
 use std::sync::Arc;
 
 /// The objective of one fit: its EM region and the mask of H_ori are fixed by the initial parameters.
@@ -23,12 +18,7 @@ pub struct Objective {
     precision: Precision,
     centres: Vec<Vec3>,
     regions: Vec<Region>,
-    /// Each view's region with B_ori over its cells.
-    targets: Vec<EmTarget>,
-    workspaces: Vec<Workspace>,
-    /// Scratch a joint: its Gaussian, and that one's adjoint.
-    gaussians: WorldGaussians,
-    bars: WorldGaussianBars,
+    em: FrameEm,
     initial: Pppr,
     /// Where the frames around say that each person's middle is, m; empty where they say nothing.
     anchors: Vec<Vec3>,
@@ -67,18 +57,14 @@ impl Objective {
         problem.check(initial)?;
         let centres = region::centres(initial);
         let (regions, warnings) = region::regions(&problem.views, config.em_region, &centres)?;
-        let targets = targets(&problem, &regions, &config, precision);
-        let workspaces = regions.iter().map(|_| Workspace::default()).collect();
+        let em = FrameEm::new(&problem.measured(), &regions, &config, precision);
         let mut objective = Self {
             problem,
             config,
             precision,
             centres,
             regions,
-            targets,
-            workspaces,
-            gaussians: WorldGaussians::default(),
-            bars: WorldGaussianBars::default(),
+            em,
             initial: initial.clone(),
             anchors: Vec::new(),
             warnings,
@@ -102,9 +88,9 @@ impl Objective {
         {
             (self.regions, self.warnings) = (regions, warnings);
         }
-        let asked = |config: &FitConfig| (config.em_region, config.tau_pct, config.objective);
+        let asked = |config: &FitConfig| (config.em_region, config.tau_pct, config.objective, config.body);
         if asked(&config) != asked(&before) {
-            self.targets = targets(&self.problem, &self.regions, &config, self.precision);
+            self.em = FrameEm::new(&self.problem.measured(), &self.regions, &config, self.precision);
         }
         self.anchor();
     }
@@ -169,27 +155,9 @@ impl Objective {
         }
         let em_gradient = &mut gradients[Weight::Em as usize];
         iou.clear();
-        let views = self.problem.views.len() as f64;
-        let mut em = 0.0;
-        let Self { problem, config, precision, targets, workspaces, gaussians, bars, anchors, .. } = self;
+        let Self { problem, config, precision, em, anchors, .. } = self;
         let config = &*config;
-        gaussians.fill(params, *precision);
-        bars.reset(gaussians.joints());
-        // Stage by stage rather than view by view: each stage's instructions then stay at hand.
-        let models: SmallVec<[ViewModel<'_>; 4]> =
-            targets.iter().map(|target| ViewModel::new(&problem.radar, &target.cell_box.view, config)).collect();
-        for (model, workspace) in models.iter().zip(&mut *workspaces) {
-            workspace.project(model, (params, &*gaussians), *precision);
-        }
-        for ((model, target), workspace) in models.iter().zip(&*targets).zip(&mut *workspaces) {
-            let answer = workspace.compare(model, target, (Some(1.0 / views), true), *precision);
-            em += answer.loss / views;
-            iou.push(answer.iou);
-        }
-        for (model, workspace) in models.iter().zip(&*workspaces) {
-            workspace.pull_back(model, gaussians, (&mut *em_gradient, &mut *bars), *precision);
-        }
-        gaussians.pull_back(bars, em_gradient, *precision);
+        let em = em.evaluate((&problem.radar, config), *precision, params, em_gradient, Some(iou));
         let inputs = Inputs { skeleton: &problem.skeleton, config, params, anchors };
         *terms = terms::evaluate(&inputs, em, gains, gradients);
         *loss = terms.loss(config);
@@ -198,30 +166,8 @@ impl Objective {
 
     /// L_EM alone, without its gradient.
     pub fn em_loss(&self, params: &Pppr) -> f64 {
-        let (mut workspace, mut gaussians) = (Workspace::default(), WorldGaussians::default());
-        gaussians.fill(params, self.precision);
-        let losses = self.targets.iter().map(|target| {
-            let model = ViewModel::new(&self.problem.radar, &target.cell_box.view, &self.config);
-            workspace.project(&model, (params, &gaussians), self.precision);
-            workspace.compare(&model, target, (None, false), self.precision).loss
-        });
-        losses.sum::<f64>() / self.problem.views.len() as f64
+        self.em.loss((&self.problem.radar, &self.config), self.precision, params)
     }
-}
-
-/// What is measured over each region's cells.
-fn targets(problem: &Problem, regions: &[Region], config: &FitConfig, precision: Precision) -> Vec<EmTarget> {
-    let of_view = |(view, region): (usize, &Region)| {
-        let map = problem.map(view);
-        let cells: Vec<f64> = region.indices(&problem.views[view].shape()).iter().map(|&i| map[i]).collect();
-        let threshold = percentile(&cells, 100.0 - config.tau_pct);
-        let target: Vec<bool> = cells.iter().map(|&h| h > threshold).collect();
-        let cell_box = CellBox::new(&problem.views[view], &region.bins, &target, precision);
-        let levels = (config.objective != EmLoss::Iou)
-            .then(|| Levels::new(config.objective, problem.views[view].quantity, &cell_box, (&cells, map), None));
-        EmTarget { cell_box, ori: target, levels }
-    };
-    regions.iter().enumerate().map(of_view).collect()
 }
 
 /// The masks of a view for a simulated whole map `sim_map` (from [`super::simulate`]). A map of another size gives an
@@ -237,7 +183,7 @@ pub fn masks(objective: &Objective, view: usize, sim_map: &[f64]) -> Masks {
     let simulated: Vec<f64> = indices.iter().filter_map(|&i| sim_map.get(i).copied()).collect();
     let threshold = percentile(&simulated, 100.0 - objective.config.tau_pct);
     let mut masks = Masks { ori: vec![false; cells], sim: vec![false; cells], inside: vec![false; cells] };
-    for (&cell, &ori) in indices.iter().zip(&objective.targets[view].ori) {
+    for (&cell, &ori) in indices.iter().zip(objective.em.ori(view)) {
         masks.inside[cell] = true;
         masks.ori[cell] = ori;
         masks.sim[cell] = sim_map.get(cell).is_some_and(|&h| h > threshold);

@@ -1,11 +1,13 @@
 //! One frame's worth of optimisation problem: radar, skeleton, views and their maps, checked and filled.
 
 use super::context::{Contexts, Neighbour, Reading, TemporalContext, anchors};
+use super::frame_em::Measured;
 use super::{FitError, fill_missing};
 use crate::body::{Pppr, Skeleton};
 use crate::config::{FitConfig, FramesAround};
 use crate::geometry::Vec3;
 use crate::radar::{RadarConfig, View, ViewSet};
+use smallvec::SmallVec;
 
 /// Everything a fit needs besides its configuration and its start. Maps are cast to f64 and their missing cells filled
 /// (SPEC section 4).
@@ -95,6 +97,16 @@ impl Problem {
     /// H_ori of a view, missing cells filled, C order; empty where there is no such view.
     pub fn map(&self, view: usize) -> &[f64] {
         self.maps.get(view).map_or(&[], Vec::as_slice)
+    }
+
+    /// What is measured in this frame.
+    pub(super) fn measured(&self) -> Measured<'_> {
+        self.measured_as(self.maps.iter().map(Vec::as_slice).collect())
+    }
+
+    /// What is measured where these are the maps, one a view.
+    pub(super) fn measured_as<'a>(&'a self, maps: SmallVec<[&'a [f64]; 4]>) -> Measured<'a> {
+        Measured { views: &self.views, skeleton: &self.skeleton, radar: &self.radar, maps, background: None }
     }
 
     /// How many cells of a view's map were filled.

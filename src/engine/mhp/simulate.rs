@@ -2,6 +2,7 @@
 
 use super::cell_box::CellBox;
 use super::floors::floored;
+use super::frame_em::skin_of;
 use super::gaussian::WorldGaussians;
 use super::kernel::Kernel;
 use super::region::Region;
@@ -16,6 +17,11 @@ use crate::radar::View;
 /// H_sim of every view over its whole map, C order, f64; SPEC section 3.
 pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, params: &Pppr) -> Vec<Vec<f64>> {
     let mut gaussians = WorldGaussians::default();
+    let skin = skin_of(config, (&problem.views, &problem.skeleton, &problem.radar)).map(|mut skin| {
+        skin.fill(params);
+        skin
+    });
+    let params = skin.as_ref().map_or(params, |skin| &skin.points);
     gaussians.fill(params, precision);
     let mut splats = Splats::default();
     let of_view = |view: &View| {

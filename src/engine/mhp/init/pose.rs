@@ -4,7 +4,7 @@
 //! posture is the standing template with its limbs turned about hips, knees, shoulders and elbows, found by their names; a
 //! skeleton without such names only stands. The angles are textbook ones: legs and arms swing as sines, half a stride apart.
 
-use crate::body::{Side, Skeleton};
+use crate::body::{Side, Skeleton, is_named};
 use crate::geometry::{Vec3, add, mat_vec, rotation_from_quaternion, scale, sub};
 use crate::mhp::template::Template;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -145,11 +145,6 @@ pub(super) fn posed(template: &Template, skeleton: &Skeleton, posture: Posture) 
         joint[2] += sunk;
     }
     Template { joints, crown_m: template.crown_m }
-}
-
-/// Whether one of `words` stands in a joint's name.
-pub(super) fn is_named(skeleton: &Skeleton, joint: usize, words: &[&str]) -> bool {
-    skeleton.joints[joint].to_lowercase().split(['_', ' ', '-']).any(|word| words.contains(&word))
 }
 
 /// Turns all above the hips forwards about their middle.

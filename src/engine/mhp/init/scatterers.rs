@@ -4,48 +4,21 @@
 //! chain of equal blobs looks the same a blob farther on. By body part each Gaussian lies along the bones that meet at its
 //! joint, wide where the body is, and as bright as that part's share of the skin.
 
-use crate::body::{Group, Pppr, Skeleton};
+use crate::body::{Group, Pppr, Scatterer, Skeleton, scatterer};
 use crate::config::Scatterers;
 use crate::geometry::{Vec3, cross, dot, norm, scale, sub};
 
 /// Standard deviation of an equal Gaussian, m.
 const EQUAL_SCALE_M: f64 = 0.08;
 
-/// A body part's Gaussian: standard deviations along and across its bones, m, and its opacity α.
-struct Part {
-    along_m: f64,
-    across_m: f64,
-    alpha: f64,
-}
-
-/// Skin area and width of the parts that meet at a joint, after the segment tables of Winter: trunk 0.5 m long and 0.3 m
-/// wide, thigh 0.15 m, shank 0.11 m, arm 0.09 m, head 0.16 m. What shares a part shares its brightness.
-fn part(word: &str) -> Option<Part> {
-    let part = |along_m, across_m, alpha| Some(Part { along_m, across_m, alpha });
-    match word {
-        "nose" | "eye" | "ear" | "jaw" => part(0.06, 0.06, 0.08),
-        "head" | "top" => part(0.08, 0.07, 0.3),
-        "neck" | "collar" | "clavicle" => part(0.08, 0.08, 0.3),
-        "thorax" | "chest" | "spine" | "torso" | "belly" => part(0.14, 0.11, 0.6),
-        "shoulder" => part(0.14, 0.10, 0.6),
-        "pelvis" | "root" => part(0.12, 0.11, 0.6),
-        "hip" => part(0.14, 0.09, 0.55),
-        "elbow" => part(0.11, 0.05, 0.25),
-        "wrist" | "hand" => part(0.07, 0.04, 0.15),
-        "knee" => part(0.15, 0.06, 0.4),
-        "ankle" | "heel" | "foot" | "toe" => part(0.08, 0.05, 0.2),
-        _ => None,
-    }
-}
-
 /// What each joint of a skeleton looks like; `None`: an equal, round Gaussian. The joints' names are read once.
-pub(super) struct ScattererModel(Vec<Option<Part>>);
+pub(super) struct ScattererModel(Vec<Option<Scatterer>>);
 
 impl ScattererModel {
     pub(super) fn new(skeleton: &Skeleton, kind: Scatterers) -> Self {
         let of_joint = |name: &String| match kind {
             Scatterers::Equal => None,
-            Scatterers::BodyParts => name.to_lowercase().split(['_', ' ', '-']).rev().find_map(part),
+            Scatterers::BodyParts => scatterer(name),
         };
         Self(skeleton.joints.iter().map(of_joint).collect())
     }
@@ -63,7 +36,7 @@ impl ScattererModel {
     }
 }
 
-fn by_part(params: &mut Pppr, skeleton: &Skeleton, joint: usize, part: &Part) {
+fn by_part(params: &mut Pppr, skeleton: &Skeleton, joint: usize, part: &Scatterer) {
     let joints = skeleton.joints.len().max(1);
     let (first, own) = (joint - joint % joints, joint % joints);
     let bones = skeleton.bones.iter().filter(|bone| bone.contains(&own));

@@ -13,18 +13,17 @@
 //! to 59 px and 85 % of the joints, for 76 %, lie in the boxes on the maps, while the vertical IoU falls from 0.45 to 0.36; poses of
 //! another simulator become worse (PA-MAJPE by 9 to 40 mm). It is a prior from simulation; `limbs = "posture"` switches it off.
 
-mod parts;
 #[cfg(feature = "train")]
 mod train;
 
 #[cfg(feature = "train")]
 pub use train::{LimbLesson, learn};
 
+use crate::body::{PARTS, Parts};
 use crate::geometry::{Vec3, add, norm, scale, sub};
 use crate::mhp::Problem;
 use crate::mhp::context::{Reading, SaliencyMap};
 use crate::mhp::template::relax;
-use parts::{PARTS, Parts};
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use std::sync::OnceLock;

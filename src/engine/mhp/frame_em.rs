@@ -1,0 +1,139 @@
+//! L_EM of one frame: what its views measure, the body as they see it, and the way back; SPEC sections 3, 4 and 8.
+
+use super::cell_box::CellBox;
+use super::em::{EmTarget, Workspace};
+use super::gaussian::{WorldGaussianBars, WorldGaussians};
+use super::levels::Levels;
+use super::percentile::percentile;
+use super::region::Region;
+use super::skin::{Skin, radar_place};
+use super::splat::ViewModel;
+use super::{Ious, Precision};
+use crate::body::{Pppr, Skeleton};
+use crate::config::{BodyModel, EmLoss, FitConfig};
+use crate::radar::{AxisKind, RadarConfig, View};
+use smallvec::SmallVec;
+
+/// What is measured in a frame's EM regions, and the scratch of an evaluation.
+pub(super) struct FrameEm {
+    /// Each view's region with B_ori over its cells.
+    targets: Vec<EmTarget>,
+    workspaces: Vec<Workspace>,
+    /// Scratch a Gaussian, and that one's adjoint.
+    gaussians: WorldGaussians,
+    bars: WorldGaussianBars,
+    /// Where the body is one of skin.
+    skin: Option<Skin>,
+}
+
+/// The maps of a frame with what is the same in all views: one map a view, C order, missing cells filled; a background power a
+/// cell, where one is known.
+pub(super) struct Measured<'a> {
+    pub views: &'a [View],
+    pub skeleton: &'a Skeleton,
+    pub radar: &'a RadarConfig,
+    pub maps: SmallVec<[&'a [f64]; 4]>,
+    pub background: Option<&'a [Vec<f64>]>,
+}
+
+/// The skin of a body before these views, if the settings ask for one and the skeleton has one.
+pub(super) fn skin_of(
+    config: &FitConfig,
+    (views, skeleton, radar): (&[View], &Skeleton, &RadarConfig),
+) -> Option<Skin> {
+    // Along a Doppler axis every feature counts, elsewhere their mean.
+    let spectral = views.iter().any(|view| view.axes.iter().any(|axis| axis.kind == AxisKind::Doppler));
+    let features = if spectral { radar.doppler_features } else { 1 };
+    (config.body == BodyModel::Skin).then(|| Skin::new(skeleton, radar_place(views), features)).flatten()
+}
+
+impl FrameEm {
+    /// Of what is measured in `regions`, one a view.
+    pub(super) fn new(measured: &Measured<'_>, regions: &[Region], config: &FitConfig, precision: Precision) -> Self {
+        let of_view = |(k, region): (usize, &Region)| {
+            let (view, map) = (&measured.views[k], measured.maps[k]);
+            let indices = region.indices(&view.shape());
+            let inside = |map: &[f64]| -> Vec<f64> { indices.iter().map(|&i| map[i]).collect() };
+            let cells = inside(map);
+            let threshold = percentile(&cells, 100.0 - config.tau_pct);
+            let ori: Vec<bool> = cells.iter().map(|&h| h > threshold).collect();
+            let cell_box = CellBox::new(view, &region.bins, &ori, precision);
+            let levels = (config.objective != EmLoss::Iou).then(|| {
+                let background = measured.background.map(|maps| inside(&maps[k]));
+                Levels::new(config.objective, view.quantity, &cell_box, (&cells, map), background.as_deref())
+            });
+            EmTarget { ori, cell_box, levels }
+        };
+        Self {
+            targets: regions.iter().enumerate().map(of_view).collect(),
+            workspaces: regions.iter().map(|_| Workspace::default()).collect(),
+            gaussians: WorldGaussians::default(),
+            bars: WorldGaussianBars::default(),
+            skin: skin_of(config, (measured.views, measured.skeleton, measured.radar)),
+        }
+    }
+
+    /// B_ori over a view's region, in C order.
+    pub(super) fn ori(&self, view: usize) -> &[bool] {
+        &self.targets[view].ori
+    }
+
+    /// L_EM at `params`; adds its gradient to `gradient`, and tells the IoU of each view where asked.
+    pub(super) fn evaluate(
+        &mut self,
+        (radar, config): (&RadarConfig, &FitConfig),
+        precision: Precision,
+        params: &Pppr,
+        gradient: &mut Pppr,
+        mut iou: Option<&mut Ious>,
+    ) -> f64 {
+        let Self { targets, workspaces, gaussians, bars, skin } = self;
+        if let Some(skin) = skin.as_mut() {
+            skin.fill(params);
+        }
+        let seen = skin.as_ref().map_or(params, |skin| &skin.points);
+        gaussians.fill(seen, precision);
+        bars.reset(gaussians.joints());
+        let share = 1.0 / targets.len() as f64;
+        // Stage by stage rather than view by view: each stage's instructions then stay at hand.
+        let models: SmallVec<[ViewModel<'_>; 4]> =
+            targets.iter().map(|target| ViewModel::new(radar, &target.cell_box.view, config)).collect();
+        for (model, workspace) in models.iter().zip(&mut *workspaces) {
+            workspace.project(model, (seen, &*gaussians), precision);
+        }
+        let mut em = 0.0;
+        for ((model, target), workspace) in models.iter().zip(&*targets).zip(&mut *workspaces) {
+            let answer = workspace.compare(model, target, (Some(share), iou.is_some()), precision);
+            em += answer.loss * share;
+            if let Some(iou) = iou.as_mut() {
+                iou.push(answer.iou);
+            }
+        }
+        let onto = skin.as_mut().map_or(&mut *gradient, |skin| &mut skin.gradient);
+        for (model, workspace) in models.iter().zip(&*workspaces) {
+            workspace.pull_back(model, gaussians, (&mut *onto, &mut *bars), precision);
+        }
+        gaussians.pull_back(bars, onto, precision);
+        if let Some(skin) = skin.as_ref() {
+            skin.pull_back(params, gradient);
+        }
+        em
+    }
+
+    /// L_EM alone, without its gradient.
+    pub(super) fn loss(&self, (radar, config): (&RadarConfig, &FitConfig), precision: Precision, params: &Pppr) -> f64 {
+        let (mut workspace, mut gaussians) = (Workspace::default(), WorldGaussians::default());
+        let skin = self.skin.clone().map(|mut skin| {
+            skin.fill(params);
+            skin
+        });
+        let seen = skin.as_ref().map_or(params, |skin| &skin.points);
+        gaussians.fill(seen, precision);
+        let losses = self.targets.iter().map(|target| {
+            let model = ViewModel::new(radar, &target.cell_box.view, config);
+            workspace.project(&model, (seen, &gaussians), precision);
+            workspace.compare(&model, target, (None, false), precision).loss
+        });
+        losses.sum::<f64>() / self.targets.len() as f64
+    }
+}

@@ -1,0 +1,483 @@
+//! The skin that faces the radar: points on trunk, limbs and head, from the Gaussians of the joints and back.
+//!
+//! PPPR stays the representation, a Gaussian a joint. But a radar sees no joints: its echo comes from the side of the body that
+//! faces it, in the middle of limbs as much as at their ends. With `body = "skin"` the forward model's Gaussians are
+//!
+//! ```text
+//! limb    p = J_a (1 − u) + J_b u on the bone, e along it, k the line of sight to p, n = k − (k·e) e, s = √(n² + 10⁻⁴):
+//!         point p − 0.8 r n/s, area 2 r l/N (s² + 0.02)          the cylinder's side that is seen, shadowed where seen end-on
+//! trunk   p between shoulders and hips, f its normal, c = k·f:
+//!         point p − 0.1 m tanh(c/0.15) f, area ∝ c² + 0.03       front or back, whichever is seen
+//! head    point 0.08 m before its middle
+//! ```
+//!
+//! each round, its amplitude the root of its area. The joints' own opacities and scales, by those that their part of the body has
+//! at the start (`body::scatterer`), make the points between them brighter and larger, at most four times; their rotations say
+//! nothing. Velocities and Doppler features are those between the joints. The line of sight is that of the radar, the mean of the
+//! views' places.
+
+use crate::body::{Group, HEAD, PARTS, Parts, Pppr, PpprShape, Skeleton, scatterer};
+use crate::geometry::{Vec3, add, add_scaled, cross, dot, norm, scale, sub};
+use smallvec::SmallVec;
+
+/// Limbs by their parts: upper arms, forearms, thighs, shanks, left and right; radius and length, m.
+const LIMBS: [([usize; 2], f64, f64); 8] = [
+    ([1, 3], 0.050, 0.29),
+    ([3, 5], 0.040, 0.25),
+    ([2, 4], 0.050, 0.29),
+    ([4, 6], 0.040, 0.25),
+    ([7, 9], 0.075, 0.42),
+    ([9, 11], 0.055, 0.42),
+    ([8, 10], 0.075, 0.42),
+    ([10, 12], 0.055, 0.42),
+];
+/// Points of a limb, and of the trunk from shoulders to hips and from left to right.
+const ON_LIMB: usize = 4;
+const DOWN: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
+const ACROSS: [f64; 3] = [0.15, 0.5, 0.85];
+/// Left and right shoulder and hip.
+const CORNERS: [usize; 4] = [1, 2, 7, 8];
+/// How far out a limb's skin lies, of its radius; the trunk's and the head's, m.
+const OUT: f64 = 0.8;
+const TRUNK_OUT_M: f64 = 0.10;
+const HEAD_OUT_M: f64 = 0.08;
+/// The cosine at which the trunk is seen from the side.
+const TRUNK_EDGE: f64 = 0.15;
+/// What is seen of a limb end-on and of the trunk from the side, of its area.
+const LIMB_END: f64 = 0.02;
+const TRUNK_SIDE: f64 = 0.03;
+/// Standard deviations, m, areas, m², and a limb's standard deviation by the length of its share.
+const TRUNK_SCALE_M: f64 = 0.05;
+const TRUNK_AREA_M2: f64 = 0.35 * 0.5 / 15.0 * 2.0;
+const HEAD_SCALE_M: f64 = 0.06;
+const HEAD_AREA_M2: f64 = 0.035;
+const LIMB_SCALE: f64 = 0.5;
+/// ln of how much brighter and larger than at the start a point may be.
+const MOST_LN: f64 = 1.386_294_361_119_890_6;
+/// α and standard deviation, m, of a joint of which nothing is known.
+const PLAIN: [f64; 2] = [0.5, 0.08];
+
+/// Points a person.
+pub(super) const POINTS: usize = LIMBS.len() * ON_LIMB + DOWN.len() * ACROSS.len() + 1;
+
+/// What a point is made of: parts with their shares.
+type Shares = SmallVec<[(usize, f64); 4]>;
+
+/// Where a point lies on its part, and what of it the radar sees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    /// The limb with these ends and this radius.
+    Limb {
+        ends: [usize; 2],
+        radius_m: f64,
+    },
+    Trunk,
+    Head,
+}
+
+#[derive(Debug, Clone)]
+struct Point {
+    kind: Kind,
+    shares: Shares,
+    scale_m: f64,
+    /// ln of its amplitude but for what is seen of it.
+    ln_amplitude: f64,
+}
+
+/// The skin of a skeleton, and its Gaussians in the last evaluation.
+#[derive(Debug, Clone)]
+pub(super) struct Skin {
+    parts: Parts,
+    body: Vec<Point>,
+    /// ln α and the mean ln scale of each joint at the start.
+    plain: Vec<[f64; 2]>,
+    /// Where the radar is, world frame, m.
+    radar: Vec3,
+    /// The Gaussians, `POINTS` a person, as the forward model takes them.
+    pub(super) points: Pppr,
+    /// The gradient with respect to them, to be filled in.
+    pub(super) gradient: Pppr,
+}
+
+/// A vector and its length with a floor under it.
+fn unit(v: Vec3, floor_sq: f64) -> (Vec3, f64) {
+    let length = (dot(v, v) + floor_sq).sqrt();
+    (scale(v, 1.0 / length), length)
+}
+
+/// ∂L/∂v of that unit vector's adjoint.
+fn unit_back(v: Vec3, length: f64, bar: Vec3) -> Vec3 {
+    let mut back = scale(bar, 1.0 / length);
+    add_scaled(&mut back, v, -dot(v, bar) / (length * length * length));
+    back
+}
+
+/// The trunk's normal, forward, and what its derivative needs.
+struct Normal {
+    across: Vec3,
+    left: (Vec3, f64),
+    up: Vec3,
+    forward: Vec3,
+    front: (Vec3, f64),
+}
+
+impl Normal {
+    fn of(places: &[Vec3; PARTS]) -> Self {
+        let [ls, rs, lh, rh] = CORNERS.map(|part| places[part]);
+        let across = sub(ls, rs);
+        let left = unit(across, 1e-6);
+        let up = sub(add(ls, rs), add(lh, rh));
+        let forward = cross(left.0, up);
+        Self { across, left, up, forward, front: unit(forward, 1e-6) }
+    }
+
+    fn pull_back(&self, bar: Vec3, places_bar: &mut [Vec3; PARTS]) {
+        let forward_bar = unit_back(self.forward, self.front.1, bar);
+        let left_bar = cross(self.up, forward_bar);
+        let up_bar = cross(forward_bar, self.left.0);
+        let across_bar = unit_back(self.across, self.left.1, left_bar);
+        for (part, sign) in CORNERS.into_iter().zip([[1.0, 1.0], [-1.0, 1.0], [0.0, -1.0], [0.0, -1.0]]) {
+            add_scaled(&mut places_bar[part], across_bar, sign[0]);
+            add_scaled(&mut places_bar[part], up_bar, sign[1]);
+        }
+    }
+}
+
+/// A limb's side as it is seen from the radar.
+struct Side {
+    /// The direction along the limb and its length.
+    along: Vec3,
+    axis: (Vec3, f64),
+    /// The line of sight and how far away the point is.
+    sight: (Vec3, f64),
+    /// Its part across the limb, and the sine between them.
+    outwards: Vec3,
+    sine: f64,
+}
+
+impl Side {
+    fn of(place: Vec3, along: Vec3) -> Self {
+        let (axis, sight) = (unit(along, 1e-6), unit(place, 1e-12));
+        let mut outwards = sight.0;
+        add_scaled(&mut outwards, axis.0, -dot(sight.0, axis.0));
+        Self { along, axis, sight, outwards, sine: (dot(outwards, outwards) + 1e-4).sqrt() }
+    }
+}
+
+impl Skin {
+    /// Of a skeleton seen by `radar` (world frame, m); `features` Doppler features a point. `None` where a part of the body has
+    /// no joint.
+    pub(super) fn new(skeleton: &Skeleton, radar: Vec3, features: usize) -> Option<Self> {
+        let parts = Parts::of(skeleton)?;
+        let mut body = Vec::with_capacity(POINTS);
+        for (ends, radius_m, length_m) in LIMBS {
+            let share_m = length_m / ON_LIMB as f64;
+            for k in 0..ON_LIMB {
+                let u = (k as f64 + 0.5) / ON_LIMB as f64;
+                body.push(Point {
+                    kind: Kind::Limb { ends, radius_m },
+                    shares: [(ends[0], 1.0 - u), (ends[1], u)].into_iter().collect(),
+                    scale_m: LIMB_SCALE * share_m,
+                    ln_amplitude: 0.5 * (2.0 * radius_m * share_m).ln(),
+                });
+            }
+        }
+        for down in DOWN {
+            for across in ACROSS {
+                let shares =
+                    [(1.0 - across) * (1.0 - down), across * (1.0 - down), (1.0 - across) * down, across * down];
+                body.push(Point {
+                    kind: Kind::Trunk,
+                    shares: CORNERS.into_iter().zip(shares).collect(),
+                    scale_m: TRUNK_SCALE_M,
+                    ln_amplitude: 0.5 * TRUNK_AREA_M2.ln(),
+                });
+            }
+        }
+        body.push(Point {
+            kind: Kind::Head,
+            shares: [(HEAD, 1.0)].into_iter().collect(),
+            scale_m: HEAD_SCALE_M,
+            ln_amplitude: 0.5 * HEAD_AREA_M2.ln(),
+        });
+        let plain = skeleton.joints.iter().map(|name| match scatterer(name) {
+            Some(part) => [part.alpha.ln(), (part.along_m.ln() + 2.0 * part.across_m.ln()) / 3.0],
+            None => PLAIN.map(f64::ln),
+        });
+        let empty = Pppr::zeros(PpprShape { persons: 0, joints: POINTS, doppler_features: features });
+        Some(Self { parts, body, plain: plain.collect(), radar, points: empty.clone(), gradient: empty })
+    }
+
+    /// Fills in the points of all persons of `params`.
+    pub(super) fn fill(&mut self, params: &Pppr) {
+        let shape = params.shape();
+        let features = self.points.shape().doppler_features;
+        self.points.reset(PpprShape { persons: shape.persons, joints: POINTS, doppler_features: features });
+        for person in 0..shape.persons {
+            let places = self.places(params.person(person));
+            let normal = Normal::of(&places);
+            let first = person * shape.joints;
+            for (k, of) in self.body.iter().enumerate() {
+                let joint = person * POINTS + k;
+                let mut place = [0.0; 3];
+                of.shares.iter().for_each(|&(part, share)| add_scaled(&mut place, places[part], share));
+                let (at, seen) = of.seen(place, &places, &normal);
+                let [ln_alpha, ln_scale] = self.looks(params, first, of).map(|x| x.clamp(-MOST_LN, MOST_LN));
+                let alpha = (of.ln_amplitude + 0.5 * seen.ln() + ln_alpha).exp().min(0.999);
+                self.points.set_vec3(Group::Position, joint, add(at, self.radar));
+                self.points.set_vec3(Group::LogScale, joint, [of.scale_m.ln() + ln_scale; 3]);
+                self.points.joint_mut(Group::Rotation, joint)[0] = 1.0;
+                self.points.joint_mut(Group::Beta, joint)[0] = (alpha / (1.0 - alpha)).ln();
+                let mut velocity = [0.0; 3];
+                self.for_joints(of, |own, share| add_scaled(&mut velocity, params.velocity(first + own), share));
+                self.points.set_vec3(Group::Velocity, joint, velocity);
+                let omega = self.points.joint_mut(Group::Omega, joint);
+                Self::each_joint(&self.parts, of, |own, share| {
+                    let from = params.joint(Group::Omega, first + own);
+                    if features == from.len() {
+                        omega.iter_mut().zip(from).for_each(|(to, from)| *to += share * from);
+                    } else {
+                        let mean = from.iter().sum::<f64>() / from.len().max(1) as f64;
+                        omega.iter_mut().for_each(|to| *to += share * mean);
+                    }
+                });
+            }
+        }
+        self.gradient.reset(self.points.shape());
+    }
+
+    /// Adds to `gradient` (of the joints) what the gradient of the points implies.
+    pub(super) fn pull_back(&self, params: &Pppr, gradient: &mut Pppr) {
+        let shape = params.shape();
+        let features = self.points.shape().doppler_features;
+        for person in 0..shape.persons {
+            let places = self.places(params.person(person));
+            let normal = Normal::of(&places);
+            let first = person * shape.joints;
+            let (mut bars, mut normal_bar) = ([[0.0; 3]; PARTS], [0.0; 3]);
+            for (k, of) in self.body.iter().enumerate() {
+                let joint = person * POINTS + k;
+                let mut place = [0.0; 3];
+                of.shares.iter().for_each(|&(part, share)| add_scaled(&mut place, places[part], share));
+                let alpha = self.points.opacity(joint);
+                // By ln α of the point; where it is as bright as can be it has no slope.
+                let by_ln =
+                    if alpha < 0.999 { self.gradient.joint(Group::Beta, joint)[0] / (1.0 - alpha) } else { 0.0 };
+                let bar = self.gradient.vec3(Group::Position, joint);
+                let place_bar = of.pull_back(place, (&places, &normal), (bar, by_ln), &mut bars, &mut normal_bar);
+                of.shares.iter().for_each(|&(part, share)| add_scaled(&mut bars[part], place_bar, share));
+                let [ln_alpha, ln_scale] = self.looks(params, first, of);
+                let pass = |x: f64, bar: f64| if x.abs() < MOST_LN { bar } else { 0.0 };
+                let scale_bar = self.gradient.vec3(Group::LogScale, joint).iter().sum();
+                let (alpha_bar, scale_bar) = (pass(ln_alpha, by_ln), pass(ln_scale, scale_bar));
+                let velocity_bar = self.gradient.vec3(Group::Velocity, joint);
+                let omega_bar = self.gradient.joint(Group::Omega, joint);
+                self.for_joints(of, |own, share| {
+                    let own = first + own;
+                    gradient.joint_mut(Group::Beta, own)[0] += share * alpha_bar * (1.0 - params.opacity(own));
+                    gradient.joint_mut(Group::LogScale, own).iter_mut().for_each(|x| *x += share * scale_bar / 3.0);
+                    let velocity = gradient.joint_mut(Group::Velocity, own);
+                    velocity.iter_mut().zip(velocity_bar).for_each(|(x, bar)| *x += share * bar);
+                    let omega = gradient.joint_mut(Group::Omega, own);
+                    if features == omega.len() {
+                        omega.iter_mut().zip(omega_bar).for_each(|(x, bar)| *x += share * bar);
+                    } else {
+                        let mean = share * omega_bar.iter().sum::<f64>() / omega.len().max(1) as f64;
+                        omega.iter_mut().for_each(|x| *x += mean);
+                    }
+                });
+            }
+            normal.pull_back(normal_bar, &mut bars);
+            for (part, bar) in bars.into_iter().enumerate() {
+                let joints = self.parts.joints_of(part);
+                for &own in joints {
+                    let position = gradient.joint_mut(Group::Position, first + own);
+                    position.iter_mut().zip(bar).for_each(|(x, bar)| *x += bar / joints.len() as f64);
+                }
+            }
+        }
+    }
+
+    /// The parts of a person's body as the radar sees them.
+    fn places(&self, joints: &[Vec3]) -> [Vec3; PARTS] {
+        self.parts.places(joints).map(|place| sub(place, self.radar))
+    }
+
+    /// Calls `each` with the joints that a point lies between and their shares.
+    fn for_joints(&self, of: &Point, each: impl FnMut(usize, f64)) {
+        Self::each_joint(&self.parts, of, each);
+    }
+
+    fn each_joint(parts: &Parts, of: &Point, mut each: impl FnMut(usize, f64)) {
+        for &(part, share) in &of.shares {
+            let joints = parts.joints_of(part);
+            joints.iter().for_each(|&joint| each(joint, share / joints.len() as f64));
+        }
+    }
+
+    /// ln of how much brighter and larger a point is than at the start.
+    fn looks(&self, params: &Pppr, first: usize, of: &Point) -> [f64; 2] {
+        let mut looks = [0.0; 2];
+        self.for_joints(of, |own, share| {
+            let [ln_alpha, ln_scale] = self.plain[own];
+            let scales = params.vec3(Group::LogScale, first + own);
+            looks[0] += share * (params.opacity(first + own).ln() - ln_alpha);
+            looks[1] += share * (scales.iter().sum::<f64>() / 3.0 - ln_scale);
+        });
+        looks
+    }
+}
+
+impl Point {
+    /// Where the point is that is seen, and the share of its area, for its place on the bone.
+    fn seen(&self, place: Vec3, places: &[Vec3; PARTS], normal: &Normal) -> (Vec3, f64) {
+        let mut at = place;
+        match self.kind {
+            Kind::Limb { ends, radius_m } => {
+                let side = Side::of(place, sub(places[ends[1]], places[ends[0]]));
+                add_scaled(&mut at, side.outwards, -OUT * radius_m / side.sine);
+                (at, side.sine * side.sine + LIMB_END)
+            }
+            Kind::Trunk => {
+                let cosine = dot(unit(place, 1e-12).0, normal.front.0);
+                add_scaled(&mut at, normal.front.0, -TRUNK_OUT_M * (cosine / TRUNK_EDGE).tanh());
+                (at, cosine * cosine + TRUNK_SIDE)
+            }
+            Kind::Head => {
+                add_scaled(&mut at, unit(place, 1e-12).0, -HEAD_OUT_M);
+                (at, 1.0)
+            }
+        }
+    }
+
+    /// ∂L/∂(its place on the bone) of the adjoints of where it is seen and of its ln α; what limbs' directions and the trunk's
+    /// normal want is added to `bars` and `normal_bar`.
+    fn pull_back(
+        &self,
+        place: Vec3,
+        (places, normal): (&[Vec3; PARTS], &Normal),
+        (bar, by_ln): (Vec3, f64),
+        bars: &mut [Vec3; PARTS],
+        normal_bar: &mut Vec3,
+    ) -> Vec3 {
+        let mut place_bar = bar;
+        let sight_bar = |sight: (Vec3, f64), bar: Vec3, place_bar: &mut Vec3| {
+            add_scaled(place_bar, unit_back(place, sight.1, bar), 1.0);
+        };
+        match self.kind {
+            Kind::Limb { ends, radius_m } => {
+                let side = Side::of(place, sub(places[ends[1]], places[ends[0]]));
+                let (n, s) = (side.outwards, side.sine);
+                let pushed = scale(bar, -OUT * radius_m);
+                let mut n_bar = unit_back(n, s, pushed);
+                add_scaled(&mut n_bar, n, by_ln / (s * s + LIMB_END));
+                let (e, k) = (side.axis.0, side.sight.0);
+                let along = dot(e, n_bar);
+                let mut k_bar = n_bar;
+                add_scaled(&mut k_bar, e, -along);
+                let mut e_bar = scale(n_bar, -dot(k, e));
+                add_scaled(&mut e_bar, k, -along);
+                sight_bar(side.sight, k_bar, &mut place_bar);
+                let along_bar = unit_back(side.along, side.axis.1, e_bar);
+                add_scaled(&mut bars[ends[1]], along_bar, 1.0);
+                add_scaled(&mut bars[ends[0]], along_bar, -1.0);
+            }
+            Kind::Trunk => {
+                let sight = unit(place, 1e-12);
+                let front = normal.front.0;
+                let cosine = dot(sight.0, front);
+                let out = (cosine / TRUNK_EDGE).tanh();
+                add_scaled(normal_bar, bar, -TRUNK_OUT_M * out);
+                let cosine_bar = -TRUNK_OUT_M * dot(front, bar) * (1.0 - out * out) / TRUNK_EDGE
+                    + by_ln * cosine / (cosine * cosine + TRUNK_SIDE);
+                add_scaled(normal_bar, sight.0, cosine_bar);
+                sight_bar(sight, scale(front, cosine_bar), &mut place_bar);
+            }
+            Kind::Head => sight_bar(unit(place, 1e-12), scale(bar, -HEAD_OUT_M), &mut place_bar),
+        }
+        place_bar
+    }
+}
+
+/// Where the radar is: the mean of the places of its views, world frame, m.
+pub(super) fn radar_place(views: &[crate::radar::View]) -> Vec3 {
+    let mut place = [0.0; 3];
+    for view in views {
+        add_scaled(&mut place, view.pose.world_from_view([0.0; 3]), 1.0 / views.len().max(1) as f64);
+    }
+    if norm(place).is_finite() { place } else { [0.0; 3] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::rngs::StdRng;
+    use rand::{Rng as _, SeedableRng as _};
+
+    fn scene() -> (Skin, Pppr, Pppr) {
+        let rng = &mut StdRng::seed_from_u64(4);
+        let skeleton = Skeleton::preset("coco17").unwrap_or_else(|| unreachable!("it is one of them"));
+        let mut skin = Skin::new(&skeleton, [0.1, -0.2, 0.3], 3).unwrap_or_else(|| unreachable!("COCO has all parts"));
+        let mut params = Pppr::zeros(PpprShape { persons: 2, joints: 17, doppler_features: 3 });
+        let standing = crate::mhp::template::Template::new(&skeleton).facing([3.0, 0.4, 0.1], [-0.8, 0.6]);
+        for joint in 0..34 {
+            let p = standing[joint % 17].map(|x| x + rng.random_range(-0.1..0.1));
+            params.set_vec3(Group::Position, joint, p);
+            params.set_vec3(Group::Velocity, joint, [0; 3].map(|_| rng.random_range(-1.0..1.0)));
+            params.set_vec3(Group::LogScale, joint, [0; 3].map(|_| rng.random_range(-2.8..-2.0)));
+            params.joint_mut(Group::Rotation, joint)[0] = 1.0;
+            params.joint_mut(Group::Beta, joint)[0] = rng.random_range(-1.0..0.2);
+            params.joint_mut(Group::Omega, joint).iter_mut().for_each(|x| *x = rng.random_range(-1.0..1.0));
+        }
+        skin.fill(&params);
+        let mut wanted = Pppr::zeros(skin.points.shape());
+        for group in Group::ALL {
+            wanted.group_mut(group).iter_mut().for_each(|x| *x = rng.random_range(-1.0..1.0));
+        }
+        // Points do not turn.
+        wanted.group_mut(Group::Rotation).fill(0.0);
+        (skin, params, wanted)
+    }
+
+    #[test]
+    fn the_way_back_agrees_with_central_differences() {
+        let (mut skin, params, wanted) = scene();
+        let mut loss = |params: &Pppr| -> f64 {
+            skin.fill(params);
+            Group::ALL
+                .map(|group| skin.points.group(group).iter().zip(wanted.group(group)).map(|(a, b)| a * b).sum::<f64>())
+                .iter()
+                .sum()
+        };
+        let mut gradient = Pppr::zeros(params.shape());
+        let mut quotients = Vec::new();
+        for group in Group::ALL {
+            for i in 0..params.group(group).len() {
+                let mut at = |offset: f64| {
+                    let mut moved = params.clone();
+                    moved.group_mut(group)[i] += offset;
+                    loss(&moved)
+                };
+                let h = 1e-4;
+                quotients.push((group, i, (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h)));
+            }
+        }
+        skin.fill(&params);
+        skin.gradient = wanted.clone();
+        skin.pull_back(&params, &mut gradient);
+        for (group, i, quotient) in quotients {
+            let got = gradient.group(group)[i];
+            assert!((got - quotient).abs() < 1e-6 * (1.0 + quotient.abs()), "{} [{i}]: {got}, {quotient}", group.key());
+        }
+    }
+
+    #[test]
+    fn points_face_the_radar() {
+        let (skin, params, _) = scene();
+        let towards = |p: Vec3| norm(sub(p, skin.radar));
+        let chest = skin.points.position(LIMBS.len() * ON_LIMB + 7);
+        let behind = crate::geometry::mean(&[5, 6, 11, 12].map(|joint| params.position(joint)));
+        assert!(towards(chest) < towards(behind) - 0.02, "{chest:?} {behind:?}");
+        assert_eq!(skin.points.shape().total_joints(), 2 * POINTS);
+    }
+}
