@@ -14,6 +14,8 @@ pub use figure::{Anchor, Build, Posture};
 pub use gait::{Gait, Path};
 pub use motion::{Motion, Performer};
 pub use pppr::{Group, Pppr, PpprShape};
+#[cfg(feature = "train")]
+pub use prior::{MOTION_COUNTS, MOTION_JOINTS, MotionClip, MotionCoverage, learn_motion, motion_coverage};
 pub use prior::{MotionPrior, MotionStart};
 pub use segment::{BodyPose, Segment, SegmentFrame};
 pub use skeleton::{Side, Skeleton};

@@ -7,6 +7,14 @@
 //! the same prior serves every skeleton that has some of them. `assets/motion.md` says from which recordings it comes,
 //! what it covers and what it does not.
 
+#[cfg(feature = "train")]
+mod clusters;
+#[cfg(feature = "train")]
+mod train;
+
+#[cfg(feature = "train")]
+pub use train::{MOTION_COUNTS, MOTION_JOINTS, MotionClip, MotionCoverage, learn_motion, motion_coverage};
+
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 
