@@ -23,6 +23,8 @@ mod train_counter;
 mod train_evidence;
 #[cfg(feature = "train")]
 mod train_limbs;
+#[cfg(feature = "train")]
+mod train_motion;
 
 pub use common::allow_outside;
 
@@ -197,6 +199,10 @@ pub enum CliCommand {
     #[cfg(feature = "train")]
     #[command(after_help = train_limbs::HELP)]
     TrainLimbs(train_limbs::TrainLimbsArgs),
+    /// Make the prior of human motion anew
+    #[cfg(feature = "train")]
+    #[command(after_help = train_motion::HELP)]
+    TrainMotion(train_motion::TrainMotionArgs),
 }
 
 /// Starts the program once more where a subcommand needs another environment than it has, and never returns then. For `main`
@@ -236,5 +242,7 @@ pub fn run(command: CliCommand) -> anyhow::Result<ExitCode> {
         CliCommand::TrainEvidence(args) => train_evidence::run(&args),
         #[cfg(feature = "train")]
         CliCommand::TrainLimbs(args) => train_limbs::run(&args),
+        #[cfg(feature = "train")]
+        CliCommand::TrainMotion(args) => train_motion::run(&args),
     }
 }

@@ -5,6 +5,7 @@ mod gait;
 mod motion;
 mod parts;
 mod pppr;
+mod prior;
 mod segment;
 mod skeleton;
 mod skeletons;
@@ -15,6 +16,9 @@ pub use gait::{Gait, Path};
 pub use motion::{Motion, Performer};
 pub use parts::{HEAD, PARTS, Parts, Scatterer, is_named, scatterer};
 pub use pppr::{Group, Pppr, PpprShape};
+#[cfg(feature = "train")]
+pub use prior::{MOTION_COUNTS, MOTION_JOINTS, MotionClip, MotionCoverage, learn_motion, motion_coverage};
+pub use prior::{MotionPrior, MotionStart};
 pub use segment::{BodyPose, Segment, SegmentFrame};
 pub use skeleton::{Side, Skeleton};
 pub use surface::{BodySurface, Capsule, SurfacePoint};
