@@ -170,6 +170,7 @@ impl Tokens {
             Hue::Amber => (0xF2B84B, 0xA66A00),
             Hue::Red => (0xF2655C, 0xC6372E),
             Hue::Rose => (0xE58FB1, 0xA33266),
+            Hue::Teal => (0x4FC3C7, 0x0F7C80),
         };
         rgb(if self.dark { on_dark } else { on_light })
     }

@@ -50,6 +50,11 @@ pub(super) const SUMMATION: &[Answer] = &[
 pub(super) const PARAMETERIZATION: &[Answer] = &[
     answer("joints", "joints", "Every joint by itself: the paper."),
     answer("bones", "root and bones", "The root moves and turns, bones turn about their inner joint: lengths stay."),
+    answer(
+        "motion",
+        "motion",
+        "Place, heading, size and pose of a window of frames at once, in the space that real motion has taught.",
+    ),
 ];
 
 pub(super) const SCATTERERS: &[Answer] = &[

@@ -84,6 +84,14 @@ pub const FIELDS: &[Field] = &[
         ..number(Weights, "w_dummy", "w_dummy", Steps, (0.0, 1000.0), number_at!(w_dummy)).logarithmic().row("weights")
     },
     Field {
+        help: "Weight of the prior of motion: the mean square of a window's coordinates in standard deviations.",
+        ..number(Weights, "w_prior", "w_prior", Steps, (0.0, 1000.0), number_at!(w_prior)).logarithmic().row("motion")
+    },
+    Field {
+        help: "Frames that are fitted together where the parameterization is motion.",
+        ..number(Model, "window", "Window", StepsAndStart, (1.0, 9.0), count_at!(window)).whole().row("motion")
+    },
+    Field {
         help: "Temperature of the soft mask m = σ((ln H_sim − ln P)/T): small is sharp, large spreads the gradient.",
         ..number(Optimiser, "softness", "T (softness)", StepsAndStart, (0.01, 10.0), number_at!(softness))
             .logarithmic()
@@ -198,7 +206,7 @@ pub const FIELDS: &[Field] = &[
             "Moves",
             StepsAndStart,
             answers::PARAMETERIZATION,
-            one_of_at!(parameterization, [Parameterization::Joints, Parameterization::Bones]),
+            one_of_at!(parameterization, [Parameterization::Joints, Parameterization::Bones, Parameterization::Motion]),
         )
         .row("bones turn")
     },
@@ -374,7 +382,7 @@ pub const FIELDS: &[Field] = &[
     },
     Field {
         help: "Postures that are tried at the place of the start, the one with the smallest L_EM is fitted: standing, then for who walks several moments of a stride, for others raised arms and sitting where they are clearly better. 1 is the paper: standing.",
-        ..number(Starting, "starts", "Starts", Start, (1.0, 16.0), count_at!(starts)).whole().row("several starts")
+        ..number(Starting, "starts", "Starts", Start, (1.0, 25.0), count_at!(starts)).whole().row("several starts")
     },
     Field {
         help: "Without a Doppler axis the start's speed is γ times the normalised intensity gradient of consecutive maps (appendix A).",

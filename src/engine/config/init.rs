@@ -13,6 +13,8 @@ pub enum Parameterization {
     Joints,
     /// A root that moves and turns, and bones that turn about their inner joint: bone lengths stay as they are.
     Bones,
+    /// Place, heading, size and pose of a window of frames, the pose in the space that real motion has taught.
+    Motion,
 }
 
 /// What the Gaussians of a start look like.

@@ -193,6 +193,10 @@ pub struct FitConfig {
     pub starts: usize,
     /// Weight of the temporal term.
     pub w_time: f64,
+    /// Weight of the prior of motion.
+    pub w_prior: f64,
+    /// Frames that are fitted together in a space of motion.
+    pub window: usize,
     /// Weight of a term that only tests know.
     #[cfg(any(test, feature = "dummies"))]
     pub w_dummy: f64,
@@ -238,6 +242,8 @@ impl Default for FitConfig {
             warm_start: WarmStart::default(),
             starts: 1,
             w_time: 0.0,
+            w_prior: 0.0,
+            window: 5,
             #[cfg(any(test, feature = "dummies"))]
             w_dummy: 0.0,
             height: Height::default(),

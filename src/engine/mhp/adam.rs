@@ -112,8 +112,8 @@ impl Adam {
         }
         next.steps = self.steps + 1;
         let step = Step::new(next.steps);
-        let turned = config.parameterization == Parameterization::Bones;
-        let by_group = if turned { &Group::ALL[1..] } else { &Group::ALL };
+        let held = config.parameterization != Parameterization::Joints;
+        let by_group = if held { &Group::ALL[1..] } else { &Group::ALL };
         for groups in by_group.chunk_by(|&a, &b| rate(config, a) == rate(config, b)) {
             let (&[from, ..], &[.., to]) = (groups, groups) else { continue };
             let changes = [
@@ -129,16 +129,18 @@ impl Adam {
                 }
             }
         }
-        if turned {
-            // The first group, positions, follows root and bones; its own moments stand still.
+        if held {
+            // The first group, positions, follows root and bones, or a window's coordinates; its own moments stand still.
             for (after, before) in
                 [(&mut *moved, params), (&mut next.first, &self.first), (&mut next.second, &self.second)]
             {
                 after.group_mut(Group::Position).copy_from_slice(before.group(Group::Position));
             }
-            body.pull_back(params, gradient, turns);
-            next.turn(turns, config, body);
-            body.advance(moved, turns);
+            if config.parameterization == Parameterization::Bones {
+                body.pull_back(params, gradient, turns);
+                next.turn(turns, config, body);
+                body.advance(moved, turns);
+            }
         }
     }
 

@@ -3,9 +3,10 @@
 use super::adam::Adam;
 use super::articulation::Articulation;
 use super::convergence::{LOOK_BACK, converged};
-use super::{Evaluation, FitError, Objective, Precision, Problem, StepReport, StopReason};
+use super::motion::{MotionState, Window, WindowLoss};
+use super::{Evaluation, FitError, Objective, Precision, Problem, StepReport, StopReason, Weight};
 use crate::body::{Group, Pppr};
-use crate::config::FitConfig;
+use crate::config::{FitConfig, Parameterization};
 use serde::{Deserialize, Serialize};
 use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
@@ -19,6 +20,9 @@ pub struct FitState {
     pub params: Pppr,
     /// Adam's moments.
     pub adam: Adam,
+    /// Where the window stands, while the parameterization is motion; empty otherwise.
+    #[serde(default)]
+    pub motion: MotionState,
     /// Losses of the last iterations (up to six), the current one last: the convergence criterion looks back five.
     pub losses: SmallVec<[f64; LOOK_BACK + 2]>,
 }
@@ -35,6 +39,10 @@ pub struct Fitter {
     next_evaluation: Evaluation,
     /// The step by the coordinates of root and bones.
     turns: Vec<f64>,
+    /// The frames that are fitted together, while the parameterization is motion.
+    window: Option<Window>,
+    /// What the window says of the current parameters, and room for what it says of the next.
+    window_loss: [WindowLoss; 2],
 }
 
 impl Fitter {
@@ -49,13 +57,48 @@ impl Fitter {
         initial: Pppr,
     ) -> Result<Self, FitError> {
         let body = Articulation::new(&problem.skeleton);
-        let mut objective = Objective::new(problem, config, precision, &initial)?;
-        let evaluation = evaluate(&mut objective, &initial, 0)?;
+        let objective = Objective::new(problem, config, precision, &initial)?;
+        let evaluation = Evaluation::zeros(initial.shape());
         let adam = Adam::new(initial.shape());
-        let losses = smallvec![evaluation.loss];
-        let state = FitState { iteration: 0, params: initial, adam, losses };
-        let (state, next, next_evaluation) = (Arc::new(state.clone()), Arc::new(state), evaluation.clone());
-        Ok(Self { objective, body, state, evaluation, next, next_evaluation, turns: Vec::new() })
+        let state =
+            FitState { iteration: 0, params: initial, adam, motion: MotionState::default(), losses: SmallVec::new() };
+        let (next, next_evaluation) = (Arc::new(state.clone()), evaluation.clone());
+        let mut fitter = Self {
+            objective,
+            body,
+            state: Arc::new(state),
+            evaluation,
+            next,
+            next_evaluation,
+            turns: Vec::new(),
+            window: None,
+            window_loss: Default::default(),
+        };
+        fitter.begin()?;
+        Ok(fitter)
+    }
+
+    /// Evaluates the current parameters, in a window where the settings ask for one, as those of a fit that begins.
+    fn begin(&mut self) -> Result<(), FitError> {
+        let (config, precision) = (*self.objective.config(), self.objective.precision());
+        let mut state = FitState::clone(&self.state);
+        self.window = None;
+        state.motion = MotionState::default();
+        if config.parameterization == Parameterization::Motion {
+            let problem = Arc::clone(self.objective.problem());
+            self.window = Window::new(&problem, &config, precision, &state.params)?;
+            if let Some(window) = &self.window {
+                state.motion = MotionState::at(window.coordinates_of(&state.params));
+                window.place(&state.motion.coordinates, &mut state.params);
+            }
+        }
+        let shape = state.params.shape();
+        self.evaluation = Evaluation::zeros(shape);
+        let Self { objective, window, evaluation, window_loss: [window_loss, _], .. } = self;
+        evaluate_state(objective, window.as_mut(), &state, (evaluation, window_loss))?;
+        state.losses = smallvec![self.evaluation.loss];
+        self.state = Arc::new(state);
+        Ok(())
     }
 
     /// Steps until iteration `last`, or until the loss has converged where the settings stop there; `watch` sees every
@@ -81,7 +124,7 @@ impl Fitter {
     /// # Errors
     /// [`FitError::Diverged`] where the new parameters or their loss are not finite; the fitter then stays where it was.
     pub fn step(&mut self) -> Result<StepReport, FitError> {
-        let Self { objective, body, state, evaluation, next, next_evaluation, turns } = self;
+        let Self { objective, body, state, evaluation, next, next_evaluation, turns, window, window_loss } = self;
         // What somebody keeps stays as it is.
         if Arc::get_mut(next).is_none() {
             *next = Arc::new(FitState::clone(state));
@@ -93,12 +136,19 @@ impl Fitter {
         let moved = (&mut next_state.adam, &mut next_state.params);
         state.adam.update(&state.params, &evaluation.gradient, how, body, turns, moved);
         hold_scales(&state.params, &mut next_state.params, objective.config().scale_max_m);
-        evaluate_into(objective, &next_state.params, next_state.iteration, next_evaluation)?;
+        let [loss_now, loss_next] = window_loss;
+        if let Some(window) = window.as_ref() {
+            let at = (objective.config(), next_state.iteration);
+            state.motion.advance(window, &loss_now.gradient, at, &mut next_state.motion);
+            window.place(&next_state.motion.coordinates, &mut next_state.params);
+        }
+        evaluate_state(objective, window.as_mut(), next_state, (next_evaluation, loss_next))?;
         next_state.losses.push(next_evaluation.loss);
         let surplus = next_state.losses.len().saturating_sub(LOOK_BACK + 1);
         next_state.losses.drain(..surplus);
         std::mem::swap(state, next);
         std::mem::swap(evaluation, next_evaluation);
+        window_loss.swap(0, 1);
         Ok(self.report())
     }
 
@@ -140,8 +190,28 @@ impl Fitter {
     /// Where the state's parameters have the wrong sizes or are not finite; the fitter then stays where it was.
     pub fn restore(&mut self, state: Arc<FitState>) -> Result<(), FitError> {
         self.objective.problem().check(&state.params)?;
-        self.evaluation = evaluate(&mut self.objective, &state.params, state.iteration)?;
+        if self.window.is_some() && state.motion.coordinates.is_empty() {
+            return self.set_state(FitState::clone(&state));
+        }
+        let Self { objective, window, evaluation, window_loss: [window_loss, _], .. } = self;
+        evaluate_state(objective, window.as_mut(), &state, (evaluation, window_loss))?;
         self.state = state;
+        Ok(())
+    }
+
+    /// Begins anew at `state`, whose coordinates are not known; stays where it is where that cannot be.
+    fn set_state(&mut self, state: FitState) -> Result<(), FitError> {
+        let before = std::mem::replace(&mut self.state, Arc::new(state));
+        let losses = self.state.losses.clone();
+        if let Err(error) = self.begin() {
+            self.state = before;
+            let Self { objective, window, evaluation, window_loss: [window_loss, _], state, .. } = self;
+            evaluate_state(objective, window.as_mut(), state, (evaluation, window_loss))?;
+            return Err(error);
+        }
+        if losses.len() > 1 {
+            Arc::make_mut(&mut self.state).losses = losses;
+        }
         Ok(())
     }
 
@@ -153,23 +223,53 @@ impl Fitter {
     pub fn set_config(&mut self, config: FitConfig) -> Result<(), FitError> {
         let before = *self.objective.config();
         self.objective.set_config(config);
-        match evaluate(&mut self.objective, &self.state.params, self.state.iteration) {
-            Ok(evaluation) => {
-                let state = Arc::make_mut(&mut self.state);
-                if let Some(last) = state.losses.last_mut() {
-                    *last = evaluation.loss;
-                }
-                if config.parameterization != before.parameterization {
+        let kept = (Arc::clone(&self.state), self.window.take());
+        let another = config.parameterization != before.parameterization;
+        let evaluated = if config.parameterization == Parameterization::Motion || another {
+            let state = FitState::clone(&kept.0);
+            self.begin_again(state, &config, another)
+        } else {
+            self.evaluate_now()
+        };
+        match evaluated {
+            Ok(()) => {
+                if another {
+                    let state = Arc::make_mut(&mut self.state);
                     state.adam = Adam::new(state.params.shape());
                 }
-                self.evaluation = evaluation;
+                if let Some(last) = Arc::make_mut(&mut self.state).losses.last_mut() {
+                    *last = self.evaluation.loss;
+                }
                 Ok(())
             }
             Err(error) => {
                 self.objective.set_config(before);
+                (self.state, self.window) = kept;
+                self.evaluate_now()?;
                 Err(error)
             }
         }
+    }
+
+    /// A window for other settings; coordinates and moments stay where they are those of a window already.
+    fn begin_again(&mut self, before: FitState, config: &FitConfig, another: bool) -> Result<(), FitError> {
+        let (motion, losses, params) = (before.motion.clone(), before.losses.clone(), before.params.clone());
+        self.begin()?;
+        let state = Arc::make_mut(&mut self.state);
+        state.losses = losses;
+        let fits = motion.coordinates.len() == state.motion.coordinates.len();
+        if config.parameterization == Parameterization::Motion && !another && fits {
+            state.motion = motion;
+            state.params = params;
+            return self.evaluate_now();
+        }
+        Ok(())
+    }
+
+    /// Evaluates the current parameters.
+    fn evaluate_now(&mut self) -> Result<(), FitError> {
+        let Self { objective, window, evaluation, window_loss: [window_loss, _], state, .. } = self;
+        evaluate_state(objective, window.as_mut(), state, (evaluation, window_loss))
     }
 
     /// Takes parameters edited by hand at the current iteration; Adam's moments start anew.
@@ -178,12 +278,11 @@ impl Fitter {
     /// Where `params` has the wrong sizes, or it or its loss is not finite; the fitter then stays where it was.
     pub fn set_params(&mut self, params: Pppr) -> Result<(), FitError> {
         self.objective.problem().check(&params)?;
-        self.evaluation = evaluate(&mut self.objective, &params, self.state.iteration)?;
-        let state = Arc::make_mut(&mut self.state);
+        let mut state = FitState::clone(&self.state);
         state.adam = Adam::new(params.shape());
         state.params = params;
-        state.losses = smallvec![self.evaluation.loss];
-        Ok(())
+        state.losses.clear();
+        self.set_state(state)
     }
 
     /// The configuration in force.
@@ -210,11 +309,43 @@ fn hold_scales(before: &Pppr, after: &mut Pppr, scale_max_m: f64) {
     }
 }
 
-/// Evaluates, and refuses what is not finite.
-fn evaluate(objective: &mut Objective, params: &Pppr, iteration: usize) -> Result<Evaluation, FitError> {
-    let mut evaluation = Evaluation::zeros(params.shape());
-    evaluate_into(objective, params, iteration, &mut evaluation)?;
-    Ok(evaluation)
+/// Evaluates a state, in its window where there is one, and refuses what is not finite.
+fn evaluate_state(
+    objective: &mut Objective,
+    window: Option<&mut Window>,
+    state: &FitState,
+    (evaluation, loss): (&mut Evaluation, &mut WindowLoss),
+) -> Result<(), FitError> {
+    evaluate_into(objective, &state.params, state.iteration, evaluation)?;
+    let Some(window) = window else { return Ok(()) };
+    let (config, precision) = (*objective.config(), objective.precision());
+    // How the persons look is what all frames say of it; where they are is the window's affair.
+    let em = &mut evaluation.gradients[Weight::Em as usize];
+    let places = em.group(Group::Position).to_vec();
+    em.reset(state.params.shape());
+    let of = (state.motion.coordinates.as_slice(), &state.params);
+    window.evaluate((objective.problem(), &config), precision, of, Some(em), loss);
+    em.group_mut(Group::Position).copy_from_slice(&places);
+    let kinematic: SmallVec<[Weight; 8]> =
+        Weight::ALL.iter().copied().filter(|&weight| weight != Weight::Em && weight.of(&config) != 0.0).collect();
+    evaluation.gradient.reset(state.params.shape());
+    for weight in kinematic {
+        evaluation.gradient.add_scaled(weight.of(&config), &evaluation.gradients[weight as usize]);
+    }
+    window.pull_back(&state.motion.coordinates, &state.params, &evaluation.gradient, &mut loss.gradient);
+    evaluation.gradient.add_scaled(config.w_em, &evaluation.gradients[Weight::Em as usize]);
+    for (key, value) in [("em", loss.em), ("prior", if config.w_prior > 0.0 { loss.prior } else { 0.0 })] {
+        evaluation.terms.put(key, value);
+    }
+    evaluation.loss = evaluation.terms.loss(&config);
+    if evaluation.loss.is_finite() && loss.gradient.iter().all(|x| x.is_finite()) {
+        return Ok(());
+    }
+    Err(FitError::Diverged {
+        iteration: state.iteration,
+        joint: "all joints".to_owned(),
+        term: "the window's loss".to_owned(),
+    })
 }
 
 fn evaluate_into(

@@ -39,6 +39,7 @@ mod init;
 mod kernel;
 mod lanes;
 mod levels;
+mod motion;
 mod objective;
 mod percentile;
 mod problem;
@@ -61,6 +62,7 @@ pub use fitter::{FitState, Fitter};
 pub use init::{Initialisation, LimbMap, initialise, initialise_people, predict};
 #[cfg(feature = "train")]
 pub use init::{LimbLesson, learn_limbs};
+pub use motion::MotionState;
 pub use objective::{Masks, Objective, masks};
 pub use percentile::{percentile, percentiles};
 pub use problem::Problem;

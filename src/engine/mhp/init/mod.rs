@@ -39,10 +39,11 @@ pub use warm::predict;
 use super::context::{
     self, Expectation, Peak, SaliencyMap, Sighting, Stature, Track, apart_m, behind_skin, bent_if_below, near,
 };
+use super::motion;
 use super::template::Template;
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
-use crate::config::{FitConfig, Height, Limbs, StartPlace, Summation, Yaw};
+use crate::config::{FitConfig, Height, Limbs, Parameterization, StartPlace, Summation, Yaw};
 use crate::geometry::{Vec3, flat_distance, norm, sub};
 use find::{find_one, middle_of_views};
 use notes::notes_of;
@@ -211,7 +212,7 @@ pub fn initialise_people(
         }
         None => own.clone(),
     };
-    if config.starts > 1 {
+    if config.starts > 1 && config.parameterization != Parameterization::Motion {
         choose_postures(problem, config, &template, &mut persons)?;
     }
     let model = ScattererModel::new(&problem.skeleton, config.scatterers);
@@ -219,6 +220,10 @@ pub fn initialise_people(
     let moved_m: Vec<f64> =
         persons.iter().enumerate().map(|(k, person)| mean_way_m(&params, k, &person.posed(problem, config))).collect();
     let mut unrefined = assemble(problem, &unrefined(config), &model, &own);
+    if config.parameterization == Parameterization::Motion {
+        let searched = motion::search(problem, config, &mut params)?;
+        notes.extend(searched.map(|searched| searched.note()));
+    }
     for start in [&mut params, &mut unrefined] {
         perturb::perturb(problem, &config.init, start);
     }

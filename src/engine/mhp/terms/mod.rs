@@ -13,6 +13,7 @@
 //! | `separation.rs` | L_sep |
 //! | `collision.rs` | L_coll |
 //! | `time.rs` | L_time |
+//! | `prior.rs` | L_prior: only its row, for the fit of a window computes it |
 //! | `penalties.rs` | what they share: ψ, lengths that have a slope everywhere, repulsion |
 
 mod angles;
@@ -22,6 +23,7 @@ mod collision;
 mod dummy;
 mod electromagnetic;
 mod penalties;
+mod prior;
 mod separation;
 #[cfg(test)]
 pub(super) mod tests;
@@ -48,6 +50,7 @@ pub const TERMS: &[Term] = &[
     separation::SEP,
     collision::COLL,
     time::TIME,
+    prior::PRIOR,
     #[cfg(any(test, feature = "dummies"))]
     dummy::DUMMY,
 ];
@@ -102,6 +105,8 @@ pub enum Hue {
     Red,
     /// Of the frames around.
     Rose,
+    /// Of what people do.
+    Teal,
 }
 
 /// How a term is evaluated: its value, and `gain` times its gradient on top of what is there.
@@ -115,6 +120,8 @@ enum Evaluate {
     WithNext(fn(&Inputs<'_>, [f64; 2], &mut Pppr) -> [f64; 2]),
     /// In the pass of the term before it.
     WithPrevious,
+    /// By the fit of a window, which knows more than one frame; 0 elsewhere.
+    Window,
 }
 
 /// What a term reads.
@@ -208,7 +215,7 @@ pub(super) fn evaluate(
                 values.set(place, both[0]);
                 values.set(place + 1, both[1]);
             }
-            Evaluate::WithPrevious => {}
+            Evaluate::WithPrevious | Evaluate::Window => {}
         }
     }
     values

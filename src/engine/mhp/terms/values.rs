@@ -34,6 +34,12 @@ impl<T: Copy> Terms<T> {
         Terms(self.0.map(change))
     }
 
+    pub(in crate::mhp) fn put(&mut self, key: &str, value: T) {
+        if let Some(term) = TermId::of(key) {
+            self.0[term.0] = value;
+        }
+    }
+
     pub(super) fn set(&mut self, place: usize, value: T) {
         self.0[place] = value;
     }

@@ -13,6 +13,8 @@ pub enum Weight {
     Kine,
     /// w_time, of L_time.
     Time,
+    /// w_prior, of L_prior.
+    Prior,
     /// Of the term that unit tests have.
     #[cfg(any(test, feature = "dummies"))]
     Dummy,
@@ -59,6 +61,7 @@ impl Weight {
         Self::Em,
         Self::Kine,
         Self::Time,
+        Self::Prior,
         #[cfg(any(test, feature = "dummies"))]
         Self::Dummy,
     ];
@@ -71,6 +74,7 @@ impl Weight {
             Self::Em => ("w_em", TermGroup::Electromagnetic),
             Self::Kine => ("w_kine", TermGroup::Kinematic),
             Self::Time => ("w_time", TermGroup::Temporal),
+            Self::Prior => ("w_prior", TermGroup::Temporal),
             #[cfg(any(test, feature = "dummies"))]
             Self::Dummy => ("w_dummy", TermGroup::Temporal),
         }
@@ -82,6 +86,7 @@ impl Weight {
             Self::Em => config.w_em,
             Self::Kine => config.w_kine,
             Self::Time => config.w_time,
+            Self::Prior => config.w_prior,
             #[cfg(any(test, feature = "dummies"))]
             Self::Dummy => config.w_dummy,
         }

@@ -1,0 +1,282 @@
+//! A window of frames fitted as one: the body moves through a space of poses that real people have taught.
+//!
+//! With `parameterization = "motion"` a fit's coordinates are, for each person, place, heading and size in the middle of the window
+//! and the coefficients of `body::MotionPrior` ([`space`]). They place the joints in all frames of the window at once; each
+//! frame compares its own maps (`frame_em.rs`), and
+//!
+//! ```text
+//! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior,  L_prior = (‖c‖² + ((s − s₀)/σ_s)²)/(K + 1)
+//! ```
+//!
+//! the kinematic terms those of the frame that is fitted. PPPR stays the state that is shown, kept and exported: positions and
+//! velocities follow the coordinates, opacities, scales and the rest move by themselves and are the same in all frames of the
+//! window. The frame stands as near the window's middle as its sequence lets it; without frames around the window is one frame.
+//! A start is searched from clusters of the prior and from several headings, coarse then fine ([`search`]).
+
+mod search;
+mod space;
+
+pub(super) use search::search;
+
+use super::frame_em::FrameEm;
+use super::region;
+use super::{FitError, Precision, Problem};
+use crate::body::{Group, MotionPrior, Pppr};
+use crate::config::FitConfig;
+use crate::geometry::{Vec3, add_scaled, mean};
+use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
+use space::{LN_SIZE, MOST_JOINTS, PLACE, PoseSpace, YAW};
+
+/// Frames of a window lie no farther from its middle, s: the prior reaches no farther.
+const REACH_S: f64 = 0.201;
+/// Adam's, for the coordinates: the steps are few.
+const BETA_1: f64 = 0.9;
+const BETA_2: f64 = 0.99;
+const EPSILON: f64 = 1e-8;
+/// Steps of t, y, s and c at the default learning rate.
+const RATES: [f64; 4] = [0.01, 0.04, 0.006, 0.08];
+const DEFAULT_RATE: f64 = 1e-3;
+/// From this share of the iterations on steps are shorter, by so much.
+const SLOW_FROM: f64 = 0.6;
+const SLOW: f64 = 0.3;
+
+/// The coordinates of a fit in a window, and Adam's moments of them.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct MotionState {
+    /// A person after the other: t (3, m), heading y (rad), ln size s, c in standard deviations.
+    pub coordinates: Vec<f64>,
+    /// Exponential mean of the gradient.
+    pub first: Vec<f64>,
+    /// Exponential mean of its square.
+    pub second: Vec<f64>,
+    /// Steps since the moments were zero.
+    pub steps: u32,
+}
+
+/// The frames that are fitted together.
+pub(super) struct Window {
+    space: PoseSpace,
+    /// The frame that is fitted, among them.
+    own: usize,
+    frames: Vec<WindowFrame>,
+    /// Numbers of one person.
+    stride: usize,
+}
+
+struct WindowFrame {
+    em: FrameEm,
+    /// The persons as they are in this frame, and what the frame says of them.
+    params: Pppr,
+    gradient: Pppr,
+}
+
+/// What a window says of its coordinates.
+#[derive(Debug, Default)]
+pub(super) struct WindowLoss {
+    /// The mean of L_EM over the frames.
+    pub(super) em: f64,
+    /// L_prior.
+    pub(super) prior: f64,
+    /// ∂(w_EM L_EM + w_prior L_prior) by the coordinates.
+    pub(super) gradient: Vec<f64>,
+}
+
+impl Window {
+    /// Around the persons of `initial`, who move as their velocities say. `None` where the prior knows nothing of the skeleton.
+    ///
+    /// # Errors
+    /// Where a position is not finite.
+    pub(super) fn new(
+        problem: &Problem,
+        config: &FitConfig,
+        precision: Precision,
+        initial: &Pppr,
+    ) -> Result<Option<Self>, FitError> {
+        let Some(prior) = MotionPrior::committed() else { return Ok(None) };
+        let neighbours = problem.neighbours_in(config.frames_around);
+        let offsets: Vec<f64> = neighbours.iter().map(|neighbour| neighbour.offset_s).collect();
+        let (chosen, middle_s) = chosen(&offsets, config.window);
+        let times: Vec<f64> = chosen.iter().map(|frame| frame.map_or(0.0, |k| offsets[k]) - middle_s).collect();
+        if problem.skeleton.joints.len() > MOST_JOINTS {
+            return Ok(None);
+        }
+        let Some(space) = PoseSpace::new(prior, &problem.skeleton, &times) else { return Ok(None) };
+        let (centres, ways) = (region::centres(initial), ways(initial));
+        let mut frames = Vec::with_capacity(chosen.len());
+        let maps = |frame: Option<usize>| -> SmallVec<[&[f64]; 4]> {
+            (0..problem.views.len()).map(|view| frame.map_or(problem.map(view), |k| neighbours[k].map(view))).collect()
+        };
+        for &frame in &chosen {
+            let t_s = frame.map_or(0.0, |k| offsets[k]);
+            let moved: Vec<Vec3> = centres
+                .iter()
+                .zip(&ways)
+                .map(|(&centre, &way)| {
+                    let mut at = centre;
+                    add_scaled(&mut at, way, t_s);
+                    at
+                })
+                .collect();
+            let (regions, _) = region::regions(&problem.views, config.em_region, &moved)?;
+            let em = FrameEm::new(&problem.measured_as(maps(frame)), &regions, config, precision);
+            frames.push(WindowFrame { em, params: initial.clone(), gradient: Pppr::zeros(initial.shape()) });
+        }
+        let own = chosen.iter().position(Option::is_none).unwrap_or(0);
+        let stride = space.coordinates();
+        Ok(Some(Self { space, own, frames, stride }))
+    }
+
+    /// The coordinates that come nearest to `params`, joints and velocities.
+    pub(super) fn coordinates_of(&self, params: &Pppr) -> Vec<f64> {
+        let joints = params.shape().joints;
+        let persons = 0..params.shape().persons;
+        persons
+            .flat_map(|person| {
+                let velocities = &params.velocities()[person * joints..(person + 1) * joints];
+                self.space.project(self.own, params.person(person), velocities)
+            })
+            .collect()
+    }
+
+    /// Puts the persons of `params` where the coordinates have them in the frame that is fitted.
+    pub(super) fn place(&self, coordinates: &[f64], params: &mut Pppr) {
+        let joints = params.shape().joints;
+        let [positions, velocities] = params.motion_mut();
+        for (person, of) in coordinates.chunks_exact(self.stride).enumerate() {
+            let own = person * joints..(person + 1) * joints;
+            self.space.pose(of, self.own, &mut positions[own.clone()]);
+            self.space.velocity(of, self.own, &mut velocities[own]);
+        }
+    }
+
+    /// L_EM and L_prior of persons with these coordinates who look as `params` says; the gradient by how they look is added to
+    /// `looks`, unweighted.
+    pub(super) fn evaluate(
+        &mut self,
+        (problem, config): (&Problem, &FitConfig),
+        precision: Precision,
+        (coordinates, params): (&[f64], &Pppr),
+        looks: Option<&mut Pppr>,
+        loss: &mut WindowLoss,
+    ) {
+        let Self { space, frames, stride, .. } = self;
+        let joints = params.shape().joints;
+        loss.gradient.clear();
+        loss.gradient.resize(coordinates.len(), 0.0);
+        let share = 1.0 / frames.len() as f64;
+        loss.em = 0.0;
+        let mut kept = looks;
+        for (frame, of) in frames.iter_mut().enumerate() {
+            for group in Group::ALL[1..].iter().filter(|&&group| group != Group::Velocity) {
+                of.params.group_mut(*group).copy_from_slice(params.group(*group));
+            }
+            let [positions, velocities] = of.params.motion_mut();
+            for (person, own) in coordinates.chunks_exact(*stride).enumerate() {
+                let joints = person * joints..(person + 1) * joints;
+                space.pose(own, frame, &mut positions[joints.clone()]);
+                space.velocity(own, frame, &mut velocities[joints]);
+            }
+            of.gradient.reset(params.shape());
+            let em = of.em.evaluate((&problem.radar, config), precision, &of.params, &mut of.gradient, None);
+            loss.em += share * em;
+            let persons = coordinates.chunks_exact(*stride).zip(loss.gradient.chunks_exact_mut(*stride));
+            for (person, (own, bars)) in persons.enumerate() {
+                let joints = person * joints..(person + 1) * joints;
+                let pose = (&of.params.positions()[joints.clone()], &of.gradient.positions()[joints]);
+                space.pull_back(own, frame, pose, bars);
+            }
+            if let Some(looks) = kept.as_deref_mut() {
+                looks.add_scaled(share, &of.gradient);
+            }
+        }
+        loss.gradient.iter_mut().for_each(|bar| *bar *= share * config.w_em);
+        let persons = (coordinates.len() / *stride).max(1) as f64;
+        loss.prior = 0.0;
+        for (own, bars) in coordinates.chunks_exact(*stride).zip(loss.gradient.chunks_exact_mut(*stride)) {
+            loss.prior += space.unlikeliness(own, config.w_prior / persons, bars) / persons;
+        }
+    }
+
+    /// Adds what a gradient by the joints of the frame that is fitted says of the coordinates.
+    pub(super) fn pull_back(&self, coordinates: &[f64], params: &Pppr, gradient: &Pppr, bars: &mut [f64]) {
+        let joints = params.shape().joints;
+        for (person, (own, bars)) in
+            coordinates.chunks_exact(self.stride).zip(bars.chunks_exact_mut(self.stride)).enumerate()
+        {
+            let joints = person * joints..(person + 1) * joints;
+            let pose = (&params.positions()[joints.clone()], &gradient.positions()[joints]);
+            self.space.pull_back(own, self.own, pose, bars);
+        }
+    }
+}
+
+impl MotionState {
+    /// These coordinates, and moments of nothing.
+    pub(super) fn at(coordinates: Vec<f64>) -> Self {
+        let zeros = vec![0.0; coordinates.len()];
+        Self { first: zeros.clone(), second: zeros, coordinates, steps: 0 }
+    }
+
+    /// One step of Adam of persons with `stride` numbers each against `gradient`, written over `next`; `pace` scales the steps.
+    fn step_into(&self, stride: usize, gradient: &[f64], pace: f64, frozen: bool, next: &mut Self) {
+        next.clone_from(self);
+        next.steps += 1;
+        let unbias = [BETA_1, BETA_2].map(|beta| 1.0 / (1.0 - beta.powf(f64::from(next.steps))));
+        let moments = next.first.iter_mut().zip(&mut next.second);
+        for (k, ((x, (m, v)), g)) in next.coordinates.iter_mut().zip(moments).zip(gradient).enumerate() {
+            let rate = match k % stride {
+                0..YAW => RATES[0],
+                YAW => RATES[1],
+                LN_SIZE => RATES[2],
+                _ if frozen => 0.0,
+                _ => RATES[3],
+            };
+            *m = BETA_1 * *m + (1.0 - BETA_1) * g;
+            *v = BETA_2 * *v + (1.0 - BETA_2) * g * g;
+            *x -= pace * rate * *m * unbias[0] / ((*v * unbias[1]).sqrt() + EPSILON);
+        }
+    }
+
+    /// The step of iteration `iteration` of a fit.
+    pub(super) fn advance(
+        &self,
+        window: &Window,
+        gradient: &[f64],
+        (config, iteration): (&FitConfig, usize),
+        next: &mut Self,
+    ) {
+        let late = iteration as f64 > SLOW_FROM * config.iterations as f64;
+        let pace = config.learning_rate / DEFAULT_RATE * if late { SLOW } else { 1.0 };
+        self.step_into(window.stride, gradient, pace, false, next);
+    }
+}
+
+/// The frames of a window, in the order of time, `None` the one that is fitted, and its middle, s: `most` that follow each other,
+/// that one among them and as near their middle as can be.
+fn chosen(offsets: &[f64], most: usize) -> (Vec<Option<usize>>, f64) {
+    let before = offsets.partition_point(|&offset| offset < 0.0);
+    let mut all: Vec<Option<usize>> = (0..offsets.len()).map(Some).collect();
+    all.insert(before, None);
+    let time = |frame: &Option<usize>| frame.map_or(0.0, |k| offsets[k]);
+    let mut best: (Vec<Option<usize>>, f64) = (vec![None], 0.0);
+    for length in (2..=most.max(1).min(all.len())).rev() {
+        let windows = (before.saturating_sub(length - 1)..=before).filter(|first| first + length <= all.len());
+        let found = windows
+            .map(|first| &all[first..first + length])
+            .map(|frames| (frames, f64::midpoint(time(&frames[0]), time(&frames[length - 1]))))
+            .filter(|(frames, middle)| frames.iter().all(|frame| (time(frame) - middle).abs() <= REACH_S))
+            .min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        if let Some((frames, middle)) = found {
+            best = (frames.to_vec(), middle);
+            break;
+        }
+    }
+    best
+}
+
+/// How each person moves as a whole, m/s.
+fn ways(params: &Pppr) -> Vec<Vec3> {
+    let joints = params.shape().joints.max(1);
+    params.velocities().chunks(joints).map(mean).collect()
+}

@@ -1,0 +1,159 @@
+//! Where a fit in a window begins: clusters of the prior and headings, coarse, then the best of them fine.
+//!
+//! Every start is moved a little with its pose held; the few with the lowest loss are fitted with it. What wins is the start; the
+//! runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
+
+use super::{LN_SIZE, MotionState, PLACE, Window, WindowLoss, YAW, ways};
+use crate::body::Pppr;
+use crate::config::FitConfig;
+use crate::mhp::{FitError, Precision, Problem};
+use std::f64::consts::{PI, TAU};
+
+/// Steps of a start with its pose held, first of all and then of the better ones, and how many are kept.
+const COARSE: [(usize, usize); 2] = [(6, 8), (8, 3)];
+/// Steps with its pose.
+const FINE: usize = 30;
+/// Headings farther apart than this are different ones.
+const ANOTHER_HEADING: f64 = PI / 3.0;
+
+/// What a search found.
+pub(in crate::mhp) struct Searched {
+    /// The start's own loss, and that of what was found.
+    pub(in crate::mhp) losses: [f64; 2],
+    /// How far the best start that looks elsewhere is behind, share of its loss, and by how much it is turned, rad.
+    pub(in crate::mhp) runner_up: Option<(f64, f64)>,
+}
+
+/// A start on its way.
+#[derive(Clone)]
+struct Tried {
+    state: MotionState,
+    loss: f64,
+}
+
+struct Search<'a> {
+    problem: &'a Problem,
+    config: &'a FitConfig,
+    window: &'a mut Window,
+    params: &'a Pppr,
+    loss: WindowLoss,
+    next: MotionState,
+}
+
+impl Search<'_> {
+    fn evaluate(&mut self, coordinates: &[f64]) -> f64 {
+        let how = (self.problem, self.config);
+        self.window.evaluate(how, Precision::F32, (coordinates, self.params), None, &mut self.loss);
+        self.config.w_em * self.loss.em + self.config.w_prior * self.loss.prior
+    }
+
+    /// Takes `steps` from a start, and stays at the best that is met.
+    fn descend(&mut self, tried: &mut Tried, steps: usize, frozen: bool) {
+        let mut state = tried.state.clone();
+        let mut best = state.coordinates.clone();
+        for step in 0..=steps {
+            let loss = self.evaluate(&state.coordinates);
+            if loss.is_finite() && loss < tried.loss {
+                tried.loss = loss;
+                best.clone_from(&state.coordinates);
+            }
+            if step < steps {
+                let stride = self.window.stride;
+                let pace = if step as f64 > super::SLOW_FROM * steps as f64 { 0.5 } else { 1.0 };
+                state.step_into(stride, &self.loss.gradient, pace, frozen, &mut self.next);
+                std::mem::swap(&mut state, &mut self.next);
+            }
+        }
+        tried.state = MotionState { coordinates: best, ..state };
+    }
+}
+
+/// Searches around `params`, one person after the other, and puts them where it found them.
+///
+/// # Errors
+/// Where a position is not finite.
+pub(in crate::mhp) fn search(
+    problem: &Problem,
+    config: &FitConfig,
+    params: &mut Pppr,
+) -> Result<Option<Searched>, FitError> {
+    let Some(mut window) = Window::new(problem, config, Precision::F32, params)? else { return Ok(None) };
+    let mut coordinates = window.coordinates_of(params);
+    let (stride, joints) = (window.stride, params.shape().joints.max(1));
+    let walks: Vec<bool> = ways(params).iter().map(|way| way[0].hypot(way[1]) > 0.5).collect();
+    let floor = problem.radar.height_m;
+    let starts = window.space.starts.clone();
+    let mut search = Search {
+        problem,
+        config,
+        window: &mut window,
+        params,
+        loss: WindowLoss::default(),
+        next: MotionState::default(),
+    };
+    let begun = search.evaluate(&coordinates);
+    let mut answer = (begun, None);
+    for person in 0..params.shape().persons {
+        let own = person * stride..(person + 1) * stride;
+        let hips = hips_of(problem, params, person, joints);
+        let mut all = vec![Tried { state: MotionState::at(coordinates.clone()), loss: f64::INFINITY }];
+        let turns: &[f64] = if walks[person] { &[0.0, PI] } else { &[0.0, 0.5 * PI, PI, 1.5 * PI] };
+        for (c, hip_height) in starts.iter().take(config.starts.saturating_sub(1)) {
+            for turn in turns {
+                let mut of = coordinates.clone();
+                let mine = &mut of[own.clone()];
+                mine[PLACE..].copy_from_slice(c);
+                mine[YAW] += turn;
+                mine[..3].copy_from_slice(&hips);
+                if let Some(height_m) = floor {
+                    mine[2] = hip_height * mine[LN_SIZE].exp() - height_m;
+                }
+                all.push(Tried { state: MotionState::at(of), loss: f64::INFINITY });
+            }
+        }
+        for (steps, kept) in COARSE {
+            for tried in &mut all {
+                search.descend(tried, steps, true);
+            }
+            all.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+            all.truncate(kept.max(1));
+        }
+        for tried in &mut all {
+            tried.state = MotionState::at(tried.state.coordinates.clone());
+            search.descend(tried, FINE, false);
+        }
+        all.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+        let Some(best) = all.first() else { continue };
+        let yaw = |tried: &Tried| tried.state.coordinates[own.start + YAW];
+        let turned = |tried: &Tried| {
+            let turn = (yaw(tried) - yaw(best)).rem_euclid(TAU);
+            turn.min(TAU - turn)
+        };
+        let runner_up = all.iter().find(|tried| turned(tried) > ANOTHER_HEADING);
+        answer = (best.loss, runner_up.map(|tried| (tried.loss / best.loss - 1.0, turned(tried))));
+        coordinates.clone_from(&best.state.coordinates);
+    }
+    window.place(&coordinates, params);
+    Ok(Some(Searched { losses: [begun, answer.0], runner_up: answer.1 }))
+}
+
+/// The middle of a person's hips, or of all its joints where it has none, world frame, m.
+fn hips_of(problem: &Problem, params: &Pppr, person: usize, joints: usize) -> [f64; 3] {
+    let named = (0..joints).filter(|&joint| crate::body::is_named(&problem.skeleton, joint, &["hip", "pelvis"]));
+    let hips: Vec<_> = named.map(|joint| params.position(person * joints + joint)).collect();
+    if hips.is_empty() { crate::geometry::mean(params.person(person)) } else { crate::geometry::mean(&hips) }
+}
+
+impl Searched {
+    /// In words.
+    pub(in crate::mhp) fn note(&self) -> String {
+        let [from, to] = self.losses;
+        let other = match self.runner_up {
+            Some((behind, turned)) => {
+                format!("; turned by {:.0}° it is {:.1} % worse", turned.to_degrees(), 100.0 * behind)
+            }
+            None => String::new(),
+        };
+        format!("motion: loss {from:.3} → {to:.3}{other}")
+    }
+}

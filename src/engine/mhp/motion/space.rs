@@ -1,0 +1,344 @@
+//! The space of poses that a prior of motion spans, on a skeleton, at the times of a window's frames.
+//!
+//! ```text
+//! X_f(c) = μ_f + Σ_k c_k B_fk            (joints, 3), sizes; c in standard deviations
+//! p_f    = e^s R_z(y) X_f(c) + t         world frame, m
+//! ```
+//!
+//! Coordinates of a person are t (3, m), y (rad), s (ln m) and c.
+
+use crate::body::{MotionPrior, Skeleton};
+use crate::geometry::Vec3;
+
+/// Components of the prior that are used.
+const MOST_COMPONENTS: usize = 20;
+/// Half the time over which a velocity is taken, s.
+const HALF_STEP_S: f64 = 0.05;
+/// t, y and s.
+pub(super) const PLACE: usize = 5;
+/// Where y and s stand.
+pub(super) const YAW: usize = 3;
+pub(super) const LN_SIZE: usize = 4;
+/// How far joints and what they travel in `HALF_STEP_S` may be from the prior's, sizes: those of a start are no measurements.
+const MISFIT: f64 = 0.05;
+
+/// Poses of a skeleton at some times.
+#[derive(Debug, Clone)]
+pub(super) struct PoseSpace {
+    joints: usize,
+    components: usize,
+    /// A row a time: the mean and then the components, (1 + components, joints), sizes.
+    poses: Vec<Vec<Vec3>>,
+    /// What these change in a second at each time.
+    changes: Vec<Vec<Vec3>>,
+    /// Mean and standard deviation of s.
+    ln_size: [f64; 2],
+    /// From where a search may begin: c, and how high the hips are, sizes.
+    pub(super) starts: Vec<(Vec<f64>, f64)>,
+}
+
+/// The joints of the prior that a joint of this name lies between, with their shares.
+fn sources(name: &str) -> Vec<(&'static str, f64)> {
+    let words: Vec<&str> = name.split(['_', ' ', '-']).collect();
+    let is = |of: &[&str]| words.iter().any(|word| of.contains(word));
+    let sided = |left: &'static str, right: &'static str| match (is(&["left", "l"]), is(&["right", "r"])) {
+        (true, false) => vec![(left, 1.0)],
+        (false, true) => vec![(right, 1.0)],
+        _ => vec![(left, 0.5), (right, 0.5)],
+    };
+    match () {
+        () if is(&["nose", "jaw"]) => vec![("nose", 1.0)],
+        () if is(&["eye"]) => sided("left_eye", "right_eye"),
+        () if is(&["ear"]) => sided("left_ear", "right_ear"),
+        () if is(&["shoulder", "clavicle", "collar"]) => sided("left_shoulder", "right_shoulder"),
+        () if is(&["elbow"]) => sided("left_elbow", "right_elbow"),
+        () if is(&["wrist", "hand", "finger", "thumb"]) => sided("left_wrist", "right_wrist"),
+        () if is(&["hip"]) => sided("left_hip", "right_hip"),
+        () if is(&["knee"]) => sided("left_knee", "right_knee"),
+        () if is(&["ankle", "heel", "foot", "toe"]) => sided("left_ankle", "right_ankle"),
+        () if is(&["pelvis", "root"]) => vec![("pelvis", 1.0)],
+        () if is(&["neck", "thorax"]) => vec![("neck", 1.0)],
+        () if is(&["spine", "torso", "belly", "chest"]) => vec![("pelvis", 0.5), ("neck", 0.5)],
+        () if is(&["top"]) => vec![("head_top", 1.0)],
+        () if is(&["head"]) => vec![("head_top", 0.5), ("left_ear", 0.25), ("right_ear", 0.25)],
+        () => Vec::new(),
+    }
+}
+
+impl PoseSpace {
+    /// Of `prior` on `skeleton` at `times_s` after a window's middle; `None` where a joint has a name that the prior knows
+    /// nothing of.
+    pub(super) fn new(prior: &MotionPrior, skeleton: &Skeleton, times_s: &[f64]) -> Option<Self> {
+        let shares: Option<Vec<Vec<(usize, f64)>>> = skeleton
+            .joints
+            .iter()
+            .map(|name| {
+                let found = sources(&name.to_lowercase());
+                let of =
+                    found.iter().map(|(name, share)| Some((prior.joint(name)?, *share))).collect::<Option<Vec<_>>>();
+                of.filter(|of| !of.is_empty())
+            })
+            .collect();
+        let shares = shares?;
+        let components = prior.components().len().min(MOST_COMPONENTS);
+        let rows = || std::iter::once(prior.mean()).chain(prior.components()[..components].iter().map(Vec::as_slice));
+        let at = |t_s: f64| -> Vec<Vec3> {
+            let (lower, share) = between(prior.times_s(), t_s);
+            let numbers = 3 * prior.joints().len();
+            let joint = |row: &[f64], of: &[(usize, f64)]| -> Vec3 {
+                std::array::from_fn(|k| {
+                    let number = |time: usize, joint: usize| row[time * numbers + 3 * joint + k];
+                    let upper = (lower + 1).min(prior.times_s().len() - 1);
+                    of.iter().map(|&(j, w)| w * (number(lower, j) * (1.0 - share) + number(upper, j) * share)).sum()
+                })
+            };
+            rows().flat_map(|row| shares.iter().map(move |of| joint(row, of)).collect::<Vec<_>>()).collect()
+        };
+        let ends = (prior.times_s().first().copied()?, prior.times_s().last().copied()?);
+        let change = |&t_s: &f64| -> Vec<Vec3> {
+            let (from, to) = ((t_s - HALF_STEP_S).max(ends.0), (t_s + HALF_STEP_S).min(ends.1));
+            let slope = 1.0 / (to - from).max(1e-9);
+            at(to).into_iter().zip(at(from)).map(|(b, a)| [0, 1, 2].map(|k| (b[k] - a[k]) * slope)).collect()
+        };
+        let starts = prior.starts().iter().map(|start| (start.coefficients[..components].to_vec(), start.hip_height));
+        Some(Self {
+            joints: skeleton.joints.len(),
+            components,
+            poses: times_s.iter().map(|&t_s| at(t_s)).collect(),
+            changes: times_s.iter().map(change).collect(),
+            ln_size: prior.ln_size(),
+            starts: starts.collect(),
+        })
+    }
+
+    /// Coordinates of a person.
+    pub(super) fn coordinates(&self) -> usize {
+        PLACE + self.components
+    }
+
+    /// Σ_k of a row's mean and components times 1 and c.
+    fn mixed(&self, row: &[Vec3], c: &[f64], out: &mut [Vec3]) {
+        out.copy_from_slice(&row[..self.joints]);
+        for (k, c) in c.iter().enumerate() {
+            let of = &row[(k + 1) * self.joints..(k + 2) * self.joints];
+            for (out, of) in out.iter_mut().zip(of) {
+                for i in 0..3 {
+                    out[i] = c.mul_add(of[i], out[i]);
+                }
+            }
+        }
+    }
+
+    /// The joints of a person with these coordinates at time `frame`, world frame, m.
+    pub(super) fn pose(&self, coordinates: &[f64], frame: usize, out: &mut [Vec3]) {
+        self.mixed(&self.poses[frame], &coordinates[PLACE..], out);
+        let (turn, place) = (Turn::of(coordinates), [coordinates[0], coordinates[1], coordinates[2]]);
+        for p in out {
+            let turned = turn.forwards(*p);
+            *p = [0, 1, 2].map(|k| turned[k] + place[k]);
+        }
+    }
+
+    /// Their velocities, m/s.
+    pub(super) fn velocity(&self, coordinates: &[f64], frame: usize, out: &mut [Vec3]) {
+        self.mixed(&self.changes[frame], &coordinates[PLACE..], out);
+        let turn = Turn::of(coordinates);
+        out.iter_mut().for_each(|v| *v = turn.forwards(*v));
+    }
+
+    /// Adds to `bars` (a coordinate each) what the adjoints of a frame's joints and of their velocities imply; `pose` are the
+    /// joints. Velocities move with c, y and s, too.
+    pub(super) fn pull_back(
+        &self,
+        coordinates: &[f64],
+        frame: usize,
+        (pose, pose_bar): (&[Vec3], &[Vec3]),
+        bars: &mut [f64],
+    ) {
+        let turn = Turn::of(coordinates);
+        let row = &self.poses[frame];
+        let [mut x, mut y, mut z, mut yaw, mut ln_size] = [0.0; PLACE];
+        let place = [coordinates[0], coordinates[1], coordinates[2]];
+        let mut own = [[0.0; 3]; MOST_JOINTS];
+        for ((p, bar), own) in pose.iter().zip(pose_bar).zip(&mut own) {
+            let beside = [p[0] - place[0], p[1] - place[1], p[2] - place[2]];
+            x += bar[0];
+            y += bar[1];
+            z += bar[2];
+            yaw += beside[0] * bar[1] - beside[1] * bar[0];
+            ln_size += beside[0] * bar[0] + beside[1] * bar[1] + beside[2] * bar[2];
+            *own = turn.backwards(*bar);
+        }
+        for (bar, sum) in bars.iter_mut().zip([x, y, z, yaw, ln_size]) {
+            *bar += sum;
+        }
+        for (k, bar) in bars[PLACE..].iter_mut().enumerate() {
+            let of = &row[(k + 1) * self.joints..(k + 2) * self.joints];
+            let mut sum = 0.0;
+            for (of, own) in of.iter().zip(&own) {
+                sum = of[0].mul_add(own[0], of[1].mul_add(own[1], of[2].mul_add(own[2], sum)));
+            }
+            *bar += sum;
+        }
+    }
+
+    /// How unlikely the coordinates are: the mean square of c and of s, in standard deviations; adds `gain` times its gradient.
+    pub(super) fn unlikeliness(&self, coordinates: &[f64], gain: f64, bars: &mut [f64]) -> f64 {
+        let share = 1.0 / (self.components + 1) as f64;
+        let [mean, deviation] = self.ln_size;
+        let size = (coordinates[LN_SIZE] - mean) / deviation;
+        bars[LN_SIZE] += 2.0 * gain * share * size / deviation;
+        let mut sum = size * size;
+        for (c, bar) in coordinates[PLACE..].iter().zip(&mut bars[PLACE..]) {
+            sum += c * c;
+            *bar += 2.0 * gain * share * c;
+        }
+        sum * share
+    }
+
+    /// The coordinates whose joints and velocities at time `frame` are nearest to these, in a space that has its mean at 0.
+    pub(super) fn project(&self, frame: usize, joints: &[Vec3], velocities: &[Vec3]) -> Vec<f64> {
+        let mut coordinates = vec![0.0; self.coordinates()];
+        coordinates[LN_SIZE] = self.ln_size[0];
+        coordinates[YAW] = yaw_of(joints, &self.poses[frame][..self.joints]);
+        // Place, size and pose in turn: each is linear where the others are known, and a few rounds settle.
+        for _ in 0..ROUNDS {
+            self.align(frame, joints, &mut coordinates);
+            self.solve(frame, joints, velocities, &mut coordinates);
+        }
+        self.align(frame, joints, &mut coordinates);
+        coordinates
+    }
+
+    /// t, y and s that bring the pose of c onto `joints`.
+    fn align(&self, frame: usize, joints: &[Vec3], coordinates: &mut [f64]) {
+        let mut pose = vec![[0.0; 3]; self.joints];
+        self.mixed(&self.poses[frame], &coordinates[PLACE..], &mut pose);
+        let (a, b) = (crate::geometry::mean(&pose), crate::geometry::mean(joints));
+        let (mut cosine, mut sine, mut square, mut height) = (0.0, 0.0, 0.0, 0.0);
+        for (p, q) in pose.iter().zip(joints) {
+            let (p, q) = ([0, 1, 2].map(|k| p[k] - a[k]), [0, 1, 2].map(|k| q[k] - b[k]));
+            cosine += p[0] * q[0] + p[1] * q[1];
+            sine += p[0] * q[1] - p[1] * q[0];
+            height += p[2] * q[2];
+            square += p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
+        }
+        coordinates[YAW] = sine.atan2(cosine);
+        let [mean, deviation] = self.ln_size;
+        let size = ((cosine.hypot(sine) + height) / square.max(1e-9)).max(1e-3).ln();
+        coordinates[LN_SIZE] = size.clamp(mean - 3.0 * deviation, mean + 3.0 * deviation);
+        let turned = Turn::of(coordinates).forwards(a);
+        for k in 0..3 {
+            coordinates[k] = b[k] - turned[k];
+        }
+    }
+
+    /// c by least squares with the prior, for the t, y and s that are there.
+    fn solve(&self, frame: usize, joints: &[Vec3], velocities: &[Vec3], coordinates: &mut [f64]) {
+        let n = self.components;
+        let turn = Turn::of(coordinates);
+        let (mut normal, mut right) = (vec![0.0; n * n], vec![0.0; n]);
+        let place = [coordinates[0], coordinates[1], coordinates[2]];
+        let own = |p: Vec3| {
+            let back = turn.backwards(p);
+            back.map(|x| x / (turn.size * turn.size))
+        };
+        let poses = joints.iter().map(|p| own([0, 1, 2].map(|k| p[k] - place[k]))).collect::<Vec<_>>();
+        let changes = velocities.iter().map(|&v| own(v)).collect::<Vec<_>>();
+        for (row, wanted, weight) in [(&self.poses[frame], &poses, 1.0), (&self.changes[frame], &changes, HALF_STEP_S)]
+        {
+            for (joint, wanted) in wanted.iter().enumerate() {
+                for axis in 0..3 {
+                    let rest = weight * (wanted[axis] - row[joint][axis]);
+                    for k in 0..n {
+                        let by_k = weight * row[(k + 1) * self.joints + joint][axis];
+                        right[k] += by_k * rest;
+                        for l in 0..=k {
+                            normal[k * n + l] += by_k * weight * row[(l + 1) * self.joints + joint][axis];
+                        }
+                    }
+                }
+            }
+        }
+        for k in 0..n {
+            normal[k * n + k] += MISFIT * MISFIT;
+            for l in 0..k {
+                normal[l * n + k] = normal[k * n + l];
+            }
+        }
+        coordinates[PLACE..].copy_from_slice(&solved(&mut normal, right));
+    }
+}
+
+/// Joints of a skeleton at most: those of larger ones are not moved by a prior.
+pub(super) const MOST_JOINTS: usize = 64;
+/// Rounds in which place and pose are found from joints.
+const ROUNDS: usize = 6;
+
+/// e^s R_z(y)
+struct Turn {
+    cosine: f64,
+    sine: f64,
+    size: f64,
+}
+
+impl Turn {
+    fn of(coordinates: &[f64]) -> Self {
+        let (sine, cosine) = coordinates[YAW].sin_cos();
+        let size = coordinates[LN_SIZE].exp();
+        Self { cosine: cosine * size, sine: sine * size, size }
+    }
+
+    fn forwards(&self, [x, y, z]: Vec3) -> Vec3 {
+        [self.cosine * x - self.sine * y, self.sine * x + self.cosine * y, self.size * z]
+    }
+
+    /// The transpose.
+    fn backwards(&self, [x, y, z]: Vec3) -> Vec3 {
+        [self.cosine * x + self.sine * y, self.cosine * y - self.sine * x, self.size * z]
+    }
+}
+
+/// The yaw that turns `mean` onto `joints`, by their horizontal extent.
+fn yaw_of(joints: &[Vec3], mean: &[Vec3]) -> f64 {
+    let (a, b) = (crate::geometry::mean(mean), crate::geometry::mean(joints));
+    let (mut cosine, mut sine) = (0.0, 0.0);
+    for (p, q) in mean.iter().zip(joints) {
+        let (p, q) = ([p[0] - a[0], p[1] - a[1]], [q[0] - b[0], q[1] - b[1]]);
+        cosine += p[0] * q[0] + p[1] * q[1];
+        sine += p[0] * q[1] - p[1] * q[0];
+    }
+    sine.atan2(cosine)
+}
+
+/// The sample at or before a time, and the share of the next.
+fn between(times: &[f64], t: f64) -> (usize, f64) {
+    let upper = times.partition_point(|&sample| sample <= t);
+    let Some(lower) = upper.checked_sub(1) else { return (0, 0.0) };
+    match times.get(upper) {
+        Some(next) => (lower, (t - times[lower]) / (next - times[lower])),
+        None => (lower, 0.0),
+    }
+}
+
+/// Solves a symmetric positive definite system, C order.
+fn solved(a: &mut [f64], mut b: Vec<f64>) -> Vec<f64> {
+    let n = b.len();
+    for k in 0..n {
+        for l in 0..k {
+            let sum: f64 = (0..l).map(|m| a[k * n + m] * a[l * n + m]).sum();
+            a[k * n + l] = (a[k * n + l] - sum) / a[l * n + l];
+        }
+        let sum: f64 = (0..k).map(|m| a[k * n + m] * a[k * n + m]).sum();
+        a[k * n + k] = (a[k * n + k] - sum).max(f64::MIN_POSITIVE).sqrt();
+    }
+    for k in 0..n {
+        let sum: f64 = (0..k).map(|m| a[k * n + m] * b[m]).sum();
+        b[k] = (b[k] - sum) / a[k * n + k];
+    }
+    for k in (0..n).rev() {
+        let sum: f64 = (k + 1..n).map(|m| a[m * n + k] * b[m]).sum();
+        b[k] = (b[k] - sum) / a[k * n + k];
+    }
+    b
+}

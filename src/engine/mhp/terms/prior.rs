@@ -1,0 +1,15 @@
+//! L_prior: how unlikely a window's motion is. The fit of a window computes it.
+
+use super::{Evaluate, Hue, Scope, Term, Weight};
+
+pub(super) const PRIOR: Term = Term {
+    key: "prior",
+    label: "L_prior",
+    formula: "(‖c‖² + ((s − s₀)/σ_s)²)/(K + 1)",
+    unit: "",
+    help: "How far a window's pose, motion and size are from what real people do, mean square in standard deviations.",
+    weight: Weight::Prior,
+    scope: Scope::Weighed,
+    hue: Hue::Teal,
+    evaluate: Evaluate::Window,
+};
