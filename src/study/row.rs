@@ -295,6 +295,7 @@ mod tests {
         assert_eq!(failed.json(&columns)["loss"], Value::Null);
     }
     /// Head, row and mean of the term that only unit tests have.
+    #[cfg(feature = "dummies")]
     #[test]
     fn the_dummy_term_has_a_column() {
         let columns = super::super::columns(&["hm".to_owned()]);

@@ -10,10 +10,11 @@ const STAGES: &[(&str, &[&str])] = &[
     ("the terms of the loss", &["terms"]),
     ("numbers", &["types", "percentile", "fill", "scalar", "lanes", "batch", "floors"]),
     ("a joint in a view", &["triad", "gaussian", "splat", "adjoint", "skin"]),
-    ("cells and masks", &["kernel", "tiles", "cell_box", "levels", "em"]),
+    ("cells and masks", &["kernel", "tiles", "cell_box", "level_rows", "levels", "em"]),
     ("what maps and frames around show", &["region", "template", "context"]),
     ("a frame", &["frame_em", "problem", "simulate"]),
     ("the objective", &["objective"]),
+    ("a window of frames", &["motion"]),
     ("the fit", &["convergence", "articulation", "adam", "fitter"]),
     ("the start", &["init"]),
 ];

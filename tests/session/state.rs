@@ -99,7 +99,13 @@ impl Bench {
         let mut params = self.params.clone();
         params.group_mut(Group::Position)[0] += 0.001 * iteration as f64;
         let adam = Adam::new(params.shape());
-        Arc::new(FitState { iteration, params, adam, losses: vec![loss(iteration)].into() })
+        Arc::new(FitState {
+            iteration,
+            params,
+            adam,
+            motion: mhp_inspector::mhp::MotionState::default(),
+            losses: vec![loss(iteration)].into(),
+        })
     }
 
     fn rows(&mut self, job: JobId, branch: u32, iterations: std::ops::RangeInclusive<usize>) {

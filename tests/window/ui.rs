@@ -20,6 +20,7 @@ use std::time::{Duration, Instant};
 fn a_data_set_opens_runs_pauses_and_steps() {
     let mut window = Window::open(3);
     assert_eq!((window.session().data.len(), window.fit().head()), (3, 0));
+    window.slowly();
     window.type_value("Iterations value", "100000");
     window.click("Run fit");
     window.until("some iterations", |w| w.fit().is_running() && w.fit().head() > 5);

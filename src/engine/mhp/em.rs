@@ -6,6 +6,7 @@ use super::cell_box::CellBox;
 use super::floors::{EPSILON, SOFT_FLOOR, ViewLoss, floored, hard_iou, ln_floored};
 use super::gaussian::{WorldGaussianBars, WorldGaussians};
 use super::kernel::Kernel;
+use super::level_rows::{RowQuery, RowScratch};
 use super::levels::Levels;
 use super::percentile::percentile;
 use super::scalar::Real;
@@ -14,12 +15,17 @@ use super::tiles::{self, EmQuery, LevelQuery, Tiles};
 use crate::body::Pppr;
 use crate::config::FitConfig;
 
+/// Returns below this share of the noise are left out of levels: of those that are shown, and of those of a search or a window.
+const LEAST_SHOWN: f64 = 1e-9;
+const LEAST_SEARCHED: f64 = 1e-5;
+
 /// What one evaluation of a view needs besides its answer; kept, so that the next one allocates nothing.
 #[derive(Default)]
 pub(super) struct Workspace {
     splats: Splats,
     moments: Moments,
     tiles: Tiles,
+    rows: RowScratch,
 }
 
 /// Where L_view is evaluated, and B_ori there.
@@ -47,7 +53,7 @@ impl Workspace {
         (factor, with_iou): (Option<f64>, bool),
         precision: Precision,
     ) -> ViewLoss {
-        let Self { splats, moments, tiles } = self;
+        let Self { splats, moments, tiles, rows } = self;
         moments.reset(splats.joints(), &model.view.axes);
         match precision {
             Precision::F64 => plain::<f64>(model, splats, target, factor, moments),
@@ -66,7 +72,19 @@ impl Workspace {
                         .map(|levels| LevelQuery { tiles: &levels.tiles, totals: &levels.totals }),
                     with_iou,
                 };
-                tiles.evaluate(&query, moments)
+                let levels = target.levels.as_ref();
+                let Some((levels, of)) = levels.and_then(|levels| Some((levels, levels.rows.as_ref()?))) else {
+                    return tiles.evaluate(&query, moments);
+                };
+                let (least, tau_pct) = if with_iou { (LEAST_SHOWN, Some(tau_pct)) } else { (LEAST_SEARCHED, None) };
+                let asked = RowQuery { splats, rows: of, totals: &levels.totals, least, factor, tau_pct };
+                let (answer, among) = rows.evaluate(&asked, moments);
+                if among {
+                    return answer;
+                }
+                // Rare: the body is above the noise in fewer cells than a mask has.
+                let masks = EmQuery { levels: None, gradient_factor: None, ..query };
+                ViewLoss { loss: answer.loss, iou: tiles.evaluate(&masks, moments).iou }
             }
             Precision::F32 => plain::<f32>(model, splats, target, factor, moments),
         }

@@ -86,10 +86,17 @@ impl Fitter {
         state.motion = MotionState::default();
         if config.parameterization == Parameterization::Motion {
             let problem = Arc::clone(self.objective.problem());
-            self.window = Window::new(&problem, &config, precision, &state.params)?;
-            if let Some(window) = &self.window {
-                state.motion = MotionState::at(window.coordinates_of(&state.params));
-                window.place(&state.motion.coordinates, &mut state.params);
+            // Where there is none, persons stay where they are.
+            self.window = Window::new(&problem, &config, precision, &state.params)?.ok();
+            if let Some(window) = &mut self.window {
+                let coordinates = window.coordinates_of(&state.params);
+                let of = (coordinates.as_slice(), &state.params);
+                if window.explains((&problem, &config), precision, of, &mut self.window_loss[0]) {
+                    window.place(&coordinates, &mut state.params);
+                    state.motion = MotionState::at(coordinates);
+                } else {
+                    self.window = None;
+                }
             }
         }
         let shape = state.params.shape();
@@ -226,8 +233,8 @@ impl Fitter {
         let kept = (Arc::clone(&self.state), self.window.take());
         let another = config.parameterization != before.parameterization;
         let evaluated = if config.parameterization == Parameterization::Motion || another {
-            let state = FitState::clone(&kept.0);
-            self.begin_again(state, &config, another)
+            let before = Arc::clone(&kept.0);
+            self.begin_again(&before, &config, another)
         } else {
             self.evaluate_now()
         };
@@ -252,7 +259,7 @@ impl Fitter {
     }
 
     /// A window for other settings; coordinates and moments stay where they are those of a window already.
-    fn begin_again(&mut self, before: FitState, config: &FitConfig, another: bool) -> Result<(), FitError> {
+    fn begin_again(&mut self, before: &FitState, config: &FitConfig, another: bool) -> Result<(), FitError> {
         let (motion, losses, params) = (before.motion.clone(), before.losses.clone(), before.params.clone());
         self.begin()?;
         let state = Arc::make_mut(&mut self.state);

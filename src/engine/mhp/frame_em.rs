@@ -10,7 +10,7 @@ use super::skin::{Skin, radar_place};
 use super::splat::ViewModel;
 use super::{Ious, Precision};
 use crate::body::{Pppr, Skeleton};
-use crate::config::{BodyModel, EmLoss, FitConfig};
+use crate::config::{BodyModel, EmLoss, FitConfig, Summation};
 use crate::radar::{AxisKind, RadarConfig, View};
 use smallvec::SmallVec;
 
@@ -34,6 +34,11 @@ pub(super) struct Measured<'a> {
     pub radar: &'a RadarConfig,
     pub maps: SmallVec<[&'a [f64]; 4]>,
     pub background: Option<&'a [Vec<f64>]>,
+}
+
+/// The settings of the forward model: points of skin lie where their echo comes from.
+pub(super) fn forward_config(config: &FitConfig, skin: bool) -> FitConfig {
+    FitConfig { surface_offset_m: if skin { 0.0 } else { config.surface_offset_m }, ..*config }
 }
 
 /// The skin of a body before these views, if the settings ask for one and the skeleton has one.
@@ -60,7 +65,11 @@ impl FrameEm {
             let cell_box = CellBox::new(view, &region.bins, &ori, precision);
             let levels = (config.objective != EmLoss::Iou).then(|| {
                 let background = measured.background.map(|maps| inside(&maps[k]));
-                Levels::new(config.objective, view.quantity, &cell_box, (&cells, map), background.as_deref())
+                // Powers that add, without a spectrum along an axis.
+                let spectral = view.axes.iter().any(|axis| axis.kind == AxisKind::Doppler);
+                let in_rows = precision == Precision::F32 && config.summation == Summation::Incoherent && !spectral;
+                let measured = (cells.as_slice(), map);
+                Levels::new(config.objective, view.quantity, &cell_box, measured, background.as_deref(), in_rows)
             });
             EmTarget { ori, cell_box, levels }
         };
@@ -88,6 +97,7 @@ impl FrameEm {
         mut iou: Option<&mut Ious>,
     ) -> f64 {
         let Self { targets, workspaces, gaussians, bars, skin } = self;
+        let config = &forward_config(config, skin.is_some());
         if let Some(skin) = skin.as_mut() {
             skin.fill(params);
         }
@@ -128,6 +138,7 @@ impl FrameEm {
             skin
         });
         let seen = skin.as_ref().map_or(params, |skin| &skin.points);
+        let config = &forward_config(config, skin.is_some());
         gaussians.fill(seen, precision);
         let losses = self.targets.iter().map(|target| {
             let model = ViewModel::new(radar, &target.cell_box.view, config);

@@ -6,6 +6,7 @@
 //! adds what the simulated power changes of it, d = ln(1 + g S / 2n) or y = g S / n.
 
 use super::cell_box::CellBox;
+use super::level_rows::LevelRows;
 use super::percentile::percentile;
 use super::tiles::LevelTiles;
 use crate::config::EmLoss;
@@ -30,8 +31,10 @@ pub(super) struct Levels {
     /// ln 2n less its mean; 0 where the noise is the same everywhere.
     base: Vec<f64>,
     pub(super) totals: LevelTotals,
-    /// The same in tiles; empty in double precision.
+    /// The same in tiles; empty in double precision, and where there are rows.
     pub(super) tiles: LevelTiles,
+    /// The same in rows, where the view has two axes and powers add.
+    pub(super) rows: Option<LevelRows>,
 }
 
 /// What is the same in every evaluation.
@@ -92,6 +95,7 @@ impl Levels {
         cell_box: &CellBox,
         (cells, map): (&[f64], &[f64]),
         background: Option<&[f64]>,
+        in_rows: bool,
     ) -> Self {
         let power = |x: f64| match quantity {
             Quantity::Amplitude => x * x,
@@ -143,8 +147,10 @@ impl Levels {
             base_variation: product(&base, &base),
             idle: if kind == EmLoss::Gamma { idle } else { 0.0 },
         };
-        let tiles = LevelTiles::new(&cell_box.grid, [&measured, &by_noise, &base]);
-        Self { kind, measured, by_noise, base, totals, tiles }
+        let values: [&[f64]; 3] = [&measured, &by_noise, &base];
+        let rows = in_rows.then(|| LevelRows::new(&cell_box.bins, &cell_box.marked, values)).flatten();
+        let tiles = if rows.is_some() { LevelTiles::default() } else { LevelTiles::new(&cell_box.grid, values) };
+        Self { kind, measured, by_noise, base, totals, tiles, rows }
     }
 
     /// L_view where the cells' simulated powers are `power`; and, where a `factor` is given, its product with ∂L_view/∂ln|S| of
@@ -172,11 +178,11 @@ impl Levels {
                 let sums = cells()
                     .fold([0.0; 3], |[s, a_s, s_s], ((&d, &a), &b)| [s + d, a_s + a * d, s_s + (2.0 * b + d) * d]);
                 let found = totals.correlation(sums);
-                let slope = |((((&d, &a), &b), &x), by_noise): ((((&f64, &f64), &f64), &f64), &f64)| {
-                    let by_d = found.by_measured * a + found.by_level * (b + d - found.mean);
-                    by_d * by_noise / (1.0 + x)
+                let slope = |(k, (&d, &x)): (usize, (&f64, &f64))| {
+                    let level = self.base[k] + d - found.mean;
+                    (found.by_measured * self.measured[k] + found.by_level * level) * self.by_noise[k] / (1.0 + x)
                 };
-                (found.loss, cells().zip(&above).zip(&self.by_noise).map(slope).collect())
+                (found.loss, d.iter().zip(&above).enumerate().map(slope).collect())
             }
         };
         let weights = factor.map(|factor| {

@@ -13,10 +13,11 @@
 //! 3. cells: `kernel.rs`, `tiles/mod.rs`, `cell_box.rs`; masks and levels over them, `levels.rs`, `em.rs`
 //! 4. what the maps of a frame and those around it show: `region.rs`, `template.rs`, `context/mod.rs`
 //! 5. a frame: `frame_em.rs`, `problem.rs`, `simulate.rs`
-//! 6. the objective: `objective.rs`
+//! 6. the objective: `objective.rs`; a window of frames: `motion/mod.rs`
 //! 7. the fit: `convergence.rs`, `articulation.rs`, `adam.rs`, `fitter.rs`; and the start of one: `init/mod.rs`
 //!
-//! **What it does not do.** The fit moves the body onto its echo; it does not find the pose: yaw and left/right are hardly visible
+//! **What it does not do.** A fit by masks moves the body onto its echo and does not find the pose; one of a window by levels
+//! (`motion/mod.rs`) finds that of who walks. Yaw and left/right are hardly visible
 //! in a single frame, and the echoes come from the skin, some centimetres before the joints. What error is left is of people
 //! who stand with their back to the radar, of tall people who sit, of arms and falls, and of people so still that they look like
 //! furniture. `sep` and `coll` matter where people are closer than 0.9 m. Single precision drops a gradient entry now and then
@@ -38,6 +39,7 @@ mod gaussian;
 mod init;
 mod kernel;
 mod lanes;
+mod level_rows;
 mod levels;
 mod motion;
 mod objective;

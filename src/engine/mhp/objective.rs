@@ -88,7 +88,8 @@ impl Objective {
         {
             (self.regions, self.warnings) = (regions, warnings);
         }
-        let asked = |config: &FitConfig| (config.em_region, config.tau_pct, config.objective, config.body);
+        let asked =
+            |config: &FitConfig| (config.em_region, config.tau_pct, config.objective, config.body, config.summation);
         if asked(&config) != asked(&before) {
             self.em = FrameEm::new(&self.problem.measured(), &self.regions, &config, self.precision);
         }

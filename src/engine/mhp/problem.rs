@@ -7,7 +7,6 @@ use crate::body::{Pppr, Skeleton};
 use crate::config::{FitConfig, FramesAround};
 use crate::geometry::Vec3;
 use crate::radar::{RadarConfig, View, ViewSet};
-use smallvec::SmallVec;
 
 /// Everything a fit needs besides its configuration and its start. Maps are cast to f64 and their missing cells filled
 /// (SPEC section 4).
@@ -101,11 +100,7 @@ impl Problem {
 
     /// What is measured in this frame.
     pub(super) fn measured(&self) -> Measured<'_> {
-        self.measured_as(self.maps.iter().map(Vec::as_slice).collect())
-    }
-
-    /// What is measured where these are the maps, one a view.
-    pub(super) fn measured_as<'a>(&'a self, maps: SmallVec<[&'a [f64]; 4]>) -> Measured<'a> {
+        let maps = self.maps.iter().map(Vec::as_slice).collect();
         Measured { views: &self.views, skeleton: &self.skeleton, radar: &self.radar, maps, background: None }
     }
 

@@ -2,7 +2,7 @@
 
 use super::cell_box::CellBox;
 use super::floors::floored;
-use super::frame_em::skin_of;
+use super::frame_em::{forward_config, skin_of};
 use super::gaussian::WorldGaussians;
 use super::kernel::Kernel;
 use super::region::Region;
@@ -21,6 +21,7 @@ pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, par
         skin.fill(params);
         skin
     });
+    let config = &forward_config(config, skin.is_some());
     let params = skin.as_ref().map_or(params, |skin| &skin.points);
     gaussians.fill(params, precision);
     let mut splats = Splats::default();

@@ -11,7 +11,7 @@
 //! head    point 0.08 m before its middle
 //! ```
 //!
-//! each round, its amplitude the root of its area. The joints' own opacities and scales, by those that their part of the body has
+//! each round, its amplitude the root of its area; `surface_offset_m` moves no point, for it lies on the skin. The joints' own opacities and scales, by those that their part of the body has
 //! at the start (`body::scatterer`), make the points between them brighter and larger, at most four times; their rotations say
 //! nothing. Velocities and Doppler features are those between the joints. The line of sight is that of the radar, the mean of the
 //! views' places.
@@ -238,7 +238,9 @@ impl Skin {
                         omega.iter_mut().zip(from).for_each(|(to, from)| *to += share * from);
                     } else {
                         let mean = from.iter().sum::<f64>() / from.len().max(1) as f64;
-                        omega.iter_mut().for_each(|to| *to += share * mean);
+                        for to in omega.iter_mut() {
+                            *to += share * mean;
+                        }
                     }
                 });
             }
@@ -283,7 +285,9 @@ impl Skin {
                         omega.iter_mut().zip(omega_bar).for_each(|(x, bar)| *x += share * bar);
                     } else {
                         let mean = share * omega_bar.iter().sum::<f64>() / omega.len().max(1) as f64;
-                        omega.iter_mut().for_each(|x| *x += mean);
+                        for x in omega.iter_mut() {
+                            *x += mean;
+                        }
                     }
                 });
             }
@@ -311,7 +315,9 @@ impl Skin {
     fn each_joint(parts: &Parts, of: &Point, mut each: impl FnMut(usize, f64)) {
         for &(part, share) in &of.shares {
             let joints = parts.joints_of(part);
-            joints.iter().for_each(|&joint| each(joint, share / joints.len() as f64));
+            for &joint in joints {
+                each(joint, share / joints.len() as f64);
+            }
         }
     }
 

@@ -210,6 +210,7 @@ mod tests {
         }
     }
 
+    #[cfg(feature = "dummies")]
     #[test]
     fn the_dummy_term_has_a_column() {
         let terms = Terms::from_fn(|term| (term.key == "dummy").then_some(0.7));

@@ -43,7 +43,7 @@ use super::motion;
 use super::template::Template;
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
-use crate::config::{FitConfig, Height, Limbs, Parameterization, StartPlace, Summation, Yaw};
+use crate::config::{BodyModel, EmLoss, FitConfig, Height, Limbs, Parameterization, StartPlace, Summation, Yaw};
 use crate::geometry::{Vec3, flat_distance, norm, sub};
 use find::{find_one, middle_of_views};
 use notes::notes_of;
@@ -56,6 +56,8 @@ use velocity::{Radial, Source};
 /// Steps in which a posture's place is looked for, m.
 const POSTURE_STEP_M: f64 = 0.06;
 const MOST_STEPS: usize = 12;
+/// Postures tried at most: more starts are those of a search in a space of motion.
+const POSTURES: usize = 9;
 /// What counting finds farther from a place than this is another place, m.
 const ELSEWHERE_M: f64 = 1.0;
 /// Somebody nearer than this is lit where the limbs are looked for, m.
@@ -128,7 +130,9 @@ impl Person {
     /// Its joints in its posture.
     fn posed(&self, problem: &Problem, config: &FitConfig) -> Vec<Vec3> {
         let at = match &self.track {
-            Some(track) if config.w_time > 0.0 => [track.at[0], track.at[1], self.at[2]],
+            Some(track) if config.w_time > 0.0 || config.parameterization == Parameterization::Motion => {
+                [track.at[0], track.at[1], self.at[2]]
+            }
             _ => self.at,
         };
         let bent = matches!(self.posture, Posture::Bent(_));
@@ -212,18 +216,26 @@ pub fn initialise_people(
         }
         None => own.clone(),
     };
-    if config.starts > 1 && config.parameterization != Parameterization::Motion {
+    let model = ScattererModel::new(&problem.skeleton, config.scatterers);
+    // A search in a space of motion begins at standing persons: its own starts are the postures.
+    let mut searched = None;
+    if config.parameterization == Parameterization::Motion {
+        let mut standing = assemble(problem, config, &model, &persons);
+        match motion::search(problem, config, &mut standing)? {
+            Ok(found) => {
+                notes.push(found.note());
+                searched = Some(standing);
+            }
+            Err(held) => notes.push(held.note().to_owned()),
+        }
+    }
+    if config.starts > 1 && searched.is_none() {
         choose_postures(problem, config, &template, &mut persons)?;
     }
-    let model = ScattererModel::new(&problem.skeleton, config.scatterers);
-    let mut params = assemble(problem, config, &model, &persons);
+    let mut params = searched.unwrap_or_else(|| assemble(problem, config, &model, &persons));
     let moved_m: Vec<f64> =
         persons.iter().enumerate().map(|(k, person)| mean_way_m(&params, k, &person.posed(problem, config))).collect();
     let mut unrefined = assemble(problem, &unrefined(config), &model, &own);
-    if config.parameterization == Parameterization::Motion {
-        let searched = motion::search(problem, config, &mut params)?;
-        notes.extend(searched.map(|searched| searched.note()));
-    }
     for start in [&mut params, &mut unrefined] {
         perturb::perturb(problem, &config.init, start);
     }
@@ -239,12 +251,15 @@ fn choose_postures(
     template: &Template,
     persons: &mut [Person],
 ) -> Result<(), FitError> {
-    let config = FitConfig { summation: Summation::Incoherent, w_time: 0.0, limbs: Limbs::Posture, ..*config };
+    // Masks tell postures apart also where levels are those of a room.
+    let (objective, body) = (EmLoss::Iou, BodyModel::Joints);
+    let config =
+        FitConfig { objective, body, summation: Summation::Incoherent, w_time: 0.0, limbs: Limbs::Posture, ..*config };
     let model = ScattererModel::new(&problem.skeleton, config.scatterers);
     for k in 0..persons.len() {
         let walks = persons[k].walks();
         let stature = persons[k].stature(problem, &config).filter(|_| !walks);
-        let tried = postures(template, problem, config.starts, walks, stature, persons[k].speeds());
+        let tried = postures(template, problem, config.starts.min(POSTURES), walks, stature, persons[k].speeds());
         let mut best: Option<(f64, Posture, Arc<Template>)> = None;
         for (posture, better) in tried {
             let posed = Arc::new(pose::posed(template, &problem.skeleton, posture));

@@ -2,7 +2,7 @@
 //!
 //! With `parameterization = "motion"` a fit's coordinates are, for each person, place, heading and size in the middle of the window
 //! and the coefficients of `body::MotionPrior` ([`space`]). They place the joints in all frames of the window at once; each
-//! frame compares its own maps (`frame_em.rs`), and
+//! frame compares its own maps (`mhp/frame_em.rs`), and
 //!
 //! ```text
 //! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior,  L_prior = (‖c‖² + ((s − s₀)/σ_s)²)/(K + 1)
@@ -13,20 +13,25 @@
 //! window. The frame stands as near the window's middle as its sequence lets it; without frames around the window is one frame.
 //! A start is searched from clusters of the prior and from several headings, coarse then fine ([`search`]).
 
+mod clutter;
 mod search;
 mod space;
+#[cfg(test)]
+mod tests;
+mod thinned;
 
 pub(super) use search::search;
 
-use super::frame_em::FrameEm;
+use super::frame_em::{FrameEm, Measured};
 use super::region;
 use super::{FitError, Precision, Problem};
 use crate::body::{Group, MotionPrior, Pppr};
-use crate::config::FitConfig;
-use crate::geometry::{Vec3, add_scaled, mean};
+use crate::config::{EmLoss, FitConfig};
+use crate::geometry::{Vec3, add_scaled, mean, norm};
+use crate::radar::View;
 use serde::{Deserialize, Serialize};
-use smallvec::SmallVec;
 use space::{LN_SIZE, MOST_JOINTS, PLACE, PoseSpace, YAW};
+use thinned::Thinned;
 
 /// Frames of a window lie no farther from its middle, s: the prior reaches no farther.
 const REACH_S: f64 = 0.201;
@@ -40,6 +45,10 @@ const DEFAULT_RATE: f64 = 1e-3;
 /// From this share of the iterations on steps are shorter, by so much.
 const SLOW_FROM: f64 = 0.6;
 const SLOW: f64 = 0.3;
+/// Levels that correlate less than by one less this are of something else than the body.
+const MOST_UNLIKE: f64 = 0.2;
+/// Slower than this nobody leaves the cells that it stands in while the frames around last, m/s.
+const WALKING_MPS: f64 = 0.35;
 
 /// The coordinates of a fit in a window, and Adam's moments of them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -52,6 +61,32 @@ pub struct MotionState {
     pub second: Vec<f64>,
     /// Steps since the moments were zero.
     pub steps: u32,
+}
+
+/// Why a fit in a window leaves the persons where they start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Held {
+    /// The prior knows nothing of the skeleton.
+    Skeleton,
+    /// Static echoes were not removed, and the person stands among them.
+    Clutter,
+    /// No body of the prior explains the maps.
+    Unlike,
+}
+
+impl Held {
+    /// In words.
+    pub(super) fn note(self) -> &'static str {
+        match self {
+            Self::Skeleton => "motion: the prior knows nothing of this skeleton; joints stay where they start",
+            Self::Unlike => {
+                "motion: no body of the prior explains the maps (their levels correlate by less than 0.8); joints stay where they start"
+            }
+            Self::Clutter => {
+                "motion: static echoes were not removed and nobody walks: body and reflectors cannot be told apart, joints stay where they start"
+            }
+        }
+    }
 }
 
 /// The frames that are fitted together.
@@ -82,8 +117,25 @@ pub(super) struct WindowLoss {
     pub(super) gradient: Vec<f64>,
 }
 
+/// Whether an L_EM is that of maps which the body does not explain.
+fn is_unlike(config: &FitConfig, em: f64) -> bool {
+    config.objective == EmLoss::NccDb && em > MOST_UNLIKE
+}
+
 impl Window {
-    /// Around the persons of `initial`, who move as their velocities say. `None` where the prior knows nothing of the skeleton.
+    /// Whether the window's maps are explained by persons with these coordinates.
+    pub(super) fn explains(
+        &mut self,
+        (problem, config): (&Problem, &FitConfig),
+        precision: Precision,
+        of: (&[f64], &Pppr),
+        loss: &mut WindowLoss,
+    ) -> bool {
+        self.evaluate((problem, config), precision, of, None, loss);
+        !is_unlike(config, loss.em)
+    }
+
+    /// Around the persons of `initial`, who move as their velocities say; or why they stay where they are.
     ///
     /// # Errors
     /// Where a position is not finite.
@@ -92,21 +144,38 @@ impl Window {
         config: &FitConfig,
         precision: Precision,
         initial: &Pppr,
-    ) -> Result<Option<Self>, FitError> {
-        let Some(prior) = MotionPrior::committed() else { return Ok(None) };
+    ) -> Result<Result<Self, Held>, FitError> {
+        let Some(prior) = MotionPrior::committed() else { return Ok(Err(Held::Skeleton)) };
         let neighbours = problem.neighbours_in(config.frames_around);
         let offsets: Vec<f64> = neighbours.iter().map(|neighbour| neighbour.offset_s).collect();
         let (chosen, middle_s) = chosen(&offsets, config.window);
         let times: Vec<f64> = chosen.iter().map(|frame| frame.map_or(0.0, |k| offsets[k]) - middle_s).collect();
         if problem.skeleton.joints.len() > MOST_JOINTS {
-            return Ok(None);
+            return Ok(Err(Held::Skeleton));
         }
-        let Some(space) = PoseSpace::new(prior, &problem.skeleton, &times) else { return Ok(None) };
+        let Some(space) = PoseSpace::new(prior, &problem.skeleton, &times) else { return Ok(Err(Held::Skeleton)) };
         let (centres, ways) = (region::centres(initial), ways(initial));
         let mut frames = Vec::with_capacity(chosen.len());
-        let maps = |frame: Option<usize>| -> SmallVec<[&[f64]; 4]> {
-            (0..problem.views.len()).map(|view| frame.map_or(problem.map(view), |k| neighbours[k].map(view))).collect()
-        };
+        let thinned: Vec<Thinned> = problem.views.iter().map(|view| Thinned::new(view, initial)).collect();
+        let views: Vec<View> = thinned.iter().map(|thinned| thinned.view.clone()).collect();
+        let (own_regions, _) = region::regions(&views, config.em_region, &centres)?;
+        let backgrounds: Vec<Vec<f64>> = (0..views.len())
+            .map(|view| {
+                let around = neighbours.iter().map(|neighbour| thinned[view].cells(neighbour.map(view)));
+                let maps: Vec<Vec<f64>> =
+                    std::iter::once(thinned[view].cells(problem.map(view))).chain(around).collect();
+                clutter::background(&maps, views[view].quantity)
+            })
+            .collect();
+        let cluttered = views
+            .iter()
+            .zip(&backgrounds)
+            .zip(&own_regions)
+            .any(|((view, background), region)| clutter::is_cluttered(background, &view.shape(), region));
+        let stands = neighbours.is_empty() || ways.iter().any(|way| norm(*way) < WALKING_MPS);
+        if cluttered && stands {
+            return Ok(Err(Held::Clutter));
+        }
         for &frame in &chosen {
             let t_s = frame.map_or(0.0, |k| offsets[k]);
             let moved: Vec<Vec3> = centres
@@ -118,13 +187,22 @@ impl Window {
                     at
                 })
                 .collect();
-            let (regions, _) = region::regions(&problem.views, config.em_region, &moved)?;
-            let em = FrameEm::new(&problem.measured_as(maps(frame)), &regions, config, precision);
+            let (regions, _) = region::regions(&views, config.em_region, &moved)?;
+            let map = |view: usize| frame.map_or(problem.map(view), |k| neighbours[k].map(view));
+            let maps: Vec<Vec<f64>> = thinned.iter().enumerate().map(|(k, of)| of.cells(map(k))).collect();
+            let measured = Measured {
+                views: &views,
+                skeleton: &problem.skeleton,
+                radar: &problem.radar,
+                maps: maps.iter().map(Vec::as_slice).collect(),
+                background: cluttered.then_some(backgrounds.as_slice()),
+            };
+            let em = FrameEm::new(&measured, &regions, config, precision);
             frames.push(WindowFrame { em, params: initial.clone(), gradient: Pppr::zeros(initial.shape()) });
         }
         let own = chosen.iter().position(Option::is_none).unwrap_or(0);
         let stride = space.coordinates();
-        Ok(Some(Self { space, own, frames, stride }))
+        Ok(Ok(Self { space, own, frames, stride }))
     }
 
     /// The coordinates that come nearest to `params`, joints and velocities.
@@ -160,14 +238,27 @@ impl Window {
         looks: Option<&mut Pppr>,
         loss: &mut WindowLoss,
     ) {
+        self.evaluate_some(1, (problem, config), precision, (coordinates, params), looks, loss);
+    }
+
+    /// The same from every so manyth frame alone.
+    fn evaluate_some(
+        &mut self,
+        every: usize,
+        (problem, config): (&Problem, &FitConfig),
+        precision: Precision,
+        (coordinates, params): (&[f64], &Pppr),
+        looks: Option<&mut Pppr>,
+        loss: &mut WindowLoss,
+    ) {
         let Self { space, frames, stride, .. } = self;
         let joints = params.shape().joints;
         loss.gradient.clear();
         loss.gradient.resize(coordinates.len(), 0.0);
-        let share = 1.0 / frames.len() as f64;
+        let share = 1.0 / frames.len().div_ceil(every) as f64;
         loss.em = 0.0;
         let mut kept = looks;
-        for (frame, of) in frames.iter_mut().enumerate() {
+        for (frame, of) in frames.iter_mut().enumerate().step_by(every) {
             for group in Group::ALL[1..].iter().filter(|&&group| group != Group::Velocity) {
                 of.params.group_mut(*group).copy_from_slice(params.group(*group));
             }

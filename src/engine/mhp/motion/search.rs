@@ -3,16 +3,16 @@
 //! Every start is moved a little with its pose held; the few with the lowest loss are fitted with it. What wins is the start; the
 //! runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
 
-use super::{LN_SIZE, MotionState, PLACE, Window, WindowLoss, YAW, ways};
+use super::{Held, LN_SIZE, MotionState, PLACE, Window, WindowLoss, YAW, ways};
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::mhp::{FitError, Precision, Problem};
 use std::f64::consts::{PI, TAU};
 
-/// Steps of a start with its pose held, first of all and then of the better ones, and how many are kept.
-const COARSE: [(usize, usize); 2] = [(6, 8), (8, 3)];
+/// Steps of a start with its pose held, how many are kept, and which frames are looked at: every so manyth; then the same of those.
+const COARSE: [(usize, usize, usize); 2] = [(12, 12, 2), (8, 4, 1)];
 /// Steps with its pose.
-const FINE: usize = 30;
+const FINE: usize = 40;
 /// Headings farther apart than this are different ones.
 const ANOTHER_HEADING: f64 = PI / 3.0;
 
@@ -38,12 +38,14 @@ struct Search<'a> {
     params: &'a Pppr,
     loss: WindowLoss,
     next: MotionState,
+    /// Every so manyth frame is looked at.
+    every: usize,
 }
 
 impl Search<'_> {
     fn evaluate(&mut self, coordinates: &[f64]) -> f64 {
         let how = (self.problem, self.config);
-        self.window.evaluate(how, Precision::F32, (coordinates, self.params), None, &mut self.loss);
+        self.window.evaluate_some(self.every, how, Precision::F32, (coordinates, self.params), None, &mut self.loss);
         self.config.w_em * self.loss.em + self.config.w_prior * self.loss.prior
     }
 
@@ -76,8 +78,11 @@ pub(in crate::mhp) fn search(
     problem: &Problem,
     config: &FitConfig,
     params: &mut Pppr,
-) -> Result<Option<Searched>, FitError> {
-    let Some(mut window) = Window::new(problem, config, Precision::F32, params)? else { return Ok(None) };
+) -> Result<Result<Searched, Held>, FitError> {
+    let mut window = match Window::new(problem, config, Precision::F32, params)? {
+        Ok(window) => window,
+        Err(held) => return Ok(Err(held)),
+    };
     let mut coordinates = window.coordinates_of(params);
     let (stride, joints) = (window.stride, params.shape().joints.max(1));
     let walks: Vec<bool> = ways(params).iter().map(|way| way[0].hypot(way[1]) > 0.5).collect();
@@ -90,13 +95,15 @@ pub(in crate::mhp) fn search(
         params,
         loss: WindowLoss::default(),
         next: MotionState::default(),
+        every: 1,
     };
     let begun = search.evaluate(&coordinates);
     let mut answer = (begun, None);
     for person in 0..params.shape().persons {
         let own = person * stride..(person + 1) * stride;
         let hips = hips_of(problem, params, person, joints);
-        let mut all = vec![Tried { state: MotionState::at(coordinates.clone()), loss: f64::INFINITY }];
+        let begun_at = Tried { state: MotionState::at(coordinates.clone()), loss: f64::INFINITY };
+        let mut all = vec![begun_at.clone()];
         let turns: &[f64] = if walks[person] { &[0.0, PI] } else { &[0.0, 0.5 * PI, PI, 1.5 * PI] };
         for (c, hip_height) in starts.iter().take(config.starts.saturating_sub(1)) {
             for turn in turns {
@@ -111,13 +118,20 @@ pub(in crate::mhp) fn search(
                 all.push(Tried { state: MotionState::at(of), loss: f64::INFINITY });
             }
         }
-        for (steps, kept) in COARSE {
+        for (steps, kept, every) in COARSE {
+            search.every = every;
             for tried in &mut all {
+                // What was seen of fewer frames is no measure any more.
+                tried.loss = f64::INFINITY;
                 search.descend(tried, steps, true);
             }
             all.sort_by(|a, b| a.loss.total_cmp(&b.loss));
             all.truncate(kept.max(1));
         }
+        // What the start itself becomes is among those that are compared in the end.
+        let mut own_start = begun_at;
+        search.descend(&mut own_start, COARSE[0].0, true);
+        all.push(own_start);
         for tried in &mut all {
             tried.state = MotionState::at(tried.state.coordinates.clone());
             search.descend(tried, FINE, false);
@@ -133,8 +147,13 @@ pub(in crate::mhp) fn search(
         answer = (best.loss, runner_up.map(|tried| (tried.loss / best.loss - 1.0, turned(tried))));
         coordinates.clone_from(&best.state.coordinates);
     }
+    search.every = 1;
+    search.evaluate(&coordinates);
+    if super::is_unlike(config, search.loss.em) {
+        return Ok(Err(Held::Unlike));
+    }
     window.place(&coordinates, params);
-    Ok(Some(Searched { losses: [begun, answer.0], runner_up: answer.1 }))
+    Ok(Ok(Searched { losses: [begun, answer.0], runner_up: answer.1 }))
 }
 
 /// The middle of a person's hips, or of all its joints where it has none, world frame, m.

@@ -123,7 +123,7 @@ impl PoseSpace {
             let of = &row[(k + 1) * self.joints..(k + 2) * self.joints];
             for (out, of) in out.iter_mut().zip(of) {
                 for i in 0..3 {
-                    out[i] = c.mul_add(of[i], out[i]);
+                    out[i] += c * of[i];
                 }
             }
         }
@@ -143,7 +143,9 @@ impl PoseSpace {
     pub(super) fn velocity(&self, coordinates: &[f64], frame: usize, out: &mut [Vec3]) {
         self.mixed(&self.changes[frame], &coordinates[PLACE..], out);
         let turn = Turn::of(coordinates);
-        out.iter_mut().for_each(|v| *v = turn.forwards(*v));
+        for v in out.iter_mut() {
+            *v = turn.forwards(*v);
+        }
     }
 
     /// Adds to `bars` (a coordinate each) what the adjoints of a frame's joints and of their velocities imply; `pose` are the
@@ -176,7 +178,7 @@ impl PoseSpace {
             let of = &row[(k + 1) * self.joints..(k + 2) * self.joints];
             let mut sum = 0.0;
             for (of, own) in of.iter().zip(&own) {
-                sum = of[0].mul_add(own[0], of[1].mul_add(own[1], of[2].mul_add(own[2], sum)));
+                sum += of[0] * own[0] + of[1] * own[1] + of[2] * own[2];
             }
             *bar += sum;
         }

@@ -162,6 +162,11 @@ impl TermId {
         std::array::from_fn(|place| f64::from(u8::from(place == self.0)))
     }
 
+    /// Whether the fit of a window computes it, which knows more than one frame.
+    pub fn is_of_windows(self) -> bool {
+        matches!(self.evaluate, Evaluate::Window)
+    }
+
     /// Whether the objective computes it, from the maps.
     pub(super) fn is_of_maps(self) -> bool {
         matches!(self.evaluate, Evaluate::Maps)

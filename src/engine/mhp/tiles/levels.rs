@@ -1,12 +1,12 @@
 //! L_EM that compares levels, in the tiles; the mathematics is in `mhp/levels.rs`.
 
 use super::{
-    EmQuery, F32Range, Lanes, Moments, PerCell, Simd, TileGrid, Tiles, ViewLoss, cell_parts, lanes, share, splat, store,
+    EmQuery, F32Range, Moments, PerCell, Simd, TileGrid, Tiles, ViewLoss, cell_parts, lanes, share, splat, store,
 };
 use crate::config::EmLoss;
+use crate::mhp::level_rows::ln_1p;
 use crate::mhp::levels::{LevelTotals, REGULARISER};
 use crate::mhp::splat::Splat;
-use std::f32::consts::LN_2;
 use std::f64::consts::{LOG2_E, PI};
 
 /// A joint whose simulated power in a cell is less than this share of the noise is dropped there.
@@ -48,30 +48,28 @@ impl LevelTiles {
     }
 }
 
-/// Sums over cells, single precision for some tiles and double for all.
-struct CellTotals<const N: usize>([f64; N]);
-
-impl<const N: usize> CellTotals<N> {
-    /// Adds what `of` says of every register of the listed tiles.
-    #[inline(always)]
-    fn over<S: Simd>(simd: S, tiles: &[u32], mut of: impl FnMut(usize, usize) -> [Lanes<S>; N]) -> [f64; N] {
-        let mut totals = Self([0.0; N]);
-        for few in tiles.chunks(TILES_OF_F32_SUM) {
-            let mut sums = [splat(simd, 0.0); N];
+/// Sums over the cells of the listed tiles of what is said of every register of them: in single precision for some tiles and in
+/// double for all. A macro, for a closure would not be compiled for the instruction set.
+macro_rules! over_cells {
+    ($simd:ident, $count:literal, $tiles:expr, |$tile:ident, $part:ident| $values:expr) => {{
+        let mut totals = [0.0; $count];
+        for few in $tiles.chunks(TILES_OF_F32_SUM) {
+            let mut sums = [splat($simd, 0.0); $count];
             for &tile in few {
-                for part in 0..cell_parts::<S>() {
-                    let values = of(tile as usize, part);
-                    for k in 0..N {
-                        sums[k] += values[k];
+                let $tile = tile as usize;
+                for $part in 0..cell_parts::<S>() {
+                    let values = $values;
+                    for (sum, value) in sums.iter_mut().zip(values) {
+                        *sum += value;
                     }
                 }
             }
-            for k in 0..N {
-                totals.0[k] += f64::from(sums[k].reduce_sum());
+            for (total, sum) in totals.iter_mut().zip(sums) {
+                *total += f64::from(sum.reduce_sum());
             }
         }
-        totals.0
-    }
+        totals
+    }};
 }
 
 impl Tiles {
@@ -85,7 +83,7 @@ impl Tiles {
         moments: &mut Moments,
     ) -> ViewLoss {
         let (grid, totals) = (query.grid, levels.totals);
-        let mut gain = totals.gain(self.power_everywhere(query));
+        let mut gain = totals.gain(Self::power_everywhere(query));
         let mut tries = 0..GAIN_GUESSES;
         let (range, sum) = loop {
             let cut_ln = 0.5 * (totals.noise * LEAST_OF_NOISE / gain).ln();
@@ -150,7 +148,7 @@ impl Tiles {
     }
 
     /// Σ S over a plane without bounds, the joints apart from each other: a first guess of the sum over the box.
-    fn power_everywhere(&self, query: &EmQuery<'_>) -> f64 {
+    fn power_everywhere(query: &EmQuery<'_>) -> f64 {
         let of = |joint: Splat<'_>| {
             let [a, b, c] = joint.weight;
             (2.0 * joint.ln_weight).exp() / (a * b * c).sqrt()
@@ -165,7 +163,7 @@ impl Tiles {
         let Self { lit, sums, power, slopes, .. } = self;
         slopes.resize(power.len(), PerCell::ZERO);
         let zero = splat(simd, 0.0);
-        let [sum] = CellTotals::over(simd, lit, |tile, part| {
+        let [sum] = over_cells!(simd, 1, lit, |tile, part| {
             let [re, im] = &sums[tile];
             let (re, im) = (lanes(simd, re, part), lanes(simd, im, part));
             let square = if COHERENT { re.mul_add(re, im * im) } else { re };
@@ -182,7 +180,7 @@ impl Tiles {
         let Self { lit, power, slopes, .. } = self;
         let LevelTiles { measured, by_noise, base } = levels.tiles;
         let (gain, one) = (splat(simd, gain), splat(simd, 1.0));
-        let sums = CellTotals::over(simd, lit, |tile, part| {
+        let sums = over_cells!(simd, 3, lit, |tile, part| {
             let above = lanes(simd, &power[tile], part) * gain * lanes(simd, &by_noise[tile], part);
             let d = ln_1p(simd, above);
             store(&mut slopes[tile], part, d);
@@ -192,7 +190,7 @@ impl Tiles {
         let found = levels.totals.correlation(sums);
         let by_measured = splat(simd, found.by_measured as f32);
         let (by_level, mean) = (splat(simd, found.by_level as f32), splat(simd, found.mean as f32));
-        let [product] = CellTotals::over(simd, lit, |tile, part| {
+        let [product] = over_cells!(simd, 1, lit, |tile, part| {
             let (power, by_noise) = (lanes(simd, &power[tile], part), lanes(simd, &by_noise[tile], part));
             let level = lanes(simd, &base[tile], part) + lanes(simd, &slopes[tile], part) - mean;
             let by_d = lanes(simd, &measured[tile], part).mul_add(by_measured, level * by_level);
@@ -210,7 +208,7 @@ impl Tiles {
         let LevelTiles { measured, by_noise, .. } = levels.tiles;
         let (gain, one) = (splat(simd, gain), splat(simd, 1.0));
         let by_count = splat(simd, (1.0 / levels.totals.count) as f32);
-        let [sum, product] = CellTotals::over(simd, lit, |tile, part| {
+        let [sum, product] = over_cells!(simd, 2, lit, |tile, part| {
             let (power, by_noise) = (lanes(simd, &power[tile], part), lanes(simd, &by_noise[tile], part));
             let (y, i) = (power * gain * by_noise, lanes(simd, &measured[tile], part));
             let m = one / (y + one);
@@ -224,21 +222,13 @@ impl Tiles {
     #[inline(always)]
     fn hard_iou<S: Simd>(&self, simd: S, query: &EmQuery<'_>, lower: f32) -> Option<f64> {
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
-        let [both, hard] = CellTotals::over(simd, &self.lit, |tile, part| {
+        let [both, hard] = over_cells!(simd, 2, self.lit, |tile, part| {
             let above = lanes(simd, &self.power[tile], part).select_gt(splat(simd, lower), one, zero);
             [above * lanes(simd, &query.grid.target[tile], part).max(zero), above]
         });
         let both = both as usize;
         share(both, hard as usize + query.grid.marked - both)
     }
-}
-
-/// ln(1 + x) of x ≥ 0; of small x with all its digits, for a correlation of faint levels is made of them.
-#[inline(always)]
-fn ln_1p<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
-    let of = |x: f32| splat(simd, x);
-    let series = x.mul_add(x.mul_add(x.mul_add(of(-0.25), of(1.0 / 3.0)), of(-0.5)), of(1.0)) * x;
-    x.select_gt(of(0.015_625), (x + of(1.0)).log2() * of(LN_2), series)
 }
 
 impl F32Range {

@@ -1,0 +1,500 @@
+//! Levels of views with two axes whose powers add: rows of cells, each joint or point of skin in those that it reaches.
+//!
+//! Tiles (`tiles/mod.rs`) are made for masks, whose threshold lies far below the noise, and for joints that interfere. Where levels
+//! are compared, nothing matters that is nothing beside the noise: a body's points are small then, some fifteen rows of thirty
+//! cells, and what would be spent on sorting out tiles is more than their sum. Here a point goes through its rows, a register of
+//! cells at a time, forward, and once more on the way back.
+#![expect(
+    clippy::inline_always,
+    reason = "all of it belongs into the one function that is compiled for an instruction set"
+)]
+
+use super::adjoint::{Moments, Sums};
+use super::floors::ViewLoss;
+use super::lanes::{Lanes, splat};
+use super::levels::{LevelTotals, REGULARISER};
+use super::percentile::place;
+use super::splat::Splats;
+use crate::config::EmLoss;
+use pulp::{Arch, Simd, WithSimd};
+use std::f32::consts::LN_2;
+use std::f64::consts::{LOG2_E, PI};
+
+/// Cells of the widest register: rows are padded to whole ones.
+const LANES: usize = 16;
+/// log₂ of what a power changes by from a row to the next, at most: what is far from a point never comes back.
+const MOST_STEP_LOG2: f32 = 100.0;
+/// log₂ of how far the columns of a leaning point part on their way from row to row before it is begun anew: what was nothing in
+/// the first row must stay it.
+const LEG_LOG2: f64 = 12.0;
+/// log₂ below which a power is nothing in single precision.
+const FAINTEST_LOG2: f64 = -52.0;
+/// How much larger the gain may be than was guessed, and how often it is guessed.
+const GAIN_STEP: f64 = 2.0;
+const GAIN_GUESSES: usize = 24;
+
+/// What is measured over a region, in padded rows: as in `Levels`, 0 beyond the region.
+#[derive(Debug, Clone, Default)]
+pub(super) struct LevelRows {
+    lo: [usize; 2],
+    size: [usize; 2],
+    stride: usize,
+    measured: Vec<f32>,
+    by_noise: Vec<f32>,
+    base: Vec<f32>,
+    /// B_ori, 1 or 0.
+    marked: Vec<f32>,
+}
+
+/// Scratch of an evaluation.
+#[derive(Debug, Default)]
+pub(super) struct RowScratch {
+    points: Vec<RowPoint>,
+    power: Vec<f32>,
+    /// ∂L/∂(g S), and then what a joint's return is to be multiplied by.
+    slopes: Vec<f32>,
+    ranked: Vec<u32>,
+}
+
+/// A joint: its bins, 1/D, skew, and ln of its largest power, in powers of two relative to the strongest.
+#[derive(Debug, Clone, Copy, Default)]
+struct RowPoint {
+    bin: [f64; 2],
+    weight: [f64; 2],
+    skew: f64,
+    top: f64,
+}
+
+/// One evaluation, as it is asked for.
+pub(super) struct RowQuery<'a> {
+    pub(super) splats: &'a Splats,
+    pub(super) rows: &'a LevelRows,
+    pub(super) totals: &'a LevelTotals,
+    /// A return below this share of the noise is left out.
+    pub(super) least: f64,
+    /// Factor of the gradient; `None` where none is wanted.
+    pub(super) factor: Option<f64>,
+    /// Where the IoU of masks of this share, percent, is asked for.
+    pub(super) tau_pct: Option<f64>,
+}
+
+impl LevelRows {
+    /// Of these numbers a cell of the box `bins`, C order; `None` unless it has two axes.
+    pub(super) fn new(bins: &[[usize; 2]], marked: &[bool], values: [&[f64]; 3]) -> Option<Self> {
+        let [rows, columns] = bins else { return None };
+        let (lo, size) = ([rows[0], columns[0]], [rows[1] - rows[0], columns[1] - columns[0]]);
+        let stride = size[1].div_ceil(LANES) * LANES;
+        let padded = |of: &dyn Fn(usize) -> f32| -> Vec<f32> {
+            let mut padded = vec![0.0; size[0] * stride];
+            for (row, to) in padded.chunks_exact_mut(stride.max(1)).enumerate() {
+                for (column, to) in to[..size[1]].iter_mut().enumerate() {
+                    *to = of(row * size[1] + column);
+                }
+            }
+            padded
+        };
+        let [measured, by_noise, base] = values.map(|values| padded(&|cell| values[cell] as f32));
+        let marked = padded(&|cell| f32::from(u8::from(marked[cell])));
+        Some(Self { lo, size, stride, measured, by_noise, base, marked })
+    }
+}
+
+impl RowScratch {
+    /// Answers `query`, and adds to `moments` where a gradient is wanted. The IoU is `None` also where the mask's threshold lies
+    /// among cells that nothing was summed in; the flag beside it tells.
+    pub(super) fn evaluate(&mut self, query: &RowQuery<'_>, moments: &mut Moments) -> (ViewLoss, bool) {
+        Arch::new().dispatch(Evaluate { scratch: self, query, moments })
+    }
+}
+
+struct Evaluate<'a> {
+    scratch: &'a mut RowScratch,
+    query: &'a RowQuery<'a>,
+    moments: &'a mut Moments,
+}
+
+impl WithSimd for Evaluate<'_> {
+    type Output = (ViewLoss, bool);
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> (ViewLoss, bool) {
+        let Self { scratch, query, moments } = self;
+        let (rows, totals) = (query.rows, query.totals);
+        let Some(unit_log2) = scratch.fill(query.splats) else {
+            return (ViewLoss { loss: f64::NAN, iou: None }, true);
+        };
+        let unit = unit_log2.exp2();
+        // Σ over a plane without bounds, the points apart from each other, is the guess.
+        let everywhere =
+            scratch.points.iter().map(|of| of.top.exp2() / (of.weight[0] * of.weight[1]).sqrt()).sum::<f64>();
+        let mut gain = totals.gain(everywhere * PI * unit);
+        let mut tries = 0..GAIN_GUESSES;
+        let sum = loop {
+            let cut = ((totals.noise * query.least / gain).log2() - unit_log2).max(FAINTEST_LOG2);
+            scratch.sum(simd, rows, cut);
+            let sum = scratch.total(simd);
+            let found = totals.gain(sum * unit);
+            if found > GAIN_STEP * gain && cut > FAINTEST_LOG2 && tries.next().is_some() {
+                gain = found;
+                continue;
+            }
+            gain = found;
+            break sum;
+        };
+        let nobody = sum * unit < REGULARISER;
+        if nobody {
+            // What is summed is what rounding leaves.
+            scratch.power.fill(0.0);
+        }
+        let scaled = (gain * unit) as f32;
+        let (loss, through_gain) = match totals.kind {
+            EmLoss::Gamma => scratch.divergences(simd, (rows, totals), scaled),
+            EmLoss::Iou | EmLoss::NccDb => scratch.correlations(simd, (rows, totals), scaled),
+        };
+        let (iou, among) = query.tau_pct.map_or((None, true), |tau_pct| scratch.iou(rows, tau_pct));
+        if let (Some(factor), false) = (query.factor, nobody) {
+            let by_sum = 1.0 / (sum + REGULARISER / unit);
+            scratch.weigh(simd, rows, [(2.0 * factor * gain * unit) as f32, (through_gain * by_sum) as f32]);
+            let cut = ((totals.noise * query.least / gain).log2() - unit_log2).max(FAINTEST_LOG2);
+            for joint in 0..scratch.points.len() {
+                let sums = scratch.collect(simd, rows, joint, cut);
+                moments.add(joint, &sums);
+            }
+        }
+        (ViewLoss { loss, iou }, among)
+    }
+}
+
+/// The rows that a point reaches above a level, `height` above it at most.
+#[inline(always)]
+fn reached(middle: f64, height: f64, weight: f64, lo: usize, size: usize) -> (usize, usize) {
+    let half = (height / weight).max(0.0).sqrt();
+    let from = (middle - half - lo as f64).ceil().max(0.0);
+    let to = (middle + half - lo as f64).floor() + 1.0;
+    (from.min(size as f64) as usize, to.clamp(0.0, size as f64) as usize)
+}
+
+impl RowScratch {
+    /// Takes the splats in; the unit of powers, log₂, or `None` where a number is not finite.
+    fn fill(&mut self, splats: &Splats) -> Option<f64> {
+        self.points.clear();
+        let mut strongest = f64::NEG_INFINITY;
+        for of in splats.iter() {
+            let point = RowPoint {
+                bin: [of.bin[1], of.bin[2]],
+                weight: [of.weight[1] * LOG2_E, of.weight[2] * LOG2_E],
+                skew: of.skew[2],
+                top: 2.0 * of.ln_weight * LOG2_E,
+            };
+            let numbers = [point.bin[0], point.bin[1], point.weight[0], point.weight[1], point.skew, point.top];
+            if !numbers.iter().all(|x| x.is_finite()) {
+                return None;
+            }
+            strongest = strongest.max(point.top);
+            self.points.push(point);
+        }
+        self.points.iter_mut().for_each(|point| point.top -= strongest);
+        // Weights are those of log₂: a plane's sum is over them in ln.
+        strongest.is_finite().then_some(strongest)
+    }
+
+    /// Σ (AK)² of every cell.
+    #[inline(always)]
+    fn sum<S: Simd>(&mut self, simd: S, rows: &LevelRows, cut: f64) {
+        self.power.clear();
+        self.power.resize(rows.size[0] * rows.stride, 0.0);
+        let steps = steps(simd);
+        for point in &self.points {
+            let Some(reach) = point.reach(rows, cut) else { continue };
+            for register in reach.registers::<S>() {
+                let mut now = RowWalk::new(simd, point, rows, reach.rows.0, steps, register);
+                for row in reach.rows.0..reach.rows.1 {
+                    if row > reach.rows.0 && (row - reach.rows.0).is_multiple_of(reach.leg) {
+                        now = RowWalk::new(simd, point, rows, row, steps, register);
+                    }
+                    let at = row * rows.stride + register * S::F32_LANES;
+                    let (cells, _) = S::as_mut_simd_f32s(&mut self.power[at..at + S::F32_LANES]);
+                    cells[0] = (Lanes::new(simd, cells[0]) + now.returned).value;
+                    now.step();
+                }
+            }
+        }
+        // Nothing lies beyond the region.
+        for row in self.power.chunks_exact_mut(rows.stride.max(1)) {
+            row[rows.size[1]..].fill(0.0);
+        }
+    }
+
+    /// Σ of all powers.
+    #[inline(always)]
+    fn total<S: Simd>(&self, simd: S) -> f64 {
+        let mut total = 0.0;
+        for few in self.power.chunks(32 * LANES) {
+            let (cells, _) = S::as_simd_f32s(few);
+            let mut sum = splat(simd, 0.0);
+            for &cell in cells {
+                sum += Lanes::new(simd, cell);
+            }
+            total += f64::from(sum.reduce_sum());
+        }
+        total
+    }
+
+    /// `ncc_db`, ∂L/∂(g S) of each cell into `slopes`, and Σ of its product with S.
+    #[inline(always)]
+    fn correlations<S: Simd>(&mut self, simd: S, (rows, totals): (&LevelRows, &LevelTotals), gain: f32) -> (f64, f64) {
+        self.slopes.resize(self.power.len(), 0.0);
+        let (gain, one) = (splat(simd, gain), splat(simd, 1.0));
+        let mut sums = [0.0; 3];
+        let chunk = 32 * LANES;
+        for at in (0..self.power.len()).step_by(chunk) {
+            let end = (at + chunk).min(self.power.len());
+            let [power, by_noise] = [&self.power[at..end], &rows.by_noise[at..end]].map(|x| S::as_simd_f32s(x).0);
+            let [measured, base] = [&rows.measured[at..end], &rows.base[at..end]].map(|x| S::as_simd_f32s(x).0);
+            let (levels, _) = S::as_mut_simd_f32s(&mut self.slopes[at..end]);
+            let [mut d_sum, mut a_sum, mut d_d_sum] = [splat(simd, 0.0); 3];
+            for k in 0..power.len() {
+                let above = Lanes::new(simd, power[k]) * gain * Lanes::new(simd, by_noise[k]);
+                let d = ln_1p(simd, above);
+                levels[k] = d.value;
+                let base = Lanes::new(simd, base[k]);
+                d_sum += d;
+                a_sum = d.mul_add(Lanes::new(simd, measured[k]), a_sum);
+                d_d_sum = (base + base + d).mul_add(d, d_d_sum);
+            }
+            for (sum, of) in sums.iter_mut().zip([d_sum, a_sum, d_d_sum]) {
+                *sum += f64::from(of.reduce_sum());
+            }
+        }
+        let found = totals.correlation(sums);
+        let by_measured = splat(simd, found.by_measured as f32);
+        let (by_level, mean) = (splat(simd, found.by_level as f32), splat(simd, found.mean as f32));
+        let mut product = 0.0;
+        for at in (0..self.power.len()).step_by(chunk) {
+            let end = (at + chunk).min(self.power.len());
+            let [power, by_noise] = [&self.power[at..end], &rows.by_noise[at..end]].map(|x| S::as_simd_f32s(x).0);
+            let [measured, base] = [&rows.measured[at..end], &rows.base[at..end]].map(|x| S::as_simd_f32s(x).0);
+            let (slopes, _) = S::as_mut_simd_f32s(&mut self.slopes[at..end]);
+            let mut sum = splat(simd, 0.0);
+            for k in 0..power.len() {
+                let (power, by_noise) = (Lanes::new(simd, power[k]), Lanes::new(simd, by_noise[k]));
+                let level = Lanes::new(simd, base[k]) + Lanes::new(simd, slopes[k]) - mean;
+                let by_d = Lanes::new(simd, measured[k]).mul_add(by_measured, level * by_level);
+                let slope = by_d * by_noise / (power * gain).mul_add(by_noise, one);
+                slopes[k] = slope.value;
+                sum = slope.mul_add(power, sum);
+            }
+            product += f64::from(sum.reduce_sum());
+        }
+        (found.loss, product)
+    }
+
+    /// `gamma`, and the same of it.
+    #[inline(always)]
+    fn divergences<S: Simd>(&mut self, simd: S, (rows, totals): (&LevelRows, &LevelTotals), gain: f32) -> (f64, f64) {
+        self.slopes.resize(self.power.len(), 0.0);
+        let (gain, one) = (splat(simd, gain), splat(simd, 1.0));
+        let by_count = splat(simd, (1.0 / totals.count) as f32);
+        let (mut loss, mut product) = (0.0, 0.0);
+        let chunk = 32 * LANES;
+        for at in (0..self.power.len()).step_by(chunk) {
+            let end = (at + chunk).min(self.power.len());
+            let [power, by_noise] = [&self.power[at..end], &rows.by_noise[at..end]].map(|x| S::as_simd_f32s(x).0);
+            let (measured, _) = S::as_simd_f32s(&rows.measured[at..end]);
+            let (slopes, _) = S::as_mut_simd_f32s(&mut self.slopes[at..end]);
+            let [mut sum, mut product_sum] = [splat(simd, 0.0); 2];
+            for k in 0..power.len() {
+                let (power, by_noise) = (Lanes::new(simd, power[k]), Lanes::new(simd, by_noise[k]));
+                let (y, i) = (power * gain * by_noise, Lanes::new(simd, measured[k]));
+                let m = one / (y + one);
+                let slope = by_noise * m * i.neg_mul_add(m, one) * by_count;
+                slopes[k] = slope.value;
+                sum += (i * y).neg_mul_add(m, ln_1p(simd, y));
+                product_sum = slope.mul_add(power, product_sum);
+            }
+            loss += f64::from(sum.reduce_sum());
+            product += f64::from(product_sum.reduce_sum());
+        }
+        (totals.idle + loss / totals.count, product)
+    }
+
+    /// From ∂L/∂(g S) to what a return is to be multiplied by.
+    #[inline(always)]
+    fn weigh<S: Simd>(&mut self, simd: S, rows: &LevelRows, [factor, through_gain]: [f32; 2]) {
+        let (factor, through_gain) = (splat(simd, factor), splat(simd, through_gain));
+        let (slopes, _) = S::as_mut_simd_f32s(&mut self.slopes);
+        for slope in slopes {
+            *slope = ((Lanes::new(simd, *slope) - through_gain) * factor).value;
+        }
+        for row in self.slopes.chunks_exact_mut(rows.stride.max(1)) {
+            row[rows.size[1]..].fill(0.0);
+        }
+    }
+
+    /// What the cells want of a joint.
+    #[inline(always)]
+    fn collect<S: Simd>(&self, simd: S, rows: &LevelRows, joint: usize, cut: f64) -> Sums {
+        let point = &self.points[joint];
+        let zero = splat(simd, 0.0);
+        let steps = steps(simd);
+        let mut sums = [zero; 6];
+        if let Some(reach) = point.reach(rows, cut) {
+            let first = ((rows.lo[0] + reach.rows.0) as f64 - point.bin[0]) as f32;
+            for register in reach.registers::<S>() {
+                let mut now = RowWalk::new(simd, point, rows, reach.rows.0, steps, register);
+                // Σ r, Σ r Δ and Σ r Δ² over the rows, a number a column.
+                let [mut r, mut r_d, mut r_d_d] = [zero; 3];
+                let (mut delta, one) = (splat(simd, first), splat(simd, 1.0));
+                for row in reach.rows.0..reach.rows.1 {
+                    if row > reach.rows.0 && (row - reach.rows.0).is_multiple_of(reach.leg) {
+                        now = RowWalk::new(simd, point, rows, row, steps, register);
+                    }
+                    let at = row * rows.stride + register * S::F32_LANES;
+                    let (cells, _) = S::as_simd_f32s(&self.slopes[at..at + S::F32_LANES]);
+                    let wanted = now.returned * Lanes::new(simd, cells[0]);
+                    let by_delta = wanted * delta;
+                    r += wanted;
+                    r_d += by_delta;
+                    r_d_d = by_delta.mul_add(delta, r_d_d);
+                    delta += one;
+                    now.step();
+                }
+                let x = steps + splat(simd, ((rows.lo[1] + register * S::F32_LANES) as f64 - point.bin[1]) as f32);
+                let r_x = r * x;
+                sums[0] += r;
+                sums[1] += r_x;
+                sums[2] = r_x.mul_add(x, sums[2]);
+                sums[3] += r_d;
+                sums[4] = r_d.mul_add(x, sums[4]);
+                sums[5] += r_d_d;
+            }
+        }
+        let mut totals = [0.0; 6];
+        for k in 0..6 {
+            totals[k] = f64::from(sums[k].reduce_sum());
+        }
+        let [r, rx, rxx, ry, rxy, ryy] = totals;
+        Sums { r, q: 0.0, r_delta: [0.0, ry, rx], q_delta: [0.0; 3], r_delta_delta: [0.0, 0.0, ryy, 0.0, rxy, rxx] }
+    }
+
+    /// The IoU of the hard masks, and whether something was summed in the cells that their threshold lies among; elsewhere it is
+    /// not known.
+    fn iou(&mut self, rows: &LevelRows, tau_pct: f64) -> (Option<f64>, bool) {
+        self.ranked.clear();
+        for row in self.power.chunks_exact(rows.stride.max(1)) {
+            self.ranked.extend(row[..rows.size[1]].iter().map(|power| power.to_bits()));
+        }
+        let Some(last) = self.ranked.len().checked_sub(1) else { return (None, true) };
+        let (lower, _) = place(last, 100.0 - tau_pct);
+        let (_, &mut lower, _) = self.ranked.select_nth_unstable(lower);
+        let lower = f32::from_bits(lower);
+        if lower <= 0.0 {
+            return (None, false);
+        }
+        // The threshold lies between it and the next above: no cell does.
+        let (mut both, mut either) = (0_usize, 0_usize);
+        for (row, marked) in
+            self.power.chunks_exact(rows.stride.max(1)).zip(rows.marked.chunks_exact(rows.stride.max(1)))
+        {
+            for (&power, &marked) in row[..rows.size[1]].iter().zip(marked) {
+                let (sim, ori) = (power > lower, marked > 0.5);
+                both += usize::from(sim && ori);
+                either += usize::from(sim || ori);
+            }
+        }
+        (super::floors::share(both, either), true)
+    }
+}
+
+/// The rows and columns of a region in which a point is above a level, `[from, to)`.
+struct Reach {
+    rows: (usize, usize),
+    columns: (usize, usize),
+    /// Rows after which the way from row to row is begun anew.
+    leg: usize,
+}
+
+impl Reach {
+    /// The registers of a row.
+    #[inline(always)]
+    fn registers<S: Simd>(&self) -> std::ops::Range<usize> {
+        self.columns.0 / S::F32_LANES..self.columns.1.div_ceil(S::F32_LANES)
+    }
+}
+
+impl RowPoint {
+    #[inline(always)]
+    fn reach(&self, rows: &LevelRows, cut: f64) -> Option<Reach> {
+        let height = self.top - cut;
+        if height <= 0.0 {
+            return None;
+        }
+        let across = reached(self.bin[0], height, self.weight[0], rows.lo[0], rows.size[0]);
+        // The ridge leans by the skew.
+        let half = (height / self.weight[0]).sqrt() * self.skew.abs() + (height / self.weight[1]).sqrt();
+        let from = (self.bin[1] - half - rows.lo[1] as f64).ceil().max(0.0);
+        let to = ((self.bin[1] + half - rows.lo[1] as f64).floor() + 1.0).clamp(0.0, rows.size[1] as f64);
+        let columns = (from.min(rows.size[1] as f64) as usize, to as usize);
+        let beside = half + LANES as f64;
+        let leg = (LEG_LOG2 / (2.0 * self.weight[1] * self.skew.abs() * beside).max(1e-3)).max(1.0) as usize;
+        (across.0 < across.1 && columns.0 < columns.1).then_some(Reach { rows: across, columns, leg })
+    }
+}
+
+/// A point in the columns of a register, from row to row: a Gaussian becomes the next row's by a factor that itself grows by one.
+///
+/// With y the rows from the point, x the columns, the exponent is −(a y² + 2 b y x + c x²), a = w₀ + w₁ s², b = w₁ s, c = w₁: from y
+/// to y + 1 it changes by −(a (2 y + 1) + 2 b x), and that changes by −2 a.
+struct RowWalk<S: Simd> {
+    returned: Lanes<S>,
+    factor: Lanes<S>,
+    change: Lanes<S>,
+}
+
+impl<S: Simd> RowWalk<S> {
+    #[inline(always)]
+    fn new(simd: S, point: &RowPoint, rows: &LevelRows, row: usize, steps: Lanes<S>, register: usize) -> Self {
+        let y = (rows.lo[0] + row) as f64 - point.bin[0];
+        let x = steps + splat(simd, ((rows.lo[1] + register * S::F32_LANES) as f64 - point.bin[1]) as f32);
+        let [w0, w1] = point.weight;
+        let a = w0 + w1 * point.skew * point.skew;
+        let lean = splat(simd, (point.skew * y) as f32);
+        let beside = x + lean;
+        let top = splat(simd, (point.top - w0 * y * y) as f32);
+        let returned = (beside * beside).mul_add(splat(simd, -w1 as f32), top);
+        let slope = x.mul_add(splat(simd, (-2.0 * w1 * point.skew) as f32), splat(simd, (-a * (2.0 * y + 1.0)) as f32));
+        Self {
+            returned: power_of(simd, returned),
+            factor: slope.min(splat(simd, MOST_STEP_LOG2)).max(splat(simd, -MOST_STEP_LOG2)).exp2(),
+            change: splat(simd, (-2.0 * a) as f32).max(splat(simd, -MOST_STEP_LOG2)).exp2(),
+        }
+    }
+
+    #[inline(always)]
+    fn step(&mut self) {
+        self.returned = self.returned * self.factor;
+        self.factor = self.factor * self.change;
+    }
+}
+
+/// 0, 1, 2, … of a register.
+#[inline(always)]
+fn steps<S: Simd>(simd: S) -> Lanes<S> {
+    const STEPS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
+    Lanes::new(simd, S::as_simd_f32s(&STEPS).0[0])
+}
+
+/// 2ˣ, and next to nothing far below 0: no less, for denormal numbers cost a hundred cycles.
+#[inline(always)]
+fn power_of<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
+    x.max(splat(simd, -110.0)).exp2()
+}
+
+/// ln(1 + x) of x ≥ 0; of small x with all its digits, for a correlation of faint levels is made of them.
+#[inline(always)]
+pub(super) fn ln_1p<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
+    let one = splat(simd, 1.0);
+    let cube = x.mul_add(splat(simd, -0.25), splat(simd, 1.0 / 3.0));
+    let series = x.mul_add(x.mul_add(cube, splat(simd, -0.5)), one) * x;
+    x.select_gt(splat(simd, 0.015_625), (x + one).log2() * splat(simd, LN_2), series)
+}

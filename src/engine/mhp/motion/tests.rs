@@ -1,0 +1,132 @@
+#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+
+use super::*;
+use crate::body::{PpprShape, Skeleton};
+use crate::config::{BodyModel, EmLoss, Summation};
+use crate::geometry::{norm, sub};
+use crate::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
+use rand::rngs::StdRng;
+use rand::{Rng as _, SeedableRng as _};
+
+fn config() -> FitConfig {
+    FitConfig {
+        objective: EmLoss::NccDb,
+        body: BodyModel::Skin,
+        summation: Summation::Incoherent,
+        w_em: 0.7,
+        w_prior: 0.03,
+        ..FitConfig::default()
+    }
+}
+
+/// Maps of noise, a frame before and two after.
+fn problem(rng: &mut StdRng) -> Problem {
+    let axis = |kind, bins, lo, hi| Axis { kind, bins, lo, hi, spacing: Spacing::Linear };
+    let view = |array: &str, depth, across, psf| View {
+        array: array.into(),
+        quantity: Quantity::Amplitude,
+        psf,
+        pose: crate::geometry::Pose::default(),
+        axes: vec![axis(depth, 40, 5.0, 1.0), axis(across, 30, 1.6, -1.6)],
+        region: None,
+    };
+    let psf = |azimuth_rad, elevation_rad| PointSpread { range_m: 0.05, azimuth_rad, elevation_rad, doppler_mps: 0.1 };
+    let views = vec![
+        view("h", AxisKind::DepthH, AxisKind::Y, psf(0.05, 0.0)),
+        view("v", AxisKind::DepthV, AxisKind::Z, psf(0.0, 0.05)),
+    ];
+    let mut maps =
+        || -> Vec<Vec<f64>> { (0..2).map(|_| (0..1200).map(|_| rng.random_range(0.0..1.0)).collect()).collect() };
+    let own = maps();
+    let radar = RadarConfig { doppler_features: 2, ..RadarConfig::default() };
+    let skeleton = Skeleton::preset("coco17").unwrap();
+    let mut problem = Problem::new(radar, skeleton, views, &[&own[0], &own[1]]).unwrap();
+    for offset_s in [-0.1, 0.1, 0.2] {
+        let around = maps();
+        problem.add_neighbour(offset_s, &[&around[0], &around[1]]).unwrap();
+    }
+    problem
+}
+
+/// Somebody who walks, as the prior has him.
+fn person(rng: &mut StdRng, window: Option<&Window>) -> (Vec<f64>, Pppr) {
+    let mut params = Pppr::zeros(PpprShape { persons: 1, joints: 17, doppler_features: 2 });
+    for joint in 0..17 {
+        params.set_vec3(Group::Position, joint, [3.0, 0.1, 0.05 * joint as f64 - 0.4]);
+        params.set_vec3(Group::LogScale, joint, [-2.5; 3]);
+        params.joint_mut(Group::Rotation, joint)[0] = 1.0;
+    }
+    let stride = window.map_or(PLACE + 1, |window| window.stride);
+    let mut coordinates: Vec<f64> = (0..stride).map(|_| rng.random_range(-0.6..0.6)).collect();
+    coordinates[..PLACE].copy_from_slice(&[3.0, 0.1, 0.0, 0.4, 0.08]);
+    if let Some(window) = window {
+        window.place(&coordinates, &mut params);
+    }
+    (coordinates, params)
+}
+
+#[test]
+fn the_gradient_by_the_coordinates_agrees_with_central_differences() {
+    let rng = &mut StdRng::seed_from_u64(3);
+    let (problem, config) = (problem(rng), config());
+    let (_, initial) = person(rng, None);
+    let mut window = Window::new(&problem, &config, Precision::F64, &initial).unwrap().unwrap();
+    assert_eq!((window.frames.len(), window.own), (4, 1), "the frames are those within reach");
+    let (coordinates, params) = person(rng, Some(&window));
+    let mut loss = WindowLoss::default();
+    let mut value = |coordinates: &[f64], loss: &mut WindowLoss| {
+        window.evaluate((&problem, &config), Precision::F64, (coordinates, &params), None, loss);
+        config.w_em * loss.em + config.w_prior * loss.prior
+    };
+    value(&coordinates, &mut loss);
+    let gradient = loss.gradient.clone();
+    for (k, got) in gradient.iter().enumerate() {
+        let mut at = |offset: f64| {
+            let mut moved = coordinates.clone();
+            moved[k] += offset;
+            value(&moved, &mut loss)
+        };
+        let h = 1e-5;
+        let slope = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+        assert!((got - slope).abs() < 1e-6 * (1.0 + slope.abs()), "coordinate {k}: {got}, {slope} by differences");
+    }
+}
+
+#[test]
+fn coordinates_come_back_from_joints_and_velocities() {
+    let rng = &mut StdRng::seed_from_u64(5);
+    let (problem, config) = (problem(rng), config());
+    let (_, initial) = person(rng, None);
+    let window = Window::new(&problem, &config, Precision::F64, &initial).unwrap().unwrap();
+    let (_, params) = person(rng, Some(&window));
+    let mut again = params.clone();
+    window.place(&window.coordinates_of(&params), &mut again);
+    let off = (0..17).map(|joint| norm(sub(params.position(joint), again.position(joint)))).fold(0.0, f64::max);
+    assert!(off < 0.02, "a joint is {off} m away");
+}
+
+#[test]
+fn a_window_holds_its_frame_as_near_its_middle_as_it_can() {
+    let at = |offsets: &[f64], most: usize| {
+        let (frames, middle_s) = chosen(offsets, most);
+        (frames.len(), frames.iter().position(Option::is_none).unwrap(), (middle_s * 1e3).round())
+    };
+    let around = [-0.4, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4];
+    assert_eq!(at(&around, 5), (5, 2, 0.0));
+    assert_eq!(at(&around[4..], 5), (5, 0, 200.0), "the first of a sequence");
+    assert_eq!(at(&around[..4], 5), (5, 4, -200.0), "the last");
+    assert_eq!(at(&[], 5), (1, 0, 0.0));
+    assert_eq!(at(&around, 1), (1, 0, 0.0));
+    assert_eq!(at(&[-0.5, 0.5], 5), (1, 0, 0.0), "frames that the prior does not reach are left out");
+}
+
+#[test]
+fn every_skeleton_with_known_names_is_moved() {
+    let prior = MotionPrior::committed().unwrap();
+    for name in ["coco17", "h36m17", "hupr14"] {
+        assert!(PoseSpace::new(prior, &Skeleton::preset(name).unwrap(), &[0.0]).is_some(), "{name}");
+    }
+    let mut other = Skeleton::preset("coco17").unwrap();
+    other.joints[3] = "tail".into();
+    assert!(PoseSpace::new(prior, &other, &[0.0]).is_none());
+}
