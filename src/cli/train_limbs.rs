@@ -1,7 +1,7 @@
 //! `train-limbs`: makes the linear map of the limbs anew, from data sets with truth.
 
 use super::common::{print, progress_bar};
-use crate::config::{FitConfig, Limbs, Preset};
+use crate::config::{FitConfig, Limbs, Parameterization, Preset};
 use crate::dataset::Dataset;
 use crate::mhp::{LimbLesson, LimbMap, Problem, learn_limbs};
 use crate::start::{find_start, problem_alone, problem_of};
@@ -76,7 +76,13 @@ pub(super) fn run(args: &TrainLimbsArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn lessons(paths: &[PathBuf]) -> anyhow::Result<Vec<LimbLesson>> {
-    let config = FitConfig { limbs: Limbs::Posture, ..Preset::Recommended.config() };
+    let config = FitConfig {
+        limbs: Limbs::Posture,
+        parameterization: Parameterization::Bones,
+        starts: 9,
+        w_time: 8.0,
+        ..Preset::Recommended.config()
+    };
     let mut lessons = Vec::new();
     for path in paths {
         let dataset = Dataset::open(path, &Progress::new())?;

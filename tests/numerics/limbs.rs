@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test stops where its material is missing")]
 
 use mhp_inspector::body::Pppr;
-use mhp_inspector::config::{FitConfig, Limbs, Preset};
+use mhp_inspector::config::{FitConfig, Limbs, Parameterization, Preset};
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::diagnose::{majpe_mm, pa_majpe_mm};
 use mhp_inspector::geometry::{Vec3, norm, sub};
@@ -23,7 +23,13 @@ fn joints(params: &Pppr) -> Vec<Vec3> {
 /// The start with the limbs of the posture, and with those that are learned.
 fn starts(problem: &Arc<Problem>) -> [Vec<Vec3>; 2] {
     [Limbs::Posture, Limbs::Learned].map(|limbs| {
-        let config = FitConfig { limbs, ..Preset::Recommended.config() };
+        let config = FitConfig {
+            limbs,
+            parameterization: Parameterization::Bones,
+            starts: 9,
+            w_time: 8.0,
+            ..Preset::Recommended.config()
+        };
         joints(&find_start(problem, &config).unwrap().initialisation.params)
     })
 }

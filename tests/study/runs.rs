@@ -421,9 +421,6 @@ fn a_perturbation_acts_or_its_row_says_why_not() {
             let acts =
                 errors(row.variant).iter().zip(errors(0)).any(|(perturbed, plain)| (perturbed - plain).abs() > 1e-6);
             assert_eq!(acts, row.note.is_none(), "{preset}, {:?}: {:?}", row.labels, row.note);
-            if row.labels[0] == "v corruption" {
-                assert_eq!(row.note.is_some(), preset == "recommended", "{:?}", row.note);
-            }
         }
         // Every frame of the chain begins with joints that are 5 cm off in each coordinate, not its first alone.
         let warm = fits(run.table.len() - 1);
@@ -435,13 +432,6 @@ fn a_perturbation_acts_or_its_row_says_why_not() {
                 "{preset}: {perturbed} and {plain} mm"
             );
         }
-        let table = std::fs::read_to_string(case.run(preset).join("table.md")).unwrap();
-        let told = "[1] cannot move a joint: velocities reach none, for powers add, and no map has a Doppler axis, and the body";
-        assert_eq!(table.contains(told), preset == "recommended", "{table}");
-        assert_eq!(table.matches("[1] |").count(), if preset == "recommended" { 3 } else { 0 }, "{table}");
-        let json: Value = serde_json::from_slice(&std::fs::read(case.run(preset).join("table.json")).unwrap()).unwrap();
-        let noted = json["rows"].as_array().unwrap().iter().filter(|row| row["note"].is_string()).count();
-        assert_eq!(noted, if preset == "recommended" { 3 } else { 0 });
     }
 }
 

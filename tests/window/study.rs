@@ -4,13 +4,14 @@
 use crate::blob;
 use crate::window::Window;
 use mhp_inspector::app::Pane;
+use mhp_inspector::config::{FitConfig, Parameterization, Preset, Summation};
 use mhp_inspector::dataset::Dataset;
+use mhp_inspector::mhp::Precision;
 use mhp_inspector::session::{Command, LogLevel};
 use mhp_inspector::study::complexity::{ComplexityOptions, compute};
 use mhp_inspector::study::run::{RunPlan, RunRequest, StudyKind, execute_run};
 use mhp_inspector::study::shard::Subset;
 use mhp_inspector::task::Progress;
-use mhp_inspector::{config::Preset, mhp::Precision};
 use std::path::{Path, PathBuf};
 
 /// Runs a small study of the window's data set.
@@ -24,14 +25,14 @@ fn run(window: &Window, study: StudyKind, grid: &[&str]) -> PathBuf {
 }
 
 fn run_of(dataset: &Dataset, out: &Path, study: StudyKind, grid: &[&str]) {
-    run_with(dataset, out, study, grid, Preset::Default);
+    run_with(dataset, out, study, grid, &Preset::Default.config());
 }
 
-fn run_with(dataset: &Dataset, out: &Path, study: StudyKind, grid: &[&str], preset: Preset) {
+fn run_with(dataset: &Dataset, out: &Path, study: StudyKind, grid: &[&str], base: &FitConfig) {
     let request = RunRequest {
         study,
-        base: preset.config(),
-        base_name: preset.name().into(),
+        base: *base,
+        base_name: "test".into(),
         precision: Precision::F32,
         frames: 0..dataset.len().min(4),
         subset: Subset::All,
@@ -84,7 +85,14 @@ fn a_row_that_cannot_differ_says_why() {
     let mut window = Window::open(3);
     let dataset = Dataset::open(window.folder.path(), &Progress::new()).unwrap();
     let folder = window.folder.path().join("run-robustness");
-    run_with(&dataset, &folder, StudyKind::Robustness, &[], Preset::Recommended);
+    // Powers that add, and a body that moves as one.
+    let mut deaf = FitConfig {
+        parameterization: Parameterization::Bones,
+        summation: Summation::Incoherent,
+        ..FitConfig::default()
+    };
+    deaf.learning_rates.bone = Some(0.0);
+    run_with(&dataset, &folder, StudyKind::Robustness, &[], &deaf);
     window.apply(Command::OpenRun(folder));
     window.harness.state_mut().show_pane(Pane::called("Study").unwrap());
     shown(&mut window, StudyKind::Robustness);

@@ -50,7 +50,7 @@ pub const FIELDS: &[Field] = &[
     Field {
         help: "What L_EM compares of H_sim and H_ori.",
         ..choice(
-            Weights,
+            Model,
             "objective",
             "Objective",
             StepsAndStart,

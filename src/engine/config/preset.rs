@@ -1,8 +1,8 @@
 //! Settings with a name.
 
 use super::{
-    Background, Convergence, EmRegion, FitConfig, FramesAround, GradientVelocity, Height, InitConfig, LearningRates,
-    Limbs, Parameterization, Scatterers, StartPlace, Still, Summation, WarmStart, Yaw,
+    Background, BodyModel, Convergence, EmLoss, EmRegion, FitConfig, FramesAround, GradientVelocity, Height,
+    InitConfig, LearningRates, Parameterization, Scatterers, StartPlace, Still, Summation, WarmStart, Yaw,
 };
 
 /// A whole [`FitConfig`] with a name.
@@ -12,7 +12,7 @@ pub enum Preset {
     Default,
     /// The paper to the letter, as far as its words say one thing; [`super::deviations`] lists what they do not.
     Paper,
-    /// What fits best on synthetic data with truth; `study switches` tells by how much each switch helps.
+    /// What fits walkers of another simulator than this program's best; `study switches` tells by how much each switch helps.
     Recommended,
 }
 
@@ -40,7 +40,7 @@ impl Preset {
             Self::Default => "The paper's fit within 1.25 m of the person, from a start that leaves the room out",
             Self::Paper => "The paper to the letter: the whole map, the strongest cluster of peaks, one frame alone",
             Self::Recommended => {
-                "What fits synthetic data with truth best: the body moves as one, posture and place are looked for"
+                "Windows of frames fitted at once: levels instead of masks, skin, and poses that real people have; who stands among reflectors stays where the start has them"
             }
         }
     }
@@ -65,24 +65,26 @@ impl Preset {
                 ..FitConfig::default()
             },
             Self::Recommended => FitConfig {
-                parameterization: Parameterization::Bones,
+                objective: EmLoss::NccDb,
+                body: BodyModel::Skin,
+                parameterization: Parameterization::Motion,
+                // What a body can do is what the prior says.
+                w_kine: 0.0,
+                w_prior: 8e-3,
                 scatterers: Scatterers::BodyParts,
                 place: StartPlace::Counted,
                 yaw: Yaw::Motion,
                 height: Height::Floor,
-                limbs: Limbs::Learned,
                 summation: Summation::Incoherent,
                 em_region: EmRegion::HalfWidth(1.0),
                 surface_offset_m: 0.04,
-                starts: 9,
-                w_time: 8.0,
+                starts: 17,
+                iterations: 60,
+                // How bright and how wide each part is differs from person to person; points of skin have areas.
                 learning_rates: LearningRates {
-                    position: Some(2e-3),
-                    bone: Some(0.0),
-                    // How bright and how wide each part is differs from person to person and says nothing of the pose.
-                    beta: Some(1e-1),
-                    log_scale: Some(3e-2),
-                    rotation: Some(1e-2),
+                    beta: Some(0.0),
+                    log_scale: Some(0.0),
+                    rotation: Some(0.0),
                     ..LearningRates::default()
                 },
                 ..FitConfig::default()

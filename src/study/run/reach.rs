@@ -1,6 +1,6 @@
 //! Whether a perturbation can act at all under a variant's settings, told from the settings and the views.
 //!
-//! Velocities reach the joints on two ways: through the simulated map (a Doppler axis, or phases where amplitudes add) and
+//! Velocities reach the joints of a window as the motion that it begins with, and others on two ways: through the simulated map (a Doppler axis, or phases where amplitudes add) and
 //! through L_rigid, where joints move by themselves or bones turn. Peaks reach them through the start that reads them.
 
 use super::variant::StartFrom;
@@ -28,6 +28,10 @@ pub(super) fn silent(config: &FitConfig, base: &FitConfig, start: StartFrom, vie
 
 /// Why velocities do not move a joint.
 fn deaf_to_velocities(config: &FitConfig, views: &[View]) -> Option<String> {
+    if config.parameterization == Parameterization::Motion {
+        // A window begins with the motion that the start's velocities tell.
+        return None;
+    }
     let axis = views.iter().flat_map(|view| &view.axes).any(|axis| axis.kind == AxisKind::Doppler);
     let map = match config.summation {
         _ if config.w_em <= 0.0 => "the maps have no weight",
@@ -84,7 +88,13 @@ mod tests {
         let moving = [view(&[AxisKind::Range, AxisKind::Azimuth, AxisKind::Doppler])];
         let noise = |config: &mut FitConfig| config.init.velocity_noise_mps = 0.3;
         let told = |base: &FitConfig, views: &[View]| silent(&perturbed(base, noise), base, StartFrom::Cold, views);
-        let best = Preset::Recommended.config();
+        assert_eq!(told(&Preset::Recommended.config(), &flat), None, "a window begins with velocities");
+        let mut best = FitConfig {
+            parameterization: Parameterization::Bones,
+            summation: Summation::Incoherent,
+            ..FitConfig::default()
+        };
+        best.learning_rates.bone = Some(0.0);
         let why = told(&best, &flat).unwrap_or_default();
         assert!(why.contains("powers add, and no map has a Doppler axis") && why.contains("moves as one"), "{why}");
         assert_eq!(told(&best, &moving), None, "a Doppler axis shows velocities");

@@ -1,10 +1,13 @@
 //! The settings in which the presets differ, one place: the rows of the study `switches` are made from the table of settings.
 
 use super::variant::{StartFrom, Variant};
-use crate::config::{FIELDS, Field, FitConfig, Preset};
+use crate::config::{EmLoss, FIELDS, Field, FitConfig, Limbs, Preset};
 
 /// The order of the rows in the runs that exist; a row that is not named here follows in the order of the table of settings.
 const ORDER: &[&str] = &[
+    "objective",
+    "body",
+    "motion",
     "bones turn",
     "scales and opacities by body part",
     "skin in front of the joints",
@@ -58,7 +61,10 @@ fn switches() -> Vec<Switch> {
 type Change = fn(&mut FitConfig);
 
 /// What no preset has, but could help: a name and what it sets on top of `recommended`.
-const EXTRAS: &[(&str, Change)] = &[("limbs that turn", |config| config.learning_rates.bone = Some(1e-3))];
+const EXTRAS: &[(&str, Change)] = &[
+    ("the likelihood of speckle", |config| config.objective = EmLoss::Gamma),
+    ("limbs as learned", |config| config.limbs = Limbs::Learned),
+];
 
 /// What a configuration becomes with one part of another; `None` where both have it alike.
 fn with(base: &FitConfig, other: &FitConfig, switch: &Switch) -> Option<FitConfig> {
