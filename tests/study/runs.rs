@@ -202,7 +202,7 @@ fn every_study_has_its_rows_and_no_row_is_without_reason() {
     let case = Case::new();
     // A file that cannot be read is a row with its reason, under every variant.
     std::fs::write(case.data().join("frames/easy/001.npz"), b"PK nonsense").unwrap();
-    let studies: [(&[&str], usize); 8] = [
+    let studies: [(&[&str], usize); 9] = [
         (&["complexity"], 4),
         (&["robustness", "--all"], 11),
         (&["operators"], 5),
@@ -210,6 +210,7 @@ fn every_study_has_its_rows_and_no_row_is_without_reason() {
         (&["weights"], 5),
         (&["init"], 3),
         (&["switches"], 3),
+        (&["truth"], 2),
         (&["sweep", "--grid", "w_em=0.1,1", "--grid", "tau_pct=5,10,20"], 6),
     ];
     for (k, (words, rows)) in studies.into_iter().enumerate() {
@@ -227,7 +228,10 @@ fn every_study_has_its_rows_and_no_row_is_without_reason() {
         for row in found.iter().filter(|row| row["stratum"].is_null()) {
             assert_eq!((&row["frames"], &row["failed"]), (&3.into(), &1.into()), "{words:?}");
             assert!(row["majpe_mm"]["mean"].as_f64().unwrap() > 0.0);
-            assert!(row["init_majpe_mm"]["mean"].as_f64().unwrap() > 0.0);
+            let start = row["init_majpe_mm"]["mean"].as_f64().unwrap();
+            let of_truth = row["labels"][0] == "truth";
+            assert!(if of_truth { start == 0.0 } else { start > 0.0 }, "{words:?}: {start}");
+            assert_eq!(row["share_below_truth"].is_number(), words[0] == "truth" && !of_truth);
             assert!(row["converged_share"].is_number() && row["share_improved"].is_number());
         }
         let run = Run::read(&case.run(&out)).unwrap();

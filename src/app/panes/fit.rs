@@ -34,6 +34,8 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let old = shared.session.config;
         let mut config = old;
+        presets(ui, &mut config);
+        ui.separator();
         settings(ui, FieldGroup::Weights, &mut config);
         ui.separator();
         ui.scope(|ui| numbers(ui, shared));
@@ -218,8 +220,6 @@ fn sections(ui: &mut Ui, shared: &mut Shared<'_>, config: &mut FitConfig) {
             }
         });
     }
-    ui.add_space(4.0);
-    presets(ui, config);
 }
 
 /// How fits are run: no settings of a fit, and in no `FIT.toml`.
@@ -253,12 +253,12 @@ fn ways(ui: &mut Ui, shared: &mut Shared<'_>) {
     }
 }
 
-/// Every setting at once, by name; what each name stands for beside it.
+/// Every setting at once, by name, above everything whose height depends on the fit: no button moves under the pointer.
 fn presets(ui: &mut Ui, config: &mut FitConfig) {
     let tokens = Tokens::of(ui);
-    ui.label("Preset").on_hover_text("All settings at once.");
-    for preset in Preset::ALL {
-        ui.horizontal_wrapped(|ui| {
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Preset").color(tokens.dim)).on_hover_text("All settings at once.");
+        for preset in Preset::ALL {
             let button = ui.selectable_label(*config == preset.config(), preset.name());
             let button = button.named(egui::Role::Button, &format!("Preset {}", preset.name()));
             let tip = match difference(config, &preset.config()) {
@@ -268,9 +268,11 @@ fn presets(ui: &mut Ui, config: &mut FitConfig) {
             if button.on_hover_text(tip).clicked() {
                 *config = preset.config();
             }
-            ui.label(RichText::new(preset.help()).small().color(tokens.dim));
-        });
-    }
+        }
+    });
+    let chosen = Preset::ALL.into_iter().find(|preset| *config == preset.config());
+    let what = chosen.map_or("Settings of your own; a preset sets them all", Preset::help);
+    ui.add(egui::Label::new(RichText::new(what).small().color(tokens.dim)).truncate());
 }
 
 #[cfg(all(test, feature = "dummies"))]

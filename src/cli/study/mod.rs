@@ -55,6 +55,9 @@ pub enum StudyCommand {
     Switches(run::RunArgs),
     /// How often the number of people is right, by number and weighted by 91, 8 and 1 %; speed in timing.md.
     Counting(run::RunArgs),
+    /// Fits from the annotated joints beside fits from the program's own start: how far the fit leaves the truth, and in how
+    /// many frames the loss prefers where it ends by itself.
+    Truth(run::RunArgs),
     /// Any grid over the configuration: numbers, switches and choices.
     #[command(after_long_help = crate::config::listing())]
     Sweep(run::SweepArgs),
@@ -76,6 +79,7 @@ pub(super) fn run(command: &StudyCommand) -> anyhow::Result<ExitCode> {
         StudyCommand::Budget(args) => run::run(Kind::Budget, args, None, &[]),
         StudyCommand::Switches(args) => run::run(Kind::Switches, args, None, &[]),
         StudyCommand::Counting(args) => run::run(Kind::Counting, args, None, &[]),
+        StudyCommand::Truth(args) => run::run(Kind::Truth, args, None, &[]),
         StudyCommand::Sweep(args) => run::run(Kind::Sweep, &args.run, None, &args.grid),
     }
 }

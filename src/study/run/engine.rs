@@ -8,6 +8,7 @@ use super::fit::{LoadedFrame, Stop, TimedStart, fit_key};
 use super::journal::{Rows, RunJournal};
 use super::plan::{RunPlan, Unit};
 use super::row::{RunNumbers, RunRow};
+use super::variant::StartFrom;
 use crate::body::Pppr;
 use crate::dataset::{Dataset, read_pppr, write_pppr};
 use crate::task::{Progress, panic_as_error};
@@ -112,7 +113,11 @@ impl Engine<'_> {
         let Some(&first) = missing.first() else { return Ok(()) };
         let started = panic_as_error(|| {
             let loaded = LoadedFrame::read(self.dataset, frame)?;
-            let start = loaded.cold(&self.plan.spec.variants[first].config)?;
+            let variant = &self.plan.spec.variants[first];
+            let start = match variant.start {
+                StartFrom::Truth => loaded.from_truth(&variant.config)?,
+                StartFrom::Cold | StartFrom::Warm => loaded.cold(&variant.config)?,
+            };
             Ok((loaded, start))
         });
         match started {

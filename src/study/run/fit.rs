@@ -74,6 +74,29 @@ impl<'a> LoadedFrame<'a> {
         Ok(TimedStart { params: found.params, unrefined: found.unrefined, init_ms: Some(milliseconds(began)) })
     }
 
+    /// A start at the annotated joints: as many persons as are annotated, who look as those of a cold start and move as the
+    /// truth says, or as a cold start says where it tells positions alone.
+    ///
+    /// # Errors
+    /// Where the frame has no joints in 3-D, or one of them is not finite.
+    pub(super) fn from_truth(&self, config: &FitConfig) -> Result<TimedStart, String> {
+        let truth = self.frame.truth.as_ref().filter(|truth| truth.persons > 0);
+        let truth = truth.ok_or_else(|| self.told(&"no joints in 3-D are annotated, which this study starts from"))?;
+        if !truth.joints.iter().flatten().all(|x| x.is_finite()) {
+            return Err(self.told(&"an annotated joint is not finite"));
+        }
+        let mut params = self.cold(&FitConfig { people: truth.persons, ..*config })?.params;
+        let [positions, velocities] = params.motion_mut();
+        if positions.len() != truth.joints.len() {
+            return Err(self.told(&format!("{} joints are annotated, {} fitted", truth.joints.len(), positions.len())));
+        }
+        positions.copy_from_slice(&truth.joints);
+        if let Some(known) = &truth.velocities {
+            velocities.copy_from_slice(known);
+        }
+        Ok(TimedStart { unrefined: params.clone(), params, init_ms: None })
+    }
+
     /// A start from what the frame before ended with, moved as its people moved and perturbed as a cold one is.
     pub(super) fn warm(&self, config: &FitConfig, before: &Pppr) -> TimedStart {
         let params = predict(&self.problem, config, before);

@@ -24,13 +24,15 @@ pub enum StudyKind {
     Switches,
     /// How often the number of people is right.
     Counting,
+    /// Fits from the truth beside fits from the program's own start.
+    Truth,
     /// Any grid over the configuration.
     Sweep,
 }
 
 impl StudyKind {
     /// Every study.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Complexity,
         Self::Robustness,
         Self::Operators,
@@ -40,6 +42,7 @@ impl StudyKind {
         Self::Budget,
         Self::Switches,
         Self::Counting,
+        Self::Truth,
         Self::Sweep,
     ];
 
@@ -55,6 +58,7 @@ impl StudyKind {
             Self::Budget => "budget",
             Self::Switches => "switches",
             Self::Counting => "counting",
+            Self::Truth => "truth",
             Self::Sweep => "sweep",
         }
     }
@@ -71,6 +75,7 @@ impl StudyKind {
             Self::Budget => "Iteration budget",
             Self::Switches => "Switches of the presets",
             Self::Counting => "Counting people",
+            Self::Truth => "Whether the loss knows the truth",
             Self::Sweep => "Sweep over the configuration",
         }
     }

@@ -50,6 +50,7 @@ fn columns<'a>(spec: &'a RunSpec, rows: &[TableRow]) -> Vec<Column<'a>> {
         let cell = move |row: &TableRow| row.labels.get(k).map(|label| escaped(label));
         columns.push(Column { head: escaped(head), cell: Box::new(cell), optional: false });
     }
+    let of_truth = spec.study == StudyKind::Truth;
     let mut add = |head: &str, optional: bool, cell: Cell<'a>| {
         columns.push(Column { head: head.to_owned(), cell, optional });
     };
@@ -75,10 +76,13 @@ fn columns<'a>(spec: &'a RunSpec, rows: &[TableRow]) -> Vec<Column<'a>> {
         return columns;
     }
     add("MAJPE, mm", false, Box::new(|row| spread(row.majpe_mm, 1)));
+    add("median, mm", true, Box::new(|row| row.median_majpe_mm.map(|x| format!("{x:.1}"))));
     add("PA-MAJPE, mm", false, Box::new(|row| spread(row.pa_majpe_mm, 1)));
     add("start MAJPE, mm", true, Box::new(|row| spread(row.init_majpe_mm, 1)));
     add("start PA-MAJPE, mm", true, Box::new(|row| spread(row.init_pa_majpe_mm, 1)));
     add("better than start", true, Box::new(|row| percent(row.share_improved)));
+    add("loss", true, Box::new(move |row| spread(row.loss.filter(|_| of_truth), 4)));
+    add("loss below truth's", true, Box::new(|row| percent(row.share_below_truth)));
     add("IoU", false, Box::new(|row| spread(row.iou, 3)));
     add("converged", false, Box::new(|row| percent(row.converged_share)));
     add("reprojection, px", true, Box::new(|row| spread(row.reprojection_px, 1)));

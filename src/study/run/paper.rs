@@ -42,7 +42,7 @@ impl PaperSet {
                 &Self::ALL[..1]
             }
             StudyKind::Threshold | StudyKind::Weights | StudyKind::Init => &Self::ALL,
-            StudyKind::Budget | StudyKind::Switches | StudyKind::Sweep => &[],
+            StudyKind::Budget | StudyKind::Switches | StudyKind::Truth | StudyKind::Sweep => &[],
         }
     }
 

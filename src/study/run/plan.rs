@@ -148,12 +148,12 @@ fn units(dataset: &Dataset, spec: &RunSpec, frames: &[usize]) -> Vec<Unit> {
     units
 }
 
-/// Cold variants that start alike, in the order of the table.
+/// Variants that start alike and from no frame before, in the order of the table.
 fn cold_groups(spec: &RunSpec) -> Vec<Vec<usize>> {
-    let mut groups: Vec<(FitConfig, Vec<usize>)> = Vec::new();
-    let cold = |variant: &Variant| variant.start == StartFrom::Cold && variant.method == Method::Fit;
-    for (k, variant) in spec.variants.iter().enumerate().filter(|(_, variant)| cold(variant)) {
-        let key = start_key(&variant.config);
+    let mut groups: Vec<((StartFrom, FitConfig), Vec<usize>)> = Vec::new();
+    let alone = |variant: &Variant| variant.start != StartFrom::Warm && variant.method == Method::Fit;
+    for (k, variant) in spec.variants.iter().enumerate().filter(|(_, variant)| alone(variant)) {
+        let key = (variant.start, start_key(&variant.config));
         match groups.iter_mut().find(|(other, _)| *other == key) {
             Some((_, group)) => group.push(k),
             None => groups.push((key, vec![k])),

@@ -45,6 +45,7 @@ pub(super) fn compared(
         StudyKind::Budget => named(&["start", "iterations"], budget(base)),
         StudyKind::Switches => named(&["preset", "change"], switches::variants(base)),
         StudyKind::Counting => named(&["method"], counting(base, set)),
+        StudyKind::Truth => named(&["start"], truth(base)),
         StudyKind::Sweep => Compared {
             columns: axes.iter().map(|axis| axis.key.clone()).collect(),
             variants: grid::variants(base, axes)?,
@@ -150,6 +151,11 @@ fn counting(base: &FitConfig, set: Option<PaperSet>) -> Vec<Variant> {
     vec![row("CFAR + DBSCAN + MLP", Method::Counter, 0.994), row("MLP alone", Method::Alone, 0.946)]
 }
 
+/// Every row from the truth follows the one from the program's own start that it is compared with ([`super::table`]).
+fn truth(base: &FitConfig) -> Vec<Variant> {
+    vec![Variant::cold(["own"], base), Variant::cold(["truth"], base).from_truth()]
+}
+
 fn budget(base: &FitConfig) -> Vec<Variant> {
     let row = |start: &str, iterations: usize| {
         Variant::cold([start.to_owned(), iterations.to_string()], &FitConfig { iterations, ..*base })
@@ -179,6 +185,7 @@ mod tests {
             (StudyKind::Init, 3, 3),
             (StudyKind::Budget, 16, 0),
             (StudyKind::Counting, 2, 2),
+            (StudyKind::Truth, 2, 0),
         ];
         for (kind, all, of_paper) in counts {
             let rows = rows(kind);

@@ -9,7 +9,7 @@ use super::kind::StudyKind;
 use super::paper::{self, PaperSet};
 use super::row::{RunNumbers, RunRow};
 use super::spec::RunSpec;
-use super::variant::{Method, PaperRow};
+use super::variant::{Method, PaperRow, StartFrom};
 use crate::people::{CLASSES, Confusion};
 use crate::study::complexity::Stratum;
 use serde::Serialize;
@@ -77,6 +77,9 @@ pub struct TableRow {
     pub count_mismatched: usize,
     /// MAJPE, mm.
     pub majpe_mm: Option<Spread>,
+    /// The median of MAJPE, mm, where starts are compared with the truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub median_majpe_mm: Option<f64>,
     /// PA-MAJPE, mm.
     pub pa_majpe_mm: Option<Spread>,
     /// MAJPE of the start, mm.
@@ -85,6 +88,9 @@ pub struct TableRow {
     pub init_pa_majpe_mm: Option<Spread>,
     /// Share of frames whose fit is nearer to truth than its start, 0..1.
     pub share_improved: Option<f64>,
+    /// Share of frames whose loss ends below that of the fit from the truth, 0..1: there the loss prefers another pose.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub share_below_truth: Option<f64>,
     /// Forward-consistency IoU, mean over views, 0..1.
     pub iou: Option<Spread>,
     /// Share of frames that met the convergence criterion, 0..1.
@@ -137,7 +143,8 @@ pub(super) fn table(spec: &RunSpec, all_rows: &Rows) -> Vec<TableRow> {
             let paper = variant.paper.filter(|_| PaperSet::beside(spec.study, &spec.data.layout).is_some());
             if variant.method == Method::Fit {
                 let note = variant.note.clone().or_else(|| unmoved(spec, &rows, all_rows));
-                TableRow { paper, note, ..summed(variant.labels.clone(), k, &rows) }
+                let row = TableRow { paper, note, ..summed(variant.labels.clone(), k, &rows) };
+                if spec.study == StudyKind::Truth { beside_truth(row, spec, &rows, all_rows) } else { row }
             } else {
                 TableRow { paper, ..counted_right(variant.labels.clone(), k, &rows) }
             }
@@ -156,6 +163,27 @@ pub(super) fn table(spec: &RunSpec, all_rows: &Rows) -> Vec<TableRow> {
         }
     });
     of_stratum.collect()
+}
+
+/// The row with its median, and with how often its loss ends lower than the one from the truth does.
+fn beside_truth(row: TableRow, spec: &RunSpec, rows: &[&RunRow], all_rows: &Rows) -> TableRow {
+    let matched = |row: &RunRow| row.fit.as_ref().ok().filter(|fit| fit.count_matched()).cloned();
+    let mut errors: Vec<f64> = rows.iter().filter_map(|row| matched(row)?.majpe_mm).collect();
+    errors.sort_by(f64::total_cmp);
+    let middle = |k: usize| errors.get(k).copied();
+    let median = match errors.len() {
+        0 => None,
+        n if n % 2 == 1 => middle(n / 2),
+        n => middle(n / 2 - 1).zip(middle(n / 2)).map(|(a, b)| f64::midpoint(a, b)),
+    };
+    let truth = spec.variants.iter().position(|variant| variant.start == StartFrom::Truth);
+    let below = |row: &&RunRow| {
+        let of_truth = matched(all_rows.get(&(truth?, row.frame))?)?;
+        Some(matched(row)?.loss < of_truth.loss)
+    };
+    let below: Vec<bool> = rows.iter().filter(|row| Some(row.variant) != truth).filter_map(below).collect();
+    let share = below.iter().filter(|&&yes| yes).count() as f64 / below.len().max(1) as f64;
+    TableRow { median_majpe_mm: median, share_below_truth: (!below.is_empty()).then_some(share), ..row }
 }
 
 /// Where a perturbed start, against the settings, left every frame exactly as it is without.
@@ -183,10 +211,12 @@ fn summed(labels: Vec<String>, variant: usize, rows: &[&RunRow]) -> TableRow {
         failed: rows.len() - fitted.len(),
         count_mismatched: fitted.len() - used.len(),
         majpe_mm: spread(|fit| fit.majpe_mm),
+        median_majpe_mm: None,
         pa_majpe_mm: spread(|fit| fit.pa_majpe_mm),
         init_majpe_mm: spread(|fit| fit.init_majpe_mm),
         init_pa_majpe_mm: spread(|fit| fit.init_pa_majpe_mm),
         share_improved: share(used.iter().filter_map(|fit| fit.improved()).collect()),
+        share_below_truth: None,
         iou: spread(RunNumbers::mean_iou),
         converged_share: share(used.iter().map(|fit| fit.converged).collect()),
         loss: spread(|fit| Some(fit.loss)),

@@ -12,6 +12,8 @@ pub enum StartFrom {
     Cold,
     /// The result of the frame before, where both are of one sequence.
     Warm,
+    /// The annotated joints.
+    Truth,
 }
 
 /// What is done with a frame.
@@ -105,6 +107,11 @@ impl Variant {
     /// The same from the frames before.
     pub(super) fn warm(self) -> Self {
         Self { start: StartFrom::Warm, ..self }
+    }
+
+    /// The same from the annotated joints.
+    pub(super) fn from_truth(self) -> Self {
+        Self { start: StartFrom::Truth, ..self }
     }
 
     /// With the paper's figures, where it has any.

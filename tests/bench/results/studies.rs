@@ -3,8 +3,18 @@
 use super::bed::Bed;
 use std::path::Path;
 
-const STUDIES: [&str; 9] =
-    ["complexity", "robustness", "operators", "threshold", "weights", "init", "budget", "switches", "counting"];
+const STUDIES: [&str; 10] = [
+    "complexity",
+    "robustness",
+    "operators",
+    "threshold",
+    "weights",
+    "init",
+    "budget",
+    "switches",
+    "counting",
+    "truth",
+];
 
 /// The lines of a run's `table.md` that are a table.
 pub(crate) fn tables_of(run: &Path) -> String {
