@@ -115,7 +115,7 @@ impl Engine<'_> {
             let loaded = LoadedFrame::read(self.dataset, frame)?;
             let variant = &self.plan.spec.variants[first];
             let start = match variant.start {
-                StartFrom::Truth => loaded.from_truth(&variant.config)?,
+                StartFrom::Truth => loaded.truth_start(&variant.config)?,
                 StartFrom::Cold | StartFrom::Warm => loaded.cold(&variant.config)?,
             };
             Ok((loaded, start))

@@ -79,7 +79,7 @@ impl<'a> LoadedFrame<'a> {
     ///
     /// # Errors
     /// Where the frame has no joints in 3-D, or one of them is not finite.
-    pub(super) fn from_truth(&self, config: &FitConfig) -> Result<TimedStart, String> {
+    pub(super) fn truth_start(&self, config: &FitConfig) -> Result<TimedStart, String> {
         let truth = self.frame.truth.as_ref().filter(|truth| truth.persons > 0);
         let truth = truth.ok_or_else(|| self.told(&"no joints in 3-D are annotated, which this study starts from"))?;
         if !truth.joints.iter().flatten().all(|x| x.is_finite()) {

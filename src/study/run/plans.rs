@@ -153,7 +153,7 @@ fn counting(base: &FitConfig, set: Option<PaperSet>) -> Vec<Variant> {
 
 /// Every row from the truth follows the one from the program's own start that it is compared with ([`super::table`]).
 fn truth(base: &FitConfig) -> Vec<Variant> {
-    vec![Variant::cold(["own"], base), Variant::cold(["truth"], base).from_truth()]
+    vec![Variant::cold(["own"], base), Variant::cold(["truth"], base).started_at_truth()]
 }
 
 fn budget(base: &FitConfig) -> Vec<Variant> {

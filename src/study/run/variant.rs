@@ -110,7 +110,7 @@ impl Variant {
     }
 
     /// The same from the annotated joints.
-    pub(super) fn from_truth(self) -> Self {
+    pub(super) fn started_at_truth(self) -> Self {
         Self { start: StartFrom::Truth, ..self }
     }
 
