@@ -3,7 +3,7 @@
 //! Tiles (`tiles/mod.rs`) are made for masks, whose threshold lies far below the noise, and for joints that interfere. Where levels
 //! are compared, nothing matters that is nothing beside the noise: a body's points are small then, some fifteen rows of thirty
 //! cells, and what would be spent on sorting out tiles is more than their sum. Here a point goes through its rows, a register of
-//! cells at a time, forward, and once more on the way back.
+//! cells at a time; what it returns there is kept for the way back.
 #![expect(
     clippy::inline_always,
     reason = "all of it belongs into the one function that is compiled for an instruction set"
@@ -22,13 +22,10 @@ use std::f64::consts::{LOG2_E, PI};
 
 /// Cells of the widest register: rows are padded to whole ones.
 const LANES: usize = 16;
-/// log₂ of what a power changes by from a row to the next, at most: what is far from a point never comes back.
-const MOST_STEP_LOG2: f32 = 100.0;
-/// log₂ of how far the columns of a leaning point part on their way from row to row before it is begun anew: what was nothing in
-/// the first row must stay it.
-const LEG_LOG2: f64 = 12.0;
 /// log₂ below which a power is nothing in single precision.
 const FAINTEST_LOG2: f64 = -52.0;
+/// 2 to less than this is 0: denormal numbers, also of products, cost a hundred cycles.
+const FAINTEST_EXPONENT: f32 = -64.0;
 /// How much larger the gain may be than was guessed, and how often it is guessed.
 const GAIN_STEP: f64 = 2.0;
 const GAIN_GUESSES: usize = 24;
@@ -50,6 +47,9 @@ pub(super) struct LevelRows {
 #[derive(Debug, Default)]
 pub(super) struct RowScratch {
     points: Vec<RowPoint>,
+    /// Where each point reaches, and what it returns there: a register of columns after the other, row by row.
+    reaches: Vec<Reach>,
+    returns: Vec<f32>,
     power: Vec<f32>,
     /// ∂L/∂(g S), and then what a joint's return is to be multiplied by.
     slopes: Vec<f32>,
@@ -155,9 +155,8 @@ impl WithSimd for Evaluate<'_> {
         if let (Some(factor), false) = (query.factor, nobody) {
             let by_sum = 1.0 / (sum + REGULARISER / unit);
             scratch.weigh(simd, rows, [(2.0 * factor * gain * unit) as f32, (through_gain * by_sum) as f32]);
-            let cut = ((totals.noise * query.least / gain).log2() - unit_log2).max(FAINTEST_LOG2);
             for joint in 0..scratch.points.len() {
-                let sums = scratch.collect(simd, rows, joint, cut);
+                let sums = scratch.collect(simd, rows, joint);
                 moments.add(joint, &sums);
             }
         }
@@ -203,20 +202,43 @@ impl RowScratch {
     fn sum<S: Simd>(&mut self, simd: S, rows: &LevelRows, cut: f64) {
         self.power.clear();
         self.power.resize(rows.size[0] * rows.stride, 0.0);
-        let steps = steps(simd);
-        for point in &self.points {
-            let Some(reach) = point.reach(rows, cut) else { continue };
+        let Self { points, reaches, returns, power, .. } = self;
+        reaches.clear();
+        let mut kept = 0;
+        for point in points.iter() {
+            let reach = point.reach(rows, cut, kept);
+            kept += (reach.rows.1 - reach.rows.0) * reach.registers::<S>().len() * S::F32_LANES;
+            reaches.push(reach);
+        }
+        if returns.len() < kept {
+            returns.resize(kept, 0.0);
+        }
+        let (stride, lo) = (rows.stride, rows.lo);
+        let (steps, faintest, zero) = (steps(simd), splat(simd, FAINTEST_EXPONENT), splat(simd, 0.0));
+        for (point, reach) in points.iter().zip(reaches.iter()) {
+            let numbers = [point.skew, point.weight[0], point.weight[1], point.top].map(|x| x as f32);
+            let [skew, w0] = [numbers[0], numbers[1]];
+            let (w1, top) = (splat(simd, -numbers[2]), numbers[3]);
+            let first = ((lo[0] + reach.rows.0) as f64 - point.bin[0]) as f32;
+            let count = reach.rows.1 - reach.rows.0;
+            let mut at = reach.kept;
             for register in reach.registers::<S>() {
-                let mut now = RowWalk::new(simd, point, rows, reach.rows.0, steps, register);
-                for row in reach.rows.0..reach.rows.1 {
-                    if row > reach.rows.0 && (row - reach.rows.0).is_multiple_of(reach.leg) {
-                        now = RowWalk::new(simd, point, rows, row, steps, register);
-                    }
-                    let at = row * rows.stride + register * S::F32_LANES;
-                    let (cells, _) = S::as_mut_simd_f32s(&mut self.power[at..at + S::F32_LANES]);
-                    cells[0] = (Lanes::new(simd, cells[0]) + now.returned).value;
-                    now.step();
+                let column = register * S::F32_LANES;
+                let x = steps + splat(simd, ((lo[1] + column) as f64 - point.bin[1]) as f32);
+                let mut y = first;
+                let kept = returns[at..at + count * S::F32_LANES].chunks_exact_mut(S::F32_LANES);
+                let cells = power[reach.rows.0 * stride..reach.rows.1 * stride].chunks_exact_mut(stride);
+                for (to, row) in kept.zip(cells) {
+                    let beside = x + splat(simd, skew * y);
+                    let ln = (beside * beside).mul_add(w1, splat(simd, top - w0 * y * y));
+                    let returned = ln.select_gt(faintest, ln.max(faintest).exp2(), zero);
+                    let (to, _) = S::as_mut_simd_f32s(to);
+                    to[0] = returned.value;
+                    let (cells, _) = S::as_mut_simd_f32s(&mut row[column..column + S::F32_LANES]);
+                    cells[0] = (Lanes::new(simd, cells[0]) + returned).value;
+                    y += 1.0;
                 }
+                at += count * S::F32_LANES;
             }
         }
         // Nothing lies beyond the region.
@@ -333,41 +355,39 @@ impl RowScratch {
 
     /// What the cells want of a joint.
     #[inline(always)]
-    fn collect<S: Simd>(&self, simd: S, rows: &LevelRows, joint: usize, cut: f64) -> Sums {
-        let point = &self.points[joint];
-        let zero = splat(simd, 0.0);
+    fn collect<S: Simd>(&self, simd: S, rows: &LevelRows, joint: usize) -> Sums {
+        let (point, reach) = (&self.points[joint], &self.reaches[joint]);
+        let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
         let steps = steps(simd);
         let mut sums = [zero; 6];
-        if let Some(reach) = point.reach(rows, cut) {
-            let first = ((rows.lo[0] + reach.rows.0) as f64 - point.bin[0]) as f32;
-            for register in reach.registers::<S>() {
-                let mut now = RowWalk::new(simd, point, rows, reach.rows.0, steps, register);
-                // Σ r, Σ r Δ and Σ r Δ² over the rows, a number a column.
-                let [mut r, mut r_d, mut r_d_d] = [zero; 3];
-                let (mut delta, one) = (splat(simd, first), splat(simd, 1.0));
-                for row in reach.rows.0..reach.rows.1 {
-                    if row > reach.rows.0 && (row - reach.rows.0).is_multiple_of(reach.leg) {
-                        now = RowWalk::new(simd, point, rows, row, steps, register);
-                    }
-                    let at = row * rows.stride + register * S::F32_LANES;
-                    let (cells, _) = S::as_simd_f32s(&self.slopes[at..at + S::F32_LANES]);
-                    let wanted = now.returned * Lanes::new(simd, cells[0]);
-                    let by_delta = wanted * delta;
-                    r += wanted;
-                    r_d += by_delta;
-                    r_d_d = by_delta.mul_add(delta, r_d_d);
-                    delta += one;
-                    now.step();
-                }
-                let x = steps + splat(simd, ((rows.lo[1] + register * S::F32_LANES) as f64 - point.bin[1]) as f32);
-                let r_x = r * x;
-                sums[0] += r;
-                sums[1] += r_x;
-                sums[2] = r_x.mul_add(x, sums[2]);
-                sums[3] += r_d;
-                sums[4] = r_d.mul_add(x, sums[4]);
-                sums[5] += r_d_d;
+        let first = splat(simd, ((rows.lo[0] + reach.rows.0) as f64 - point.bin[0]) as f32);
+        let (mut at, count) = (reach.kept, reach.rows.1 - reach.rows.0);
+        for register in reach.registers::<S>() {
+            // Σ r, Σ r Δ and Σ r Δ² over the rows, a number a column.
+            let [mut r, mut r_d, mut r_d_d] = [zero; 3];
+            let mut delta = first;
+            let column = register * S::F32_LANES;
+            let kept = self.returns[at..at + count * S::F32_LANES].chunks_exact(S::F32_LANES);
+            let cells = self.slopes[reach.rows.0 * rows.stride..reach.rows.1 * rows.stride].chunks_exact(rows.stride);
+            for (returned, row) in kept.zip(cells) {
+                let (slopes, _) = S::as_simd_f32s(&row[column..column + S::F32_LANES]);
+                let (returned, _) = S::as_simd_f32s(returned);
+                let wanted = Lanes::new(simd, returned[0]) * Lanes::new(simd, slopes[0]);
+                let by_delta = wanted * delta;
+                r += wanted;
+                r_d += by_delta;
+                r_d_d = by_delta.mul_add(delta, r_d_d);
+                delta += one;
             }
+            at += count * S::F32_LANES;
+            let x = steps + splat(simd, ((rows.lo[1] + column) as f64 - point.bin[1]) as f32);
+            let r_x = r * x;
+            sums[0] += r;
+            sums[1] += r_x;
+            sums[2] = r_x.mul_add(x, sums[2]);
+            sums[3] += r_d;
+            sums[4] = r_d.mul_add(x, sums[4]);
+            sums[5] += r_d_d;
         }
         let mut totals = [0.0; 6];
         for k in 0..6 {
@@ -406,12 +426,13 @@ impl RowScratch {
     }
 }
 
-/// The rows and columns of a region in which a point is above a level, `[from, to)`.
+/// The rows and columns of a region in which a point is above a level, `[from, to)`; none of somebody who is not.
+#[derive(Debug, Clone, Copy, Default)]
 struct Reach {
     rows: (usize, usize),
     columns: (usize, usize),
-    /// Rows after which the way from row to row is begun anew.
-    leg: usize,
+    /// Where what it returns begins.
+    kept: usize,
 }
 
 impl Reach {
@@ -424,56 +445,22 @@ impl Reach {
 
 impl RowPoint {
     #[inline(always)]
-    fn reach(&self, rows: &LevelRows, cut: f64) -> Option<Reach> {
+    fn reach(&self, rows: &LevelRows, cut: f64, kept: usize) -> Reach {
         let height = self.top - cut;
         if height <= 0.0 {
-            return None;
+            return Reach { kept, ..Reach::default() };
         }
         let across = reached(self.bin[0], height, self.weight[0], rows.lo[0], rows.size[0]);
         // The ridge leans by the skew.
         let half = (height / self.weight[0]).sqrt() * self.skew.abs() + (height / self.weight[1]).sqrt();
-        let from = (self.bin[1] - half - rows.lo[1] as f64).ceil().max(0.0);
+        let from = (self.bin[1] - half - rows.lo[1] as f64).ceil().clamp(0.0, rows.size[1] as f64);
         let to = ((self.bin[1] + half - rows.lo[1] as f64).floor() + 1.0).clamp(0.0, rows.size[1] as f64);
-        let columns = (from.min(rows.size[1] as f64) as usize, to as usize);
-        let beside = half + LANES as f64;
-        let leg = (LEG_LOG2 / (2.0 * self.weight[1] * self.skew.abs() * beside).max(1e-3)).max(1.0) as usize;
-        (across.0 < across.1 && columns.0 < columns.1).then_some(Reach { rows: across, columns, leg })
-    }
-}
-
-/// A point in the columns of a register, from row to row: a Gaussian becomes the next row's by a factor that itself grows by one.
-///
-/// With y the rows from the point, x the columns, the exponent is −(a y² + 2 b y x + c x²), a = w₀ + w₁ s², b = w₁ s, c = w₁: from y
-/// to y + 1 it changes by −(a (2 y + 1) + 2 b x), and that changes by −2 a.
-struct RowWalk<S: Simd> {
-    returned: Lanes<S>,
-    factor: Lanes<S>,
-    change: Lanes<S>,
-}
-
-impl<S: Simd> RowWalk<S> {
-    #[inline(always)]
-    fn new(simd: S, point: &RowPoint, rows: &LevelRows, row: usize, steps: Lanes<S>, register: usize) -> Self {
-        let y = (rows.lo[0] + row) as f64 - point.bin[0];
-        let x = steps + splat(simd, ((rows.lo[1] + register * S::F32_LANES) as f64 - point.bin[1]) as f32);
-        let [w0, w1] = point.weight;
-        let a = w0 + w1 * point.skew * point.skew;
-        let lean = splat(simd, (point.skew * y) as f32);
-        let beside = x + lean;
-        let top = splat(simd, (point.top - w0 * y * y) as f32);
-        let returned = (beside * beside).mul_add(splat(simd, -w1 as f32), top);
-        let slope = x.mul_add(splat(simd, (-2.0 * w1 * point.skew) as f32), splat(simd, (-a * (2.0 * y + 1.0)) as f32));
-        Self {
-            returned: power_of(simd, returned),
-            factor: slope.min(splat(simd, MOST_STEP_LOG2)).max(splat(simd, -MOST_STEP_LOG2)).exp2(),
-            change: splat(simd, (-2.0 * a) as f32).max(splat(simd, -MOST_STEP_LOG2)).exp2(),
+        let columns = (from as usize, to as usize);
+        if across.0 < across.1 && columns.0 < columns.1 {
+            Reach { rows: across, columns, kept }
+        } else {
+            Reach { kept, ..Reach::default() }
         }
-    }
-
-    #[inline(always)]
-    fn step(&mut self) {
-        self.returned = self.returned * self.factor;
-        self.factor = self.factor * self.change;
     }
 }
 
@@ -482,12 +469,6 @@ impl<S: Simd> RowWalk<S> {
 fn steps<S: Simd>(simd: S) -> Lanes<S> {
     const STEPS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
     Lanes::new(simd, S::as_simd_f32s(&STEPS).0[0])
-}
-
-/// 2ˣ, and next to nothing far below 0: no less, for denormal numbers cost a hundred cycles.
-#[inline(always)]
-fn power_of<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
-    x.max(splat(simd, -110.0)).exp2()
 }
 
 /// ln(1 + x) of x ≥ 0; of small x with all its digits, for a correlation of faint levels is made of them.
