@@ -32,8 +32,8 @@ const LIMBS: [([usize; 2], f64, f64); 8] = [
     ([10, 12], 0.055, 0.42),
 ];
 /// Points of a limb, and of the trunk from shoulders to hips and from left to right.
-const ON_LIMB: usize = 4;
-const DOWN: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
+const ON_LIMB: usize = 3;
+const DOWN: [f64; 4] = [0.125, 0.375, 0.625, 0.875];
 const ACROSS: [f64; 3] = [0.15, 0.5, 0.85];
 /// Left and right shoulder and hip.
 const CORNERS: [usize; 4] = [1, 2, 7, 8];
@@ -47,11 +47,11 @@ const TRUNK_EDGE: f64 = 0.15;
 const LIMB_END: f64 = 0.02;
 const TRUNK_SIDE: f64 = 0.03;
 /// Standard deviations, m, areas, m², and a limb's standard deviation by the length of its share.
-const TRUNK_SCALE_M: f64 = 0.05;
-const TRUNK_AREA_M2: f64 = 0.35 * 0.5 / 15.0 * 2.0;
-const HEAD_SCALE_M: f64 = 0.06;
+const TRUNK_SCALE_M: f64 = 0.03;
+const TRUNK_AREA_M2: f64 = 0.35 * 0.5 / 12.0 * 2.0;
+const HEAD_SCALE_M: f64 = 0.036;
 const HEAD_AREA_M2: f64 = 0.035;
-const LIMB_SCALE: f64 = 0.5;
+const LIMB_SCALE: f64 = 0.3;
 /// ln of how much brighter and larger than at the start a point may be.
 const MOST_LN: f64 = 1.386_294_361_119_890_6;
 /// α and standard deviation, m, of a joint of which nothing is known.
@@ -79,9 +79,19 @@ enum Kind {
 struct Point {
     kind: Kind,
     shares: Shares,
+    /// The same of the skeleton's joints.
+    joints: Shares,
     scale_m: f64,
     /// ln of its amplitude but for what is seen of it.
     ln_amplitude: f64,
+}
+
+/// ln of how much brighter and larger a joint is than at the start, and how opaque it is.
+#[derive(Debug, Clone, Copy, Default)]
+struct Look {
+    ln_alpha: f64,
+    ln_scale: f64,
+    opacity: f64,
 }
 
 /// The skin of a skeleton, and its Gaussians in the last evaluation.
@@ -91,6 +101,8 @@ pub(super) struct Skin {
     body: Vec<Point>,
     /// ln α and the mean ln scale of each joint at the start.
     plain: Vec<[f64; 2]>,
+    /// What each joint of the last evaluation adds to its points.
+    looks: Vec<Look>,
     /// Where the radar is, world frame, m.
     radar: Vec3,
     /// The Gaussians, `POINTS` a person, as the forward model takes them.
@@ -177,6 +189,7 @@ impl Skin {
                 body.push(Point {
                     kind: Kind::Limb { ends, radius_m },
                     shares: [(ends[0], 1.0 - u), (ends[1], u)].into_iter().collect(),
+                    joints: Shares::new(),
                     scale_m: LIMB_SCALE * share_m,
                     ln_amplitude: 0.5 * (2.0 * radius_m * share_m).ln(),
                 });
@@ -189,6 +202,7 @@ impl Skin {
                 body.push(Point {
                     kind: Kind::Trunk,
                     shares: CORNERS.into_iter().zip(shares).collect(),
+                    joints: Shares::new(),
                     scale_m: TRUNK_SCALE_M,
                     ln_amplitude: 0.5 * TRUNK_AREA_M2.ln(),
                 });
@@ -197,15 +211,31 @@ impl Skin {
         body.push(Point {
             kind: Kind::Head,
             shares: [(HEAD, 1.0)].into_iter().collect(),
+            joints: Shares::new(),
             scale_m: HEAD_SCALE_M,
             ln_amplitude: 0.5 * HEAD_AREA_M2.ln(),
         });
+        for point in &mut body {
+            let of_part = |&(part, share): &(usize, f64)| {
+                let joints = parts.joints_of(part);
+                joints.iter().map(move |&joint| (joint, share / joints.len() as f64))
+            };
+            point.joints = point.shares.iter().flat_map(of_part).collect();
+        }
         let plain = skeleton.joints.iter().map(|name| match scatterer(name) {
             Some(part) => [part.alpha.ln(), (part.along_m.ln() + 2.0 * part.across_m.ln()) / 3.0],
             None => PLAIN.map(f64::ln),
         });
         let empty = Pppr::zeros(PpprShape { persons: 0, joints: POINTS, doppler_features: features });
-        Some(Self { parts, body, plain: plain.collect(), radar, points: empty.clone(), gradient: empty })
+        Some(Self {
+            parts,
+            body,
+            plain: plain.collect(),
+            looks: Vec::new(),
+            radar,
+            points: empty.clone(),
+            gradient: empty,
+        })
     }
 
     /// Fills in the points of all persons of `params`.
@@ -213,6 +243,7 @@ impl Skin {
         let shape = params.shape();
         let features = self.points.shape().doppler_features;
         self.points.reset(PpprShape { persons: shape.persons, joints: POINTS, doppler_features: features });
+        self.look(params);
         for person in 0..shape.persons {
             let places = self.places(params.person(person));
             let normal = Normal::of(&places);
@@ -222,17 +253,19 @@ impl Skin {
                 let mut place = [0.0; 3];
                 of.shares.iter().for_each(|&(part, share)| add_scaled(&mut place, places[part], share));
                 let (at, seen) = of.seen(place, &places, &normal);
-                let [ln_alpha, ln_scale] = self.looks(params, first, of).map(|x| x.clamp(-MOST_LN, MOST_LN));
+                let [ln_alpha, ln_scale] = self.looks(first, of).map(|x| x.clamp(-MOST_LN, MOST_LN));
                 let alpha = (of.ln_amplitude + 0.5 * seen.ln() + ln_alpha).exp().min(0.999);
                 self.points.set_vec3(Group::Position, joint, add(at, self.radar));
                 self.points.set_vec3(Group::LogScale, joint, [of.scale_m.ln() + ln_scale; 3]);
                 self.points.joint_mut(Group::Rotation, joint)[0] = 1.0;
                 self.points.joint_mut(Group::Beta, joint)[0] = (alpha / (1.0 - alpha)).ln();
                 let mut velocity = [0.0; 3];
-                self.for_joints(of, |own, share| add_scaled(&mut velocity, params.velocity(first + own), share));
+                for &(own, share) in &of.joints {
+                    add_scaled(&mut velocity, params.velocity(first + own), share);
+                }
                 self.points.set_vec3(Group::Velocity, joint, velocity);
                 let omega = self.points.joint_mut(Group::Omega, joint);
-                Self::each_joint(&self.parts, of, |own, share| {
+                for &(own, share) in &of.joints {
                     let from = params.joint(Group::Omega, first + own);
                     if features == from.len() {
                         omega.iter_mut().zip(from).for_each(|(to, from)| *to += share * from);
@@ -242,7 +275,7 @@ impl Skin {
                             *to += share * mean;
                         }
                     }
-                });
+                }
             }
         }
         self.gradient.reset(self.points.shape());
@@ -268,15 +301,15 @@ impl Skin {
                 let bar = self.gradient.vec3(Group::Position, joint);
                 let place_bar = of.pull_back(place, (&places, &normal), (bar, by_ln), &mut bars, &mut normal_bar);
                 of.shares.iter().for_each(|&(part, share)| add_scaled(&mut bars[part], place_bar, share));
-                let [ln_alpha, ln_scale] = self.looks(params, first, of);
+                let [ln_alpha, ln_scale] = self.looks(first, of);
                 let pass = |x: f64, bar: f64| if x.abs() < MOST_LN { bar } else { 0.0 };
                 let scale_bar = self.gradient.vec3(Group::LogScale, joint).iter().sum();
                 let (alpha_bar, scale_bar) = (pass(ln_alpha, by_ln), pass(ln_scale, scale_bar));
                 let velocity_bar = self.gradient.vec3(Group::Velocity, joint);
                 let omega_bar = self.gradient.joint(Group::Omega, joint);
-                self.for_joints(of, |own, share| {
+                for &(own, share) in &of.joints {
                     let own = first + own;
-                    gradient.joint_mut(Group::Beta, own)[0] += share * alpha_bar * (1.0 - params.opacity(own));
+                    gradient.joint_mut(Group::Beta, own)[0] += share * alpha_bar * (1.0 - self.looks[own].opacity);
                     gradient.joint_mut(Group::LogScale, own).iter_mut().for_each(|x| *x += share * scale_bar / 3.0);
                     let velocity = gradient.joint_mut(Group::Velocity, own);
                     velocity.iter_mut().zip(velocity_bar).for_each(|(x, bar)| *x += share * bar);
@@ -289,7 +322,7 @@ impl Skin {
                             *x += mean;
                         }
                     }
-                });
+                }
             }
             normal.pull_back(normal_bar, &mut bars);
             for (part, bar) in bars.into_iter().enumerate() {
@@ -307,29 +340,26 @@ impl Skin {
         self.parts.places(joints).map(|place| sub(place, self.radar))
     }
 
-    /// Calls `each` with the joints that a point lies between and their shares.
-    fn for_joints(&self, of: &Point, each: impl FnMut(usize, f64)) {
-        Self::each_joint(&self.parts, of, each);
-    }
-
-    fn each_joint(parts: &Parts, of: &Point, mut each: impl FnMut(usize, f64)) {
-        for &(part, share) in &of.shares {
-            let joints = parts.joints_of(part);
-            for &joint in joints {
-                each(joint, share / joints.len() as f64);
-            }
-        }
+    /// Takes in how the joints look.
+    fn look(&mut self, params: &Pppr) {
+        let of_joint = |joint: usize, [ln_alpha, ln_scale]: [f64; 2]| {
+            let opacity = params.opacity(joint);
+            let scales = params.vec3(Group::LogScale, joint);
+            Look { ln_alpha: opacity.ln() - ln_alpha, ln_scale: scales.iter().sum::<f64>() / 3.0 - ln_scale, opacity }
+        };
+        let all = 0..params.shape().total_joints();
+        self.looks.clear();
+        self.looks.extend(all.zip(self.plain.iter().cycle()).map(|(joint, &plain)| of_joint(joint, plain)));
     }
 
     /// ln of how much brighter and larger a point is than at the start.
-    fn looks(&self, params: &Pppr, first: usize, of: &Point) -> [f64; 2] {
+    fn looks(&self, first: usize, of: &Point) -> [f64; 2] {
         let mut looks = [0.0; 2];
-        self.for_joints(of, |own, share| {
-            let [ln_alpha, ln_scale] = self.plain[own];
-            let scales = params.vec3(Group::LogScale, first + own);
-            looks[0] += share * (params.opacity(first + own).ln() - ln_alpha);
-            looks[1] += share * (scales.iter().sum::<f64>() / 3.0 - ln_scale);
-        });
+        for &(own, share) in &of.joints {
+            let look = &self.looks[first + own];
+            looks[0] += share * look.ln_alpha;
+            looks[1] += share * look.ln_scale;
+        }
         looks
     }
 }
@@ -341,16 +371,16 @@ impl Point {
         match self.kind {
             Kind::Limb { ends, radius_m } => {
                 let side = Side::of(place, sub(places[ends[1]], places[ends[0]]));
-                add_scaled(&mut at, side.outwards, -OUT * radius_m / side.sine);
+                add_scaled(&mut at, side.outwards, -(OUT) * radius_m / side.sine);
                 (at, side.sine * side.sine + LIMB_END)
             }
             Kind::Trunk => {
                 let cosine = dot(unit(place, 1e-12).0, normal.front.0);
-                add_scaled(&mut at, normal.front.0, -TRUNK_OUT_M * (cosine / TRUNK_EDGE).tanh());
+                add_scaled(&mut at, normal.front.0, -(TRUNK_OUT_M) * (cosine / TRUNK_EDGE).tanh());
                 (at, cosine * cosine + TRUNK_SIDE)
             }
             Kind::Head => {
-                add_scaled(&mut at, unit(place, 1e-12).0, -HEAD_OUT_M);
+                add_scaled(&mut at, unit(place, 1e-12).0, -(HEAD_OUT_M));
                 (at, 1.0)
             }
         }
@@ -374,7 +404,7 @@ impl Point {
             Kind::Limb { ends, radius_m } => {
                 let side = Side::of(place, sub(places[ends[1]], places[ends[0]]));
                 let (n, s) = (side.outwards, side.sine);
-                let pushed = scale(bar, -OUT * radius_m);
+                let pushed = scale(bar, -(OUT) * radius_m);
                 let mut n_bar = unit_back(n, s, pushed);
                 add_scaled(&mut n_bar, n, by_ln / (s * s + LIMB_END));
                 let (e, k) = (side.axis.0, side.sight.0);
@@ -393,13 +423,13 @@ impl Point {
                 let front = normal.front.0;
                 let cosine = dot(sight.0, front);
                 let out = (cosine / TRUNK_EDGE).tanh();
-                add_scaled(normal_bar, bar, -TRUNK_OUT_M * out);
-                let cosine_bar = -TRUNK_OUT_M * dot(front, bar) * (1.0 - out * out) / TRUNK_EDGE
+                add_scaled(normal_bar, bar, -(TRUNK_OUT_M) * out);
+                let cosine_bar = -(TRUNK_OUT_M) * dot(front, bar) * (1.0 - out * out) / TRUNK_EDGE
                     + by_ln * cosine / (cosine * cosine + TRUNK_SIDE);
                 add_scaled(normal_bar, sight.0, cosine_bar);
                 sight_bar(sight, scale(front, cosine_bar), &mut place_bar);
             }
-            Kind::Head => sight_bar(unit(place, 1e-12), scale(bar, -HEAD_OUT_M), &mut place_bar),
+            Kind::Head => sight_bar(unit(place, 1e-12), scale(bar, -(HEAD_OUT_M)), &mut place_bar),
         }
         place_bar
     }
