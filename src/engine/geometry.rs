@@ -168,6 +168,13 @@ pub fn norm<T: Numeric>(a: Vec3<T>) -> T {
     dot(a, a).sqrt()
 }
 
+/// `p`, turned by `angle` rad about the vertical axis through `middle`.
+pub fn turned_about(middle: Vec3, angle: f64, p: Vec3) -> Vec3 {
+    let (sine, cosine) = angle.sin_cos();
+    let [x, y, z] = [p[0] - middle[0], p[1] - middle[1], p[2]];
+    [middle[0] + cosine * x - sine * y, middle[1] + sine * x + cosine * y, z]
+}
+
 /// Distance of two points on the floor, whatever their heights.
 pub fn flat_distance(a: Vec3, b: Vec3) -> f64 {
     norm([a[0] - b[0], a[1] - b[1], 0.0])

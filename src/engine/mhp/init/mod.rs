@@ -232,7 +232,11 @@ pub fn initialise_people(
     if config.starts > 1 && searched.is_none() {
         choose_postures(problem, config, &template, &mut persons)?;
     }
+    let is_held = searched.is_none() && config.parameterization == Parameterization::Motion;
     let mut params = searched.unwrap_or_else(|| assemble(problem, config, &model, &persons));
+    if is_held {
+        notes.extend(motion::turn(problem, config, &mut params)?);
+    }
     let moved_m: Vec<f64> =
         persons.iter().enumerate().map(|(k, person)| mean_way_m(&params, k, &person.posed(problem, config))).collect();
     let mut unrefined = assemble(problem, &unrefined(config), &model, &own);

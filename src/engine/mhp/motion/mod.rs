@@ -19,8 +19,10 @@ mod space;
 #[cfg(test)]
 mod tests;
 mod thinned;
+mod turn;
 
 pub(super) use search::search;
+pub(super) use turn::turn;
 
 use super::frame_em::{FrameEm, Measured};
 use super::region;
@@ -309,8 +311,9 @@ impl MotionState {
         Self { first: zeros.clone(), second: zeros, coordinates, steps: 0 }
     }
 
-    /// One step of Adam of persons with `stride` numbers each against `gradient`, written over `next`; `pace` scales the steps.
-    fn step_into(&self, stride: usize, gradient: &[f64], pace: f64, frozen: bool, next: &mut Self) {
+    /// One step of Adam of persons with `stride` numbers each against `gradient`, written over `next`; `pace` scales the steps,
+    /// and a pose that is `held` takes none.
+    fn step_into(&self, stride: usize, gradient: &[f64], pace: f64, held: bool, next: &mut Self) {
         next.clone_from(self);
         next.steps += 1;
         let unbias = [BETA_1, BETA_2].map(|beta| 1.0 / (1.0 - beta.powf(f64::from(next.steps))));
@@ -320,7 +323,7 @@ impl MotionState {
                 0..YAW => RATES[0],
                 YAW => RATES[1],
                 LN_SIZE => RATES[2],
-                _ if frozen => 0.0,
+                _ if held => 0.0,
                 _ => RATES[3],
             };
             *m = BETA_1 * *m + (1.0 - BETA_1) * g;

@@ -6,15 +6,33 @@
 use super::{Held, LN_SIZE, MotionState, PLACE, Window, WindowLoss, YAW, ways};
 use crate::body::Pppr;
 use crate::config::FitConfig;
+use crate::geometry::{norm, sub};
 use crate::mhp::{FitError, Precision, Problem};
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
-/// Steps of a start with its pose held, how many are kept, and which frames are looked at: every so manyth; then the same of those.
-const COARSE: [(usize, usize, usize); 2] = [(12, 12, 2), (8, 4, 1)];
-/// Steps with its pose.
-const FINE: usize = 40;
+/// The sieves that starts go through, coarse then fine.
+const SIEVES: [Sieve; 3] = [
+    Sieve { steps: 6, every: 4, held: true, kept: 8 },
+    Sieve { steps: 6, every: 2, held: false, kept: 4 },
+    Sieve { steps: 14, every: 1, held: false, kept: 2 },
+];
+/// Steps of what is left.
+const FINE: usize = 28;
+/// Starts whose joints have come nearer to each other than this, on average, have become one, m.
+const ONE_M: f64 = 0.03;
 /// Headings farther apart than this are different ones.
 const ANOTHER_HEADING: f64 = PI / 3.0;
+
+/// Moves every start by some steps and keeps the few with the lowest loss.
+struct Sieve {
+    steps: usize,
+    /// Every so manyth frame is looked at.
+    every: usize,
+    /// Whether poses are held, so that place, heading and size alone move.
+    held: bool,
+    kept: usize,
+}
 
 /// What a search found.
 pub(in crate::mhp) struct Searched {
@@ -49,8 +67,8 @@ impl Search<'_> {
         self.config.w_em * self.loss.em + self.config.w_prior * self.loss.prior
     }
 
-    /// Takes `steps` from a start, and stays at the best that is met.
-    fn descend(&mut self, tried: &mut Tried, steps: usize, frozen: bool) {
+    /// Takes `steps` from a start, its pose `held` or not, and stays at the best that is met.
+    fn descend(&mut self, tried: &mut Tried, steps: usize, held: bool) {
         let mut state = tried.state.clone();
         let mut best = state.coordinates.clone();
         for step in 0..=steps {
@@ -62,11 +80,43 @@ impl Search<'_> {
             if step < steps {
                 let stride = self.window.stride;
                 let pace = if step as f64 > super::SLOW_FROM * steps as f64 { 0.5 } else { 1.0 };
-                state.step_into(stride, &self.loss.gradient, pace, frozen, &mut self.next);
+                state.step_into(stride, &self.loss.gradient, pace, held, &mut self.next);
                 std::mem::swap(&mut state, &mut self.next);
             }
         }
         tried.state = MotionState { coordinates: best, ..state };
+    }
+
+    /// What a sieve leaves of `all`, the best first; of those that have become one, one.
+    fn sift(&mut self, all: &mut Vec<Tried>, sieve: &Sieve, own: &Range<usize>) {
+        self.every = sieve.every;
+        for tried in &mut *all {
+            // What was seen of fewer frames is no measure any more.
+            tried.loss = f64::INFINITY;
+            self.descend(tried, sieve.steps, sieve.held);
+        }
+        all.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+        let mut kept: Vec<Tried> = Vec::with_capacity(sieve.kept);
+        for tried in all.drain(..) {
+            if kept.len() < sieve.kept && kept.iter().all(|other| self.apart_m(&tried, other, own) > ONE_M) {
+                kept.push(tried);
+            }
+        }
+        *all = kept;
+    }
+
+    /// The mean distance between the joints of two starts at the window's ends, m.
+    fn apart_m(&self, a: &Tried, b: &Tried, own: &Range<usize>) -> f64 {
+        let joints = self.params.shape().joints;
+        let mut poses = [vec![[0.0; 3]; joints], vec![[0.0; 3]; joints]];
+        let ends = [0, self.window.frames.len() - 1];
+        let apart = ends.map(|frame| {
+            for (of, pose) in [a, b].into_iter().zip(&mut poses) {
+                self.window.space.pose(&of.state.coordinates[own.clone()], frame, pose);
+            }
+            poses[0].iter().zip(&poses[1]).map(|(p, q)| norm(sub(*p, *q))).sum::<f64>()
+        });
+        apart.iter().sum::<f64>() / (ends.len() * joints.max(1)) as f64
     }
 }
 
@@ -118,23 +168,25 @@ pub(in crate::mhp) fn search(
                 all.push(Tried { state: MotionState::at(of), loss: f64::INFINITY });
             }
         }
-        for (steps, kept, every) in COARSE {
-            search.every = every;
-            for tried in &mut all {
-                // What was seen of fewer frames is no measure any more.
-                tried.loss = f64::INFINITY;
-                search.descend(tried, steps, true);
-            }
-            all.sort_by(|a, b| a.loss.total_cmp(&b.loss));
-            all.truncate(kept.max(1));
+        for sieve in &SIEVES {
+            search.sift(&mut all, sieve, &own);
         }
+        search.every = 1;
         // What the start itself becomes is among those that are compared in the end.
         let mut own_start = begun_at;
-        search.descend(&mut own_start, COARSE[0].0, true);
+        search.descend(&mut own_start, SIEVES[0].steps, true);
         all.push(own_start);
         for tried in &mut all {
             tried.state = MotionState::at(tried.state.coordinates.clone());
             search.descend(tried, FINE, false);
+        }
+        // A stride with the other leg in front looks much the same from afar.
+        if let Some(best) = all.iter().min_by(|a, b| a.loss.total_cmp(&b.loss)) {
+            let mut of = best.state.coordinates.clone();
+            search.window.space.mirror(&mut of[own.clone()]);
+            let mut mirrored = Tried { state: MotionState::at(of), loss: f64::INFINITY };
+            search.descend(&mut mirrored, FINE, false);
+            all.push(mirrored);
         }
         all.sort_by(|a, b| a.loss.total_cmp(&b.loss));
         let Some(best) = all.first() else { continue };
@@ -157,7 +209,7 @@ pub(in crate::mhp) fn search(
 }
 
 /// The middle of a person's hips, or of all its joints where it has none, world frame, m.
-fn hips_of(problem: &Problem, params: &Pppr, person: usize, joints: usize) -> [f64; 3] {
+pub(super) fn hips_of(problem: &Problem, params: &Pppr, person: usize, joints: usize) -> [f64; 3] {
     let named = (0..joints).filter(|&joint| crate::body::is_named(&problem.skeleton, joint, &["hip", "pelvis"]));
     let hips: Vec<_> = named.map(|joint| params.position(person * joints + joint)).collect();
     if hips.is_empty() { crate::geometry::mean(params.person(person)) } else { crate::geometry::mean(&hips) }

@@ -130,3 +130,33 @@ fn every_skeleton_with_known_names_is_moved() {
     other.joints[3] = "tail".into();
     assert!(PoseSpace::new(prior, &other, &[0.0]).is_none());
 }
+
+/// Left for right, and y for −y in the body's own frame.
+#[test]
+fn a_mirrored_body_has_left_and_right_exchanged() {
+    let skeleton = Skeleton::preset("coco17").unwrap();
+    let prior = MotionPrior::committed().unwrap();
+    let space = PoseSpace::new(prior, &skeleton, &[-0.1, 0.0, 0.1]).unwrap();
+    let rng = &mut StdRng::seed_from_u64(9);
+    let mut coordinates: Vec<f64> = (0..space.coordinates()).map(|_| rng.random_range(-1.0..1.0)).collect();
+    coordinates[..PLACE].fill(0.0);
+    let other = |joint: usize| {
+        let name = &skeleton.joints[joint];
+        let named = |from: &str, to: &str| skeleton.joints.iter().position(|other| *other == name.replace(from, to));
+        if name.contains("left") { named("left", "right") } else { named("right", "left") }.unwrap()
+    };
+    let pose = |coordinates: &[f64], frame: usize| {
+        let mut pose = vec![[0.0; 3]; 17];
+        space.pose(coordinates, frame, &mut pose);
+        pose
+    };
+    let plain = [0, 1, 2].map(|frame| pose(&coordinates, frame));
+    space.mirror(&mut coordinates);
+    for (frame, plain) in plain.iter().enumerate() {
+        for (joint, p) in pose(&coordinates, frame).into_iter().enumerate() {
+            let [x, y, z] = plain[other(joint)];
+            assert!(norm(sub(p, [x, -y, z])) < 1e-3, "{}: {p:?} {:?}", skeleton.joints[joint], plain[other(joint)]);
+        }
+    }
+    assert!(norm(sub(plain[1][9], plain[1][10])) > 0.05, "it is no symmetric pose");
+}

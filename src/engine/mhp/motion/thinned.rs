@@ -3,10 +3,18 @@
 use crate::body::Pppr;
 use crate::geometry::norm;
 use crate::mhp::region::centres;
-use crate::radar::{Axis, AxisKind, View};
+use crate::radar::{Axis, AxisKind, PointSpread, View};
 
 /// Cells that a standard deviation of the point spread covers at least where every second one is enough.
 const CELLS: f64 = 1.5;
+
+/// Levels see a point spread down to the noise, where a window's main lobe falls faster than the Gaussian that has its width.
+const ACROSS: f64 = 0.9;
+
+/// The point spread that levels see.
+fn narrowed(psf: &PointSpread) -> PointSpread {
+    PointSpread { azimuth_rad: ACROSS * psf.azimuth_rad, elevation_rad: ACROSS * psf.elevation_rad, ..*psf }
+}
 
 /// A view of every second cell along the axes that can spare the others.
 pub(super) struct Thinned {
@@ -40,7 +48,7 @@ impl Thinned {
             Axis { bins, hi: axis.lo + axis.step() * (bins * stride) as f64, ..axis.clone() }
         };
         let axes = view.axes.iter().zip(&strides).map(thinned).collect();
-        Self { view: View { axes, ..view.clone() }, shape: view.shape(), strides }
+        Self { view: View { axes, psf: narrowed(psf), ..view.clone() }, shape: view.shape(), strides }
     }
 
     /// The cells of a map that are kept, C order.
