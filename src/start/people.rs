@@ -25,7 +25,7 @@ pub fn find_start(problem: &Arc<Problem>, config: &FitConfig) -> Result<FoundSta
         // The paper looks for one person without a count, and so it goes where nothing can be counted, or nobody is.
         let asked = config.place == StartPlace::Counted && !problem.neighbours_in(config.frames_around).is_empty();
         let counted = asked.then(|| count(problem, config).ok()).flatten().filter(|count| count.people() > 0);
-        let seeds = counted.map_or_else(Vec::new, |count| count.seeds(1));
+        let seeds = counted.map_or_else(Vec::new, |count| [count.seeds(1), count.seeds(count.people())].concat());
         return Ok(FoundStart { initialisation: initialise_people(problem, config, &seeds)?, count: None });
     }
     let count = count(problem, config)?;

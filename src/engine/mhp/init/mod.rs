@@ -169,8 +169,9 @@ pub fn initialise(problem: &Arc<Problem>, config: &FitConfig) -> Result<Initiali
     initialise_people(problem, config, &[])
 }
 
-/// Finds one person near each of `seeds` (world frame, m), or one anywhere where there are none. One seed is where counting
-/// found the one person: with [`StartPlace::Counted`] it decides only where the frame's own peaks show that person elsewhere.
+/// Finds one person near each of `seeds` (world frame, m), or one anywhere where there are none. Where one person is asked for
+/// with [`StartPlace::Counted`], they are where counting found people, the likeliest first: that one decides only where the frame's
+/// own peaks show somebody where nobody was counted.
 ///
 /// # Errors
 /// [`FitError::NoStart`] where no view shows anything above its background.
@@ -189,10 +190,11 @@ pub fn initialise_people(
     let seen = |(at, expected): (Vec3, Expectation)| (at, Some(expected));
     let nearby = |k: usize| seen(near(&problem.views, maps, seeds, k));
     let mut alone = || find_one(problem, config.place, maps, &template, &peaks, &mut notes).map(seen);
+    let one_counted = config.people == 1 && config.place == StartPlace::Counted && !seeds.is_empty();
     let found = match seeds {
         _ if !config.init.position => vec![(middle_of_views(problem), None)],
         [] => vec![alone()?],
-        [_] if config.place == StartPlace::Counted => vec![alone().unwrap_or_else(|_| nearby(0))],
+        _ if one_counted => vec![alone().unwrap_or_else(|_| nearby(0))],
         seeds => (0..seeds.len()).map(nearby).collect(),
     };
     let places: Vec<Vec3> = found.iter().map(|(at, _)| *at).collect();
@@ -204,10 +206,8 @@ pub fn initialise_people(
     };
     let own: Vec<Person> =
         found.into_iter().enumerate().map(|(k, (at, expected))| person(at, expected, apart_m(&places, k))).collect();
-    let elsewhere = match (seeds, &places[..]) {
-        ([seed], [place]) if config.init.position && flat_distance(*seed, *place) > ELSEWHERE_M => Some(nearby(0)),
-        _ => None,
-    };
+    let counted_at = |place: Vec3| seeds.iter().any(|&seed| flat_distance(seed, place) <= ELSEWHERE_M);
+    let elsewhere = (one_counted && config.init.position && !counted_at(places[0])).then(|| nearby(0));
     let mut persons = match elsewhere {
         Some((at, expected)) => {
             let [x, y, _] = own[0].at;
