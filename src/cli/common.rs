@@ -34,7 +34,8 @@ impl From<PrecisionArg> for Precision {
 
 /// Reads a preset as typed; `--help` lists them with a line each.
 pub(super) fn presets() -> impl TypedValueParser<Value = Preset> {
-    let named = Preset::ALL.map(|preset| PossibleValue::new(preset.name()).help(preset.help()));
+    let named =
+        Preset::ALL.map(|preset| PossibleValue::new(preset.name()).aliases(preset.former_names()).help(preset.help()));
     PossibleValuesParser::new(named).try_map(|name| Preset::named(&name).ok_or("no such preset"))
 }
 
@@ -67,7 +68,7 @@ pub(super) fn inputs<'a>(dataset: &'a Dataset, path: &Path, named: &[Option<&Pat
     dataset.inputs().with_folder(path).with_named([Some(path)]).with_named(named.iter().copied())
 }
 
-/// The fit configuration of a file, or the defaults.
+/// The fit configuration of a file, or the baseline.
 ///
 /// # Errors
 /// As [`FitConfig::from_file`].

@@ -1,6 +1,8 @@
 //! `evidence`: what speaks for each failure mode of a fit, as cards, JSON or CSV.
 
-use super::common::{CsvArgs, PrecisionArg, complain, inputs, open, print, print_json, progress_bar, settings};
+use super::common::{
+    CsvArgs, PrecisionArg, complain, inputs, open, presets, print, print_json, progress_bar, settings,
+};
 use super::frames::{FrameRange, chosen};
 use super::merge::MergeArgs;
 use super::shards::{ShardArgs, end};
@@ -76,9 +78,12 @@ pub struct EvidenceArgs {
     /// Adam steps of a frame, instead of the configuration's.
     #[arg(long, value_name = "N")]
     iterations: Option<usize>,
-    /// Fit configuration; without it the defaults.
-    #[arg(long, value_name = "FIT.toml")]
+    /// Fit configuration; without it the preset.
+    #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
     config: Option<PathBuf>,
+    /// Settings with a name. The scores were calibrated on fits of the baseline.
+    #[arg(long, value_name = "NAME", default_value = Preset::Baseline.name(), value_parser = presets())]
+    preset: Preset,
     /// Scalar of the per-cell kernel.
     #[arg(long, value_enum, default_value = "f32")]
     precision: PrecisionArg,
@@ -103,7 +108,7 @@ pub struct EvidenceArgs {
 /// Where the configuration, the data set, the range of frames or the parameters are bad, or the table cannot be written.
 pub(super) fn run(args: &EvidenceArgs) -> anyhow::Result<ExitCode> {
     args.cells.apply();
-    let config = settings(args.config.as_deref(), Preset::Default, args.iterations)?;
+    let config = settings(args.config.as_deref(), args.preset, args.iterations)?;
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
     let named = [args.params.as_deref(), args.config.as_deref(), args.manifest.as_deref()];

@@ -108,9 +108,9 @@ pub struct ExportArgs {
     #[arg(long, value_enum, default_value = "match")]
     scale: ScaleArg,
     /// The settings of the fits and of the simulation.
-    #[arg(long, value_name = "NAME", default_value = "default", value_parser = super::common::presets())]
+    #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = super::common::presets())]
     preset: Preset,
-    /// A fit configuration instead of a preset; keys that it lacks are those of `default`.
+    /// A fit configuration instead of a preset; keys that it lacks are those of `baseline`.
     #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
     config: Option<PathBuf>,
     /// Adam steps of a frame, instead of the configuration's.

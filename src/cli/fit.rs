@@ -68,7 +68,7 @@ pub struct FitArgs {
     #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
     config: Option<PathBuf>,
     /// Settings with a name.
-    #[arg(long, value_name = "NAME", default_value = "default", value_parser = presets())]
+    #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = presets())]
     preset: Preset,
     /// Persons that are fitted at once, instead of the configuration's; 0 fits as many as are counted.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=8))]

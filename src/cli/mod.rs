@@ -96,10 +96,13 @@ pub struct WindowArgs {
     #[arg(long, value_name = "K")]
     pub iteration: Option<usize>,
     /// The settings to begin with.
-    #[arg(long, value_name = "FIT.toml")]
+    #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
     pub config: Option<PathBuf>,
+    /// The settings to begin with, by their name.
+    #[arg(long, value_name = "NAME", default_value = crate::config::Preset::default().name(), value_parser = common::presets())]
+    pub preset: crate::config::Preset,
     /// Open a session file: the same frame, iteration, camera, pins and layout.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["paths", "frame", "iteration", "results", "study", "config"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["paths", "frame", "iteration", "results", "study", "config", "preset"])]
     pub session: Option<PathBuf>,
 }
 
@@ -128,7 +131,7 @@ impl WindowArgs {
             aim,
             results: self.results,
             study: self.study,
-            config: self.config.as_deref().map(crate::config::FitConfig::from_file).transpose()?,
+            config: Some(common::settings(self.config.as_deref(), self.preset, None)?),
             session: self.session,
             allow_outside: common::outside_allowed(),
         })

@@ -1,7 +1,8 @@
 //! `screenshot`: the real window, drawn offscreen after a number of iterations.
 
-use super::common::{config, outside_allowed};
+use super::common::{outside_allowed, presets, settings};
 use crate::app::{Begin, InspectorApp, Pane};
+use crate::config::Preset;
 use crate::output::{Sink, replace_file};
 use crate::session::{Command, FitStatus, LabelStatus, StrataStatus, ThemeChoice};
 use anyhow::{Context as _, bail};
@@ -34,7 +35,7 @@ pub struct ScreenshotArgs {
     #[arg(required_unless_present = "session")]
     path: Option<PathBuf>,
     /// A session file instead of a data set; frame, iterations, settings and theme are then its own.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["path", "frame", "iterations", "config", "focus", "joint"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["path", "frame", "iterations", "config", "preset", "focus", "joint"])]
     session: Option<PathBuf>,
     /// Show the run folder of a study in its pane.
     #[arg(long, value_name = "RUN")]
@@ -45,7 +46,10 @@ pub struct ScreenshotArgs {
     /// Adam steps to take first.
     #[arg(long, value_name = "K", default_value_t = 60)]
     iterations: usize,
-    /// Fit configuration; without it the defaults.
+    /// Settings with a name.
+    #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = presets())]
+    preset: Preset,
+    /// Fit configuration instead of a preset.
     #[arg(long, value_name = "FIT.toml")]
     config: Option<PathBuf>,
     /// Where the picture is written.
@@ -124,7 +128,7 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
     let begin = Begin {
         paths: args.path.iter().cloned().collect(),
         study: args.study.clone(),
-        config: Some(config(args.config.as_deref())?),
+        config: Some(settings(args.config.as_deref(), args.preset, None)?),
         session: args.session.clone(),
         allow_outside: outside_allowed(),
         ..Begin::default()

@@ -3,7 +3,7 @@
 
 use crate::common;
 use mhp_inspector::body::{Group, Pppr, PpprShape, Skeleton};
-use mhp_inspector::config::{FIELDS, FitConfig};
+use mhp_inspector::config::{FIELDS, FitConfig, Preset};
 use mhp_inspector::dataset::npz::{ArrayView, write};
 use mhp_inspector::dataset::{Dataset, Manifest, read_pppr};
 use mhp_inspector::diagnose::joint_errors;
@@ -204,7 +204,7 @@ fn a_batch_writes_rows_in_order_and_goes_on_after_a_bad_frame() {
     assert_eq!(files, ["a_000.npz", "a_001.npz", "a_003.npz", "b_000.npz"]);
 
     let config = FitConfig::from_file(&out.join("fit.toml")).unwrap();
-    assert_eq!(config, FitConfig { iterations: 6, ..FitConfig::default() });
+    assert_eq!(config, FitConfig { iterations: 6, ..Preset::Recommended.config() });
     let dataset = small.open();
     for (index, row) in rows.iter().enumerate().filter(|(index, _)| *index != 2) {
         let (loss, params) = by_hand(&dataset, index, &config, None);
@@ -224,7 +224,10 @@ fn a_warm_start_follows_a_sequence_and_no_further() {
     let small = Small::new(&[("a/000", 0.0), ("a/001", 0.05), ("a/003", 0.1), ("b/000", -0.3)]);
     small.damage("a/002");
     let out = small.out("out");
-    let output = fit(small.path(), &["--iterations", "5", "--warm-start", "--out", out.to_str().unwrap()]);
+    let output = fit(
+        small.path(),
+        &["--iterations", "5", "--warm-start", "--preset", "baseline", "--out", out.to_str().unwrap()],
+    );
     assert_eq!(code(&output), 1);
     let rows = summary(&out);
     let fresh: Vec<bool> = column(&rows, "init_ms").iter().map(|cell| !cell.is_empty()).collect();
@@ -445,8 +448,8 @@ fn the_real_mmvr_frame_reaches_the_asked_iou() {
         assert!(row["majpe_mm"].is_null(), "pixels are no truth in metres");
         [row["iou_hm_hori"].as_f64().unwrap(), row["iou_hm_vert"].as_f64().unwrap()]
     };
-    let [hori, vert] = run("data/mmvr", &[]);
-    println!("defaults: IoU {hori:.3} {vert:.3}");
+    let [hori, vert] = run("data/mmvr", &["--preset", "baseline"]);
+    println!("baseline: IoU {hori:.3} {vert:.3}");
     assert!(f64::midpoint(hori, vert) >= 0.52, "{hori} {vert}");
     let [hori, vert] = run("data/mmvr/00383_radar.npz", &["--config", config.to_str().unwrap()]);
     println!("learning_rate 3e-3: IoU {hori:.3} {vert:.3}");

@@ -3,7 +3,7 @@
 
 use crate::blob;
 use half::f16;
-use mhp_inspector::config::FitConfig;
+use mhp_inspector::config::Preset;
 use mhp_inspector::dataset::npz::{NpzArchive, read_array};
 use mhp_inspector::dataset::{Dataset, read_pppr};
 use mhp_inspector::mhp::{Precision, simulate};
@@ -110,7 +110,7 @@ fn one_frame(forms: [Form; 2], unit: f64, method: zip::CompressionMethod) -> (te
 fn simulated(folder: &Path, params: &Path) -> Vec<Vec<f64>> {
     let dataset = Dataset::open(folder, &Progress::new()).unwrap();
     let problem = problem_alone(&dataset, &dataset.load(0).unwrap()).unwrap();
-    simulate(&problem, &FitConfig::default(), Precision::default(), &read_pppr(params, None).unwrap())
+    simulate(&problem, &Preset::default().config(), Precision::default(), &read_pppr(params, None).unwrap())
 }
 
 const PLAIN: Form = Form { descr: "<f4", fortran: false };
@@ -284,7 +284,7 @@ fn every_sample_is_exported_and_reads_back_as_a_data_set() {
             let params = read_pppr(&file("pppr"), None).unwrap();
             assert!(file("pc").is_file());
             let problem = Arc::new(problem_of(&before, &old).unwrap());
-            let config = FitConfig::default();
+            let config = Preset::default().config();
             let wanted = scaled_maps(&problem, &config, Precision::F32, &params, ExportScale::Match).unwrap();
             for (map, wanted) in new.maps.iter().zip(&wanted) {
                 let most = wanted.iter().copied().fold(0.0, f64::max);

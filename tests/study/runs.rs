@@ -184,7 +184,7 @@ fn another_configuration_or_other_data_are_refused() {
         text(&output.stderr)
     };
     assert!(refusal(&words(&["--seed", "9"])).contains("another seed: 0, not 9"));
-    assert!(refusal(&words(&["--preset", "recommended"])).contains("another preset"));
+    assert!(refusal(&words(&["--preset", "paper"])).contains("another preset"));
     assert!(refusal(&words(&["--precision", "f64"])).contains("another precision: f32, not f64"));
     assert!(refusal(&words(&["--shard", "1/2"])).contains("another shard: the whole, not 1/2"));
     assert!(refusal(&["threshold", "--iterations", "2"]).contains("another study: init, not threshold"));
@@ -385,7 +385,7 @@ fn bad_requests_say_what_is_wrong() {
     assert!(refusal(&["sweep", "--grid", "tau_pct=101"]).contains("expected a number in 0.1 ..= 100"));
     assert!(refusal(&["init", "--shard", "3/2"]).contains("expected i/n"));
     assert!(refusal(&["init", "--frames", "5..99"]).contains("the data set has 6"));
-    assert!(refusal(&["init", "--preset", "best"]).contains("[possible values: default, paper, recommended]"));
+    assert!(refusal(&["init", "--preset", "best"]).contains("[possible values: baseline, paper, recommended]"));
     assert!(refusal(&["init", "--seed", "9999999999"]).contains("init.seed is 9999999999; expected"));
 }
 
@@ -410,7 +410,7 @@ fn a_run_that_another_process_works_on_or_that_lies_in_the_data_is_left_alone() 
 fn a_perturbation_acts_or_its_row_says_why_not() {
     let case = Case::new();
     let words: &[&str] = &["robustness", "--all", "--iterations", "3"];
-    for preset in ["default", "recommended", "paper"] {
+    for preset in ["baseline", "recommended", "paper"] {
         case.done(&[words, &["--preset", preset]].concat(), preset);
         let run = Run::read(&case.run(preset)).unwrap();
         let fits = |variant: usize| -> Vec<_> {

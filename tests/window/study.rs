@@ -25,7 +25,7 @@ fn run(window: &Window, study: StudyKind, grid: &[&str]) -> PathBuf {
 }
 
 fn run_of(dataset: &Dataset, out: &Path, study: StudyKind, grid: &[&str]) {
-    run_with(dataset, out, study, grid, &Preset::Default.config());
+    run_with(dataset, out, study, grid, &Preset::Baseline.config());
 }
 
 fn run_with(dataset: &Dataset, out: &Path, study: StudyKind, grid: &[&str], base: &FitConfig) {

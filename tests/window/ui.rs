@@ -45,7 +45,7 @@ fn a_data_set_opens_runs_pauses_and_steps() {
 #[test]
 fn presets_are_chosen_by_what_they_stand_for() {
     let mut window = Window::open(2);
-    for preset in [Preset::Paper, Preset::Recommended, Preset::Default] {
+    for preset in [Preset::Paper, Preset::Recommended, Preset::Baseline] {
         window.click(&format!("Preset {}", preset.name()));
         window.harness.run_steps(2);
         assert_eq!(window.session().config, preset.config(), "{}", preset.name());

@@ -50,8 +50,8 @@ pub enum StudyCommand {
     Init(run::RunArgs),
     /// 5 to 100 iterations, from a frame's own peaks and from the frame before: errors, IoU, and times in timing.md.
     Budget(run::RunArgs),
-    /// Each switch of the presets: what `recommended` adds to `default`, one by one, and without each; and each place where
-    /// `default` leaves the paper's words, taken to the letter, and all of them.
+    /// Each switch of the presets: what `recommended` adds to `baseline`, one by one, and without each; and each place where
+    /// `baseline` leaves the paper's words, taken to the letter, and all of them.
     Switches(run::RunArgs),
     /// How often the number of people is right, by number and weighted by 91, 8 and 1 %; speed in timing.md.
     Counting(run::RunArgs),

@@ -35,9 +35,9 @@ pub struct RunArgs {
     #[arg(long, value_name = "A..B")]
     frames: Option<FrameRange>,
     /// The settings that the study varies.
-    #[arg(long, value_name = "NAME", default_value = "default", value_parser = presets())]
+    #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = presets())]
     preset: Preset,
-    /// A fit configuration instead of a preset; keys that it lacks are those of `default`.
+    /// A fit configuration instead of a preset; keys that it lacks are those of `baseline`.
     #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
     config: Option<PathBuf>,
     /// Adam steps of every fit, instead of the study's own.

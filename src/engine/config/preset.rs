@@ -5,39 +5,49 @@ use super::{
     InitConfig, LearningRates, Parameterization, Scatterers, StartPlace, Still, Summation, WarmStart, Yaw,
 };
 
-/// A whole [`FitConfig`] with a name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A whole [`FitConfig`] with a name. Without a name, every command and the window take the recommended one; a FIT.toml begins at
+/// the baseline.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Preset {
-    /// What SPEC fixes of the paper, and the start that the program finds: what every command takes without `--preset`.
-    Default,
+    /// What SPEC fixes of the paper, and a start that leaves the room out.
+    Baseline,
     /// The paper to the letter, as far as its words say one thing; [`super::deviations`] lists what they do not.
     Paper,
     /// What fits walkers of another simulator than this program's best; `study switches` tells by how much each switch helps.
+    #[default]
     Recommended,
 }
 
+/// What the baseline was called when every command took it.
+const FORMER_NAME: &str = "default";
+
 impl Preset {
     /// Every preset.
-    pub const ALL: [Self; 3] = [Self::Default, Self::Paper, Self::Recommended];
+    pub const ALL: [Self; 3] = [Self::Baseline, Self::Paper, Self::Recommended];
 
     /// The word on the command line and the screen.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Default => "default",
+            Self::Baseline => "baseline",
             Self::Paper => "paper",
             Self::Recommended => "recommended",
         }
     }
 
+    /// Words of earlier versions that are understood, too.
+    pub fn former_names(self) -> &'static [&'static str] {
+        if self == Self::Baseline { &[FORMER_NAME] } else { &[] }
+    }
+
     /// The preset with this name.
     pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|preset| preset.name() == name)
+        Self::ALL.into_iter().find(|preset| preset.name() == name || preset.former_names().contains(&name))
     }
 
     /// What it is, in a line.
     pub fn help(self) -> &'static str {
         match self {
-            Self::Default => "The paper's fit within 1.25 m of the person, from a start that leaves the room out",
+            Self::Baseline => "The paper's fit within 1.25 m of the person, from a start that leaves the room out",
             Self::Paper => "The paper to the letter: the whole map, the strongest cluster of peaks, one frame alone",
             Self::Recommended => {
                 "Windows of frames fitted at once: levels instead of masks, skin, and poses that real people have; who stands among reflectors stays where the start has them"
@@ -48,7 +58,7 @@ impl Preset {
     /// Its settings.
     pub fn config(self) -> FitConfig {
         match self {
-            Self::Default => FitConfig::default(),
+            Self::Baseline => FitConfig::default(),
             Self::Paper => FitConfig {
                 em_region: EmRegion::Full,
                 bone_tolerance_m: 0.05,

@@ -159,7 +159,7 @@ fn a_new_setting_shows_up_by_its_row() {
     assert!(FieldGroup::Weights.fields().any(|field| field.label == "w_dummy"));
     assert_eq!(plain.changes(&other).map(|field| field.key).collect::<Vec<_>>(), ["w_dummy"]);
     assert_eq!(difference(&plain, &other), "w_dummy 0 → 2");
-    assert_eq!(from_preset(&other), "default, w_dummy 0 → 2");
+    assert_eq!(from_preset(&other), "baseline, w_dummy 0 → 2");
     assert_eq!(read(&other.to_toml()), Ok(other));
     assert_eq!(refusal("w_dummy = -1"), "fit.toml:1: w_dummy is -1; expected a number in 0 ..= 1000");
     assert!(listing().contains("w_dummy = 0: a number in 0 ..= 1000. Weight of a term that only tests know."));

@@ -5,7 +5,7 @@
 //! power that each puts there. From that place the point moves the shortest way to where the map has it.
 
 use crate::body::{Group, Pppr, PpprShape};
-use crate::config::FitConfig;
+use crate::config::{BodyModel, FitConfig};
 use crate::geometry::{Vec3, add, dot, norm, scale, sub};
 use crate::mhp::{Precision, Problem, simulate};
 use crate::radar::{AxisKind, View, unravel};
@@ -33,8 +33,10 @@ pub fn point_cloud(
     cells: &[Vec<usize>],
 ) -> Vec<CloudPoint> {
     let shape = params.shape();
+    // What a joint alone sends back is its Gaussian's, also where the map was simulated with skin between joints.
+    let config = FitConfig { body: BodyModel::Joints, ..*config };
     let parts: Vec<Vec<Vec<f64>>> = (0..shape.total_joints())
-        .map(|joint| simulate(problem, config, Precision::F32, &alone(params, joint)))
+        .map(|joint| simulate(problem, &config, Precision::F32, &alone(params, joint)))
         .collect();
     let mut points = Vec::new();
     for (view, (of, cells)) in problem.views.iter().zip(cells).enumerate() {

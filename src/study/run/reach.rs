@@ -99,7 +99,7 @@ mod tests {
         assert!(why.contains("powers add, and no map has a Doppler axis") && why.contains("moves as one"), "{why}");
         assert_eq!(told(&best, &moving), None, "a Doppler axis shows velocities");
         assert_eq!(told(&FitConfig { summation: Summation::Coherent, ..best }, &flat), None, "phases do");
-        assert_eq!(told(&Preset::Default.config(), &flat), None);
+        assert_eq!(told(&Preset::Baseline.config(), &flat), None);
         assert_eq!(told(&Preset::Paper.config(), &flat), None);
         let mut turning = best;
         turning.learning_rates.bone = Some(1e-3);

@@ -73,8 +73,8 @@ fn with(base: &FitConfig, other: &FitConfig, switch: &Switch) -> Option<FitConfi
     (config != *base).then_some(config)
 }
 
-/// `default`, `default` with each switch that `recommended` sets, `recommended`, `recommended` without each of them and with
-/// each of the extras that it lacks; then `default` with each switch to the letter of the paper, `default` from the frame before,
+/// `baseline`, `baseline` with each switch that `recommended` sets, `recommended`, `recommended` without each of them and with
+/// each of the extras that it lacks; then `baseline` with each switch to the letter of the paper, `baseline` from the frame before,
 /// and `paper`. `base` gives what belongs to the study: the seed.
 pub(super) fn variants(base: &FitConfig) -> Vec<Variant> {
     let of = |preset: Preset| {
@@ -82,7 +82,7 @@ pub(super) fn variants(base: &FitConfig) -> Vec<Variant> {
         config.init.seed = base.init.seed;
         config
     };
-    let [plain, paper, best] = [Preset::Default, Preset::Paper, Preset::Recommended].map(of);
+    let [plain, paper, best] = [Preset::Baseline, Preset::Paper, Preset::Recommended].map(of);
     let switches = switches();
     let row =
         |preset: Preset, change: String, config: FitConfig| Variant::cold([preset.name().to_owned(), change], &config);
@@ -90,8 +90,8 @@ pub(super) fn variants(base: &FitConfig) -> Vec<Variant> {
         let changed = switches.iter().filter_map(|switch| Some((switch, with(from, to, switch)?)));
         changed.map(|(switch, config)| row(preset, format!("{how} {}", switch.name), config)).collect()
     };
-    let mut rows = vec![row(Preset::Default, "as it is".into(), plain)];
-    rows.extend(one_by_one(Preset::Default, &plain, &best, "with"));
+    let mut rows = vec![row(Preset::Baseline, "as it is".into(), plain)];
+    rows.extend(one_by_one(Preset::Baseline, &plain, &best, "with"));
     rows.push(row(Preset::Recommended, "as it is".into(), best));
     rows.extend(one_by_one(Preset::Recommended, &best, &plain, "without"));
     for (name, set) in EXTRAS {
@@ -101,10 +101,10 @@ pub(super) fn variants(base: &FitConfig) -> Vec<Variant> {
             rows.push(row(Preset::Recommended, format!("with {name}"), config));
         }
     }
-    rows.extend(one_by_one(Preset::Default, &plain, &paper, "to the letter:"));
+    rows.extend(one_by_one(Preset::Baseline, &plain, &paper, "to the letter:"));
     // Only who starts from the frame before notices how, so that these two are compared with each other.
     rows.iter_mut().filter(|row| row.config.warm_start != plain.warm_start).for_each(|row| row.start = StartFrom::Warm);
-    rows.push(row(Preset::Default, "from the frame before".into(), plain).warm());
+    rows.push(row(Preset::Baseline, "from the frame before".into(), plain).warm());
     rows.push(row(Preset::Paper, "as it is".into(), paper));
     rows
 }
@@ -131,9 +131,9 @@ mod tests {
     fn each_difference_is_added_once_and_removed_once() {
         let rows = variants(&FitConfig::default());
         let count = |start: &str| rows.iter().filter(|row| row.name().starts_with(start)).count();
-        assert_eq!((count("default, as"), count("recommended, as"), count("paper, as")), (1, 1, 1));
-        assert!(count("default, with ") >= 5);
-        assert_eq!(count("default, with "), count("recommended, without "));
+        assert_eq!((count("baseline, as"), count("recommended, as"), count("paper, as")), (1, 1, 1));
+        assert!(count("baseline, with ") >= 5);
+        assert_eq!(count("baseline, with "), count("recommended, without "));
         let names: std::collections::BTreeSet<String> = rows.iter().map(Variant::name).collect();
         assert_eq!(names.len(), rows.len(), "no two rows have one name");
     }

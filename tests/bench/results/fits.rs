@@ -4,7 +4,7 @@ use super::bed::{Bed, over_groups, row, table};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-const PRESETS: [&str; 3] = ["default", "paper", "recommended"];
+const PRESETS: [&str; 3] = ["baseline", "paper", "recommended"];
 
 /// Frames of rows files by sequence: error of the fit and of the start, mm, and whether the fit is nearer.
 #[derive(Default)]

@@ -60,7 +60,7 @@ pub(crate) fn several(bed: &Bed) -> String {
     let mut rows = vec![row(&["data", "preset", "one body each", "two bodies in one place"])];
     for (name, people, options) in sets {
         let data = bed.simulated(name, options);
-        for preset in ["default", "recommended"] {
+        for preset in ["baseline", "recommended"] {
             let results = format!("{name}-{preset}");
             let count = people.to_string();
             bed.program(&["fit", name, "--preset", preset, "--people", &count, "--out", &results]);
