@@ -53,6 +53,23 @@ fn presets_are_chosen_by_what_they_stand_for() {
     }
 }
 
+/// A fit that will not move says why before it is run, beside the button that runs it.
+#[test]
+fn a_fit_that_leaves_the_joints_where_they_start_says_so() {
+    let mut window = Window::open(1);
+    window.ready(0);
+    assert!(!window.says("held at the start"));
+    window.click("Preset recommended");
+    window.until("a start of motion", |w| {
+        w.fit().found_start.as_ref().is_some_and(|found| found.initialisation.motion.is_some())
+    });
+    let found = window.fit().found_start.clone().unwrap().initialisation;
+    let held = found.motion.unwrap().unwrap_err();
+    assert!(held.starts_with("held at the start: ") && found.notes.iter().any(|note| note == held), "{held}");
+    window.harness.run_steps(2);
+    assert!(window.says(held));
+}
+
 /// A start is found as soon as a data set is open: settings that come later would not be in it.
 #[test]
 fn settings_given_at_the_beginning_are_in_the_first_start() {

@@ -111,6 +111,25 @@ fn status(ui: &mut Ui, shared: &mut Shared<'_>) {
     });
     // Always there: a branch that begins while a slider is dragged must not move the slider.
     branches(ui, shared);
+    start(ui, shared);
+}
+
+/// How the start came about, a line that is always there: the rest is its tooltip.
+fn start(ui: &mut Ui, shared: &Shared<'_>) {
+    let tokens = Tokens::of(ui);
+    let found = shared.session.fit.found_start.as_ref().map(|found| &found.initialisation);
+    let (text, color) = match found {
+        None => ("Start: —", tokens.dim),
+        Some(found) => match (&found.motion, found.notes.first()) {
+            (Some(Err(held)), _) => (*held, tokens.warn),
+            (Some(Ok(note)), _) | (None, Some(note)) => (note.as_str(), tokens.dim),
+            (None, None) => ("Start: from the peaks", tokens.dim),
+        },
+    };
+    let line = ui.add(egui::Label::new(RichText::new(text).small().color(color)).truncate());
+    if let Some(found) = found.filter(|found| !found.notes.is_empty()) {
+        line.on_hover_text(found.notes.join("\n"));
+    }
 }
 
 fn branches(ui: &mut Ui, shared: &mut Shared<'_>) {
@@ -256,7 +275,7 @@ fn ways(ui: &mut Ui, shared: &mut Shared<'_>) {
 /// Every setting at once, by name, above everything whose height depends on the fit: no button moves under the pointer.
 fn presets(ui: &mut Ui, config: &mut FitConfig) {
     let tokens = Tokens::of(ui);
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new("Preset").color(tokens.dim)).on_hover_text("All settings at once.");
         for preset in Preset::ALL {
             let button = ui.selectable_label(*config == preset.config(), preset.name());

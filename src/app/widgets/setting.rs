@@ -1,12 +1,17 @@
 //! One setting on screen, made from its row in the table.
 
 use super::Named as _;
-use crate::config::{Answer, Field, FieldGroup, FieldKind, FitConfig, Number, Value};
+use crate::config::{Answer, Field, FieldGroup, FieldKind, FitConfig, Number, Preset, Value};
 use egui::{Response, Ui};
+
+/// The box of a number, and the button beside it, points.
+const VALUE: egui::Vec2 = egui::vec2(62.0, 20.0);
+const BACK: egui::Vec2 = egui::vec2(18.0, 20.0);
 
 /// The settings of a group, one a line; switches that follow each other share one.
 pub(in crate::app) fn settings(ui: &mut Ui, group: FieldGroup, config: &mut FitConfig) {
     let fields: Vec<&Field> = group.fields().collect();
+    let preset = Preset::nearest(config);
     for run in fields.chunk_by(|a, b| matches!((&a.kind, &b.kind), (FieldKind::Switch, FieldKind::Switch))) {
         if let [Field { kind: FieldKind::Switch, .. }, ..] = run {
             ui.horizontal_wrapped(|ui| run.iter().for_each(|field| switch(ui, field, config)));
@@ -16,7 +21,7 @@ pub(in crate::app) fn settings(ui: &mut Ui, group: FieldGroup, config: &mut FitC
             match &field.kind {
                 FieldKind::Choice(answers) => choice(ui, field, answers, config),
                 FieldKind::Number(number) if number.unset.is_some() => optional(ui, field, number, config),
-                FieldKind::Number(number) => slider(ui, field, number, config),
+                FieldKind::Number(number) => slider(ui, field, number, preset, config),
                 FieldKind::Switch => {}
             }
         }
@@ -43,9 +48,9 @@ fn choice(ui: &mut Ui, field: &Field, answers: &[Answer], config: &mut FitConfig
     });
 }
 
-/// Label, slider, value, and a button back to the default where the value differs from it.
-fn slider(ui: &mut Ui, field: &Field, number: &Number, config: &mut FitConfig) {
-    let (Value::Number(old), Value::Number(default)) = (field.get(config), field.default()) else { return };
+/// Label, slider, value, and a button back to what the nearest preset sets where the value differs from it.
+fn slider(ui: &mut Ui, field: &Field, number: &Number, preset: Preset, config: &mut FitConfig) {
+    let (Value::Number(old), Value::Number(usual)) = (field.get(config), field.get(&preset.config())) else { return };
     let mut value = old;
     let (lo, hi) = number.offered;
     let tip = field.tip();
@@ -56,7 +61,8 @@ fn slider(ui: &mut Ui, field: &Field, number: &Number, config: &mut FitConfig) {
             ui.add(egui::Label::new(field.label).truncate())
         });
         label.inner.on_hover_text(&tip);
-        let width = (ui.available_width() - 92.0).max(40.0);
+        let beside = VALUE.x + BACK.x + 2.0 * ui.spacing().item_spacing.x;
+        let width = (ui.available_width() - beside).max(40.0);
         ui.spacing_mut().slider_width = width;
         let mut slider = egui::Slider::new(&mut value, lo..=hi).show_value(false);
         if number.logarithmic {
@@ -66,11 +72,11 @@ fn slider(ui: &mut Ui, field: &Field, number: &Number, config: &mut FitConfig) {
         response.widget_info(|| egui::WidgetInfo::slider(true, value, field.label));
         response.on_hover_text(&tip);
         typed(ui, field, number, &mut value).on_hover_text(&tip);
-        let off = value != default;
-        let back = ui.add_visible(off, egui::Button::new("↺").small().frame(false));
+        let back = egui::Button::new("↺").small().frame(false).min_size(BACK);
+        let back = ui.add_visible(value != usual, back);
         let back = back.named(egui::Role::Button, &format!("Reset {}", field.label));
-        if back.on_hover_text(format!("Back to {default}")).clicked() {
-            value = default;
+        if back.on_hover_text(format!("Back to {usual}, as {} has it", preset.name())).clicked() {
+            value = usual;
         }
     });
     if value != old {
@@ -117,7 +123,7 @@ fn typed(ui: &mut Ui, field: &Field, number: &Number, value: &mut f64) -> Respon
         .speed(speed)
         .max_decimals(if number.whole { 0 } else { 6 })
         .suffix(if number.unit == "m" { " m" } else { number.unit });
-    let response = ui.add_sized([62.0, 20.0], drag);
+    let response = ui.add_sized(VALUE, drag);
     response.named(egui::Role::SpinButton, &format!("{} value", field.label))
 }
 

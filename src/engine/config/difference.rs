@@ -11,8 +11,7 @@ pub fn difference(old: &FitConfig, new: &FitConfig) -> String {
 
 /// The preset that a configuration is nearest to, and what it sets otherwise: `recommended, τ_pct 10 → 15`.
 pub fn from_preset(config: &FitConfig) -> String {
-    let away = |preset: &Preset| preset.config().changes(config).count();
-    let nearest = Preset::ALL.into_iter().min_by_key(away).unwrap_or(Preset::Baseline);
+    let nearest = Preset::nearest(config);
     match difference(&nearest.config(), config) {
         text if text.is_empty() => nearest.name().to_owned(),
         text => format!("{}, {text}", nearest.name()),

@@ -44,6 +44,11 @@ impl Preset {
         Self::ALL.into_iter().find(|preset| preset.name() == name || preset.former_names().contains(&name))
     }
 
+    /// The preset of which the fewest settings are set otherwise.
+    pub fn nearest(config: &FitConfig) -> Self {
+        Self::ALL.into_iter().min_by_key(|preset| preset.config().changes(config).count()).unwrap_or_default()
+    }
+
     /// What it is, in a line.
     pub fn help(self) -> &'static str {
         match self {

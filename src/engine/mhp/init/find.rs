@@ -30,7 +30,8 @@ pub(super) fn find_one(
         notes.push(format!("{} peaks in {} clusters: the middle of the strongest", peaks.len(), places.len()));
         return Ok((strongest, Expectation { middle_m: strongest[2], ..Expectation::new(maps, strongest) }));
     }
-    notes.push(format!("{} peaks, {} places tried", peaks.len(), places.len()));
+    let plural = if places.len() == 1 { "" } else { "s" };
+    notes.push(format!("{} peaks, {} place{plural} tried", peaks.len(), places.len()));
     let mut ranked = rank(&places, template, |body| shared_excess(maps, body));
     if ranked.is_empty() {
         notes.push("the views agree on no place: the strongest echo of one view was taken".to_owned());

@@ -77,6 +77,9 @@ pub struct Initialisation {
     pub peaks: Vec<Peak>,
     /// What was found and assumed, in words.
     pub notes: Vec<String>,
+    /// What a search in the space of motion found, or why a fit in it leaves the persons where they start; both are among the
+    /// notes.
+    pub motion: Option<Result<String, &'static str>>,
 }
 
 /// A person before it has parameters.
@@ -218,23 +221,23 @@ pub fn initialise_people(
     };
     let model = ScattererModel::new(&problem.skeleton, config.scatterers);
     // A search in a space of motion begins at standing persons: its own starts are the postures.
-    let mut searched = None;
+    let (mut searched, mut told) = (None, None);
     if config.parameterization == Parameterization::Motion {
         let mut standing = assemble(problem, config, &model, &persons);
         match motion::search(problem, config, &mut standing)? {
             Ok(found) => {
-                notes.push(found.note());
+                told = Some(Ok(found.note()));
                 searched = Some(standing);
             }
-            Err(held) => notes.push(held.note().to_owned()),
+            Err(held) => told = Some(Err(held.note())),
         }
     }
     if config.starts > 1 && searched.is_none() {
         choose_postures(problem, config, &template, &mut persons)?;
     }
-    let is_held = searched.is_none() && config.parameterization == Parameterization::Motion;
     let mut params = searched.unwrap_or_else(|| assemble(problem, config, &model, &persons));
-    if is_held {
+    notes.extend(told.as_ref().map(|told| told.as_ref().map_or_else(|held| (*held).to_owned(), String::clone)));
+    if matches!(told, Some(Err(_))) {
         notes.extend(motion::turn(problem, config, &mut params)?);
     }
     let moved_m: Vec<f64> =
@@ -244,7 +247,7 @@ pub fn initialise_people(
         perturb::perturb(problem, &config.init, start);
     }
     notes.extend(persons.iter().zip(moved_m).flat_map(|(person, moved_m)| notes_of(person, config, moved_m)));
-    Ok(Initialisation { params, unrefined, peaks, notes })
+    Ok(Initialisation { params, unrefined, peaks, notes, motion: told })
 }
 
 /// Gives each person the posture whose L_EM is smallest where it stands best near its place; the place itself is left

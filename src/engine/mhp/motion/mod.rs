@@ -80,12 +80,12 @@ impl Held {
     /// In words.
     pub(super) fn note(self) -> &'static str {
         match self {
-            Self::Skeleton => "motion: the prior knows nothing of this skeleton; joints stay where they start",
+            Self::Skeleton => "held at the start: the prior of motion knows nothing of this skeleton",
             Self::Unlike => {
-                "motion: no body of the prior explains the maps (their levels correlate by less than 0.8); joints stay where they start"
+                "held at the start: no body of the prior explains the maps (their levels correlate by less than 0.8)"
             }
             Self::Clutter => {
-                "motion: static echoes were not removed and nobody walks: body and reflectors cannot be told apart, joints stay where they start"
+                "held at the start: nobody walks and static echoes were not removed, so body and reflectors cannot be told apart"
             }
         }
     }

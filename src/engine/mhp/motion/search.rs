@@ -21,6 +21,8 @@ const SIEVES: [Sieve; 3] = [
 const FINE: usize = 28;
 /// Starts whose joints have come nearer to each other than this, on average, have become one, m.
 const ONE_M: f64 = 0.03;
+/// A heading whose loss is larger by a smaller share than this is as good.
+const AMBIGUOUS: f64 = 0.1;
 /// Headings farther apart than this are different ones.
 const ANOTHER_HEADING: f64 = PI / 3.0;
 
@@ -221,7 +223,8 @@ impl Searched {
         let [from, to] = self.losses;
         let other = match self.runner_up {
             Some((behind, turned)) => {
-                format!("; turned by {:.0}° it is {:.1} % worse", turned.to_degrees(), 100.0 * behind)
+                let doubt = if behind < AMBIGUOUS { "; heading ambiguous: " } else { "; " };
+                format!("{doubt}turned by {:.0}° it is {:.1} % worse", turned.to_degrees(), 100.0 * behind)
             }
             None => String::new(),
         };
