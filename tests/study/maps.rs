@@ -259,7 +259,8 @@ fn every_sample_is_exported_and_reads_back_as_a_data_set() {
     assert_eq!(folders.len(), 10);
     for folder in folders {
         let out = tempfile::tempdir().unwrap();
-        exported(&folder, out.path(), &["--iterations", "1", "--what", "pppr,heatmap,pc", "--format", "npz"]);
+        let words = ["--preset", "baseline", "--iterations", "1", "--what", "pppr,heatmap,pc", "--format", "npz"];
+        exported(&folder, out.path(), &words);
         let [before, after] =
             [folder.clone(), out.path().join("heatmap")].map(|path| Dataset::open(&path, &Progress::new()).unwrap());
         assert_eq!(
@@ -284,7 +285,7 @@ fn every_sample_is_exported_and_reads_back_as_a_data_set() {
             let params = read_pppr(&file("pppr"), None).unwrap();
             assert!(file("pc").is_file());
             let problem = Arc::new(problem_of(&before, &old).unwrap());
-            let config = Preset::default().config();
+            let config = Preset::Baseline.config();
             let wanted = scaled_maps(&problem, &config, Precision::F32, &params, ExportScale::Match).unwrap();
             for (map, wanted) in new.maps.iter().zip(&wanted) {
                 let most = wanted.iter().copied().fold(0.0, f64::max);
