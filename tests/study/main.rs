@@ -7,11 +7,12 @@ mod common;
 #[path = "../common/scenes.rs"]
 mod scenes;
 
+// The first by name: it waits more than it works, beside the others.
+#[cfg(unix)]
+mod array_jobs;
 mod clouds;
 mod evidence;
 mod export;
 mod maps;
 mod runs;
 mod shards;
-#[cfg(unix)]
-mod slurm;

@@ -111,11 +111,27 @@ impl Slurm {
         let submitted = self.sbatch(&[&array], "shards.sh", &[&[out], words].concat(), variables);
         assert!(submitted.status.success(), "{}", String::from_utf8_lossy(&submitted.stderr));
         let dependency = format!("--dependency=afterany:{}", String::from_utf8(submitted.stdout).unwrap().trim());
-        let merged = self.sbatch(&["--wait", &dependency], "merge.sh", &[out], &[]);
-        let told = String::from_utf8(merged.stdout).unwrap();
-        let log = self.folder.path().join(format!("slurm-{}.out", told.trim()));
+        let merged = self.sbatch(&[&dependency], "merge.sh", &[out], &[]);
+        assert!(merged.status.success(), "{}", String::from_utf8_lossy(&merged.stderr));
+        let merge = String::from_utf8(merged.stdout).unwrap().trim().to_owned();
+        let done = self.ended(&merge);
+        let log = self.folder.path().join(format!("slurm-{merge}.out"));
         let told = std::fs::read_to_string(&log).unwrap_or_else(|_| self.logs());
-        (merged.status.success(), told)
+        (done, told)
+    }
+
+    /// Waits for a job, and whether it ended with exit code 0. `sbatch --wait` asks every ten seconds.
+    fn ended(&self, job: &str) -> bool {
+        let state = || {
+            let told = self.command("scontrol").args(["show", "job", job, "--oneliner"]).output().unwrap();
+            String::from_utf8(told.stdout).unwrap()
+        };
+        let waits = ["PENDING", "CONFIGURING", "RUNNING", "COMPLETING"].map(|word| format!("JobState={word}"));
+        wait_for("end of the merge", || {
+            let told = state();
+            told.contains("JobState=") && !waits.iter().any(|word| told.contains(word))
+        });
+        state().contains("JobState=COMPLETED")
     }
 
     /// What the daemons said, where something is wrong.
@@ -151,6 +167,7 @@ fn configuration(folder: &Path) -> String {
          ProctrackType=proctrack/linuxproc\nTaskPlugin=task/none\nSwitchType=switch/none\nMpiDefault=none\n\
          SelectType=select/cons_tres\nSelectTypeParameters=CR_CPU\nSlurmdParameters=config_overrides\n\
          ReturnToService=2\nMailProg=/bin/true\n\
+         SchedulerParameters=batch_sched_delay=0,sched_interval=1,sched_min_interval=0,bf_interval=1\n\
          NodeName={host} NodeAddr=127.0.0.1 CPUs=4 State=UNKNOWN\n\
          PartitionName=test Nodes={host} Default=YES MaxTime=INFINITE State=UP\n"
     )
