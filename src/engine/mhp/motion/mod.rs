@@ -24,16 +24,15 @@ mod turn;
 pub(super) use search::search;
 pub(super) use turn::turn;
 
-use super::frame_em::{FrameEm, Measured};
+use super::frame_em::FrameEm;
 use super::region;
 use super::{FitError, Precision, Problem};
 use crate::body::{Group, MotionPrior, Pppr};
 use crate::config::{EmLoss, FitConfig};
 use crate::geometry::{Vec3, add_scaled, mean, norm};
-use crate::radar::View;
 use serde::{Deserialize, Serialize};
 use space::{LN_SIZE, MOST_JOINTS, PLACE, PoseSpace, YAW};
-use thinned::Thinned;
+use thinned::ThinnedViews;
 
 /// Frames of a window lie no farther from its middle, s: the prior reaches no farther.
 const REACH_S: f64 = 0.201;
@@ -158,14 +157,13 @@ impl Window {
         let Some(space) = PoseSpace::new(prior, &problem.skeleton, &times) else { return Ok(Err(Held::Skeleton)) };
         let (centres, ways) = (region::centres(initial), ways(initial));
         let mut frames = Vec::with_capacity(chosen.len());
-        let thinned: Vec<Thinned> = problem.views.iter().map(|view| Thinned::new(view, initial)).collect();
-        let views: Vec<View> = thinned.iter().map(|thinned| thinned.view.clone()).collect();
-        let (own_regions, _) = region::regions(&views, config.em_region, &centres)?;
+        let thinned = ThinnedViews::new(problem, initial);
+        let views = &thinned.views;
+        let (own_regions, _) = region::regions(views, config.em_region, &centres)?;
         let backgrounds: Vec<Vec<f64>> = (0..views.len())
             .map(|view| {
-                let around = neighbours.iter().map(|neighbour| thinned[view].cells(neighbour.map(view)));
-                let maps: Vec<Vec<f64>> =
-                    std::iter::once(thinned[view].cells(problem.map(view))).chain(around).collect();
+                let frames = std::iter::once(None).chain(neighbours.iter().map(Some));
+                let maps: Vec<Vec<f64>> = frames.map(|frame| thinned.cells(view, frame)).collect();
                 clutter::background(&maps, views[view].quantity)
             })
             .collect();
@@ -189,17 +187,9 @@ impl Window {
                     at
                 })
                 .collect();
-            let (regions, _) = region::regions(&views, config.em_region, &moved)?;
-            let map = |view: usize| frame.map_or(problem.map(view), |k| neighbours[k].map(view));
-            let maps: Vec<Vec<f64>> = thinned.iter().enumerate().map(|(k, of)| of.cells(map(k))).collect();
-            let measured = Measured {
-                views: &views,
-                skeleton: &problem.skeleton,
-                radar: &problem.radar,
-                maps: maps.iter().map(Vec::as_slice).collect(),
-                background: cluttered.then_some(backgrounds.as_slice()),
-            };
-            let em = FrameEm::new(&measured, &regions, config, precision);
+            let (regions, _) = region::regions(views, config.em_region, &moved)?;
+            let background = cluttered.then_some(backgrounds.as_slice());
+            let em = thinned.compared(frame.map(|k| &neighbours[k]), &regions, (config, precision), background);
             frames.push(WindowFrame { em, params: initial.clone(), gradient: Pppr::zeros(initial.shape()) });
         }
         let own = chosen.iter().position(Option::is_none).unwrap_or(0);

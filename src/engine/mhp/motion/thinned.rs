@@ -1,8 +1,11 @@
 //! Every second cell of a map where its point spread covers several: what is left says the same in a quarter of the time.
 
 use crate::body::Pppr;
+use crate::config::FitConfig;
 use crate::geometry::norm;
-use crate::mhp::region::centres;
+use crate::mhp::frame_em::{FrameEm, Measured};
+use crate::mhp::region::{Region, centres};
+use crate::mhp::{Neighbour, Precision, Problem};
 use crate::radar::{Axis, AxisKind, PointSpread, View};
 
 /// Cells that a standard deviation of the point spread covers at least where every second one is enough.
@@ -16,9 +19,49 @@ fn narrowed(psf: &PointSpread) -> PointSpread {
     PointSpread { azimuth_rad: ACROSS * psf.azimuth_rad, elevation_rad: ACROSS * psf.elevation_rad, ..*psf }
 }
 
+/// The views of a problem, thinned, and what its frames show in them.
+pub(super) struct ThinnedViews<'a> {
+    problem: &'a Problem,
+    thinned: Vec<Thinned>,
+    pub(super) views: Vec<View>,
+}
+
+impl<'a> ThinnedViews<'a> {
+    /// For persons who stand where those of `params` do.
+    pub(super) fn new(problem: &'a Problem, params: &Pppr) -> Self {
+        let thinned: Vec<Thinned> = problem.views.iter().map(|view| Thinned::new(view, params)).collect();
+        let views = thinned.iter().map(|thinned| thinned.view.clone()).collect();
+        Self { problem, thinned, views }
+    }
+
+    /// The kept cells of a view in a frame around, or in the one that is fitted; C order.
+    pub(super) fn cells(&self, view: usize, frame: Option<&Neighbour>) -> Vec<f64> {
+        self.thinned[view].cells(frame.map_or_else(|| self.problem.map(view), |frame| frame.map(view)))
+    }
+
+    /// What compares the maps of a frame, over a background power a kept cell where one is known.
+    pub(super) fn compared(
+        &self,
+        frame: Option<&Neighbour>,
+        regions: &[Region],
+        (config, precision): (&FitConfig, Precision),
+        background: Option<&[Vec<f64>]>,
+    ) -> FrameEm {
+        let maps: Vec<Vec<f64>> = (0..self.views.len()).map(|view| self.cells(view, frame)).collect();
+        let measured = Measured {
+            views: &self.views,
+            skeleton: &self.problem.skeleton,
+            radar: &self.problem.radar,
+            maps: maps.iter().map(Vec::as_slice).collect(),
+            background,
+        };
+        FrameEm::new(&measured, regions, config, precision)
+    }
+}
+
 /// A view of every second cell along the axes that can spare the others.
-pub(super) struct Thinned {
-    pub(super) view: View,
+struct Thinned {
+    view: View,
     /// Of each axis, every so manyth cell.
     strides: Vec<usize>,
     shape: Vec<usize>,
@@ -26,7 +69,7 @@ pub(super) struct Thinned {
 
 impl Thinned {
     /// Of `view`, for persons who stand where those of `params` do.
-    pub(super) fn new(view: &View, params: &Pppr) -> Self {
+    fn new(view: &View, params: &Pppr) -> Self {
         let far =
             centres(params).into_iter().map(|at| norm(view.pose.view_from_world(at))).fold(f64::INFINITY, f64::min);
         let psf = &view.psf;
@@ -52,7 +95,7 @@ impl Thinned {
     }
 
     /// The cells of a map that are kept, C order.
-    pub(super) fn cells(&self, map: &[f64]) -> Vec<f64> {
+    fn cells(&self, map: &[f64]) -> Vec<f64> {
         let places = self.shape.iter().zip(&self.strides).fold(vec![0], |places: Vec<usize>, (&bins, &stride)| {
             places.iter().flat_map(|&at| (0..bins).step_by(stride).map(move |bin| at * bins + bin)).collect()
         });

@@ -7,14 +7,12 @@
 //! and who stands before a radar is as likely as not to look at it: only a loss that is clearly lower turns somebody's back.
 
 use super::search::hips_of;
-use super::thinned::Thinned;
+use super::thinned::ThinnedViews;
 use super::{WALKING_MPS, is_unlike, ways};
 use crate::body::Pppr;
 use crate::config::{EmRegion, FitConfig};
 use crate::geometry::{norm, turned_about};
-use crate::mhp::frame_em::{FrameEm, Measured};
 use crate::mhp::{FitError, Neighbour, Precision, Problem, region};
-use crate::radar::View;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Headings that are tried.
@@ -79,10 +77,9 @@ fn profiles(
     let all = problem.neighbours_in(config.frames_around);
     let neighbours: Vec<&Neighbour> = all.iter().filter(|neighbour| neighbour.offset_s.abs() <= NEAR_S).collect();
     let own = neighbours.partition_point(|neighbour| neighbour.offset_s < 0.0);
-    let thinned: Vec<Thinned> = problem.views.iter().map(|view| Thinned::new(view, params)).collect();
-    let views: Vec<View> = thinned.iter().map(|thinned| thinned.view.clone()).collect();
+    let thinned = ThinnedViews::new(problem, params);
     let centre = region::centres(params)[person];
-    let (regions, _) = region::regions(&views, em_region, &[centre])?;
+    let (regions, _) = region::regions(&thinned.views, em_region, &[centre])?;
     let turned: Vec<Pppr> = (0..HEADINGS)
         .map(|k| {
             let mut turned = params.clone();
@@ -91,16 +88,7 @@ fn profiles(
         })
         .collect();
     let profile = |frame: Option<usize>| -> Headings {
-        let map = |view: usize| frame.map_or(problem.map(view), |k| neighbours[k].map(view));
-        let maps: Vec<Vec<f64>> = thinned.iter().enumerate().map(|(k, of)| of.cells(map(k))).collect();
-        let measured = Measured {
-            views: &views,
-            skeleton: &problem.skeleton,
-            radar: &problem.radar,
-            maps: maps.iter().map(Vec::as_slice).collect(),
-            background: None,
-        };
-        let em = FrameEm::new(&measured, &regions, config, Precision::F32);
+        let em = thinned.compared(frame.map(|k| neighbours[k]), &regions, (config, Precision::F32), None);
         std::array::from_fn(|k| em.loss((&problem.radar, config), Precision::F32, &turned[k]))
     };
     let mut frames: Vec<Option<usize>> = (0..neighbours.len()).map(Some).collect();
