@@ -64,6 +64,8 @@ pub struct InspectorApp {
     pictures: sharing::PendingPictures,
     notices_seen: u64,
     last_play: Option<f64>,
+    /// When the replay got on last, s.
+    last_replay: Option<f64>,
     applied_zoom: f32,
     dropped: Option<PathBuf>,
 }
@@ -80,9 +82,12 @@ impl InspectorApp {
         let (mut view, mut recent) = (ViewState::default(), Vec::new());
         let mut layout = PaneLayout::default();
         let mut annotator = crate::folders::user_name();
+        let mut first_visit = false;
         if let Some(storage) = cc.storage {
             annotator = eframe::get_value(storage, ANNOTATOR_KEY).unwrap_or(annotator);
-            view = eframe::get_value(storage, VIEW_KEY).unwrap_or_default();
+            let stored = eframe::get_value(storage, VIEW_KEY);
+            first_visit = stored.is_none();
+            view = stored.unwrap_or_default();
             recent = eframe::get_value(storage, RECENT_KEY).unwrap_or_default();
             if let Some(stored) = eframe::get_value(storage, LAYOUT_KEY) {
                 layout = PaneLayout::restored(stored);
@@ -90,8 +95,11 @@ impl InspectorApp {
         }
         let ctx = cc.egui_ctx.clone();
         let wake: Wake = Arc::new(move || ctx.request_repaint());
-        let mut runtime = Runtime::new(Session::remembered(view, recent), wake, Some(Arc::new(overlay::pick)))
-            .allow_outside(begin.allow_outside);
+        let mut session = Session::remembered(view, recent);
+        if first_visit {
+            session = session.first_visit();
+        }
+        let mut runtime = Runtime::new(session, wake, Some(Arc::new(overlay::pick))).allow_outside(begin.allow_outside);
         runtime.apply(Command::SetAnnotator(annotator));
         let mut app = Self {
             runtime,
@@ -103,6 +111,7 @@ impl InspectorApp {
             pictures: sharing::PendingPictures::default(),
             notices_seen: 0,
             last_play: None,
+            last_replay: None,
             applied_zoom: 1.0,
             dropped: None,
         };
@@ -252,6 +261,26 @@ impl InspectorApp {
         }
     }
 
+    /// Plays the iterations of a fit at the speed that runs are watched at.
+    fn replay(&mut self, ctx: &egui::Context) {
+        if self.session().fit.replay.is_none() {
+            self.last_replay = None;
+            return;
+        }
+        let now = ctx.input(|i| i.time);
+        if let Some(last) = self.last_replay.replace(now) {
+            self.apply(Command::PlayOn(now - last));
+        }
+        ctx.request_repaint();
+    }
+
+    /// Settings stay under the finger until it is lifted.
+    fn lift_finger(&mut self, ctx: &egui::Context) {
+        if self.session().is_dragging() && !ctx.input(|i| i.pointer.any_down()) {
+            self.apply(Command::EndDrag);
+        }
+    }
+
     /// Errors and warnings that appeared since the last pass become notifications.
     fn take_notices(&mut self, ctx: &egui::Context) {
         if let Some((count, level, text)) = &self.runtime.session().notice
@@ -275,6 +304,8 @@ impl eframe::App for InspectorApp {
         self.take_pictures(ctx);
         self.take_drops(ctx);
         self.play(ctx);
+        self.replay(ctx);
+        self.lift_finger(ctx);
         if self.runtime.is_busy() {
             ctx.request_repaint_after(std::time::Duration::from_millis(100));
         }

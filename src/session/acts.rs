@@ -83,6 +83,8 @@ impl Changes {
 /// An act that can be undone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabelAct {
+    /// Its place among all acts of the session.
+    pub at: u64,
     /// In words: `tag F2 on 12 frames`.
     pub name: String,
     /// What it changed.

@@ -9,6 +9,7 @@ mod diagnosis;
 mod export;
 mod fit;
 mod labels;
+mod live;
 mod pins;
 mod queue;
 mod reports;
@@ -125,6 +126,10 @@ impl Session {
             Command::Discard => self.discard(),
             Command::SelectBranch(id) => self.select_branch(id),
             Command::SetConfig(config) => self.set_config(&config),
+            Command::DragConfig(config) => self.drag_config(&config),
+            Command::EndDrag => self.end_drag(),
+            Command::ToggleReplay => self.toggle_replay(),
+            Command::PlayOn(seconds) => self.play_on(seconds),
             Command::SetPrecision(precision) => {
                 if self.precision == precision {
                     return Vec::new();
@@ -142,8 +147,9 @@ impl Session {
                 Vec::new()
             }
             Command::SetView(view) => {
+                let faster = view.speed != self.view.speed;
                 self.view = *view;
-                Vec::new()
+                if faster { self.set_speed() } else { Vec::new() }
             }
             Command::Export(what, path) => self.export(what, path),
             Command::SaveSession(path, window) => self.save_session(path, window),

@@ -79,7 +79,7 @@ pub enum Command {
     SetVerdict(Option<Verdict>),
     /// Say nothing of the targets any more.
     ClearLabel,
-    /// Take the last act of labelling back.
+    /// Take the last act, of labelling or on settings, back.
     Undo,
     /// Do it again.
     Redo,
@@ -117,8 +117,16 @@ pub enum Command {
     Discard,
     /// Continue on another branch.
     SelectBranch(u32),
-    /// New settings; effective from the next step.
+    /// New settings: the fit is done anew with them where that is live, else they count from the next step on.
     SetConfig(Box<FitConfig>),
+    /// The same while they are under a finger: until [`Command::EndDrag`] it is one act.
+    DragConfig(Box<FitConfig>),
+    /// The finger is lifted.
+    EndDrag,
+    /// Play the iterations of the branch on screen, or stop playing them.
+    ToggleReplay,
+    /// So many seconds of the replay went by.
+    PlayOn(f64),
     /// Another scalar for the kernel; prepares the fit again.
     SetPrecision(Precision),
     /// Start the next frame from this one's result.

@@ -3,6 +3,7 @@
 use super::history::{Branch, History, IterationRow};
 use super::state::FitHashes;
 use crate::body::Pppr;
+use crate::config::FitConfig;
 use crate::mhp::Problem;
 use crate::start::FoundStart;
 use crate::worker::{JobId, Snapshot};
@@ -45,6 +46,14 @@ pub struct Fit {
     pub edited: bool,
     /// Number of the newest run, and the iteration that it began at.
     pub run: (u64, usize),
+    /// Number of the newest run that a finger asked for.
+    pub(super) refit_run: u64,
+    /// Milliseconds that a step takes, about.
+    pub step_ms: f64,
+    /// The settings that the start was found with.
+    pub start_config: Option<FitConfig>,
+    /// Where the replay of the active branch is, in iterations; `None` where none is played.
+    pub replay: Option<f64>,
     /// Milliseconds of the last run.
     pub run_ms: Option<f64>,
     /// Why the last run ended, in words.

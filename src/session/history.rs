@@ -131,6 +131,23 @@ impl History {
         id
     }
 
+    /// Forgets the rows of a branch: it is written anew with other settings.
+    pub fn restart(&mut self, branch: u32, config: FitConfig) {
+        let Some(branch) = self.branches.iter_mut().find(|b| b.id == branch) else { return };
+        branch.rows.clear();
+        branch.flags.clear();
+        branch.config = config;
+        self.revision += 1;
+        self.recount();
+    }
+
+    /// Removes a branch on which none began.
+    pub(super) fn remove(&mut self, id: u32) {
+        self.branches.retain(|branch| branch.id != id);
+        self.revision += 1;
+        self.recount();
+    }
+
     /// All branches in the order they began.
     pub fn branches(&self) -> &[Branch] {
         &self.branches

@@ -223,7 +223,7 @@ impl Labels {
     }
 
     /// Takes in what a commit wrote; gives the records that were replaced.
-    pub(super) fn written(&mut self, kind: ActKind, name: String, done: Done) -> Vec<Arc<Record>> {
+    pub(super) fn written(&mut self, kind: ActKind, (at, name): (u64, String), done: Done) -> Vec<Arc<Record>> {
         let Done { changes, records, scored } = done;
         let mine = self.table.change().entry(self.annotator.clone()).or_default();
         let mut replaced = Vec::new();
@@ -234,16 +234,16 @@ impl Labels {
         if changes.is_empty() {
             self.forget(kind);
         } else {
-            self.remember(kind, name, changes);
+            self.remember(kind, (at, name), changes);
         }
         replaced
     }
 
-    fn remember(&mut self, kind: ActKind, name: String, changes: Changes) {
+    fn remember(&mut self, kind: ActKind, (at, name): (u64, String), changes: Changes) {
         match kind {
             ActKind::Do => {
                 self.redo.clear();
-                self.undo.push(LabelAct { name, changes: Arc::new(changes) });
+                self.undo.push(LabelAct { at, name, changes: Arc::new(changes) });
                 let bytes = |acts: &[LabelAct]| acts.iter().map(|act| act.changes.bytes()).sum::<usize>();
                 while self.undo.len() > UNDO_DEPTH || (self.undo.len() > 1 && bytes(&self.undo) > UNDO_BYTES) {
                     self.undo.remove(0);
@@ -251,12 +251,12 @@ impl Labels {
             }
             // The stacks change only now: an act that could not be written is still there to be taken back.
             ActKind::Undo => {
-                let name = self.undo.pop().map_or(name, |act| act.name);
-                self.redo.push(LabelAct { name, changes: Arc::new(changes.reversed()) });
+                let (at, name) = self.undo.pop().map_or((at, name), |act| (act.at, act.name));
+                self.redo.push(LabelAct { at, name, changes: Arc::new(changes.reversed()) });
             }
             ActKind::Redo => {
-                let name = self.redo.pop().map_or(name, |act| act.name);
-                self.undo.push(LabelAct { name, changes: Arc::new(changes) });
+                let (at, name) = self.redo.pop().map_or((at, name), |act| (act.at, act.name));
+                self.undo.push(LabelAct { at, name, changes: Arc::new(changes) });
             }
         }
     }

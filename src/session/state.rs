@@ -8,6 +8,7 @@ use super::identity::Identities;
 use super::labels::Labels;
 use super::pins::Pins;
 use super::queue::{ListedFrom, Queue};
+use super::settings::{Drag, SettingsActs};
 use super::strata::Strata;
 use super::study::StudyView;
 use super::tracked::Tracked;
@@ -181,11 +182,26 @@ pub struct Session {
     /// A table of results whose data set is being opened.
     pub(super) waiting_results: Option<PathBuf>,
     pub(super) jobs: JobId,
+    /// Settings under a finger.
+    pub(super) drag: Option<Drag>,
+    /// Acts on settings.
+    pub(super) settings: SettingsActs,
+    /// Acts so far, on labels or on settings.
+    pub(super) acts_done: u64,
+    /// Iterations a second that the worker was told.
+    pub(super) pace: Option<f64>,
+    /// The next run that a person asks for is slow enough to be watched.
+    pub(super) slow_first_run: bool,
 }
 
 impl Session {
     /// Nothing open yet; shown as in an earlier session, and with what was opened in it, newest first.
     pub fn remembered(view: ViewState, recent: Vec<PathBuf>) -> Self {
         Self { view, data: Data { recent, ..Data::default() }, ..Self::default() }
+    }
+
+    /// For a person who was not here before: the first run is slow enough to be watched.
+    pub fn first_visit(self) -> Self {
+        Self { slow_first_run: true, ..self }
     }
 }

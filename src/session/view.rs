@@ -2,6 +2,7 @@
 
 use super::labels::LabelMode;
 use super::queue::{SavedView, Sort};
+use super::settings::{Live, LiveFrom, RunSpeed};
 use crate::labels::Tag;
 use serde::{Deserialize, Serialize};
 
@@ -172,6 +173,12 @@ pub struct ViewState {
     pub zoom: f32,
     /// Begin to fit a frame as soon as it is shown.
     pub run_on_open: bool,
+    /// Whether a change of settings fits anew at once.
+    pub live: Live,
+    /// Where such a fit begins.
+    pub live_from: LiveFrom,
+    /// How fast runs and replays are watched.
+    pub speed: RunSpeed,
 }
 
 impl Default for ViewState {
@@ -213,6 +220,9 @@ impl Default for ViewState {
             show_baseline: true,
             zoom: 1.0,
             run_on_open: false,
+            live: Live::default(),
+            live_from: LiveFrom::default(),
+            speed: RunSpeed::default(),
         }
     }
 }

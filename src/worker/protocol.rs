@@ -58,6 +58,23 @@ pub enum WorkerCommand {
         /// Comes back with the run's end, so that the end of an older run is not taken for this one's.
         run: u64,
     },
+    /// Fit anew from a state with other settings, and write the branch anew with it: what a setting under a finger asks
+    /// many times a second. Of those that wait the newest is done; each that is begun is shown, as far as it came.
+    Refit {
+        /// The branch that is written anew.
+        branch: u32,
+        /// Where to begin.
+        state: Arc<FitState>,
+        /// Settings from there on.
+        config: Box<FitConfig>,
+        /// Run until this iteration.
+        target: usize,
+        /// Comes back with the end, as that of [`WorkerCommand::RunTo`].
+        run: u64,
+    },
+    /// Runs take at most so many iterations a second from now on, `None` as fast as they go; a fit that is done anew
+    /// always does.
+    Pace(Option<f64>),
     /// Stop after the current step; the job stays.
     Pause,
     /// Take effect at the next step.
@@ -167,6 +184,8 @@ pub struct PreparedFit {
     pub warnings: Vec<String>,
     /// Milliseconds of the initialisation.
     pub init_ms: f64,
+    /// Milliseconds that a step takes, about.
+    pub step_ms: f64,
 }
 
 /// Rare and lossless.
@@ -181,6 +200,13 @@ pub enum WorkerEvent {
         /// The last iteration with the old settings.
         iteration: usize,
         /// The new settings.
+        config: Box<FitConfig>,
+    },
+    /// A branch is written anew: the rows that follow replace all that were sent of it.
+    Refitted {
+        /// The branch.
+        branch: u32,
+        /// The settings that it is fitted with.
         config: Box<FitConfig>,
     },
     /// A run ended.

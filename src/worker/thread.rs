@@ -10,7 +10,7 @@ use crate::mhp::{
 };
 use crate::start::{find_start, problem_of};
 use crate::task::{catch_panic, milliseconds};
-use crossbeam_channel::{Receiver, Sender};
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -23,6 +23,13 @@ const ROWS_INTERVAL: Duration = Duration::from_millis(33);
 /// So many iterations keep every state; in twice as many every second is kept, in four times as many every fourth: nobody
 /// goes through thousands one by one, and fresh memory for each is a large part of what being watched costs.
 const CLOSELY: usize = 1024;
+
+/// A fit that is done anew is shown when it has ended, or with what it came to in this time: then newer settings count.
+const REFIT_SHOWN: Duration = Duration::from_millis(16);
+/// Steps that are taken to tell how long one takes.
+const TIMED_STEPS: usize = 3;
+/// A step this slow is timed once, ms.
+const SLOW_STEP_MS: f64 = 2.0;
 
 /// The start of a branch whose first row this job did not make.
 const NOWHERE: usize = usize::MAX;
@@ -47,6 +54,20 @@ struct Job {
     snapshot_sent: Instant,
     snapshot_cost: Duration,
     dirty: bool,
+    /// Time from step to step; `None` as fast as it goes.
+    pause: Option<Duration>,
+    /// The run is a fit that is done anew.
+    anew: bool,
+    /// When a paced run takes its next step.
+    next_step: Instant,
+    /// A branch that is written anew, until its first rows are sent.
+    refit: Option<Refit>,
+}
+
+/// A fit that is done anew, of which nothing was shown yet.
+struct Refit {
+    began: Instant,
+    config: Box<FitConfig>,
 }
 
 /// The thread's state.
@@ -58,6 +79,8 @@ pub(super) struct Thread {
     job: Option<Job>,
     /// The job that the last `Prepare` named, also when it failed.
     current: JobId,
+    /// Iterations a second that runs may take; `None` as fast as they go.
+    pace: Option<f64>,
 }
 
 impl Thread {
@@ -67,7 +90,7 @@ impl Thread {
         snapshot: Arc<Latest>,
         wake: Box<dyn Fn() + Send>,
     ) -> Self {
-        Self { inbox, outbox, snapshot, wake, job: None, current: 0 }
+        Self { inbox, outbox, snapshot, wake, job: None, current: 0, pace: None }
     }
 
     /// Until `Shutdown` or until the window is gone.
@@ -86,24 +109,37 @@ impl Thread {
 
     /// Drains the commands and takes one step. False at the end.
     fn turn(&mut self) -> bool {
-        let running = self.job.as_ref().is_some_and(Job::is_running);
-        if !running {
-            self.publish();
-            match self.inbox.recv() {
-                Ok(command) => {
-                    if !self.handle(command) {
-                        return false;
-                    }
+        let mut first = None;
+        match self.job.as_ref().filter(|job| job.is_running()).map(Job::wait) {
+            Some(Wait::Not) => {
+                self.step();
+                return true;
+            }
+            Some(Wait::For(time)) => match self.inbox.recv_timeout(time) {
+                Ok(command) => first = Some(command),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return false,
+            },
+            Some(Wait::Look) => {}
+            None => {
+                self.publish();
+                match self.inbox.recv() {
+                    Ok(command) => first = Some(command),
+                    Err(_) => return false,
                 }
-                Err(_) => return false,
             }
         }
-        while let Ok(command) = self.inbox.try_recv() {
-            if !self.handle(command) {
+        let mut commands = first.into_iter().chain(self.inbox.try_iter()).collect::<Vec<_>>().into_iter().peekable();
+        while let Some(command) = commands.next() {
+            let is_refit = |command: &WorkerCommand| matches!(command, WorkerCommand::Refit { .. });
+            let overtaken = is_refit(&command) && commands.peek().is_some_and(is_refit);
+            if !overtaken && !self.handle(command) {
                 return false;
             }
         }
-        self.step();
+        if self.job.as_ref().is_some_and(Job::is_due) {
+            self.step();
+        }
         true
     }
 
@@ -131,6 +167,10 @@ impl Thread {
         match command {
             WorkerCommand::Prepare(prepare) => self.prepare(*prepare),
             WorkerCommand::Discard => self.job = None,
+            WorkerCommand::Pace(pace) => {
+                self.pace = pace;
+                self.job.iter_mut().for_each(|job| job.set_pace(pace));
+            }
             WorkerCommand::Shutdown => return false,
             command => {
                 if let Some(job) = self.job.as_mut() {
@@ -158,7 +198,8 @@ impl Thread {
         self.job = None;
         self.current = prepare.job;
         match Job::new(prepare) {
-            Ok((job, prepared)) => {
+            Ok((mut job, prepared)) => {
+                job.set_pace(self.pace);
                 self.job = Some(job);
                 self.event(WorkerEvent::Prepared(Box::new(prepared)));
             }
@@ -178,6 +219,13 @@ impl Thread {
     /// While running: rows and snapshots at their own pace.
     fn publish_in_passing(&mut self) {
         let Some(job) = self.job.as_mut() else { return };
+        if job.refit.is_some() {
+            // As far as it came, or nothing: rows without their picture would be of two fits.
+            if !job.hurries() {
+                self.publish();
+            }
+            return;
+        }
         let pause = SNAPSHOT_INTERVAL.max(job.snapshot_cost * SNAPSHOT_SHARE);
         if job.snapshot_sent.elapsed() >= pause {
             self.snapshot.put(job.snapshot());
@@ -192,6 +240,10 @@ impl Thread {
     fn send_rows(&mut self) {
         if let Some(job) = self.job.as_mut().filter(|job| !job.rows.is_empty()) {
             job.rows_sent = Instant::now();
+            if let Some(Refit { config, .. }) = job.refit.take() {
+                let event = WorkerEvent::Refitted { branch: job.branch, config };
+                let _ = self.outbox.send(WorkerMessage::Event(job.id, event));
+            }
             let _ = self.outbox.send(WorkerMessage::Rows(job.id, job.take_rows()));
             (self.wake)();
         }
@@ -204,9 +256,38 @@ impl Thread {
     }
 }
 
+/// Milliseconds of a step, the least of a few that are taken back again.
+fn step_ms(fitter: &mut Fitter) -> Result<f64, FitError> {
+    let begin = fitter.state();
+    let mut least = f64::INFINITY;
+    for _ in 0..TIMED_STEPS {
+        let began = Instant::now();
+        // A start that cannot be stepped from is told when somebody asks for steps.
+        if fitter.step().is_err() {
+            break;
+        }
+        least = least.min(milliseconds(began));
+        if least > SLOW_STEP_MS {
+            break;
+        }
+    }
+    fitter.restore(begin)?;
+    Ok(if least.is_finite() { least } else { 0.0 })
+}
+
 /// Of so many iterations the state of one is kept.
 fn stride(iteration: usize) -> usize {
     (iteration / CLOSELY).next_power_of_two()
+}
+
+/// What a run does before its next step.
+enum Wait {
+    /// Take it.
+    Not,
+    /// Look whether somebody asks for something.
+    Look,
+    /// Wait that long for somebody to ask for something.
+    For(Duration),
 }
 
 enum Reply {
@@ -237,6 +318,7 @@ impl Job {
         if let Some(state) = state {
             fitter.restore(state)?;
         }
+        let step_ms = step_ms(&mut fitter)?;
         let now = Instant::now();
         let mut new = Self {
             id: job,
@@ -254,11 +336,15 @@ impl Job {
             snapshot_sent: now,
             snapshot_cost: Duration::ZERO,
             dirty: true,
+            pause: None,
+            anew: false,
+            next_step: now,
+            refit: None,
         };
         if !resumed {
             new.push_row(new.fitter.report());
         }
-        Ok((new, PreparedFit { problem, found_start, initial, warnings, init_ms }))
+        Ok((new, PreparedFit { problem, found_start, initial, warnings, init_ms, step_ms }))
     }
 
     fn iteration(&self) -> usize {
@@ -267,6 +353,33 @@ impl Job {
 
     fn is_running(&self) -> bool {
         self.target > self.iteration()
+    }
+
+    /// Whether a fit that is done anew has time left before it is shown.
+    fn hurries(&self) -> bool {
+        self.refit.as_ref().is_some_and(|refit| refit.began.elapsed() < REFIT_SHOWN)
+    }
+
+    fn unpaced(&self) -> bool {
+        self.anew || self.pause.is_none()
+    }
+
+    fn wait(&self) -> Wait {
+        if self.hurries() {
+            return Wait::Not;
+        }
+        let left = self.next_step.saturating_duration_since(Instant::now());
+        if self.unpaced() || left.is_zero() { Wait::Look } else { Wait::For(left) }
+    }
+
+    /// Whether the next step is to be taken now.
+    fn is_due(&self) -> bool {
+        self.is_running() && (self.unpaced() || self.next_step <= Instant::now())
+    }
+
+    fn set_pace(&mut self, pace: Option<f64>) {
+        self.pause = pace.filter(|pace| *pace > 0.0).and_then(|pace| Duration::try_from_secs_f64(1.0 / pace).ok());
+        self.next_step = Instant::now();
     }
 
     fn finished(&self, reason: StopReason) -> WorkerEvent {
@@ -305,6 +418,10 @@ impl Job {
 
     fn step(&mut self) -> Result<Option<StopReason>, FitError> {
         let report = self.fitter.step()?;
+        if let Some(pause) = self.pause {
+            // What a step takes is part of the pause; who was held up does not hurry after it.
+            self.next_step = (self.next_step + pause).max(Instant::now());
+        }
         self.steps_in_run += 1;
         let (iteration, converged) = (report.iteration, report.converged);
         self.push_row(report);
@@ -319,9 +436,20 @@ impl Job {
         self.keep_last();
         match command {
             WorkerCommand::RunTo { target, run } => {
-                (self.target, self.run) = (target, run);
-                self.run_began = Instant::now();
-                self.steps_in_run = 0;
+                self.begin_run(target, run);
+                if !self.is_running() {
+                    return Ok(Reply::Event(self.finished(StopReason::Iterations)));
+                }
+            }
+            WorkerCommand::Refit { branch, state, config, target, run } => {
+                self.rows.clear();
+                self.fitter.set_config(*config)?;
+                self.fitter.restore(state)?;
+                (self.branch, self.branch_start) = (branch, self.iteration());
+                self.push_row(self.fitter.report());
+                self.begin_run(target, run);
+                self.anew = true;
+                self.refit = Some(Refit { began: self.run_began, config });
                 if !self.is_running() {
                     return Ok(Reply::Event(self.finished(StopReason::Iterations)));
                 }
@@ -360,9 +488,16 @@ impl Job {
             }
             #[expect(clippy::panic, reason = "the test hook that proves the window survives a panic")]
             WorkerCommand::PanicForTest => panic!("asked to panic"),
-            WorkerCommand::Prepare(_) | WorkerCommand::Discard | WorkerCommand::Shutdown => {}
+            WorkerCommand::Prepare(_) | WorkerCommand::Discard | WorkerCommand::Pace(_) | WorkerCommand::Shutdown => {}
         }
         Ok(Reply::Nothing)
+    }
+
+    fn begin_run(&mut self, target: usize, run: u64) {
+        (self.target, self.run, self.anew) = (target, run, false);
+        self.next_step = Instant::now();
+        self.run_began = Instant::now();
+        self.steps_in_run = 0;
     }
 
     fn inspect(&mut self, branch: u32, state: &FitState, config: &FitConfig) -> Snapshot {

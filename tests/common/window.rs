@@ -177,6 +177,14 @@ impl Window {
         self.harness.step();
     }
 
+    /// From now on settings count from the next step on, instead of fitting anew at once.
+    pub(crate) fn switch_live_off(&mut self) {
+        if self.session().is_live() {
+            self.key(Key::V);
+        }
+        assert!(!self.session().is_live());
+    }
+
     /// Opens a folder that is there already.
     pub(crate) fn on(folder: tempfile::TempDir) -> Self {
         let harness = Self::empty(&[folder.path().into()], [1440.0, 900.0]);

@@ -1,7 +1,7 @@
 //! Labels, evidence and strata in `Session::apply` without threads: what a window meets only when answers come late.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
-use crate::dataset;
+use crate::{SLOW_MS, dataset};
 use mhp_inspector::body::Pppr;
 use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::Dataset;
@@ -115,7 +115,8 @@ impl Bench {
         let problem = Arc::new(problem_alone(&prepare.dataset, &prepare.frame).unwrap());
         let params = initialise(&problem, &FitConfig::default()).unwrap().params;
         let initial = params.clone();
-        let prepared = PreparedFit { problem, found_start: None, initial, warnings: Vec::new(), init_ms: 1.0 };
+        let prepared =
+            PreparedFit { problem, found_start: None, initial, warnings: Vec::new(), init_ms: 1.0, step_ms: SLOW_MS };
         let event = WorkerEvent::Prepared(Box::new(prepared));
         self.session.report(Report::Worker(WorkerMessage::Event(prepare.job, event)));
         self.draw(params);

@@ -6,6 +6,7 @@ mod blob;
 
 mod acts;
 mod labels;
+mod live;
 mod state;
 mod worker;
 
@@ -13,6 +14,9 @@ use mhp_inspector::dataset::Dataset;
 use mhp_inspector::task::Progress;
 use std::path::Path;
 use std::sync::Arc;
+
+/// A step of this many milliseconds: settings count from the next step on.
+const SLOW_MS: f64 = 1e3;
 
 /// A data set of blobs, made in `folder` and opened.
 fn dataset(folder: &Path, frames: usize) -> Arc<Dataset> {

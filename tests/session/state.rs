@@ -1,7 +1,7 @@
 //! `Session::apply` without threads: commands and reports in, effects and state out.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
-use crate::dataset;
+use crate::{SLOW_MS, dataset};
 use mhp_inspector::body::{Group, Pppr};
 use mhp_inspector::config::{FIELDS, Field, FieldKind, FitConfig, Number, ReadBy, Value};
 use mhp_inspector::dataset::{BareCatalog, BareChoice, Dataset, DatasetError};
@@ -90,7 +90,8 @@ impl Bench {
         if !resumed {
             self.rows(job, branch, 0..=0);
         }
-        let prepared = PreparedFit { problem, found_start: None, initial, warnings: Vec::new(), init_ms: 1.5 };
+        let prepared =
+            PreparedFit { problem, found_start: None, initial, warnings: Vec::new(), init_ms: 1.5, step_ms: SLOW_MS };
         self.event(job, WorkerEvent::Prepared(Box::new(prepared)));
         assert_eq!(self.session.fit.status, FitStatus::Paused);
     }
@@ -676,6 +677,7 @@ fn a_fit_that_was_left_is_found_again() {
         initial: bench.params.clone(),
         warnings: Vec::new(),
         init_ms: 0.0,
+        step_ms: SLOW_MS,
     };
     let effects = bench.event(job, WorkerEvent::Prepared(Box::new(prepared)));
     assert!(matches!(sent(&effects), WorkerCommand::Inspect { branch: 1, state, .. } if state.iteration == 7));
@@ -751,6 +753,7 @@ fn a_run_begins_by_itself_only_where_asked() {
         initial: bench.params.clone(),
         warnings: vec!["the region has no cell".into()],
         init_ms: 0.0,
+        step_ms: SLOW_MS,
     };
     let effects = bench.event(job, WorkerEvent::Prepared(Box::new(prepared)));
     assert!(matches!(sent(&effects), WorkerCommand::RunTo { target: 100, .. }));

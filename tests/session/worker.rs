@@ -539,3 +539,27 @@ fn every_command_in_the_queue_is_obeyed_in_order() {
     }
     assert_eq!(branches, (1..=200).collect::<Vec<_>>());
 }
+
+/// While the worker was busy a finger went over forty values: the newest is fitted, the others never were.
+#[test]
+fn of_the_fits_that_wait_to_be_done_anew_the_newest_is() {
+    let mut rig = Rig::new();
+    let (row, prepared) = rig.prepared();
+    let begin = Arc::clone(state(&row));
+    rig.prepare_with(2, &FitConfig::default(), Start::Warm(prepared.initial));
+    for k in 1..=40_u32 {
+        let config = Box::new(FitConfig { w_em: f64::from(k), ..FitConfig::default() });
+        rig.send(WorkerCommand::Refit { branch: 1, state: Arc::clone(&begin), config, target: 5, run: u64::from(k) });
+    }
+    let (rows, _) = rig.rows_until(2, |event| matches!(event, WorkerEvent::Prepared(_)));
+    assert_eq!(iterations(&rows), [0]);
+    let (rows, event) = rig.rows_until(2, |event| matches!(event, WorkerEvent::Refitted { .. }));
+    let WorkerEvent::Refitted { branch: 1, config } = event else { panic!("{event:?}") };
+    assert_eq!((rows.len(), config.w_em), (0, 40.0));
+    let (rows, event) = rig.rows_until(2, |event| matches!(event, WorkerEvent::Finished { .. }));
+    assert!(matches!(event, WorkerEvent::Finished { run: 40, branch: 1, iteration: 5, .. }), "{event:?}");
+    assert_eq!(iterations(&rows), [0, 1, 2, 3, 4, 5]);
+    assert!(rows.iter().all(|row| row.branch == 1));
+    let snapshot = rig.snapshot(|snapshot| snapshot.iteration == 5);
+    assert_eq!((snapshot.branch, snapshot.config.w_em), (1, 40.0));
+}

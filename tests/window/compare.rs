@@ -33,6 +33,7 @@ fn number(text: f64, digits: usize) -> String {
 #[test]
 fn a_pinned_fit_is_the_baseline_of_the_next_one() {
     let mut window = run_ten(2, 0);
+    window.switch_live_off();
     assert!(!window.named("Compare with the baseline"));
     window.click("Compare");
     assert!(window.says("No pinned fit"));
@@ -103,6 +104,7 @@ fn a_pin_can_be_named_and_leads_back_to_its_frame() {
 /// a moved camera, zoomed maps, another pane in front.
 fn busy() -> Window {
     let mut window = run_ten(4, 2);
+    window.switch_live_off();
     window.type_value("w_EM value", "2");
     window.key_with(Modifiers::SHIFT, Key::Period);
     window.paused_at(20);

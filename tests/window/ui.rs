@@ -90,6 +90,7 @@ fn settings_given_at_the_beginning_are_in_the_first_start() {
     window.ready(0);
     let other = find_start(&problem, &plain).unwrap().initialisation.params;
     assert!(window.fit().initial.as_ref() == Some(&other) && other != start);
+    window.switch_live_off();
     let job = window.fit().job;
     window.apply(Command::SetConfig(Box::new(FitConfig { w_em: 0.7, ..plain })));
     window.apply(Command::StepFit(2));
@@ -142,6 +143,7 @@ fn a_setting_typed_during_a_run_takes_effect_and_is_flagged() {
 #[test]
 fn a_setting_changed_at_an_earlier_iteration_branches_and_discard_goes_back() {
     let mut window = Window::fitted(1);
+    window.switch_live_off();
     window.key_with(Modifiers::SHIFT, Key::Comma);
     window.until("iteration 10", |w| w.fit().shown.as_ref().is_some_and(|s| s.iteration == 10));
     // Two keystrokes: the branch that the first one begins must not take the field away from the second.
@@ -166,6 +168,7 @@ fn a_setting_changed_at_an_earlier_iteration_branches_and_discard_goes_back() {
 #[test]
 fn branches_are_chosen_by_name() {
     let mut window = Window::fitted(1);
+    window.switch_live_off();
     window.key_with(Modifiers::SHIFT, Key::Comma);
     window.type_value("w_EM value", "2");
     window.paused_at(10);
@@ -374,6 +377,7 @@ fn a_window_without_data_says_what_to_do() {
 #[test]
 fn everything_that_can_be_used_has_a_name() {
     let mut window = Window::fitted(2);
+    window.switch_live_off();
     window.key(Key::W);
     window.key_with(Modifiers::SHIFT, Key::Comma);
     window.type_value("w_EM value", "2");
@@ -514,4 +518,48 @@ fn a_picture_without_a_session_is_drawn_in_silence() {
     let told = String::from_utf8_lossy(&drawn.stderr);
     assert!(drawn.status.success() && picture.exists(), "{told}");
     assert_eq!(told, "");
+}
+
+/// The body follows the finger; when it is lifted one branch, one line and one act are left.
+#[test]
+fn a_dragged_weight_fits_anew_under_the_finger() {
+    let mut window = Window::fitted(1);
+    assert!(window.session().is_live(), "a fit of blobs is quick");
+    let before = window.fit().shown.clone().unwrap();
+    window.reveal("w_EM");
+    let rect = window.node("w_EM").rect();
+    let at = |share: f32| egui::pos2(rect.left() + share * rect.width(), rect.center().y);
+    window.harness.hover_at(at(0.3));
+    window.harness.drag_at(at(0.3));
+    let mut shown = std::collections::BTreeSet::new();
+    for k in 1..=12 {
+        window.harness.hover_at(at(0.3 + 0.05 * k as f32));
+        window.until("a fit with the value under the finger", |w| {
+            w.fit().shown.as_ref().is_some_and(|shown| shown.config == w.session().config && shown.iteration == 20)
+        });
+        shown.insert(window.fit().shown.as_ref().unwrap().config.w_em.to_bits());
+        assert!(window.session().is_dragging());
+        assert_eq!(window.fit().history.branches().len(), 2, "one branch, written anew");
+    }
+    window.harness.drop_at(at(0.9));
+    window.until("the lifted finger", |w| !w.session().is_dragging());
+    assert!(shown.len() >= 6, "{shown:?}");
+    assert_ne!(window.fit().shown.as_ref().unwrap().params, before.params);
+    let told = window.session().log.iter().filter(|line| line.text.contains("w_EM 0.5 → ")).count();
+    assert_eq!(told, 1, "{:?}", window.session().log);
+    window.key_with(Modifiers::COMMAND, Key::Z);
+    window.paused_at(20);
+    assert_eq!((window.session().config.w_em, window.fit().history.active_id()), (0.5, 0));
+}
+
+#[test]
+fn settings_are_found_by_what_is_said_of_them() {
+    let mut window = Window::open(1);
+    window.click("Search the settings");
+    window.type_text("adam step size");
+    window.harness.run_steps(2);
+    assert!(window.named("Learning rate value") && !window.named("d_sep value"));
+    window.type_text(" no such thing");
+    window.harness.run_steps(2);
+    assert!(window.says("No setting is called that"));
 }

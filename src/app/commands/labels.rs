@@ -28,20 +28,20 @@ fn reviewing(s: &Session) -> bool {
 pub(super) const COMMANDS: &[CommandRow] = &[
     CommandRow {
         label: "Undo",
-        title: Some(|s| s.labels.undo_name().map_or_else(|| "Undo".into(), |name| format!("Undo: {name}"))),
+        title: Some(|s| s.undo_name().map_or_else(|| "Undo".into(), |name| format!("Undo: {name}"))),
         tooltip: "Take the last act of labelling back.",
         menu: Menu::Edit,
         keys: &[(CTRL, Key::Z)],
-        enabled: |s| s.labels.undo_name().is_some(),
+        enabled: |s| s.undo_name().is_some(),
         act: |_| UiAction::Session(Command::Undo),
     },
     CommandRow {
         label: "Redo",
-        title: Some(|s| s.labels.redo_name().map_or_else(|| "Redo".into(), |name| format!("Redo: {name}"))),
+        title: Some(|s| s.redo_name().map_or_else(|| "Redo".into(), |name| format!("Redo: {name}"))),
         tooltip: "Do the last act again that was taken back.",
         menu: Menu::Edit,
         keys: &[(CTRL_SHIFT, Key::Z), (CTRL, Key::Y)],
-        enabled: |s| s.labels.redo_name().is_some(),
+        enabled: |s| s.redo_name().is_some(),
         act: |_| UiAction::Session(Command::Redo),
     },
     CommandRow {

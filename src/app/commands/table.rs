@@ -2,7 +2,7 @@
 
 use super::{AppAct, CommandRow, Menu, UiAction};
 use crate::app::panes::scene;
-use crate::session::{Command, Compare, PickKind, Session, ThemeChoice, ViewState};
+use crate::session::{Command, Compare, Live, PickKind, Session, ThemeChoice, ViewState};
 use egui::{Key, Modifiers};
 
 pub(crate) const NONE: Modifiers = Modifiers::NONE;
@@ -225,6 +225,27 @@ pub(super) const COMMANDS: &[CommandRow] = &[
         keys: &[(NONE, Key::L)],
         enabled: |s| s.fit.cursor.is_some(),
         act: |_| UiAction::Session(Command::FollowLive),
+    },
+    CommandRow {
+        label: "Replay",
+        title: None,
+        tooltip: "Show the iterations of the branch on screen one after the other, at the speed of runs; again to stop.",
+        menu: Menu::Fit,
+        keys: &[(SHIFT, Key::Enter)],
+        enabled: |s| ready(s) && !s.fit.is_running() && s.fit.branch().is_some_and(|branch| branch.rows.len() > 1),
+        act: |_| UiAction::Session(Command::ToggleReplay),
+    },
+    CommandRow {
+        label: "Live fit",
+        title: None,
+        tooltip: "Fit anew while a setting is dragged; or let settings count from the next step on.",
+        menu: Menu::Fit,
+        keys: &[(NONE, Key::V)],
+        enabled: always,
+        act: |s| {
+            let live = s.is_live();
+            view(s, |view| view.live = if live { Live::Off } else { Live::On })
+        },
     },
     CommandRow {
         label: "Reset fit",

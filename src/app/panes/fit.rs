@@ -1,12 +1,12 @@
 //! The fit: transport, the shown iteration's numbers, and every setting.
 
-use super::{Dock, Pane, PaneStates, Shared};
+use super::{Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::{Named as _, chip, icon_button, iou_color, settings, value_row};
-use crate::config::{Convergence, FieldGroup, FitConfig, Preset, difference};
+use crate::app::widgets::{Named as _, chip, icon_button, iou_color, rows, settings, value_row};
+use crate::config::{Convergence, FIELDS, Field, FieldGroup, FitConfig, Preset, difference};
 use crate::mhp::{Precision, Scope, TERMS, TermId, Terms, formula};
-use crate::session::{Command, FitStatus};
+use crate::session::{Command, FitStatus, Live, LiveFrom, RunSpeed};
 use egui::{Key, RichText, Ui};
 
 /// The pane.
@@ -17,33 +17,57 @@ pub(super) static PANE: Pane = Pane {
     dock: Dock::RightTop,
     keys: &[(CTRL, Key::Num6)],
     margin: 8,
-    state: PaneStates::prepare::<()>,
+    state: PaneStates::prepare::<State>,
     blank: |_| None,
     toolbar: Some(|ui, shared, _| toolbar(ui, shared)),
-    ui: |ui, shared, _| show(ui, shared),
+    ui: |ui, shared, states| show(ui, shared, states.of()),
 };
 
+/// What the pane remembers.
+#[derive(Default)]
+struct State {
+    /// What is looked for among the settings.
+    search: String,
+}
+
+impl PaneState for State {}
+
+/// The setting of the top row that is no weight.
+const PEOPLE: &str = "people";
+
 fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let old = shared.session.config;
+    let mut config = old;
+    presets(ui, &mut config);
     transport(ui, shared);
+    watching(ui, shared);
     // In scopes of their own: what appears in them must not shift the identity of a number that is being typed below.
     ui.scope(|ui| status(ui, shared));
     ui.separator();
+    change(ui, shared, &old, &config);
 }
 
-fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
+/// Asks for the settings that were set: still under a finger, or an act of their own.
+fn change(ui: &Ui, shared: &mut Shared<'_>, old: &FitConfig, config: &FitConfig) {
+    if config != old {
+        let held = ui.input(|i| i.pointer.any_down());
+        let command = if held { Command::DragConfig } else { Command::SetConfig };
+        shared.send(command(Box::new(*config)));
+    }
+}
+
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let old = shared.session.config;
         let mut config = old;
-        presets(ui, &mut config);
-        ui.separator();
         settings(ui, FieldGroup::Weights, &mut config);
+        let people: Vec<&Field> = FIELDS.iter().filter(|field| field.key == PEOPLE).collect();
+        rows(ui, &people, &mut config);
         ui.separator();
         ui.scope(|ui| numbers(ui, shared));
         ui.separator();
-        sections(ui, shared, &mut config);
-        if config != old {
-            shared.send(Command::SetConfig(Box::new(config)));
-        }
+        sections(ui, shared, state, &mut config);
+        change(ui, shared, &old, &config);
     });
 }
 
@@ -78,6 +102,49 @@ fn transport(ui: &mut Ui, shared: &mut Shared<'_>) {
     });
 }
 
+/// How a fit is watched: whether it follows a finger, how fast it runs, and once more.
+fn watching(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let view = &shared.session.view;
+    let (live, mut from, mut speed) = (shared.session.is_live(), view.live_from, view.speed);
+    let took = shared.session.fit_ms().map_or_else(String::new, |ms| format!(" A fit takes about {ms:.0} ms here."));
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        let tip = format!(
+            "While a setting is dragged the fit is done anew with it, on one branch that is an act when the finger is lifted.{took} Off: settings count from the next step on. On by itself where a fit takes less than {:.0} ms.\nKey: V",
+            Live::QUICK_MS
+        );
+        let switch = ui.selectable_label(live, "Live").named(egui::Role::Button, "Live fit");
+        if switch.on_hover_text(tip).clicked() {
+            shared.invoke("Live fit");
+        }
+        let name = |from: LiveFrom| if from == LiveFrom::Start { "from start" } else { "from here" };
+        let tip = "Where a live fit begins: at the start pose, or at the iteration on screen when the finger goes down.";
+        let choice = egui::ComboBox::from_id_salt("live from").width(76.0).selected_text(name(from)).show_ui(ui, |ui| {
+            for one in [LiveFrom::Start, LiveFrom::Shown] {
+                ui.selectable_value(&mut from, one, name(one));
+            }
+        });
+        choice.response.named(egui::Role::ComboBox, "Live fit from").on_hover_text(tip);
+        let tip = "Iterations a second of a run or a replay.";
+        let choice = egui::ComboBox::from_id_salt("speed").width(52.0).selected_text(speed.title()).show_ui(ui, |ui| {
+            for one in RunSpeed::ALL {
+                ui.selectable_value(&mut speed, one, one.title());
+            }
+        });
+        choice.response.named(egui::Role::ComboBox, "Speed of a run").on_hover_text(tip);
+        let (playing, ready) = (shared.session.fit.replay.is_some(), shared.session.fit.is_ready());
+        let can = ready && !shared.session.fit.is_running() && shared.session.fit.branch().is_some_and(|b| b.rows.len() > 1);
+        let text = if playing { "Stop replay" } else { "Replay" };
+        let button = ui.add_enabled(can, egui::Button::new(text));
+        if button.on_hover_text("Show the iterations of this branch one after the other, at that speed.\nKey: Shift+Enter").clicked() {
+            shared.invoke("Replay");
+        }
+    });
+    if (from, speed) != (shared.session.view.live_from, shared.session.view.speed) {
+        shared.set_view(|view| (view.live_from, view.speed) = (from, speed));
+    }
+}
+
 fn status(ui: &mut Ui, shared: &mut Shared<'_>) {
     let tokens = Tokens::of(ui);
     let fit = &shared.session.fit;
@@ -107,6 +174,14 @@ fn status(ui: &mut Ui, shared: &mut Shared<'_>) {
         }
         if let FitStatus::Failed(why) = &fit.status {
             ui.label(RichText::new(why).small().color(tokens.bad));
+        }
+        if shared.session.needs_new_start() {
+            let button = egui::Button::new(RichText::new("↺ new start needed").small().color(tokens.warn)).small();
+            let changed = fit.start_config.map_or_else(String::new, |old| difference(&old, &shared.session.config));
+            let tip = format!("Settings that only a start reads have changed since this one was found: {changed}.\nFinds a new start and fits from there; the iterations of this frame are forgotten.");
+            if ui.add(button).on_hover_text(tip).clicked() {
+                shared.invoke("Reset fit");
+            }
         }
     });
     // Always there: a branch that begins while a slider is dragged must not move the slider.
@@ -225,20 +300,37 @@ fn shown_terms(terms: &Terms) -> impl Iterator<Item = (TermId, f64)> {
     terms.iter().filter(move |(term, _)| term.scope == Scope::Always || there(term.scope))
 }
 
-/// Every group but the weights, which stand above, each under its head.
-fn sections(ui: &mut Ui, shared: &mut Shared<'_>, config: &mut FitConfig) {
+/// Every setting but those above, each group under its head; or those that are looked for.
+fn sections(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, config: &mut FitConfig) {
+    let search =
+        egui::TextEdit::singleline(&mut state.search).hint_text("Search the settings").desired_width(f32::INFINITY);
+    ui.add(search).named(egui::Role::SearchInput, "Search the settings");
+    let rest = |field: &&Field| field.group != FieldGroup::Weights && field.key != PEOPLE;
+    if !state.search.trim().is_empty() {
+        let found: Vec<&Field> = FIELDS.iter().filter(rest).filter(|field| fits(field, &state.search)).collect();
+        if found.is_empty() {
+            ui.label(RichText::new("No setting is called that.").small().color(Tokens::of(ui).dim));
+        }
+        return rows(ui, &found, config);
+    }
     for group in FieldGroup::ALL.into_iter().filter(|group| *group != FieldGroup::Weights) {
         let open = matches!(group, FieldGroup::Optimiser | FieldGroup::Radar | FieldGroup::Model);
         egui::CollapsingHeader::new(group.title()).default_open(open).show(ui, |ui| {
             if !group.help().is_empty() {
                 ui.label(RichText::new(group.help()).small());
             }
-            settings(ui, group, config);
+            rows(ui, &group.fields().filter(rest).collect::<Vec<_>>(), config);
             if group == FieldGroup::Optimiser {
                 ways(ui, shared);
             }
         });
     }
+}
+
+/// Whether every word that was typed is in a setting's label, key, group or help.
+fn fits(field: &Field, search: &str) -> bool {
+    let text = format!("{} {} {} {}", field.label, field.key, field.group.title(), field.help).to_lowercase();
+    search.to_lowercase().split_whitespace().all(|word| text.contains(word))
 }
 
 /// How fits are run: no settings of a fit, and in no `FIT.toml`.

@@ -6,4 +6,4 @@ mod setting;
 
 pub(super) use chip::{Named, chip, icon_button, iou_color, value_row};
 pub(super) use colorbar::{ColorBar, colorbar, tick};
-pub(super) use setting::settings;
+pub(super) use setting::{rows, settings};

@@ -4,13 +4,18 @@ use super::Named as _;
 use crate::config::{Answer, Field, FieldGroup, FieldKind, FitConfig, Number, Preset, Value};
 use egui::{Response, Ui};
 
-/// The box of a number, and the button beside it, points.
+/// The box of a number, the label and the button beside it, points.
 const VALUE: egui::Vec2 = egui::vec2(62.0, 20.0);
+const NAME: egui::Vec2 = egui::vec2(96.0, 20.0);
 const BACK: egui::Vec2 = egui::vec2(18.0, 20.0);
 
 /// The settings of a group, one a line; switches that follow each other share one.
 pub(in crate::app) fn settings(ui: &mut Ui, group: FieldGroup, config: &mut FitConfig) {
-    let fields: Vec<&Field> = group.fields().collect();
+    rows(ui, &group.fields().collect::<Vec<_>>(), config);
+}
+
+/// These settings, one a line; switches that follow each other share one.
+pub(in crate::app) fn rows(ui: &mut Ui, fields: &[&Field], config: &mut FitConfig) {
     let preset = Preset::nearest(config);
     for run in fields.chunk_by(|a, b| matches!((&a.kind, &b.kind), (FieldKind::Switch, FieldKind::Switch))) {
         if let [Field { kind: FieldKind::Switch, .. }, ..] = run {
@@ -38,7 +43,7 @@ fn switch(ui: &mut Ui, field: &Field, config: &mut FitConfig) {
 /// Label and answers.
 fn choice(ui: &mut Ui, field: &Field, answers: &[Answer], config: &mut FitConfig) {
     ui.horizontal_wrapped(|ui| {
-        ui.label(field.label).on_hover_text(field.tip());
+        name(ui, field);
         for (k, answer) in answers.iter().enumerate() {
             let given = field.get(config) == Value::Answer(k);
             if ui.selectable_label(given, answer.label).on_hover_text(field.answer_tip(answer)).clicked() {
@@ -48,6 +53,16 @@ fn choice(ui: &mut Ui, field: &Field, answers: &[Answer], config: &mut FitConfig
     });
 }
 
+/// The label, in the column that all of them share.
+fn name(ui: &mut Ui, field: &Field) {
+    let layout = egui::Layout::left_to_right(egui::Align::Center);
+    let label = ui.allocate_ui_with_layout(NAME, layout, |ui| {
+        ui.set_min_width(NAME.x);
+        ui.add(egui::Label::new(field.label).truncate())
+    });
+    label.inner.on_hover_text(field.tip());
+}
+
 /// Label, slider, value, and a button back to what the nearest preset sets where the value differs from it.
 fn slider(ui: &mut Ui, field: &Field, number: &Number, preset: Preset, config: &mut FitConfig) {
     let (Value::Number(old), Value::Number(usual)) = (field.get(config), field.get(&preset.config())) else { return };
@@ -55,12 +70,7 @@ fn slider(ui: &mut Ui, field: &Field, number: &Number, preset: Preset, config: &
     let (lo, hi) = number.offered;
     let tip = field.tip();
     ui.horizontal(|ui| {
-        let layout = egui::Layout::left_to_right(egui::Align::Center);
-        let label = ui.allocate_ui_with_layout(egui::vec2(96.0, 20.0), layout, |ui| {
-            ui.set_min_width(96.0);
-            ui.add(egui::Label::new(field.label).truncate())
-        });
-        label.inner.on_hover_text(&tip);
+        name(ui, field);
         let beside = VALUE.x + BACK.x + 2.0 * ui.spacing().item_spacing.x;
         let width = (ui.available_width() - beside).max(40.0);
         ui.spacing_mut().slider_width = width;
@@ -89,7 +99,7 @@ fn optional(ui: &mut Ui, field: &Field, number: &Number, config: &mut FitConfig)
     let Some(unset) = number.unset else { return };
     ui.horizontal(|ui| {
         let tip = field.tip();
-        ui.label(field.label).on_hover_text(&tip);
+        name(ui, field);
         let given = field.get(config);
         let without = given == Value::Unset;
         // What has no word is left out of FIT.toml.

@@ -134,7 +134,8 @@ impl Session {
             }
         };
         let warm = self.warm_params();
-        let mut effects = self.leave_frame();
+        let mut effects = self.end_drag();
+        effects.extend(self.leave_frame());
         for note in &frame.notes {
             self.note(LogLevel::Info, format!("{}: {note}", frame.name));
         }
@@ -197,6 +198,7 @@ impl Session {
             self.fit.history.flag(id, head, self.config);
         } else {
             self.fit.history = History::new(self.config);
+            self.fit.start_config = Some(self.config);
             self.fit.cursor = None;
         }
         vec![Effect::Send(WorkerCommand::Prepare(Box::new(Prepare {

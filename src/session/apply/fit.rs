@@ -1,14 +1,61 @@
 //! Running, stepping, going back, branching, changing settings.
 
 use crate::body::Pppr;
-use crate::config::{FitConfig, ReadBy, difference};
+use crate::config::FitConfig;
 use crate::session::effect::Effect;
 use crate::session::fit::FitStatus;
 use crate::session::state::{LogLevel, Session};
 use crate::worker::WorkerCommand;
 use std::sync::Arc;
 
+/// What the first run of a person takes, s.
+const FIRST_RUN_S: f64 = 4.0;
+/// What a replay takes at full speed, s.
+const FASTEST_REPLAY_S: f64 = 1.0;
+
 impl Session {
+    /// The run is watched at another speed, from now on.
+    pub(super) fn set_speed(&mut self) -> Vec<Effect> {
+        self.slow_first_run = false;
+        self.set_pace(self.view.speed.pace())
+    }
+
+    /// Tells the worker the pace of runs, where it is another one.
+    fn set_pace(&mut self, pace: Option<f64>) -> Vec<Effect> {
+        if self.pace == pace {
+            return Vec::new();
+        }
+        self.pace = pace;
+        vec![Effect::Send(WorkerCommand::Pace(pace))]
+    }
+
+    /// Plays the iterations of the branch on screen from its first one, or stops playing them.
+    pub(super) fn toggle_replay(&mut self) -> Vec<Effect> {
+        if self.fit.replay.take().is_some() || !self.fit.is_ready() || self.fit.is_running() {
+            return Vec::new();
+        }
+        let Some(branch) = self.fit.branch().filter(|branch| branch.rows.len() > 1) else { return Vec::new() };
+        let (start, head) = (branch.start(), branch.head());
+        let shown = self.fit.shown_iteration();
+        let from = if shown >= head { start } else { shown };
+        self.fit.replay = Some(from as f64);
+        self.show_iteration(from)
+    }
+
+    /// The replay gets on by so many seconds.
+    pub(super) fn play_on(&mut self, seconds: f64) -> Vec<Effect> {
+        let (Some(at), Some(branch)) = (self.fit.replay, self.fit.branch()) else { return Vec::new() };
+        let (start, head) = (branch.start(), branch.head());
+        let pace = self.view.speed.pace().unwrap_or((head - start) as f64 / FASTEST_REPLAY_S);
+        let next = at + pace * seconds;
+        if next >= head as f64 {
+            self.fit.replay = None;
+            return self.show_iteration(head);
+        }
+        self.fit.replay = Some(next);
+        self.show_iteration(next as usize)
+    }
+
     pub(super) fn toggle_run(&mut self) -> Vec<Effect> {
         if self.fit.is_running() {
             return vec![Effect::Send(WorkerCommand::Pause)];
@@ -18,15 +65,33 @@ impl Session {
         }
         let (head, asked) = (self.fit.head(), self.config.iterations);
         let target = if head < asked { asked } else { head + asked };
-        self.run_to(target)
+        let mut pace = self.view.speed.pace();
+        if pace.is_none() && std::mem::take(&mut self.slow_first_run) {
+            let slow = ((target - head) as f64 / FIRST_RUN_S).max(1.0);
+            pace = Some(slow);
+            let text = format!(
+                "Your first run, slowed to {slow:.0} iterations a second to be watched. It takes {:.0} ms: “max” beside Run.",
+                self.fit_ms().unwrap_or_default().max(1.0)
+            );
+            self.hint(text);
+        }
+        self.run_at(target, pace)
     }
 
+    /// A run as fast as it goes.
     pub(super) fn run_to(&mut self, target: usize) -> Vec<Effect> {
+        self.run_at(target, None)
+    }
+
+    fn run_at(&mut self, target: usize, pace: Option<f64>) -> Vec<Effect> {
         self.fit.cursor = None;
+        self.fit.replay = None;
         self.fit.status = FitStatus::Running;
         self.fit.reason = None;
         self.fit.run = (self.fit.run.0 + 1, self.fit.head());
-        vec![Effect::Send(WorkerCommand::RunTo { target, run: self.fit.run.0 })]
+        let mut effects = self.set_pace(pace);
+        effects.push(Effect::Send(WorkerCommand::RunTo { target, run: self.fit.run.0 }));
+        effects
     }
 
     pub(super) fn step_fit(&mut self, n: usize) -> Vec<Effect> {
@@ -46,7 +111,13 @@ impl Session {
         self.run_to(head + n)
     }
 
+    /// Looks at an iteration; one that is being played stays there.
     pub(super) fn goto_iteration(&mut self, iteration: usize) -> Vec<Effect> {
+        self.fit.replay = None;
+        self.show_iteration(iteration)
+    }
+
+    fn show_iteration(&mut self, iteration: usize) -> Vec<Effect> {
         let Some(branch) = self.fit.branch() else { return Vec::new() };
         let wanted = iteration.clamp(branch.start(), branch.head());
         if wanted == branch.head() {
@@ -120,39 +191,12 @@ impl Session {
         vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: Box::new(self.config) })]
     }
 
-    pub(super) fn set_config(&mut self, config: &FitConfig) -> Vec<Effect> {
-        let config = match config.validated() {
-            Ok(config) => config,
-            Err(error) => {
-                self.note(LogLevel::Error, error.to_string());
-                return Vec::new();
-            }
-        };
-        if config == self.config {
-            return Vec::new();
-        }
-        let steering_only = config.same_but(&self.config, |read_by| read_by == ReadBy::Run);
-        let starts_alike = config.same_but(&self.config, |read_by| read_by != ReadBy::Start);
-        self.config = config;
-        if !starts_alike && self.fit.is_untouched() {
-            return self.reset();
-        }
-        if matches!(self.fit.status, FitStatus::Idle | FitStatus::Failed(_)) {
-            return Vec::new();
-        }
-        if !steering_only && let Some(effects) = self.branch_at_cursor() {
-            return effects;
-        }
-        vec![Effect::Send(WorkerCommand::Configure(Box::new(config)))]
-    }
-
     /// Where an earlier iteration is looked at: starts a branch there with the current settings.
     pub(super) fn branch_at_cursor(&mut self) -> Option<Vec<Effect>> {
         let at = self.fit.cursor?;
         let branch = self.fit.branch()?;
         let (kept, state) = branch.state_at(at).map(|(k, s)| (k, Arc::clone(s)))?;
         let parent = branch.id;
-        let old = branch.config_at(kept);
         // Until the worker answers with the row under the new settings, the branch begins with the one that is known.
         let row = branch.row(kept).cloned();
         let id = self.fit.history.begin(Some((parent, kept)), self.config);
@@ -161,9 +205,11 @@ impl Session {
         }
         self.fit.cursor = None;
         self.fit.status = FitStatus::Paused;
-        let what = difference(&old, &self.config);
-        let what = if what.is_empty() { "edited by hand".into() } else { what };
-        self.note(LogLevel::Info, format!("branch {id} begins at iteration {kept} of branch {parent}: {what}"));
+        // What a finger does is told when it is lifted.
+        if self.drag.is_none() {
+            let text = format!("branch {id} begins at iteration {kept} of branch {parent}: edited by hand");
+            self.note(LogLevel::Info, text);
+        }
         Some(vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: Box::new(self.config) })])
     }
 

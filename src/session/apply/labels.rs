@@ -134,7 +134,7 @@ impl Session {
         self.view.label_mode == LabelMode::Agreement && self.view.blind && self.labels.tags(frame).is_empty()
     }
 
-    pub(super) fn undo(&mut self) -> Vec<Effect> {
+    pub(super) fn undo_label(&mut self) -> Vec<Effect> {
         if self.labels.undo_name().is_none() {
             return Vec::new();
         }
@@ -142,7 +142,7 @@ impl Session {
         self.again(ActKind::Undo, &act.name, Asked::Back(act.changes))
     }
 
-    pub(super) fn redo(&mut self) -> Vec<Effect> {
+    pub(super) fn redo_label(&mut self) -> Vec<Effect> {
         if self.labels.redo_name().is_none() {
             return Vec::new();
         }
@@ -221,7 +221,11 @@ impl Session {
                     let on = if done.changes.len() == 1 { format!(" ({first})") } else { String::new() };
                     self.hint(format!("{act}{on}"));
                 }
-                let replaced = self.labels.written(kind, act, done);
+                if kind == ActKind::Do && !done.changes.is_empty() {
+                    self.acts_done += 1;
+                    self.settings.redo.clear();
+                }
+                let replaced = self.labels.written(kind, (self.acts_done, act), done);
                 free(replaced.len(), (asked, replaced))
             }
             Err(why) => {

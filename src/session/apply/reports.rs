@@ -85,6 +85,10 @@ impl Session {
                 self.fit.history.flag(branch, iteration, *config);
                 Vec::new()
             }
+            WorkerEvent::Refitted { branch, config } => {
+                self.fit.history.restart(branch, *config);
+                Vec::new()
+            }
             WorkerEvent::Finished { run, branch, iteration, reason, run_ms } => {
                 if run == self.fit.run.0 && branch == self.fit.history.active_id() {
                     self.fit.status = FitStatus::Paused;
@@ -92,7 +96,8 @@ impl Session {
                     self.fit.reason = Some(reason.text());
                     self.change_summary(|summary| summary.reason = Some(reason.text().to_owned()));
                     // A single step is seen on the screen; the log is for runs.
-                    if iteration > self.fit.run.1 + 1 {
+                    // What a finger asks for is told when it is lifted.
+                    if iteration > self.fit.run.1 + 1 && run != self.fit.refit_run {
                         self.note(
                             LogLevel::Info,
                             format!("{} at iteration {iteration} after {run_ms:.0} ms", reason.text()),
@@ -133,6 +138,7 @@ impl Session {
         self.fit.initial = Some(prepared.initial);
         self.identify();
         self.fit.init_ms = prepared.init_ms;
+        self.fit.step_ms = prepared.step_ms;
         if prepared.found_start.is_some() {
             self.fit.found_start = prepared.found_start;
         }
