@@ -13,6 +13,8 @@ type Leaf = &'static Pane;
 /// The tree of tiles.
 pub(crate) struct PaneLayout {
     tree: Tree<Leaf>,
+    /// The default layout, as long as nobody moved one of its borders: it goes with the size of the window.
+    fitted: Option<Fitted>,
     /// A pane whose tab was right-clicked, and what was chosen.
     asked: Option<AppAct>,
 }
@@ -20,16 +22,55 @@ pub(crate) struct PaneLayout {
 impl Default for PaneLayout {
     fn default() -> Self {
         let mut tiles = Tiles::default();
-        let top = docked(&mut tiles, Dock::Top);
-        let bottom = [Dock::BottomLeft, Dock::BottomRight].map(|dock| (docked(&mut tiles, dock), 1.0));
-        let bottom = linear(&mut tiles, LinearDir::Horizontal, &bottom);
-        let middle = linear(&mut tiles, LinearDir::Vertical, &[(top, 1.12), (bottom, 1.0)]);
-        let left = docked(&mut tiles, Dock::Left);
-        let right = [(Dock::RightTop, 1.0), (Dock::RightBottom, 1.25)];
-        let right = right.map(|(dock, share)| (docked(&mut tiles, dock), share));
-        let right = linear(&mut tiles, LinearDir::Vertical, &right);
-        let root = linear(&mut tiles, LinearDir::Horizontal, &[(left, 0.235), (middle, 0.6), (right, 0.25)]);
-        Self { tree: Tree::new(egui::Id::unique("panes"), root, tiles), asked: None }
+        let mut column = |docks: [(Dock, f32); 2]| {
+            let panes = docks.map(|(dock, share)| (docked(&mut tiles, dock), share));
+            linear(&mut tiles, LinearDir::Vertical, &panes)
+        };
+        let left = column([(Dock::LeftTop, 1.2), (Dock::LeftBottom, 1.0)]);
+        let middle = column([(Dock::Centre, 4.0), (Dock::Bottom, 1.0)]);
+        let right = column([(Dock::RightTop, 1.4), (Dock::RightBottom, 1.0)]);
+        let root = linear(&mut tiles, LinearDir::Horizontal, &[(left, 1.0), (middle, 4.0), (right, 1.25)]);
+        let fitted = Fitted { columns: root, middle, shares: [Vec::new(), Vec::new()] };
+        Self { tree: Tree::new(egui::Id::unique("panes"), root, tiles), fitted: Some(fitted), asked: None }
+    }
+}
+
+/// Borders of the default layout.
+struct Fitted {
+    /// Left, middle and right.
+    columns: TileId,
+    /// Maps, and what is below them.
+    middle: TileId,
+    /// As they were set last; empty before.
+    shares: [Vec<f32>; 2],
+}
+
+/// Widths of the columns at the edges: a share of the window's within these, points.
+const LEFT: (f32, [f32; 2]) = (0.158, [200.0, 330.0]);
+const RIGHT: (f32, [f32; 2]) = (0.197, [250.0, 430.0]);
+/// Height of what is below the maps.
+const BELOW: (f32, [f32; 2]) = (0.18, [124.0, 300.0]);
+
+impl Fitted {
+    /// Sets the borders for a window; false where somebody moved one.
+    fn set(&mut self, tiles: &mut Tiles<Leaf>, size: egui::Vec2) -> bool {
+        let part = |(share, [least, most]): (f32, [f32; 2]), of: f32| (share * of).clamp(least, most) / of.max(1.0);
+        let (left, right, below) = (part(LEFT, size.x), part(RIGHT, size.x), part(BELOW, size.y));
+        let wanted = [vec![left, (1.0 - left - right).max(0.1), right], vec![(1.0 - below).max(0.1), below]];
+        for ((id, shares), set) in [self.columns, self.middle].into_iter().zip(wanted).zip(&mut self.shares) {
+            let Some(Tile::Container(Container::Linear(linear))) = tiles.get_mut(id) else { return false };
+            let now: Vec<f32> = linear.children.iter().map(|child| linear.shares[*child]).collect();
+            let moved =
+                !set.is_empty() && (now.len() != set.len() || now.iter().zip(&*set).any(|(a, b)| (a - b).abs() > 1e-4));
+            if moved || linear.children.len() != shares.len() {
+                return false;
+            }
+            for (&child, &share) in linear.children.iter().zip(&shares) {
+                linear.shares.set_share(child, share);
+            }
+            *set = shares;
+        }
+        true
     }
 }
 
@@ -41,13 +82,12 @@ fn linear(tiles: &mut Tiles<Leaf>, dir: LinearDir, children: &[(TileId, f32)]) -
     tiles.insert_container(Container::Linear(linear))
 }
 
-/// The panes of a place: side by side at the top, else tabs, and one alone as it is.
+/// The panes of a place: tabs, and one alone as it is.
 fn docked(tiles: &mut Tiles<Leaf>, dock: Dock) -> TileId {
     let panes = Pane::all().iter().filter(|pane| pane.dock() == dock);
     let panes: Vec<TileId> = panes.map(|pane| tiles.insert_pane(*pane)).collect();
     match panes[..] {
         [one] => one,
-        _ if dock == Dock::Top => tiles.insert_horizontal_tile(panes),
         _ => tiles.insert_tab_tile(panes),
     }
 }
@@ -56,7 +96,7 @@ impl PaneLayout {
     /// A stored tree; one without a single pane is replaced by the default.
     pub(crate) fn restored(tree: Tree<Leaf>) -> Self {
         if tree.root().is_some() && tree.tiles.iter().any(|(_, tile)| matches!(tile, Tile::Pane(_))) {
-            let mut restored = Self { tree, asked: None };
+            let mut restored = Self { tree, fitted: None, asked: None };
             restored.complete();
             restored
         } else {
@@ -108,6 +148,9 @@ impl PaneLayout {
     pub(crate) fn show(&mut self, ui: &mut egui::Ui, shared: &mut Shared<'_>, states: &mut PaneStates) {
         let tokens = Tokens::of(ui);
         egui::CentralPanel::default().frame(egui::Frame::new().fill(tokens.stroke)).show(ui, |ui| {
+            let size = ui.available_size();
+            self.fitted =
+                self.fitted.take().and_then(|mut fitted| fitted.set(&mut self.tree.tiles, size).then_some(fitted));
             let mut behavior = Behavior { shared, states, asked: &mut self.asked };
             self.tree.ui(&mut behavior, ui);
         });

@@ -189,7 +189,8 @@ impl InspectorApp {
             AppAct::OpenPath => self.overlay.open_path(self.runtime.session().data.recent.first()),
             AppAct::ResetLayout => self.layout = PaneLayout::default(),
             AppAct::ResetViews => self.panes.reset_views(),
-            AppAct::Focus => self.panes.focus(self.runtime.session()),
+            AppAct::Back => self.back(),
+            AppAct::Focus => self.panes.toggle_focus(self.runtime.session()),
             AppAct::ZoomIn => self.set_zoom(self.session().view.zoom + 0.1),
             AppAct::ZoomOut => self.set_zoom(self.session().view.zoom - 0.1),
             AppAct::ZoomReset => self.set_zoom(1.0),
@@ -206,6 +207,19 @@ impl InspectorApp {
                 ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!full));
             }
         }
+    }
+
+    /// One step back from what was singled out: a map alone, selected frames, a joint.
+    fn back(&mut self) {
+        if self.panes.back() {
+            return;
+        }
+        let clear = if self.session().labels.selection.is_empty() {
+            Command::SelectJoint(None)
+        } else {
+            Command::SelectFrames(std::collections::BTreeSet::new())
+        };
+        self.apply(clear);
     }
 
     fn set_zoom(&mut self, zoom: f32) {

@@ -293,7 +293,7 @@ fn help(ui: &mut Ui) {
             ("right drag", "pan in 3-D; zoom to a box in the curves"),
             ("wheel", "zoom at the pointer"),
             ("click", "select a joint; show an iteration"),
-            ("double click", "whole map; focus a joint; whole curve"),
+            ("double click", "one map alone; focus a joint; whole curve"),
         ] {
             key_row(ui, gesture, what, &tokens);
         }

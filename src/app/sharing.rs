@@ -23,6 +23,8 @@ struct WindowState {
 /// Pictures that were asked for and are not drawn yet.
 #[derive(Default)]
 pub(super) struct PendingPictures {
+    /// To be drawn with the next pass: the one in which somebody asks still has the dialog or the menu on it.
+    asked: Vec<Wanted>,
     drawn: Arc<Mutex<Vec<Drawn>>>,
 }
 
@@ -39,14 +41,22 @@ pub(super) enum Wanted {
 
 impl PendingPictures {
     /// Asks for a picture of the next pass.
-    fn ask(&self, ctx: &Context, wanted: Wanted) {
-        let drawn = Arc::clone(&self.drawn);
-        let waker = ctx.clone();
-        ctx.request_screenshot(move |image: Arc<ColorImage>| {
-            drawn.lock().unwrap_or_else(PoisonError::into_inner).push((wanted, image));
-            waker.request_repaint();
-        });
+    fn ask(&mut self, ctx: &Context, wanted: Wanted) {
+        self.asked.push(wanted);
         ctx.request_repaint();
+    }
+
+    /// A pass begins, of which pictures are taken that were asked for in the one before.
+    fn begin_pass(&mut self, ctx: &Context) {
+        for wanted in self.asked.drain(..) {
+            let drawn = Arc::clone(&self.drawn);
+            let waker = ctx.clone();
+            ctx.request_screenshot(move |image: Arc<ColorImage>| {
+                drawn.lock().unwrap_or_else(PoisonError::into_inner).push((wanted, image));
+                waker.request_repaint();
+            });
+            ctx.request_repaint();
+        }
     }
 
     fn take(&self) -> Vec<Drawn> {
@@ -151,6 +161,7 @@ impl InspectorApp {
     /// Carries out what was asked of the pictures that are drawn by now.
     pub(super) fn take_pictures(&mut self, ctx: &Context) {
         let scale = ctx.pixels_per_point();
+        self.pictures.begin_pass(ctx);
         for (wanted, image) in self.pictures.take() {
             match wanted {
                 Wanted::File(path, rect) => {

@@ -25,7 +25,7 @@ Examples:
       The window after 60 Adam steps on the first frame.
   mhp-inspector screenshot data/mmvr --iterations 0 --size 1920x1080 --theme light --focus --out start.png
       The start pose, the maps zoomed to the fitted region.
-  mhp-inspector screenshot --session talk.mhp-session --pane H_sim --figure --scale 2 --out h_sim.png
+  mhp-inspector screenshot --session talk.mhp-session --pane Maps --figure --scale 2 --out h_sim.png
       One pane of a saved session, with a caption, for a figure.";
 
 /// What `screenshot` is told.

@@ -119,6 +119,8 @@ pub struct ViewState {
     pub wipe: f32,
     /// Draw maps whose axes are metres to scale.
     pub true_proportions: bool,
+    /// Maps and camera go with the person from frame to frame.
+    pub follow: bool,
     /// Draw the EM region on the maps.
     pub show_region: bool,
     /// Draw the joints and bones on the maps.
@@ -193,6 +195,7 @@ impl Default for ViewState {
             against: Against::default(),
             wipe: 0.5,
             true_proportions: false,
+            follow: true,
             show_region: true,
             show_skeleton: true,
             show_boxes: true,

@@ -180,7 +180,7 @@ impl Window {
     /// From now on settings count from the next step on, instead of fitting anew at once.
     pub(crate) fn switch_live_off(&mut self) {
         if self.session().is_live() {
-            self.key(Key::V);
+            self.key_with(Modifiers::SHIFT, Key::L);
         }
         assert!(!self.session().is_live());
     }

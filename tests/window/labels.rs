@@ -366,6 +366,7 @@ fn a_new_fit_leaves_the_tag_and_says_that_it_was_judged_on_another() {
 #[test]
 fn a_drag_with_ctrl_marks_cells() {
     let mut window = open(1);
+    window.key(Key::F);
     let map = window.node("H_ori map of hori").rect();
     // 48 bins of depth from the top, 32 across from the left.
     let cell = |row: f32, column: f32| {

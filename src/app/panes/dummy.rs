@@ -63,7 +63,7 @@ fn a_layout_survives_json_and_ron_and_one_from_before_gets_the_pane() {
     let tree: Tree<&'static Pane> = serde_json::from_str(&json).unwrap();
     assert_eq!(tree, *default.stored());
     let text = ron::to_string(default.stored()).unwrap();
-    assert!(text.contains("Pane(HOri)"), "keys are written as they always were: {text}");
+    assert!(text.contains("Pane(Maps)"), "keys are written as they always were: {text}");
     let tree: Tree<&'static Pane> = ron::from_str(&text).unwrap();
     assert_eq!(tree, *default.stored());
     // A tree from before the pane, and one with a pane that there is no longer.

@@ -79,7 +79,7 @@ fn transport(ui: &mut Ui, shared: &mut Shared<'_>) {
         ui.spacing_mut().item_spacing.x = 3.0;
         let (sign, name) = if running { ("‖", "Pause fit") } else { ("▶", "Run fit") };
         let text = RichText::new(if running { format!("{sign} Pause") } else { format!("{sign} Run") });
-        let response = ui.add_enabled(ready, egui::Button::new(text).min_size(egui::vec2(72.0, 24.0)));
+        let response = ui.add_enabled(ready, egui::Button::new(text).min_size(egui::vec2(60.0, 24.0)));
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, ready, name));
         if response.on_hover_text("Run the asked number of iterations, or pause.\nKey: Enter").clicked() {
             shared.invoke("Run or pause");
@@ -108,25 +108,26 @@ fn watching(ui: &mut Ui, shared: &mut Shared<'_>) {
     let (live, mut from, mut speed) = (shared.session.is_live(), view.live_from, view.speed);
     let took = shared.session.fit_ms().map_or_else(String::new, |ms| format!(" A fit takes about {ms:.0} ms here."));
     ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.spacing_mut().item_spacing.x = 3.0;
+        ui.spacing_mut().button_padding.x = 6.0;
         let tip = format!(
-            "While a setting is dragged the fit is done anew with it, on one branch that is an act when the finger is lifted.{took} Off: settings count from the next step on. On by itself where a fit takes less than {:.0} ms.\nKey: V",
+            "While a setting is dragged the fit is done anew with it, on one branch that is an act when the finger is lifted.{took} Off: settings count from the next step on. On by itself where a fit takes less than {:.0} ms.\nKey: Shift+L",
             Live::QUICK_MS
         );
         let switch = ui.selectable_label(live, "Live").named(egui::Role::Button, "Live fit");
         if switch.on_hover_text(tip).clicked() {
             shared.invoke("Live fit");
         }
-        let name = |from: LiveFrom| if from == LiveFrom::Start { "from start" } else { "from here" };
+        let name = |from: LiveFrom| if from == LiveFrom::Start { "start" } else { "here" };
         let tip = "Where a live fit begins: at the start pose, or at the iteration on screen when the finger goes down.";
-        let choice = egui::ComboBox::from_id_salt("live from").width(76.0).selected_text(name(from)).show_ui(ui, |ui| {
+        let choice = egui::ComboBox::from_id_salt("live from").width(38.0).selected_text(name(from)).show_ui(ui, |ui| {
             for one in [LiveFrom::Start, LiveFrom::Shown] {
                 ui.selectable_value(&mut from, one, name(one));
             }
         });
         choice.response.named(egui::Role::ComboBox, "Live fit from").on_hover_text(tip);
         let tip = "Iterations a second of a run or a replay.";
-        let choice = egui::ComboBox::from_id_salt("speed").width(52.0).selected_text(speed.title()).show_ui(ui, |ui| {
+        let choice = egui::ComboBox::from_id_salt("speed").width(44.0).selected_text(speed.title()).show_ui(ui, |ui| {
             for one in RunSpeed::ALL {
                 ui.selectable_value(&mut speed, one, one.title());
             }
@@ -368,7 +369,8 @@ fn ways(ui: &mut Ui, shared: &mut Shared<'_>) {
 fn presets(ui: &mut Ui, config: &mut FitConfig) {
     let tokens = Tokens::of(ui);
     ui.horizontal_wrapped(|ui| {
-        ui.label(RichText::new("Preset").color(tokens.dim)).on_hover_text("All settings at once.");
+        ui.spacing_mut().item_spacing.x = 3.0;
+        ui.spacing_mut().button_padding.x = 6.0;
         for preset in Preset::ALL {
             let button = ui.selectable_label(*config == preset.config(), preset.name());
             let button = button.named(egui::Role::Button, &format!("Preset {}", preset.name()));

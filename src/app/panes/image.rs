@@ -15,7 +15,7 @@ pub(super) static PANE: Pane = Pane {
     key: "Image",
     title: "Image plane",
     help: "key points, boxes and masks in camera pixels",
-    dock: Dock::BottomLeft,
+    dock: Dock::RightBottom,
     keys: &[(CTRL, Key::Num9)],
     margin: 0,
     state: PaneStates::prepare::<State>,

@@ -11,7 +11,7 @@ pub(super) static PANE: Pane = Pane {
     key: "Log",
     title: "Log",
     help: "what was opened, assumed, repaired and refused",
-    dock: Dock::BottomRight,
+    dock: Dock::Bottom,
     keys: &[(CTRL, Key::Num5)],
     margin: 8,
     state: PaneStates::prepare::<()>,

@@ -1,7 +1,10 @@
-//! The maps: H_ori, H_sim and the masks of each view, with one zoom, one cursor and one probe for all three columns.
+//! The maps: a row a view with H_ori, H_sim and the masks, one zoom, one cursor and one read-out for all of them.
 
+mod focus;
+mod grid;
 mod overlay;
 mod picture;
+mod readout;
 mod region;
 mod toolbar;
 
@@ -14,49 +17,34 @@ use crate::app::widgets::{ColorBar, colorbar};
 use crate::radar::View;
 use crate::session::{ColorRange, Compare, Session};
 use egui::{Key, Rect, Sense, Ui, UiBuilder, pos2, vec2};
+use focus::Focus;
+use grid::GridRow;
 use picture::{Content, Pictures};
 use serde_json::Value;
 
-/// The measured maps.
-pub(super) static H_ORI: Pane = Pane {
-    key: "HOri",
-    title: "H_ori",
-    help: "the measured maps",
-    dock: Dock::Top,
+/// The pane.
+pub(super) static PANE: Pane = Pane {
+    key: "Maps",
+    title: "Maps",
+    help: "the measured maps, the simulated ones and the masks of both",
+    dock: Dock::Centre,
     keys: &[],
     margin: 0,
     state: PaneStates::prepare::<State>,
     blank,
-    toolbar: Some(|ui, shared, _| toolbar::show(ui, shared, MapColumn::Ori)),
-    ui: |ui, shared, states| show(ui, shared, states.of(), MapColumn::Ori),
+    toolbar: Some(|ui, shared, states| toolbar::show(ui, shared, states.of())),
+    ui: |ui, shared, states| show(ui, shared, states.of()),
 };
 
-/// The simulated maps.
-pub(super) static H_SIM: Pane = Pane {
-    key: "HSim",
-    title: "H_sim",
-    help: "the simulated maps",
-    dock: Dock::Top,
-    keys: &[],
-    margin: 0,
-    state: PaneStates::prepare::<State>,
-    blank,
-    toolbar: Some(|ui, shared, _| toolbar::show(ui, shared, MapColumn::Sim)),
-    ui: |ui, shared, states| show(ui, shared, states.of(), MapColumn::Sim),
-};
-
-/// The masks of the two.
-pub(super) static MASKS: Pane = Pane {
-    key: "Masks",
-    title: "Masks",
-    help: "the masks of both",
-    dock: Dock::Top,
-    keys: &[],
-    margin: 0,
-    state: PaneStates::prepare::<State>,
-    blank,
-    toolbar: Some(|ui, shared, _| toolbar::show(ui, shared, MapColumn::Masks)),
-    ui: |ui, shared, states| show(ui, shared, states.of(), MapColumn::Masks),
+/// One map takes the room of all.
+pub(in crate::app) const ENLARGE: CommandRow = CommandRow {
+    label: "One map alone",
+    title: None,
+    tooltip: "The map under the pointer takes the room of all of them; again, or Esc, to see all. A double click does the same.",
+    menu: Menu::View,
+    keys: &[(NONE, Key::Z)],
+    enabled: has_frame,
+    act: |_| UiAction::panes(|states, _| states.of::<State>().enlarge()),
 };
 
 /// The next drag on a map marks cells; again to leave it.
@@ -75,12 +63,16 @@ pub(super) fn show_cells(view: usize, lo: Vec<usize>, hi: Vec<usize>) -> UiActio
     UiAction::panes(move |states, session| states.of::<State>().show_cells(session, view, &lo, &hi))
 }
 
-/// Which column a pane is.
+/// What a column shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum MapColumn {
     Ori,
     Sim,
     Masks,
+}
+
+impl MapColumn {
+    const ALL: [Self; grid::COLUMNS] = [Self::Ori, Self::Sim, Self::Masks];
 }
 
 /// The part of a map that is seen, in picture coordinates (0..1 both ways).
@@ -101,12 +93,17 @@ impl Default for MapExtent {
 struct State {
     pictures: Pictures,
     windows: Vec<MapExtent>,
-    /// View and (column, row) pixel under the pointer, whichever pane it is in.
+    /// View and (column, row) pixel under the pointer, in whichever column.
     hovered: Option<(usize, [usize; 2])>,
     hovered_next: Option<(usize, [usize; 2])>,
+    /// View and column of the map under the pointer.
+    pointed: Option<(usize, usize)>,
+    /// View and column of the map that is alone.
+    solo: Option<(usize, usize)>,
+    focus: Focus,
     pass: u64,
-    /// Shift is held over the pane that is drawn: H_ori and H_sim are flipped in all its views.
-    flipped: bool,
+    /// The column over which Shift is held: H_ori and H_sim are flipped in all its views.
+    flipped: Option<MapColumn>,
     highlight: Option<region::Highlight>,
     marking: region::Marking,
     /// The data set that the windows belong to.
@@ -116,7 +113,21 @@ struct State {
 impl PaneState for State {
     fn reset_view(&mut self) {
         self.highlight = None;
+        self.solo = None;
+        self.show_all();
+    }
+
+    fn show_all(&mut self) {
         self.windows.clear();
+        self.focus.whole = true;
+    }
+
+    fn back(&mut self) -> bool {
+        self.solo.take().is_some()
+    }
+
+    fn shows_all(&self) -> bool {
+        self.windows.iter().all(|window| *window == MapExtent::default())
     }
 
     fn stored_as(&self) -> Option<&'static str> {
@@ -135,24 +146,16 @@ impl PaneState for State {
         let valid =
             |w: &[f32; 4]| w.iter().all(|x| (0.0..=1.0).contains(x)) && w[2] - w[0] > 0.01 && w[3] - w[1] > 0.01;
         let window = |w: [f32; 4]| MapExtent { min: [w[0], w[1]], max: [w[2], w[3]] };
+        self.focus.whole = true;
         self.windows = stored.into_iter().map(|w| if valid(&w) { window(w) } else { MapExtent::default() }).collect();
         Ok(())
     }
 
-    /// Zooms every map to the EM region.
+    /// Zooms every map to the person.
     fn focus(&mut self, session: &Session) {
-        let (Some(dataset), Some(snapshot)) = (&session.data.dataset, &session.fit.shown) else { return };
-        let views = &dataset.info().views;
-        self.windows.resize(views.len(), MapExtent::default());
-        for (i, (view, masks)) in views.iter().zip(&snapshot.masks).enumerate() {
-            if let Some([min, max]) = overlay::region_box(view, &masks.inside) {
-                let pad = [(max[0] - min[0]) * 0.06, (max[1] - min[1]) * 0.06];
-                self.windows[i] = MapExtent {
-                    min: [(min[0] - pad[0]).max(0.0), (min[1] - pad[1]).max(0.0)],
-                    max: [(max[0] + pad[0]).min(1.0), (max[1] + pad[1]).min(1.0)],
-                };
-            }
-        }
+        let Some(dataset) = &session.data.dataset else { return };
+        self.focus.whole = false;
+        self.show_person(session, &dataset.info().views, false);
     }
 }
 
@@ -169,6 +172,11 @@ impl State {
             }
         }
     }
+
+    /// The map under the pointer alone, else the first one; or all of them again.
+    fn enlarge(&mut self) {
+        self.solo = if self.solo.is_some() { None } else { Some(self.pointed.unwrap_or_default()) };
+    }
 }
 
 fn blank(session: &Session) -> Option<Blank> {
@@ -182,8 +190,8 @@ fn blank(session: &Session) -> Option<Blank> {
     }
 }
 
-/// Draws one column.
-fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColumn) {
+/// Draws every map, and what is under the pointer.
+fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     state.begin_pass(ui.ctx());
     let session = shared.session;
     let (Some(dataset), Some(frame)) = (&session.data.dataset, &session.data.frame) else { return };
@@ -192,63 +200,44 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColu
     if !known.is_some_and(|known| std::sync::Arc::ptr_eq(&known, dataset)) {
         state.dataset = Some(std::sync::Arc::downgrade(dataset));
         state.windows.clear();
+        state.solo = None;
+        state.focus = Focus::default();
     }
     state.windows.resize(views.len(), MapExtent::default());
     state.leave_highlight(Some(session.data.frame_index));
     state.pictures.update(session, views, frame);
-    if column != MapColumn::Ori
-        && session.fit.shown.is_none()
-        && let crate::session::FitStatus::Failed(why) = &session.fit.status
-    {
-        return Blank::new("No fit", why.clone()).show(ui);
-    }
+    state.follow(session, views);
     // A toolbar that is wider than the pane must not push the maps out of it.
     let area = ui.available_rect_before_wrap().intersect(shared.pane);
-    let pointer = ui.input(|i| i.pointer.hover_pos().filter(|_| i.modifiers.shift));
-    state.flipped = column != MapColumn::Masks && pointer.is_some_and(|p| area.contains(p));
-    for (i, rect) in arrange(area, views, session.view.true_proportions).into_iter().enumerate() {
-        let builder = UiBuilder::new().max_rect(rect).id_salt(("map", i));
-        ui.scope_builder(builder, |ui| one(ui, shared, state, column, i, rect));
+    let (maps, readout) = area.split_top_bottom_at_y((area.max.y - grid::READOUT).max(area.min.y));
+    let rows = grid::rows(maps.shrink2(vec2(4.0, 1.0)), views.len(), state.solo);
+    let pointer = ui.input(|i| i.pointer.hover_pos());
+    let over = |column: usize| pointer.is_some_and(|p| rows.iter().any(|row| row.maps[column].contains(p)));
+    let column = (0..grid::COLUMNS).find(|&column| over(column));
+    state.pointed = column.and_then(|column| {
+        let row = rows.iter().find(|row| pointer.is_some_and(|p| row.maps[column].contains(p)))?;
+        Some((row.view, column))
+    });
+    let flip = ui.input(|i| i.modifiers.shift);
+    state.flipped = column.filter(|_| flip).map(|column| MapColumn::ALL[column]);
+    for row in rows {
+        let builder = UiBuilder::new().max_rect(maps).id_salt(("map", row.view));
+        ui.scope_builder(builder, |ui| {
+            for (column, rect) in MapColumn::ALL.into_iter().zip(row.maps).filter(|(_, rect)| rect.is_positive()) {
+                ui.push_id(column, |ui| one(ui, shared, state, column, &row, rect));
+            }
+            if row.axes {
+                beside(ui, shared, state, &row);
+            }
+        });
     }
+    readout::show(ui, shared.session, state, readout);
 }
 
-/// Side by side or one above the other, whichever makes the maps larger.
-fn arrange(area: Rect, views: &[View], to_scale: bool) -> Vec<Rect> {
-    let n = views.len().max(1);
-    let aspects: Vec<f32> = views.iter().map(|v| Orientation::of(v).metric_aspect(v).unwrap_or(1.0)).collect();
-    let score = |cell: egui::Vec2| -> f32 {
-        let usable = (cell - vec2(92.0, 48.0)).max(egui::Vec2::ZERO);
-        // To scale: the area that is left. Freely stretched: the area, less where the proportions are far off.
-        aspects
-            .iter()
-            .map(|a| {
-                let (w, h) = (usable.x.min(usable.y * a), usable.y.min(usable.x / a));
-                if to_scale { w * h } else { (usable.x * usable.y * w * h).sqrt() }
-            })
-            .sum()
-    };
-    let across = vec2(area.width() / n as f32, area.height());
-    let down = vec2(area.width(), area.height() / n as f32);
-    let side_by_side = score(across) > score(down);
-    (0..n)
-        .map(|i| {
-            let (size, offset) = if side_by_side {
-                (across, vec2(across.x * i as f32, 0.0))
-            } else {
-                (down, vec2(0.0, down.y * i as f32))
-            };
-            Rect::from_min_size(area.min + offset, size)
-        })
-        .collect()
-}
-
-/// One map of one view: title, picture, axes, colour bar, overlays, probe.
-fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColumn, index: usize, rect: Rect) {
-    let session = shared.session;
-    let Some(view) = session.data.dataset.as_ref().and_then(|d| d.info().views.get(index)) else { return };
-    let orientation = Orientation::of(view);
-    let flipped = state.flipped;
-    let content = match (column, flipped) {
+/// What a column shows now.
+fn content_of(column: MapColumn, state: &State, session: &Session) -> Content {
+    let flipped = state.flipped == Some(column);
+    match (column, flipped) {
         (MapColumn::Masks, _) => Content::Masks,
         (MapColumn::Ori, false) => Content::Ori,
         (MapColumn::Sim, true) => state.pictures.reference(),
@@ -257,31 +246,33 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
             Compare::Flip | Compare::Wipe => Content::Sim,
             Compare::Difference => Content::Difference,
         },
-    };
+    }
+}
+
+fn name_of(content: Content, state: &State, view: &View) -> (String, &'static str) {
     let what = match (content, state.pictures.reference()) {
         (Content::Difference, Content::Base) => "H_sim − baseline",
         (Content::Difference, _) => "H_sim − H_ori",
         _ => content.name(),
     };
+    (format!("{what} map of {}", view.array), what)
+}
+
+/// One map of one view: picture, title, axes, overlays.
+fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColumn, row: &GridRow, rect: Rect) {
+    let (session, index) = (shared.session, row.view);
+    let Some(view) = session.data.dataset.as_ref().and_then(|d| d.info().views.get(index)) else { return };
+    let orientation = Orientation::of(view);
+    let content = content_of(column, state, session);
+    let (name, what) = name_of(content, state, view);
     let unit = if content == Content::Masks { "masks" } else { state.pictures.unit(content) };
     let caption = figure::of(session, &format!("{what} {} · {unit}", view.array));
     let rect = figure::print(ui, rect, caption.as_deref());
-    // The masks have no colour bar, but keep its place: the three columns must line up.
-    let bar_width = 46.0;
-    // Where there is hardly room for the map, it goes without axes and colour bar; the probe still tells both.
-    let compact = rect.height() < 112.0 || rect.width() < 150.0;
-    let inner = if compact {
-        Rect::from_min_max(rect.min + vec2(6.0, 18.0), rect.max - vec2(6.0, 4.0))
-    } else {
-        Rect::from_min_max(rect.min + vec2(42.0, 20.0), rect.max - vec2(4.0 + bar_width, 30.0))
-    };
-    let plot = if session.view.true_proportions { fit_aspect(inner, view, orientation) } else { inner };
+    let plot = if session.view.true_proportions { fit_aspect(rect, view, orientation) } else { rect };
     if plot.width() < 12.0 || plot.height() < 12.0 {
         return;
     }
     let tokens = Tokens::of(ui);
-    overlay::title(ui, rect, plot, view, content, state.pictures.reference(), &tokens, session);
-    let name = format!("{what} map of {}", view.array);
     let response = ui.interact(plot, ui.scope_id().with("plot"), Sense::click_and_drag());
     response.widget_info(|| figure::spoken(&name, caption.as_deref()));
     let (marking, marked) = state.mark(ui, &response, plot, index, view);
@@ -295,26 +286,22 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
     let painter = ui.painter().with_clip_rect(plot.intersect(ui.clip_rect()));
     painter.rect_filled(plot, 0.0, theme::MASK_GROUND);
     state.pictures.paint(ui, &painter, plot, window_rect(window), index, content);
-    if column == MapColumn::Sim && session.view.compare == Compare::Wipe && !flipped {
+    if column == MapColumn::Sim && session.view.compare == Compare::Wipe && content == Content::Sim {
         wipe(ui, shared, state, index, plot, window);
     }
     let to_screen = |unit: [f64; 2]| screen(plot, window, unit);
     overlay::draw(&painter, session, view, index, orientation, &to_screen, &tokens);
     state.draw_regions(&painter, session, index, view, &to_screen, &tokens);
-    if !compact {
-        overlay::axes(ui, plot, view, orientation, window, &tokens);
+    overlay::title(&painter, plot, view, content, state.pictures.reference(), session);
+    if row.axes {
+        let first = column == MapColumn::Ori || state.solo.is_some();
+        overlay::axes(ui, plot, view, orientation, window, first, &tokens);
     }
     ui.painter().rect_stroke(plot, 0.0, egui::Stroke::new(1.0, tokens.stroke), egui::StrokeKind::Outside);
     if let Some(pointer) = response.hover_pos() {
         let unit = unit_at(plot, window, pointer);
         if let Some(pixel) = overlay::pixel_at(view, orientation, unit) {
             state.hovered_next = Some((index, pixel));
-            let text = overlay::probe(session, &state.pictures, view, index, orientation, pixel);
-            let anchor = egui::PopupAnchor::Pointer;
-            let probe = egui::Tooltip::always_open(ui.ctx().clone(), ui.layer_id(), response.id, anchor).gap(14.0);
-            probe.show(|ui| {
-                ui.add(egui::Label::new(egui::RichText::new(text).font(theme::mono(theme::CAPTION))).extend());
-            });
         }
         if response.clicked() {
             let joint = overlay::joint_near(session, view, orientation, &to_screen, pointer);
@@ -323,21 +310,56 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
             }
         }
     }
-    if let Some((hovered, pixel)) = state.hovered.filter(|(hovered, _)| *hovered == index) {
-        debug_assert_eq!(hovered, index);
+    if response.double_clicked() {
+        state.pointed = Some((index, MapColumn::ALL.iter().position(|one| *one == column).unwrap_or_default()));
+        state.enlarge();
+    }
+    if let Some((_, pixel)) = state.hovered.filter(|(hovered, _)| *hovered == index) {
         overlay::crosshair(&painter, plot, &to_screen, view, orientation, pixel, &tokens);
     }
-    if content != Content::Masks && !compact {
+}
+
+/// What belongs to a whole row: where on the map it is, where that is not all of it, and what its colours mean.
+fn beside(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, row: &GridRow) {
+    let index = row.view;
+    let Some(view) = shared.session.data.dataset.as_ref().and_then(|d| d.info().views.get(index)) else { return };
+    let rest = if state.windows[index] == MapExtent::default() {
+        row.beside
+    } else {
+        let [width, height] = Orientation::of(view).size(view);
+        let high = (row.beside.width() * height as f32 / width.max(1) as f32).clamp(20.0, 0.36 * row.beside.height());
+        let (above, rest) = row.beside.split_top_bottom_at_y(row.beside.min.y + high);
+        overview(ui, state, view, index, above);
+        rest.with_min_y(rest.min.y + 6.0)
+    };
+    let shown: Vec<(MapColumn, Content)> = MapColumn::ALL
+        .into_iter()
+        .zip(row.maps)
+        .filter(|(_, rect)| rect.is_positive())
+        .map(|(column, _)| (column, content_of(column, state, shared.session)))
+        .filter(|(_, content)| *content != Content::Masks)
+        .collect();
+    // One bar for all that share their limits.
+    let mut bars: Vec<(Content, (f64, f64))> = Vec::new();
+    for (_, content) in shown {
+        let limits = state.pictures.limits(index, content);
+        let same = |known: &(Content, (f64, f64))| {
+            known.1 == limits && (known.0 == Content::Difference) == (content == Content::Difference)
+        };
+        if !bars.iter().any(same) {
+            bars.push((content, limits));
+        }
+    }
+    let height = rest.height() / bars.len().max(1) as f32;
+    for (k, (content, limits)) in bars.into_iter().enumerate() {
+        let rect = Rect::from_min_size(rest.min + vec2(0.0, height * k as f32), vec2(rest.width(), height));
         let bar = ColorBar {
-            rect: Rect::from_min_max(
-                pos2(plot.max.x + 2.0, plot.min.y - 18.0),
-                pos2(plot.max.x + 2.0 + bar_width, plot.max.y + 6.0),
-            ),
+            rect,
             map: state.pictures.colormap(content),
-            limits: state.pictures.limits(index, content),
+            limits,
             floor: state.pictures.floor(content),
             unit: state.pictures.unit(content),
-            name,
+            name: name_of(content, state, view).0,
         };
         if let Some((lo, hi)) = colorbar(ui, &bar)
             && content != Content::Difference
@@ -345,6 +367,31 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
             shared.set_view(|v| v.range = ColorRange::Fixed { lo, hi });
         }
     }
+}
+
+/// The whole map, small, with what is seen of it, which can be dragged.
+fn overview(ui: &mut Ui, state: &mut State, view: &View, index: usize, rect: Rect) {
+    let response = ui.interact(rect, ui.scope_id().with("overview"), Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, format!("Overview of {}", view.array)));
+    let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
+    painter.rect_filled(rect, 0.0, theme::MASK_GROUND);
+    state.pictures.paint(ui, &painter, rect, Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0)), index, Content::Ori);
+    let window = &mut state.windows[index];
+    if (response.dragged() || response.clicked())
+        && let Some(pointer) = response.interact_pointer_pos()
+    {
+        let at = [(pointer.x - rect.min.x) / rect.width(), (pointer.y - rect.min.y) / rect.height()];
+        for axis in 0..2 {
+            let span = window.max[axis] - window.min[axis];
+            let low = (at[axis] - 0.5 * span).clamp(0.0, 1.0 - span);
+            (window.min[axis], window.max[axis]) = (low, low + span);
+        }
+    }
+    let corner = |at: [f32; 2]| rect.min + vec2(at[0] * rect.width(), at[1] * rect.height());
+    let seen = Rect::from_min_max(corner(window.min), corner(window.max));
+    painter.rect_stroke(seen, 0.0, egui::Stroke::new(1.5, egui::Color32::WHITE), egui::StrokeKind::Inside);
+    ui.painter().rect_stroke(rect, 0.0, egui::Stroke::new(1.0, Tokens::of(ui).stroke), egui::StrokeKind::Outside);
+    response.on_hover_text("The whole map. Drag the frame to look elsewhere; F shows all of it.");
 }
 
 /// The largest rectangle of the map's own proportions; where an axis is not in metres, all of it.
@@ -379,9 +426,6 @@ fn navigate(ui: &Ui, response: &egui::Response, plot: Rect, window: &mut MapExte
                 moved.max[axis] = min + new_span;
             }
         }
-    }
-    if response.double_clicked() {
-        moved = MapExtent::default();
     }
     *window = moved;
 }

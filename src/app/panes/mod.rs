@@ -35,20 +35,18 @@ use crate::session::{Command, Session, ViewState};
 
 /// Every pane, in the order of the menu; panes of one place are tabs in this order.
 static PANES: &[&Pane] = &[
-    &curves::PANE,
+    &maps::PANE,
     &study::PANE,
-    &compare::PANE,
-    &agreement::PANE,
     &statistics::PANE,
+    &agreement::PANE,
+    &curves::PANE,
+    &compare::PANE,
     &log::PANE,
     &fit::PANE,
     &joint::PANE,
     &scene::PANE,
     &image::PANE,
     &frames::PANE,
-    &maps::H_ORI,
-    &maps::H_SIM,
-    &maps::MASKS,
     &modes::PANE,
     #[cfg(test)]
     &dummy::PANE,

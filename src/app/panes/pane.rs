@@ -78,14 +78,14 @@ impl Blank {
 /// Where a pane is in the default layout. Panes of one place are tabs, in the order of the list of panes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Dock {
-    /// The column at the left edge.
-    Left,
-    /// The upper half of the middle, where panes stand side by side.
-    Top,
-    /// The left part of the lower half of the middle.
-    BottomLeft,
-    /// The right part of the lower half of the middle.
-    BottomRight,
+    /// The upper part of the column at the left edge.
+    LeftTop,
+    /// The lower part of the column at the left edge.
+    LeftBottom,
+    /// The middle: most of the window.
+    Centre,
+    /// Below the middle.
+    Bottom,
     /// The upper part of the column at the right edge.
     RightTop,
     /// The lower part of the column at the right edge.
@@ -219,6 +219,19 @@ pub(crate) trait PaneState: Any {
     /// Fills the picture with the person, or with what is selected.
     fn focus(&mut self, _session: &Session) {}
 
+    /// Shows all there is, and keeps whatever else was set.
+    fn show_all(&mut self) {}
+
+    /// One step back from what was singled out; false where nothing was.
+    fn back(&mut self) -> bool {
+        false
+    }
+
+    /// Whether all there is is shown.
+    fn shows_all(&self) -> bool {
+        true
+    }
+
     /// The name under which a session file keeps something of it.
     fn stored_as(&self) -> Option<&'static str> {
         None
@@ -283,6 +296,20 @@ impl PaneStates {
     /// Zooms to the person, or to what is selected.
     pub(in crate::app) fn focus(&mut self, session: &Session) {
         self.0.iter_mut().for_each(|state| state.focus(session));
+    }
+
+    /// One step back from what was singled out in a pane; false where nothing was.
+    pub(in crate::app) fn back(&mut self) -> bool {
+        self.0.iter_mut().any(|state| state.back())
+    }
+
+    /// The person, or where that is shown already, all there is.
+    pub(in crate::app) fn toggle_focus(&mut self, session: &Session) {
+        if self.0.iter().all(|state| state.shows_all()) {
+            self.focus(session);
+        } else {
+            self.0.iter_mut().for_each(|state| state.show_all());
+        }
     }
 
     /// What a session file keeps of the panes.

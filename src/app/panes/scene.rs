@@ -9,8 +9,10 @@ use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::{CTRL, CommandRow, Menu, NONE, UiAction, always};
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Named as _;
 use crate::render::{Camera, Scene, SceneRenderer, Vec2, Vec3, pick, shapes};
 use crate::session::{Command, Session, SplatMode};
+use crate::worker::JobId;
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
 use egui::{Align2, Color32, Key, Rect, RichText, Sense, TextureId, Ui, pos2, vec2};
@@ -24,7 +26,7 @@ pub(super) static PANE: Pane = Pane {
     key: "Scene",
     title: "3-D",
     help: "Gaussians, bones and the radar in the room",
-    dock: Dock::BottomLeft,
+    dock: Dock::RightBottom,
     keys: &[(CTRL, Key::Num8)],
     margin: 0,
     state: PaneStates::prepare::<State>,
@@ -76,6 +78,8 @@ struct State {
     renderer: Option<SceneRenderer>,
     texture: Option<(TextureId, u64)>,
     camera: Option<Camera>,
+    /// The fit that was on screen in the pass before, and where its person was, m.
+    person: Option<(JobId, Vec3)>,
     /// The data set that the camera was placed for.
     dataset: Option<std::sync::Weak<crate::dataset::Dataset>>,
 }
@@ -97,6 +101,10 @@ impl PaneState for State {
         }
     }
 
+    fn show_all(&mut self) {
+        self.camera = None;
+    }
+
     fn stored_as(&self) -> Option<&'static str> {
         Some("camera")
     }
@@ -110,11 +118,27 @@ impl PaneState for State {
     fn restore(&mut self, stored: Value, session: &Session) -> serde_json::Result<()> {
         let stored: Option<StoredCamera> = serde_json::from_value(stored)?;
         self.dataset = session.data.dataset.as_ref().map(std::sync::Arc::downgrade);
+        self.person = None;
         self.camera =
             stored.filter(|numbers| numbers.iter().all(|x| x.is_finite())).map(|[x, y, z, distance, yaw, pitch]| {
                 Camera { target: Vec3::new(x, y, z), distance, yaw, pitch, ..Camera::default() }
             });
         Ok(())
+    }
+}
+
+impl State {
+    /// The camera goes where the person goes from frame to frame.
+    fn follow(&mut self, session: &Session) {
+        let Some(shown) = session.fit.shown.as_ref().filter(|shown| shown.job == session.fit.job) else { return };
+        let now = centre(session);
+        if let Some((job, before)) = self.person.replace((shown.job, now))
+            && job != shown.job
+            && session.view.follow
+            && let Some(camera) = &mut self.camera
+        {
+            camera.target += now - before;
+        }
     }
 }
 
@@ -151,11 +175,12 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         .is_some_and(|known| shared.session.data.dataset.as_ref().is_some_and(|d| std::sync::Arc::ptr_eq(&known, d)))
     {
         state.dataset = shared.session.data.dataset.as_ref().map(std::sync::Arc::downgrade);
-        state.camera = None;
+        (state.camera, state.person) = (None, None);
     }
     if state.camera.is_none() && shared.session.fit.shown.is_some() {
         state.camera = Some(overview(shared.session));
     }
+    state.follow(shared.session);
     let caption = figure::of(shared.session, "3-D, metres, z up");
     let rect = figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref());
     if rect.width() < 16.0 || rect.height() < 16.0 {
@@ -319,17 +344,20 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
     let mut view = shared.session.view.clone();
     egui::Frame::new().inner_margin(egui::Margin::symmetric(8, 3)).show(ui, |ui| {
         ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing.x = 3.0;
+            ui.spacing_mut().button_padding.x = 6.0;
             ui.selectable_value(&mut view.splat_mode, SplatMode::Splat, "Splats")
                 .on_hover_text("Alpha-blended Gaussians, sorted by depth.");
             ui.selectable_value(&mut view.splat_mode, SplatMode::Ellipsoid, "Ellipsoids")
                 .on_hover_text("Opaque surfaces at the stated number of standard deviations.");
-            let drag =
-                egui::DragValue::new(&mut view.splat_sigma).range(0.5..=4.0).speed(0.02).fixed_decimals(1).suffix(" σ");
-            let response = ui.add(drag);
-            response
-                .widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, "Standard deviations drawn"));
-            response.on_hover_text("How many standard deviations of each Gaussian are drawn.");
             ui.menu_button("Show", |ui| {
+                ui.horizontal(|ui| {
+                    let drag = egui::DragValue::new(&mut view.splat_sigma);
+                    let drag = ui.add(drag.range(0.5..=4.0).speed(0.02).fixed_decimals(1).suffix(" σ"));
+                    let drag = drag.named(egui::Role::SpinButton, "Standard deviations drawn");
+                    drag.on_hover_text("How many standard deviations of each Gaussian are drawn.");
+                    ui.label("of each Gaussian");
+                });
                 ui.checkbox(&mut view.show_velocity, "Velocity").on_hover_text("v of each joint, 0.3 s long.");
                 ui.checkbox(&mut view.show_gradients, "Descent directions")
                     .on_hover_text(

@@ -14,7 +14,7 @@ pub(super) static PANE: Pane = Pane {
     key: "Statistics",
     title: "Statistics",
     help: "how often each tag was given",
-    dock: Dock::BottomRight,
+    dock: Dock::Centre,
     keys: &[(CTRL, Key::Num4)],
     margin: 8,
     state: PaneStates::prepare::<State>,

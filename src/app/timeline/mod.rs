@@ -20,7 +20,7 @@ pub(super) struct Timeline {
 pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut Timeline) {
     let tokens = Tokens::of(ui);
     let frame = egui::Frame::new().fill(tokens.panel).inner_margin(egui::Margin::symmetric(8, 4));
-    egui::Panel::bottom("timeline").exact_size(62.0).frame(frame).show(ui, |ui| {
+    egui::Panel::bottom("timeline").exact_size(56.0).frame(frame).show(ui, |ui| {
         ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
         ui.horizontal(|ui| frames(ui, shared, state, &tokens));
         ui.horizontal(|ui| iterations(ui, shared, &tokens));

@@ -1,7 +1,7 @@
 //! A view: one map of a frame, with its pose, its point-spread function and its axes.
 
-use super::Axis;
-use crate::geometry::{Pose, Vec3};
+use super::{Axis, AxisKind};
+use crate::geometry::{Pose, Vec3, add, dot, norm, sub};
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
@@ -79,8 +79,41 @@ impl View {
         self.axes.iter().map(|axis| axis.bin(axis.coordinate(p_view))).collect()
     }
 
+    /// Bin coordinates of a point that moves at `v_world`, m/s: on a Doppler axis it is at its radial velocity.
+    pub fn bins_of_moving(&self, p_world: Vec3, v_world: Vec3) -> Vec<f64> {
+        let p_view = self.pose.view_from_world(p_world);
+        let v_view = sub(self.pose.view_from_world(add(p_world, v_world)), p_view);
+        let radial = dot(v_view, p_view) / norm(p_view).max(1e-9);
+        let coordinate = |axis: &Axis| if axis.kind == AxisKind::Doppler { radial } else { axis.coordinate(p_view) };
+        self.axes.iter().map(|axis| axis.bin(coordinate(axis))).collect()
+    }
+
     /// Number of cells of the whole map.
     pub fn cells(&self) -> usize {
         self.axes.iter().map(|axis| axis.bins).product()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::radar::Spacing;
+
+    /// Who comes closer is at a negative radial velocity, who walks across at 0, whatever way the radar looks.
+    #[test]
+    fn a_moving_point_is_at_its_radial_velocity() {
+        let axis = |kind, bins, lo, hi| Axis { kind, bins, lo, hi, spacing: Spacing::Linear };
+        let axes = vec![axis(AxisKind::Range, 11, 0.0, 10.0), axis(AxisKind::Doppler, 9, -4.0, 4.0)];
+        let turned = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+        for rotation in [Pose::default().rotation, turned] {
+            let pose = Pose { rotation, ..Pose::default() };
+            let (array, quantity) = ("m".into(), Quantity::Amplitude);
+            let view = View { array, quantity, psf: PointSpread::default(), pose, axes: axes.clone(), region: None };
+            for (v, doppler) in [([-1.5, 0.0, 0.0], -1.5), ([0.0, 2.0, 0.0], 0.0), ([2.0, 0.0, 1.0], 2.0)] {
+                let bins = view.bins_of_moving([3.0, 0.0, 0.0], v);
+                let expected = [view.axes[0].bin(3.0), view.axes[1].bin(doppler)];
+                assert!((0..2).all(|axis| (bins[axis] - expected[axis]).abs() < 1e-9), "{v:?}: {bins:?}");
+            }
+        }
     }
 }

@@ -19,7 +19,7 @@ pub(super) static PANE: Pane = Pane {
     key: "Frames",
     title: "Frames",
     help: "the list of frames, its filter and its order",
-    dock: Dock::Left,
+    dock: Dock::LeftTop,
     keys: &[],
     margin: 8,
     state: PaneStates::prepare::<State>,

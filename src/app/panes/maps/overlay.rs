@@ -1,32 +1,24 @@
-//! What lies on a map: axes, labelled boxes, the EM region, the skeleton, the cursor and the probe's text.
+//! What lies on a map: axes, labelled boxes, the EM region, the skeleton and the cursor.
 
 use super::MapExtent;
-use super::picture::{Content, Pictures};
-use crate::app::map_image::{Orientation, level};
+use super::picture::Content;
+use crate::app::map_image::Orientation;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::tick;
 use crate::body::Skeleton;
-use crate::geometry::Vec3;
 use crate::radar::{Axis, AxisKind, View};
 use crate::session::Session;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, pos2, vec2};
 
-#[expect(clippy::too_many_arguments, reason = "where it is drawn, and what the title tells")]
-/// Title line of a map: array, what it shows, IoU.
+/// What a map shows, in its upper left corner: array, content, IoU.
 pub(super) fn title(
-    ui: &Ui,
-    rect: Rect,
+    painter: &Painter,
     plot: Rect,
     view: &View,
     content: Content,
     reference: Content,
-    tokens: &Tokens,
     session: &Session,
 ) {
-    let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
-    let at = pos2(plot.min.x.min(rect.max.x - 120.0), rect.min.y + 3.0);
-    let caption = FontId::proportional(theme::CAPTION);
-    let name = painter.text(at, Align2::LEFT_TOP, &view.array, caption.clone(), tokens.text);
     let text = match content {
         Content::Masks => {
             let iou = session.fit.shown.as_ref().and_then(|snapshot| {
@@ -35,7 +27,7 @@ pub(super) fn title(
             });
             iou.map_or_else(|| "IoU —".to_owned(), |iou| format!("IoU {iou:.3}"))
         }
-        _ if session.fit.shown.is_none() && content != Content::Ori => "preparing…".into(),
+        _ if session.fit.shown.is_none() && content != Content::Ori => waiting(session),
         Content::Difference if reference == Content::Base => "H_sim − baseline".into(),
         Content::Difference => "H_sim − H_ori".into(),
         Content::Base => {
@@ -44,12 +36,29 @@ pub(super) fn title(
         }
         _ => content.name().to_owned(),
     };
-    let font = if content == Content::Masks { theme::mono(theme::CAPTION) } else { caption };
-    painter.text(name.right_top() + vec2(8.0, 0.0), Align2::LEFT_TOP, text, font, tokens.dim);
+    let mut job = egui::text::LayoutJob::default();
+    let format =
+        |color| egui::TextFormat { font_id: FontId::proportional(theme::CAPTION), color, ..Default::default() };
+    job.append(&view.array, 0.0, format(theme::DARK.dim));
+    job.append(&text, 6.0, format(theme::DARK.text));
+    job.wrap.max_width = (plot.width() - 8.0).max(20.0);
+    job.wrap.max_rows = 2;
+    let galley = painter.layout_job(job);
+    let ground = Rect::from_min_size(plot.min, galley.size() + vec2(8.0, 3.0));
+    painter.rect_filled(ground, 0.0, theme::DARK.canvas.gamma_multiply(0.72));
+    painter.galley(plot.min + vec2(4.0, 1.0), galley, theme::DARK.text);
 }
 
-/// Ticks and names along the left and the lower edge.
-pub(super) fn axes(ui: &Ui, plot: Rect, view: &View, o: Orientation, window: MapExtent, tokens: &Tokens) {
+/// Why there is no simulated map yet, or none at all.
+fn waiting(session: &Session) -> String {
+    match &session.fit.status {
+        crate::session::FitStatus::Failed(why) => format!("no fit: {why}"),
+        _ => "preparing…".into(),
+    }
+}
+
+/// Ticks along the lower edge; in a row's first map the name inside it, and ticks and name along the left edge too.
+pub(super) fn axes(ui: &Ui, plot: Rect, view: &View, o: Orientation, window: MapExtent, first: bool, tokens: &Tokens) {
     let painter = ui.painter();
     let stroke = Stroke::new(1.0, tokens.dim);
     let font = theme::mono(10.0);
@@ -60,14 +69,23 @@ pub(super) fn axes(ui: &Ui, plot: Rect, view: &View, o: Orientation, window: Map
         painter.vline(x, plot.max.y..=plot.max.y + 3.0, stroke);
         painter.text(pos2(x, plot.max.y + 3.0), Align2::CENTER_TOP, text, font.clone(), tokens.dim);
     }
+    if !first {
+        return;
+    }
     let up = &view.axes[o.vertical];
     for (t, text) in ticks(up, window.min[1], window.max[1], o.vertical_from_top, plot.height() / 34.0) {
         let y = plot.min.y + t * plot.height();
         painter.hline(plot.min.x - 3.0..=plot.min.x, y, stroke);
         painter.text(pos2(plot.min.x - 5.0, y), Align2::RIGHT_CENTER, text, font.clone(), tokens.dim);
     }
-    let name = axis_caption(across);
-    painter.text(pos2(plot.center().x, plot.max.y + 14.0), Align2::CENTER_TOP, name, caption.clone(), tokens.dim);
+    let galley = painter.layout_no_wrap(axis_caption(across), caption.clone(), theme::DARK.dim);
+    let at = pos2(plot.center().x - 0.5 * galley.size().x, plot.max.y - galley.size().y - 2.0);
+    painter.rect_filled(
+        Rect::from_min_size(at, galley.size()).expand2(vec2(4.0, 1.0)),
+        0.0,
+        theme::DARK.canvas.gamma_multiply(0.72),
+    );
+    painter.galley(at, galley, theme::DARK.dim);
     let name = format!("{} {} →", up.shown_name(), up.shown_unit());
     let galley = painter.layout_no_wrap(name, caption, tokens.dim);
     let at = pos2(plot.min.x - 40.0, plot.center().y + galley.size().x / 2.0);
@@ -161,24 +179,24 @@ pub(super) fn draw(
         && let Some(truth) = session.data.frame.as_ref().and_then(|f| f.truth.as_ref())
         && let Some(dataset) = &session.data.dataset
     {
-        let color = Color32::from_white_alpha(170);
-        bones(painter, &dataset.info().skeleton, &truth.joints, view, o, to_screen, &|_, _| Stroke::new(1.0, color));
+        let stroke = Stroke::new(1.0, Color32::from_white_alpha(170));
+        let at: Vec<Pos2> = truth.joints.iter().map(|&p| to_screen(o.unit_from_bins(view, &view.bins_of(p)))).collect();
+        bones(painter, &dataset.info().skeleton, &at, &|_, _| stroke);
     }
     if look.show_skeleton
         && let Some(problem) = &session.fit.problem
     {
-        let positions = session.shown_positions();
+        let at = joints_on(session, view, o, to_screen);
         let skeleton = &problem.skeleton;
         let joints = skeleton.joints.len().max(1);
         // Dark-theme colours in both themes: the ground is the map. Of several people each has its own.
-        let several = positions.len() > joints;
+        let several = at.len() > joints;
         let color = |person: usize, side| {
             if several { theme::DARK.person(session.identity(person)) } else { theme::DARK.side(side) }
         };
         let stroke = |person: usize, side| Stroke::new(1.5, color(person, side));
-        bones(painter, skeleton, positions, view, o, to_screen, &stroke);
-        for (joint, &p) in positions.iter().enumerate() {
-            let at = to_screen(o.unit_from_bins(view, &view.bins_of(p)));
+        bones(painter, skeleton, &at, &stroke);
+        for (joint, at) in at.into_iter().enumerate() {
             let selected = session.joint == Some(joint);
             let color = color(joint / joints, skeleton.side(joint % joints));
             painter.circle(
@@ -194,21 +212,20 @@ pub(super) fn draw(
     }
 }
 
-fn bones(
-    painter: &Painter,
-    skeleton: &Skeleton,
-    positions: &[Vec3],
-    view: &View,
-    o: Orientation,
-    to_screen: &dyn Fn([f64; 2]) -> Pos2,
-    stroke: &dyn Fn(usize, crate::body::Side) -> Stroke,
-) {
-    let joints = skeleton.joints.len().max(1);
-    for (number, person) in positions.chunks_exact(joints).enumerate() {
+/// Where the shown joints are on a map; on a Doppler axis at their own radial velocities.
+fn joints_on(session: &Session, view: &View, o: Orientation, to_screen: &dyn Fn([f64; 2]) -> Pos2) -> Vec<Pos2> {
+    let moving = session.fit.shown.iter().flat_map(|shown| {
+        let velocities = shown.params.velocities().iter().copied();
+        shown.params.positions().iter().copied().zip(velocities)
+    });
+    moving.map(|(p, v)| to_screen(o.unit_from_bins(view, &view.bins_of_moving(p, v)))).collect()
+}
+
+fn bones(painter: &Painter, skeleton: &Skeleton, joints: &[Pos2], stroke: &dyn Fn(usize, crate::body::Side) -> Stroke) {
+    for (number, person) in joints.chunks_exact(skeleton.joints.len().max(1)).enumerate() {
         for &bone in &skeleton.bones {
             let (Some(&a), Some(&b)) = (person.get(bone[0]), person.get(bone[1])) else { continue };
-            let ends = [a, b].map(|p| to_screen(o.unit_from_bins(view, &view.bins_of(p))));
-            painter.line_segment(ends, stroke(number, skeleton.bone_side(bone)));
+            painter.line_segment([a, b], stroke(number, skeleton.bone_side(bone)));
         }
     }
 }
@@ -272,78 +289,6 @@ pub(super) fn crosshair(
     painter.rect_stroke(cell.expand(1.0), 0.0, Stroke::new(1.0, Color32::WHITE), egui::StrokeKind::Outside);
 }
 
-/// What the probe says of a pixel: stored and shown values, where it is.
-pub(super) fn probe(
-    session: &Session,
-    pictures: &Pictures,
-    view: &View,
-    index: usize,
-    o: Orientation,
-    pixel: [usize; 2],
-) -> String {
-    let [width, height] = o.size(view);
-    let unit = [(pixel[0] as f64 + 0.5) / width as f64, (pixel[1] as f64 + 0.5) / height as f64];
-    let [across, up] = o.bins_from_unit(view, unit);
-    let unit_text = pictures.unit(Content::Ori);
-    let mut lines = vec![format!(
-        "{}[{}, {}]",
-        view.array,
-        if o.vertical == 0 { up.round() } else { across.round() },
-        if o.vertical == 0 { across.round() } else { up.round() },
-    )];
-    for (name, value) in ["H_ori", "H_sim"].iter().zip(pictures.values(index, pixel)) {
-        lines.push(match value {
-            Some((stored, _)) if stored.is_nan() => format!("{name}  NaN (filled before the fit)"),
-            Some((stored, shown)) => {
-                let shown = level(shown, pictures.floor(Content::Ori));
-                format!("{name}  {stored:>11.4e}  {shown:>8} {unit_text}")
-            }
-            None => format!("{name}  —"),
-        });
-    }
-    if session.view.compare == crate::session::Compare::Difference
-        && let [Some((_, ori)), Some((_, sim))] = pictures.values(index, pixel)
-    {
-        let floor = pictures.limits(index, Content::Ori).0;
-        let difference = sim.max(floor) - ori.max(floor);
-        lines.push(format!("Δ      {difference:>20.2} {} (from {floor:.0} up)", pictures.unit(Content::Difference)));
-    }
-    if let Some([ori, sim, inside]) = pictures.mask_at(index, pixel) {
-        let mask = match (ori, sim) {
-            (true, true) => "in both masks",
-            (true, false) => "in H_ori's mask only",
-            (false, true) => "in H_sim's mask only",
-            (false, false) => "in no mask",
-        };
-        lines.push(if inside { mask.to_owned() } else { "outside the EM region".into() });
-    }
-    for axis in [o.vertical, o.horizontal] {
-        let a = &view.axes[axis];
-        let bin = if axis == o.vertical { up } else { across };
-        lines.push(format!("{:<15} {:>8.3} {}", a.shown_name(), a.shown_at(bin), a.shown_unit()));
-    }
-    lines.extend(polar(view, o, up, across));
-    if o.collapsed.is_some() {
-        lines.push("largest over the third axis".into());
-    }
-    if session.view.compare == crate::session::Compare::Flip {
-        lines.push("hold Shift: flip H_ori and H_sim".into());
-    }
-    lines.join("\n")
-}
-
-/// Range and angle of a cell of a Cartesian map, in the map's own plane.
-fn polar(view: &View, o: Orientation, up: f64, across: f64) -> Vec<String> {
-    let (v, h) = (&view.axes[o.vertical], &view.axes[o.horizontal]);
-    let depth = matches!(v.kind, AxisKind::X | AxisKind::DepthH | AxisKind::DepthV);
-    if !depth || !matches!(h.kind, AxisKind::Y | AxisKind::Z) {
-        return Vec::new();
-    }
-    let (x, y) = (v.value_at(up), h.value_at(across));
-    let name = if h.kind == AxisKind::Y { "azimuth" } else { "elevation" };
-    vec![format!("{:<15} {:>8.3} m", "range", x.hypot(y)), format!("{name:<15} {:>8.2} °", y.atan2(x).to_degrees())]
-}
-
 /// The joint drawn within 10 points of the pointer.
 pub(super) fn joint_near(
     session: &Session,
@@ -352,9 +297,8 @@ pub(super) fn joint_near(
     to_screen: &dyn Fn([f64; 2]) -> Pos2,
     pointer: Pos2,
 ) -> Option<usize> {
-    let distance = |p: &Vec3| to_screen(o.unit_from_bins(view, &view.bins_of(*p))).distance(pointer);
-    let positions = session.shown_positions();
-    let (joint, nearest) =
-        positions.iter().enumerate().map(|(i, p)| (i, distance(p))).min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let joints = joints_on(session, view, o, to_screen);
+    let distances = joints.iter().map(|at| at.distance(pointer)).enumerate();
+    let (joint, nearest) = distances.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (nearest < 10.0).then_some(joint)
 }

@@ -222,6 +222,15 @@ impl Pictures {
         [pair(&p.ori_stored, &p.ori), pair(&p.sim_stored, &p.sim)]
     }
 
+    /// The percentile of a stored value among the cells of H_ori (0) or H_sim (1).
+    pub(super) fn rank(&self, view: usize, map: usize, stored: f64) -> Option<f64> {
+        let p = self.views.get(view)?;
+        let cells = if map == 0 { &p.ori_stored } else { &p.sim_stored };
+        let known = cells.iter().filter(|x| x.is_finite());
+        let (below, all) = known.fold((0usize, 0usize), |(below, all), &x| (below + usize::from(x < stored), all + 1));
+        (all > 0).then(|| 100.0 * below as f64 / all as f64)
+    }
+
     /// Whether a pixel is in H_ori's mask, in H_sim's, in the EM region.
     pub(super) fn mask_at(&self, view: usize, pixel: [usize; 2]) -> Option<[bool; 3]> {
         let p = self.views.get(view)?;

@@ -1,28 +1,37 @@
-//! The line above the maps: scale and colours over H_ori, comparison over H_sim, the legend over the masks.
+//! The line above the maps: scale and colours, comparison, what is seen, the legend of the masks.
 
-use super::{MapColumn, Shared};
+use super::super::PaneState as _;
+use super::{Shared, State};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::render::Colormap;
 use crate::session::{Against, ColorRange, Compare, MapScale};
 use egui::{Color32, RichText, Sense, Ui, vec2};
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, column: MapColumn) {
-    egui::Frame::new().inner_margin(egui::Margin::symmetric(8, 3)).show(ui, |ui| {
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
+    egui::Frame::new().inner_margin(egui::Margin::symmetric(8, 2)).show(ui, |ui| {
         ui.horizontal(|ui| {
             ui.set_height(22.0);
             ui.spacing_mut().item_spacing.x = 4.0;
-            if column == MapColumn::Sim && ui.available_width() < 260.0 {
-                ui.spacing_mut().item_spacing.x = 1.0;
-                ui.spacing_mut().button_padding.x = 5.0;
-            }
-            match column {
-                MapColumn::Ori => colours(ui, shared),
-                MapColumn::Sim => comparison(ui, shared),
-                MapColumn::Masks => legend(ui),
+            colours(ui, shared);
+            ui.separator();
+            comparison(ui, shared);
+            ui.separator();
+            focus(ui, shared, state);
+            // The legend goes where there is no room for it: its colours are told on the masks' read-out too.
+            if ui.available_width() > 230.0 {
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), legend);
             }
         });
     });
+}
+
+/// The person or the whole map.
+fn focus(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
+    let person = ui.selectable_label(!state.shows_all(), "Person").named(egui::Role::Button, "Show the person");
+    if person.on_hover_text("The part of each map around the person, or all of it. Key: F").clicked() {
+        shared.invoke("Person or whole");
+    }
 }
 
 fn colours(ui: &mut Ui, shared: &mut Shared<'_>) {
@@ -78,6 +87,8 @@ fn more(ui: &mut Ui, shared: &mut Shared<'_>) {
         ui.checkbox(&mut view.show_truth, "Truth")
             .on_hover_text("The data set's joints in metres, where it has them (white).");
         ui.checkbox(&mut view.show_boxes, "Labelled boxes").on_hover_text("The data set's boxes on the maps (red).");
+        ui.checkbox(&mut view.follow, "Follow the person")
+            .on_hover_text("Maps and camera go with the person from frame to frame; the zoom stays.");
         ui.checkbox(&mut view.true_proportions, "True proportions")
             .on_hover_text("Draw maps whose axes are metres to scale.");
         ui.checkbox(&mut view.show_clipped, "Hatch clipped cells")
@@ -137,13 +148,10 @@ fn legend(ui: &mut Ui) {
         (theme::MASK_ORI, "H_ori only", "Measured, not explained by the fit."),
         (theme::MASK_SIM, "H_sim only", "Simulated, not measured."),
     ];
-    for (color, text, tip) in entries {
-        ui.horizontal(|ui| {
-            ui.spacing_mut().item_spacing.x = 4.0;
-            let (rect, _) = ui.allocate_exact_size(vec2(9.0, 9.0), Sense::hover());
-            ui.painter().rect(rect, 1.0, color, egui::Stroke::new(1.0, tokens.dim), egui::StrokeKind::Inside);
-            ui.label(RichText::new(text).small()).on_hover_text(tip);
-        });
+    for (color, text, tip) in entries.into_iter().rev() {
+        ui.label(RichText::new(text).small()).on_hover_text(tip);
+        let (rect, _) = ui.allocate_exact_size(vec2(9.0, 9.0), Sense::hover());
+        ui.painter().rect(rect, 1.0, color, egui::Stroke::new(1.0, tokens.dim), egui::StrokeKind::Inside);
     }
 }
 

@@ -17,7 +17,7 @@ pub(super) static PANE: Pane = Pane {
     key: "Modes",
     title: "Failure modes",
     help: "a frame's tags and note, and the machine's evidence",
-    dock: Dock::RightBottom,
+    dock: Dock::LeftBottom,
     keys: &[],
     margin: 8,
     state: PaneStates::prepare::<State>,

@@ -25,7 +25,7 @@ pub(in crate::app) static PANE: Pane = Pane {
     key: "Study",
     title: "Study",
     help: "a study's table and plot",
-    dock: Dock::BottomRight,
+    dock: Dock::Centre,
     keys: &[],
     margin: 8,
     state: PaneStates::prepare::<State>,

@@ -1,0 +1,95 @@
+//! The strip under the maps: what is under the pointer, in a place of its own so that it covers no picture.
+
+use super::State;
+use super::picture::Content;
+use crate::app::figure;
+use crate::app::map_image::{Orientation, level};
+use crate::app::theme::{self, Tokens};
+use crate::radar::{AxisKind, View};
+use crate::session::{Compare, Session};
+use egui::{FontId, Rect, Ui, vec2};
+
+/// Draws the strip.
+pub(super) fn show(ui: &Ui, session: &Session, state: &State, rect: Rect) {
+    let tokens = Tokens::of(ui);
+    let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
+    painter.hline(rect.x_range(), rect.min.y, egui::Stroke::new(1.0, tokens.stroke));
+    let views = session.data.dataset.iter().flat_map(|dataset| &dataset.info().views);
+    let pointed = state.hovered.and_then(|(view, pixel)| Some((view, pixel, views.clone().nth(view)?)));
+    let (lines, font, color) = match pointed {
+        Some((index, pixel, view)) => {
+            (lines(session, state, view, index, pixel), theme::mono(theme::CAPTION), tokens.text)
+        }
+        None => (vec![hint(session)], FontId::proportional(theme::CAPTION), tokens.dim),
+    };
+    let mut job = egui::text::LayoutJob::simple(lines.join("\n"), font, color, rect.width() - 16.0);
+    job.wrap.max_rows = 2;
+    painter.galley(rect.min + vec2(8.0, 4.0), painter.layout_job(job), color);
+    let response = ui.interact(rect, ui.scope_id().with("read-out"), egui::Sense::hover());
+    let told = pointed.is_some().then(|| lines.join("\n"));
+    response.widget_info(|| figure::spoken("Cell under the pointer", told.as_deref()));
+}
+
+fn hint(session: &Session) -> String {
+    let flip = if session.view.compare == Compare::Flip { " · Shift flips H_ori and H_sim" } else { "" };
+    format!("Point at a map for its values · wheel zooms · double click or Z: one map alone · F: person or whole{flip}")
+}
+
+/// Where a cell is, and what is there.
+fn lines(session: &Session, state: &State, view: &View, index: usize, pixel: [usize; 2]) -> Vec<String> {
+    let (o, pictures) = (Orientation::of(view), &state.pictures);
+    let [width, height] = o.size(view);
+    let unit = [(pixel[0] as f64 + 0.5) / width as f64, (pixel[1] as f64 + 0.5) / height as f64];
+    let [across, up] = o.bins_from_unit(view, unit);
+    let (first, second) = if o.vertical == 0 { (up, across) } else { (across, up) };
+    let mut place = vec![format!("{}[{}, {}]", view.array, first.round(), second.round())];
+    for (axis, bin) in [(o.vertical, up), (o.horizontal, across)] {
+        let a = &view.axes[axis];
+        place.push(format!("{} {:.3} {}", a.shown_name(), a.shown_at(bin), a.shown_unit()));
+    }
+    place.extend(polar(view, o, up, across));
+    if o.collapsed.is_some() {
+        place.push("largest over the third axis".into());
+    }
+    let unit = pictures.unit(Content::Ori);
+    let mut values = Vec::new();
+    for (k, (name, value)) in ["H_ori", "H_sim"].into_iter().zip(pictures.values(index, pixel)).enumerate() {
+        values.push(match value {
+            Some((stored, _)) if stored.is_nan() => format!("{name} NaN (filled before the fit)"),
+            Some((stored, shown)) => {
+                let rank = pictures.rank(index, k, stored).map_or_else(String::new, |rank| format!(" P{rank:.1}"));
+                format!("{name} {stored:.4e}  {} {unit}{rank}", level(shown, pictures.floor(Content::Ori)))
+            }
+            None => format!("{name} —"),
+        });
+    }
+    if session.view.compare == Compare::Difference
+        && let [Some((_, ori)), Some((_, sim))] = pictures.values(index, pixel)
+    {
+        let floor = pictures.limits(index, Content::Ori).0;
+        values.push(format!("Δ {:.2} {}", sim.max(floor) - ori.max(floor), pictures.unit(Content::Difference)));
+    }
+    if let Some([ori, sim, inside]) = pictures.mask_at(index, pixel) {
+        let mask = match (ori, sim) {
+            _ if !inside => "outside the EM region",
+            (true, true) => "in both masks",
+            (true, false) => "in H_ori's mask only",
+            (false, true) => "in H_sim's mask only",
+            (false, false) => "in no mask",
+        };
+        values.push(mask.into());
+    }
+    vec![place.join("   "), values.join("   ")]
+}
+
+/// Range and angle of a cell of a Cartesian map, in the map's own plane.
+fn polar(view: &View, o: Orientation, up: f64, across: f64) -> Option<String> {
+    let (v, h) = (&view.axes[o.vertical], &view.axes[o.horizontal]);
+    let depth = matches!(v.kind, AxisKind::X | AxisKind::DepthH | AxisKind::DepthV);
+    if !depth || !matches!(h.kind, AxisKind::Y | AxisKind::Z) {
+        return None;
+    }
+    let (x, y) = (v.value_at(up), h.value_at(across));
+    let name = if h.kind == AxisKind::Y { "azimuth" } else { "elevation" };
+    Some(format!("range {:.3} m   {name} {:.2}°", x.hypot(y), y.atan2(x).to_degrees()))
+}
