@@ -133,7 +133,8 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
     let (_lock, mut summary) = prepared.unzip();
     let bar = progress_bar(frames.len());
     let mut report = Report::new(arrays, args.json);
-    let done = run_batch(&dataset, frames, &options, |row| {
+    let frames: Vec<usize> = frames.collect();
+    let done = run_batch(&dataset, &frames, &options, |row| {
         bar.inc(1);
         summary.as_mut().map_or(Ok(()), |summary| summary.add(&row))?;
         report.add(row);
@@ -167,7 +168,8 @@ fn part(
     let mine = if options.warm_start { shard.sequences(dataset, frames) } else { shard.stretch(frames) };
     let bar = progress_bar(mine.len());
     let mut rows = Vec::with_capacity(mine.len());
-    let done = run_batch(dataset, mine, options, |row| {
+    let mine: Vec<usize> = mine.collect();
+    let done = run_batch(dataset, &mine, options, |row| {
         bar.inc(1);
         rows.push(row);
         Ok(())

@@ -4,6 +4,7 @@
 //! writes what people say, `diagnosis` takes in strata and evidence, `fit` steers the optimiser, `reports` takes in what the
 //! worker says.
 
+mod batch;
 mod data;
 mod diagnosis;
 mod export;
@@ -154,6 +155,9 @@ impl Session {
             Command::Export(what, path) => self.export(what, path),
             Command::SaveSession(path, window) => self.save_session(path, window),
             Command::OpenSession(path) => vec![Effect::ReadSession(path)],
+            Command::FitListed => self.fit_listed(),
+            Command::PauseBatch => self.pause_batch(),
+            Command::CancelBatch => self.cancel_batch(),
             Command::LoadResults(path) => self.load_results(path),
             Command::OpenRun(folder) => self.open_run(&folder),
             Command::ShowStudyRow(row) => self.show_study_row(row),
@@ -208,6 +212,9 @@ impl Session {
             }
             Report::SessionRead(path, result) => self.session_read(path, result),
             Report::ResultsRead(path, result) => self.results_read(&path, result),
+            Report::BatchRows(dataset, rows, done) => self.batch_rows(&dataset, rows, done),
+            Report::BatchDone(dataset, result) => self.batch_done(&dataset, result),
+            Report::KeptFound(dataset, kept) => self.kept_found(&dataset, kept),
             Report::RunRead(folder, result) => self.run_read(folder, result),
             Report::TaskDone(result) => self.task_done(result),
             Report::Log(level, text) => {

@@ -143,6 +143,12 @@ pub enum Command {
     SaveSession(PathBuf, serde_json::Value),
     /// Open a session file.
     OpenSession(PathBuf),
+    /// Fit the selected frames, or all in the list, on all cores; what is kept of them already is taken.
+    FitListed,
+    /// Let the batch wait, or go on.
+    PauseBatch,
+    /// Stop the batch; what was fitted is kept.
+    CancelBatch,
     /// Take the results of a batch, a table that `fit --out` wrote, into the frame list.
     LoadResults(PathBuf),
     /// Show the run of a study.

@@ -1,6 +1,7 @@
 //! What the session asks of the outside.
 
 use super::acts::{ActKind, Asked};
+use super::batch::BatchRequest;
 use super::command::PickKind;
 use super::evidence::EvidenceRequest;
 use super::pins::Pin;
@@ -120,6 +121,14 @@ pub enum Effect {
     ReadSession(PathBuf),
     /// Read a table of results on a thread, and find its frames in this data set.
     ReadResults(PathBuf, Arc<Dataset>),
+    /// Fit these frames on all cores.
+    StartBatch(Box<BatchRequest>),
+    /// Let the batch wait, or go on.
+    PauseBatch(bool),
+    /// Stop the batch.
+    CancelBatch,
+    /// Look for what earlier batches left of this data set, on a thread.
+    FindKept(Arc<Dataset>),
     /// Read a run folder on a thread.
     ReadRun(PathBuf),
     /// Find the frames of a row of a run's table in this data set, on a thread.

@@ -14,6 +14,7 @@
 
 mod acts;
 mod apply;
+mod batch;
 mod command;
 mod effect;
 mod evidence;
@@ -37,6 +38,7 @@ mod view;
 
 pub use acts::{ActKind, Asked, Changes, Done, LabelAct};
 pub use apply::OutputCheck;
+pub use batch::{Batch, BatchRequest, BatchStatus};
 pub use command::{Command, Export, PickKind, StartAt};
 pub use effect::{BackgroundTask, Commit, Effect, PinRequest, Trash};
 pub use evidence::EvidenceRequest;

@@ -10,6 +10,7 @@ use crate::diagnose::Evidence;
 use crate::labels::LabelPlace;
 use crate::study::complexity::Complexity;
 use crate::study::run::Run;
+use crate::study::{BatchRow, KeptFits};
 use crate::worker::{Snapshot, WorkerMessage};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -63,6 +64,12 @@ pub enum Report {
     SessionRead(PathBuf, Result<Box<SessionFile>, String>),
     /// A table of results was read and its frames were found in the data set, or not.
     ResultsRead(PathBuf, Result<Box<FoundResults>, String>),
+    /// Rows of a batch, and how many frames are done.
+    BatchRows(Arc<Dataset>, Vec<BatchRow>, u64),
+    /// A batch ended: with all frames, or cancelled; or it could not go on.
+    BatchDone(Arc<Dataset>, Result<bool, String>),
+    /// What earlier batches left of a data set.
+    KeptFound(Arc<Dataset>, Vec<KeptFits>),
     /// A run folder was read, or not.
     RunRead(PathBuf, Result<Arc<Run>, String>),
     /// Something was written, or not.

@@ -53,5 +53,6 @@ fn summary(row: SummaryRow) -> FrameSummary {
         majpe_mm: row.majpe_mm,
         reason: row.reason,
         hashes: None,
+        batch: false,
     }
 }

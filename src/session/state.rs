@@ -1,5 +1,6 @@
 //! The session's fields.
 
+use super::batch::Batch;
 use super::command::StartAt;
 use super::evidence::EvidenceState;
 use super::file::SessionFile;
@@ -98,7 +99,7 @@ impl Data {
 }
 
 /// What is known of a frame's fit, for the list and the timeline.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct FrameSummary {
     /// Iterations done; `None` where a batch could not fit the frame.
     pub iterations: Option<usize>,
@@ -117,6 +118,9 @@ pub struct FrameSummary {
     pub reason: Option<String>,
     /// What identifies the fit; `None` for one that was read from a table.
     pub hashes: Option<Box<FitHashes>>,
+    /// Whether a batch of the window made it.
+    #[serde(default)]
+    pub batch: bool,
 }
 
 /// What identifies a fit: a label remembers it.
@@ -151,6 +155,8 @@ pub struct Session {
     pub strata: Strata,
     /// What people say of the frames.
     pub labels: Labels,
+    /// Fits of many frames at once.
+    pub batch: Batch,
     /// What the machine says of the fit on screen.
     pub(super) evidence: EvidenceState,
     /// Fits that others are compared with.

@@ -68,5 +68,6 @@ fn summary(row: &RunRow) -> FrameSummary {
         majpe_mm: fit.and_then(|fit| fit.majpe_mm),
         reason: Some(row.fit.as_ref().map_or_else(|why| format!("error: {why}"), |fit| fit.reason.clone())),
         hashes: None,
+        batch: false,
     }
 }

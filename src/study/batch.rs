@@ -16,7 +16,6 @@ use crate::start::{find_start, problem_of};
 use crate::task::{milliseconds, panic_as_error};
 use crossbeam_channel::Sender;
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -90,14 +89,13 @@ fn errors(params: &Pppr, truth: &Truth, joints: usize) -> Option<JointErrors> {
     joint_errors(params.positions(), &truth.joints, joints)
 }
 
-/// Fits `frames` and hands every row to `sink`, in the order of the data set, as soon as it and those before it are
-/// done. A frame that fails is a row with the reason, and the batch goes on; an error of `sink` ends it.
+/// Fits `frames` and hands every row to `sink`, in their order, as soon as it and those before it are done. A frame that fails is a row with the reason, and the batch goes on; an error of `sink` ends it.
 ///
 /// # Errors
 /// What `sink` said, or that there is no thread to fit on.
 pub fn run_batch(
     dataset: &Dataset,
-    frames: Range<usize>,
+    frames: &[usize],
     options: &BatchOptions,
     mut sink: impl FnMut(BatchRow) -> Result<(), StudyError>,
 ) -> Result<(), StudyError> {
@@ -106,11 +104,11 @@ pub fn run_batch(
         options,
         names: dataset.file_names(),
         inputs: dataset.inputs(),
-        next: AtomicUsize::new(frames.start),
-        end: frames.end,
+        next: AtomicUsize::new(0),
+        frames,
     };
     let threads = if options.warm_start { 1 } else { rayon::current_num_threads().clamp(1, frames.len().max(1)) };
-    let (outbox, inbox) = crossbeam_channel::bounded::<BatchRow>(threads);
+    let (outbox, inbox) = crossbeam_channel::bounded::<(usize, BatchRow)>(threads);
     std::thread::scope(|scope| {
         // The inbox goes with this closure: after an error the threads find nobody listening, and end.
         let inbox = inbox;
@@ -121,9 +119,9 @@ pub fn run_batch(
         }
         drop(outbox);
         let mut early = BTreeMap::new();
-        let mut due = frames.start;
-        for row in inbox {
-            early.insert(row.index, row);
+        let mut due = 0;
+        for (place, row) in inbox {
+            early.insert(place, row);
             while let Some(row) = early.remove(&due) {
                 sink(row)?;
                 due += 1;
@@ -140,31 +138,30 @@ struct Batch<'a> {
     names: FileNames,
     inputs: Inputs<'a>,
     next: AtomicUsize,
-    end: usize,
+    frames: &'a [usize],
 }
 
 impl Batch<'_> {
     /// Takes frames until none is left or nobody listens.
-    fn work(&self, outbox: &Sender<BatchRow>) {
+    fn work(&self, outbox: &Sender<(usize, BatchRow)>) {
         let mut before: Option<(usize, Pppr)> = None;
         loop {
-            let index = self.next.fetch_add(1, Ordering::Relaxed);
-            if index >= self.end {
-                return;
-            }
+            let place = self.next.fetch_add(1, Ordering::Relaxed);
+            let Some(&index) = self.frames.get(place) else { return };
             let start = before.take().filter(|(last, _)| self.follows(*last, index)).map(|(_, params)| params);
             let fit = panic_as_error(|| self.fit_and_keep(index, start)).map(|fit| {
                 before = Some((index, fit.params));
                 fit.numbers
             });
-            if outbox.send(BatchRow { index, frame: self.dataset.frame_name(index).to_owned(), fit }).is_err() {
+            let row = BatchRow { index, frame: self.dataset.frame_name(index).to_owned(), fit };
+            if outbox.send((place, row)).is_err() {
                 return;
             }
         }
     }
 
     fn follows(&self, last: usize, index: usize) -> bool {
-        self.options.warm_start && self.dataset.sequence(last) == self.dataset.sequence(index)
+        self.options.warm_start && last + 1 == index && self.dataset.sequence(last) == self.dataset.sequence(index)
     }
 
     fn fit_and_keep(&self, index: usize, start: Option<Pppr>) -> Result<FrameFit, String> {

@@ -12,6 +12,7 @@ pub mod count;
 mod evidence;
 mod export;
 mod file_error;
+mod kept;
 mod results;
 mod row;
 pub mod run;
@@ -25,6 +26,7 @@ pub use export::{
     scaled_maps, write_cloud_npz, write_cloud_pcd, write_cloud_ply, write_curves, write_ply,
 };
 pub use file_error::FileError;
+pub use kept::{FitsFile, FitsOf, KeptFits, kept_fits};
 pub use results::{SummaryRow, read_summary};
 pub use row::{BatchRow, FitNumbers, FrameFit, Means};
 pub use summary::{StudyError, Summary, columns};

@@ -422,7 +422,7 @@ fn an_error_of_the_sink_ends_the_batch() {
     };
     let mut told = Vec::new();
     let full = || StudyError::Write { reason: std::io::Error::other("disk full"), path: "summary.csv".into() };
-    let error = run_batch(&small.open(), 0..40, &options, |row| {
+    let error = run_batch(&small.open(), &(0..40).collect::<Vec<_>>(), &options, |row| {
         told.push(row.index);
         if told.len() < 3 { Ok(()) } else { Err(full()) }
     });

@@ -5,6 +5,7 @@
 mod blob;
 
 mod acts;
+mod batch;
 mod labels;
 mod live;
 mod state;

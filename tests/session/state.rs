@@ -34,6 +34,7 @@ fn of_data_and_fit(mut effects: Vec<Effect>) -> Vec<Effect> {
                 | Effect::ComputeStrata { .. }
                 | Effect::CancelStrata
                 | Effect::Evidence(_)
+                | Effect::FindKept(_)
         )
     });
     effects

@@ -19,8 +19,8 @@ pub(super) struct Timeline {
 /// Draws the strip at the bottom of the window.
 pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut Timeline) {
     let tokens = Tokens::of(ui);
-    let frame = egui::Frame::new().fill(tokens.panel).inner_margin(egui::Margin::symmetric(8, 4));
-    egui::Panel::bottom("timeline").exact_size(56.0).frame(frame).show(ui, |ui| {
+    let frame = egui::Frame::new().fill(tokens.panel).inner_margin(egui::Margin::symmetric(8, 3));
+    egui::Panel::bottom("timeline").exact_size(60.0).frame(frame).show(ui, |ui| {
         ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
         ui.horizontal(|ui| frames(ui, shared, state, &tokens));
         ui.horizontal(|ui| iterations(ui, shared, &tokens));

@@ -2,6 +2,7 @@
 
 use crate::body::Pppr;
 use crate::dataset::{Dataset, DatasetError, Frame};
+use crate::session::batch::Batch;
 use crate::session::command::StartAt;
 use crate::session::effect::Effect;
 use crate::session::evidence::EvidenceState;
@@ -57,11 +58,16 @@ impl Session {
             self.note(LogLevel::Info, assumption);
         }
         let start = dataset.start_index();
-        let mut effects = self.leave_frame();
+        let mut effects = self.end_drag();
+        effects.extend(self.leave_frame());
+        if self.batch.is_running() {
+            effects.push(Effect::CancelBatch);
+        }
         self.fits.clear();
         self.left.clear();
         self.summaries.change().clear();
         self.pins = Pins::default();
+        self.batch = Batch::default();
         self.evidence = EvidenceState::default();
         self.data.frame = None;
         self.data.playing = false;
@@ -76,6 +82,7 @@ impl Session {
         effects.extend(self.open_labels());
         effects.extend(self.begin_strata());
         effects.extend(self.load_waiting_results());
+        effects.push(Effect::FindKept(Arc::clone(&dataset)));
         effects
     }
 

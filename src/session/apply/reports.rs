@@ -53,6 +53,7 @@ impl Session {
             iou: mean_known(&row.report.iou),
             converged: Some(row.report.converged),
             majpe_mm: row.majpe_mm,
+            batch: false,
         };
         self.summaries.change().insert(self.fit.frame, summary);
     }

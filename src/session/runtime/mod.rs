@@ -1,5 +1,6 @@
 //! The session with the threads behind it: carries effects out, and brings back what the threads tell.
 
+mod batch;
 mod evidence;
 mod labels;
 
@@ -44,6 +45,7 @@ pub struct Runtime {
     labels: LabelKeeper,
     evidence: EvidenceKeeper,
     grading: Option<ComplexityJob>,
+    batch: Option<batch::BatchRun>,
     restored_window: Option<serde_json::Value>,
 }
 
@@ -60,6 +62,7 @@ impl Runtime {
             labels: LabelKeeper::start(&wake),
             evidence: EvidenceKeeper::start(&wake),
             grading: None,
+            batch: None,
             restored_window: None,
             wake,
             picker,
@@ -125,12 +128,30 @@ impl Runtime {
         if let Some(report) = self.labels.poll().or_else(|| self.evidence.poll()).or_else(|| self.grading_report()) {
             return Some(report);
         }
+        if let Some(report) = self.batch_report() {
+            return Some(report);
+        }
         let worker = self.worker.as_ref()?;
         // Rows and events first: a snapshot may be of a branch that an event announces.
         if let Some(message) = worker.poll() {
             return Some(Report::Worker(message));
         }
         worker.take_snapshot().map(|snapshot| Report::Snapshot(Box::new(snapshot)))
+    }
+
+    fn batch_report(&mut self) -> Option<Report> {
+        let batch = self.batch.as_mut()?;
+        let (report, ended) = batch.poll()?;
+        if ended {
+            // Its last rows are taken in before its end is told.
+            if let Some(rest) = batch.rest() {
+                let _ = self.answers.0.send(report);
+                self.batch = None;
+                return Some(rest);
+            }
+            self.batch = None;
+        }
+        Some(report)
     }
 
     fn opening_report(&mut self) -> Option<Report> {
@@ -201,6 +222,24 @@ impl Runtime {
             Effect::ReadResults(path, dataset) => self.on_thread("results", move || {
                 let read = FoundResults::read(&path, &dataset).map(Box::new);
                 Report::ResultsRead(path, read)
+            }),
+            Effect::StartBatch(request) => self.batch = Some(batch::BatchRun::start(*request, &self.wake)),
+            Effect::PauseBatch(wait) => {
+                if let Some(batch) = &self.batch {
+                    batch.pause(wait);
+                }
+            }
+            Effect::CancelBatch => {
+                if let Some(batch) = &self.batch {
+                    batch.cancel();
+                }
+            }
+            Effect::FindKept(dataset) => self.on_thread("kept-fits", move || {
+                let (kept, wrong) = batch::kept(&dataset);
+                for why in wrong {
+                    tracing::warn!("{why}");
+                }
+                Report::KeptFound(dataset, kept)
             }),
             Effect::ReadRun(folder) => self.on_thread("study", move || {
                 let read = crate::study::run::Run::read(&folder).map(Arc::new).map_err(|error| error.to_string());

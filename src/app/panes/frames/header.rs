@@ -5,7 +5,7 @@ use super::{GAP, ROW, State};
 use crate::app::panes::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
-use crate::session::{Command, Sort, SortKey, StrataStatus, syntax};
+use crate::session::{BatchStatus, Command, Sort, SortKey, StrataStatus, syntax};
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Align2, RichText, Role, Sense, Ui, pos2, vec2};
 use std::collections::BTreeSet;
@@ -19,8 +19,10 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         quick(ui, shared, state);
         views(ui, shared, state);
         column_menu(ui, shared);
+        fit_listed(ui, shared);
     });
     grading(ui, shared, tokens);
+    batch(ui, shared, tokens);
     found(ui, shared, tokens);
 }
 
@@ -149,6 +151,64 @@ fn grading(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
             }
         }
         StrataStatus::Ready => {}
+    }
+}
+
+/// Fits all that is listed, or what is selected of it.
+fn fit_listed(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let session = shared.session;
+    let selected = session.labels.selection.len();
+    let (what, count) = if selected > 0 { ("selected", selected) } else { ("listed", session.queue.rows().len()) };
+    let can = count > 0 && !session.batch.is_running();
+    let text = if selected > 0 { "Fit selected" } else { "Fit listed" };
+    let button = ui.add_enabled(can, egui::Button::new(RichText::new(text).small()));
+    let tip = format!(
+        "Fit the {count} {what} frame{} with the settings in force, on all cores. The results come into the list, and are kept \
+         beside the labels: fits that are there already are taken as they are.\nKey: Ctrl+Enter",
+        if count == 1 { "" } else { "s" }
+    );
+    if button.on_hover_text(tip).clicked() {
+        shared.invoke("Fit listed frames");
+    }
+}
+
+/// How far a batch is, or what its fits are of where they are not of the settings in force.
+fn batch(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
+    let batch = &shared.session.batch;
+    if let BatchStatus::Running { done, total, paused } = batch.status {
+        let left = batch.eta().map_or_else(String::new, |left| format!(" · {} left", in_words(left)));
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 3.0;
+            let text = if paused { format!("paused at {done} of {total}") } else { format!("{done} of {total}{left}") };
+            let share = if total > 0 { done as f32 / total as f32 } else { 0.0 };
+            let bar = egui::ProgressBar::new(share).desired_height(14.0).text(RichText::new(text).small());
+            ui.add(bar.desired_width((ui.available_width() - 50.0).max(60.0)));
+            let (sign, name) = if paused { ("▶", "Go on with the batch") } else { ("‖", "Pause the batch") };
+            if ui.small_button(sign).on_hover_text(name).named(Role::Button, name).clicked() {
+                shared.send(Command::PauseBatch);
+            }
+            let cancel = ui.small_button("✕").on_hover_text("Stop; what was fitted is kept.");
+            if cancel.named(Role::Button, "Cancel the batch").clicked() {
+                shared.send(Command::CancelBatch);
+            }
+        });
+        // What is left changes without anything else.
+        ui.ctx().request_repaint_after(std::time::Duration::from_secs(1));
+        return;
+    }
+    if let Some(stale) = batch.stale(&shared.session.config).filter(|_| batch.fitted > 0) {
+        let text = format!("results of {} frames are of other settings", batch.fitted);
+        let label = egui::Label::new(RichText::new(text).small().color(tokens.warn)).truncate();
+        ui.add(label).on_hover_text(format!("Fitted {stale}.\n“Fit listed” fits with the settings in force."));
+    }
+}
+
+/// A time, to be read at a glance.
+fn in_words(time: std::time::Duration) -> String {
+    match time.as_secs() {
+        s @ 0..=99 => format!("{} s", s.max(1)),
+        s @ 100..=5999 => format!("{} min", (s + 30) / 60),
+        s => format!("{:.1} h", s as f64 / 3600.0),
     }
 }
 

@@ -1,0 +1,133 @@
+//! Fits of many frames from the window: into the list as they come, stopped, gone on with, found again.
+
+use crate::blob;
+use mhp_inspector::config::{FitConfig, Preset};
+use mhp_inspector::session::{BatchStatus, Command, Live, Runtime, Session, ViewState};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+const PATIENCE: Duration = Duration::from_mins(1);
+
+fn config() -> FitConfig {
+    FitConfig { iterations: 5, ..Preset::Baseline.config() }
+}
+
+fn opened(folder: &Path, config: &FitConfig) -> Runtime {
+    // A fit by hand would keep its own numbers.
+    let view = ViewState { live: Live::Off, ..ViewState::default() };
+    let mut runtime = Runtime::new(Session::remembered(view, Vec::new()), Arc::new(|| ()), None);
+    runtime.apply(Command::SetConfig(Box::new(*config)));
+    runtime.apply(Command::SetAnnotator("ada".into()));
+    runtime.apply(Command::Open(folder.into()));
+    until(&mut runtime, "a fit that is ready", |s| s.fit.is_ready() && !s.queue.rows().is_empty());
+    runtime
+}
+
+fn until(runtime: &mut Runtime, what: &str, done: impl Fn(&Session) -> bool) {
+    let deadline = Instant::now() + PATIENCE;
+    while !done(runtime.session()) {
+        let session = runtime.session();
+        let log: Vec<&str> = session.log.iter().map(|line| line.text.as_str()).collect();
+        assert!(Instant::now() < deadline, "waited for {what}; {:?}; {log:#?}", session.batch.status);
+        runtime.poll();
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+fn fitted(session: &Session) -> Vec<usize> {
+    session.summaries.iter().filter(|(_, summary)| summary.batch).map(|(&frame, _)| frame).collect()
+}
+
+#[test]
+fn listed_frames_are_fitted_kept_and_found_again() {
+    let folder = tempfile::tempdir().unwrap();
+    blob::write_dataset(folder.path(), 9);
+    let mut runtime = opened(folder.path(), &config());
+    // A selection is fitted alone.
+    runtime.apply(Command::SelectFrames([2, 5].into()));
+    runtime.apply(Command::FitListed);
+    assert!(runtime.session().batch.is_running());
+    until(&mut runtime, "two fits", |s| !s.batch.is_running());
+    assert_eq!(fitted(runtime.session()), [2, 5]);
+    runtime.apply(Command::SelectFrames([].into()));
+    runtime.apply(Command::FitListed);
+    until(&mut runtime, "all fits", |s| !s.batch.is_running());
+    let session = runtime.session();
+    assert_eq!(fitted(session), (0..9).collect::<Vec<_>>());
+    let summary = &session.summaries[&4];
+    assert!(summary.iou.is_some() && summary.majpe_mm.is_some() && summary.iterations == Some(5), "{summary:?}");
+    assert_eq!(session.batch.stale(&session.config), None);
+    let all: Vec<_> = session.summaries.values().cloned().collect();
+    drop(runtime);
+
+    // Another day.
+    let mut runtime = opened(folder.path(), &config());
+    until(&mut runtime, "the kept fits", |s| s.batch.fitted == 9);
+    assert!(all.iter().eq(runtime.session().summaries.values()), "to the last digit");
+    // With other settings they are told to be others'; a new batch takes their place.
+    let other = FitConfig { w_em: 2.0, ..config() };
+    runtime.apply(Command::SetConfig(Box::new(other)));
+    assert_eq!(runtime.session().batch.stale(&other).as_deref(), Some("w_EM 2 → 0.5"));
+    runtime.apply(Command::FitListed);
+    assert_eq!(fitted(runtime.session()), [0; 0], "two settings are not mixed in one list");
+    until(&mut runtime, "all fits", |s| !s.batch.is_running());
+    assert_eq!((runtime.session().batch.stale(&other), fitted(runtime.session()).len()), (None, 9));
+    // Back to the first ones: nothing is fitted, all of it is there.
+    runtime.apply(Command::SetConfig(Box::new(config())));
+    let began = runtime.session().log.len();
+    runtime.apply(Command::FitListed);
+    until(&mut runtime, "the kept ones", |s| !s.batch.is_running());
+    assert!(all.iter().eq(runtime.session().summaries.values()), "{began}");
+}
+
+#[test]
+fn a_batch_waits_stops_and_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    blob::write_dataset(folder.path(), 40);
+    let config = FitConfig { iterations: 60, ..config() };
+    let mut runtime = opened(folder.path(), &config);
+    runtime.apply(Command::FitListed);
+    until(&mut runtime, "some fits", |s| matches!(s.batch.status, BatchStatus::Running { done: 1.., .. }));
+    runtime.apply(Command::PauseBatch);
+    std::thread::sleep(Duration::from_millis(300));
+    runtime.poll();
+    let waiting = fitted(runtime.session()).len();
+    std::thread::sleep(Duration::from_millis(300));
+    runtime.poll();
+    let BatchStatus::Running { paused: true, .. } = runtime.session().batch.status else {
+        unreachable!("{:?}", runtime.session().batch.status)
+    };
+    // One row may have been on its way.
+    assert!(fitted(runtime.session()).len() <= waiting + 1 && waiting < 40, "{waiting}");
+    runtime.apply(Command::PauseBatch);
+    until(&mut runtime, "another fit", |s| fitted(s).len() > waiting + 1);
+    runtime.apply(Command::CancelBatch);
+    until(&mut runtime, "the end", |s| !s.batch.is_running());
+    let there = fitted(runtime.session()).len();
+    assert!(there < 40, "stopped before the end");
+    assert!(runtime.session().log.back().unwrap().text.starts_with(&format!("stopped after {there} of 40 frames")));
+    drop(runtime);
+
+    let mut runtime = opened(folder.path(), &config);
+    until(&mut runtime, "the kept fits", |s| s.batch.fitted == there);
+    runtime.apply(Command::FitListed);
+    until(&mut runtime, "the others", |s| !s.batch.is_running());
+    assert_eq!(fitted(runtime.session()).len(), 40);
+}
+
+/// A data set that nobody can fit fills the list with the reason.
+#[test]
+fn frames_that_cannot_be_fitted_say_why() {
+    let folder = tempfile::tempdir().unwrap();
+    blob::write_dataset(folder.path(), 3);
+    let mut runtime = opened(folder.path(), &config());
+    std::fs::write(runtime.session().data.dataset.as_ref().unwrap().frame_path(1), b"no array").unwrap();
+    runtime.apply(Command::FitListed);
+    until(&mut runtime, "the end", |s| !s.batch.is_running());
+    let session = runtime.session();
+    assert_eq!((session.batch.fitted, session.batch.failed), (2, 1));
+    let why = session.summaries[&1].reason.clone().unwrap();
+    assert!(why.starts_with("error: "), "{why}");
+    assert!(session.log.back().unwrap().text.contains("1 could not be fitted"), "{:?}", session.log.back());
+}
