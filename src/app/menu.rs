@@ -26,11 +26,34 @@ pub(super) fn bar(ui: &mut Ui, shared: &mut Shared<'_>) {
     });
 }
 
+/// Commands before which a menu has a line.
+const BEGIN_A_GROUP: [&str; 14] = [
+    "Quit",
+    "Save session",
+    "Export labels as CSV…",
+    "Save picture…",
+    "Fit listed frames",
+    "Replay",
+    "Reset fit",
+    "Person or whole",
+    "View from the radar",
+    "Clear selection",
+    "Light or dark",
+    "Full screen",
+    "Show Maps",
+    "First frame",
+];
+
 fn items(ui: &mut Ui, shared: &mut Shared<'_>, menu: Menu) {
     ui.set_min_width(230.0);
-    for command in all().filter(|command| command.menu() == menu) {
-        if menu == Menu::File && command.label() == "Quit" {
+    let (last, items): (Vec<_>, Vec<_>) =
+        all().filter(|command| command.menu() == menu).partition(|command| command.label() == "Quit");
+    for command in items.into_iter().chain(last) {
+        let label = command.label();
+        if label == "Quit" {
             recent(ui, shared);
+        }
+        if BEGIN_A_GROUP.contains(&&*label) {
             ui.separator();
         }
         let enabled = command.enabled(shared.session);

@@ -23,11 +23,17 @@ use overlay::Overlay;
 use panes::{PaneStates, Shared, study};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 pub use panes::Pane;
 
 /// The name under which settings are stored.
 pub const APP_ID: &str = "mhp-inspector";
+
+/// The window's title without data.
+const TITLE: &str = "MHP Inspector";
+/// Nobody answers a file dialog faster: there was none.
+const TOO_QUICK: std::time::Duration = std::time::Duration::from_millis(250);
 
 const VIEW_KEY: &str = "view";
 const RECENT_KEY: &str = "recent";
@@ -68,6 +74,10 @@ pub struct InspectorApp {
     last_replay: Option<f64>,
     applied_zoom: f32,
     dropped: Option<PathBuf>,
+    /// The title of the window.
+    title: String,
+    /// Set where the desktop answered a dialog before anybody could have.
+    no_dialog: Arc<AtomicBool>,
 }
 
 impl InspectorApp {
@@ -99,7 +109,18 @@ impl InspectorApp {
         if first_visit {
             session = session.first_visit();
         }
-        let mut runtime = Runtime::new(session, wake, Some(Arc::new(overlay::pick))).allow_outside(begin.allow_outside);
+        let no_dialog = Arc::new(AtomicBool::new(false));
+        let (unanswered, waker) = (Arc::clone(&no_dialog), cc.egui_ctx.clone());
+        let pick = move |kind| {
+            let asked = std::time::Instant::now();
+            let picked = overlay::pick(kind);
+            if picked.is_none() && asked.elapsed() < TOO_QUICK {
+                unanswered.store(true, Ordering::Relaxed);
+                waker.request_repaint();
+            }
+            picked
+        };
+        let mut runtime = Runtime::new(session, wake, Some(Arc::new(pick))).allow_outside(begin.allow_outside);
         runtime.apply(Command::SetAnnotator(annotator));
         let mut app = Self {
             runtime,
@@ -114,6 +135,8 @@ impl InspectorApp {
             last_replay: None,
             applied_zoom: 1.0,
             dropped: None,
+            title: String::new(),
+            no_dialog,
         };
         if let Some(session) = &begin.session {
             app.apply(Command::OpenSession(session.clone()));
@@ -122,7 +145,8 @@ impl InspectorApp {
         if let Some(config) = begin.config {
             app.apply(Command::SetConfig(Box::new(config)));
         }
-        match begin.paths.first().cloned().or_else(crate::dataset::bundled_sample) {
+        let last = app.session().data.recent.first().filter(|path| path.exists()).cloned();
+        match begin.paths.first().cloned().or(last).or_else(crate::dataset::bundled_sample) {
             Some(path) => app.apply(Command::OpenAt(path, begin.aim.clone())),
             None => app.runtime.report(Report::Log(
                 LogLevel::Info,
@@ -288,6 +312,29 @@ impl InspectorApp {
         ctx.request_repaint();
     }
 
+    /// The title names the data, so that windows can be told apart.
+    fn name_window(&mut self, ctx: &egui::Context) {
+        let data = &self.session().data;
+        let title = match (&data.dataset, &data.frame) {
+            (Some(dataset), Some(frame)) => format!("{} · {} – {TITLE}", dataset.info().name, frame.name),
+            (Some(dataset), None) => format!("{} – {TITLE}", dataset.info().name),
+            (None, _) => TITLE.to_owned(),
+        };
+        if title != self.title {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
+            self.title = title;
+        }
+    }
+
+    /// Where the desktop shows no file dialog, a path can be typed.
+    fn take_missing_dialog(&mut self, ctx: &egui::Context) {
+        if self.no_dialog.swap(false, Ordering::Relaxed) {
+            self.overlay.open_path(self.runtime.session().data.recent.first());
+            let text = "this desktop shows no file dialog: type the path, or drop the file on the window";
+            self.overlay.notify(LogLevel::Warning, text.into(), ctx.input(|i| i.time));
+        }
+    }
+
     /// Settings stay under the finger until it is lifted.
     fn lift_finger(&mut self, ctx: &egui::Context) {
         if self.session().is_dragging() && !ctx.input(|i| i.pointer.any_down()) {
@@ -319,6 +366,8 @@ impl eframe::App for InspectorApp {
         self.take_drops(ctx);
         self.play(ctx);
         self.replay(ctx);
+        self.name_window(ctx);
+        self.take_missing_dialog(ctx);
         self.lift_finger(ctx);
         if self.runtime.is_busy() {
             ctx.request_repaint_after(std::time::Duration::from_millis(100));
@@ -370,7 +419,7 @@ pub fn run(begin: Begin) -> anyhow::Result<()> {
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_app_id(APP_ID)
-            .with_title("MHP Inspector")
+            .with_title(TITLE)
             .with_inner_size([1440.0, 900.0])
             .with_min_inner_size([960.0, 600.0])
             .with_drag_and_drop(true),

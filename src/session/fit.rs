@@ -4,10 +4,17 @@ use super::history::{Branch, History, IterationRow};
 use super::state::FitHashes;
 use crate::body::Pppr;
 use crate::config::FitConfig;
+use crate::geometry::{norm, sub};
 use crate::mhp::Problem;
 use crate::start::FoundStart;
 use crate::worker::{JobId, Snapshot};
 use std::sync::Arc;
+
+/// Iterations that a fit is looked at over to say that it has settled, and how little may change meanwhile: share of the
+/// loss, m of each joint.
+const SETTLED_OVER: usize = 10;
+const SETTLED_LOSS: f64 = 1e-3;
+const SETTLED_M: f64 = 2e-3;
 
 /// What the worker is doing for this frame.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -105,5 +112,20 @@ impl Fit {
     /// True while stepping.
     pub fn is_running(&self) -> bool {
         self.status == FitStatus::Running
+    }
+
+    /// Whether the fit moves no more at the iteration that is looked at: over the last ten iterations the loss changed by
+    /// less than 0.1 % and no joint moved more than 2 mm. `None` before there are as many.
+    pub fn settled(&self) -> Option<bool> {
+        let (branch, now) = (self.branch()?, self.shown_iteration());
+        let then = now.checked_sub(SETTLED_OVER).filter(|then| *then >= branch.start())?;
+        let (before, after) = (branch.row(then)?, branch.row(now)?);
+        let losses = [before, after].map(|row| row.report.loss);
+        let flat = (losses[1] - losses[0]).abs() <= SETTLED_LOSS * losses[0].abs();
+        let (_, then) = branch.state_at(then)?;
+        let (_, now) = branch.state_at(now)?;
+        let joints = then.params.positions().iter().zip(now.params.positions());
+        let still = joints.clone().count() > 0 && joints.into_iter().all(|(a, b)| norm(sub(*a, *b)) <= SETTLED_M);
+        Some(flat && still)
     }
 }

@@ -18,6 +18,13 @@ pub struct IterationRow {
     pub majpe_mm: Option<f64>,
 }
 
+impl IterationRow {
+    /// The mean IoU over the views where it is defined.
+    pub fn iou(&self) -> Option<f64> {
+        super::apply::mean_known(&self.report.iou)
+    }
+}
+
 /// A hyperparameter changed here.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flag {

@@ -631,3 +631,22 @@ fn listed_frames_are_fitted_by_one_key() {
     window.click("Fit listed");
     window.until("the kept ones", |w| !w.session().batch.is_running());
 }
+
+/// Each curve has a picture of its own; a click shows the iteration under it, and the head is followed again from its end.
+#[test]
+fn every_curve_has_its_own_picture_and_leads_to_an_iteration() {
+    let mut window = Window::fitted(1);
+    for name in ["Curve of L", "Curve of L_EM", "Curve of IoU hori", "Curve of MAJPE / m"] {
+        assert!(window.named(name), "{name}: {:?}", window.names());
+    }
+    let rect = window.node("Curve of L_EM").rect();
+    window.harness.hover_at(rect.center());
+    window.harness.drag_at(rect.center());
+    window.harness.drop_at(rect.center());
+    window.until("the middle of the run", |w| w.fit().cursor.is_some_and(|cursor| (9..=11).contains(&cursor)));
+    let shown = window.fit().shown_row().unwrap().report.loss;
+    let told = window.text_of("Curve of L");
+    assert!((told.parse::<f64>().unwrap() - shown).abs() < 1e-3 * shown, "{told} for {shown}");
+    // A term that is 0 throughout has none.
+    assert!(!window.named("Curve of L_sep"));
+}

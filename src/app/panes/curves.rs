@@ -1,5 +1,6 @@
 //! Loss, terms, IoU and MAJPE over the iterations, with flags where settings changed and a cursor that can be dragged.
 
+mod multiples;
 mod series;
 mod thin;
 
@@ -8,9 +9,9 @@ use crate::app::commands::CTRL;
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
 use crate::mhp::{Scope, TermId, Weight};
-use crate::session::{Branch, Command, FitStatus, IterationRow, PinRow, Session, numbers};
+use crate::session::{Branch, Command, FitStatus, IterationRow, PinRow, Session, ViewState, numbers};
 use crate::worker::JobId;
-use egui::{Color32, Key, Ui};
+use egui::{Color32, Key, Sense, Ui};
 use egui_plot::{GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, VLine, uniform_grid_spacer};
 use series::{SeriesCache, series};
 use std::borrow::Cow;
@@ -18,6 +19,9 @@ use thin::VisibleSpan;
 
 /// Room on the right for half of the last number below the plot, points.
 const LAST_NUMBER: f32 = 12.0;
+
+/// Two clicks within this time are one gesture, s.
+const DOUBLE_CLICK_S: f64 = 0.6;
 
 /// The pane.
 pub(super) static PANE: Pane = Pane {
@@ -38,8 +42,8 @@ pub(super) static PANE: Pane = Pane {
 struct State {
     reset: bool,
     tab: Tab,
-    /// The shown iteration before the last click.
-    before_click: usize,
+    /// The shown iteration before the last click, and when that was, s.
+    before_click: Option<(usize, f64)>,
     /// What was on screen in the pass before.
     window: Option<VisibleSpan>,
     /// Values of the curves of a job's history, as it was built up.
@@ -54,7 +58,9 @@ impl PaneState for State {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum Tab {
+    /// Each curve with a scale of its own.
     #[default]
+    Each,
     Loss,
     Quality,
 }
@@ -97,6 +103,17 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let lineage = fit.history.lineage();
     let first = lineage.first().and_then(|rows| rows.first()).map_or(0, |row| row.report.iteration);
     let curves = curves(shared, branch, state.tab);
+    if state.tab == Tab::Each {
+        let caption = figure::of(shared.session, "each curve with its own scale");
+        let area = figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref());
+        ui.interact(area, ui.scope_id().with("curves"), Sense::hover())
+            .widget_info(|| figure::spoken("Curves", caption.as_deref()));
+        let hidden = &shared.session.view.hidden_curves;
+        let visible: Vec<&Curve> = curves.iter().filter(|c| !hidden.contains(&c.key)).collect();
+        state.series.begin((fit.job, fit.history.revision()));
+        let branch = branch.id;
+        return multiples::show(ui, shared, &mut state.series, &visible, branch, area);
+    }
     let log = shared.session.view.log_loss && state.tab == Tab::Loss;
     let hidden = &shared.session.view.hidden_curves;
     let tokens = Tokens::of(ui);
@@ -178,11 +195,15 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     inner.widget_info(|| figure::spoken("Curves", caption.as_deref()));
     if inner.double_clicked() {
         // The first click of the two has moved the cursor; the gesture was for the plot.
-        shared.send(Command::GotoIteration(state.before_click));
+        // Where both came in one pass there was none to take back.
+        let now = ui.input(|i| i.time);
+        if let Some((before, _)) = state.before_click.take().filter(|(_, at)| now - at < DOUBLE_CLICK_S) {
+            shared.send(Command::GotoIteration(before));
+        }
     } else if inner.clicked()
         && let Some(at) = pointer
     {
-        state.before_click = shown;
+        state.before_click = Some((shown, ui.input(|i| i.time)));
         shared.send(Command::GotoIteration(at.x.round().clamp(0.0, 1e9) as usize));
     }
 }
@@ -197,7 +218,7 @@ fn pinned(
     let pins = shared.session.pins.list().iter();
     pins.map(|pin| {
         let value = |row: &PinRow| match tab {
-            Tab::Loss => Some(row.report.loss),
+            Tab::Each | Tab::Loss => Some(row.report.loss),
             Tab::Quality => numbers(&row.report, None)[1],
         };
         let what = if tab == Tab::Loss { "L" } else { "mean IoU" };
@@ -230,11 +251,16 @@ fn flag_texts<R>(ui: &Ui, response: &egui_plot::PlotResponse<R>, branch: &Branch
 fn curves(shared: &Shared<'_>, branch: &Branch, tab: Tab) -> Vec<Curve> {
     let arrays: Vec<String> =
         shared.session.fit.problem.iter().flat_map(|p| &p.views).map(|view| view.array.clone()).collect();
+    let losses = || {
+        let fit = &shared.session.fit;
+        loss_curves(fit.initial.as_ref().map_or(1, |p| p.shape().persons), fit.history.branches())
+    };
     match tab {
-        Tab::Loss => {
-            let fit = &shared.session.fit;
-            loss_curves(fit.initial.as_ref().map_or(1, |p| p.shape().persons), fit.history.branches())
+        Tab::Each => {
+            let quality = self::curves(shared, branch, Tab::Quality);
+            losses().into_iter().chain(quality).collect()
         }
+        Tab::Loss => losses(),
         Tab::Quality => {
             let mut curves: Vec<Curve> = arrays
                 .iter()
@@ -320,39 +346,53 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let tokens = Tokens::of(ui);
     let mut view = shared.session.view.clone();
     ui.horizontal_wrapped(|ui| {
+        ui.selectable_value(&mut state.tab, Tab::Each, "Each")
+            .on_hover_text("Every curve in a picture of its own, with its own scale.");
         ui.selectable_value(&mut state.tab, Tab::Loss, "Loss").on_hover_text("The total and its unweighted terms.");
         ui.selectable_value(&mut state.tab, Tab::Quality, "IoU and error")
             .on_hover_text("Forward-consistency IoU of each view, and MAJPE where the data set has truth.");
-        if state.tab == Tab::Loss {
+        if state.tab != Tab::Quality {
             ui.checkbox(&mut view.log_loss, "log y").on_hover_text("Logarithmic vertical axis.");
         }
-        ui.add_space(4.0);
-        for c in &curves {
-            let on = !view.hidden_curves.contains(&c.key);
-            let mut text = egui::text::LayoutJob::default();
-            let font = egui::FontId::proportional(theme::CAPTION);
-            let part = |color: Color32, on: bool| egui::TextFormat {
-                font_id: font.clone(),
-                color,
-                strikethrough: if on { egui::Stroke::NONE } else { egui::Stroke::new(1.0, tokens.dim) },
-                ..Default::default()
-            };
-            text.append("■ ", 0.0, part(if on { tokens.curve(&c.key) } else { tokens.stroke }, true));
-            text.append(&c.name, 0.0, part(if on { tokens.text } else { tokens.dim }, on));
-            let response = ui.add(egui::Label::new(text).sense(egui::Sense::click()).selectable(false).extend());
-            let name = format!("Curve {}", c.name);
-            response.widget_info(|| egui::WidgetInfo::selected(egui::Role::CheckBox, true, on, &name));
-            if response.on_hover_text("Click to show or hide.").clicked() {
-                if on {
-                    view.hidden_curves.push(c.key.clone());
-                } else {
-                    view.hidden_curves.retain(|key| *key != c.key);
-                }
-            }
+        if state.tab == Tab::Each {
+            // Their names are over the pictures.
+            ui.menu_button("Show", |ui| choose(ui, &curves, &mut view, &tokens))
+                .response
+                .on_hover_text("Which curves are shown.");
+        } else {
+            ui.add_space(4.0);
+            choose(ui, &curves, &mut view, &tokens);
         }
     });
     if view != shared.session.view {
         shared.set_view(|v| *v = view);
+    }
+}
+
+/// The names of curves; a click shows or hides one.
+fn choose(ui: &mut Ui, curves: &[Curve], view: &mut ViewState, tokens: &Tokens) {
+    for c in curves {
+        let on = !view.hidden_curves.contains(&c.key);
+        let mut text = egui::text::LayoutJob::default();
+        let font = egui::FontId::proportional(theme::CAPTION);
+        let part = |color: Color32, on: bool| egui::TextFormat {
+            font_id: font.clone(),
+            color,
+            strikethrough: if on { egui::Stroke::NONE } else { egui::Stroke::new(1.0, tokens.dim) },
+            ..Default::default()
+        };
+        text.append("■ ", 0.0, part(if on { tokens.curve(&c.key) } else { tokens.stroke }, true));
+        text.append(&c.name, 0.0, part(if on { tokens.text } else { tokens.dim }, on));
+        let response = ui.add(egui::Label::new(text).sense(egui::Sense::click()).selectable(false).extend());
+        let name = format!("Curve {}", c.name);
+        response.widget_info(|| egui::WidgetInfo::selected(egui::Role::CheckBox, true, on, &name));
+        if response.on_hover_text("Click to show or hide.").clicked() {
+            if on {
+                view.hidden_curves.push(c.key.clone());
+            } else {
+                view.hidden_curves.retain(|key| *key != c.key);
+            }
+        }
     }
 }
 

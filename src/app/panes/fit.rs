@@ -6,7 +6,7 @@ use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, chip, icon_button, iou_color, rows, settings, value_row};
 use crate::config::{Convergence, FIELDS, Field, FieldGroup, FitConfig, Preset, difference};
 use crate::mhp::{Precision, Scope, TERMS, TermId, Terms, formula};
-use crate::session::{Command, FitStatus, Live, LiveFrom, RunSpeed};
+use crate::session::{Command, FitStatus, IterationRow, Live, LiveFrom, RunSpeed, Session};
 use egui::{Key, RichText, Ui};
 
 /// The pane.
@@ -160,14 +160,8 @@ fn status(ui: &mut Ui, shared: &mut Shared<'_>) {
     ui.horizontal_wrapped(|ui| {
         chip(ui, word, color);
         if let Some(row) = fit.shown_row() {
-            if row.report.converged && row.report.iteration > 0 && !fit.is_running() {
-                let settled = match shared.session.config.convergence {
-                    Convergence::Change => "L changed",
-                    Convergence::Improvement => "L fell",
-                };
-                chip(ui, "✓ converged", tokens.ok).on_hover_text(format!(
-                    "The criterion holds: L < 1, or {settled} by less than 0.5 % over five iterations; every joint finite and every bone within 0.5–1.5 of its reference.",
-                ));
+            if row.report.iteration > 0 && !fit.is_running() {
+                judgement(ui, shared.session, row, &tokens);
             }
             if let Some(reason) = fit.reason {
                 ui.label(RichText::new(reason).small().color(tokens.dim));
@@ -188,6 +182,34 @@ fn status(ui: &mut Ui, shared: &mut Shared<'_>) {
     // Always there: a branch that begins while a slider is dragged must not move the slider.
     branches(ui, shared);
     start(ui, shared);
+}
+
+/// Three questions that are not one: does the paper's criterion hold, does the fit still move, is the echo explained.
+fn judgement(ui: &mut Ui, session: &Session, row: &IterationRow, tokens: &Tokens) {
+    if let Some(iou) = row.iou() {
+        let (word, color) =
+            if iou >= 0.5 { ("explained", tokens.ok) } else { ("not explained", iou_color(tokens, iou)) };
+        chip(ui, word, color).on_hover_text(format!(
+            "Mean IoU of the masks {iou:.3}: from 0.5 on most of the measured echo is explained by the fit, and little else is simulated."
+        ));
+    }
+    if let Some(settled) = session.fit.settled() {
+        let (word, color) = if settled { ("settled", tokens.dim) } else { ("moving", tokens.warn) };
+        chip(ui, word, color).on_hover_text(
+            "Over the last ten iterations the loss changed by less than 0.1 % and no joint moved more than 2 mm; or not: more \
+             iterations would change the fit.",
+        );
+    }
+    if row.report.converged {
+        let progress = match session.config.convergence {
+            Convergence::Change => "L changed",
+            Convergence::Improvement => "L fell",
+        };
+        let chip = chip(ui, "criterion", tokens.dim).named(egui::Role::Label, "Convergence criterion holds");
+        chip.on_hover_text(format!(
+            "The paper's criterion holds: L < 1, or {progress} by less than 0.5 % over five iterations; every joint finite and every bone within 0.5–1.5 of its reference. At iteration 0 it nearly always does: it is no success by itself."
+        ));
+    }
 }
 
 /// How the start came about, a line that is always there: the rest is its tooltip.

@@ -9,7 +9,7 @@ mod region;
 mod toolbar;
 
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
-use crate::app::commands::{CommandRow, Menu, NONE, UiAction, has_frame};
+use crate::app::commands::{AppAct, CommandRow, Menu, NONE, UiAction, has_frame};
 use crate::app::figure;
 use crate::app::map_image::Orientation;
 use crate::app::theme::{self, Tokens};
@@ -307,6 +307,9 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
             let joint = overlay::joint_near(session, view, orientation, &to_screen, pointer);
             if joint != session.joint {
                 shared.send(crate::session::Command::SelectJoint(joint));
+                if joint.is_some() {
+                    shared.app(AppAct::ShowPane(&super::joint::PANE));
+                }
             }
         }
     }

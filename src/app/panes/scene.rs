@@ -6,7 +6,7 @@
 mod build;
 
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
-use crate::app::commands::{CTRL, CommandRow, Menu, NONE, UiAction, always};
+use crate::app::commands::{AppAct, CTRL, CommandRow, Menu, NONE, UiAction, always};
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
@@ -303,6 +303,9 @@ fn interact(
         }
     } else if response.clicked() && hit != shared.session.joint {
         shared.send(Command::SelectJoint(hit));
+        if hit.is_some() {
+            shared.app(AppAct::ShowPane(&super::joint::PANE));
+        }
     }
     if let (Some(joint), Some(problem)) = (hit, &shared.session.fit.problem) {
         let joints = problem.skeleton.joints.len().max(1);

@@ -9,7 +9,7 @@ pub(crate) fn chip(ui: &mut Ui, text: &str, color: Color32) -> Response {
         .stroke(egui::Stroke::new(1.0, color))
         .corner_radius(3)
         .inner_margin(egui::Margin::symmetric(4, 0))
-        .show(ui, |ui| ui.label(RichText::new(text).small().color(color)))
+        .show(ui, |ui| ui.add(egui::Label::new(RichText::new(text).small().color(color)).extend()))
         .response
 }
 

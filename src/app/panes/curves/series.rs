@@ -40,6 +40,13 @@ impl Series {
         }
     }
 
+    /// Whether it is 0 wherever it has a value.
+    pub(super) fn is_zero(&self) -> bool {
+        // Of the longest stretches the lowest and the highest.
+        let ends = self.levels.last().into_iter().flatten().flatten();
+        ends.map(|&at| self.values[at]).all(|value| value == 0.0 || value.is_nan())
+    }
+
     /// The points that a curve in `window` is drawn from, in pieces: it breaks where there is no value, or on a logarithmic
     /// scale none above 1e−7. Everything where nothing was on screen yet.
     pub(super) fn pieces(&self, window: Option<&VisibleSpan>, log: bool) -> Vec<Vec<PlotPoint>> {

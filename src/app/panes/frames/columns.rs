@@ -144,7 +144,7 @@ const COLUMNS: &[Column] = &[
         key: "converged",
         title: "C",
         name: "Converged",
-        tip: "✓ the fit met the convergence criterion, ✕ it did not.",
+        tip: "✓ the fit met the paper's convergence criterion, ✕ it did not. It says nothing of how well the echo is explained: that is the IoU.",
         sort: SortKey::Converged,
         width: 14.0,
         right: false,
@@ -215,7 +215,7 @@ fn text(column: &Column, row: &FrameRow<'_>, tokens: &Tokens) -> (String, Color3
             None => dim(if fitted { "–".into() } else { String::new() }),
         },
         "converged" => match row.converged {
-            Some(true) => ("✓".into(), tokens.ok),
+            Some(true) => dim("✓".into()),
             Some(false) => ("✕".into(), tokens.warn),
             None => dim(String::new()),
         },

@@ -1,0 +1,183 @@
+//! Every curve in a picture of its own, with a scale of its own: terms differ by powers of ten, and what changes is seen in each.
+
+use super::series::SeriesCache;
+use super::thin::VisibleSpan;
+use super::{Curve, Shared};
+use crate::app::figure;
+use crate::app::theme::{self, Tokens};
+use crate::session::Command;
+use crate::worker::JobId;
+use egui::{Align2, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
+use egui_plot::PlotPoint;
+
+/// The least width of a picture, points.
+const LEAST: f32 = 92.0;
+/// Between pictures.
+const GAP: f32 = 6.0;
+/// Name and value over a curve.
+const TITLE: f32 = 15.0;
+
+/// Draws `curves` of the rows that led to the head of the active branch, and of other branches behind them; a click asks for
+/// the iteration under it.
+pub(super) fn show(
+    ui: &mut Ui,
+    shared: &mut Shared<'_>,
+    series: &mut SeriesCache<(JobId, u64)>,
+    curves: &[&Curve],
+    branch: u32,
+    area: Rect,
+) {
+    let fit = &shared.session.fit;
+    let lineage = fit.history.lineage();
+    let others: Vec<_> = fit.history.branches().iter().filter(|b| b.id != branch && !b.rows.is_empty()).collect();
+    let (Some(first), Some(last)) =
+        (lineage.first().and_then(|rows| rows.first()), lineage.last().and_then(|rows| rows.last()))
+    else {
+        return;
+    };
+    let (first, head) = (first.report.iteration, last.report.iteration);
+    let shown = fit.shown_iteration();
+    let shown_row = fit.shown_row();
+    let end = others.iter().map(|b| b.head()).chain([head, first + 1]).max().unwrap_or_default();
+    let span = (first as f64, end as f64);
+    let log = shared.session.view.log_loss;
+    let tokens = Tokens::of(ui);
+    let mut asked = None;
+    // A term that is 0 from end to end has nothing to show.
+    let curves: Vec<&&Curve> =
+        curves.iter().filter(|c| !series.grown(None, &c.key, first, &lineage, &c.value).is_zero()).collect();
+    for (curve, rect) in curves.iter().zip(cells(area, curves.len())) {
+        let window = VisibleSpan::new(span.0, span.1, rect.width() * ui.pixels_per_point());
+        let line = series.grown(None, &curve.key, first, &lineage, &curve.value).pieces(Some(&window), false);
+        let behind: Vec<Vec<PlotPoint>> = others
+            .iter()
+            .flat_map(|b| {
+                series.grown(Some(b.id), &curve.key, b.start(), &[&b.rows], &curve.value).pieces(Some(&window), false)
+            })
+            .collect();
+        let scale = Scale::of(line.iter().chain(&behind).flatten().map(|point| point.y), log);
+        let response = ui.interact(rect, ui.scope_id().with(("curve", &curve.key)), Sense::click_and_drag());
+        let plot = rect.with_min_y(rect.min.y + TITLE);
+        let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
+        let x = |iteration: f64| {
+            let t = (iteration - span.0) / (span.1 - span.0).max(1.0);
+            plot.min.x + 2.0 + t as f32 * (plot.width() - 4.0)
+        };
+        let at = |p: PlotPoint| pos2(x(p.x), plot.max.y - 3.0 - scale.unit(p.y) * (plot.height() - 6.0));
+        let color = tokens.curve(&curve.key);
+        painter.rect(plot, 2.0, tokens.canvas, Stroke::new(1.0, tokens.stroke), egui::StrokeKind::Inside);
+        for piece in behind {
+            painter.line(piece.into_iter().map(at).collect(), Stroke::new(1.0, tokens.dim.gamma_multiply(0.6)));
+        }
+        for piece in line {
+            painter.line(piece.into_iter().map(at).collect(), Stroke::new(1.5, color));
+        }
+        let now = shown_row.and_then(|row| (curve.value)(row));
+        painter.vline(x(shown as f64), plot.y_range(), Stroke::new(1.0, tokens.accent));
+        if let Some(y) = now {
+            painter.circle_filled(at(PlotPoint::new(shown as f64, y)), 2.5, color);
+        }
+        let text = now.map_or_else(|| "–".into(), number);
+        let value = painter.text(rect.right_top(), Align2::RIGHT_TOP, &text, theme::mono(theme::CAPTION), tokens.text);
+        let name = painter.with_clip_rect(rect.with_max_x(value.min.x - 4.0).intersect(ui.clip_rect()));
+        let font = FontId::proportional(theme::CAPTION);
+        name.text(rect.min + vec2(1.0, 0.0), Align2::LEFT_TOP, &curve.name, font, color);
+        if plot.height() > 60.0 && plot.width() > 140.0 && scale.hi > scale.lo {
+            let small = theme::mono(9.0);
+            for (place, anchor, y) in
+                [(plot.left_top(), Align2::LEFT_TOP, scale.hi), (plot.left_bottom(), Align2::LEFT_BOTTOM, scale.lo)]
+            {
+                painter.text(place + vec2(3.0, 0.0), anchor, number(y), small.clone(), tokens.dim);
+            }
+        }
+        response.widget_info(|| figure::spoken(&format!("Curve of {}", curve.name), Some(&text)));
+        let pointed = (response.clicked() || response.dragged()).then(|| response.interact_pointer_pos()).flatten();
+        if let Some(pointer) = pointed {
+            let t = f64::from((pointer.x - plot.min.x - 2.0) / (plot.width() - 4.0).max(1.0)).clamp(0.0, 1.0);
+            let iteration = (span.0 + t * (span.1 - span.0)).round() as usize;
+            asked = Some(iteration).filter(|iteration| *iteration != shown);
+        }
+        response.on_hover_text(format!(
+            "{}: {} to {}{}\nClick or drag to show an iteration.",
+            curve.name,
+            number(scale.lo),
+            number(scale.hi),
+            if scale.log { ", logarithmic" } else { "" }
+        ));
+    }
+    if let Some(iteration) = asked {
+        shared.send(Command::GotoIteration(iteration));
+    }
+}
+
+/// Places for `count` pictures: as many rows as make them least narrow.
+fn cells(area: Rect, count: usize) -> Vec<Rect> {
+    let across = ((area.width() / LEAST).floor() as usize).clamp(1, count.max(1));
+    let down = count.div_ceil(across);
+    // Rows of the same length, not one full and one with the rest.
+    let across = count.div_ceil(down.max(1)).max(1);
+    let size = vec2(area.width() / across as f32, area.height() / down.max(1) as f32);
+    let place = |k: usize| {
+        let corner = area.min + vec2(size.x * (k % across) as f32, size.y * (k / across) as f32);
+        Rect::from_min_size(corner, (size - vec2(GAP, GAP * 0.5)).max(vec2(1.0, 1.0)))
+    };
+    (0..count).map(place).collect()
+}
+
+/// From a value to 0 (lowest) to 1 (highest).
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Scale {
+    lo: f64,
+    hi: f64,
+    log: bool,
+}
+
+impl Scale {
+    /// Of these values; logarithmic only where all of them are positive.
+    fn of(values: impl Iterator<Item = f64>, log: bool) -> Self {
+        let (lo, hi) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), y| (lo.min(y), hi.max(y)));
+        if lo > hi { Self { lo: 0.0, hi: 0.0, log: false } } else { Self { lo, hi, log: log && lo > 0.0 } }
+    }
+
+    fn unit(&self, y: f64) -> f32 {
+        let [lo, hi, y] = [self.lo, self.hi, y].map(|y| if self.log { y.ln() } else { y });
+        if hi > lo { ((y - lo) / (hi - lo)) as f32 } else { 0.5 }
+    }
+}
+
+/// Four digits that count.
+fn number(y: f64) -> String {
+    let text = match y.abs() {
+        0.0 => "0".to_owned(),
+        a if !(1e-4..1e5).contains(&a) => format!("{y:.2e}"),
+        a => format!("{y:.*}", (3 - a.log10().floor() as i32).clamp(0, 6) as usize),
+    };
+    text.replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_share_the_area_in_even_rows() {
+        let area = Rect::from_min_size(pos2(0.0, 0.0), vec2(800.0, 100.0));
+        for (count, rows) in [(1, 1), (5, 1), (8, 1), (9, 2), (10, 2)] {
+            let cells = cells(area, count);
+            let mut tops: Vec<i32> = cells.iter().map(|cell| cell.min.y as i32).collect();
+            tops.dedup();
+            assert_eq!((cells.len(), tops.len()), (count, rows));
+            assert!(cells.iter().all(|cell| area.contains_rect(*cell)));
+        }
+    }
+
+    #[test]
+    fn scales_and_numbers_fit_what_they_show() {
+        let scale = Scale::of([0.01, 1.0].into_iter(), true);
+        assert!((scale.unit(0.1) - 0.5).abs() < 1e-6);
+        assert!(!Scale::of([0.0, 1.0].into_iter(), true).log, "0 has no logarithm");
+        assert_eq!(Scale::of([2.0].into_iter(), false).unit(2.0), 0.5);
+        let told = [0.0, 0.023_51, -1.5, 97.94, 12_345.6, 3.2e-7].map(number);
+        assert_eq!(told, ["0", "0.02351", "−1.500", "97.94", "12346", "3.20e−7"]);
+    }
+}
