@@ -23,6 +23,29 @@ pub(crate) struct Orientation {
     pub(crate) horizontal_from_left: bool,
 }
 
+/// The way through an array that goes along the rows of its picture.
+struct Walk {
+    size: [usize; 2],
+    first: isize,
+    across: isize,
+    down: isize,
+    /// Bins of the collapsed axis and how far apart they are; one where none is.
+    third: (usize, usize),
+}
+
+impl Walk {
+    /// What `of` makes of the cells behind each pixel: the first of them, how many they are and how far apart.
+    fn each<T>(&self, of: impl Fn(usize, (usize, usize)) -> T) -> Vec<T> {
+        let [width, height] = self.size;
+        let mut out = Vec::with_capacity(width * height);
+        for row in 0..height as isize {
+            let begin = self.first + row * self.down;
+            out.extend((0..width as isize).map(|column| of((begin + column * self.across) as usize, self.third)));
+        }
+        out
+    }
+}
+
 impl Orientation {
     /// The orientation of a view by the conventions above.
     pub(crate) fn of(view: &View) -> Self {
@@ -64,48 +87,35 @@ impl Orientation {
         [across * view.axes[self.horizontal].bins as f64 - 0.5, down * view.axes[self.vertical].bins as f64 - 0.5]
     }
 
-    /// The array bin of a pixel, with the collapsed axis at `third`.
-    pub(crate) fn index(&self, view: &View, column: usize, row: usize, third: usize) -> usize {
-        let [width, height] = self.size(view);
-        let mut bins = [0usize; 3];
-        bins[self.horizontal] = if self.horizontal_from_left { column } else { width - 1 - column };
-        bins[self.vertical] = if self.vertical_from_top { row } else { height - 1 - row };
-        if let Some(axis) = self.collapsed {
-            bins[axis] = third;
+    /// How far apart neighbours are in the array: across, down, and along the collapsed axis; and where the upper left pixel is.
+    fn walk(&self, view: &View) -> Walk {
+        let mut strides = vec![1; view.axes.len()];
+        for axis in (1..view.axes.len()).rev() {
+            strides[axis - 1] = strides[axis] * view.axes[axis].bins;
         }
-        view.axes.iter().zip(bins).fold(0, |index, (axis, bin)| index * axis.bins + bin)
+        let step = |axis: usize, forward: bool| {
+            let (stride, last) = (strides[axis] as isize, view.axes[axis].bins.saturating_sub(1) as isize);
+            if forward { (stride, 0) } else { (-stride, last * stride) }
+        };
+        let (across, left) = step(self.horizontal, self.horizontal_from_left);
+        let (down, top) = step(self.vertical, self.vertical_from_top);
+        let third = self.collapsed.map_or((1, 1), |axis| (view.axes[axis].bins, strides[axis]));
+        Walk { size: self.size(view), first: left + top, across, down, third }
     }
 
     /// The picture of a map, row by row: the cell itself, or the largest over the collapsed axis.
     pub(crate) fn picture(&self, view: &View, map: &[f64]) -> Vec<f64> {
-        let [width, height] = self.size(view);
-        let depth = self.collapsed.map_or(1, |axis| view.axes[axis].bins);
-        let mut out = Vec::with_capacity(width * height);
-        for row in 0..height {
-            for column in 0..width {
-                let mut best = f64::NAN;
-                for third in 0..depth {
-                    let value = map.get(self.index(view, column, row, third)).copied().unwrap_or(f64::NAN);
-                    best = best.max(value);
-                }
-                out.push(best);
-            }
-        }
-        out
+        let value = |at: usize| map.get(at).copied().unwrap_or(f64::NAN);
+        self.walk(view).each(|at, third| match third {
+            (1, _) => value(at),
+            (bins, apart) => (0..bins).map(|bin| value(at + bin * apart)).fold(f64::NAN, f64::max),
+        })
     }
 
     /// The picture of a mask: true where any cell over the collapsed axis is.
     pub(crate) fn mask_picture(&self, view: &View, mask: &[bool]) -> Vec<bool> {
-        let [width, height] = self.size(view);
-        let depth = self.collapsed.map_or(1, |axis| view.axes[axis].bins);
-        let mut out = Vec::with_capacity(width * height);
-        for row in 0..height {
-            for column in 0..width {
-                let any = (0..depth).any(|third| mask.get(self.index(view, column, row, third)) == Some(&true));
-                out.push(any);
-            }
-        }
-        out
+        let is_in = |at: usize| mask.get(at) == Some(&true);
+        self.walk(view).each(|at, (bins, apart)| (0..bins).any(|bin| is_in(at + bin * apart)))
     }
 
     /// True where one cell is as wide as it is high in metres when drawn to scale.

@@ -290,7 +290,8 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
         wipe(ui, shared, state, index, plot, window);
     }
     let to_screen = |unit: [f64; 2]| screen(plot, window, unit);
-    overlay::draw(&painter, session, view, index, orientation, &to_screen, &tokens);
+    let region = state.pictures.region(index);
+    overlay::draw(&painter, session, view, index, region, &to_screen, &tokens);
     state.draw_regions(&painter, session, index, view, &to_screen, &tokens);
     overlay::title(&painter, plot, view, content, state.pictures.reference(), session);
     if row.axes {

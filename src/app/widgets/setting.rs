@@ -74,11 +74,15 @@ fn slider(ui: &mut Ui, field: &Field, number: &Number, preset: Preset, config: &
         let beside = VALUE.x + BACK.x + 2.0 * ui.spacing().item_spacing.x;
         let width = (ui.available_width() - beside).max(40.0);
         ui.spacing_mut().slider_width = width;
-        let mut slider = egui::Slider::new(&mut value, lo..=hi).show_value(false);
+        // Every point of the way is another value, of three digits: a live fit follows as finely as the finger moves.
+        let mut slider = egui::Slider::new(&mut value, lo..=hi).show_value(false).smart_aim(false);
         if number.logarithmic {
             slider = slider.logarithmic(true).smallest_positive(if lo > 0.0 { lo } else { 1e-3 });
         }
         let response = ui.add(slider);
+        if response.changed() {
+            value = three_digits(value).clamp(lo, hi);
+        }
         response.widget_info(|| egui::WidgetInfo::slider(true, value, field.label));
         response.on_hover_text(&tip);
         typed(ui, field, number, &mut value).on_hover_text(&tip);
@@ -92,6 +96,15 @@ fn slider(ui: &mut Ui, field: &Field, number: &Number, preset: Preset, config: &
     if value != old {
         field.set(config, Value::Number(value));
     }
+}
+
+/// The nearest number of three digits that count.
+fn three_digits(value: f64) -> f64 {
+    if value == 0.0 || !value.is_finite() {
+        return value;
+    }
+    let unit = 10f64.powi(2 - value.abs().log10().floor() as i32);
+    (value * unit).round() / unit
 }
 
 /// Label, the answer that needs no number, and the number.
@@ -148,6 +161,12 @@ mod tests {
             Shape::Text(text) => into.push(text.galley.text().to_owned()),
             _ => {}
         }
+    }
+
+    #[test]
+    fn a_dragged_value_has_three_digits() {
+        let told = [0.0, 3.472_13, 0.012_345_6, 999.9, 98_765.4, -0.5].map(three_digits);
+        assert_eq!(told, [0.0, 3.47, 0.0123, 1000.0, 98_800.0, -0.5]);
     }
 
     /// Each setting by its label, also one that only tests know; and drawing them changes none.

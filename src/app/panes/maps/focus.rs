@@ -52,12 +52,13 @@ impl State {
 /// Where the person is on a map, picture coordinates: the EM region where it is a part of the map, else around the joints.
 fn person_box(session: &Session, view: &View, index: usize) -> Option<[[f32; 2]; 2]> {
     let snapshot = session.fit.shown.as_ref()?;
-    let region = snapshot.masks.get(index).and_then(|masks| super::overlay::region_box(view, &masks.inside));
+    let o = crate::app::map_image::Orientation::of(view);
+    let inside = snapshot.masks.get(index).map(|masks| o.mask_picture(view, &masks.inside));
+    let region = inside.and_then(|inside| super::overlay::region_box(o.size(view), &inside));
     let covers = |[min, max]: [[f32; 2]; 2]| (0..2).all(|axis| max[axis] - min[axis] > 0.95);
     if let Some(region) = region.filter(|region| !covers(*region)) {
         return Some(region);
     }
-    let o = crate::app::map_image::Orientation::of(view);
     let (mut min, mut max) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
     for &p in session.shown_positions() {
         let at = o.unit_from_bins(view, &view.bins_of(p));

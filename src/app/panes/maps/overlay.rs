@@ -130,19 +130,16 @@ fn ticks(axis: &Axis, from: f32, to: f32, forward: bool, wanted: f32) -> Vec<(f3
         .collect()
 }
 
-/// The EM region's corners in picture coordinates.
-pub(super) fn region_box(view: &View, inside: &[bool]) -> Option<[[f32; 2]; 2]> {
-    let o = Orientation::of(view);
-    let [width, height] = o.size(view);
-    let mask = o.mask_picture(view, inside);
+/// The corners of the EM region, a picture of its mask, in picture coordinates.
+pub(super) fn region_box([width, height]: [usize; 2], mask: &[bool]) -> Option<[[f32; 2]; 2]> {
     let (mut min, mut max) = ([usize::MAX; 2], [0usize; 2]);
-    for row in 0..height {
-        for column in 0..width {
-            if mask[row * width + column] {
-                min = [min[0].min(column), min[1].min(row)];
-                max = [max[0].max(column + 1), max[1].max(row + 1)];
-            }
-        }
+    for (row, cells) in mask.chunks_exact(width.max(1)).enumerate() {
+        let (Some(first), Some(last)) = (cells.iter().position(|cell| *cell), cells.iter().rposition(|cell| *cell))
+        else {
+            continue;
+        };
+        min = [min[0].min(first), min[1].min(row)];
+        max = [max[0].max(last + 1), max[1].max(row + 1)];
     }
     (max[0] > 0).then(|| {
         let unit = |p: [usize; 2]| [p[0] as f32 / width as f32, p[1] as f32 / height as f32];
@@ -156,14 +153,13 @@ pub(super) fn draw(
     session: &Session,
     view: &View,
     index: usize,
-    o: Orientation,
+    region: Option<[[f32; 2]; 2]>,
     to_screen: &dyn Fn([f64; 2]) -> Pos2,
     tokens: &Tokens,
 ) {
-    let look = &session.view;
+    let (look, o) = (&session.view, Orientation::of(view));
     if look.show_region
-        && let Some(masks) = session.fit.shown.as_ref().and_then(|s| s.masks.get(index))
-        && let Some([min, max]) = region_box(view, &masks.inside)
+        && let Some([min, max]) = region
     {
         let corner = |p: [f32; 2]| to_screen([f64::from(p[0]), f64::from(p[1])]);
         dashed(painter, Rect::from_two_pos(corner(min), corner(max)), Color32::from_white_alpha(150));

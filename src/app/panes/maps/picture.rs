@@ -1,5 +1,6 @@
 //! Textures of the maps, made again only when what they show changed.
 
+use super::overlay::region_box;
 use crate::app::map_image::{Orientation, Shown, colorize, floor, limits, shown};
 use crate::app::theme;
 use crate::dataset::Frame;
@@ -45,6 +46,8 @@ struct ViewPictures {
     sim: Option<Shown>,
     base: Option<Shown>,
     masks: Option<[Vec<bool>; 3]>,
+    /// Corners of the EM region, picture coordinates.
+    region: Option<[[f32; 2]; 2]>,
     ori_limits: (f64, f64),
     sim_limits: (f64, f64),
     difference_limit: f64,
@@ -231,6 +234,11 @@ impl Pictures {
         (all > 0).then(|| 100.0 * below as f64 / all as f64)
     }
 
+    /// Corners of the EM region in picture coordinates.
+    pub(super) fn region(&self, view: usize) -> Option<[[f32; 2]; 2]> {
+        self.views.get(view)?.region
+    }
+
     /// Whether a pixel is in H_ori's mask, in H_sim's, in the EM region.
     pub(super) fn mask_at(&self, view: usize, pixel: [usize; 2]) -> Option<[bool; 3]> {
         let p = self.views.get(view)?;
@@ -244,7 +252,7 @@ impl ViewPictures {
     fn take_snapshot(&mut self, snapshot: Option<&Snapshot>, index: usize, view: &View, look: &Look) {
         let orientation = Orientation::of(view);
         self.sim = None;
-        self.masks = None;
+        (self.masks, self.region) = (None, None);
         self.sim_stored.clear();
         let Some(snapshot) = snapshot else { return };
         if let Some(map) = snapshot.h_sim.get(index) {
@@ -262,6 +270,7 @@ impl ViewPictures {
             .masks
             .get(index)
             .map(|masks| [&masks.ori, &masks.sim, &masks.inside].map(|mask| orientation.mask_picture(view, mask)));
+        self.region = self.masks.as_ref().and_then(|[.., inside]| region_box(orientation.size(view), inside));
     }
 
     /// H_sim less what it is compared with, both clipped to the lower limit, so that what is nothing does not hide the rest.
