@@ -164,7 +164,7 @@ fn status(ui: &mut Ui, shared: &mut Shared<'_>) {
                 judgement(ui, shared.session, row, &tokens);
             }
             if let Some(reason) = fit.reason {
-                ui.label(RichText::new(reason).small().color(tokens.dim));
+                ui.add(egui::Label::new(RichText::new(reason).small().color(tokens.dim)).extend());
             }
         }
         if let FitStatus::Failed(why) = &fit.status {
