@@ -5,7 +5,7 @@
 
 use crate::radar::{Axis, AxisKind, View};
 use crate::render::Colormap;
-use crate::session::{ColorRange, MapScale};
+use crate::session::{ColorRange, CubeAxes, CubeView, MapScale, ThirdAxis};
 use egui::{Color32, ColorImage};
 
 /// How a view's array becomes a picture. Pixel (column, row), row 0 at the top.
@@ -15,8 +15,10 @@ pub(crate) struct Orientation {
     pub(crate) vertical: usize,
     /// The array axis drawn across.
     pub(crate) horizontal: usize,
-    /// A third axis, over which the largest value is drawn.
+    /// A third axis, which is not drawn.
     pub(crate) collapsed: Option<usize>,
+    /// How it is taken.
+    pub(crate) third: ThirdAxis,
     /// Bin 0 of the vertical axis is at the top.
     pub(crate) vertical_from_top: bool,
     /// Bin 0 of the horizontal axis is at the left.
@@ -47,19 +49,26 @@ impl Walk {
 }
 
 impl Orientation {
-    /// The orientation of a view by the conventions above.
-    pub(crate) fn of(view: &View) -> Self {
+    /// The orientation of a view by the conventions above; `cube` says which axes of three are drawn.
+    pub(crate) fn of(view: &View, cube: CubeView) -> Self {
         let axes = &view.axes;
-        let vertical = axes.iter().position(|axis| axis.kind.is_depth()).unwrap_or(0);
-        let others: Vec<usize> = (0..axes.len()).filter(|&axis| axis != vertical).collect();
-        let horizontal = others.first().copied().unwrap_or(vertical);
+        let depth = axes.iter().position(|axis| axis.kind.is_depth()).unwrap_or(0);
+        let others: Vec<usize> = (0..axes.len()).filter(|&axis| axis != depth).collect();
+        let (vertical, horizontal, collapsed) = match (others.as_slice(), cube.axes) {
+            (&[first, second, ..], CubeAxes::First) => (depth, first, Some(second)),
+            (&[first, second, ..], CubeAxes::Second) => (depth, second, Some(first)),
+            (&[first, second, ..], CubeAxes::Others) => (second, first, Some(depth)),
+            (&[only], _) => (depth, only, None),
+            _ => (depth, depth, None),
+        };
         let grows_left = |axis: &Axis| matches!(axis.kind, AxisKind::Azimuth | AxisKind::Cone | AxisKind::Y);
         let rising = |axis: usize| axes.get(axis).is_some_and(|axis| axis.step() > 0.0);
         let leftward = axes.get(horizontal).is_some_and(grows_left);
         Self {
             vertical,
             horizontal,
-            collapsed: others.get(1).copied(),
+            collapsed,
+            third: cube.third,
             vertical_from_top: !rising(vertical),
             horizontal_from_left: rising(horizontal) != leftward,
         }
@@ -99,15 +108,27 @@ impl Orientation {
         };
         let (across, left) = step(self.horizontal, self.horizontal_from_left);
         let (down, top) = step(self.vertical, self.vertical_from_top);
-        let third = self.collapsed.map_or((1, 1), |axis| (view.axes[axis].bins, strides[axis]));
-        Walk { size: self.size(view), first: left + top, across, down, third }
+        let (mut first, mut third) = (left + top, (1, 1));
+        if let Some(axis) = self.collapsed {
+            let (bins, stride) = (view.axes[axis].bins, strides[axis]);
+            match self.third {
+                ThirdAxis::Bin(bin) => first += (bin.min(bins.saturating_sub(1)) * stride) as isize,
+                ThirdAxis::Largest | ThirdAxis::Mean => third = (bins, stride),
+            }
+        }
+        Walk { size: self.size(view), first, across, down, third }
     }
 
-    /// The picture of a map, row by row: the cell itself, or the largest over the collapsed axis.
+    /// The picture of a map, row by row: the cell itself, or what the collapsed axis is taken for; means of what is finite.
     pub(crate) fn picture(&self, view: &View, map: &[f64]) -> Vec<f64> {
         let value = |at: usize| map.get(at).copied().unwrap_or(f64::NAN);
         self.walk(view).each(|at, third| match third {
             (1, _) => value(at),
+            (bins, apart) if self.third == ThirdAxis::Mean => {
+                let finite = (0..bins).map(|bin| value(at + bin * apart)).filter(|x| x.is_finite());
+                let (sum, count) = finite.fold((0.0, 0), |(sum, count), x| (sum + x, count + 1));
+                if count > 0 { sum / f64::from(count) } else { f64::NAN }
+            }
             (bins, apart) => (0..bins).map(|bin| value(at + bin * apart)).fold(f64::NAN, f64::max),
         })
     }
@@ -241,7 +262,7 @@ mod tests {
     fn far_is_up_and_left_is_left() {
         for (range, azimuth) in [((0.0, 8.0), (-1.0, 1.0)), ((8.0, 0.0), (1.0, -1.0)), ((0.0, 8.0), (1.0, -1.0))] {
             let v = view(&[(AxisKind::Range, 4, range.0, range.1), (AxisKind::Azimuth, 6, azimuth.0, azimuth.1)]);
-            let o = Orientation::of(&v);
+            let o = Orientation::of(&v, CubeView::default());
             let far = v.axes[0].bin(6.0);
             let left = v.axes[1].bin(0.6);
             let [x, y] = o.unit_from_bins(&v, &[far, left]);
@@ -253,10 +274,10 @@ mod tests {
     #[test]
     fn height_grows_to_the_right_and_doppler_too() {
         let v = view(&[(AxisKind::DepthV, 256, 7.98, -0.01), (AxisKind::Z, 128, -1.98, 3.02)]);
-        let o = Orientation::of(&v);
+        let o = Orientation::of(&v, CubeView::default());
         assert!(o.vertical_from_top && o.horizontal_from_left);
         let d = view(&[(AxisKind::Doppler, 8, -2.0, 2.0), (AxisKind::Range, 8, 0.0, 4.0)]);
-        let o = Orientation::of(&d);
+        let o = Orientation::of(&d, CubeView::default());
         assert_eq!((o.vertical, o.horizontal), (1, 0));
         assert!(o.horizontal_from_left && !o.vertical_from_top);
     }
@@ -268,7 +289,7 @@ mod tests {
             (AxisKind::Azimuth, 32, 0.9, -1.0),
             (AxisKind::Elevation, 8, -1.0, 1.0),
         ]);
-        let o = Orientation::of(&v);
+        let o = Orientation::of(&v, CubeView::default());
         let unit = o.unit_from_bins(&v, &[12.25, 7.5, 3.0]);
         let [h, w] = [o.bins_from_unit(&v, unit)[1], o.bins_from_unit(&v, unit)[0]];
         assert!((h - 12.25).abs() < 1e-12 && (w - 7.5).abs() < 1e-12);
@@ -281,9 +302,16 @@ mod tests {
             (AxisKind::Azimuth, 2, 1.0, -1.0),
             (AxisKind::Elevation, 3, -1.0, 1.0),
         ]);
-        let o = Orientation::of(&v);
+        let o = Orientation::of(&v, CubeView::default());
         let map: Vec<f64> = (0..12).map(f64::from).collect();
         assert_eq!(o.picture(&v, &map), vec![2.0, 5.0, 8.0, 11.0]);
+        // Range falls with its bins and azimuth too; element (r, a, e) is 6 r + 3 a + e.
+        let of = |axes, third| Orientation::of(&v, CubeView { axes, third }).picture(&v, &map);
+        assert_eq!(of(CubeAxes::First, ThirdAxis::Mean), vec![1.0, 4.0, 7.0, 10.0]);
+        assert_eq!(of(CubeAxes::First, ThirdAxis::Bin(1)), vec![1.0, 4.0, 7.0, 10.0]);
+        assert_eq!(of(CubeAxes::First, ThirdAxis::Bin(99)), vec![2.0, 5.0, 8.0, 11.0], "no further than the last");
+        assert_eq!(of(CubeAxes::Second, ThirdAxis::Largest), vec![3.0, 4.0, 5.0, 9.0, 10.0, 11.0]);
+        assert_eq!(of(CubeAxes::Others, ThirdAxis::Largest), vec![8.0, 11.0, 7.0, 10.0, 6.0, 9.0]);
     }
 
     #[test]

@@ -29,7 +29,8 @@ pub(super) const HELP: &str = "\
 Columns: frame iterations converged reason people annotated loss em bone rigid joint sep coll iou_<array>... majpe_mm \
 pa_majpe_mm init_ms fit_ms. What is unknown is empty (null in JSON): the errors in mm where the data set has no joints in \
 metres, init_ms where the frame before was the start. Errors are of the smaller of the two numbers of people, paired best; \
-their means leave out the frames where another number is annotated than was fitted, and say how many. A frame that cannot be fitted has the reason `error: ...`, and the run goes on.
+their means leave out the frames where another number is annotated than was fitted, and say how many. Persons are in the \
+order of their identities through a sequence in the parameter files. A frame that cannot be fitted has the reason `error: ...`, and the run goes on.
 
 Exit codes: 0 every frame was fitted; 1 some were not; 2 none was, or the input is bad.
 
@@ -146,7 +147,7 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
     report.tell()
 }
 
-/// Fits a part of `frames` into the folder of a shard; with a warm start whole sequences of them.
+/// Fits a part of `frames` into the folder of a shard; whole sequences of them with a warm start, or for several people.
 fn part(
     shard: Shard,
     out: &Path,
@@ -165,7 +166,9 @@ fn part(
     let spec = ShardSpec::new(FrameCommand::Fit, dataset, frames, shard, &settings)?;
     let folder = ShardFolder::begin(out, shelves(settings.curves), spec, inputs)?;
     write_settings(out, dataset, options, inputs)?;
-    let mine = if options.warm_start { shard.sequences(dataset, frames) } else { shard.stretch(frames) };
+    // Who is who goes on through a sequence, as a warm start does.
+    let whole = options.warm_start || options.config.people != 1;
+    let mine = if whole { shard.sequences(dataset, frames) } else { shard.stretch(frames) };
     let bar = progress_bar(mine.len());
     let mut rows = Vec::with_capacity(mine.len());
     let mine: Vec<usize> = mine.collect();

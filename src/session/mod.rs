@@ -57,4 +57,7 @@ pub use state::{Data, FitHashes, FrameSummary, LogLevel, LogLine, Opening, Sessi
 pub use strata::{Strata, StrataStatus};
 pub use study::StudyView;
 pub use tracked::Tracked;
-pub use view::{Against, ColorRange, Compare, MapScale, SplatMode, ThemeChoice, TimelineStrip, ViewState};
+pub use view::{
+    Against, ColorRange, Compare, CubeAxes, CubeView, MapScale, SplatMode, ThemeChoice, ThirdAxis, TimelineStrip,
+    ViewState,
+};

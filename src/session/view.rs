@@ -97,6 +97,39 @@ pub enum TimelineStrip {
     Tags,
 }
 
+/// Which two axes of a map with three are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum CubeAxes {
+    /// Depth, and the first of the others.
+    #[default]
+    First,
+    /// Depth, and the second of the others.
+    Second,
+    /// The two others.
+    Others,
+}
+
+/// How the axis that is not drawn is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum ThirdAxis {
+    /// The largest value along it.
+    #[default]
+    Largest,
+    /// The mean along it.
+    Mean,
+    /// One of its bins.
+    Bin(usize),
+}
+
+/// How maps with three axes are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct CubeView {
+    /// What is drawn.
+    pub axes: CubeAxes,
+    /// What is not.
+    pub third: ThirdAxis,
+}
+
 /// Everything about the view that a person sets.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -117,6 +150,8 @@ pub struct ViewState {
     pub against: Against,
     /// Where the wipe's line is, 0..1 of the map's width.
     pub wipe: f32,
+    /// How maps with three axes are drawn.
+    pub cube: CubeView,
     /// Draw maps whose axes are metres to scale.
     pub true_proportions: bool,
     /// Maps and camera go with the person from frame to frame.
@@ -194,6 +229,7 @@ impl Default for ViewState {
             compare: Compare::default(),
             against: Against::default(),
             wipe: 0.5,
+            cube: CubeView::default(),
             true_proportions: false,
             follow: true,
             show_region: true,

@@ -10,8 +10,10 @@ use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::{Dataset, Truth, write_pppr};
 use crate::diagnose::{JointErrors, joint_errors};
+use crate::geometry::{Vec3, mean};
 use crate::mhp::{Fitter, Precision, StepReport, predict};
 use crate::output::{FileNames, Inputs};
+use crate::people::Tracker;
 use crate::start::{find_start, problem_of};
 use crate::task::{milliseconds, panic_as_error};
 use crossbeam_channel::Sender;
@@ -108,7 +110,8 @@ pub fn run_batch(
         frames,
     };
     let threads = if options.warm_start { 1 } else { rayon::current_num_threads().clamp(1, frames.len().max(1)) };
-    let (outbox, inbox) = crossbeam_channel::bounded::<(usize, BatchRow)>(threads);
+    let mut persons = PersonOrder::default();
+    let (outbox, inbox) = crossbeam_channel::bounded::<Done>(threads);
     std::thread::scope(|scope| {
         // The inbox goes with this closure: after an error the threads find nobody listening, and end.
         let inbox = inbox;
@@ -120,15 +123,59 @@ pub fn run_batch(
         drop(outbox);
         let mut early = BTreeMap::new();
         let mut due = 0;
-        for (place, row) in inbox {
-            early.insert(place, row);
-            while let Some(row) = early.remove(&due) {
+        for done in inbox {
+            early.insert(done.place, done);
+            while let Some(Done { mut row, several, .. }) = early.remove(&due) {
+                if let Some(params) = several {
+                    let ordered = persons.ordered(dataset, row.index, &params);
+                    if let Err(why) = panic_as_error(|| batch.keep(row.index, &ordered)) {
+                        row.fit = Err(why);
+                    }
+                }
                 sink(row)?;
                 due += 1;
             }
         }
         Ok(())
     })
+}
+
+/// A frame that was fitted.
+struct Done {
+    /// Its place among the frames of the batch.
+    place: usize,
+    row: BatchRow,
+    /// Parameters of several persons that are to be kept: in which order the frames before tell.
+    several: Option<Pppr>,
+}
+
+/// The order of persons from frame to frame: who comes first stays first, as long as a sequence is followed.
+#[derive(Default)]
+struct PersonOrder {
+    tracker: Tracker,
+    last: Option<usize>,
+}
+
+/// Seconds a frame where the data set does not say.
+const FRAME_S: f64 = 0.1;
+
+impl PersonOrder {
+    /// The persons of a frame in the order of their identities.
+    fn ordered(&mut self, dataset: &Dataset, index: usize, params: &Pppr) -> Pppr {
+        let before = self.last.replace(index);
+        let before = before.filter(|last| *last < index && dataset.sequence(*last) == dataset.sequence(index));
+        if before.is_none() {
+            self.tracker = Tracker::default();
+        }
+        let frame_s = dataset.info().frame_rate_hz.filter(|rate| *rate > 0.0).map_or(FRAME_S, f64::recip);
+        let apart_s = before.map_or(0, |last| index - last) as f64 * frame_s;
+        let persons = params.shape().persons;
+        let places: Vec<Vec3> = (0..persons).map(|person| mean(params.person(person))).collect();
+        let identities = self.tracker.step(&places, apart_s);
+        let mut order: Vec<usize> = (0..persons).collect();
+        order.sort_by_key(|&person| identities.get(person).copied().unwrap_or(person));
+        params.with_persons(&order)
+    }
 }
 
 /// What the threads of a batch share.
@@ -143,18 +190,30 @@ struct Batch<'a> {
 
 impl Batch<'_> {
     /// Takes frames until none is left or nobody listens.
-    fn work(&self, outbox: &Sender<(usize, BatchRow)>) {
+    fn work(&self, outbox: &Sender<Done>) {
+        let several = self.options.params_folder.is_some() && self.options.config.people != 1;
         let mut before: Option<(usize, Pppr)> = None;
         loop {
             let place = self.next.fetch_add(1, Ordering::Relaxed);
             let Some(&index) = self.frames.get(place) else { return };
             let start = before.take().filter(|(last, _)| self.follows(*last, index)).map(|(_, params)| params);
-            let fit = panic_as_error(|| self.fit_and_keep(index, start)).map(|fit| {
+            let mut kept = None;
+            let fit = panic_as_error(|| {
+                let fit = self.fit(index, start)?;
+                if several {
+                    kept = Some(fit.params.clone());
+                } else {
+                    self.keep(index, &fit.params)?;
+                }
+                Ok(fit)
+            });
+            let fit = fit.map(|fit| {
                 before = Some((index, fit.params));
                 fit.numbers
             });
             let row = BatchRow { index, frame: self.dataset.frame_name(index).to_owned(), fit };
-            if outbox.send((place, row)).is_err() {
+            let several = kept.filter(|_| row.fit.is_ok());
+            if outbox.send(Done { place, row, several }).is_err() {
                 return;
             }
         }
@@ -164,7 +223,8 @@ impl Batch<'_> {
         self.options.warm_start && last + 1 == index && self.dataset.sequence(last) == self.dataset.sequence(index)
     }
 
-    fn fit_and_keep(&self, index: usize, start: Option<Pppr>) -> Result<FrameFit, String> {
+    /// Fits a frame, and writes its iterations where that is asked.
+    fn fit(&self, index: usize, start: Option<Pppr>) -> Result<FrameFit, String> {
         let (dataset, options) = (self.dataset, self.options);
         let mut rows = Vec::new();
         let fit = fit_watched(dataset, index, options, start, |report, majpe_mm| {
@@ -172,24 +232,30 @@ impl Batch<'_> {
                 rows.push((report, majpe_mm));
             }
         })?;
-        let name = self.names.of(index, dataset.frame_name(index));
-        let file = |folder: &Path, ending: &str| {
-            let file = folder.join(format!("{name}.{ending}"));
-            self.inputs.check_replaced(&file).map_err(|error| error.to_string()).map(|()| file)
-        };
-        if let Some(folder) = &options.params_folder {
-            write_pppr(&file(folder, "npz")?, &fit.params).map_err(|error| error.to_string())?;
-        }
-        if let Some(folder) = options.params_folder.as_ref().filter(|_| options.ply) {
-            let written = write_ply(&file(folder, "ply")?, &fit.params, &dataset.info().skeleton);
-            written.map_err(|error| error.to_string())?;
-        }
         if let Some(folder) = &options.curves_folder {
             let arrays: Vec<String> = dataset.info().views.iter().map(|view| view.array.clone()).collect();
             let rows =
                 rows.iter().map(|(report, majpe_mm)| CurveRow { branch: 0, report, majpe_mm: *majpe_mm, flag: None });
-            write_curves(&file(folder, "csv")?, &arrays, rows).map_err(|error| error.to_string())?;
+            write_curves(&self.file(index, folder, "csv")?, &arrays, rows).map_err(|error| error.to_string())?;
         }
         Ok(fit)
+    }
+
+    /// Writes the parameters of a frame where that is asked.
+    fn keep(&self, index: usize, params: &Pppr) -> Result<(), String> {
+        let Some(folder) = &self.options.params_folder else { return Ok(()) };
+        write_pppr(&self.file(index, folder, "npz")?, params).map_err(|error| error.to_string())?;
+        if self.options.ply {
+            let written = write_ply(&self.file(index, folder, "ply")?, params, &self.dataset.info().skeleton);
+            written.map_err(|error| error.to_string())?;
+        }
+        Ok(())
+    }
+
+    /// The file of a frame in a folder of results.
+    fn file(&self, index: usize, folder: &Path, ending: &str) -> Result<PathBuf, String> {
+        let name = self.names.of(index, self.dataset.frame_name(index));
+        let file = folder.join(format!("{name}.{ending}"));
+        self.inputs.check_replaced(&file).map_err(|error| error.to_string()).map(|()| file)
     }
 }

@@ -182,3 +182,41 @@ fn a_table_that_cannot_be_written_leaves_the_older_one_and_no_input_is_replaced(
     assert!(text(&full.stderr).contains("/dev/full: cannot be written: No space left"), "{}", text(&full.stderr));
     assert!(!std::fs::metadata("/dev/full").unwrap().is_file());
 }
+
+/// Two people through a sequence: in the files of the parameters each keeps its place, one body nearest to its own of the
+/// frame before.
+#[test]
+fn persons_keep_their_places_in_the_parameter_files() {
+    let (data, out) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let run = |args: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_mhp-inspector")).args(args).output().unwrap();
+        assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
+    };
+    let (data, out) = (data.path().join("two"), out.path().join("fits"));
+    let (folder, results) = (data.to_str().unwrap(), out.to_str().unwrap());
+    let two = ["--people", "2", "--frames", "16", "--sequence-length", "8", "--seed", "5", "--preset", "easy"];
+    run(&[&["simulate", folder], &two[..]].concat());
+    run(&["fit", folder, "--people", "2", "--preset", "baseline", "--iterations", "4", "--out", results]);
+    let mut files: Vec<_> = std::fs::read_dir(out.join("pppr")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    assert_eq!(files.len(), 16);
+    let places: Vec<[[f64; 2]; 2]> = files
+        .iter()
+        .map(|file| {
+            let params = mhp_inspector::dataset::read_pppr(file, None).unwrap();
+            [0, 1].map(|person| {
+                let joints = params.person(person);
+                [0, 1].map(|axis| joints.iter().map(|p| p[axis]).sum::<f64>() / joints.len() as f64)
+            })
+        })
+        .collect();
+    let apart = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+    for sequence in places.chunks(8) {
+        for pair in sequence.windows(2) {
+            let (before, now) = (pair[0], pair[1]);
+            let kept = apart(before[0], now[0]) + apart(before[1], now[1]);
+            let swapped = apart(before[0], now[1]) + apart(before[1], now[0]);
+            assert!(kept <= swapped + 1e-9, "{before:?} then {now:?}");
+        }
+    }
+}

@@ -650,3 +650,28 @@ fn every_curve_has_its_own_picture_and_leads_to_an_iteration() {
     // A term that is 0 throughout has none.
     assert!(!window.named("Curve of L_sep"));
 }
+
+/// A map with three axes shows two of them, and says what it makes of the third.
+#[test]
+fn a_cube_is_seen_along_another_axis() {
+    let sample = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/hupr");
+    let harness = Window::empty(&[sample], [1440.0, 900.0]);
+    let mut window = Window { harness, folder: tempfile::tempdir().unwrap() };
+    window.ready(0);
+    let told = |window: &mut Window| {
+        let map = window.node("H_ori map of hori").rect();
+        window.harness.hover_at(map.center());
+        window.harness.run_steps(3);
+        window.text_of("Cell under the pointer")
+    };
+    let first = told(&mut window);
+    assert!(first.contains("radial velocity") && first.contains("largest over cone angle"), "{first}");
+    window.click("Axes of the maps");
+    window.click("range × cone angle");
+    window.click("one bin");
+    window.key(Key::Escape);
+    window.harness.run_steps(2);
+    let second = told(&mut window);
+    assert!(second.contains("cone angle") && !second.contains("largest over"), "{second}");
+    assert_ne!(first.lines().last(), second.lines().last());
+}

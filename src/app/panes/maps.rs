@@ -262,7 +262,7 @@ fn name_of(content: Content, state: &State, view: &View) -> (String, &'static st
 fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColumn, row: &GridRow, rect: Rect) {
     let (session, index) = (shared.session, row.view);
     let Some(view) = session.data.dataset.as_ref().and_then(|d| d.info().views.get(index)) else { return };
-    let orientation = Orientation::of(view);
+    let orientation = Orientation::of(view, session.view.cube);
     let content = content_of(column, state, session);
     let (name, what) = name_of(content, state, view);
     let unit = if content == Content::Masks { "masks" } else { state.pictures.unit(content) };
@@ -275,7 +275,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
     let tokens = Tokens::of(ui);
     let response = ui.interact(plot, ui.scope_id().with("plot"), Sense::click_and_drag());
     response.widget_info(|| figure::spoken(&name, caption.as_deref()));
-    let (marking, marked) = state.mark(ui, &response, plot, index, view);
+    let (marking, marked) = state.mark(ui, &response, plot, index, (view, orientation));
     if let Some(region) = marked {
         shared.send(crate::session::Command::SetRegion(session.data.frame_index, Some(region)));
     }
@@ -330,7 +330,7 @@ fn beside(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, row: &GridRow
     let rest = if state.windows[index] == MapExtent::default() {
         row.beside
     } else {
-        let [width, height] = Orientation::of(view).size(view);
+        let [width, height] = Orientation::of(view, shared.session.view.cube).size(view);
         let high = (row.beside.width() * height as f32 / width.max(1) as f32).clamp(20.0, 0.36 * row.beside.height());
         let (above, rest) = row.beside.split_top_bottom_at_y(row.beside.min.y + high);
         overview(ui, state, view, index, above);

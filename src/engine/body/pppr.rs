@@ -266,6 +266,20 @@ impl Pppr {
         1.0 / (1.0 + (-self.joint(Group::Beta, joint)[0]).exp())
     }
 
+    /// The persons of these numbers, in this order.
+    pub fn with_persons(&self, order: &[usize]) -> Self {
+        let shape = PpprShape { persons: order.len(), ..self.shape };
+        let mut picked = Self::zeros(shape);
+        for group in Group::ALL {
+            let width = shape.width(group) * shape.joints;
+            let from: Vec<&[f64]> = self.group(group).chunks_exact(width.max(1)).collect();
+            for (to, &person) in picked.group_mut(group).chunks_exact_mut(width.max(1)).zip(order) {
+                to.copy_from_slice(from[person]);
+            }
+        }
+        picked
+    }
+
     /// True where every number of every group is finite.
     pub fn is_finite(&self) -> bool {
         // Zero times what is not finite is no number; without a way out of the loop it is many at a time.
@@ -277,5 +291,32 @@ impl Pppr {
             }
         }
         zeros.iter().all(|&zero| zero == 0.0) && rest.iter().all(|x| x.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn persons_are_picked_in_the_order_that_is_asked() {
+        let shape = PpprShape { persons: 3, joints: 2, doppler_features: 2 };
+        let mut all = Pppr::zeros(shape);
+        for group in Group::ALL {
+            let numbers = all.group_mut(group);
+            let a_person = numbers.len() / 3;
+            numbers
+                .iter_mut()
+                .enumerate()
+                .for_each(|(k, x)| *x = (k / a_person) as f64 * 100.0 + (k % a_person) as f64);
+        }
+        assert_eq!(all.with_persons(&[0, 1, 2]), all);
+        let picked = all.with_persons(&[2, 0]);
+        assert_eq!(picked.shape(), PpprShape { persons: 2, ..shape });
+        for group in Group::ALL {
+            let (from, to) = (all.group(group), picked.group(group));
+            let a_person = from.len() / 3;
+            assert_eq!([&to[..a_person], &to[a_person..]], [&from[2 * a_person..], &from[..a_person]], "{group:?}");
+        }
     }
 }

@@ -52,7 +52,7 @@ impl State {
 /// Where the person is on a map, picture coordinates: the EM region where it is a part of the map, else around the joints.
 fn person_box(session: &Session, view: &View, index: usize) -> Option<[[f32; 2]; 2]> {
     let snapshot = session.fit.shown.as_ref()?;
-    let o = crate::app::map_image::Orientation::of(view);
+    let o = crate::app::map_image::Orientation::of(view, session.view.cube);
     let inside = snapshot.masks.get(index).map(|masks| o.mask_picture(view, &masks.inside));
     let region = inside.and_then(|inside| super::overlay::region_box(o.size(view), &inside));
     let covers = |[min, max]: [[f32; 2]; 2]| (0..2).all(|axis| max[axis] - min[axis] > 0.95);

@@ -157,7 +157,7 @@ pub(super) fn draw(
     to_screen: &dyn Fn([f64; 2]) -> Pos2,
     tokens: &Tokens,
 ) {
-    let (look, o) = (&session.view, Orientation::of(view));
+    let (look, o) = (&session.view, Orientation::of(view, session.view.cube));
     if look.show_region
         && let Some([min, max]) = region
     {

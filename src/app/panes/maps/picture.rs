@@ -6,7 +6,7 @@ use crate::app::theme;
 use crate::dataset::Frame;
 use crate::radar::View;
 use crate::render::Colormap;
-use crate::session::{Against, ColorRange, MapScale, Session, ViewState};
+use crate::session::{Against, ColorRange, CubeView, MapScale, Session, ViewState};
 use crate::worker::Snapshot;
 use egui::{Color32, ColorImage, Painter, Rect, TextureHandle, TextureOptions, Ui};
 use std::cell::RefCell;
@@ -75,6 +75,7 @@ struct Look {
     hatch: bool,
     mask_opacity: f32,
     against: Against,
+    cube: CubeView,
 }
 
 impl Look {
@@ -88,6 +89,7 @@ impl Look {
             hatch: view.show_clipped,
             mask_opacity: view.mask_opacity,
             against: view.against,
+            cube: view.cube,
         }
     }
 }
@@ -116,7 +118,7 @@ impl Pictures {
         self.views.resize_with(views.len(), ViewPictures::default);
         for (i, view) in views.iter().enumerate() {
             let pictures = &mut self.views[i];
-            let orientation = Orientation::of(view);
+            let orientation = Orientation::of(view, look.cube);
             pictures.size = orientation.size(view);
             if all && let Some(map) = frame.maps.get(i) {
                 pictures.ori_stored = orientation.picture(view, &map.data);
@@ -250,7 +252,7 @@ impl Pictures {
 
 impl ViewPictures {
     fn take_snapshot(&mut self, snapshot: Option<&Snapshot>, index: usize, view: &View, look: &Look) {
-        let orientation = Orientation::of(view);
+        let orientation = Orientation::of(view, look.cube);
         self.sim = None;
         (self.masks, self.region) = (None, None);
         self.sim_stored.clear();

@@ -6,7 +6,7 @@ use crate::app::figure;
 use crate::app::map_image::{Orientation, level};
 use crate::app::theme::{self, Tokens};
 use crate::radar::{AxisKind, View};
-use crate::session::{Compare, Session};
+use crate::session::{Compare, Session, ThirdAxis};
 use egui::{FontId, Rect, Ui, vec2};
 
 /// Draws the strip.
@@ -37,7 +37,7 @@ fn hint(session: &Session) -> String {
 
 /// Where a cell is, and what is there.
 fn lines(session: &Session, state: &State, view: &View, index: usize, pixel: [usize; 2]) -> Vec<String> {
-    let (o, pictures) = (Orientation::of(view), &state.pictures);
+    let (o, pictures) = (Orientation::of(view, session.view.cube), &state.pictures);
     let [width, height] = o.size(view);
     let unit = [(pixel[0] as f64 + 0.5) / width as f64, (pixel[1] as f64 + 0.5) / height as f64];
     let [across, up] = o.bins_from_unit(view, unit);
@@ -48,8 +48,13 @@ fn lines(session: &Session, state: &State, view: &View, index: usize, pixel: [us
         place.push(format!("{} {:.3} {}", a.shown_name(), a.shown_at(bin), a.shown_unit()));
     }
     place.extend(polar(view, o, up, across));
-    if o.collapsed.is_some() {
-        place.push("largest over the third axis".into());
+    if let Some(axis) = o.collapsed {
+        let a = &view.axes[axis];
+        place.push(match o.third {
+            ThirdAxis::Largest => format!("largest over {}", a.shown_name()),
+            ThirdAxis::Mean => format!("mean over {}", a.shown_name()),
+            ThirdAxis::Bin(bin) => format!("{} {:.3} {}", a.shown_name(), a.shown_at(bin as f64), a.shown_unit()),
+        });
     }
     let unit = pictures.unit(Content::Ori);
     let mut values = Vec::new();

@@ -48,7 +48,7 @@ impl State {
     /// Points at cells and zooms the map to them.
     pub(super) fn show_cells(&mut self, session: &Session, view: usize, lo: &[usize], hi: &[usize]) {
         let Some(v) = session.data.dataset.as_ref().and_then(|dataset| dataset.info().views.get(view)) else { return };
-        let Some([min, max]) = unit_box(v, lo, hi) else { return };
+        let Some([min, max]) = unit_box(v, Orientation::of(v, session.view.cube), lo, hi) else { return };
         let frame = session.data.frame_index;
         self.leave_highlight(None);
         let before = self.windows.get(view).copied().unwrap_or_default();
@@ -82,6 +82,7 @@ impl State {
         to_screen: &dyn Fn([f64; 2]) -> Pos2,
         tokens: &Tokens,
     ) {
+        let o = Orientation::of(view, session.view.cube);
         if let Some(begun) = self.marking.from.filter(|begun| begun.view == index) {
             let rect = Rect::from_two_pos(to_screen(begun.at), to_screen(self.marking.to));
             painter.rect_stroke(rect, 0.0, Stroke::new(1.5, tokens.accent), egui::StrokeKind::Middle);
@@ -89,10 +90,10 @@ impl State {
         let label = session.labels.label(session.data.frame_index);
         if let Some(region) = label.region.as_ref().filter(|region| region.view == view.array) {
             let text = if label.tags.is_empty() { "marked".into() } else { label.tags.to_string() };
-            outline(painter, view, &region.lo, &region.hi, to_screen, &text, tokens);
+            outline(painter, (view, o), &region.lo, &region.hi, to_screen, &text, tokens);
         }
         if let Some(h) = self.highlight.as_ref().filter(|h| h.view == index && h.frame == session.data.frame_index) {
-            outline(painter, view, &h.lo, &h.hi, to_screen, "here", tokens);
+            outline(painter, (view, o), &h.lo, &h.hi, to_screen, "here", tokens);
         }
     }
 
@@ -103,7 +104,7 @@ impl State {
         response: &egui::Response,
         plot: Rect,
         index: usize,
-        view: &View,
+        (view, o): (&View, Orientation),
     ) -> (bool, Option<CellRegion>) {
         let window = self.windows.get(index).copied().unwrap_or_default();
         let pointer = response.interact_pointer_pos();
@@ -125,13 +126,12 @@ impl State {
             return (true, None);
         }
         self.marking = Marking::default();
-        (true, region(view, from, to))
+        (true, region(view, o, from, to))
     }
 }
 
 /// The cells between two points of the picture.
-fn region(view: &View, from: [f64; 2], to: [f64; 2]) -> Option<CellRegion> {
-    let o = Orientation::of(view);
+fn region(view: &View, o: Orientation, from: [f64; 2], to: [f64; 2]) -> Option<CellRegion> {
     let [width, height] = o.size(view);
     let pixel = |at: f64, size: usize| ((at * size as f64).floor().max(0.0) as usize).min(size.saturating_sub(1));
     let columns = [from[0], to[0]].map(|x| pixel(x, width));
@@ -148,11 +148,10 @@ fn region(view: &View, from: [f64; 2], to: [f64; 2]) -> Option<CellRegion> {
 }
 
 /// Corners of a box of cells in picture coordinates, lower first; `None` where the box is not of this view.
-fn unit_box(view: &View, lo: &[usize], hi: &[usize]) -> Option<[[f32; 2]; 2]> {
+fn unit_box(view: &View, o: Orientation, lo: &[usize], hi: &[usize]) -> Option<[[f32; 2]; 2]> {
     if lo.len() != view.axes.len() || hi.len() != view.axes.len() {
         return None;
     }
-    let o = Orientation::of(view);
     let corner = |bins: &[usize], by: f64| -> Vec<f64> { bins.iter().map(|&bin| bin as f64 + by).collect() };
     let a = o.unit_from_bins(view, &corner(lo, -0.5));
     let b = o.unit_from_bins(view, &corner(hi, 0.5));
@@ -163,14 +162,14 @@ fn unit_box(view: &View, lo: &[usize], hi: &[usize]) -> Option<[[f32; 2]; 2]> {
 
 fn outline(
     painter: &Painter,
-    view: &View,
+    (view, o): (&View, Orientation),
     lo: &[usize],
     hi: &[usize],
     to_screen: &dyn Fn([f64; 2]) -> Pos2,
     text: &str,
     tokens: &Tokens,
 ) {
-    let Some([min, max]) = unit_box(view, lo, hi) else { return };
+    let Some([min, max]) = unit_box(view, o, lo, hi) else { return };
     let at = |p: [f32; 2]| to_screen([f64::from(p[0]), f64::from(p[1])]);
     let rect = Rect::from_two_pos(at(min), at(max));
     painter.rect_stroke(
@@ -192,6 +191,7 @@ mod tests {
     #![expect(clippy::panic, reason = "tests")]
     use super::*;
     use crate::radar::{Axis, AxisKind, PointSpread, Quantity, Spacing};
+    use crate::session::CubeView;
 
     fn view() -> View {
         let axis = |kind, bins, lo, hi| Axis { kind, bins, lo, hi, spacing: Spacing::Linear };
@@ -209,10 +209,11 @@ mod tests {
     #[test]
     fn a_drawn_box_comes_back_where_it_was_drawn() {
         let view = view();
+        let o = Orientation::of(&view, CubeView::default());
         for (from, to) in [([0.101, 0.201], [0.349, 0.399]), ([0.349, 0.399], [0.101, 0.201])] {
-            let Some(region) = region(&view, from, to) else { panic!("a region") };
+            let Some(region) = region(&view, o, from, to) else { panic!("a region") };
             assert_eq!((region.view.as_str(), region.lo.len()), ("hm", 2));
-            let Some([min, max]) = unit_box(&view, &region.lo, &region.hi) else { panic!("a box") };
+            let Some([min, max]) = unit_box(&view, o, &region.lo, &region.hi) else { panic!("a box") };
             let near = |a: f32, b: f32| (a - b).abs() < 1e-5;
             assert!(
                 near(min[0], 0.1) && near(max[0], 0.35) && near(min[1], 0.2) && near(max[1], 0.4),
@@ -223,6 +224,6 @@ mod tests {
 
     #[test]
     fn a_box_of_another_view_is_not_drawn() {
-        assert_eq!(unit_box(&view(), &[1], &[2]), None);
+        assert_eq!(unit_box(&view(), Orientation::of(&view(), CubeView::default()), &[1], &[2]), None);
     }
 }

@@ -2,10 +2,13 @@
 
 use super::super::PaneState as _;
 use super::{Shared, State};
+use crate::app::commands::AppAct;
+use crate::app::map_image::Orientation;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::render::Colormap;
-use crate::session::{Against, ColorRange, Compare, MapScale};
+use crate::session::{Against, ColorRange, Compare, CubeAxes, CubeView, MapScale, ThirdAxis};
+use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Color32, RichText, Sense, Ui, vec2};
 
 pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
@@ -18,6 +21,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
             comparison(ui, shared);
             ui.separator();
             focus(ui, shared, state);
+            cube(ui, shared);
             // The legend goes where there is no room for it: its colours are told on the masks' read-out too.
             if ui.available_width() > 230.0 {
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), legend);
@@ -31,6 +35,53 @@ fn focus(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
     let person = ui.selectable_label(!state.shows_all(), "Person").named(egui::Role::Button, "Show the person");
     if person.on_hover_text("The part of each map around the person, or all of it. Key: F").clicked() {
         shared.invoke("Person or whole");
+    }
+}
+
+/// Which axes of maps with three are drawn, and how the third is taken; nothing where no map has three.
+fn cube(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let Some(dataset) = &shared.session.data.dataset else { return };
+    let Some(view) = dataset.info().views.iter().find(|view| view.axes.len() == 3) else { return };
+    let old = shared.session.view.cube;
+    let mut cube = old;
+    let of = |axes| Orientation::of(view, CubeView { axes, ..old });
+    let pair = |axes| {
+        let o = of(axes);
+        format!("{} × {}", view.axes[o.vertical].shown_name(), view.axes[o.horizontal].shown_name())
+    };
+    let stays = MenuConfig::new().close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
+    let (button, _) = MenuButton::new("Axes").config(stays).ui(ui, |ui| {
+        for axes in [CubeAxes::First, CubeAxes::Second, CubeAxes::Others] {
+            ui.selectable_value(&mut cube.axes, axes, pair(axes));
+        }
+        ui.separator();
+        let Some(third) = of(cube.axes).collapsed.map(|axis| &view.axes[axis]) else { return };
+        ui.label(RichText::new(third.shown_name()).small());
+        ui.selectable_value(&mut cube.third, ThirdAxis::Largest, "largest");
+        ui.selectable_value(&mut cube.third, ThirdAxis::Mean, "mean");
+        let last = third.bins.saturating_sub(1);
+        let mut bin = match cube.third {
+            ThirdAxis::Bin(bin) => bin.min(last),
+            ThirdAxis::Largest | ThirdAxis::Mean => last / 2,
+        };
+        let one = matches!(cube.third, ThirdAxis::Bin(_));
+        if ui.selectable_label(one, "one bin").clicked() {
+            cube.third = ThirdAxis::Bin(bin);
+        }
+        let text = format!("{:.2} {}", third.shown_at(bin as f64), third.shown_unit());
+        let slider = ui.add(egui::Slider::new(&mut bin, 0..=last).text(text));
+        if slider.named(egui::Role::Slider, "Bin of the third axis").changed() {
+            cube.third = ThirdAxis::Bin(bin);
+        }
+    });
+    let tip = "Which two axes of a map with three are drawn, and how the third is taken.";
+    button.named(egui::Role::Button, "Axes of the maps").on_hover_text(tip);
+    if cube != old {
+        shared.set_view(|view| view.cube = cube);
+        if cube.axes != old.axes {
+            // What was seen of other axes means nothing.
+            shared.app(AppAct::ResetViews);
+        }
     }
 }
 
