@@ -1,6 +1,7 @@
 //! `--frames A..B`: which frames, as a range is written in Rust.
 
 use crate::dataset::Dataset;
+use crate::study::shard::FrameSet;
 use std::ops::Range;
 use std::path::Path;
 use std::str::FromStr;
@@ -14,6 +15,18 @@ pub(super) fn chosen(asked: Option<FrameRange>, path: &Path, dataset: &Dataset) 
         return Ok(dataset.named_frame().map_or(0..dataset.len(), |frame| frame..frame + 1));
     };
     range.within(dataset.len()).map_err(|why| anyhow::anyhow!("{}: --frames: {why}", path.display()))
+}
+
+/// The frames of all these ranges; the one that `path` names, or all, where there is none.
+///
+/// # Errors
+/// Where a range reaches past the end.
+pub(super) fn chosen_set(asked: &[FrameRange], path: &Path, dataset: &Dataset) -> anyhow::Result<FrameSet> {
+    if asked.is_empty() {
+        return Ok(chosen(None, path, dataset)?.into());
+    }
+    let ranges = asked.iter().map(|range| chosen(Some(*range), path, dataset));
+    Ok(FrameSet::of_ranges(ranges.collect::<anyhow::Result<Vec<_>>>()?))
 }
 
 /// A range of frames as typed; the end is open where none was given.

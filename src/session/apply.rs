@@ -5,6 +5,7 @@
 //! worker says.
 
 mod batch;
+mod compared;
 mod data;
 mod diagnosis;
 mod export;
@@ -158,7 +159,12 @@ impl Session {
             Command::FitListed => self.fit_listed(),
             Command::PauseBatch => self.pause_batch(),
             Command::CancelBatch => self.cancel_batch(),
+            Command::KeepResults(side) => self.keep_results(side),
+            Command::ForgetResults(side) => self.forget_results(side),
             Command::LoadResults(path) => self.load_results(path),
+            Command::RunStudy(order) => self.run_study(order),
+            Command::PauseStudy => self.pause_study(),
+            Command::CancelStudy => self.cancel_study(),
             Command::OpenRun(folder) => self.open_run(&folder),
             Command::ShowStudyRow(row) => self.show_study_row(row),
             Command::RunTask(task) => vec![Effect::Run(task)],
@@ -215,6 +221,12 @@ impl Session {
             Report::BatchRows(dataset, rows, done) => self.batch_rows(&dataset, rows, done),
             Report::BatchDone(dataset, result) => self.batch_done(&dataset, result),
             Report::KeptFound(dataset, kept) => self.kept_found(&dataset, kept),
+            Report::StudyProgress(done, total) => {
+                self.study.work.advance(done, total);
+                Vec::new()
+            }
+            Report::StudyGrew(folder, run) => self.study_grew(folder, run),
+            Report::StudyDone(result) => self.study_done(result),
             Report::RunRead(folder, result) => self.run_read(folder, result),
             Report::TaskDone(result) => self.task_done(result),
             Report::Log(level, text) => {

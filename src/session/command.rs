@@ -1,7 +1,9 @@
 //! What a person asks of a session.
 
+use super::compared::ResultSide;
 use super::effect::BackgroundTask;
 use super::queue::Sort;
+use super::study::StudyOrder;
 use super::view::ViewState;
 use crate::body::Pppr;
 use crate::config::FitConfig;
@@ -149,8 +151,18 @@ pub enum Command {
     PauseBatch,
     /// Stop the batch; what was fitted is kept.
     CancelBatch,
+    /// Keep what the list says of the fits as one of the two sets that are compared.
+    KeepResults(ResultSide),
+    /// Forget one of them.
+    ForgetResults(ResultSide),
     /// Take the results of a batch, a table that `fit --out` wrote, into the frame list.
     LoadResults(PathBuf),
+    /// Study the selected frames, or all in the list, on all cores; what was done of the same study is taken.
+    RunStudy(StudyOrder),
+    /// Let the study wait, or go on.
+    PauseStudy,
+    /// Stop the study; what was fitted is kept.
+    CancelStudy,
     /// Show the run of a study.
     OpenRun(PathBuf),
     /// Put the frames of a row of the study's table into the list, with what the study says of them.

@@ -5,6 +5,7 @@ use super::batch::BatchRequest;
 use super::command::PickKind;
 use super::evidence::EvidenceRequest;
 use super::pins::Pin;
+use super::study::StudyRequest;
 use crate::dataset::{BareChoice, Dataset};
 use crate::labels::Judged;
 use crate::study::run::Run;
@@ -129,6 +130,12 @@ pub enum Effect {
     CancelBatch,
     /// Look for what earlier batches left of this data set, on a thread.
     FindKept(Arc<Dataset>),
+    /// Do this study on all cores.
+    StartStudy(Box<StudyRequest>),
+    /// Let the study wait, or go on.
+    PauseStudy(bool),
+    /// Stop the study.
+    CancelStudy,
     /// Read a run folder on a thread.
     ReadRun(PathBuf),
     /// Find the frames of a row of a run's table in this data set, on a thread.

@@ -6,6 +6,7 @@
 //! to the session file, and told from others by its fingerprint. What only the window knows (camera, layout) is kept in
 //! `window` as the window gives it.
 
+use super::compared::ResultSet;
 use super::pins::PinRow;
 use super::state::{FrameSummary, Session};
 use super::view::ViewState;
@@ -89,6 +90,9 @@ pub struct SessionFile {
     /// What the frame list knows of frames that were fitted in the session, by index.
     #[serde(default)]
     pub summaries: BTreeMap<usize, FrameSummary>,
+    /// Results A and B, where they were kept.
+    #[serde(default)]
+    pub results: [Option<ResultSet>; 2],
     /// Pinned fits.
     pub pins: Vec<SavedPin>,
     /// The pin that others are compared with, by its place in the list.
@@ -197,6 +201,7 @@ impl SessionFile {
                 .filter(|(_, summary)| summary.hashes.is_some())
                 .map(|(&frame, summary)| (frame, summary.clone()))
                 .collect(),
+            results: session.results.saved(),
             pins: pins
                 .list()
                 .iter()

@@ -16,6 +16,7 @@ mod acts;
 mod apply;
 mod batch;
 mod command;
+mod compared;
 mod effect;
 mod evidence;
 mod file;
@@ -35,11 +36,13 @@ mod strata;
 mod study;
 mod tracked;
 mod view;
+mod work;
 
 pub use acts::{ActKind, Asked, Changes, Done, LabelAct};
 pub use apply::OutputCheck;
-pub use batch::{Batch, BatchRequest, BatchStatus};
+pub use batch::{Batch, BatchRequest};
 pub use command::{Command, Export, PickKind, StartAt};
+pub use compared::{ComparedNumber, ResultSet, ResultSets, ResultSide, SetDifference};
 pub use effect::{BackgroundTask, Commit, Effect, PinRequest, Trash};
 pub use evidence::EvidenceRequest;
 pub use file::{SavedChange, SavedDataset, SavedFit, SavedFrame, SavedPin, SessionFile, SessionFileError};
@@ -55,9 +58,10 @@ pub use runtime::{Picker, Runtime, Wake};
 pub use settings::{Live, LiveFrom, RunSpeed};
 pub use state::{Data, FitHashes, FrameSummary, LogLevel, LogLine, Opening, Session};
 pub use strata::{Strata, StrataStatus};
-pub use study::StudyView;
+pub use study::{StudyOrder, StudyRequest, StudyView};
 pub use tracked::Tracked;
 pub use view::{
     Against, ColorRange, Compare, CubeAxes, CubeView, MapScale, SplatMode, ThemeChoice, ThirdAxis, TimelineStrip,
     ViewState,
 };
+pub use work::{Work, WorkStatus};

@@ -70,6 +70,12 @@ pub enum Report {
     BatchDone(Arc<Dataset>, Result<bool, String>),
     /// What earlier batches left of a data set.
     KeptFound(Arc<Dataset>, Vec<KeptFits>),
+    /// The study that was begun here got on: fits done, of how many.
+    StudyProgress(u64, u64),
+    /// It has more rows.
+    StudyGrew(PathBuf, Arc<Run>),
+    /// It ended: with its run, cancelled, or it could not go on.
+    StudyDone(Result<Option<(PathBuf, Arc<Run>)>, String>),
     /// A run folder was read, or not.
     RunRead(PathBuf, Result<Arc<Run>, String>),
     /// Something was written, or not.

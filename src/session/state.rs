@@ -2,6 +2,7 @@
 
 use super::batch::Batch;
 use super::command::StartAt;
+use super::compared::ResultSets;
 use super::evidence::EvidenceState;
 use super::file::SessionFile;
 use super::fit::Fit;
@@ -147,6 +148,10 @@ pub struct Session {
     pub(super) left: VecDeque<usize>,
     /// One line a fitted frame.
     pub summaries: Tracked<BTreeMap<usize, FrameSummary>>,
+    /// What the results in the list were read from, in words; `None` for fits of this session and its batches.
+    pub(super) results_from: Option<String>,
+    /// Two sets of results that are compared.
+    pub results: ResultSets,
     /// The frame list.
     pub queue: Queue,
     /// What the list was filled from.

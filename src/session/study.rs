@@ -3,10 +3,12 @@
 use super::results::FoundResults;
 use super::state::FrameSummary;
 use super::tracked::Tracked;
+use super::work::Work;
 use crate::dataset::Dataset;
-use crate::study::run::{Run, RunRow};
+use crate::study::complexity::Complexity;
+use crate::study::run::{GridAxis, Run, RunRequest, RunRow, StudyKind};
 use std::collections::{BTreeMap, HashMap};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The run on screen.
@@ -18,12 +20,44 @@ pub struct StudyView {
     pub reading: Option<PathBuf>,
     /// The row of the table whose frames are in the list.
     pub row: Option<usize>,
+    /// How far the study is that was begun here.
+    pub work: Work,
+    /// Which study that is; while it is shown, its table grows.
+    pub(super) begun: Option<StudyKind>,
+    /// Whether the study that was begun here is the one on screen.
+    pub(super) follow: bool,
+}
+
+/// What a person asks to be studied, on the listed frames, from the settings in force.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StudyOrder {
+    /// Which study.
+    pub study: StudyKind,
+    /// The axes of a sweep; empty for every other study.
+    pub grid: Vec<GridAxis>,
+}
+
+/// A study, ready to be begun.
+#[derive(Debug, Clone)]
+pub struct StudyRequest {
+    /// The data set.
+    pub dataset: Arc<Dataset>,
+    /// What is studied.
+    pub run: RunRequest,
+    /// The strata of its frames, where they are known.
+    pub complexity: Option<Arc<Complexity>>,
 }
 
 impl StudyView {
     /// The run.
     pub fn shown(&self) -> Option<&Run> {
         self.run.as_ref().map(|(_, run)| run.as_ref())
+    }
+
+    /// The row whose frames are in the list, in words, where the run lies in `folder`.
+    pub(super) fn shown_row(&self, folder: &Path) -> Option<String> {
+        let (_, run) = self.run.as_ref().filter(|(lies, _)| lies == folder)?;
+        Some(format!("{} {}", run.spec.study, run.table.get(self.row?)?.labels.join(", ")))
     }
 
     /// Whether the open data set may be the run's: the same name and arrays, and frames enough. (Its fingerprint is not for

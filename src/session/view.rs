@@ -1,5 +1,6 @@
 //! How things are shown: kept over frame changes and restarts, never touched by a fit.
 
+use super::compared::ComparedNumber;
 use super::labels::LabelMode;
 use super::queue::{SavedView, Sort};
 use super::settings::{Live, LiveFrom, RunSpeed};
@@ -192,6 +193,8 @@ pub struct ViewState {
     pub hidden_columns: Vec<String>,
     /// Terms of the loss that have a column in the frame list, by their keys.
     pub shown_terms: Vec<String>,
+    /// By which number results A and B are compared.
+    pub compared: ComparedNumber,
     /// Kept filters.
     pub saved_views: Vec<SavedView>,
     /// What the strip over the frames shows.
@@ -250,6 +253,7 @@ impl Default for ViewState {
             sort: Sort::default(),
             hidden_columns: ["peaks", "static", "saliency", "reason", "by"].map(str::to_owned).to_vec(),
             shown_terms: Vec::new(),
+            compared: ComparedNumber::default(),
             saved_views: Vec::new(),
             strip: TimelineStrip::default(),
             label_mode: LabelMode::default(),

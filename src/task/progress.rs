@@ -1,7 +1,7 @@
 //! What long work tells of itself, and how it is told to stop.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
 #[derive(Debug, Default)]
 struct Inner {
@@ -9,6 +9,8 @@ struct Inner {
     done: AtomicU64,
     total: AtomicU64,
     cancelled: AtomicBool,
+    paused: Mutex<bool>,
+    resumed: Condvar,
 }
 
 /// Work was stopped because somebody asked for it ([`Progress::cancel`]).
@@ -65,6 +67,21 @@ impl Progress {
     /// Asks the work to stop; it answers [`Cancelled`] soon after.
     pub fn cancel(&self) {
         self.0.cancelled.store(true, Ordering::Relaxed);
+        self.pause(false);
+    }
+
+    /// Lets the work wait at the next [`Self::wait_while_paused`], or go on.
+    pub fn pause(&self, wait: bool) {
+        *self.0.paused.lock().unwrap_or_else(PoisonError::into_inner) = wait;
+        self.0.resumed.notify_all();
+    }
+
+    /// Returns once nobody wants the work to wait; at once after [`Self::cancel`].
+    pub fn wait_while_paused(&self) {
+        let mut paused = self.0.paused.lock().unwrap_or_else(PoisonError::into_inner);
+        while *paused && !self.is_cancelled() {
+            paused = self.0.resumed.wait(paused).unwrap_or_else(PoisonError::into_inner);
+        }
     }
 
     /// True once [`Self::cancel`] was called.

@@ -2,7 +2,10 @@
 
 use crate::blob;
 use mhp_inspector::config::{FitConfig, Preset};
-use mhp_inspector::session::{BatchStatus, Command, Live, Runtime, Session, ViewState};
+use mhp_inspector::session::{
+    Command, ComparedNumber, Live, ResultSide, Runtime, Session, StudyOrder, ViewState, WorkStatus,
+};
+use mhp_inspector::study::run::{Run, StudyKind};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -29,7 +32,7 @@ fn until(runtime: &mut Runtime, what: &str, done: impl Fn(&Session) -> bool) {
     while !done(runtime.session()) {
         let session = runtime.session();
         let log: Vec<&str> = session.log.iter().map(|line| line.text.as_str()).collect();
-        assert!(Instant::now() < deadline, "waited for {what}; {:?}; {log:#?}", session.batch.status);
+        assert!(Instant::now() < deadline, "waited for {what}; {:?}; {log:#?}", session.batch.work.status);
         runtime.poll();
         std::thread::sleep(Duration::from_millis(1));
     }
@@ -88,15 +91,15 @@ fn a_batch_waits_stops_and_goes_on() {
     let config = FitConfig { iterations: 60, ..config() };
     let mut runtime = opened(folder.path(), &config);
     runtime.apply(Command::FitListed);
-    until(&mut runtime, "some fits", |s| matches!(s.batch.status, BatchStatus::Running { done: 1.., .. }));
+    until(&mut runtime, "some fits", |s| matches!(s.batch.work.status, WorkStatus::Running { done: 1.., .. }));
     runtime.apply(Command::PauseBatch);
     std::thread::sleep(Duration::from_millis(300));
     runtime.poll();
     let waiting = fitted(runtime.session()).len();
     std::thread::sleep(Duration::from_millis(300));
     runtime.poll();
-    let BatchStatus::Running { paused: true, .. } = runtime.session().batch.status else {
-        unreachable!("{:?}", runtime.session().batch.status)
+    let WorkStatus::Running { paused: true, .. } = runtime.session().batch.work.status else {
+        unreachable!("{:?}", runtime.session().batch.work.status)
     };
     // One row may have been on its way.
     assert!(fitted(runtime.session()).len() <= waiting + 1 && waiting < 40, "{waiting}");
@@ -130,4 +133,109 @@ fn frames_that_cannot_be_fitted_say_why() {
     let why = session.summaries[&1].reason.clone().unwrap();
     assert!(why.starts_with("error: "), "{why}");
     assert!(session.log.back().unwrap().text.contains("1 could not be fitted"), "{:?}", session.log.back());
+}
+
+fn sweep(axes: &[&str]) -> Command {
+    let grid = axes.iter().map(|axis| axis.parse().unwrap()).collect();
+    Command::RunStudy(StudyOrder { study: StudyKind::Sweep, grid })
+}
+
+/// The same rows as on the command line, in a folder beside the labels; the table is there while it grows.
+#[test]
+fn a_sweep_of_the_listed_frames_grows_stops_and_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    blob::write_dataset(folder.path(), 12);
+    let mut runtime = opened(folder.path(), &config());
+    runtime.apply(Command::SetFilter("-index<2".into()));
+    runtime.apply(Command::SelectFrames([1, 4, 5, 9].into()));
+    runtime.apply(sweep(&["w_em=0.1,1"]));
+    until(&mut runtime, "the end", |s| !s.study.work.is_running());
+    let run = runtime.session().study.shown().unwrap();
+    assert!(run.complete && run.rows.len() == 8 && run.table.len() == 2, "{:?}", run.table);
+    assert_eq!(run.spec.data.asked(), "1,4..6,9");
+    assert_eq!(run.spec.base, "baseline, Iterations 100 → 5");
+    let (shown, _) = runtime.session().study.run.as_ref().unwrap();
+    assert!(shown.starts_with(folder.path().join("mhp-labels/studies")), "{}", shown.display());
+    assert_eq!(&Run::read(shown).unwrap(), run, "what is on screen is what is on disk");
+
+    // All that match, stopped half way.
+    runtime.apply(Command::SelectFrames([].into()));
+    runtime.apply(sweep(&["w_em=0.1,0.5,1", "iterations=200,300"]));
+    until(&mut runtime, "a table that grows", |s| s.study.shown().is_some_and(|run| run.table.len() == 6));
+    assert!(!runtime.session().study.shown().unwrap().complete);
+    runtime.apply(sweep(&["w_em=0.1"]));
+    assert!(runtime.session().log.back().unwrap().text.contains("under way"));
+    runtime.apply(Command::PauseStudy);
+    let WorkStatus::Running { paused: true, .. } = runtime.session().study.work.status else {
+        unreachable!("{:?}", runtime.session().study.work.status)
+    };
+    runtime.apply(Command::CancelStudy);
+    until(&mut runtime, "the end", |s| !s.study.work.is_running());
+    let told = &runtime.session().log.back().unwrap().text;
+    assert!(told.starts_with("sweep: stopped after") && told.ends_with("goes on from there"), "{told}");
+    let before = runtime.session().study.shown().unwrap().rows.clone();
+    assert!(!before.is_empty() && before.len() < 60);
+    runtime.apply(sweep(&["w_em=0.1,0.5,1", "iterations=200,300"]));
+    until(&mut runtime, "the end", |s| !s.study.work.is_running());
+    let run = runtime.session().study.shown().unwrap();
+    assert!(run.complete && run.rows.len() == 60);
+    let mut times = before.iter().map(|row| (row.variant, row.frame, row.fit_ms));
+    assert!(times.all(|known| run.rows.iter().any(|row| (row.variant, row.frame, row.fit_ms) == known)), "not again");
+}
+
+#[test]
+fn what_cannot_be_studied_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    blob::write_dataset(folder.path(), 3);
+    let mut runtime = opened(folder.path(), &config());
+    for (axes, told) in [
+        (&["tau_pct=500"] as &[&str], "tau_pct is 500; expected a number in 0.1 ..= 100"),
+        (&["nothing=1"], "unknown key `nothing`"),
+        (&[], "at least one"),
+    ] {
+        runtime.apply(sweep(axes));
+        let text = &runtime.session().log.back().unwrap().text;
+        assert!(text.contains(told) && !runtime.session().study.work.is_running(), "{text}");
+    }
+    runtime.apply(Command::SetFilter("iou>2".into()));
+    runtime.apply(sweep(&["w_em=1"]));
+    assert!(runtime.session().log.back().unwrap().text.contains("nothing to study"));
+}
+
+#[test]
+fn results_are_kept_as_a_and_b_and_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    blob::write_dataset(folder.path(), 6);
+    let mut runtime = opened(folder.path(), &config());
+    runtime.apply(Command::KeepResults(ResultSide::A));
+    assert!(runtime.session().log.back().unwrap().text.contains("nothing to keep"));
+    runtime.apply(Command::FitListed);
+    until(&mut runtime, "the fits", |s| !s.batch.is_running());
+    runtime.apply(Command::KeepResults(ResultSide::A));
+    let other = Preset::Baseline.config();
+    runtime.apply(Command::SetConfig(Box::new(other)));
+    runtime.apply(Command::FitListed);
+    until(&mut runtime, "the fits", |s| !s.batch.is_running());
+    runtime.apply(Command::KeepResults(ResultSide::B));
+    let session = runtime.session();
+    assert_eq!(session.results.get(ResultSide::A).unwrap().name, "baseline, Iterations 100 → 5");
+    assert_eq!(session.results.get(ResultSide::B).unwrap().name, "baseline");
+    let found = session.results.difference(ComparedNumber::Loss).unwrap();
+    assert!(found.frames == 6 && found.mean < 0.0 && found.better > 3, "{found:?}");
+    let mut view = ViewState { compared: ComparedNumber::Loss, ..session.view.clone() };
+    view.sort = mhp_inspector::session::Sort { key: mhp_inspector::session::SortKey::Difference, descending: false };
+    runtime.apply(Command::SetView(Box::new(view)));
+    runtime.apply(Command::SetFilter("diff<0 b<100".into()));
+    let session = runtime.session();
+    assert_eq!(session.queue.rows().len(), found.better);
+    let differences: Vec<f64> = session
+        .queue
+        .rows()
+        .iter()
+        .map(|&row| session.frame_row(row as usize))
+        .map(|row| row.results[1].unwrap() - row.results[0].unwrap())
+        .collect();
+    assert!(differences.is_sorted(), "{differences:?}");
+    runtime.apply(Command::ForgetResults(ResultSide::A));
+    assert_eq!(runtime.session().queue.rows().len(), 0, "what is not known satisfies no comparison");
 }

@@ -9,7 +9,7 @@ use mhp_inspector::dataset::Dataset;
 use mhp_inspector::mhp::Precision;
 use mhp_inspector::session::{Command, LogLevel};
 use mhp_inspector::study::complexity::{ComplexityOptions, compute};
-use mhp_inspector::study::run::{RunPlan, RunRequest, StudyKind, execute_run};
+use mhp_inspector::study::run::{RunFolder, RunPlan, RunRequest, StudyKind, execute_run};
 use mhp_inspector::study::shard::Subset;
 use mhp_inspector::task::Progress;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ fn run_with(dataset: &Dataset, out: &Path, study: StudyKind, grid: &[&str], base
         base: *base,
         base_name: "test".into(),
         precision: Precision::F32,
-        frames: 0..dataset.len().min(4),
+        frames: (0..dataset.len().min(4)).into(),
         subset: Subset::All,
         grid: grid.iter().map(|axis| axis.parse().unwrap()).collect(),
         iterations: Some(2),
@@ -43,7 +43,7 @@ fn run_with(dataset: &Dataset, out: &Path, study: StudyKind, grid: &[&str], base
     let complexity = RunPlan::needs_strata(&request)
         .then(|| compute(dataset, &ComplexityOptions::default(), None, &Progress::new()).unwrap());
     let plan = RunPlan::new(dataset, &request, complexity.as_ref()).unwrap();
-    execute_run(dataset, &plan, out, 2, &Progress::new()).unwrap();
+    execute_run(dataset, &plan, &RunFolder::of_data(out, dataset), 2, &Progress::new(), None).unwrap();
 }
 
 fn shown(window: &mut Window, study: StudyKind) {
@@ -56,7 +56,8 @@ fn an_empty_pane_says_how_it_is_filled() {
     let mut window = Window::open(2);
     window.harness.state_mut().show_pane(Pane::called("Study").unwrap());
     window.harness.run_steps(2);
-    assert!(window.says("No study yet") && window.says("study operators DATA --out RUN"));
+    assert!(window.says("A study fits the listed frames with several settings"));
+    assert!(window.named("Run study") && window.named("Which study"));
 }
 
 #[test]
@@ -194,4 +195,52 @@ fn what_is_no_run_is_told() {
     window.apply(Command::OpenRun(damaged));
     window.until("the second error", |w| w.told("damaged/run.toml"));
     assert!(window.session().study.shown().is_none());
+}
+
+#[test]
+fn a_sweep_is_put_together_and_run_in_the_pane() {
+    let mut window = Window::open(4);
+    window.switch_live_off();
+    window.apply(Command::SetConfig(Box::new(FitConfig { iterations: 5, ..Preset::Baseline.config() })));
+    window.harness.state_mut().show_pane(Pane::called("Study").unwrap());
+    window.harness.run_steps(3);
+    assert!(window.says("25 variants × 4 frames = 100 fits"), "{:#?}", window.names());
+    window.node("Values of setting 1").focus();
+    window.harness.step();
+    window.key_with(egui::Modifiers::COMMAND, egui::Key::A);
+    window.type_text("0.1, 1, x");
+    window.harness.run_steps(2);
+    assert!(window.says("w_em is x; expected a number in"), "{:#?}", window.names());
+    window.key_with(egui::Modifiers::COMMAND, egui::Key::A);
+    window.type_text("0.1, 1");
+    window.harness.run_steps(2);
+    window.click("Setting 2");
+    window.harness.run_steps(2);
+    window.click("no second setting");
+    window.harness.run_steps(2);
+    assert!(window.says("2 variants × 4 frames = 8 fits"), "{:#?}", window.names());
+    window.click("Run study");
+    window.until("the table", |w| w.session().study.shown().is_some_and(|run| run.complete));
+    window.harness.run_steps(3);
+    assert!(window.named("Study row 0.1") && window.named("Study row 1") && window.named("New study"));
+    // Its settings for the fit on screen: one act, that can be taken back.
+    let before = window.session().config;
+    window.click("Take settings of 1");
+    assert_eq!((window.session().config.w_em, window.session().config.iterations), (1.0, 5));
+    window.key_with(egui::Modifiers::COMMAND, egui::Key::Z);
+    assert_eq!(window.session().config, before);
+    // A row's frames, kept as A; another row's as B.
+    for (row, side) in [("0.1", "A"), ("1", "B")] {
+        window.click(&format!("Study row {row}"));
+        window.until("its frames", |w| {
+            w.session().summaries.len() == 4 && w.session().results_name() == format!("sweep {row}")
+        });
+        window.click("A | B");
+        window.harness.run_steps(2);
+        window.click(&format!("Keep these as {side}"));
+        window.harness.run_steps(2);
+        window.key(egui::Key::Escape);
+    }
+    window.harness.run_steps(2);
+    assert!(window.named("Sort by Difference of results"), "{:#?}", window.names());
 }

@@ -2,13 +2,13 @@
 
 use crate::cli::common::{CsvArgs, PrecisionArg, complain, inputs, open, presets, print, print_json};
 use crate::cli::complexity::compute;
-use crate::cli::frames::{FrameRange, chosen};
+use crate::cli::frames::{FrameRange, chosen_set};
 use crate::cli::shards::typed;
 use crate::cli::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::config::{FitConfig, Preset};
 use crate::dataset::Dataset;
 use crate::study::complexity::{ComplexityOptions, cache_folder};
-use crate::study::run::{GridAxis, Run, RunPlan, RunRequest, StudyKind, check_run_folder, execute_run};
+use crate::study::run::{GridAxis, Run, RunFolder, RunPlan, RunRequest, StudyKind, check_run_folder, execute_run};
 use crate::study::shard::{Shard, Subset};
 use crate::task::Progress;
 use clap::Args;
@@ -31,9 +31,10 @@ pub struct RunArgs {
     /// The run folder. Where it holds the same run, what is done is not done again.
     #[arg(long, value_name = "RUN")]
     out: PathBuf,
-    /// Frames to study, counted from 0, as in Rust: 5..12 (12 not included), 5..=11, 5.., ..12, or 7 alone. Default: all.
-    #[arg(long, value_name = "A..B")]
-    frames: Option<FrameRange>,
+    /// Frames to study, counted from 0, as in Rust: 5..12 (12 not included), 5..=11, 5.., ..12, or 7 alone; several with
+    /// commas between: 0..5,7,9..12. Default: all.
+    #[arg(long, value_name = "A..B,…", value_delimiter = ',')]
+    frames: Vec<FrameRange>,
     /// The settings that the study varies.
     #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = presets())]
     preset: Preset,
@@ -102,7 +103,7 @@ pub(super) fn run(kind: StudyKind, args: &RunArgs, all: Option<bool>, grid: &[Gr
         base,
         base_name,
         precision: args.precision.into(),
-        frames: chosen(args.frames, &args.path, &dataset)?,
+        frames: chosen_set(&args.frames, &args.path, &dataset)?,
         subset: if all == Some(false) { Subset::Hard } else { Subset::All },
         grid: grid.to_vec(),
         iterations: args.iterations,
@@ -138,7 +139,7 @@ fn execute(dataset: &Arc<Dataset>, plan: RunPlan, args: &RunArgs) -> anyhow::Res
     let (sender, answer) = bounded(1);
     let told = progress.clone();
     let work = move || {
-        let done = execute_run(&dataset, &plan, &folder, threads, &told);
+        let done = execute_run(&dataset, &plan, &RunFolder::of_data(&folder, &dataset), threads, &told, None);
         // The receiver lives until the answer is here.
         let _ = sender.send(done);
     };

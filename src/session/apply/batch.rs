@@ -1,9 +1,10 @@
 //! Fits of the listed frames: asked for, taken in as they come, found again.
 
 use crate::dataset::Dataset;
-use crate::session::batch::{BatchRequest, BatchStatus, summary};
+use crate::session::batch::{BatchRequest, summary};
 use crate::session::effect::Effect;
 use crate::session::state::{LogLevel, Session};
+use crate::session::work::WorkStatus;
 use crate::study::{BatchRow, FitsOf, KeptFits};
 use std::sync::Arc;
 
@@ -28,6 +29,7 @@ impl Session {
             // Fits with other settings and these are not of one table.
             self.forget_batch();
         }
+        self.results_from = None;
         self.batch.begin(of.clone(), frames.len());
         vec![Effect::StartBatch(Box::new(BatchRequest { dataset, frames, of }))]
     }
@@ -41,9 +43,7 @@ impl Session {
     }
 
     pub(super) fn pause_batch(&mut self) -> Vec<Effect> {
-        let BatchStatus::Running { paused, .. } = self.batch.status else { return Vec::new() };
-        self.batch.pause(!paused);
-        vec![Effect::PauseBatch(!paused)]
+        self.batch.work.toggle_pause().map(Effect::PauseBatch).into_iter().collect()
     }
 
     pub(super) fn cancel_batch(&mut self) -> Vec<Effect> {
@@ -55,7 +55,9 @@ impl Session {
         if !self.is_open(dataset) {
             return Vec::new();
         }
-        self.batch.advance(done);
+        if let WorkStatus::Running { total, .. } = self.batch.work.status {
+            self.batch.work.advance(done, total);
+        }
         self.take_rows(rows);
         Vec::new()
     }
@@ -84,7 +86,7 @@ impl Session {
         if !self.is_open(dataset) {
             return Vec::new();
         }
-        let BatchStatus::Running { done, total, .. } = std::mem::take(&mut self.batch.status) else {
+        let WorkStatus::Running { done, total, .. } = std::mem::take(&mut self.batch.work).status else {
             return Vec::new();
         };
         let failed = match self.batch.failed {

@@ -66,6 +66,8 @@ impl Session {
         self.fits.clear();
         self.left.clear();
         self.summaries.change().clear();
+        self.results_from = None;
+        effects.extend(self.clear_results());
         self.pins = Pins::default();
         self.batch = Batch::default();
         self.evidence = EvidenceState::default();

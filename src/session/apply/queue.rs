@@ -1,5 +1,6 @@
 //! The frame list: filter, order, and what "next" means.
 
+use crate::session::compared::ResultSide;
 use crate::session::effect::Effect;
 use crate::session::queue::{FrameRow, ListedFrom, Reads, SavedView, Sort};
 use crate::session::state::{FrameSummary, LogLevel, Session};
@@ -119,6 +120,7 @@ impl Session {
             strata: self.strata.revision(),
             fits: reads.fit.then(|| self.summaries.revision()),
             labels: reads.labels().then(|| self.labels.revision()),
+            results: reads.results.then(|| (self.results.revision(), self.view.compared)),
             sort: self.view.sort,
             label_mode: self.view.label_mode,
         }
@@ -153,6 +155,9 @@ impl Session {
             row.converged = summary.converged;
             row.reason = summary.reason.as_deref();
             row.majpe_mm = summary.majpe_mm;
+        }
+        if reads.results {
+            row.results = ResultSide::ALL.map(|side| self.results.value(side, index, self.view.compared));
         }
         if reads.tags {
             row.tags = self.labels.visible_tags(index, mode);

@@ -3,6 +3,7 @@
 use crate::config::FitConfig;
 use crate::dataset::Dataset;
 use crate::mhp::Precision;
+use crate::session::compared::ResultSide;
 use crate::session::effect::{Effect, PinRequest};
 use crate::session::file::{SavedFit, SavedFrame, SessionFile};
 use crate::session::fit::{Fit, FitStatus};
@@ -36,6 +37,9 @@ impl Session {
             let summaries = self.summaries.change();
             *summaries = file.summaries;
             summaries.retain(|&frame, _| frame < dataset.len());
+            for (side, set) in ResultSide::ALL.into_iter().zip(file.results) {
+                self.results.set(side, set);
+            }
         } else {
             let text = "the data set is not the one that the session was saved with; frames are found by their names";
             self.note(LogLevel::Warning, text.into());

@@ -6,6 +6,7 @@
 mod filter;
 mod row;
 
+use super::compared::ComparedNumber;
 use super::labels::LabelMode;
 use super::tracked::Tracked;
 pub use filter::{FrameFilter, syntax};
@@ -41,6 +42,12 @@ pub enum SortKey {
     Tags,
     /// Who labelled it.
     Annotator,
+    /// What result set A says.
+    ResultA,
+    /// What result set B says.
+    ResultB,
+    /// B − A.
+    Difference,
     /// An unweighted term of the loss.
     Term(TermId),
 }
@@ -55,6 +62,7 @@ impl SortKey {
                 Reads { strata: true, ..none }
             }
             Self::Iou | Self::Converged | Self::Majpe | Self::Term(_) => Reads { fit: true, ..none },
+            Self::ResultA | Self::ResultB | Self::Difference => Reads { results: true, ..none },
             Self::Tags => Reads { tags: true, ..none },
             Self::Annotator => Reads { annotators: true, ..none },
         }
@@ -91,6 +99,7 @@ pub(super) struct ListedFrom {
     pub(super) strata: u64,
     pub(super) fits: Option<u64>,
     pub(super) labels: Option<u64>,
+    pub(super) results: Option<(u64, ComparedNumber)>,
     pub(super) sort: Sort,
     pub(super) label_mode: LabelMode,
 }
@@ -240,6 +249,9 @@ fn key(sort: Sort, row: &FrameRow<'_>) -> u64 {
         SortKey::Iou => row.iou.and_then(ordered),
         SortKey::Converged => row.converged.map(u64::from),
         SortKey::Majpe => row.majpe_mm.and_then(ordered),
+        SortKey::ResultA => row.results[0].and_then(ordered),
+        SortKey::ResultB => row.results[1].and_then(ordered),
+        SortKey::Difference => row.number(FrameNumber::Difference).and_then(ordered),
         SortKey::Tags => Some(tag_rank(row.tags)).filter(|&rank| rank > 0),
         SortKey::Annotator => row.annotators.first().map(|name| letters(name)),
         SortKey::Term(term) => row.number(FrameNumber::Term(term)).and_then(ordered),

@@ -39,6 +39,8 @@ pub struct FrameRow<'a> {
     pub reason: Option<&'a str>,
     /// MAJPE, mm.
     pub majpe_mm: Option<f64>,
+    /// What result sets A and B say, by the number that they are compared by.
+    pub results: [Option<f64>; 2],
     /// Tags that may be seen, by whomever.
     pub tags: Tags,
     /// Those that the annotator gave.
@@ -70,6 +72,7 @@ impl Default for FrameRow<'_> {
             converged: None,
             reason: None,
             majpe_mm: None,
+            results: [None; 2],
             tags: Tags::NONE,
             own_tags: Tags::NONE,
             note: "",
@@ -90,6 +93,8 @@ pub struct Reads {
     pub strata: bool,
     /// What is known of the fit.
     pub fit: bool,
+    /// Result sets A and B.
+    pub results: bool,
     /// Tags.
     pub tags: bool,
     /// The annotator's note and verdict.
@@ -100,8 +105,16 @@ pub struct Reads {
 
 impl Reads {
     /// Everything.
-    pub const ALL: Self =
-        Self { name: true, scene: true, strata: true, fit: true, tags: true, said: true, annotators: true };
+    pub const ALL: Self = Self {
+        name: true,
+        scene: true,
+        strata: true,
+        fit: true,
+        results: true,
+        tags: true,
+        said: true,
+        annotators: true,
+    };
 
     /// What either asks for.
     #[must_use]
@@ -111,6 +124,7 @@ impl Reads {
             scene: self.scene || other.scene,
             strata: self.strata || other.strata,
             fit: self.fit || other.fit,
+            results: self.results || other.results,
             tags: self.tags || other.tags,
             said: self.said || other.said,
             annotators: self.annotators || other.annotators,
@@ -144,6 +158,12 @@ pub enum FrameNumber {
     Iterations,
     /// MAJPE, mm.
     Majpe,
+    /// What result set A says.
+    ResultA,
+    /// What result set B says.
+    ResultB,
+    /// B − A.
+    Difference,
     /// An unweighted term of the loss.
     Term(TermId),
 }
@@ -161,6 +181,9 @@ impl FrameNumber {
             Self::Loss,
             Self::Iterations,
             Self::Majpe,
+            Self::ResultA,
+            Self::ResultB,
+            Self::Difference,
         ];
         own.into_iter().chain(TermId::all().map(Self::Term))
     }
@@ -177,6 +200,9 @@ impl FrameNumber {
             Self::Loss => "loss",
             Self::Iterations => "iterations",
             Self::Majpe => "majpe",
+            Self::ResultA => "a",
+            Self::ResultB => "b",
+            Self::Difference => "diff",
             Self::Term(term) => term.key,
         }
     }
@@ -194,6 +220,7 @@ impl FrameNumber {
             Self::Hardness | Self::PeakDensity | Self::StaticDominance | Self::HumanSaliency => {
                 Reads { strata: true, ..none }
             }
+            Self::ResultA | Self::ResultB | Self::Difference => Reads { results: true, ..none },
             Self::Iou | Self::Loss | Self::Iterations | Self::Majpe | Self::Term(_) => Reads { fit: true, ..none },
         }
     }
@@ -212,6 +239,9 @@ impl FrameRow<'_> {
             FrameNumber::Loss => self.loss,
             FrameNumber::Iterations => self.iterations.map(|n| n as f64),
             FrameNumber::Majpe => self.majpe_mm,
+            FrameNumber::ResultA => self.results[0],
+            FrameNumber::ResultB => self.results[1],
+            FrameNumber::Difference => self.results[1].zip(self.results[0]).map(|(b, a)| b - a),
             FrameNumber::Term(term) => self.terms.and_then(|terms| terms[term]),
         }
     }

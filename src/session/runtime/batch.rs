@@ -8,7 +8,7 @@ use crate::session::report::Report;
 use crate::study::{BatchOptions, BatchRow, FitsFile, KeptFits, StudyError, kept_fits, run_batch};
 use crate::task::{Job, Progress};
 use std::path::PathBuf;
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The window hears of rows at most this often.
@@ -21,13 +21,8 @@ pub(super) struct BatchRun {
     waiting: Arc<Waiting>,
 }
 
-/// What the window has not heard yet, and whether the batch has to wait.
-#[derive(Default)]
-struct Waiting {
-    rows: Mutex<(Vec<BatchRow>, u64)>,
-    paused: Mutex<bool>,
-    changed: Condvar,
-}
+/// Rows that the window has not heard of yet, and how many frames are done.
+type Waiting = Mutex<(Vec<BatchRow>, u64)>;
 
 impl BatchRun {
     pub(super) fn start(request: BatchRequest, wake: &Wake) -> Self {
@@ -40,13 +35,11 @@ impl BatchRun {
     }
 
     pub(super) fn pause(&self, wait: bool) {
-        *self.waiting.paused.lock().unwrap_or_else(PoisonError::into_inner) = wait;
-        self.waiting.changed.notify_all();
+        self.job.progress().pause(wait);
     }
 
     pub(super) fn cancel(&self) {
         self.job.cancel();
-        self.pause(false);
     }
 
     /// Rows that came since, then the end; `None` where there is neither. True with the end.
@@ -54,10 +47,9 @@ impl BatchRun {
         // The end first asked, then told last: rows that came before it are in.
         let ended = self.job.poll();
         if let Some(result) = ended {
-            *self.waiting.paused.lock().unwrap_or_else(PoisonError::into_inner) = false;
             return Some((Report::BatchDone(Arc::clone(&self.dataset), result), true));
         }
-        let mut rows = self.waiting.rows.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut rows = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
         if rows.0.is_empty() {
             return None;
         }
@@ -67,7 +59,7 @@ impl BatchRun {
 
     /// The rows that nobody has heard of, at the end.
     pub(super) fn rest(&self) -> Option<Report> {
-        let mut rows = self.waiting.rows.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut rows = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
         let (new, done) = (std::mem::take(&mut rows.0), rows.1);
         (!new.is_empty()).then(|| Report::BatchRows(Arc::clone(&self.dataset), new, done))
     }
@@ -95,7 +87,7 @@ fn work(request: &BatchRequest, waiting: &Waiting, progress: &Progress, wake: &W
     let mut done = there.len() as u64;
     let mut told = Instant::now();
     let mut tell = |rows: &mut Vec<BatchRow>, done: u64, now: bool| {
-        let mut waiting = waiting.rows.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut waiting = waiting.lock().unwrap_or_else(PoisonError::into_inner);
         waiting.0.append(rows);
         waiting.1 = done;
         drop(waiting);
@@ -114,11 +106,7 @@ fn work(request: &BatchRequest, waiting: &Waiting, progress: &Progress, wake: &W
         curves_folder: None,
     };
     let fitted = run_batch(dataset, &todo, &options, |row| {
-        let mut paused = waiting.paused.lock().unwrap_or_else(PoisonError::into_inner);
-        while *paused {
-            paused = waiting.changed.wait(paused).unwrap_or_else(PoisonError::into_inner);
-        }
-        drop(paused);
+        progress.wait_while_paused();
         file.add(&row).map_err(|error| StudyError::Internal { message: error.to_string() })?;
         done += 1;
         tell(&mut vec![row], done, false);

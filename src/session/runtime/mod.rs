@@ -3,6 +3,7 @@
 mod batch;
 mod evidence;
 mod labels;
+mod study;
 
 use super::command::{Command, PickKind};
 use super::effect::{Effect, Trash};
@@ -46,6 +47,7 @@ pub struct Runtime {
     evidence: EvidenceKeeper,
     grading: Option<ComplexityJob>,
     batch: Option<batch::BatchRun>,
+    study: Option<study::StudyThread>,
     restored_window: Option<serde_json::Value>,
 }
 
@@ -63,6 +65,7 @@ impl Runtime {
             evidence: EvidenceKeeper::start(&wake),
             grading: None,
             batch: None,
+            study: None,
             restored_window: None,
             wake,
             picker,
@@ -128,7 +131,7 @@ impl Runtime {
         if let Some(report) = self.labels.poll().or_else(|| self.evidence.poll()).or_else(|| self.grading_report()) {
             return Some(report);
         }
-        if let Some(report) = self.batch_report() {
+        if let Some(report) = self.batch_report().or_else(|| self.study_report()) {
             return Some(report);
         }
         let worker = self.worker.as_ref()?;
@@ -150,6 +153,14 @@ impl Runtime {
                 return Some(rest);
             }
             self.batch = None;
+        }
+        Some(report)
+    }
+
+    fn study_report(&mut self) -> Option<Report> {
+        let report = self.study.as_mut()?.poll()?;
+        if matches!(report, Report::StudyDone(_)) {
+            self.study = None;
         }
         Some(report)
     }
@@ -232,6 +243,17 @@ impl Runtime {
             Effect::CancelBatch => {
                 if let Some(batch) = &self.batch {
                     batch.cancel();
+                }
+            }
+            Effect::StartStudy(request) => self.study = Some(study::StudyThread::start(*request, &self.wake)),
+            Effect::PauseStudy(wait) => {
+                if let Some(study) = &self.study {
+                    study.pause(wait);
+                }
+            }
+            Effect::CancelStudy => {
+                if let Some(study) = &self.study {
+                    study.cancel();
                 }
             }
             Effect::FindKept(dataset) => self.on_thread("kept-fits", move || {

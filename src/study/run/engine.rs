@@ -31,6 +31,7 @@ pub(super) fn execute(
     folder: &Path,
     threads: usize,
     progress: &Progress,
+    grown: &(dyn Fn(&Rows) + Sync),
 ) -> Result<Rows, RunError> {
     let done: BTreeSet<(usize, usize)> = rows.keys().copied().collect();
     let engine = Engine {
@@ -42,6 +43,7 @@ pub(super) fn execute(
         next: AtomicUsize::new(0),
         kept: Mutex::new(Kept { journal, rows, fault: None }),
         progress,
+        grown,
     };
     progress.begin("fitting", plan.rows() as u64);
     progress.advance(engine.done.len() as u64);
@@ -82,6 +84,8 @@ struct Engine<'a> {
     next: AtomicUsize,
     kept: Mutex<Kept>,
     progress: &'a Progress,
+    /// Told of every new row, one at a time.
+    grown: &'a (dyn Fn(&Rows) + Sync),
 }
 
 /// The journal could not be written, or somebody pressed cancel: the thread ends.
@@ -102,6 +106,7 @@ impl Engine<'_> {
     }
 
     fn halted(&self) -> Result<(), Halt> {
+        self.progress.wait_while_paused();
         let fault = self.kept.lock().unwrap_or_else(PoisonError::into_inner).fault.is_some();
         if fault || self.progress.is_cancelled() { Err(Halt) } else { Ok(()) }
     }
@@ -280,6 +285,7 @@ impl Engine<'_> {
             return Err(Halt);
         }
         kept.rows.insert((variant, frame), row);
+        (self.grown)(&kept.rows);
         drop(kept);
         self.progress.advance(1);
         Ok(())

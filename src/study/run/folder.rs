@@ -14,7 +14,12 @@ use crate::dataset::Dataset;
 use crate::output::{FolderLock, Inputs};
 use crate::study::shard::{Part as _, gather};
 use crate::task::Progress;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// A watcher of a run is told no more often.
+const LEAST_BETWEEN: Duration = Duration::from_millis(250);
 
 /// A run as it lies on disk, finished or not.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,8 +72,40 @@ pub fn is_run_folder(folder: &Path) -> bool {
     folder.join(RUN_FILE).is_file()
 }
 
-/// Does `plan` in `folder`, which is made; where it holds the same run, rows that are done are not done again. Progress
-/// counts rows.
+/// The folder that a run is written to, and what it must not be written over.
+#[derive(Debug)]
+pub struct RunFolder<'a> {
+    /// The folder; made where it is not there.
+    pub path: PathBuf,
+    /// What is read.
+    pub inputs: Inputs<'a>,
+}
+
+impl<'a> RunFolder<'a> {
+    /// A folder that must not lie in the data set.
+    pub fn of_data(path: &Path, dataset: &'a Dataset) -> Self {
+        Self { path: path.to_owned(), inputs: dataset.inputs() }
+    }
+}
+
+/// How often a watcher is told: for the first row, then as seldom as keeps the work undisturbed.
+#[derive(Default)]
+struct Pace {
+    next: Option<Instant>,
+}
+
+impl Pace {
+    fn tell(&mut self, tell: impl FnOnce()) {
+        let began = Instant::now();
+        if self.next.is_none_or(|next| began >= next) {
+            tell();
+            self.next = Some(Instant::now() + LEAST_BETWEEN.max(20 * began.elapsed()));
+        }
+    }
+}
+
+/// Does `plan` in a folder; where it holds the same run, rows that are done are not done again. Progress counts rows; a watcher
+/// gets the run as it grows, several times a second at most.
 ///
 /// # Errors
 /// Where the folder holds another run, lies in the data set or cannot be written, another process works on it, there is no thread,
@@ -76,11 +113,12 @@ pub fn is_run_folder(folder: &Path) -> bool {
 pub fn execute_run(
     dataset: &Dataset,
     plan: &RunPlan,
-    folder: &Path,
+    RunFolder { path: folder, inputs }: &RunFolder<'_>,
     threads: usize,
     progress: &Progress,
+    watcher: Option<&(dyn Fn(Run) + Sync)>,
 ) -> Result<Run, RunError> {
-    let _lock = claim(folder, &dataset.inputs())?;
+    let _lock = claim(folder, inputs)?;
     if is_run_folder(folder) {
         let there = RunSpec::read(folder)?;
         if let Some((what, there, here)) = there.difference(&plan.spec) {
@@ -92,7 +130,14 @@ pub fn execute_run(
     } else {
         plan.spec.write(folder)?;
     }
-    let rows = execute(dataset, plan, RunJournal::open(folder, &plan.spec)?, folder, threads, progress)?;
+    let pace = Mutex::new(Pace::default());
+    let grown = |rows: &Rows| {
+        if let Some(watcher) = watcher {
+            let mut pace = pace.lock().unwrap_or_else(PoisonError::into_inner);
+            pace.tell(|| watcher(Run::of(plan.spec.clone(), rows, false)));
+        }
+    };
+    let rows = execute(dataset, plan, RunJournal::open(folder, &plan.spec)?, folder, threads, progress, &grown)?;
     output::write(folder, &plan.spec, &rows)?;
     Ok(Run::of(plan.spec.clone(), &rows, true))
 }

@@ -30,12 +30,11 @@ pub(super) fn text(spec: &RunSpec, rows: &[TableRow]) -> String {
     let precision = if spec.precision == Precision::F32 { "f32" } else { "f64" };
     let _ = writeln!(
         text,
-        "{} of {}: {}{subset} of {}..{}. Based on `{}`, {precision}, seed {}, mhp-inspector {}.{}\n",
+        "{} of {}: {}{subset} of {}. Based on `{}`, {precision}, seed {}, mhp-inspector {}.{}\n",
         spec.study,
         escaped(&data.name),
         data.frames,
-        data.first,
-        data.end,
+        data.asked(),
         escaped(&spec.base),
         spec.seed,
         spec.version,

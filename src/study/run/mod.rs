@@ -48,12 +48,12 @@ mod table;
 mod variant;
 
 pub use error::RunError;
-pub use folder::{Run, check_run_folder, execute_run, is_run_folder, merge_runs};
+pub use folder::{Run, RunFolder, check_run_folder, execute_run, is_run_folder, merge_runs};
 pub use grid::GridAxis;
 pub use journal::JOURNAL_FILE;
 pub use kind::StudyKind;
 pub use output::TABLE_FILE;
-pub use plan::{RunPlan, RunRequest};
+pub use plan::{RunPlan, RunRequest, points};
 pub use row::{RunNumbers, RunRow};
 pub use spec::{RUN_FILE, RunSpec};
 pub use table::{CountShares, Spread, TableRow, mark, notes};

@@ -36,7 +36,7 @@ pub(super) fn write(folder: &Path, spec: &RunSpec, rows: &Rows) -> Result<(), Ru
 /// The table as JSON: the study, the label columns, the data, a row each.
 pub(super) fn json_text(spec: &RunSpec, table: &[TableRow]) -> String {
     let data = &spec.data;
-    let object = json!({
+    let mut object = json!({
         "study": spec.study,
         "version": spec.version,
         "precision": spec.precision,
@@ -51,6 +51,9 @@ pub(super) fn json_text(spec: &RunSpec, table: &[TableRow]) -> String {
         "paper_missing": spec.paper_missing(),
         "rows": table,
     });
+    if let Some(listed) = &data.listed {
+        object["data"]["listed"] = json!(listed);
+    }
     serde_json::to_string_pretty(&object).unwrap_or_default() + "\n"
 }
 

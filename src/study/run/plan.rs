@@ -12,9 +12,8 @@ use crate::config::FitConfig;
 use crate::dataset::Dataset;
 use crate::mhp::Precision;
 use crate::study::complexity::{Complexity, Stratum};
-use crate::study::shard::{DataSpec, Shard, Subset};
+use crate::study::shard::{DataSpec, FrameSet, Shard, Subset};
 use std::collections::BTreeSet;
-use std::ops::Range;
 
 /// What is asked for.
 #[derive(Debug, Clone)]
@@ -27,8 +26,8 @@ pub struct RunRequest {
     pub base_name: String,
     /// Scalar of the per-cell kernel.
     pub precision: Precision,
-    /// The range of frames.
-    pub frames: Range<usize>,
+    /// The frames.
+    pub frames: FrameSet,
     /// Which of them.
     pub subset: Subset,
     /// The axes of a sweep.
@@ -37,6 +36,14 @@ pub struct RunRequest {
     pub iterations: Option<usize>,
     /// Which part is done here.
     pub shard: Option<Shard>,
+}
+
+/// How many variants a study compares on top of `base`, on data with this layout.
+///
+/// # Errors
+/// Where a grid makes no sense.
+pub fn points(study: StudyKind, base: &FitConfig, grid: &[GridAxis], layout: &str) -> Result<usize, RunError> {
+    Ok(plans::compared(study, base, grid, &[], layout)?.variants.len())
 }
 
 /// Work that is done in one piece by one thread.
@@ -80,11 +87,11 @@ impl RunPlan {
         request.study.by_stratum() || request.subset == Subset::Hard
     }
 
-    /// Plans a run. `complexity` is that of the whole data set, where [`Self::needs_strata`]. Where no frame of the range is
+    /// Plans a run. `complexity` is that of the whole data set, where [`Self::needs_strata`]. Where none of the frames is
     /// hard, all are studied, and the specification says so.
     ///
     /// # Errors
-    /// Where the range is empty or a grid makes no sense.
+    /// Where there is no frame or a grid makes no sense.
     pub fn new(dataset: &Dataset, request: &RunRequest, complexity: Option<&Complexity>) -> Result<Self, RunError> {
         let info = dataset.info();
         let layout = info.layout.word();
@@ -97,13 +104,12 @@ impl RunPlan {
         let hard = |&frame: &usize| strata.get(frame).copied().flatten() == Some(Stratum::Hard);
         let wanted: Vec<usize> = match request.subset {
             Subset::All => Vec::new(),
-            Subset::Hard => request.frames.clone().filter(hard).collect(),
+            Subset::Hard => request.frames.iter().filter(hard).collect(),
         };
         let subset = if wanted.is_empty() { Subset::All } else { Subset::Hard };
-        let frames = if wanted.is_empty() { request.frames.clone().collect() } else { wanted };
+        let frames = if wanted.is_empty() { request.frames.iter().collect() } else { wanted };
         if frames.is_empty() {
-            let Range { start, end } = request.frames;
-            return Err(RunError::NoFrames { message: format!("{start}..{end} holds no frame to study") });
+            return Err(RunError::NoFrames { message: "there is no frame to study".into() });
         }
         let data = DataSpec::of(dataset, &request.frames, frames.len(), subset);
         let spec = RunSpec {

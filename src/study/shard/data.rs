@@ -1,9 +1,8 @@
 //! The data that rows are of, as specifications name them.
 
-use super::stamp;
+use super::{FrameSet, stamp};
 use crate::dataset::Dataset;
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
 use std::path::PathBuf;
 
 /// Which frames of the range are studied.
@@ -42,24 +41,33 @@ pub struct DataSpec {
     pub frames: usize,
     /// Which of the range.
     pub subset: Subset,
+    /// The frames asked for where they are no range.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub listed: Option<FrameSet>,
 }
 
 impl DataSpec {
-    /// Of a range of a data set, of which `frames` frames are studied.
-    pub fn of(dataset: &Dataset, range: &Range<usize>, frames: usize, subset: Subset) -> Self {
-        let info = dataset.info();
+    /// Of frames of a data set, of which `frames` are studied.
+    pub fn of(dataset: &Dataset, asked: &FrameSet, frames: usize, subset: Subset) -> Self {
+        let (info, range) = (dataset.info(), asked.hull());
         Self {
             name: info.name.clone(),
             root: std::path::absolute(&info.root).unwrap_or_else(|_| info.root.clone()),
             layout: info.layout.word().to_owned(),
             fingerprint: dataset.fingerprint().to_owned(),
-            content: stamp::content(dataset, range),
+            content: stamp::content(dataset, &range),
             arrays: info.views.iter().map(|view| view.array.clone()).collect(),
             first: range.start,
             end: range.end,
             frames,
             subset,
+            listed: asked.has_gaps().then(|| asked.clone()),
         }
+    }
+
+    /// The frames asked for, as text.
+    pub fn asked(&self) -> String {
+        self.listed.as_ref().map_or_else(|| format!("{}..{}", self.first, self.end), FrameSet::to_string)
     }
 
     /// In words, what tells one data set from another.
@@ -69,7 +77,7 @@ impl DataSpec {
 
     /// In words, which frames.
     pub(in crate::study) fn told_frames(&self) -> String {
-        let Self { first, end, frames, subset, .. } = self;
-        format!("{frames} of {first}..{end} ({})", if *subset == Subset::Hard { "hard" } else { "all" })
+        let word = if self.subset == Subset::Hard { "hard" } else { "all" };
+        format!("{} of {} ({word})", self.frames, self.asked())
     }
 }

@@ -81,7 +81,7 @@ impl ShardSpec {
             command,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             shard: Some(shard),
-            data: DataSpec::of(dataset, frames, frames.len(), Subset::All),
+            data: DataSpec::of(dataset, &frames.clone().into(), frames.len(), Subset::All),
             settings: toml::Table::try_from(settings).map_err(wrong)?,
         };
         Ok(Self { id: spec.digest(), ..spec })

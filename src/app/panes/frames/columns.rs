@@ -4,7 +4,7 @@ use crate::app::theme::{self, Tokens};
 use crate::app::widgets::iou_color;
 use crate::labels::Verdict;
 use crate::mhp::TermId;
-use crate::session::{FrameNumber, FrameRow, SortKey, ViewState};
+use crate::session::{ComparedNumber, FrameNumber, FrameRow, ResultSets, ResultSide, SortKey, ViewState};
 use egui::{Align2, Color32, FontId, Painter, Rect, pos2};
 use std::sync::LazyLock;
 
@@ -49,6 +49,17 @@ impl Column {
     pub(super) fn is_shown(&self, view: &ViewState) -> bool {
         let named = |keys: &[String]| keys.iter().any(|key| key == self.key);
         if self.is_of_term() { named(&view.shown_terms) } else { !named(&view.hidden_columns) }
+    }
+
+    /// Whether there is something to say in it: the two result sets only where they are kept.
+    pub(super) fn has_any(&self, results: &ResultSets) -> bool {
+        let kept = |side| results.get(side).is_some();
+        match self.sort {
+            SortKey::ResultA => kept(ResultSide::A),
+            SortKey::ResultB => kept(ResultSide::B),
+            SortKey::Difference => kept(ResultSide::A) && kept(ResultSide::B),
+            _ => true,
+        }
     }
 
     /// Takes it into the list, or out of it.
@@ -177,6 +188,33 @@ const COLUMNS: &[Column] = &[
         right: true,
     },
     Column {
+        key: "a",
+        title: "A",
+        name: "Results A",
+        tip: "What the results kept as A say; the menu “A | B” says which number.",
+        sort: SortKey::ResultA,
+        width: 34.0,
+        right: true,
+    },
+    Column {
+        key: "b",
+        title: "B",
+        name: "Results B",
+        tip: "What the results kept as B say.",
+        sort: SortKey::ResultB,
+        width: 34.0,
+        right: true,
+    },
+    Column {
+        key: "difference",
+        title: "B − A",
+        name: "Difference of results",
+        tip: "B − A, green where B is the better fit.",
+        sort: SortKey::Difference,
+        width: 38.0,
+        right: true,
+    },
+    Column {
         key: "by",
         title: "By",
         name: "Annotator",
@@ -193,7 +231,7 @@ fn number(value: Option<f64>, digits: usize) -> String {
 }
 
 /// Text and colour of a cell.
-fn text(column: &Column, row: &FrameRow<'_>, tokens: &Tokens) -> (String, Color32) {
+fn text(column: &Column, row: &FrameRow<'_>, compared: ComparedNumber, tokens: &Tokens) -> (String, Color32) {
     let dim = |text: String| (text, tokens.dim);
     let fitted = row.iterations.is_some();
     if let SortKey::Term(term) = column.sort {
@@ -221,13 +259,36 @@ fn text(column: &Column, row: &FrameRow<'_>, tokens: &Tokens) -> (String, Color3
         },
         "reason" => dim(row.reason.unwrap_or_default().to_owned()),
         "majpe" => (row.majpe_mm.map_or_else(String::new, |mm| format!("{mm:.0}")), tokens.text),
+        "a" => (row.results[0].map_or_else(String::new, |x| compared.text(x)), tokens.text),
+        "b" => (row.results[1].map_or_else(String::new, |x| compared.text(x)), tokens.text),
+        "difference" => match row.number(FrameNumber::Difference) {
+            Some(x) => {
+                let better = (x > 0.0) == compared.larger_is_better() && x != 0.0;
+                let color = if x == 0.0 {
+                    tokens.dim
+                } else if better {
+                    tokens.ok
+                } else {
+                    tokens.bad
+                };
+                (format!("{}{}", if x > 0.0 { "+" } else { "" }, compared.text(x)), color)
+            }
+            None => dim(String::new()),
+        },
         "by" => dim(row.annotators.join(", ")),
         _ => dim(String::new()),
     }
 }
 
 /// Draws a cell into `rect`.
-pub(super) fn cell(painter: &Painter, rect: Rect, column: &Column, row: &FrameRow<'_>, tokens: &Tokens) {
+pub(super) fn cell(
+    painter: &Painter,
+    rect: Rect,
+    column: &Column,
+    row: &FrameRow<'_>,
+    compared: ComparedNumber,
+    tokens: &Tokens,
+) {
     let painter = painter.with_clip_rect(rect.intersect(painter.clip_rect()));
     let y = rect.center().y;
     match column.key {
@@ -256,7 +317,7 @@ pub(super) fn cell(painter: &Painter, rect: Rect, column: &Column, row: &FrameRo
             }
         }
         _ => {
-            let (text, color) = text(column, row, tokens);
+            let (text, color) = text(column, row, compared, tokens);
             let font = if column.right { theme::mono(theme::CAPTION) } else { FontId::proportional(12.0) };
             let (at, align) = if column.right {
                 (pos2(rect.right(), y), Align2::RIGHT_CENTER)
@@ -297,7 +358,7 @@ mod tests {
         assert!(column.is_shown(&view));
         let terms = Terms::from_fn(|term| (term.key == "dummy").then_some(0.7));
         let row = FrameRow { terms: Some(&terms), ..FrameRow::default() };
-        assert_eq!(text(column, &row, &crate::app::theme::DARK).0, "0.7000");
+        assert_eq!(text(column, &row, ComparedNumber::Iou, &crate::app::theme::DARK).0, "0.7000");
         column.show(&mut view, false);
         assert_eq!(view, ViewState::default());
     }

@@ -4,8 +4,8 @@ use super::columns::{Column, columns};
 use super::{GAP, ROW, State};
 use crate::app::panes::Shared;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::Named as _;
-use crate::session::{BatchStatus, Command, Sort, SortKey, StrataStatus, syntax};
+use crate::app::widgets::{Named as _, WorkAsked, work};
+use crate::session::{Command, ComparedNumber, ResultSide, Sort, SortKey, StrataStatus, syntax};
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Align2, RichText, Role, Sense, Ui, pos2, vec2};
 use std::collections::BTreeSet;
@@ -19,6 +19,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         quick(ui, shared, state);
         views(ui, shared, state);
         column_menu(ui, shared);
+        compared(ui, shared, tokens);
         fit_listed(ui, shared);
     });
     grading(ui, shared, tokens);
@@ -123,6 +124,60 @@ fn column_menu(ui: &mut Ui, shared: &mut Shared<'_>) {
     button.on_hover_text("Which columns the list has.");
 }
 
+/// Two sets of results: what is kept as which, by which number they are compared, and how they differ.
+fn compared(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
+    let (button, _) = staying("A | B").ui(ui, |ui| {
+        ui.set_min_width(260.0);
+        let session = shared.session;
+        for side in ResultSide::ALL {
+            let letter = side.letter();
+            ui.horizontal(|ui| {
+                ui.label(RichText::new(letter).strong());
+                match session.results.get(side) {
+                    Some(set) => {
+                        let text = format!("{} frames, {}", set.len(), set.name);
+                        let width = (ui.available_width() - 24.0).clamp(60.0, 260.0);
+                        let label = egui::Label::new(RichText::new(&text).small()).truncate();
+                        ui.add_sized([width, 18.0], label).on_hover_text(text);
+                        let forget = ui.small_button("✕").named(Role::Button, &format!("Forget results {letter}"));
+                        if forget.clicked() {
+                            shared.send(Command::ForgetResults(side));
+                        }
+                    }
+                    None => {
+                        ui.label(RichText::new("nothing kept").small().color(tokens.dim));
+                    }
+                }
+            });
+            let keep =
+                ui.add_enabled(!session.summaries.is_empty(), egui::Button::new(format!("Keep these as {letter}")));
+            let tip = format!("What the list says now of its fits: {}.", session.results_name());
+            if keep.on_hover_text(tip).clicked() {
+                shared.send(Command::KeepResults(side));
+            }
+        }
+        ui.separator();
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("by").small());
+            for number in ComparedNumber::ALL {
+                if ui.selectable_label(session.view.compared == number, number.label()).clicked() {
+                    shared.set_view(|view| view.compared = number);
+                }
+            }
+        });
+        let number = session.view.compared;
+        let text = session.results.difference(number).map_or_else(
+            || "Fit the list, keep it as A, change something, fit again, keep it as B.".to_owned(),
+            |found| {
+                let (mean, share) = (number.text(found.mean), 100 * found.better / found.frames);
+                format!("B − A: {mean} on average; better on {share} % of {} frames", found.frames)
+            },
+        );
+        ui.label(RichText::new(text).small().color(tokens.dim));
+    });
+    button.on_hover_text("Two sets of results beside each other: columns A, B and B − A.");
+}
+
 /// Progress of the grading, or how to begin it.
 fn grading(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
     match shared.session.strata.status.clone() {
@@ -175,40 +230,19 @@ fn fit_listed(ui: &mut Ui, shared: &mut Shared<'_>) {
 /// How far a batch is, or what its fits are of where they are not of the settings in force.
 fn batch(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
     let batch = &shared.session.batch;
-    if let BatchStatus::Running { done, total, paused } = batch.status {
-        let left = batch.eta().map_or_else(String::new, |left| format!(" · {} left", in_words(left)));
-        ui.horizontal(|ui| {
-            ui.spacing_mut().item_spacing.x = 3.0;
-            let text = if paused { format!("paused at {done} of {total}") } else { format!("{done} of {total}{left}") };
-            let share = if total > 0 { done as f32 / total as f32 } else { 0.0 };
-            let bar = egui::ProgressBar::new(share).desired_height(14.0).text(RichText::new(text).small());
-            ui.add(bar.desired_width((ui.available_width() - 50.0).max(60.0)));
-            let (sign, name) = if paused { ("▶", "Go on with the batch") } else { ("‖", "Pause the batch") };
-            if ui.small_button(sign).on_hover_text(name).named(Role::Button, name).clicked() {
-                shared.send(Command::PauseBatch);
-            }
-            let cancel = ui.small_button("✕").on_hover_text("Stop; what was fitted is kept.");
-            if cancel.named(Role::Button, "Cancel the batch").clicked() {
-                shared.send(Command::CancelBatch);
-            }
-        });
-        // What is left changes without anything else.
-        ui.ctx().request_repaint_after(std::time::Duration::from_secs(1));
+    match work(ui, &batch.work, "the batch") {
+        Some(WorkAsked::Pause) => shared.send(Command::PauseBatch),
+        Some(WorkAsked::Cancel) => shared.send(Command::CancelBatch),
+        None => {}
+    }
+    let batch = &shared.session.batch;
+    if batch.is_running() {
         return;
     }
     if let Some(stale) = batch.stale(&shared.session.config).filter(|_| batch.fitted > 0) {
         let text = format!("results of {} frames are of other settings", batch.fitted);
         let label = egui::Label::new(RichText::new(text).small().color(tokens.warn)).truncate();
         ui.add(label).on_hover_text(format!("Fitted {stale}.\n“Fit listed” fits with the settings in force."));
-    }
-}
-
-/// A time, to be read at a glance.
-fn in_words(time: std::time::Duration) -> String {
-    match time.as_secs() {
-        s @ 0..=99 => format!("{} s", s.max(1)),
-        s @ 100..=5999 => format!("{} min", (s + 30) / 60),
-        s => format!("{:.1} h", s as f64 / 3600.0),
     }
 }
 

@@ -62,7 +62,9 @@ fn blank(session: &Session) -> Option<Blank> {
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let session = shared.session;
     let tokens = Tokens::of(ui);
-    let columns: Vec<&Column> = columns::columns().filter(|column| column.is_shown(&session.view)).collect();
+    let columns: Vec<&Column> = columns::columns()
+        .filter(|column| column.is_shown(&session.view) && column.has_any(&session.results))
+        .collect();
     let wanted: f32 = columns.iter().map(|column| column.width + GAP).sum::<f32>() + 4.0;
     let width = wanted.max(ui.available_width());
     // The name takes what the numbers leave.
@@ -177,7 +179,7 @@ fn row(
     for column in columns {
         let width = extent(column);
         let at = egui::Rect::from_min_max(pos2(x, rect.top()), pos2(x + width, rect.bottom()));
-        cell(painter, at, column, &row, tokens);
+        cell(painter, at, column, &row, session.view.compared, tokens);
         x += width + GAP;
     }
     response.on_hover_ui(|ui| tooltip(ui, session, index)).clicked()

@@ -4,6 +4,7 @@ mod bars;
 mod contour;
 mod lines;
 mod measure;
+mod order;
 mod parallel;
 mod table;
 
@@ -30,7 +31,10 @@ pub(in crate::app) static PANE: Pane = Pane {
     margin: 8,
     state: PaneStates::prepare::<State>,
     blank,
-    toolbar: Some(|ui, shared, _| head(ui, shared)),
+    toolbar: Some(|ui, shared, states| {
+        order::show(ui, shared, &mut states.of::<State>().order);
+        head(ui, shared);
+    }),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };
 
@@ -38,10 +42,20 @@ pub(in crate::app) static PANE: Pane = Pane {
 #[derive(Default)]
 struct State {
     measure: PlottedQuantity,
+    order: order::Order,
     values: Option<(u64, Vec<(PlottedQuantity, Values)>)>,
 }
 
 impl PaneState for State {}
+
+/// What a person asks of a row of the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum RowAsked {
+    /// Its frames in the list.
+    Frames(usize),
+    /// Its settings for the fit on screen.
+    Settings(usize),
+}
 
 /// How a study is plotted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,10 +67,9 @@ enum Picture {
 }
 
 fn blank(session: &Session) -> Option<Blank> {
-    let how = "Run one on the command line, for example\n`mhp-inspector study operators DATA --out RUN`,\nand open its \
-               folder with File > Open study…, or drop the folder on the window.";
+    let how = "Open a data set to run one here, or a run folder of `mhp-inspector study` with File > Open study….";
     match &session.study {
-        study if study.run.is_some() => None,
+        study if study.run.is_some() || session.data.dataset.is_some() => None,
         study if study.reading.is_some() => Some(Blank::new("Reading a run…", "")),
         _ => Some(Blank::new("No study yet", how)),
     }
@@ -64,8 +77,8 @@ fn blank(session: &Session) -> Option<Blank> {
 
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let study = &shared.session.study;
-    let Some((_, run)) = study.run.clone() else { return };
     let tokens = Tokens::of(ui);
+    let Some((_, run)) = study.run.clone() else { return none_yet(ui, study.work.is_running(), &tokens) };
     let revision = study.run.revision();
     if state.values.as_ref().is_none_or(|(known, _)| *known != revision) {
         state.values = Some((revision, measure::of_run(&run)));
@@ -95,17 +108,35 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
                 let of_plot = ui.allocate_ui(size, |ui| ui.vertical(plot).inner).inner;
                 ui.add_space(12.0);
                 let of_table = ui.vertical(|ui| table::show(ui, &run, row, &tokens)).inner;
-                asked = of_plot.or(of_table);
+                asked = of_plot.map(RowAsked::Frames).or(of_table);
             });
         } else {
             let of_plot = plot(ui);
             ui.add_space(8.0);
-            asked = of_plot.or(table::show(ui, &run, row, &tokens));
+            asked = of_plot.map(RowAsked::Frames).or(table::show(ui, &run, row, &tokens));
         }
     });
-    if let Some(row) = asked {
-        shared.send(Command::ShowStudyRow(row));
+    match asked {
+        Some(RowAsked::Frames(row)) => shared.send(Command::ShowStudyRow(row)),
+        Some(RowAsked::Settings(row)) => {
+            let variant = run.table.get(row).and_then(|row| run.spec.variants.get(row.variant));
+            if let Some(variant) = variant {
+                shared.send(Command::SetConfig(Box::new(variant.config)));
+            }
+        }
+        None => {}
     }
+}
+
+/// What the pane is for, while nothing is on screen.
+fn none_yet(ui: &mut Ui, running: bool, tokens: &Tokens) {
+    let text = if running {
+        "The table grows here as frames are fitted."
+    } else {
+        "A study fits the listed frames with several settings and puts their errors side by side. A sweep takes any two \
+         settings; the others ask what the paper asks. A run folder of the command line is shown with File > Open study…."
+    };
+    ui.label(RichText::new(text).small().color(tokens.dim));
 }
 
 /// Numbers along one axis are a curve, along two a map, along more or beside words parallel lines; names are bars.

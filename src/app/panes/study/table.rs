@@ -1,7 +1,9 @@
 //! The table: a row a variant; its name puts its frames into the list.
 
+use super::RowAsked;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
+use crate::config::from_preset;
 use crate::study::run::{Run, Spread, TableRow, mark, notes};
 use egui::{Align, Layout, RichText, Role, Ui};
 
@@ -55,17 +57,18 @@ fn percent(share: Option<f64>) -> Option<String> {
     share.map(|share| format!("{:.1} %", 100.0 * share))
 }
 
-/// Draws the table; answers the row whose frames are asked for.
-pub(super) fn show(ui: &mut Ui, run: &Run, chosen: Option<usize>, tokens: &Tokens) -> Option<usize> {
+/// Draws the table; answers what is asked of which row.
+pub(super) fn show(ui: &mut Ui, run: &Run, chosen: Option<usize>, tokens: &Tokens) -> Option<RowAsked> {
     let notes = notes(&run.table);
     let shown: Vec<_> = COLUMNS.iter().filter(|(.., cell)| run.table.iter().any(|row| cell(row).is_some())).collect();
     let mut asked = None;
     let grid = egui::Grid::new("study table")
-        .num_columns(1 + shown.len() + usize::from(!notes.is_empty()))
+        .num_columns(2 + shown.len() + usize::from(!notes.is_empty()))
         .spacing([12.0, 2.0])
         .striped(true);
     grid.show(ui, |ui| {
         ui.label(RichText::new(run.spec.columns.join(", ")).small().color(tokens.dim));
+        ui.label("");
         for (head, tip, _) in &shown {
             right(ui, |ui| ui.label(RichText::new(*head).small().color(tokens.dim)).on_hover_text(*tip));
         }
@@ -79,7 +82,11 @@ pub(super) fn show(ui: &mut Ui, run: &Run, chosen: Option<usize>, tokens: &Token
             let label = ui.selectable_label(chosen == Some(k), RichText::new(&name).small());
             let label = label.named(Role::Button, &format!("Study row {name}"));
             if label.on_hover_text("Put these frames into the list, with what this row says of each.").clicked() {
-                asked = Some(k);
+                asked = Some(RowAsked::Frames(k));
+            }
+            let take = ui.small_button("Take").named(Role::Button, &format!("Take settings of {name}"));
+            if take.on_hover_text(taken(run, row)).clicked() {
+                asked = Some(RowAsked::Settings(k));
             }
             for (.., cell) in &shown {
                 let text = cell(row);
@@ -100,6 +107,12 @@ pub(super) fn show(ui: &mut Ui, run: &Run, chosen: Option<usize>, tokens: &Token
         ui.label(RichText::new(why).small().color(tokens.dim));
     }
     asked
+}
+
+/// What taking the settings of a row means.
+fn taken(run: &Run, row: &TableRow) -> String {
+    let settings = run.spec.variants.get(row.variant).map(|variant| from_preset(&variant.config));
+    format!("Take these settings for the fit on screen: {}.", settings.unwrap_or_default())
 }
 
 fn right<R>(ui: &mut Ui, add: impl FnOnce(&mut Ui) -> R) -> R {

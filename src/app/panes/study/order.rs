@@ -1,0 +1,213 @@
+//! What is studied next: which study, of which settings, on the listed frames.
+
+use crate::app::panes::Shared;
+use crate::app::theme::Tokens;
+use crate::app::widgets::{Named as _, WorkAsked, work};
+use crate::config::{FIELDS, Field, FieldGroup, FieldKind, Value};
+use crate::session::{Command, Session, StudyOrder};
+use crate::study::run::{GridAxis, RunError, StudyKind, points};
+use egui::{RichText, Role, Ui};
+
+/// Values that an axis of a sweep begins with, where its setting is a number.
+const STEPS: usize = 5;
+/// Of more fits than this it is said how long they may take before they begin.
+const MANY: usize = 20_000;
+
+/// What is being put together.
+#[derive(Debug, Clone)]
+pub(super) struct Order {
+    study: StudyKind,
+    axes: [Axis; 2],
+    /// Whether the form is unfolded where a study is on screen.
+    open: bool,
+}
+
+/// An axis of a sweep while it is being typed.
+#[derive(Debug, Clone, Default)]
+struct Axis {
+    /// `None`: a sweep has one axis less.
+    field: Option<&'static Field>,
+    values: String,
+}
+
+impl Default for Order {
+    fn default() -> Self {
+        let axis = |key: &str| {
+            let field = Field::of_key(key);
+            Axis { field, values: field.map(offered).unwrap_or_default() }
+        };
+        Self { study: StudyKind::Sweep, axes: [axis("w_em"), axis("tau_pct")], open: false }
+    }
+}
+
+impl Order {
+    /// The axes, or what is wrong with them.
+    fn grid(&self) -> Result<Vec<GridAxis>, String> {
+        if self.study != StudyKind::Sweep {
+            return Ok(Vec::new());
+        }
+        let typed = self.axes.iter().filter_map(|axis| Some((axis.field?, &axis.values)));
+        typed
+            .map(|(field, values)| {
+                let axis = format!("{}={}", field.key, values).parse::<GridAxis>();
+                axis.map_err(|why| format!("{}: {why}", field.name))
+            })
+            .collect()
+    }
+}
+
+/// The form, and how far a study is that was begun here.
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, order: &mut Order) {
+    let tokens = Tokens::of(ui);
+    let study = &shared.session.study;
+    match work(ui, &study.work, "the study") {
+        Some(WorkAsked::Pause) => shared.send(Command::PauseStudy),
+        Some(WorkAsked::Cancel) => shared.send(Command::CancelStudy),
+        None => {}
+    }
+    if shared.session.data.dataset.is_none() || shared.session.study.work.is_running() {
+        return;
+    }
+    let shown = shared.session.study.run.is_some();
+    if shown {
+        let arrow = if order.open { "▾" } else { "▸" };
+        let button = ui.small_button(format!("{arrow} New study"));
+        let button = button.named(Role::Button, "New study");
+        if button.on_hover_text("Study the listed frames with the settings in force.").clicked() {
+            order.open = !order.open;
+        }
+        if !order.open {
+            return;
+        }
+    }
+    ui.horizontal_wrapped(|ui| {
+        kind(ui, order);
+        if order.study == StudyKind::Sweep {
+            for k in 0..order.axes.len() {
+                axis(ui, &mut order.axes[k], k);
+            }
+        }
+    });
+    match asked(shared.session, order) {
+        Ok((grid, variants, frames)) => ui.horizontal_wrapped(|ui| {
+            let run = ui.add_enabled(frames > 0, egui::Button::new("Run study"));
+            let tip = "On all cores, from the settings in force. It is kept: the same study goes on where it was stopped, and \
+                       one that is done is there at once.";
+            if run.on_hover_text(tip).clicked() {
+                order.open = false;
+                shared.send(Command::RunStudy(StudyOrder { study: order.study, grid }));
+            }
+            let fits = variants * frames;
+            let text = format!("{variants} variants × {frames} frames = {fits} fits");
+            let color = if fits > MANY { tokens.warn } else { tokens.dim };
+            ui.label(RichText::new(text).small().color(color)).on_hover_text(
+                "Of the frames that are selected in the list, else of all that match its filter: filter, or select, to \
+                 study fewer.",
+            );
+        }),
+        Err(why) => ui.horizontal_wrapped(|ui| {
+            ui.add_enabled(false, egui::Button::new("Run study"));
+            ui.label(RichText::new(why).small().color(tokens.bad));
+        }),
+    };
+    ui.add_space(4.0);
+}
+
+/// The grid, how many variants there are, and on how many frames; or what is wrong.
+fn asked(session: &Session, order: &Order) -> Result<(Vec<GridAxis>, usize, usize), String> {
+    let grid = order.grid()?;
+    let frames = match session.labels.selection.len() {
+        0 => session.queue.rows().len(),
+        selected => selected,
+    };
+    let layout = session.data.dataset.as_ref().map_or("", |dataset| dataset.info().layout.word());
+    let variants = points(order.study, &session.config, &grid, layout).map_err(|error| match error {
+        RunError::Grid { message, .. } => message,
+        other => other.to_string(),
+    })?;
+    Ok((grid, variants, frames))
+}
+
+fn kind(ui: &mut Ui, order: &mut Order) {
+    let menu = egui::ComboBox::from_id_salt("study").width(120.0).selected_text(order.study.word());
+    let response = menu.show_ui(ui, |ui| {
+        for kind in StudyKind::ALL.into_iter().rev() {
+            ui.selectable_value(&mut order.study, kind, kind.word()).on_hover_text(kind.title());
+        }
+    });
+    response.response.named(Role::ComboBox, "Which study").on_hover_text(order.study.title());
+    if order.study != StudyKind::Sweep {
+        ui.label(RichText::new(order.study.title()).small());
+    }
+}
+
+/// A setting and its values.
+fn axis(ui: &mut Ui, axis: &mut Axis, number: usize) {
+    let title = axis.field.map_or("no second setting", |field| field.key);
+    let menu = egui::ComboBox::from_id_salt(("axis", number)).width(110.0).selected_text(title).height(420.0);
+    let response = menu.show_ui(ui, |ui| {
+        if number > 0 && ui.selectable_label(axis.field.is_none(), "no second setting").clicked() {
+            *axis = Axis::default();
+        }
+        for group in FieldGroup::ALL {
+            ui.label(RichText::new(group.title()).small().weak());
+            for field in FIELDS.iter().filter(|field| field.group == group) {
+                let chosen = axis.field.is_some_and(|chosen| chosen.key == field.key);
+                if ui.selectable_label(chosen, field.key).on_hover_text(field.tip()).clicked() {
+                    *axis = Axis { field: Some(field), values: offered(field) };
+                }
+            }
+        }
+    });
+    response.response.named(Role::ComboBox, &format!("Setting {}", number + 1));
+    if let Some(field) = axis.field {
+        let edit = egui::TextEdit::singleline(&mut axis.values).desired_width(130.0);
+        let tip = format!("Values with commas between: {}.", field.expected());
+        ui.add(edit).named(Role::TextInput, &format!("Values of setting {}", number + 1)).on_hover_text(tip);
+    }
+}
+
+/// Values over what the screen offers of a setting; every answer of a choice.
+fn offered(field: &'static Field) -> String {
+    let numbers = |lo: f64, hi: f64, logarithmic: bool, whole: bool| {
+        let share = |k: usize| k as f64 / (STEPS - 1) as f64;
+        let lowest = if lo > 0.0 { lo } else { hi * 1e-3 };
+        let at = |k: usize| {
+            if logarithmic { lowest * (hi / lowest).powf(share(k)) } else { lo + (hi - lo) * share(k) }
+        };
+        let mut values: Vec<f64> = (0..STEPS).map(|k| if whole { at(k).round() } else { two_digits(at(k)) }).collect();
+        values.dedup();
+        values.into_iter().map(|x| field.text(Value::Number(x))).collect::<Vec<_>>()
+    };
+    let values = match &field.kind {
+        FieldKind::Number(number) => numbers(number.offered.0, number.offered.1, number.logarithmic, number.whole),
+        FieldKind::Switch => vec!["false".to_owned(), "true".to_owned()],
+        FieldKind::Choice(answers) => answers.iter().map(|answer| answer.word.to_owned()).collect(),
+    };
+    values.join(",")
+}
+
+/// The nearest number of two digits that count.
+fn two_digits(x: f64) -> f64 {
+    if x == 0.0 {
+        return x;
+    }
+    let unit = 10f64.powi(1 - x.abs().log10().floor() as i32);
+    (x * unit).round() / unit
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+    use super::*;
+    use crate::config::FitConfig;
+
+    #[test]
+    fn what_is_offered_for_a_setting_can_be_swept() {
+        for field in FIELDS {
+            let axis: GridAxis = format!("{}={}", field.key, offered(field)).parse().unwrap();
+            let count = points(StudyKind::Sweep, &FitConfig::default(), &[axis], "").unwrap();
+            assert!(count > 1, "{}: {}", field.key, offered(field));
+        }
+    }
+}
