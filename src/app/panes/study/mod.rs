@@ -42,7 +42,7 @@ pub(in crate::app) static PANE: Pane = Pane {
 #[derive(Default)]
 struct State {
     measure: PlottedQuantity,
-    order: order::Order,
+    order: Option<order::Order>,
     values: Option<(u64, Vec<(PlottedQuantity, Values)>)>,
 }
 
@@ -170,14 +170,16 @@ fn head(ui: &mut Ui, shared: &mut Shared<'_>) {
     let (spec, data) = (&run.spec, &run.spec.data);
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new(spec.study.title()).font(theme::strong(theme::TITLE)));
-        if !run.complete {
+        let growing = shared.session.study.work.is_running();
+        if !run.complete && !growing {
             let text = format!("△ not finished: {} fits so far", run.rows.len());
             ui.label(RichText::new(text).small().color(tokens.warn));
         }
-        if ui
-            .small_button("Read again")
-            .on_hover_text("Read the run folder again: what a running study has done since.")
-            .clicked()
+        if !growing
+            && ui
+                .small_button("Read again")
+                .on_hover_text("Read the run folder again: what a running study has done since.")
+                .clicked()
         {
             shared.send(Command::OpenRun(folder.clone()));
         }

@@ -3,7 +3,7 @@
 use crate::app::panes::Shared;
 use crate::app::theme::Tokens;
 use crate::app::widgets::{Named as _, WorkAsked, work};
-use crate::config::{FIELDS, Field, FieldGroup, FieldKind, Value};
+use crate::config::{FIELDS, Field, FieldGroup, FieldKind, FitConfig, Number, Value};
 use crate::session::{Command, Session, StudyOrder};
 use crate::study::run::{GridAxis, RunError, StudyKind, points};
 use egui::{RichText, Role, Ui};
@@ -30,17 +30,16 @@ struct Axis {
     values: String,
 }
 
-impl Default for Order {
-    fn default() -> Self {
+impl Order {
+    /// A sweep of the two settings that are tuned most, around what they are set to.
+    fn around(config: &FitConfig) -> Self {
         let axis = |key: &str| {
             let field = Field::of_key(key);
-            Axis { field, values: field.map(offered).unwrap_or_default() }
+            Axis { field, values: field.map(|field| offered(field, config)).unwrap_or_default() }
         };
         Self { study: StudyKind::Sweep, axes: [axis("w_em"), axis("tau_pct")], open: false }
     }
-}
 
-impl Order {
     /// The axes, or what is wrong with them.
     fn grid(&self) -> Result<Vec<GridAxis>, String> {
         if self.study != StudyKind::Sweep {
@@ -57,7 +56,9 @@ impl Order {
 }
 
 /// The form, and how far a study is that was begun here.
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, order: &mut Order) {
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, order: &mut Option<Order>) {
+    let config = shared.session.config;
+    let order = order.get_or_insert_with(|| Order::around(&config));
     let tokens = Tokens::of(ui);
     let study = &shared.session.study;
     match work(ui, &study.work, "the study") {
@@ -84,7 +85,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, order: &mut Order) {
         kind(ui, order);
         if order.study == StudyKind::Sweep {
             for k in 0..order.axes.len() {
-                axis(ui, &mut order.axes[k], k);
+                axis(ui, &mut order.axes[k], k, &config);
             }
         }
     });
@@ -142,7 +143,7 @@ fn kind(ui: &mut Ui, order: &mut Order) {
 }
 
 /// A setting and its values.
-fn axis(ui: &mut Ui, axis: &mut Axis, number: usize) {
+fn axis(ui: &mut Ui, axis: &mut Axis, number: usize, config: &FitConfig) {
     let title = axis.field.map_or("no second setting", |field| field.key);
     let menu = egui::ComboBox::from_id_salt(("axis", number)).width(110.0).selected_text(title).height(420.0);
     let response = menu.show_ui(ui, |ui| {
@@ -154,7 +155,7 @@ fn axis(ui: &mut Ui, axis: &mut Axis, number: usize) {
             for field in FIELDS.iter().filter(|field| field.group == group) {
                 let chosen = axis.field.is_some_and(|chosen| chosen.key == field.key);
                 if ui.selectable_label(chosen, field.key).on_hover_text(field.tip()).clicked() {
-                    *axis = Axis { field: Some(field), values: offered(field) };
+                    *axis = Axis { field: Some(field), values: offered(field, config) };
                 }
             }
         }
@@ -167,22 +168,22 @@ fn axis(ui: &mut Ui, axis: &mut Axis, number: usize) {
     }
 }
 
-/// Values over what the screen offers of a setting; every answer of a choice.
-fn offered(field: &'static Field) -> String {
-    let numbers = |lo: f64, hi: f64, logarithmic: bool, whole: bool| {
+/// Values around what a setting is set to, over what the screen offers where that is nothing; every answer of a choice.
+fn offered(field: &'static Field, config: &FitConfig) -> String {
+    let number = |number: &Number, value: f64| {
+        let ((lo, hi), whole) = (number.offered, number.whole);
         let share = |k: usize| k as f64 / (STEPS - 1) as f64;
-        let lowest = if lo > 0.0 { lo } else { hi * 1e-3 };
-        let at = |k: usize| {
-            if logarithmic { lowest * (hi / lowest).powf(share(k)) } else { lo + (hi - lo) * share(k) }
-        };
-        let mut values: Vec<f64> = (0..STEPS).map(|k| if whole { at(k).round() } else { two_digits(at(k)) }).collect();
+        let at = |k: usize| if value > 0.0 { value * 2f64.powi(k as i32 - 2) } else { lo + (hi - lo) * share(k) };
+        let near = |x: f64| if whole { x.round() } else { two_digits(x) };
+        let mut values: Vec<f64> = (0..STEPS).map(|k| near(at(k)).clamp(number.range.0, number.range.1)).collect();
         values.dedup();
         values.into_iter().map(|x| field.text(Value::Number(x))).collect::<Vec<_>>()
     };
-    let values = match &field.kind {
-        FieldKind::Number(number) => numbers(number.offered.0, number.offered.1, number.logarithmic, number.whole),
-        FieldKind::Switch => vec!["false".to_owned(), "true".to_owned()],
-        FieldKind::Choice(answers) => answers.iter().map(|answer| answer.word.to_owned()).collect(),
+    let values = match (&field.kind, field.get(config)) {
+        (FieldKind::Number(of), Value::Number(value)) => number(of, value),
+        (FieldKind::Number(of), _) => number(of, of.unset.map_or(0.0, |unset| unset.first)),
+        (FieldKind::Switch, _) => vec!["false".to_owned(), "true".to_owned()],
+        (FieldKind::Choice(answers), _) => answers.iter().map(|answer| answer.word.to_owned()).collect(),
     };
     values.join(",")
 }
@@ -200,14 +201,19 @@ fn two_digits(x: f64) -> f64 {
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
     use super::*;
-    use crate::config::FitConfig;
+    use crate::config::Preset;
 
     #[test]
     fn what_is_offered_for_a_setting_can_be_swept() {
-        for field in FIELDS {
-            let axis: GridAxis = format!("{}={}", field.key, offered(field)).parse().unwrap();
-            let count = points(StudyKind::Sweep, &FitConfig::default(), &[axis], "").unwrap();
-            assert!(count > 1, "{}: {}", field.key, offered(field));
+        for preset in Preset::ALL {
+            for field in FIELDS {
+                let values = offered(field, &preset.config());
+                let axis: GridAxis = format!("{}={values}", field.key).parse().unwrap();
+                let count = points(StudyKind::Sweep, &preset.config(), &[axis], "").unwrap();
+                assert!(count > 1, "{}: {values}", field.key);
+            }
         }
+        let of = |key| offered(Field::of_key(key).unwrap(), &Preset::Baseline.config());
+        assert_eq!((of("tau_pct").as_str(), of("iterations").as_str()), ("2.5,5,10,20,40", "25,50,100,200,400"));
     }
 }

@@ -63,7 +63,7 @@ pub(super) fn show(ui: &mut Ui, run: &Run, chosen: Option<usize>, tokens: &Token
     let shown: Vec<_> = COLUMNS.iter().filter(|(.., cell)| run.table.iter().any(|row| cell(row).is_some())).collect();
     let mut asked = None;
     let grid = egui::Grid::new("study table")
-        .num_columns(2 + shown.len() + usize::from(!notes.is_empty()))
+        .num_columns(3 + shown.len() + usize::from(!notes.is_empty()))
         .spacing([12.0, 2.0])
         .striped(true);
     grid.show(ui, |ui| {
@@ -94,9 +94,11 @@ pub(super) fn show(ui: &mut Ui, run: &Run, chosen: Option<usize>, tokens: &Token
                 let text = RichText::new(text.unwrap_or_else(|| "–".into())).font(theme::mono(theme::CAPTION));
                 right(ui, |ui| ui.label(text.color(color)));
             }
+            // The last column of a grid takes what room there is: one without a number.
             if let Some(mark) = mark(&notes, row) {
                 ui.label(RichText::new(mark).small()).on_hover_text(row.note.as_deref().unwrap_or_default());
             }
+            ui.label("");
             ui.end_row();
         }
     });
