@@ -5,6 +5,7 @@
 mod blob;
 
 mod acts;
+mod another;
 mod batch;
 mod labels;
 mod live;

@@ -17,10 +17,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A session on a data set of four frames, and what the worker would answer.
-struct Bench {
-    session: Session,
+pub(crate) struct Bench {
+    pub(crate) session: Session,
     dataset: Arc<Dataset>,
-    params: Pppr,
+    pub(crate) params: Pppr,
     folder: tempfile::TempDir,
 }
 
@@ -42,7 +42,7 @@ fn of_data_and_fit(mut effects: Vec<Effect>) -> Vec<Effect> {
 
 impl Bench {
     /// Frame 0 is on screen and its fit is ready at iteration 0.
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let dataset = dataset(folder.path(), 4);
         let frame = dataset.load(0).unwrap();
@@ -56,13 +56,23 @@ impl Bench {
         bench
     }
 
+    /// Another data set is opened, and the fit of its first frame is ready.
+    pub(crate) fn open_another(&mut self) {
+        let folder = tempfile::tempdir().unwrap();
+        self.dataset = dataset(folder.path(), 4);
+        self.folder = folder;
+        self.report(Report::Opened(self.folder.path().into(), Ok(Arc::clone(&self.dataset))));
+        let prepare = self.load(0);
+        self.answer(prepare);
+    }
+
     /// What follows for data and fit of what a person asks.
-    fn apply(&mut self, command: Command) -> Vec<Effect> {
+    pub(crate) fn apply(&mut self, command: Command) -> Vec<Effect> {
         of_data_and_fit(self.session.apply(command))
     }
 
     /// What follows for data and fit of what a thread tells.
-    fn report(&mut self, report: Report) -> Vec<Effect> {
+    pub(crate) fn report(&mut self, report: Report) -> Vec<Effect> {
         of_data_and_fit(self.session.report(report))
     }
 
@@ -73,14 +83,14 @@ impl Bench {
         prepare_of(effects)
     }
 
-    fn goto(&mut self, index: usize) -> Prepare {
+    pub(crate) fn goto(&mut self, index: usize) -> Prepare {
         let effects = self.apply(Command::GotoFrame(index));
         assert!(matches!(effects[..], [Effect::Load(i)] if i == index), "{effects:?}");
         self.load(index)
     }
 
     /// The worker answers a preparation.
-    fn answer(&mut self, prepare: Prepare) {
+    pub(crate) fn answer(&mut self, prepare: Prepare) {
         let Prepare { job, branch, dataset, frame, start, .. } = prepare;
         let problem = Arc::new(problem_alone(&dataset, &frame).unwrap());
         let (initial, resumed) = match start {
@@ -125,7 +135,7 @@ impl Bench {
     }
 
     /// Runs the active branch to an iteration.
-    fn run_to(&mut self, last: usize) {
+    pub(crate) fn run_to(&mut self, last: usize) {
         let (job, branch, head) = (self.job(), self.session.fit.history.active_id(), self.session.fit.head());
         self.apply(Command::StepFit(last - head));
         self.rows(job, branch, head + 1..=last);

@@ -1,6 +1,7 @@
 //! Opening data sets, changing frames, putting fits aside and finding them again.
 
 use crate::body::Pppr;
+use crate::config::FitConfig;
 use crate::dataset::{Dataset, DatasetError, Frame};
 use crate::session::batch::Batch;
 use crate::session::command::StartAt;
@@ -8,7 +9,9 @@ use crate::session::effect::Effect;
 use crate::session::evidence::EvidenceState;
 use crate::session::fit::{Fit, FitStatus};
 use crate::session::history::History;
+use crate::session::identity::Identities;
 use crate::session::pins::Pins;
+use crate::session::settings::SettingsActs;
 use crate::session::state::{LogLevel, Opening, RECENT, Session};
 use crate::worker::{Prepare, Start, WorkerCommand};
 use std::path::PathBuf;
@@ -63,18 +66,13 @@ impl Session {
         if self.batch.is_running() {
             effects.push(Effect::CancelBatch);
         }
-        self.fits.clear();
-        self.left.clear();
-        self.summaries.change().clear();
         self.results_from = None;
         effects.extend(self.clear_results());
-        self.pins = Pins::default();
-        self.batch = Batch::default();
-        self.evidence = EvidenceState::default();
-        self.data.frame = None;
-        self.data.playing = false;
+        self.forget_frames();
+        if self.data.dataset.as_ref().is_some_and(|old| old.info().root != dataset.info().root) {
+            self.forget_scene();
+        }
         self.data.dataset = Some(Arc::clone(&dataset));
-        self.joint = None;
         effects.push(Effect::UseDataset(Arc::clone(&dataset)));
         let start = self.aimed(&dataset).unwrap_or(start);
         let (start, pins) = self.restore(&dataset).unwrap_or((start, Vec::new()));
@@ -86,6 +84,35 @@ impl Session {
         effects.extend(self.load_waiting_results());
         effects.push(Effect::FindKept(Arc::clone(&dataset)));
         effects
+    }
+
+    /// Forgets what speaks of frames, fits, joints and persons by their numbers, which mean others from now on.
+    fn forget_frames(&mut self) {
+        self.fits.clear();
+        self.left.clear();
+        self.summaries.change().clear();
+        self.pins = Pins::default();
+        self.batch = Batch::default();
+        self.evidence = EvidenceState::default();
+        self.identities = Identities::default();
+        self.settings = SettingsActs::default();
+        self.study.row = None;
+        self.queue.last_position = 0;
+        self.data.frame = None;
+        self.data.playing = false;
+        self.joint = None;
+    }
+
+    /// Forgets what was said of the scene, when another data set takes the place of one: which of its frames are listed, how
+    /// many people are in it, and the file that its session is kept in.
+    fn forget_scene(&mut self) {
+        self.queue.set_text(String::new());
+        self.session_path = None;
+        let people = FitConfig::default().people;
+        if self.config.people != people {
+            self.note(LogLevel::Info, format!("people {} → {people}: this is another data set", self.config.people));
+            self.config.people = people;
+        }
     }
 
     /// The frame that was asked for by name or index.
