@@ -344,11 +344,11 @@ impl InspectorApp {
 
     /// Errors and warnings that appeared since the last pass become notifications.
     fn take_notices(&mut self, ctx: &egui::Context) {
-        if let Some((count, level, text)) = &self.runtime.session().notice
-            && *count > self.notices_seen
+        if let Some(notice) = &self.runtime.session().notice
+            && notice.count > self.notices_seen
         {
-            self.notices_seen = *count;
-            self.overlay.notify(*level, text.clone(), ctx.input(|i| i.time));
+            self.notices_seen = notice.count;
+            self.overlay.tell(notice.clone(), ctx.input(|i| i.time));
         }
     }
 }

@@ -2,18 +2,15 @@
 
 mod bare;
 mod files;
+mod notices;
+mod palette;
 
-use super::commands::{Menu, SaveKind, all, found, shortcut_text};
+use super::commands::{Menu, SaveKind, all, shortcut_text};
 use super::panes::Shared;
 use super::theme::{self, Tokens};
-use crate::session::{Command, LogLevel, PickKind};
-use egui::{Align2, Key, RichText, Ui, vec2};
+use crate::session::{Command, LogLevel, Notice, PickKind};
+use egui::{Key, RichText, Ui, vec2};
 use std::path::PathBuf;
-
-/// Seconds that a notification of something wrong stays.
-const NOTICE_S: f64 = 8.0;
-/// Seconds that one of something done stays.
-const HINT_S: f64 = 4.0;
 
 /// Which sheet is open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -40,7 +37,7 @@ pub(super) struct Overlay {
     hint: String,
     chosen: usize,
     fresh: bool,
-    notices: Vec<(f64, LogLevel, String)>,
+    notices: notices::Notices,
     bare: bare::BareQuestion,
     files: files::FileDialog,
 }
@@ -81,15 +78,16 @@ impl Overlay {
     }
 
     pub(super) fn notify(&mut self, level: LogLevel, text: String, now: f64) {
-        let stays = if level == LogLevel::Info { HINT_S } else { NOTICE_S };
-        self.notices.push((now + stays, level, text));
-        let surplus = self.notices.len().saturating_sub(4);
-        self.notices.drain(..surplus);
+        self.tell(Notice { count: 0, level, text, act: None }, now);
+    }
+
+    pub(super) fn tell(&mut self, notice: Notice, now: f64) {
+        self.notices.tell(notice, now);
     }
 
     pub(super) fn show(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) {
         self.bare.show(ui, shared);
-        self.notices(ui);
+        self.notices.show(ui, shared);
         let close = match self.sheet {
             Sheet::None => false,
             Sheet::Palette => self.palette(ui, shared),
@@ -105,56 +103,6 @@ impl Overlay {
         if close {
             self.sheet = Sheet::None;
         }
-    }
-
-    /// Type to find a command, arrows to choose, Enter to do it.
-    fn palette(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
-        let (up, down, enter) = ui.input_mut(|i| {
-            let none = egui::Modifiers::NONE;
-            (i.consume_key(none, Key::ArrowUp), i.consume_key(none, Key::ArrowDown), i.key_pressed(Key::Enter))
-        });
-        let found = found(&self.query);
-        let last = found.len().saturating_sub(1);
-        self.chosen = (self.chosen + usize::from(down)).min(last).saturating_sub(usize::from(up));
-        let mut done = false;
-        let tokens = Tokens::of(ui);
-        let response = modal(ui, "palette").show(ui.ctx(), |ui| {
-            ui.set_width(460.0);
-            let field = ui.add(
-                egui::TextEdit::singleline(&mut self.query).hint_text("Type a command").desired_width(f32::INFINITY),
-            );
-            field.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Command palette"));
-            if self.fresh {
-                field.request_focus();
-                self.fresh = false;
-            }
-            if field.changed() {
-                self.chosen = 0;
-            }
-            ui.add_space(4.0);
-            egui::ScrollArea::vertical().max_height(340.0).show(ui, |ui| {
-                for (i, command) in found.iter().enumerate() {
-                    let enabled = command.enabled(shared.session);
-                    let mut button = egui::Button::new(command.text(shared.session).into_owned())
-                        .selected(i == self.chosen)
-                        .min_size(vec2(440.0, 22.0));
-                    let keys = command.keys().first().map(|&k| shortcut_text(k)).unwrap_or_default();
-                    button = button.shortcut_text(keys).frame_when_inactive(false);
-                    let response = ui.add_enabled(enabled, button).on_hover_text(command.tooltip());
-                    if i == self.chosen && (up || down) {
-                        response.scroll_to_me(None);
-                    }
-                    if response.clicked() || (enter && i == self.chosen && enabled) {
-                        shared.acts.push(command.action(shared.session));
-                        done = true;
-                    }
-                }
-                if found.is_empty() {
-                    ui.label(RichText::new("No command has these words.").color(tokens.dim));
-                }
-            });
-        });
-        done || response.should_close()
     }
 
     fn goto(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
@@ -203,44 +151,6 @@ impl Overlay {
             }
         });
         done || response.should_close()
-    }
-
-    fn notices(&mut self, ui: &Ui) {
-        let now = ui.input(|i| i.time);
-        self.notices.retain(|(until, ..)| *until > now);
-        let tokens = Tokens::of(ui);
-        let mut closed = None;
-        for (i, (until, level, text)) in self.notices.iter().enumerate() {
-            let (sign, color) = match level {
-                LogLevel::Error => ("■", tokens.bad),
-                LogLevel::Warning => ("▲", tokens.warn),
-                LogLevel::Info => ("●", tokens.accent),
-            };
-            let offset = vec2(-12.0, -74.0 - 64.0 * i as f32);
-            egui::Area::new(egui::Id::unique(("notice", i)))
-                .anchor(Align2::RIGHT_BOTTOM, offset)
-                .order(egui::Order::Foreground)
-                .show(ui.ctx(), |ui| {
-                    egui::Frame::popup(ui.style()).stroke(egui::Stroke::new(1.0, color)).show(ui, |ui| {
-                        ui.set_max_width(420.0);
-                        ui.horizontal(|ui| {
-                            ui.label(RichText::new(sign).color(color));
-                            ui.add(egui::Label::new(RichText::new(text).small()).wrap());
-                            let close = ui.small_button("✕");
-                            close.widget_info(|| {
-                                egui::WidgetInfo::labeled(egui::Role::Button, true, "Dismiss notification")
-                            });
-                            if close.clicked() {
-                                closed = Some(i);
-                            }
-                        });
-                    });
-                });
-            ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64((until - now).max(0.05)));
-        }
-        if let Some(i) = closed {
-            self.notices.remove(i);
-        }
     }
 }
 

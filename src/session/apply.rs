@@ -25,7 +25,7 @@ pub(super) use reports::mean_known;
 use super::command::Command;
 use super::effect::Effect;
 use super::report::Report;
-use super::state::{LOG_LINES, LogLevel, LogLine, Session};
+use super::state::{LOG_LINES, LogLevel, LogLine, Notice, Session};
 use super::strata::StrataStatus;
 
 impl Session {
@@ -90,12 +90,7 @@ impl Session {
                 self.view.saved_views.retain(|view| view.name != name);
                 Vec::new()
             }
-            Command::SelectFrames(frames) => {
-                let mut frames = frames;
-                frames.split_off(&self.data.len());
-                self.labels.select(frames);
-                Vec::new()
-            }
+            Command::SelectFrames(frames) => self.select_frames(frames),
             Command::ToggleTag(tag) => self.toggle_tag(tag),
             Command::SetNote(frames, note) => self.set_note(frames, note),
             Command::SetPerson(person) => self.set_person(person),
@@ -242,9 +237,17 @@ impl Session {
         self.notify(LogLevel::Info, text);
     }
 
+    /// The same of the act that was done last, which the notification offers to take back.
+    pub(super) fn hint_of_act(&mut self, text: String) {
+        self.hint(text);
+        if let Some(notice) = &mut self.notice {
+            notice.act = Some(self.acts_done);
+        }
+    }
+
     fn notify(&mut self, level: LogLevel, text: String) {
-        let count = self.notice.as_ref().map_or(0, |(count, ..)| *count);
-        self.notice = Some((count + 1, level, text));
+        let count = self.notice.as_ref().map_or(0, |notice| notice.count);
+        self.notice = Some(Notice { count: count + 1, level, text, act: None });
     }
 
     /// Writes a line to the log; warnings and errors also become the notice.

@@ -56,7 +56,7 @@ pub use report::{OpenedLabels, Report, Written};
 pub use results::FoundResults;
 pub use runtime::{Picker, Runtime, Wake};
 pub use settings::{Live, LiveFrom, RunSpeed};
-pub use state::{Data, FitHashes, FrameSummary, LogLevel, LogLine, Opening, Session};
+pub use state::{Data, FitHashes, FrameSummary, LogLevel, LogLine, Notice, Opening, Session};
 pub use strata::{Strata, StrataStatus};
 pub use study::{StudyOrder, StudyRequest, StudyView};
 pub use tracked::Tracked;

@@ -51,6 +51,19 @@ pub struct LogLine {
     pub text: String,
 }
 
+/// Something to be told in a notification.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Notice {
+    /// Counts up, so that the same text twice is told twice.
+    pub count: u64,
+    /// How bad.
+    pub level: LogLevel,
+    /// What.
+    pub text: String,
+    /// The act of which it tells, where it is one that touches so much that it must be easy to take back.
+    pub act: Option<u64>,
+}
+
 /// A data set that is being opened.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Opening {
@@ -182,8 +195,8 @@ pub struct Session {
     pub view: ViewState,
     /// The log, oldest first.
     pub log: VecDeque<LogLine>,
-    /// The newest error, for a notification; counts up so that the same text twice is told twice.
-    pub notice: Option<(u64, LogLevel, String)>,
+    /// The newest that is to be told.
+    pub notice: Option<Notice>,
     /// Where the session was saved to or opened from.
     pub session_path: Option<PathBuf>,
     /// Where to begin in the data set that is being opened.

@@ -294,7 +294,7 @@ impl Window {
 
     /// The newest error or hint contains these words.
     pub(crate) fn told(&self, words: &str) -> bool {
-        self.session().notice.as_ref().is_some_and(|(_, _, text)| text.contains(words))
+        self.session().notice.as_ref().is_some_and(|notice| notice.text.contains(words))
     }
 
     pub(crate) fn frame(&self) -> usize {

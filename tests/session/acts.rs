@@ -109,6 +109,32 @@ fn an_act_on_every_frame_is_one_act_that_is_undone_and_done_again() {
 }
 
 #[test]
+fn an_act_on_more_frames_than_can_be_seen_is_told_and_offers_to_be_taken_back() {
+    let mut bench = Bench::new();
+    let told = |bench: &Bench| bench.session.notice.as_ref().map(|notice| notice.text.clone()).unwrap_or_default();
+    bench.session.apply(Command::SelectFrames((0..20).collect()));
+    let commit = bench.ask(Command::ToggleTag(Tag::F2));
+    bench.answer(commit);
+    assert_eq!(bench.session.notice, None, "twenty rows are in sight");
+    bench.session.apply(Command::SelectFrames((0..100).collect()));
+    assert!(told(&bench).starts_with("100 frames are selected"), "{}", told(&bench));
+    bench.session.apply(Command::SelectFrames((0..30).collect()));
+    bench.session.notice = None;
+    bench.session.apply(Command::SelectFrames((0..31).collect()));
+    assert_eq!(bench.session.notice, None, "who selects one after the other sees each");
+    let commit = bench.ask(Command::ToggleTag(Tag::F1));
+    assert_eq!(bench.session.notice, None, "nothing is told before it is on disk");
+    bench.answer(commit);
+    assert_eq!(told(&bench), "tag F1 on 31 frames");
+    let offered = bench.session.notice.as_ref().and_then(|notice| notice.act);
+    assert!(offered.is_some() && offered == bench.session.undo_act());
+    let undo = bench.ask(Command::Undo);
+    bench.answer(undo);
+    assert_ne!(bench.session.undo_act(), offered, "it cannot be taken back twice");
+    assert_eq!((bench.tags(3), bench.tags(25)), ("F2".into(), String::new()));
+}
+
+#[test]
 fn an_act_counts_what_is_still_being_written() {
     let mut bench = Bench::new();
     bench.session.apply(Command::SelectFrames((0..100).collect()));

@@ -7,7 +7,8 @@ use mhp_inspector::config::{FIELDS, Field, FieldKind, FitConfig, Number, ReadBy,
 use mhp_inspector::dataset::{BareCatalog, BareChoice, Dataset, DatasetError};
 use mhp_inspector::mhp::{Adam, Evaluation, FitState, StepReport, StopReason, Terms, initialise};
 use mhp_inspector::session::{
-    Command, Effect, FitStatus, History, IterationRow, LogLevel, PickKind, Report, Session, ThemeChoice, ViewState,
+    Command, Effect, FitStatus, History, IterationRow, LogLevel, Notice, PickKind, Report, Session, ThemeChoice,
+    ViewState,
 };
 use mhp_inspector::start::problem_alone;
 use mhp_inspector::worker::{
@@ -228,12 +229,12 @@ fn an_error_while_opening_keeps_what_is_on_screen() {
     let effects = bench.report(Report::Opened("/gone".into(), Err(DatasetError::NotFound { path: "/gone".into() })));
     assert!(effects.is_empty());
     assert_eq!(bench.errors(), ["/gone: no such file or folder"]);
-    let (count, level, text) = bench.session.notice.clone().unwrap();
+    let Notice { count, level, text, .. } = bench.session.notice.clone().unwrap();
     assert_eq!((level, text.as_str()), (LogLevel::Error, "/gone: no such file or folder"));
     assert_eq!((bench.session.data.opening.clone(), bench.job(), bench.session.fit.head()), (None, job, 3));
     assert!(!bench.session.data.recent.contains(&PathBuf::from("/gone")), "what cannot be opened is not remembered");
     bench.report(Report::Opened("/gone".into(), Err(DatasetError::NotFound { path: "/gone".into() })));
-    assert_eq!(bench.session.notice.unwrap().0, count + 1, "the same text again is told again");
+    assert_eq!(bench.session.notice.unwrap().count, count + 1, "the same text again is told again");
 }
 
 #[test]
@@ -768,7 +769,7 @@ fn a_run_begins_by_itself_only_where_asked() {
     };
     let effects = bench.event(job, WorkerEvent::Prepared(Box::new(prepared)));
     assert!(matches!(sent(&effects), WorkerCommand::RunTo { target: 100, .. }));
-    assert_eq!(bench.session.notice.as_ref().unwrap().2, "the region has no cell");
+    assert_eq!(bench.session.notice.as_ref().unwrap().text, "the region has no cell");
 }
 
 #[test]

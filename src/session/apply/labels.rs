@@ -6,9 +6,11 @@ use crate::session::effect::{Commit, Effect, Trash};
 use crate::session::labels::{LabelMode, LabelStatus, LabelTable};
 use crate::session::report::{OpenedLabels, Written};
 use crate::session::state::{FitHashes, LogLevel, Session};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+/// Acts on more frames are told of, and how to take them back: nobody has all of them in sight.
+const IN_SIGHT: usize = 20;
 /// Acts on so many frames are looked at before they are sent, to tell whether they would change anything; of larger ones
 /// the journal's thread tells.
 const LOOKED_AT: usize = 64;
@@ -22,6 +24,17 @@ impl Session {
             return Arc::clone(&self.labels.targets);
         }
         if self.data.is_empty() { Arc::new([]) } else { Arc::new([self.data.frame_index as u32]) }
+    }
+
+    pub(super) fn select_frames(&mut self, mut frames: BTreeSet<usize>) -> Vec<Effect> {
+        frames.split_off(&self.data.len());
+        let (before, now) = (self.labels.selection.len(), frames.len());
+        self.labels.select(frames);
+        // Who adds one frame after the other sees each.
+        if now > IN_SIGHT && now > before + 1 {
+            self.hint(format!("{now} frames are selected: a tag goes to all of them; Esc clears the selection"));
+        }
+        Vec::new()
     }
 
     pub(super) fn toggle_tag(&mut self, tag: Tag) -> Vec<Effect> {
@@ -224,6 +237,9 @@ impl Session {
                 if kind == ActKind::Do && !done.changes.is_empty() {
                     self.acts_done += 1;
                     self.settings.redo.clear();
+                    if done.changes.len() > IN_SIGHT {
+                        self.hint_of_act(act.clone());
+                    }
                 }
                 let replaced = self.labels.written(kind, (self.acts_done, act), done);
                 free(replaced.len(), (asked, replaced))

@@ -199,6 +199,12 @@ impl Session {
         self.labels.undo_name()
     }
 
+    /// The number of the last act that is not undone.
+    pub fn undo_act(&self) -> Option<u64> {
+        let settings = self.settings.undo.last().map(|act| act.at);
+        settings.max(self.labels.undo.last().map(|act| act.at))
+    }
+
     /// The act that would be done again, in words.
     pub fn redo_name(&self) -> Option<&str> {
         if self.settings_first(ActKind::Redo) {
