@@ -3,6 +3,7 @@
 //! Each pass: threads' reports become commands, pressed keys become commands, panes are drawn and send commands, all of
 //! them are applied at the end. Nothing repaints unless something changed: threads wake the window.
 
+mod closing;
 mod commands;
 mod figure;
 mod layout;
@@ -76,6 +77,8 @@ pub struct InspectorApp {
     dropped: Option<PathBuf>,
     /// The title of the window.
     title: String,
+    /// Somebody said that the window may close, whatever is under way.
+    leaving: bool,
     /// Set where the desktop answered a dialog before anybody could have.
     no_dialog: Arc<AtomicBool>,
 }
@@ -136,6 +139,7 @@ impl InspectorApp {
             applied_zoom: 1.0,
             dropped: None,
             title: String::new(),
+            leaving: false,
             no_dialog,
         };
         if let Some(session) = &begin.session {
@@ -205,7 +209,8 @@ impl InspectorApp {
 
     fn app_act(&mut self, ctx: &egui::Context, act: AppAct) {
         match act {
-            AppAct::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
+            AppAct::Quit => self.quit(ctx),
+            AppAct::StopAndQuit => self.stop_and_quit(ctx),
             AppAct::Palette => self.overlay.toggle_palette(),
             AppAct::Help => self.overlay.toggle_help(),
             AppAct::About => self.overlay.toggle_about(),
@@ -361,6 +366,7 @@ impl eframe::App for InspectorApp {
             ctx.set_zoom_factor(self.applied_zoom);
         }
         self.runtime.poll();
+        self.take_close(ctx);
         self.take_restored();
         self.take_pictures(ctx);
         self.take_drops(ctx);

@@ -4,6 +4,7 @@ mod bare;
 mod files;
 mod notices;
 mod palette;
+mod quit;
 
 use super::commands::{Menu, SaveKind, all, shortcut_text};
 use super::panes::Shared;
@@ -26,6 +27,7 @@ enum Sheet {
     Results,
     Study,
     Save(SaveKind),
+    Quit,
 }
 
 /// What lies over the panes.
@@ -99,6 +101,7 @@ impl Overlay {
             Sheet::Results => self.results_path(ui, shared),
             Sheet::Study => self.study_path(ui, shared),
             Sheet::Save(kind) => self.save(ui, shared, kind),
+            Sheet::Quit => self.quit(ui, shared),
         };
         if close {
             self.sheet = Sheet::None;

@@ -43,6 +43,7 @@ impl Session {
 
     /// What follows from any change.
     fn settle(&mut self, mut effects: Vec<Effect>) -> Vec<Effect> {
+        self.writing += effects.iter().filter(|effect| matches!(effect, Effect::Run(_))).count();
         effects.extend(self.ask_evidence());
         self.refresh_queue();
         effects

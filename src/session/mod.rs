@@ -35,6 +35,7 @@ mod state;
 mod strata;
 mod study;
 mod tracked;
+mod under_way;
 mod view;
 mod work;
 

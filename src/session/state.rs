@@ -214,6 +214,8 @@ pub struct Session {
     pub(super) acts_done: u64,
     /// Iterations a second that the worker was told.
     pub(super) pace: Option<f64>,
+    /// Files that are being written.
+    pub(super) writing: usize,
     /// The next run that a person asks for is slow enough to be watched.
     pub(super) slow_first_run: bool,
 }

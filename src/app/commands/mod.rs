@@ -57,8 +57,10 @@ impl Menu {
 /// What only the window can do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum AppAct {
-    /// Close the window.
+    /// Close the window; ask where something is under way.
     Quit,
+    /// Close the window, whatever is under way.
+    StopAndQuit,
     /// One step back from what was singled out.
     Back,
     /// Show or hide the palette.

@@ -76,7 +76,7 @@ pub(super) const COMMANDS: &[CommandRow] = &[
     CommandRow {
         label: "Quit",
         title: None,
-        tooltip: "Close the window. A fit that runs is stopped after its step.",
+        tooltip: "Close the window; asks first while a fit runs or a file is being written.",
         menu: Menu::File,
         keys: &[(CTRL, Key::Q)],
         enabled: always,

@@ -119,6 +119,7 @@ impl Session {
     }
 
     pub(super) fn task_done(&mut self, result: Result<String, String>) -> Vec<Effect> {
+        self.writing = self.writing.saturating_sub(1);
         match result {
             Ok(text) => self.hint(text),
             Err(why) => self.note(LogLevel::Error, why),

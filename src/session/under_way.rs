@@ -1,0 +1,26 @@
+//! What would be cut off by leaving now.
+
+use super::batch::BatchStatus;
+use super::state::Session;
+
+impl Session {
+    /// What is under way that leaving would cut off, a sentence each that says what of it is kept; empty where nothing is
+    /// lost by leaving.
+    pub fn under_way(&self) -> Vec<String> {
+        let mut said = Vec::new();
+        if self.fit.is_running() {
+            let name = self.data.frame.as_ref().map_or("the frame", |frame| frame.name.as_str());
+            let at = self.fit.head();
+            said.push(format!("The fit of {name} runs, iteration {at}. It is kept only in a saved session."));
+        }
+        if let BatchStatus::Running { done, total, .. } = self.batch.status {
+            said.push(format!("{done} of {total} listed frames are fitted. Those are kept; the others are not begun."));
+        }
+        match self.writing {
+            0 => {}
+            1 => said.push("A file is being written. Cut off, it is not there at all.".into()),
+            n => said.push(format!("{n} files are being written. Cut off, they are not there at all.")),
+        }
+        said
+    }
+}
