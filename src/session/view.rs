@@ -98,6 +98,41 @@ pub enum TimelineStrip {
     Tags,
 }
 
+/// How much curves over the iterations are smoothed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Smoothing {
+    /// As they are.
+    #[default]
+    Off,
+    /// Over a few iterations.
+    Light,
+    /// Over tens of iterations.
+    Strong,
+}
+
+impl Smoothing {
+    /// All of them, least to most.
+    pub const ALL: [Self; 3] = [Self::Off, Self::Light, Self::Strong];
+
+    /// What of the mean so far is kept at each iteration; `None` where nothing is smoothed.
+    pub fn weight(self) -> Option<f64> {
+        match self {
+            Self::Off => None,
+            Self::Light => Some(0.8),
+            Self::Strong => Some(0.95),
+        }
+    }
+
+    /// In words.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Off => "raw",
+            Self::Light => "smooth 0.8",
+            Self::Strong => "smooth 0.95",
+        }
+    }
+}
+
 /// Which two axes of a map with three are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum CubeAxes {
@@ -185,6 +220,10 @@ pub struct ViewState {
     pub show_gradients: bool,
     /// Log₁₀ of the losses.
     pub log_loss: bool,
+    /// Log₁₀ of the iterations, from 1 on.
+    pub log_iterations: bool,
+    /// How much curves are smoothed.
+    pub smoothing: Smoothing,
     /// Curves switched off, by name.
     pub hidden_curves: Vec<String>,
     /// Order of the frame list.
@@ -249,6 +288,8 @@ impl Default for ViewState {
             show_initial: false,
             show_gradients: false,
             log_loss: true,
+            log_iterations: false,
+            smoothing: Smoothing::default(),
             hidden_curves: Vec::new(),
             sort: Sort::default(),
             hidden_columns: ["peaks", "static", "saliency", "reason", "by"].map(str::to_owned).to_vec(),

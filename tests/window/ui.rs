@@ -3,8 +3,10 @@
 
 use crate::blob;
 use crate::window::Window;
+use egui::accesskit::Toggled;
 use egui::{Key, Modifiers, pos2};
 use egui_kittest::Harness;
+use egui_kittest::kittest::NodeT as _;
 use mhp_inspector::app::{Begin, InspectorApp, Pane};
 use mhp_inspector::body::Group;
 use mhp_inspector::config::{FitConfig, Preset};
@@ -282,6 +284,137 @@ fn the_palette_finds_and_does_a_command() {
     assert!(window.says("Keys and gestures"));
     window.key(Key::Escape);
     assert!(!window.says("Keys and gestures"));
+}
+
+#[test]
+fn one_row_of_the_palette_is_lit_and_enter_takes_it() {
+    let mut window = Window::open(1);
+    window.key_with(Modifiers::COMMAND, Key::K);
+    let rows = |w: &Window| -> Vec<(String, bool, egui::Rect)> {
+        let rows = w.harness.root().children_recursive().filter(|node| {
+            let inside = || (400.0..1040.0).contains(&node.rect().center().x) && node.rect().height() == 24.0;
+            node.accesskit_node().role() == egui::Role::Button && inside()
+        });
+        let toggled = |node: &egui_kittest::Node<'_>| node.accesskit_node().toggled() == Some(Toggled::True);
+        rows.filter_map(|node| Some((node.accesskit_node().label()?, toggled(&node), node.rect()))).collect()
+    };
+    let lit =
+        |w: &Window| -> Vec<String> { rows(w).into_iter().filter(|(_, lit, _)| *lit).map(|(name, ..)| name).collect() };
+    window.harness.step();
+    let top = window.node("Command palette").rect().bottom();
+    let seen = rows(&window).iter().filter(|(_, _, rect)| rect.top() > top && rect.bottom() < 860.0).count();
+    assert!(seen >= 12, "{seen} rows");
+    assert_eq!(lit(&window), ["Open folder…"]);
+    window.type_text("frames");
+    let found: Vec<String> = rows(&window).into_iter().map(|(name, ..)| name).collect();
+    assert_eq!(lit(&window), found[..1], "the best");
+    for _ in 0..3 {
+        window.key(Key::ArrowDown);
+    }
+    window.key(Key::ArrowUp);
+    assert_eq!(lit(&window), found[2..3]);
+    window.key(Key::PageUp);
+    window.key(Key::ArrowUp);
+    assert_eq!(lit(&window), found[..1], "never none");
+    window.key_with(Modifiers::COMMAND, Key::A);
+    window.type_text("wipe");
+    assert_eq!(lit(&window), ["Wipe H_ori | H_sim"]);
+    window.key(Key::ArrowDown);
+    window.key(Key::ArrowUp);
+    window.key(Key::Enter);
+    assert_eq!(window.session().view.compare, Compare::Wipe);
+}
+
+/// Names of pictures of single curves, and what is behind the axes.
+#[test]
+fn curves_have_a_log_axis_of_iterations_smoothing_and_a_wheel() {
+    use mhp_inspector::session::Smoothing;
+    let mut window = Window::fitted(1);
+    let view = |w: &Window| (w.session().view.log_iterations, w.session().view.smoothing);
+    assert_eq!(view(&window), (false, Smoothing::Off));
+    window.click("log x");
+    window.click("Smoothing");
+    window.click("smooth 0.95");
+    assert_eq!(view(&window), (true, Smoothing::Strong));
+    // On a log axis the middle of the picture is an early iteration: log₁₀(21) / 2 is 3.6 of 20.
+    let middle = window.node("Curve of L").rect().center();
+    window.harness.hover_at(middle);
+    window.harness.drag_at(middle);
+    window.harness.drop_at(middle);
+    window.harness.step();
+    window.until("an early iteration", |w| w.fit().shown_iteration() == 4);
+    // Zoomed in at the right edge, the left edge is a late iteration.
+    window.harness.run_steps(60);
+    let rect = window.node("Curve of L").rect();
+    let turn = |w: &mut Window, at: egui::Pos2| {
+        w.harness.hover_at(at);
+        let delta = egui::vec2(0.0, 400.0);
+        let (unit, phase, modifiers) = (egui::MouseWheelUnit::Point, egui::TouchPhase::Move, Modifiers::NONE);
+        let source = egui::MouseWheelSource::Unknown;
+        w.harness.event(egui::Event::MouseWheel { unit, delta, phase, modifiers, source });
+        w.harness.run_steps(40);
+    };
+    turn(&mut window, rect.right_center() - egui::vec2(3.0, 0.0));
+    let left = rect.left_center() + egui::vec2(3.0, 0.0);
+    let click = |w: &mut Window| {
+        w.harness.hover_at(left);
+        w.harness.drag_at(left);
+        w.harness.drop_at(left);
+        w.harness.step();
+    };
+    click(&mut window);
+    window.until("a late iteration", |w| w.fit().shown_iteration() > 8);
+    let shown = window.fit().shown_iteration();
+    // A double click shows all, and the iteration stays.
+    window.harness.run_steps(60);
+    click(&mut window);
+    click(&mut window);
+    window.until("the same iteration", |w| w.fit().shown_iteration() == shown);
+    window.harness.run_steps(60);
+    click(&mut window);
+    window.until("the start", |w| w.fit().shown_iteration() == 0);
+}
+
+/// What the window asks of the desktop about being closed.
+fn closing(window: &Window) -> (bool, bool) {
+    let output = &window.harness.output().viewport_output[&egui::ViewportId::ROOT];
+    let has = |command| output.commands.contains(&command);
+    (has(egui::ViewportCommand::Close), has(egui::ViewportCommand::CancelClose))
+}
+
+fn press_the_close_button(window: &mut Window) {
+    let root = window.harness.input_mut().viewports.entry(egui::ViewportId::ROOT).or_default();
+    root.events.push(egui::ViewportEvent::Close);
+    window.harness.step();
+}
+
+#[test]
+fn leaving_asks_while_something_would_be_cut_off() {
+    let mut window = Window::open(2);
+    press_the_close_button(&mut window);
+    assert!(!window.says("Quit now?") && !closing(&window).1, "nothing is under way");
+    window.run_forever();
+    press_the_close_button(&mut window);
+    assert!(closing(&window).1, "the desktop is told to wait");
+    window.harness.step();
+    assert!(window.says("The fit of frames/000 runs") && window.says("Labels and the fits of batches are on disk"));
+    press_the_close_button(&mut window);
+    assert!(closing(&window).1, "asked again, it still waits");
+    window.key(Key::Escape);
+    window.harness.step();
+    assert!(!window.says("Quit now?") && window.fit().is_running());
+    window.key_with(Modifiers::COMMAND, Key::Q);
+    window.harness.step();
+    assert!(window.says("Quit now?") && !closing(&window).0);
+    window.key(Key::Enter);
+    window.harness.step();
+    assert!(!window.says("Quit now?") && window.fit().is_running(), "Enter stays");
+    window.choose("File", "Quit");
+    window.node("Stop and quit").click();
+    window.harness.step();
+    assert!(closing(&window).0);
+    press_the_close_button(&mut window);
+    assert!(!closing(&window).1, "it was said once");
 }
 
 #[test]

@@ -1,18 +1,21 @@
 //! Loss, terms, IoU and MAJPE over the iterations, with flags where settings changed and a cursor that can be dragged.
 
+mod along;
 mod multiples;
 mod series;
 mod thin;
+mod toolbar;
 
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::CTRL;
 use crate::app::figure;
-use crate::app::theme::{self, Tokens};
+use crate::app::theme::Tokens;
 use crate::mhp::{Scope, TermId, Weight};
-use crate::session::{Branch, Command, FitStatus, IterationRow, PinRow, Session, ViewState, numbers};
+use crate::session::{Branch, Command, FitStatus, IterationRow, PinRow, Session, numbers};
 use crate::worker::JobId;
-use egui::{Color32, Key, Sense, Ui};
-use egui_plot::{GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, VLine, uniform_grid_spacer};
+use along::Along;
+use egui::{Key, Sense, Ui};
+use egui_plot::{GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, VLine};
 use series::{SeriesCache, series};
 use std::borrow::Cow;
 use thin::VisibleSpan;
@@ -33,7 +36,7 @@ pub(super) static PANE: Pane = Pane {
     margin: 8,
     state: PaneStates::prepare::<State>,
     blank,
-    toolbar: Some(|ui, shared, states| toolbar(ui, shared, states.of())),
+    toolbar: Some(|ui, shared, states| toolbar::show(ui, shared, states.of())),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };
 
@@ -46,6 +49,10 @@ struct State {
     before_click: Option<(usize, f64)>,
     /// What was on screen in the pass before.
     window: Option<VisibleSpan>,
+    /// How iterations were laid in the pass before.
+    along: Along,
+    /// The places that all pictures show, where somebody zoomed.
+    zoomed: Option<(f64, f64)>,
     /// Values of the curves of a job's history, as it was built up.
     series: SeriesCache<(JobId, u64)>,
 }
@@ -63,6 +70,32 @@ enum Tab {
     Each,
     Loss,
     Quality,
+}
+
+/// What is left of the colour of a raw line behind its smoothed one.
+const RAW: f32 = 0.4;
+
+/// The pieces of a line.
+struct Drawn<'a> {
+    pieces: Vec<Vec<PlotPoint>>,
+    curve: &'a Curve,
+    /// Thin, behind those that are smoothed.
+    behind: bool,
+}
+
+impl<'a> Drawn<'a> {
+    fn behind(pieces: Vec<Vec<PlotPoint>>, curve: &'a Curve) -> Self {
+        Self { pieces, curve, behind: true }
+    }
+
+    fn in_front(pieces: Vec<Vec<PlotPoint>>, curve: &'a Curve) -> Self {
+        Self { pieces, curve, behind: false }
+    }
+}
+
+/// By how much the wheel was turned to zoom in, as over a map. (A pinch is the plot's own.)
+fn wheel(ctx: &egui::Context) -> f32 {
+    ctx.input(|i| (i.smooth_scroll_delta().y * 0.004).exp())
 }
 
 type Value = Box<dyn Fn(&IterationRow) -> Option<f64>>;
@@ -103,6 +136,11 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let lineage = fit.history.lineage();
     let first = lineage.first().and_then(|rows| rows.first()).map_or(0, |row| row.report.iteration);
     let curves = curves(shared, branch, state.tab);
+    let along = Along::of(shared.session.view.log_iterations);
+    // What was zoomed to on one scale is no place on the other.
+    if std::mem::replace(&mut state.along, along) != along {
+        state.reset = true;
+    }
     if state.tab == Tab::Each {
         let caption = figure::of(shared.session, "each curve with its own scale");
         let area = figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref());
@@ -111,25 +149,25 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         let hidden = &shared.session.view.hidden_curves;
         let visible: Vec<&Curve> = curves.iter().filter(|c| !hidden.contains(&c.key)).collect();
         state.series.begin((fit.job, fit.history.revision()));
-        let branch = branch.id;
-        return multiples::show(ui, shared, &mut state.series, &visible, branch, area);
+        if std::mem::take(&mut state.reset) {
+            state.zoomed = None;
+        }
+        return multiples::show(ui, shared, state, &visible, branch.id, area);
     }
     let log = shared.session.view.log_loss && state.tab == Tab::Loss;
     let hidden = &shared.session.view.hidden_curves;
     let tokens = Tokens::of(ui);
     let mut plot = Plot::new(("curves", state.tab == Tab::Loss))
-        .x_axis_formatter(
-            |mark, _| if mark.value.fract().abs() < 1e-9 { format!("{}", mark.value) } else { String::new() },
-        )
-        .x_grid_spacer(uniform_grid_spacer(|input| iterations(input.base_step_size)))
+        .x_axis_formatter(move |mark, _| along.tick(mark.value))
+        .x_grid_spacer(move |input| along.grid(input))
         .show_grid([true, true])
         .grid_color(tokens.stroke)
         .allow_scroll(false)
         .set_margin_fraction(egui::vec2(0.02, 0.06))
         .include_x(0.0)
-        .include_x(shared.session.config.iterations.min(20_000).max(fit.head()) as f64)
+        .include_x(along.x(shared.session.config.iterations.min(20_000).max(fit.head()) as f64))
         .y_axis_min_width(44.0)
-        .label_formatter(move |hover| label(hover, log));
+        .label_formatter(move |hover| label(hover, along, log));
     let what = if state.tab == Tab::Loss { "L and its unweighted terms" } else { "IoU; MAJPE in m" };
     let caption = figure::of(shared.session, what);
     let area = figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref());
@@ -147,16 +185,25 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let State { series, window, tab, .. } = &mut *state;
     let window = window.as_ref();
     series.begin((fit.job, fit.history.revision()));
-    let visible = curves.iter().filter(|c| !hidden.contains(&c.key));
-    let lines: Vec<(Vec<Vec<PlotPoint>>, &Curve)> =
-        visible.map(|c| (series.grown(None, &c.key, first, &lineage, &c.value).pieces(window, log), c)).collect();
+    let smoothing = shared.session.view.smoothing.weight();
+    let mut lines: Vec<Drawn<'_>> = Vec::new();
+    for c in curves.iter().filter(|c| !hidden.contains(&c.key)) {
+        let raw = series.grown(None, &c.key, first, &lineage, &c.value).pieces(window, along, log);
+        let smooth = smoothing.and_then(|weight| series.smoothed(&c.key, weight));
+        match smooth.map(|smooth| smooth.pieces(window, along, log)) {
+            Some(smooth) => lines.extend([Drawn::behind(raw, c), Drawn::in_front(smooth, c)]),
+            None => lines.push(Drawn::in_front(raw, c)),
+        }
+    }
+    lines.sort_by_key(|line| !line.behind);
     let mut others: Vec<(u32, Vec<Vec<PlotPoint>>)> = Vec::new();
     if let Some(c) = curves.first() {
         for b in fit.history.branches().iter().filter(|b| b.id != branch.id) {
-            others.push((b.id, series.grown(Some(b.id), &c.key, b.start(), &[&b.rows], &c.value).pieces(window, log)));
+            let series = series.grown(Some(b.id), &c.key, b.start(), &[&b.rows], &c.value);
+            others.push((b.id, series.pieces(window, along, log)));
         }
     }
-    let pinned = pinned(shared, *tab, window, log);
+    let pinned = pinned(shared, *tab, window, (along, log));
     let shown = fit.shown_iteration();
     let response = plot.show(ui, |plot| {
         for (id, pieces) in &others {
@@ -171,26 +218,30 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
                 plot.line(line.color(tokens.warn.gamma_multiply(0.8)).width(1.2).style(LineStyle::dashed_loose()));
             }
         }
-        for (pieces, c) in &lines {
-            let color = tokens.curve(&c.key);
+        for Drawn { pieces, curve: c, behind } in &lines {
+            let (faint, width) = if *behind { (RAW, 0.8) } else { (1.0, c.width) };
+            let color = tokens.curve(&c.key).gamma_multiply(faint);
             for piece in pieces {
                 if let [only] = piece.as_slice() {
                     plot.points(Points::new(c.name.clone(), vec![[only.x, only.y]]).color(color).radius(2.5));
                 }
-                plot.line(Line::new(c.name.clone(), PlotPoints::Borrowed(piece)).color(color).width(c.width));
+                plot.line(Line::new(c.name.clone(), PlotPoints::Borrowed(piece)).color(color).width(width));
             }
         }
         for flag in &branch.flags {
-            let line = VLine::new(flag.text.clone(), flag.iteration as f64);
+            let line = VLine::new(flag.text.clone(), along.x(flag.iteration as f64));
             plot.vline(line.color(tokens.warn.gamma_multiply(0.7)).width(1.0));
         }
-        plot.vline(VLine::new("shown iteration", shown as f64).color(tokens.accent).width(1.0));
+        plot.vline(VLine::new("shown iteration", along.x(shown as f64)).color(tokens.accent).width(1.0));
+        if plot.response().hovered() {
+            plot.zoom_bounds_around_hovered(egui::Vec2::splat(wheel(plot.ctx())));
+        }
         (plot.pointer_coordinate(), plot.response().clone())
     });
-    flag_texts(ui, &response, branch, &tokens);
+    flag_texts(ui, &response, branch, along, &tokens);
     let [lo, hi] = response.transform.bounds().range_x().into_inner().into();
     state.window =
-        (hi > lo).then(|| VisibleSpan::new(lo, hi, response.transform.frame().width() * ui.pixels_per_point()));
+        (hi > lo).then(|| VisibleSpan::new(lo, hi, response.transform.frame().width() * ui.pixels_per_point(), along));
     let (pointer, inner) = response.inner;
     inner.widget_info(|| figure::spoken("Curves", caption.as_deref()));
     if inner.double_clicked() {
@@ -204,7 +255,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         && let Some(at) = pointer
     {
         state.before_click = Some((shown, ui.input(|i| i.time)));
-        shared.send(Command::GotoIteration(at.x.round().clamp(0.0, 1e9) as usize));
+        shared.send(Command::GotoIteration(along.iteration(at.x).round().clamp(0.0, 1e9) as usize));
     }
 }
 
@@ -213,7 +264,7 @@ fn pinned(
     shared: &Shared<'_>,
     tab: Tab,
     window: Option<&VisibleSpan>,
-    log: bool,
+    (along, log): (Along, bool),
 ) -> Vec<(String, Vec<Vec<PlotPoint>>)> {
     let pins = shared.session.pins.list().iter();
     pins.map(|pin| {
@@ -223,7 +274,7 @@ fn pinned(
         };
         let what = if tab == Tab::Loss { "L" } else { "mean IoU" };
         let first = pin.rows.first().map_or(0, |row| row.report.iteration);
-        let pieces = series(first, pin.rows.iter().map(value)).pieces(window, log);
+        let pieces = series(first, pin.rows.iter().map(value)).pieces(window, along, log);
         (format!("{} · {what}", pin.name), pieces)
     })
     .collect()
@@ -231,21 +282,37 @@ fn pinned(
 
 /// What changed at each flag, where there is room: a dragged slider leaves many. Painted over the plot, not in it, so
 /// that no text takes part in the plot's bounds.
-fn flag_texts<R>(ui: &Ui, response: &egui_plot::PlotResponse<R>, branch: &Branch, tokens: &Tokens) {
+fn flag_texts<R>(ui: &Ui, response: &egui_plot::PlotResponse<R>, branch: &Branch, along: Along, tokens: &Tokens) {
     let frame = *response.transform.frame();
     let painter = ui.painter().with_clip_rect(frame.intersect(ui.clip_rect()));
-    let mut free_from = frame.left();
-    for flag in &branch.flags {
-        let x = response.transform.position_from_point(&PlotPoint::new(flag.iteration as f64, 0.0)).x;
-        if !(frame.left()..=frame.right()).contains(&x) || x < free_from {
-            continue;
+    let font = egui::FontId::proportional(10.0);
+    let shown = branch.flags.iter().filter_map(|flag| {
+        let x = response.transform.position_from_point(&PlotPoint::new(along.x(flag.iteration as f64), 0.0)).x;
+        let text = format!("◆ {}", flag.text);
+        let inside = (frame.left()..=frame.right()).contains(&x);
+        inside.then(|| (x + 3.0, painter.layout_no_wrap(text, font.clone(), tokens.warn)))
+    });
+    let shown: Vec<_> = shown.collect();
+    let wanted: Vec<(f32, f32)> = shown.iter().map(|(x, galley)| (*x, galley.size().x)).collect();
+    for (left, (_, galley)) in apart(&wanted, frame.right() - 3.0).into_iter().zip(shown) {
+        if let Some(left) = left {
+            painter.galley(egui::pos2(left, frame.top() + 2.0), galley, tokens.warn);
         }
-        let font = egui::FontId::proportional(10.0);
-        let galley = painter.layout_no_wrap(format!("◆ {}", flag.text), font, tokens.warn);
-        let left = (x + 3.0).min(frame.right() - galley.size().x - 3.0);
-        free_from = left + galley.size().x + 6.0;
-        painter.galley(egui::pos2(left, frame.top() + 2.0), galley, tokens.warn);
     }
+}
+
+/// Where texts of these places and widths, from left to right, are written: none over another, none beyond `end`; one that
+/// has no room is left out.
+fn apart(wanted: &[(f32, f32)], end: f32) -> Vec<Option<f32>> {
+    let mut free_from = f32::NEG_INFINITY;
+    let place = |&(at, width): &(f32, f32)| {
+        let left = at.min(end - width);
+        (left >= free_from && width <= end).then(|| {
+            free_from = left + width + 6.0;
+            left
+        })
+    };
+    wanted.iter().map(place).collect()
 }
 
 fn curves(shared: &Shared<'_>, branch: &Branch, tab: Tab) -> Vec<Curve> {
@@ -294,25 +361,14 @@ fn loss_curves(persons: usize, branches: &[Branch]) -> Vec<Curve> {
     [curve("total", "L", 2.0, |r| Some(r.report.loss))].into_iter().chain(terms).collect()
 }
 
-fn label(hover: &egui_plot::HoverPosition<'_>, log: bool) -> Option<String> {
+fn label(hover: &egui_plot::HoverPosition<'_>, along: Along, log: bool) -> Option<String> {
     match hover {
         egui_plot::HoverPosition::NearDataPoint { plot_name, position, .. } => {
             let y = if log { 10f64.powf(position.y) } else { position.y };
-            Some(format!("{plot_name}\niteration {}\n{y:.5}", position.x.round()))
+            Some(format!("{plot_name}\niteration {}\n{y:.5}", along.iteration(position.x).round()))
         }
         egui_plot::HoverPosition::Elsewhere { .. } => None,
     }
-}
-
-/// Steps of the grid along the iterations: between lines, between those with a number (1, 2 or 5 times a power of ten, which
-/// leaves room for it), and between the strongest; `base` are those that the plot would draw at most.
-fn iterations(base: f64) -> [f64; 3] {
-    // The plot asks for lines that are 8 points apart or more, and writes numbers 80 points apart.
-    let wanted = (10.0 * base).max(1.0);
-    let decade = 10f64.powf(wanted.log10().floor());
-    let round = [(1.0, 0.2), (2.0, 0.5), (5.0, 1.0), (10.0, 2.0)];
-    let (numbered, line) = round.into_iter().find(|(step, _)| step * decade >= wanted).unwrap_or((10.0, 2.0));
-    [(line * decade).max(1.0), numbered * decade, 10.0 * numbered * decade]
 }
 
 /// The grid of a log₁₀ axis: decades, and 2 and 5 between them where no more than three are seen.
@@ -341,72 +397,29 @@ fn power(exponent: f64) -> String {
     }
 }
 
-fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
-    let curves = curves(shared, &branch_of(shared.session), state.tab);
-    let tokens = Tokens::of(ui);
-    let mut view = shared.session.view.clone();
-    ui.horizontal_wrapped(|ui| {
-        ui.selectable_value(&mut state.tab, Tab::Each, "Each")
-            .on_hover_text("Every curve in a picture of its own, with its own scale.");
-        ui.selectable_value(&mut state.tab, Tab::Loss, "Loss").on_hover_text("The total and its unweighted terms.");
-        ui.selectable_value(&mut state.tab, Tab::Quality, "IoU and error")
-            .on_hover_text("Forward-consistency IoU of each view, and MAJPE where the data set has truth.");
-        if state.tab != Tab::Quality {
-            ui.checkbox(&mut view.log_loss, "log y").on_hover_text("Logarithmic vertical axis.");
-        }
-        if state.tab == Tab::Each {
-            // Their names are over the pictures.
-            ui.menu_button("Show", |ui| choose(ui, &curves, &mut view, &tokens))
-                .response
-                .on_hover_text("Which curves are shown.");
-        } else {
-            ui.add_space(4.0);
-            choose(ui, &curves, &mut view, &tokens);
-        }
-    });
-    if view != shared.session.view {
-        shared.set_view(|v| *v = view);
-    }
-}
-
-/// The names of curves; a click shows or hides one.
-fn choose(ui: &mut Ui, curves: &[Curve], view: &mut ViewState, tokens: &Tokens) {
-    for c in curves {
-        let on = !view.hidden_curves.contains(&c.key);
-        let mut text = egui::text::LayoutJob::default();
-        let font = egui::FontId::proportional(theme::CAPTION);
-        let part = |color: Color32, on: bool| egui::TextFormat {
-            font_id: font.clone(),
-            color,
-            strikethrough: if on { egui::Stroke::NONE } else { egui::Stroke::new(1.0, tokens.dim) },
-            ..Default::default()
-        };
-        text.append("■ ", 0.0, part(if on { tokens.curve(&c.key) } else { tokens.stroke }, true));
-        text.append(&c.name, 0.0, part(if on { tokens.text } else { tokens.dim }, on));
-        let response = ui.add(egui::Label::new(text).sense(egui::Sense::click()).selectable(false).extend());
-        let name = format!("Curve {}", c.name);
-        response.widget_info(|| egui::WidgetInfo::selected(egui::Role::CheckBox, true, on, &name));
-        if response.on_hover_text("Click to show or hide.").clicked() {
-            if on {
-                view.hidden_curves.push(c.key.clone());
-            } else {
-                view.hidden_curves.retain(|key| *key != c.key);
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    #[cfg(feature = "dummies")]
+
+    #[test]
+    fn what_is_told_of_flags_never_overlaps() {
+        let wanted = [(0.0, 40.0), (10.0, 40.0), (46.0, 40.0), (95.0, 40.0), (180.0, 30.0), (182.0, 30.0)];
+        let places = apart(&wanted, 200.0);
+        assert_eq!(places, [Some(0.0), None, Some(46.0), Some(95.0), Some(170.0), None]);
+        // Two at the right edge are both moved to the left: the second would be over the first.
+        assert_eq!(apart(&[(190.0, 50.0), (195.0, 60.0)], 200.0), [Some(150.0), None]);
+    }
+}
+
+#[cfg(all(test, feature = "dummies"))]
+mod dummy_tests {
+    use super::*;
     use crate::{
         config::FitConfig,
         mhp::{StepReport, Terms},
     };
 
     /// The keys of the curves of a fit of one person, and what they show of a row.
-    #[cfg(feature = "dummies")]
     fn shown(config: &FitConfig) -> Vec<(String, Option<f64>)> {
         let terms = Terms::from_fn(|term| if term.key == "dummy" { 0.7 } else { 0.1 });
         let report = StepReport { iteration: 0, loss: 1.0, terms, iou: vec![None].into(), converged: false };
@@ -415,7 +428,6 @@ mod tests {
         loss_curves(1, &[branch]).into_iter().map(|curve| (curve.key, (curve.value)(&row))).collect()
     }
 
-    #[cfg(feature = "dummies")]
     #[test]
     fn the_dummy_term_has_a_curve_where_it_has_a_weight() {
         let weighed = FitConfig { w_time: 8.0, w_dummy: 1.0, ..FitConfig::default() };
@@ -423,14 +435,5 @@ mod tests {
         assert_eq!(keys(&FitConfig::default()), ["total", "em", "bone", "rigid", "joint"]);
         assert_eq!(keys(&weighed), ["total", "em", "bone", "rigid", "joint", "time", "dummy"]);
         assert!(shown(&weighed).contains(&("dummy".to_owned(), Some(0.7))));
-    }
-
-    #[test]
-    fn numbers_along_the_iterations_are_round_and_have_room() {
-        assert_eq!(iterations(0.01), [1.0, 1.0, 10.0], "nothing lies between two iterations");
-        assert_eq!(iterations(0.75), [2.0, 10.0, 100.0]);
-        assert_eq!(iterations(16.0), [50.0, 200.0, 2000.0]);
-        assert_eq!(iterations(160.0), [500.0, 2000.0, 20_000.0]);
-        assert_eq!(iterations(30.0), [100.0, 500.0, 5000.0]);
     }
 }

@@ -1,12 +1,10 @@
 //! Every curve in a picture of its own, with a scale of its own: terms differ by powers of ten, and what changes is seen in each.
 
-use super::series::SeriesCache;
 use super::thin::VisibleSpan;
-use super::{Curve, Shared};
+use super::{Curve, DOUBLE_CLICK_S, RAW, Shared, State, wheel};
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
 use crate::session::Command;
-use crate::worker::JobId;
 use egui::{Align2, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
 use egui_plot::PlotPoint;
 
@@ -22,7 +20,7 @@ const TITLE: f32 = 15.0;
 pub(super) fn show(
     ui: &mut Ui,
     shared: &mut Shared<'_>,
-    series: &mut SeriesCache<(JobId, u64)>,
+    state: &mut State,
     curves: &[&Curve],
     branch: u32,
     area: Rect,
@@ -39,43 +37,61 @@ pub(super) fn show(
     let shown = fit.shown_iteration();
     let shown_row = fit.shown_row();
     let end = others.iter().map(|b| b.head()).chain([head, first + 1]).max().unwrap_or_default();
-    let span = (first as f64, end as f64);
+    let along = state.along;
+    let whole = (along.x(first as f64), along.x(end as f64));
+    let span = state.zoomed.filter(|(lo, hi)| *lo >= whole.0 && *hi <= whole.1).unwrap_or(whole);
+    let (mut zoomed, mut whole_again) = (state.zoomed, false);
+    let series = &mut state.series;
     let log = shared.session.view.log_loss;
+    let smoothing = shared.session.view.smoothing.weight();
     let tokens = Tokens::of(ui);
     let mut asked = None;
     // A term that is 0 from end to end has nothing to show.
     let curves: Vec<&&Curve> =
         curves.iter().filter(|c| !series.grown(None, &c.key, first, &lineage, &c.value).is_zero()).collect();
     for (curve, rect) in curves.iter().zip(cells(area, curves.len())) {
-        let window = VisibleSpan::new(span.0, span.1, rect.width() * ui.pixels_per_point());
-        let line = series.grown(None, &curve.key, first, &lineage, &curve.value).pieces(Some(&window), false);
+        let window = VisibleSpan::new(span.0, span.1, rect.width() * ui.pixels_per_point(), along);
+        let raw = series.grown(None, &curve.key, first, &lineage, &curve.value).pieces(Some(&window), along, false);
+        let smooth = smoothing.and_then(|weight| series.smoothed(&curve.key, weight));
+        let smooth = smooth.map(|smooth| smooth.pieces(Some(&window), along, false));
         let behind: Vec<Vec<PlotPoint>> = others
             .iter()
             .flat_map(|b| {
-                series.grown(Some(b.id), &curve.key, b.start(), &[&b.rows], &curve.value).pieces(Some(&window), false)
+                let series = series.grown(Some(b.id), &curve.key, b.start(), &[&b.rows], &curve.value);
+                series.pieces(Some(&window), along, false)
             })
             .collect();
-        let scale = Scale::of(line.iter().chain(&behind).flatten().map(|point| point.y), log);
+        let seen = |point: &&PlotPoint| (span.0..=span.1).contains(&point.x);
+        let scale = Scale::of(raw.iter().chain(&behind).flatten().filter(seen).map(|point| point.y), log);
         let response = ui.interact(rect, ui.scope_id().with(("curve", &curve.key)), Sense::click_and_drag());
         let plot = rect.with_min_y(rect.min.y + TITLE);
         let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
-        let x = |iteration: f64| {
-            let t = (iteration - span.0) / (span.1 - span.0).max(1.0);
+        let inside = ui.painter().with_clip_rect(plot.intersect(ui.clip_rect()));
+        let x = |place: f64| {
+            let t = (place - span.0) / (span.1 - span.0).max(1e-9);
             plot.min.x + 2.0 + t as f32 * (plot.width() - 4.0)
         };
         let at = |p: PlotPoint| pos2(x(p.x), plot.max.y - 3.0 - scale.unit(p.y) * (plot.height() - 6.0));
         let color = tokens.curve(&curve.key);
         painter.rect(plot, 2.0, tokens.canvas, Stroke::new(1.0, tokens.stroke), egui::StrokeKind::Inside);
         for piece in behind {
-            painter.line(piece.into_iter().map(at).collect(), Stroke::new(1.0, tokens.dim.gamma_multiply(0.6)));
+            inside.line(piece.into_iter().map(at).collect(), Stroke::new(1.0, tokens.dim.gamma_multiply(0.6)));
         }
-        for piece in line {
-            painter.line(piece.into_iter().map(at).collect(), Stroke::new(1.5, color));
+        let (thin, front) = match smooth {
+            Some(smooth) => (raw, smooth),
+            None => (Vec::new(), raw),
+        };
+        for piece in thin {
+            inside.line(piece.into_iter().map(at).collect(), Stroke::new(0.8, color.gamma_multiply(RAW)));
+        }
+        for piece in front {
+            inside.line(piece.into_iter().map(at).collect(), Stroke::new(1.5, color));
         }
         let now = shown_row.and_then(|row| (curve.value)(row));
-        painter.vline(x(shown as f64), plot.y_range(), Stroke::new(1.0, tokens.accent));
+        let here = along.x(shown as f64);
+        inside.vline(x(here), plot.y_range(), Stroke::new(1.0, tokens.accent));
         if let Some(y) = now {
-            painter.circle_filled(at(PlotPoint::new(shown as f64, y)), 2.5, color);
+            inside.circle_filled(at(PlotPoint::new(here, y)), 2.5, color);
         }
         let text = now.map_or_else(|| "–".into(), number);
         let value = painter.text(rect.right_top(), Align2::RIGHT_TOP, &text, theme::mono(theme::CAPTION), tokens.text);
@@ -91,23 +107,54 @@ pub(super) fn show(
             }
         }
         response.widget_info(|| figure::spoken(&format!("Curve of {}", curve.name), Some(&text)));
-        let pointed = (response.clicked() || response.dragged()).then(|| response.interact_pointer_pos()).flatten();
-        if let Some(pointer) = pointed {
+        let place = |pointer: egui::Pos2| {
             let t = f64::from((pointer.x - plot.min.x - 2.0) / (plot.width() - 4.0).max(1.0)).clamp(0.0, 1.0);
-            let iteration = (span.0 + t * (span.1 - span.0)).round() as usize;
+            span.0 + t * (span.1 - span.0)
+        };
+        let now_s = ui.input(|i| i.time);
+        if let Some(pointer) = response.hover_pos() {
+            let factor = f64::from(wheel(ui.ctx()) * ui.input(egui::InputState::zoom_delta));
+            if factor != 1.0 {
+                zoomed = zoom(span, whole, place(pointer), factor);
+            }
+        }
+        let pointed = (response.clicked() || response.dragged()).then(|| response.interact_pointer_pos()).flatten();
+        if response.double_clicked() {
+            // The first click of the two has moved the cursor; the gesture was for the picture.
+            whole_again = true;
+            let before = state.before_click.take().filter(|(_, at)| now_s - at < DOUBLE_CLICK_S);
+            asked = before.map(|(iteration, _)| iteration).or(Some(shown));
+        } else if let Some(pointer) = pointed {
+            if response.clicked() {
+                state.before_click = Some((shown, now_s));
+            }
+            let iteration = along.iteration(place(pointer)).round() as usize;
             asked = Some(iteration).filter(|iteration| *iteration != shown);
         }
         response.on_hover_text(format!(
-            "{}: {} to {}{}\nClick or drag to show an iteration.",
+            "{}: {} to {}{}\nClick or drag to show an iteration; the wheel zooms, a double click shows all.",
             curve.name,
             number(scale.lo),
             number(scale.hi),
             if scale.log { ", logarithmic" } else { "" }
         ));
     }
-    if let Some(iteration) = asked {
+    state.zoomed = zoomed.filter(|_| !whole_again);
+    if let Some(iteration) = asked.filter(|iteration| *iteration != shown) {
         shared.send(Command::GotoIteration(iteration));
     }
+}
+
+/// What is seen of `whole` after zooming in by `factor` about a place; `None` for all of it.
+fn zoom(span: (f64, f64), whole: (f64, f64), about: f64, factor: f64) -> Option<(f64, f64)> {
+    let all = whole.1 - whole.0;
+    let width = ((span.1 - span.0) / factor).max(all * 1e-4);
+    if width >= all {
+        return None;
+    }
+    let share = (about - span.0) / (span.1 - span.0).max(1e-9);
+    let lo = (about - share * width).clamp(whole.0, whole.1 - width);
+    Some((lo, lo + width))
 }
 
 /// Places for `count` pictures: as many rows as make them least narrow.
@@ -169,6 +216,16 @@ mod tests {
             assert_eq!((cells.len(), tops.len()), (count, rows));
             assert!(cells.iter().all(|cell| area.contains_rect(*cell)));
         }
+    }
+
+    #[test]
+    fn zooming_keeps_the_place_and_stays_inside() {
+        let whole = (0.0, 100.0);
+        assert_eq!(zoom(whole, whole, 50.0, 2.0), Some((25.0, 75.0)));
+        assert_eq!(zoom(whole, whole, 0.0, 4.0), Some((0.0, 25.0)));
+        let (lo, hi) = zoom((0.0, 25.0), whole, 20.0, 5.0).unwrap_or_default();
+        assert!(((20.0 - lo) / (hi - lo) - 0.8).abs() < 1e-9, "the place stays under the pointer");
+        assert_eq!(zoom((60.0, 100.0), whole, 90.0, 0.1), None, "all of it again");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The values of curves as they grow, and what of them can be seen: lowest and highest of ever longer stretches.
 
+use super::along::Along;
 use super::thin::VisibleSpan;
 use egui_plot::PlotPoint;
 use std::collections::HashMap;
@@ -48,41 +49,38 @@ impl Series {
     }
 
     /// The points that a curve in `window` is drawn from, in pieces: it breaks where there is no value, or on a logarithmic
-    /// scale none above 1e−7. Everything where nothing was on screen yet.
-    pub(super) fn pieces(&self, window: Option<&VisibleSpan>, log: bool) -> Vec<Vec<PlotPoint>> {
+    /// scale none above 1e−7. Everything, laid `along`, where nothing was on screen yet.
+    pub(super) fn pieces(&self, window: Option<&VisibleSpan>, along: Along, log: bool) -> Vec<Vec<PlotPoint>> {
         let Some(last) = self.values.len().checked_sub(1) else { return Vec::new() };
-        let (shown, stretch) = window.map_or((0..=last, 1), |window| {
-            let place = |x: f64| ((x - self.first as f64).max(0.0) as usize).min(last);
-            (place(window.drawn().start().floor())..=place(window.drawn().end().ceil()), window.iterations_a_column())
-        });
+        let window = window.filter(|window| window.along() == along);
+        let Some(window) = window else { return self.joined(0..=last, along, log) };
+        let place = |iteration: f64| ((iteration - self.first as f64).max(0.0) as usize).min(last);
+        let iterations = window.iterations();
+        let (mut at, end) = (place(iterations.start().floor()), place(iterations.end().ceil()));
         // Both ends are always among them, so that the plot's own bounds do not depend on what it shows.
         let mut places = vec![0];
-        match stretch.checked_ilog2().and_then(|level| Some((level, self.levels.get(level.checked_sub(1)? as usize)?)))
-        {
-            Some((level, stretches)) => {
-                for &[a, b] in &stretches[shown.start() >> level..=shown.end() >> level] {
-                    places.extend([a.min(b), a.max(b)]);
-                }
-            }
-            None => places.extend(shown),
+        while at <= end {
+            let stretch = window.iterations_a_column(self.first + at);
+            let level = stretch.ilog2().min(self.levels.len() as u32);
+            let ends = level.checked_sub(1).and_then(|k| self.levels.get(k as usize)?.get(at >> level));
+            places.extend(ends.map_or([at, at], |&[a, b]| [a.min(b), a.max(b)]));
+            at = ends.map_or(at + 1, |_| ((at >> level) + 1) << level);
         }
         places.push(last);
+        // A stretch may have begun before the one that it follows was over.
+        places.sort_unstable();
         places.dedup();
-        let pieces = self.joined(places.into_iter(), log);
-        match window {
-            Some(window) => pieces.into_iter().map(|piece| window.thinned(piece)).collect(),
-            None => pieces,
-        }
+        self.joined(places.into_iter(), along, log).into_iter().map(|piece| window.thinned(piece)).collect()
     }
 
-    fn joined(&self, places: impl Iterator<Item = usize>, log: bool) -> Vec<Vec<PlotPoint>> {
+    fn joined(&self, places: impl Iterator<Item = usize>, along: Along, log: bool) -> Vec<Vec<PlotPoint>> {
         let mut pieces: Vec<Vec<PlotPoint>> = vec![Vec::new()];
         for place in places {
             let value = self.values[place];
             match pieces.last_mut() {
                 Some(piece) if value.is_finite() && (!log || value > 1e-7) => {
                     let y = if log { value.log10() } else { value };
-                    piece.push(PlotPoint::new((self.first + place) as f64, y));
+                    piece.push(PlotPoint::new(along.x((self.first + place) as f64), y));
                 }
                 _ => pieces.push(Vec::new()),
             }
@@ -97,6 +95,8 @@ impl Series {
 pub(super) struct SeriesCache<K> {
     of: K,
     series: HashMap<(Option<u32>, String), (Series, bool)>,
+    /// The same smoothed, and with which weight.
+    smoothed: HashMap<String, (Series, f64)>,
 }
 
 impl<K: PartialEq> SeriesCache<K> {
@@ -105,8 +105,25 @@ impl<K: PartialEq> SeriesCache<K> {
         if self.of == of {
             self.series.retain(|_, (_, asked)| std::mem::take(asked));
         } else {
-            (self.of, self.series) = (of, HashMap::new());
+            (self.of, self.series, self.smoothed) = (of, HashMap::new(), HashMap::new());
         }
+    }
+
+    /// The exponential moving average of a curve that was [`Self::grown`] on the way to where the fit stands: of the mean so
+    /// far, `weight` is kept at each value. Nothing is known before the first value.
+    pub(super) fn smoothed(&mut self, curve: &str, weight: f64) -> Option<&Series> {
+        let (raw, _) = self.series.get(&(None, curve.to_owned()))?;
+        let (series, of) = self.smoothed.entry(curve.to_owned()).or_default();
+        if (*of, series.first) != (weight, raw.first) {
+            (*series, *of) = (Series { first: raw.first, ..Series::default() }, weight);
+        }
+        let mut mean = series.values.iter().rev().copied().find(|value| value.is_finite());
+        for &value in raw.values.get(series.values.len()..).unwrap_or_default() {
+            let now = mean.map_or(value, |mean| weight * mean + (1.0 - weight) * value);
+            mean = Some(now).filter(|now| now.is_finite()).or(mean);
+            series.push(now);
+        }
+        Some(series)
     }
 
     /// The series of a curve on a branch (`None`: on the way to where the fit stands), of rows without holes from iteration
@@ -153,10 +170,10 @@ mod tests {
     fn a_part_looks_as_if_all_points_were_drawn() {
         let series = series(5, (0..100_000).map(value));
         for (lo, hi, pixels) in [(0.0, 100_005.0, 800.0), (61_000.0, 63_000.0, 640.0), (300.0, 420.0, 500.0)] {
-            let window = VisibleSpan::new(lo, hi, pixels);
-            let every = series.joined(0..series.values.len(), false);
+            let window = VisibleSpan::new(lo, hi, pixels, Along::Even);
+            let every = series.joined(0..series.values.len(), Along::Even, false);
             let every: Vec<PlotPoint> = every.into_iter().flat_map(|piece| window.thinned(piece)).collect();
-            let few: Vec<PlotPoint> = series.pieces(Some(&window), false).concat();
+            let few: Vec<PlotPoint> = series.pieces(Some(&window), Along::Even, false).concat();
             assert!(few.len() <= every.len() + 2, "{} of {}", few.len(), every.len());
             let on_screen = |p: &&PlotPoint| (lo..=hi).contains(&p.x);
             // The same heights in all columns, but for those that the stretches straddle.
@@ -189,7 +206,7 @@ mod tests {
                 Some(k as f64)
             };
             let series = cache.grown(None, "L", 0, &[early, late], value);
-            let last = series.pieces(None, false)[0].last().map(|p| (p.x, p.y));
+            let last = series.pieces(None, Along::Even, false)[0].last().map(|p| (p.x, p.y));
             (series.values.len(), last, asked.take())
         };
         assert_eq!(grown(1, 100), (100, Some((99.0, 99.0)), 100));
@@ -198,10 +215,40 @@ mod tests {
     }
 
     #[test]
+    fn on_a_log_axis_the_start_is_drawn_whole_and_the_rest_by_its_ends() {
+        let series = series(0, (0..100_000).map(|k| Some(if k == 61_803 { 9.0 } else { (k as f64 * 0.1).sin() })));
+        let window = VisibleSpan::new(0.0, 5.0, 800.0, Along::Log);
+        let points = series.pieces(Some(&window), Along::Log, false).concat();
+        assert!(points.len() < 2000 && points.is_sorted_by(|a, b| a.x < b.x), "{}", points.len());
+        for k in 0..60 {
+            let x = Along::Log.x(f64::from(k));
+            assert!(points.iter().any(|p| (p.x - x).abs() < 1e-12), "iteration {k}");
+        }
+        assert!(points.iter().any(|p| p.y == 9.0), "a spike is kept");
+    }
+
+    #[test]
+    fn smoothing_grows_with_its_curve_and_bridges_what_has_no_value() {
+        let mut cache = SeriesCache::<u32>::default();
+        let rows: Vec<Option<f64>> = vec![Some(1.0), Some(0.0), None, Some(0.0), Some(1.0)];
+        let mut smooth = |count: usize, weight: f64| {
+            cache.begin(1);
+            cache.grown(None, "L", 0, &[&rows[..count]], |v| *v);
+            cache.smoothed("L", weight).map(|series| series.values.clone()).unwrap_or_default()
+        };
+        assert_eq!(smooth(2, 0.5), [1.0, 0.5]);
+        let all = smooth(5, 0.5);
+        assert!(all[2].is_nan());
+        assert_eq!([all[0], all[1], all[3], all[4]], [1.0, 0.5, 0.25, 0.625]);
+        assert_eq!(smooth(5, 0.0)[3..], [0.0, 1.0], "another weight begins anew");
+        assert!(cache.smoothed("nothing", 0.5).is_none());
+    }
+
+    #[test]
     fn logarithms_break_where_there_are_none() {
         let series = series(0, [Some(1.0), Some(0.0), Some(100.0), None, Some(10.0)].into_iter());
         let ys = |log: bool| -> Vec<Vec<f64>> {
-            series.pieces(None, log).iter().map(|piece| piece.iter().map(|p| p.y).collect()).collect()
+            series.pieces(None, Along::Even, log).iter().map(|piece| piece.iter().map(|p| p.y).collect()).collect()
         };
         assert_eq!(ys(true), [vec![0.0], vec![2.0], vec![1.0]]);
         assert_eq!(ys(false), [vec![1.0, 0.0, 100.0], vec![10.0]]);
