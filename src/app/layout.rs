@@ -157,6 +157,26 @@ impl PaneLayout {
     }
 }
 
+/// What a tab is called: its pane; where panes were dropped beside each other into one tab, the first, and the second or how
+/// many more.
+fn title(tiles: &Tiles<Leaf>, tile: TileId) -> String {
+    match panes_in(tiles, tile)[..] {
+        [] => String::new(),
+        [one] => one.title().to_owned(),
+        [first, second] => format!("{} + {}", first.title(), second.title()),
+        [first, ref others @ ..] => format!("{} + {} more", first.title(), others.len()),
+    }
+}
+
+/// The panes of a tile, in their order.
+fn panes_in(tiles: &Tiles<Leaf>, tile: TileId) -> Vec<Leaf> {
+    match tiles.get(tile) {
+        Some(Tile::Pane(pane)) => vec![*pane],
+        Some(Tile::Container(container)) => container.children().flat_map(|child| panes_in(tiles, *child)).collect(),
+        None => Vec::new(),
+    }
+}
+
 struct Behavior<'a, 'b> {
     shared: &'a mut Shared<'b>,
     states: &'a mut PaneStates,
@@ -172,6 +192,10 @@ impl egui_tiles::Behavior<Leaf> for Behavior<'_, '_> {
 
     fn tab_title_for_pane(&mut self, pane: &Leaf) -> egui::WidgetText {
         egui::RichText::new(pane.title()).font(theme::strong(12.0)).into()
+    }
+
+    fn tab_title_for_tile(&mut self, tiles: &Tiles<Leaf>, tile: TileId) -> egui::WidgetText {
+        egui::RichText::new(title(tiles, tile)).font(theme::strong(12.0)).into()
     }
 
     fn on_tab_button(&mut self, tiles: &mut Tiles<Leaf>, tile: TileId, response: egui::Response) -> egui::Response {
@@ -231,5 +255,24 @@ impl egui_tiles::Behavior<Leaf> for Behavior<'_, '_> {
 
     fn simplification_options(&self) -> SimplificationOptions {
         SimplificationOptions { all_panes_must_have_tabs: true, ..Default::default() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tab_is_called_by_what_is_in_it_however_it_was_dropped_there() {
+        let mut tiles = Tiles::default();
+        let [a, b, c] = [0, 1, 2].map(|k| Pane::all()[k]);
+        let [one, two, three] = [a, b, c].map(|pane| tiles.insert_pane(pane));
+        let alone = tiles.insert_tab_tile(vec![one]);
+        let pair = tiles.insert_vertical_tile(vec![alone, two]);
+        let mixed = tiles.insert_tab_tile(vec![pair, three]);
+        let all = tiles.insert_horizontal_tile(vec![mixed]);
+        assert_eq!((title(&tiles, one), title(&tiles, alone)), (a.title().to_owned(), a.title().to_owned()));
+        assert_eq!(title(&tiles, pair), format!("{} + {}", a.title(), b.title()));
+        assert_eq!(title(&tiles, all), format!("{} + 2 more", a.title()));
     }
 }
