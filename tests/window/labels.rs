@@ -4,6 +4,7 @@
 use crate::blob;
 use crate::window::Window;
 use egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable as _;
 use mhp_inspector::labels::{
     CellRegion, Change, FrameId, Journal, Judged, LabelPlace, Record, Tag, Verdict, read_acts, read_table,
 };
@@ -126,6 +127,49 @@ fn a_bulk_tag_is_one_act() {
     window.click("Frame frames/000");
     window.ready(0);
     assert!(window.session().labels.selection.is_empty());
+}
+
+#[test]
+fn a_slip_that_tags_every_frame_is_told_and_taken_back_by_one_click() {
+    let mut window = open(24);
+    window.key_with(CTRL, Key::A);
+    window.until("the count", |w| w.says("24 frames are selected"));
+    window.key(Key::Num1);
+    window.until("the tags", |w| (0..24).all(|frame| w.tags(frame) == "F1"));
+    window.click("Undo tag F1 on 24 frames");
+    window.until("no tag", |w| (0..24).all(|frame| w.tags(frame).is_empty()));
+    assert!(!window.named("Undo tag F1 on 24 frames"), "what is taken back is not offered");
+    // Taken back by the key, or followed by another act, it is not offered either.
+    window.key(Key::Num1);
+    window.until("the tags", |w| (0..24).all(|frame| w.tags(frame) == "F1"));
+    window.until("the offer", |w| w.named("Undo tag F1 on 24 frames"));
+    window.key(Key::Escape);
+    window.key(Key::Num2);
+    window.until("another tag", |w| w.tags(0) == "F1 F2");
+    window.harness.step();
+    assert!(!window.named("Undo tag F1 on 24 frames"));
+}
+
+#[test]
+fn who_labels_stands_above_the_tags_and_in_one_line_with_how_much() {
+    let mut window = open(2);
+    window.harness.set_size(egui::vec2(1024.0, 640.0));
+    window.harness.run_steps(3);
+    let line = |w: &Window| (w.node("Annotator").rect(), w.harness.get_by_label_contains(" labelled").rect());
+    let (name, count) = line(&window);
+    assert!(name.bottom() < window.node("Tag F1").rect().top(), "without scrolling, above the tags");
+    assert!((name.center().y - count.center().y).abs() < 3.0 && name.right() < count.left(), "{name:?} {count:?}");
+    assert!(window.says("0 labelled"));
+    press(&mut window, Key::Num1, "F1");
+    assert!(window.says("1 labelled"));
+    window.click("Annotator");
+    window.key_with(CTRL, Key::A);
+    window.type_text("grace");
+    window.key(Key::Enter);
+    window.until("grace's journal", |w| {
+        w.session().labels.annotator == "grace" && w.session().labels.status == LabelStatus::Ready
+    });
+    assert!(window.says("0 labelled"));
 }
 
 #[test]

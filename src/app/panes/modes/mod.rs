@@ -1,14 +1,16 @@
 //! Failure modes: the tags of a frame, its note, and the machine's evidence for each mode.
 
 mod cards;
+mod journal;
 
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::{CommandRow, Menu, NONE, UiAction, UserCommand, command, has_frame};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
+use crate::dataset::Dataset;
 use crate::labels::{CellRegion, Tag, Verdict};
 use crate::radar::View;
-use crate::session::{Command, LabelMode, LabelStatus, Session};
+use crate::session::{Command, LabelMode, Session};
 use egui::{Key, RichText, Role, Ui, vec2};
 use std::sync::Arc;
 
@@ -45,6 +47,8 @@ struct State {
     annotator: Option<String>,
     region: Option<(usize, String)>,
     focus_note: bool,
+    /// The data set that this is typed for.
+    of: Option<Arc<Dataset>>,
 }
 
 impl PaneState for State {}
@@ -56,8 +60,14 @@ fn blank(session: &Session) -> Option<Blank> {
 
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let tokens = Tokens::of(ui);
+    let dataset = shared.session.data.dataset.as_ref();
+    if state.of.as_ref().map(Arc::as_ptr) != dataset.map(Arc::as_ptr) {
+        // The same numbers are other frames now.
+        *state = State { of: dataset.cloned(), focus_note: state.focus_note, ..State::default() };
+    }
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 6.0;
+        journal::show(ui, shared, &mut state.annotator, &tokens);
         mode(ui, shared);
         targets(ui, shared, &tokens);
         match shared.session.view.label_mode {
@@ -68,8 +78,6 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         details(ui, shared, state, &tokens);
         said(ui, shared.session, &tokens);
         cards::show(ui, shared, &tokens);
-        ui.add_space(2.0);
-        journal(ui, shared, state, &tokens);
     });
 }
 
@@ -306,39 +314,4 @@ fn said(ui: &mut Ui, session: &Session, tokens: &Tokens) {
         ui.label(RichText::new(text).small().color(tokens.dim))
             .on_hover_text(format!("{}, {}", record.act, record.time));
     }
-}
-
-/// Who labels, how much, and where it is kept.
-fn journal(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tokens) {
-    let labels = &shared.session.labels;
-    ui.horizontal_wrapped(|ui| {
-        ui.label(RichText::new("Annotator").small().color(tokens.dim));
-        let mut name = state.annotator.clone().unwrap_or_else(|| labels.annotator.clone());
-        let field = egui::TextEdit::singleline(&mut name).desired_width(96.0);
-        let response = ui.add(field).named(Role::TextInput, "Annotator");
-        if response.lost_focus() {
-            state.annotator = None;
-            if name != labels.annotator {
-                shared.send(Command::SetAnnotator(name));
-            }
-        } else {
-            state.annotator = response.has_focus().then_some(name);
-        }
-        response.on_hover_text("Whose labels these are. Each annotator has a journal of their own.");
-    });
-    let labels = &shared.session.labels;
-    let (text, color) = match (&labels.status, &labels.place) {
-        (LabelStatus::Failed(why), _) => (format!("■ labels cannot be written: {why}"), tokens.bad),
-        (LabelStatus::Ready, Some(place)) if place.beside_data => {
-            (format!("{} labelled · every act is on disk beside the data", labels.count()), tokens.dim)
-        }
-        (LabelStatus::Ready, Some(place)) => {
-            let why = place.reason.as_deref().unwrap_or("the data's folder cannot be written");
-            (format!("△ {} labelled · kept in {} because {why}", labels.count(), place.folder.display()), tokens.warn)
-        }
-        _ => ("reading the journals…".into(), tokens.dim),
-    };
-    let folder =
-        labels.place.as_ref().map_or_else(String::new, |place| format!("Journals: {}", place.folder.display()));
-    ui.label(RichText::new(text).small().color(color)).on_hover_text(folder);
 }
