@@ -77,7 +77,7 @@ fn transport(ui: &mut Ui, shared: &mut Shared<'_>) {
     let head = fit.head();
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
-        let (sign, name) = if running { ("‖", "Pause fit") } else { ("▶", "Run fit") };
+        let (sign, name) = if running { ("‖", "Pause fit") } else { ("∂", "Run fit") };
         let text = RichText::new(if running { format!("{sign} Pause") } else { format!("{sign} Run") });
         let response = ui.add_enabled(ready, egui::Button::new(text).min_size(egui::vec2(60.0, 24.0)));
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, ready, name));

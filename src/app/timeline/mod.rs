@@ -32,6 +32,23 @@ const CAPTION: f32 = 70.0;
 /// Width of the numbers behind each strip.
 const NUMBERS: f32 = 118.0;
 
+/// Half of the width of the handle on the strip of iterations.
+const HANDLE: f32 = 5.0;
+/// What runs a fit: ▶ plays the frames, this goes down the gradient.
+const RUN_FIT: &str = "∂ Fit";
+/// What pauses it.
+const PAUSE_FIT: &str = "‖ Fit";
+
+/// As wide as two buttons, so that both strips begin at the same place.
+fn run_button(ui: &mut Ui, text: &str, name: &str, tip: &str, enabled: bool, running: bool) -> egui::Response {
+    let mut button = egui::Button::new(RichText::new(text).font(theme::mono(12.0))).min_size(vec2(64.0, 22.0));
+    if running {
+        button = button.fill(Tokens::of(ui).accent.gamma_multiply(0.35));
+    }
+    let response = ui.add_enabled(enabled, button).named(egui::Role::Button, name);
+    response.on_hover_text(tip).on_disabled_hover_text(tip)
+}
+
 fn caption(ui: &mut Ui, text: &str) {
     ui.allocate_ui_with_layout(vec2(CAPTION, 22.0), egui::Layout::left_to_right(egui::Align::Center), |ui| {
         ui.set_min_width(CAPTION);
@@ -118,49 +135,54 @@ fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
     let flags: Vec<(usize, String)> =
         fit.branch().map_or_else(Vec::new, |b| b.flags.iter().map(|f| (f.iteration, f.text.clone())).collect());
     caption(ui, "Iteration");
-    for (sign, name, label, enabled, active) in [
-        ("◂", "Iteration back", "One step back", ready && shown > start, false),
-        (if running { "‖" } else { "▶" }, "Run or pause fit", "Run or pause", ready, running),
-        ("▸", "Iteration forward", "One step", ready && (back || !running), false),
-        ("▸|", "Follow newest", "Follow newest iteration", back, false),
+    for (sign, name, label, enabled) in [
+        ("◂", "Iteration back", "One step back", ready && shown > start),
+        (if running { PAUSE_FIT } else { RUN_FIT }, "Run or pause fit", "Run or pause", ready),
+        ("▸", "Iteration forward", "One step", ready && (back || !running)),
+        ("▸|", "Follow newest", "Follow newest iteration", back),
     ] {
         let tip = command(label).map(UserCommand::tip).unwrap_or_default();
-        if icon_button(ui, sign, name, &tip, enabled, active).clicked() {
+        let clicked = if label == "Run or pause" {
+            run_button(ui, sign, name, &tip, enabled, running).clicked()
+        } else {
+            icon_button(ui, sign, name, &tip, enabled, false).clicked()
+        };
+        if clicked {
             shared.invoke(label);
         }
     }
-    ui.add_space(30.0 + 4.0);
     let (rect, response) =
         ui.allocate_exact_size(vec2((ui.available_width() - NUMBERS - 4.0).max(40.0), 22.0), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::slider(ready, shown as f64, "Iteration scrubber"));
+    // The handle is whole at both ends, and nothing beside the strip is under it.
+    let lane = rect.shrink2(vec2(HANDLE, 0.0));
     let track = Rect::from_center_size(rect.center(), vec2(rect.width(), 4.0));
     ui.painter().rect_filled(track, 2.0, tokens.stroke);
     let span = (head - start).max(1) as f32;
-    let x_of = |k: usize| rect.left() + (k.saturating_sub(start)) as f32 / span * rect.width();
+    let x_of = |k: usize| lane.left() + (k.saturating_sub(start)) as f32 / span * lane.width();
     let target = shared.session.config.iterations;
     if head > start {
         let done = Rect::from_min_max(track.min, pos2(x_of(shown), track.max.y));
         ui.painter().rect_filled(done, 2.0, tokens.accent.gamma_multiply(0.7));
-        ui.painter().circle_filled(pos2(x_of(shown), rect.center().y), 5.0, tokens.accent);
+        ui.painter().circle_filled(pos2(x_of(shown), rect.center().y), HANDLE, tokens.accent);
     }
     for (k, _) in &flags {
         ui.painter().vline(x_of(*k), rect.y_range(), Stroke::new(1.0, tokens.warn));
     }
     if let Some(pointer) = response.interact_pointer_pos().filter(|_| response.dragged() || response.clicked()) {
-        let k = start + ((pointer.x - rect.left()) / rect.width() * span).round().max(0.0) as usize;
+        let k = start + ((pointer.x - lane.left()) / lane.width() * span).round().max(0.0) as usize;
         if k.min(head) != shown {
             shared.send(Command::GotoIteration(k.min(head)));
         }
     }
-    response.on_hover_text("Drag to show an earlier iteration. Changing a setting there starts a branch.");
-    let rate = shared.session.fit.shown.as_ref().map_or(0.0, |s| s.iterations_per_s);
-    let side = if running && rate > 0.0 {
-        format!("{rate:.0} it/s")
-    } else if head < target && head > 0 {
-        format!("of {target}")
-    } else {
-        String::new()
-    };
+    // The lines have no room for words: what changed is told where the pointer is.
+    let pointer = response.hover_pos();
+    let near = |k: usize| pointer.is_some_and(|pointer| (pointer.x - x_of(k)).abs() < HANDLE);
+    let changed: Vec<String> =
+        flags.iter().filter(|(k, _)| near(*k)).map(|(k, text)| format!("from iteration {k} on: {text}")).collect();
+    let tip = "Drag to show an earlier iteration. Changing a setting there starts a branch.";
+    response.on_hover_text(if changed.is_empty() { tip.to_owned() } else { changed.join("\n") });
+    let side = if head < target && head > 0 { format!("of {target}") } else { String::new() };
     numbers(ui, &format!("{shown} / {head}"), &side);
 }
 
@@ -168,6 +190,10 @@ fn numbers(ui: &mut Ui, text: &str, side: &str) {
     let tokens = Tokens::of(ui);
     ui.allocate_ui_with_layout(vec2(NUMBERS, 22.0), egui::Layout::right_to_left(egui::Align::Center), |ui| {
         ui.label(RichText::new(text).font(theme::mono(12.0)));
-        ui.label(RichText::new(side).small().color(tokens.dim));
+        // Never over the strip: what has no room is left out.
+        let font = egui::FontId::proportional(theme::CAPTION);
+        if ui.painter().layout_no_wrap(side.to_owned(), font, tokens.dim).size().x <= ui.available_width() {
+            ui.label(RichText::new(side).small().color(tokens.dim));
+        }
     });
 }
