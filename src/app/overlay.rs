@@ -4,12 +4,13 @@ mod bare;
 mod files;
 mod notices;
 mod palette;
+mod presets;
 mod quit;
 
 use super::commands::{Menu, SaveKind, all, shortcut_text};
 use super::panes::Shared;
 use super::theme::{self, Tokens};
-use crate::session::{Command, LogLevel, Notice, PickKind};
+use crate::session::{Command, LogLevel, Notice, PickKind, PresetCard};
 use egui::{Key, RichText, Ui, vec2};
 use std::path::PathBuf;
 
@@ -39,6 +40,8 @@ pub(super) struct Overlay {
     hint: String,
     chosen: usize,
     fresh: bool,
+    /// Two presets are compared on a card.
+    presets: bool,
     notices: notices::Notices,
     bare: bare::BareQuestion,
     files: files::FileDialog,
@@ -76,7 +79,7 @@ impl Overlay {
 
     /// True while keys belong to a sheet.
     pub(super) fn is_modal(&self) -> bool {
-        self.sheet != Sheet::None || self.bare.is_open()
+        self.sheet != Sheet::None || self.bare.is_open() || self.presets
     }
 
     pub(super) fn notify(&mut self, level: LogLevel, text: String, now: f64) {
@@ -90,6 +93,10 @@ impl Overlay {
     pub(super) fn show(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) {
         self.bare.show(ui, shared);
         self.notices.show(ui, shared);
+        self.presets = !matches!(shared.session.presets, PresetCard::Closed);
+        if self.presets && self.sheet == Sheet::None && presets::show(ui, shared) {
+            shared.send(Command::ClosePresets);
+        }
         let close = match self.sheet {
             Sheet::None => false,
             Sheet::Palette => self.palette(ui, shared),

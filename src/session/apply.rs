@@ -13,6 +13,7 @@ mod fit;
 mod labels;
 mod live;
 mod pins;
+mod presets;
 mod queue;
 mod reports;
 mod restore;
@@ -24,6 +25,7 @@ pub(super) use reports::mean_known;
 
 use super::command::Command;
 use super::effect::Effect;
+use super::presets::PresetCard;
 use super::report::Report;
 use super::state::{LOG_LINES, LogLevel, LogLine, Notice, Session};
 use super::strata::StrataStatus;
@@ -158,6 +160,11 @@ impl Session {
             Command::KeepResults(side) => self.keep_results(side),
             Command::ForgetResults(side) => self.forget_results(side),
             Command::LoadResults(path) => self.load_results(path),
+            Command::ComparePresets => self.compare_presets(),
+            Command::ClosePresets => {
+                self.presets = PresetCard::Closed;
+                Vec::new()
+            }
             Command::RunStudy(order) => self.run_study(order),
             Command::PauseStudy => self.pause_study(),
             Command::CancelStudy => self.cancel_study(),
@@ -217,6 +224,7 @@ impl Session {
             Report::BatchRows(dataset, rows, done) => self.batch_rows(&dataset, rows, done),
             Report::BatchDone(dataset, result) => self.batch_done(&dataset, result),
             Report::KeptFound(dataset, kept) => self.kept_found(&dataset, kept),
+            Report::PresetsFitted(fits) => self.presets_fitted(fits),
             Report::StudyProgress(done, total) => {
                 self.study.work.advance(done, total);
                 Vec::new()

@@ -157,6 +157,10 @@ pub enum Command {
     ForgetResults(ResultSide),
     /// Take the results of a batch, a table that `fit --out` wrote, into the frame list.
     LoadResults(PathBuf),
+    /// Fit the frame on screen with the paper's and the recommended settings, and show both.
+    ComparePresets,
+    /// Close what shows them.
+    ClosePresets,
     /// Study the selected frames, or all in the list, on all cores; what was done of the same study is taken.
     RunStudy(StudyOrder),
     /// Let the study wait, or go on.

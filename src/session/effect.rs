@@ -6,8 +6,9 @@ use super::command::PickKind;
 use super::evidence::EvidenceRequest;
 use super::pins::Pin;
 use super::study::StudyRequest;
-use crate::dataset::{BareChoice, Dataset};
+use crate::dataset::{BareChoice, Dataset, Frame};
 use crate::labels::Judged;
+use crate::mhp::Precision;
 use crate::study::run::Run;
 use crate::worker::WorkerCommand;
 use std::collections::BTreeMap;
@@ -130,6 +131,8 @@ pub enum Effect {
     CancelBatch,
     /// Look for what earlier batches left of this data set, on a thread.
     FindKept(Arc<Dataset>),
+    /// Fit a frame with two presets, on a thread.
+    FitPresets(Arc<Dataset>, Arc<Frame>, Precision),
     /// Do this study on all cores.
     StartStudy(Box<StudyRequest>),
     /// Let the study wait, or go on.

@@ -3,6 +3,7 @@
 use super::acts::{ActKind, Done};
 use super::file::SessionFile;
 use super::labels::LabelTable;
+use super::presets::PresetFits;
 use super::results::FoundResults;
 use super::state::{FitHashes, LogLevel};
 use crate::dataset::{Dataset, DatasetError, Frame};
@@ -70,6 +71,8 @@ pub enum Report {
     BatchDone(Arc<Dataset>, Result<bool, String>),
     /// What earlier batches left of a data set.
     KeptFound(Arc<Dataset>, Vec<KeptFits>),
+    /// A frame was fitted with two presets.
+    PresetsFitted(Arc<PresetFits>),
     /// The study that was begun here got on: fits done, of how many.
     StudyProgress(u64, u64),
     /// It has more rows.

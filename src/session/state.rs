@@ -9,6 +9,7 @@ use super::fit::Fit;
 use super::identity::Identities;
 use super::labels::Labels;
 use super::pins::Pins;
+use super::presets::PresetCard;
 use super::queue::{ListedFrom, Queue};
 use super::settings::{Drag, SettingsActs};
 use super::strata::Strata;
@@ -177,6 +178,10 @@ pub struct Session {
     pub batch: Batch,
     /// What the machine says of the fit on screen.
     pub(super) evidence: EvidenceState,
+    /// The frame on screen, fitted with two presets.
+    pub presets: PresetCard,
+    /// Whether that is done with the first frame that is there.
+    pub(super) presets_first: bool,
     /// Fits that others are compared with.
     pub pins: Pins,
     /// The study on screen.
@@ -226,8 +231,9 @@ impl Session {
         Self { view, data: Data { recent, ..Data::default() }, ..Self::default() }
     }
 
-    /// For a person who was not here before: the first run is slow enough to be watched.
+    /// For a person who was not here before: two presets are compared on the first frame, and the first run is slow enough to
+    /// be watched.
     pub fn first_visit(self) -> Self {
-        Self { slow_first_run: true, ..self }
+        Self { slow_first_run: true, presets_first: true, ..self }
     }
 }

@@ -1,7 +1,7 @@
 //! What would be cut off by leaving now.
 
-use super::batch::BatchStatus;
 use super::state::Session;
+use super::work::WorkStatus;
 
 impl Session {
     /// What is under way that leaving would cut off, a sentence each that says what of it is kept; empty where nothing is
@@ -13,8 +13,13 @@ impl Session {
             let at = self.fit.head();
             said.push(format!("The fit of {name} runs, iteration {at}. It is kept only in a saved session."));
         }
-        if let BatchStatus::Running { done, total, .. } = self.batch.status {
+        if let WorkStatus::Running { done, total, .. } = self.batch.work.status {
             said.push(format!("{done} of {total} listed frames are fitted. Those are kept; the others are not begun."));
+        }
+        if let WorkStatus::Running { done, total, .. } = self.study.work.status {
+            said.push(format!(
+                "{done} of {total} fits of a study are done. Those are kept; the same study goes on from there."
+            ));
         }
         match self.writing {
             0 => {}

@@ -7,6 +7,7 @@ use mhp_inspector::app::Pane;
 use mhp_inspector::config::{FitConfig, Parameterization, Preset, Summation};
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::mhp::Precision;
+use mhp_inspector::session::PresetCard;
 use mhp_inspector::session::{Command, LogLevel};
 use mhp_inspector::study::complexity::{ComplexityOptions, compute};
 use mhp_inspector::study::run::{RunFolder, RunPlan, RunRequest, StudyKind, execute_run};
@@ -243,4 +244,28 @@ fn a_sweep_is_put_together_and_run_in_the_pane() {
     }
     window.harness.run_steps(2);
     assert!(window.named("Sort by Difference of results"), "{:#?}", window.names());
+}
+
+#[test]
+fn two_presets_are_compared_on_one_frame() {
+    let mut window = Window::open(3);
+    window.switch_live_off();
+    let before = window.session().config;
+    window.key_with(egui::Modifiers::SHIFT, egui::Key::C);
+    window.until("both fits", |w| w.named("Take paper"));
+    for what in [
+        "Body fitted with paper, from the front and from above",
+        "Body fitted with recommended, from the front and from above",
+    ] {
+        assert!(window.named(what), "{what}: {:#?}", window.names());
+    }
+    assert!(window.says("MAJPE") && window.says("PA-MAJPE") && window.says("IoU, mean of views"));
+    window.key(egui::Key::N);
+    assert_eq!(window.frame(), 0, "keys belong to the card");
+    window.click("Take paper");
+    assert_eq!(window.session().config, Preset::Paper.config());
+    window.until("the card gone", |w| !w.named("Take paper"));
+    assert!(!matches!(window.session().presets, PresetCard::Shown(_)));
+    window.key_with(egui::Modifiers::COMMAND, egui::Key::Z);
+    assert_eq!(window.session().config, before, "one act");
 }

@@ -227,6 +227,15 @@ pub(super) const COMMANDS: &[CommandRow] = &[
         act: |_| UiAction::Session(Command::FollowLive),
     },
     CommandRow {
+        label: "Compare presets",
+        title: None,
+        tooltip: "Fit this frame with the paper's and the recommended settings, and show both side by side.",
+        menu: Menu::Fit,
+        keys: &[(SHIFT, Key::C)],
+        enabled: has_frame,
+        act: |_| UiAction::Session(Command::ComparePresets),
+    },
+    CommandRow {
         label: "Fit listed frames",
         title: Some(|s| match s.labels.selection.len() {
             0 => format!("Fit {} listed frames", s.queue.rows().len()),

@@ -11,6 +11,7 @@ use crate::session::fit::{Fit, FitStatus};
 use crate::session::history::History;
 use crate::session::identity::Identities;
 use crate::session::pins::Pins;
+use crate::session::presets::PresetCard;
 use crate::session::settings::SettingsActs;
 use crate::session::state::{LogLevel, Opening, RECENT, Session};
 use crate::worker::{Prepare, Start, WorkerCommand};
@@ -177,6 +178,10 @@ impl Session {
         }
         self.data.frame = Some(frame);
         effects.extend(self.begin_fit(index, warm));
+        self.presets = PresetCard::Closed;
+        if std::mem::take(&mut self.presets_first) {
+            effects.extend(self.compare_presets());
+        }
         effects
     }
 

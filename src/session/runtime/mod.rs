@@ -8,6 +8,7 @@ mod study;
 use super::command::{Command, PickKind};
 use super::effect::{Effect, Trash};
 use super::file::SessionFile;
+use super::presets::PresetFits;
 use super::report::Report;
 use super::results::FoundResults;
 use super::state::{LogLevel, Session};
@@ -245,6 +246,9 @@ impl Runtime {
                     batch.cancel();
                 }
             }
+            Effect::FitPresets(dataset, frame, precision) => self.on_thread("presets", move || {
+                Report::PresetsFitted(Arc::new(PresetFits::of(&dataset, &frame, precision)))
+            }),
             Effect::StartStudy(request) => self.study = Some(study::StudyThread::start(*request, &self.wake)),
             Effect::PauseStudy(wait) => {
                 if let Some(study) = &self.study {
