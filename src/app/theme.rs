@@ -44,6 +44,12 @@ pub(crate) struct Tokens {
     pub(crate) left: Color32,
     /// The person's right.
     pub(crate) right: Color32,
+    /// The selected joint.
+    pub(crate) selected: Color32,
+    /// The truth's skeleton.
+    pub(crate) truth: Color32,
+    /// A pinned fit that others are compared with.
+    pub(crate) pin: Color32,
     /// True in the dark theme.
     pub(crate) dark: bool,
 }
@@ -60,12 +66,15 @@ pub(crate) const DARK: Tokens = Tokens {
     stroke: rgb(0x2B303A),
     text: rgb(0xE6E8EB),
     dim: rgb(0x9AA3AF),
-    accent: rgb(0x4DA3FF),
+    accent: rgb(0x9797FC),
     ok: rgb(0x5CC98B),
     warn: rgb(0xF2B84B),
     bad: rgb(0xF2655C),
     left: rgb(0x4DA3FF),
     right: rgb(0xFF9F45),
+    selected: rgb(0xFE69D5),
+    truth: rgb(0x9BEC44),
+    pin: rgb(0xBA7AFB),
     dark: true,
 };
 
@@ -77,21 +86,24 @@ pub(crate) const LIGHT: Tokens = Tokens {
     stroke: rgb(0xD9DDE3),
     text: rgb(0x1B1F24),
     dim: rgb(0x5C6570),
-    accent: rgb(0x1769C2),
+    accent: rgb(0x584ACA),
     ok: rgb(0x1E8A52),
     warn: rgb(0xA66A00),
     bad: rgb(0xC6372E),
     left: rgb(0x1769C2),
     right: rgb(0xC25E00),
+    selected: rgb(0xC40A8F),
+    truth: rgb(0x599305),
+    pin: rgb(0x7F22BB),
     dark: false,
 };
 
 /// Mask overlay: cells in both masks, in H_ori's only, in H_sim's only.
 pub(crate) const MASK_BOTH: Color32 = Color32::from_rgb(0xFF, 0xFF, 0xFF);
 /// In H_ori's mask only.
-pub(crate) const MASK_ORI: Color32 = Color32::from_rgb(0xFF, 0x9F, 0x45);
+pub(crate) const MASK_ORI: Color32 = Color32::from_rgb(0xE6, 0xC8, 0x4A);
 /// In H_sim's mask only.
-pub(crate) const MASK_SIM: Color32 = Color32::from_rgb(0x4D, 0xA3, 0xFF);
+pub(crate) const MASK_SIM: Color32 = Color32::from_rgb(0x2F, 0xCC, 0xCB);
 /// Behind the masks, in both themes: white must be readable on it.
 pub(crate) const MASK_GROUND: Color32 = Color32::from_rgb(0x10, 0x12, 0x16);
 /// Cells that hold no number.
@@ -121,36 +133,38 @@ impl Tokens {
         rgb(colors[identity % colors.len()])
     }
 
+    /// The one of two colours that is of this theme.
+    fn pick(&self, on_dark: u32, on_light: u32) -> Color32 {
+        rgb(if self.dark { on_dark } else { on_light })
+    }
+
     /// The colour of a stratum; a letter or a height says the same.
     pub(crate) fn stratum(&self, stratum: Stratum) -> Color32 {
         match stratum {
-            Stratum::Easy => self.ok,
-            Stratum::Medium => self.warn,
-            Stratum::Hard => self.bad,
+            Stratum::Easy => self.pick(0x5CB99B, 0x278D73),
+            Stratum::Medium => self.pick(0xD4BE52, 0xA18308),
+            Stratum::Hard => self.pick(0xF34E6C, 0xC01244),
         }
     }
 
     /// The colour of a tag; its code says the same.
     pub(crate) fn tag(&self, tag: Tag) -> Color32 {
-        let pick = |on_dark: u32, on_light: u32| rgb(if self.dark { on_dark } else { on_light });
         match tag {
-            Tag::F1 => pick(0xF2655C, 0xC6372E),
-            Tag::F2 => pick(0xC792EA, 0x7A3DB8),
-            Tag::F3 => pick(0xF2B84B, 0xA66A00),
-            Tag::F4 => pick(0x4DA3FF, 0x1769C2),
-            Tag::Clean => self.ok,
+            Tag::F1 => self.pick(0xEC7859, 0xAA4429),
+            Tag::F2 => self.pick(0xCE81E5, 0x9843B1),
+            Tag::F3 => self.pick(0xF3C530, 0xA2790D),
+            Tag::F4 => self.pick(0x3BC4E0, 0x087E9B),
+            Tag::Clean => self.pick(0x5EDB81, 0x0E862C),
             Tag::Unsure => self.dim,
         }
     }
 
     /// The colours of the curves, by name.
     pub(crate) fn curve(&self, name: &str) -> Color32 {
-        let dark = self.dark;
-        let pick = |on_dark: u32, on_light: u32| rgb(if dark { on_dark } else { on_light });
         match name {
             "total" => self.text,
-            "majpe" => pick(0x7FDBDA, 0x0B7A78),
-            "iou 0" => pick(0x8BD17C, 0x2E7D1E),
+            "majpe" => self.pick(0xA6ECF4, 0x095258),
+            "iou 0" => self.pick(0xA0BE66, 0x637D21),
             name => self.hue(TermId::of(name).map_or(Hue::Rose, |term| term.hue)),
         }
     }
@@ -162,17 +176,16 @@ impl Tokens {
 
     /// The shade of a colour that a term of the loss has.
     pub(crate) fn hue(&self, hue: Hue) -> Color32 {
-        let (on_dark, on_light) = match hue {
-            Hue::Blue => (0x4DA3FF, 0x1769C2),
-            Hue::Orange => (0xFF9F45, 0xC25E00),
-            Hue::Violet => (0xC792EA, 0x7A3DB8),
-            Hue::Green => (0x5CC98B, 0x1E8A52),
-            Hue::Amber => (0xF2B84B, 0xA66A00),
-            Hue::Red => (0xF2655C, 0xC6372E),
-            Hue::Rose => (0xE58FB1, 0xA33266),
-            Hue::Teal => (0x4FC3C7, 0x0F7C80),
-        };
-        rgb(if self.dark { on_dark } else { on_light })
+        match hue {
+            Hue::Blue => self.pick(0x89C5F7, 0x1C5C8C),
+            Hue::Orange => self.pick(0xFCBA89, 0x945829),
+            Hue::Violet => self.pick(0xB49CE1, 0x563B85),
+            Hue::Green => self.pick(0x93E4A4, 0x1D6835),
+            Hue::Amber => self.pick(0xF0E07F, 0x8A8419),
+            Hue::Red => self.pick(0xEB9191, 0x963538),
+            Hue::Rose => self.pick(0xF2B0D5, 0xB4608A),
+            Hue::Teal => self.pick(0x6BCACA, 0x208182),
+        }
     }
 }
 
@@ -281,4 +294,117 @@ fn visuals(t: &Tokens) -> Visuals {
     // The track of a slider and the box of a check mark must be seen against the panel.
     w.inactive.bg_fill = t.stroke;
     v
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mhp::TERMS;
+
+    fn linear(color: Color32) -> [f64; 3] {
+        let of = |c: u8| {
+            let c = f64::from(c) / 255.0;
+            if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+        };
+        [color.r(), color.g(), color.b()].map(of)
+    }
+
+    /// As WCAG 2 has it: 1 to 21.
+    fn contrast(a: Color32, b: Color32) -> f64 {
+        let light = |color| {
+            let [r, g, b] = linear(color);
+            0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05
+        };
+        let (a, b) = (light(a), light(b));
+        a.max(b) / a.min(b)
+    }
+
+    /// Lightness and two axes of colour in which equal distances look about equal (Ottosson 2020).
+    fn oklab(color: Color32) -> [f64; 3] {
+        let [r, g, b] = linear(color);
+        let l = (0.412_221_470_8 * r + 0.536_332_536_3 * g + 0.051_445_992_9 * b).cbrt();
+        let m = (0.211_903_498_2 * r + 0.680_699_545_1 * g + 0.107_396_956_6 * b).cbrt();
+        let s = (0.088_302_461_9 * r + 0.281_718_837_6 * g + 0.629_978_700_5 * b).cbrt();
+        [
+            0.210_454_255_3 * l + 0.793_617_785_0 * m - 0.004_072_046_8 * s,
+            1.977_998_495_1 * l - 2.428_592_205_0 * m + 0.450_593_709_9 * s,
+            0.025_904_037_1 * l + 0.782_771_766_2 * m - 0.808_675_766_0 * s,
+        ]
+    }
+
+    fn distance(a: Color32, b: Color32) -> f64 {
+        oklab(a).iter().zip(oklab(b)).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    }
+
+    type Role = (&'static str, Color32);
+
+    /// Roles that stand in one picture, and how far apart they are at least.
+    fn pictures(t: &Tokens) -> Vec<(Vec<Role>, f64)> {
+        let bodies = [
+            ("left", t.left),
+            ("right", t.right),
+            ("selected", t.selected),
+            ("truth", t.truth),
+            ("pin", t.pin),
+            ("middle", t.dim),
+        ];
+        let terms = TERMS.iter().filter(|term| term.key != "dummy").map(|term| (term.key, t.curve(term.key)));
+        let curves = ["total", "iou 0", "majpe"].map(|key| (key, t.curve(key)));
+        let tags = Tag::ALL.map(|tag| (tag.code(), t.tag(tag)));
+        let strata = [Stratum::Easy, Stratum::Medium, Stratum::Hard].map(|s| (s.word(), t.stratum(s)));
+        let states = [("ok", t.ok), ("warn", t.warn), ("bad", t.bad), ("accent", t.accent)];
+        vec![
+            (bodies.to_vec(), 0.12),
+            (terms.chain(curves).collect(), 0.06),
+            (tags.to_vec(), 0.09),
+            (strata.to_vec(), 0.14),
+            (states.to_vec(), 0.12),
+        ]
+    }
+
+    #[test]
+    fn every_role_is_seen_on_every_ground_and_told_from_those_beside_it() {
+        for t in [DARK, LIGHT] {
+            let pictures = pictures(&t);
+            for &(name, color) in pictures.iter().flat_map(|(roles, _)| roles) {
+                for ground in [t.canvas, t.panel, t.raised] {
+                    let seen = contrast(color, ground);
+                    assert!(seen >= 3.0, "{name} in the theme dark={}: {seen:.2}", t.dark);
+                }
+            }
+            for (roles, least) in &pictures {
+                for (i, a) in roles.iter().enumerate() {
+                    for b in &roles[i + 1..] {
+                        let apart = distance(a.1, b.1);
+                        assert!(apart >= *least, "{} and {} in the theme dark={}: {apart:.3}", a.0, b.0, t.dark);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_two_roles_share_a_colour() {
+        for t in [DARK, LIGHT] {
+            // What has no tag and what is the middle of a body is grey in both.
+            let all: Vec<Role> = pictures(&t).into_iter().flat_map(|(roles, _)| roles).collect();
+            for (i, a) in all.iter().enumerate() {
+                for b in all[i + 1..].iter().filter(|b| (a.1, b.1) != (t.dim, t.dim)) {
+                    let apart = distance(a.1, b.1);
+                    assert!(apart >= 0.02, "{} and {} in the theme dark={}: {apart:.3}", a.0, b.0, t.dark);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn masks_are_told_from_each_other_and_from_the_body_over_them() {
+        let roles = [MASK_BOTH, MASK_ORI, MASK_SIM, DARK.left, DARK.right, DARK.selected, DARK.truth];
+        for (i, &a) in roles.iter().enumerate() {
+            assert!(contrast(a, MASK_GROUND) >= 3.0);
+            for &b in &roles[i + 1..] {
+                assert!(distance(a, b) >= 0.09, "{a:?} {b:?}: {:.3}", distance(a, b));
+            }
+        }
+    }
 }

@@ -215,7 +215,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         for (name, pieces) in &pinned {
             for piece in pieces {
                 let line = Line::new(name.clone(), PlotPoints::Borrowed(piece));
-                plot.line(line.color(tokens.warn.gamma_multiply(0.8)).width(1.2).style(LineStyle::dashed_loose()));
+                plot.line(line.color(tokens.pin.gamma_multiply(0.8)).width(1.2).style(LineStyle::dashed_loose()));
             }
         }
         for Drawn { pieces, curve: c, behind } in &lines {

@@ -328,8 +328,8 @@ fn captions(painter: &egui::Painter, rect: Rect, session: &Session, tokens: &Tok
     let keys = [
         ("right", tokens.right, true),
         ("left", tokens.left, true),
-        ("truth", tokens.ok, has_truth),
-        (name.as_str(), tokens.warn, baseline.is_some()),
+        ("truth", tokens.truth, has_truth),
+        (name.as_str(), tokens.pin, baseline.is_some()),
     ];
     for (word, color, shown) in keys {
         if shown {

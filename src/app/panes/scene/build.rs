@@ -59,13 +59,13 @@ pub(super) fn scene(session: &Session, camera: &Camera, tokens: &Tokens, px: f32
         && let (Some(truth), Some(dataset)) =
             (session.data.frame.as_ref().and_then(|f| f.truth.as_ref()), &session.data.dataset)
     {
-        let stroke = Stroke { color: rgba(tokens.ok, 0.85), width_px: 1.5 * px };
+        let stroke = Stroke { color: rgba(tokens.truth, 0.85), width_px: 1.5 * px };
         bones(&mut scene.lines, &dataset.info().skeleton, &truth.joints, &|_, _| stroke);
     }
     if look.show_baseline
         && let (Some(pin), Some(dataset)) = (session.pins.baseline(), &session.data.dataset)
     {
-        let stroke = Stroke { color: rgba(tokens.warn, 0.85), width_px: 1.5 * px };
+        let stroke = Stroke { color: rgba(tokens.pin, 0.85), width_px: 1.5 * px };
         bones(&mut scene.lines, &dataset.info().skeleton, pin.params.positions(), &|_, _| stroke);
     }
     (scene, labels)
@@ -105,7 +105,7 @@ fn person(
         scene.splats.push(SplatInstance {
             center: params.position(joint).map(|x| x as f32),
             covariance: covariance(params, joint),
-            color: rgba(if selected { tokens.warn } else { color }, alpha),
+            color: rgba(if selected { tokens.selected } else { color }, alpha),
             id: joint as u32,
         });
         if selected {
