@@ -222,6 +222,33 @@ pub(crate) fn colorize(
     let span = hi - lo;
     let mut image = ColorImage::filled(size, Color32::BLACK);
     for (i, (pixel, &value)) in image.pixels.iter_mut().zip(values).enumerate() {
+/// How often shown values occur, over the whole of a colour bar.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Histogram {
+    /// Ends of the bar: all that occurs, and the limits.
+    pub(crate) span: (f64, f64),
+    /// Height of each bar, lowest value first: the logarithm of its count, the largest is 1.
+    pub(crate) heights: Vec<f32>,
+}
+
+impl Histogram {
+    const BARS: usize = 48;
+
+    /// Of shown values, with limits lower < upper; what is no number is left out.
+    pub(crate) fn of(values: &[f64], (lo, hi): (f64, f64)) -> Self {
+        let finite = || values.iter().copied().filter(|x| x.is_finite());
+        let span = finite().fold((lo, hi), |(lo, hi), x| (lo.min(x), hi.max(x)));
+        let mut counts = [0u32; Self::BARS];
+        let per_value = Self::BARS as f64 / (span.1 - span.0);
+        for value in finite() {
+            counts[(((value - span.0) * per_value) as usize).min(Self::BARS - 1)] += 1;
+        }
+        let height = |count: u32| f64::from(count).ln_1p();
+        let most = height(counts.into_iter().max().unwrap_or_default()).max(1.0);
+        Self { span, heights: counts.map(|count| (height(count) / most) as f32).to_vec() }
+    }
+}
+
         if value.is_nan() {
             *pixel = nan;
             continue;
@@ -346,3 +373,14 @@ mod tests {
         assert!(lo < hi);
     }
 }
+    /// The bar reaches over all that occurs and over the limits; what occurs most often is highest.
+    #[test]
+    fn a_histogram_reaches_over_values_and_limits() {
+        let values = [-60.0, -60.0, -60.0, -31.0, -2.0, f64::NAN, f64::NEG_INFINITY];
+        let Histogram { span, heights } = Histogram::of(&values, (-40.0, 10.0));
+        assert_eq!(span, (-60.0, 10.0));
+        let highest = (0..heights.len()).max_by(|&a, &b| heights[a].total_cmp(&heights[b]));
+        assert_eq!((highest, heights[0], heights.iter().filter(|height| **height > 0.0).count()), (Some(0), 1.0, 3));
+        assert!((heights[19] - 2f32.ln() / 4f32.ln()).abs() < 1e-6, "-31 is 29/70 of the way up: {heights:?}");
+    }
+

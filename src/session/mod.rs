@@ -64,7 +64,7 @@ pub use strata::{Strata, StrataStatus};
 pub use study::{StudyOrder, StudyRequest, StudyView};
 pub use tracked::Tracked;
 pub use view::{
-    Against, ColorRange, Compare, CubeAxes, CubeView, MapScale, Smoothing, SplatMode, ThemeChoice, ThirdAxis,
+    Against, ColorRange, Compare, CubeAxes, CubeView, MapLimits, MapScale, Smoothing, SplatMode, ThemeChoice, ThirdAxis,
     TimelineStrip, ViewState,
 };
 pub use work::{Work, WorkStatus};

@@ -39,7 +39,7 @@ pub enum ColorRange {
         /// Upper percentile, 0..100.
         hi: f64,
     },
-    /// Fixed limits in shown units.
+    /// Limits set by hand, in shown units.
     Fixed {
         /// Lower limit.
         lo: f64,
@@ -52,6 +52,21 @@ impl Default for ColorRange {
     fn default() -> Self {
         Self::Percentile { lo: 2.0, hi: 99.8 }
     }
+}
+
+/// The colour limits of one map that were set by hand.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MapLimits {
+    /// Key of the map's array.
+    pub array: String,
+    /// The scale that the limits are in; on the other one they count for nothing.
+    pub scale: MapScale,
+    /// Lower limit, shown units.
+    pub lo: f64,
+    /// Upper limit, shown units.
+    pub hi: f64,
+    /// They stay when another frame is shown.
+    pub locked: bool,
 }
 
 /// What the H_sim pane shows against H_ori.
@@ -174,13 +189,15 @@ pub struct ViewState {
     pub theme: ThemeChoice,
     /// Linear or dB.
     pub scale: MapScale,
-    /// Limits of the colour bar.
+    /// Limits of the colour bars that have none of their own.
     pub range: ColorRange,
     /// H_sim uses H_ori's limits.
     pub shared_range: bool,
     /// Name of the colour map, in lower case.
     pub colormap: String,
     /// What the H_sim pane shows.
+    /// Limits of single maps.
+    pub limits: Vec<MapLimits>,
     pub compare: Compare,
     /// What flip, wipe and difference compare H_sim with.
     pub against: Against,
@@ -273,6 +290,7 @@ impl Default for ViewState {
             wipe: 0.5,
             cube: CubeView::default(),
             true_proportions: false,
+            limits: Vec::new(),
             follow: true,
             show_region: true,
             show_skeleton: true,
@@ -321,3 +339,50 @@ impl ViewState {
         self
     }
 }
+        self.limits.retain(|limits| limits.lo.is_finite() && limits.hi.is_finite() && limits.lo < limits.hi);
+
+    /// The limits of a map that were set by hand in the scale shown.
+    pub fn limits_of(&self, array: &str) -> Option<&MapLimits> {
+        self.limits.iter().find(|limits| limits.array == array && limits.scale == self.scale)
+    }
+
+    /// How the limits of a map are found.
+    pub fn range_of(&self, array: &str) -> ColorRange {
+        self.limits_of(array).map_or(self.range, |limits| ColorRange::Fixed { lo: limits.lo, hi: limits.hi })
+    }
+
+    /// Sets the limits of a map in the scale shown. Changing the frame resets nothing that a person set: they are locked,
+    /// unless the lock was taken from them.
+    pub fn set_limits(&mut self, array: &str, (lo, hi): (f64, f64)) {
+        let locked = self.limits_of(array).is_none_or(|limits| limits.locked);
+        self.free_limits(array);
+        self.limits.push(MapLimits { array: array.to_owned(), scale: self.scale, lo, hi, locked });
+    }
+
+    /// Lets the limits of a map stay over frames, those on screen where it has none of its own; or no longer.
+    pub fn lock_limits(&mut self, array: &str, on_screen: (f64, f64), locked: bool) {
+        if self.limits_of(array).is_none() {
+            self.set_limits(array, on_screen);
+        }
+        let scale = self.scale;
+        for limits in self.limits.iter_mut().filter(|limits| limits.array == array && limits.scale == scale) {
+            limits.locked = locked;
+        }
+    }
+
+    /// The limits of a map are found again.
+    pub fn free_limits(&mut self, array: &str) {
+        let scale = self.scale;
+        self.limits.retain(|limits| limits.array != array || limits.scale != scale);
+    }
+
+    /// The limits of every map are found again, by percentiles.
+    pub fn auto_contrast(&mut self) {
+        self.range = ColorRange::default();
+        self.limits.clear();
+    }
+
+    /// Another frame is shown.
+    pub(super) fn leave_frame(&mut self) {
+        self.limits.retain(|limits| limits.locked);
+    }

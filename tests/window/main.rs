@@ -14,6 +14,7 @@ mod compare;
 mod journey;
 mod labels;
 mod large;
+mod maps;
 mod results;
 mod study;
 mod ui;

@@ -334,11 +334,11 @@ pub(super) const COMMANDS: &[CommandRow] = &[
     CommandRow {
         label: "Auto-contrast",
         title: None,
-        tooltip: "Set the colour limits to the 2nd and 99.8th percentile again.",
+        tooltip: "Set the colour limits of every map to the 2nd and 99.8th percentile again.",
         menu: Menu::View,
         keys: &[(NONE, Key::C)],
         enabled: always,
-        act: |s| view(s, |v| v.range = crate::session::ColorRange::default()),
+        act: |s| view(s, crate::session::ViewState::auto_contrast),
     },
     CommandRow {
         label: "Person or whole",

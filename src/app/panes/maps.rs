@@ -13,9 +13,9 @@ use crate::app::commands::{AppAct, CommandRow, Menu, NONE, UiAction, has_frame};
 use crate::app::figure;
 use crate::app::map_image::Orientation;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::{ColorBar, colorbar};
+use crate::app::widgets::{BarRow, ColorBar, LimitsEdit, colorbar};
 use crate::radar::View;
-use crate::session::{ColorRange, Compare, Session};
+use crate::session::{Compare, Session};
 use egui::{Key, Rect, Sense, Ui, UiBuilder, pos2, vec2};
 use focus::Focus;
 use grid::GridRow;
@@ -350,7 +350,8 @@ fn beside(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, row: &GridRow
         let same = |known: &(Content, (f64, f64))| {
             known.1 == limits && (known.0 == Content::Difference) == (content == Content::Difference)
         };
-        if !bars.iter().any(same) {
+        // What is not there yet has no limits.
+        if limits.0 < limits.1 && !bars.iter().any(same) {
             bars.push((content, limits));
         }
     }
@@ -361,16 +362,24 @@ fn beside(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, row: &GridRow
             rect,
             map: state.pictures.colormap(content),
             limits,
-            floor: state.pictures.floor(content),
+            histogram: state.pictures.histogram(index, content),
+            floor: state.pictures.floor(index, content),
             unit: state.pictures.unit(content),
-            name: name_of(content, state, view).0,
+            row: (content != Content::Difference).then(|| BarRow {
+                array: &view.array,
+                name: name_of(content, state, view).0,
+                by_hand: set.is_some(),
+                locked: set.is_some_and(|set| set.locked),
+            }),
         };
-        if let Some((lo, hi)) = colorbar(ui, &bar)
-            && content != Content::Difference
-        {
-            shared.set_view(|v| v.range = ColorRange::Fixed { lo, hi });
-        }
+        let Some(edit) = colorbar(ui, &bar) else { continue };
+        shared.set_view(|v| match edit {
+            LimitsEdit::Set(limits) => v.set_limits(&view.array, limits),
+            LimitsEdit::Automatic => v.free_limits(&view.array),
+            LimitsEdit::Lock(on) => v.lock_limits(&view.array, limits, on),
+        });
     }
+    let set = shared.session.view.limits_of(&view.array);
 }
 
 /// The whole map, small, with what is seen of it, which can be dragged.

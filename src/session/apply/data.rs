@@ -139,6 +139,9 @@ impl Session {
         if index >= self.data.len() || (index == self.data.frame_index && self.data.error.is_none()) {
             return Vec::new();
         }
+        if index != self.data.frame_index {
+            self.view.leave_frame();
+        }
         self.data.frame_index = index;
         if let Some(at) = self.queue.position(index) {
             self.queue.last_position = at;

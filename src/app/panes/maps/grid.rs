@@ -16,7 +16,7 @@ pub(super) const COLUMNS: usize = 3;
 /// The numbers and the name of the vertical axis, points.
 const LEFT: f32 = 42.0;
 /// Overview and colour bar.
-const RIGHT: f32 = 62.0;
+const RIGHT: f32 = 72.0;
 /// The numbers of the horizontal axis.
 const BELOW: f32 = 15.0;
 /// Between maps.

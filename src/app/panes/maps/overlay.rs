@@ -4,7 +4,7 @@ use super::MapExtent;
 use super::picture::Content;
 use crate::app::map_image::Orientation;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::tick;
+use crate::app::widgets::{round_step, tick};
 use crate::body::Skeleton;
 use crate::radar::{Axis, AxisKind, View};
 use crate::session::Session;
@@ -112,9 +112,7 @@ fn ticks(axis: &Axis, from: f32, to: f32, forward: bool, wanted: f32) -> Vec<(f3
     if !(span.is_finite() && span > 0.0) {
         return Vec::new();
     }
-    let raw = span / f64::from(wanted.max(1.5));
-    let magnitude = 10f64.powf(raw.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * magnitude).into_iter().find(|s| *s >= raw).unwrap_or(raw);
+    let step = round_step(span / f64::from(wanted.max(1.5)));
     let first = (lo / step).ceil() as i64;
     let last = (hi / step).floor() as i64;
     (first..=last.min(first.saturating_add(40)))

@@ -1,12 +1,12 @@
 //! Textures of the maps, made again only when what they show changed.
 
 use super::overlay::region_box;
-use crate::app::map_image::{Orientation, Shown, colorize, floor, limits, shown};
+use crate::app::map_image::{Histogram, Orientation, Shown, colorize, floor, limits, shown};
 use crate::app::theme;
 use crate::dataset::Frame;
 use crate::radar::View;
 use crate::render::Colormap;
-use crate::session::{Against, ColorRange, CubeView, MapScale, Session, ViewState};
+use crate::session::{Against, ColorRange, CubeView, MapLimits, MapScale, Session, ViewState};
 use crate::worker::Snapshot;
 use egui::{Color32, ColorImage, Painter, Rect, TextureHandle, TextureOptions, Ui};
 use std::cell::RefCell;
@@ -50,7 +50,10 @@ struct ViewPictures {
     region: Option<[[f32; 2]; 2]>,
     ori_limits: (f64, f64),
     sim_limits: (f64, f64),
+    /// How the limits are found.
+    range: ColorRange,
     difference_limit: f64,
+    ori_histogram: Histogram,
 }
 
 /// Every view's pictures and the textures made of them.
@@ -72,6 +75,7 @@ struct Look {
     range: ColorRange,
     shared_range: bool,
     colormap: Colormap,
+    limits: Vec<MapLimits>,
     hatch: bool,
     mask_opacity: f32,
     against: Against,
@@ -86,6 +90,7 @@ impl Look {
             range: view.range,
             shared_range: view.shared_range,
             colormap: colormap.unwrap_or_default(),
+            limits: view.limits.clone(),
             hatch: view.show_clipped,
             mask_opacity: view.mask_opacity,
             against: view.against,
@@ -120,17 +125,19 @@ impl Pictures {
             let pictures = &mut self.views[i];
             let orientation = Orientation::of(view, look.cube);
             pictures.size = orientation.size(view);
+            pictures.range = session.view.range_of(&view.array);
+            let range = pictures.range;
             if all && let Some(map) = frame.maps.get(i) {
                 pictures.ori_stored = orientation.picture(view, &map.data);
-                let ori = shown(&pictures.ori_stored, look.scale, look.range, view.quantity.db_factor());
-                pictures.ori_limits = limits(&ori.values, look.range);
+                let ori = shown(&pictures.ori_stored, look.scale, range, view.quantity.db_factor());
+                pictures.ori_limits = limits(&ori.values, range);
+                pictures.ori_histogram = Histogram::of(&ori.values, pictures.ori_limits);
                 pictures.ori = Some(ori);
             }
             if all || new_baseline {
                 let map = baseline.as_ref().and_then(|base| base.h_sim.get(i)).filter(|map| map.len() == view.cells());
-                let shown = |map: &[f64]| {
-                    shown(&orientation.picture(view, map), look.scale, look.range, view.quantity.db_factor())
-                };
+                let shown =
+                    |map: &[f64]| shown(&orientation.picture(view, map), look.scale, range, view.quantity.db_factor());
                 pictures.base = map.map(|map| shown(map));
             }
             if all || new_snapshot {
@@ -214,9 +221,28 @@ impl Pictures {
     }
 
     /// What lies lower than this is shown as this.
-    pub(super) fn floor(&self, content: Content) -> f64 {
-        let look = self.look.as_ref().filter(|_| content != Content::Difference);
-        look.map_or(f64::NEG_INFINITY, |look| floor(look.scale, look.range))
+    pub(super) fn floor(&self, view: usize, content: Content) -> f64 {
+        let (look, view) = (self.look.as_ref().filter(|_| content != Content::Difference), self.views.get(view));
+        look.zip(view).map_or(f64::NEG_INFINITY, |(look, view)| floor(look.scale, view.range))
+    }
+
+    /// How often what is shown occurs.
+    pub(super) fn histogram(&self, view: usize, content: Content) -> Histogram {
+        let limits = self.limits(view, content);
+        let Some(pictures) = self.views.get(view) else { return Histogram::of(&[], limits) };
+        let of = |shown: &Option<Shown>| shown.as_ref().map_or_else(Vec::new, |shown| shown.values.clone());
+        match content {
+            Content::Ori | Content::Masks => pictures.ori_histogram.clone(),
+            Content::Sim => Histogram::of(&of(&pictures.sim), limits),
+            Content::Base => Histogram::of(&of(&pictures.base), limits),
+            Content::Difference => {
+                let mut values = pictures.difference(self.reference()).unwrap_or_default();
+                for value in &mut values {
+                    *value = value.clamp(limits.0, limits.1);
+                }
+                Histogram::of(&values, limits)
+            }
+        }
     }
 
     /// (stored, shown) value of H_ori and of H_sim at a pixel.
@@ -259,9 +285,9 @@ impl ViewPictures {
         let Some(snapshot) = snapshot else { return };
         if let Some(map) = snapshot.h_sim.get(index) {
             self.sim_stored = orientation.picture(view, map);
-            let sim = shown(&self.sim_stored, look.scale, look.range, view.quantity.db_factor());
-            let own = look.shared_range || matches!(look.range, ColorRange::Fixed { .. });
-            self.sim_limits = if own { self.ori_limits } else { limits(&sim.values, look.range) };
+            let sim = shown(&self.sim_stored, look.scale, self.range, view.quantity.db_factor());
+            let shared = look.shared_range || matches!(self.range, ColorRange::Fixed { .. });
+            self.sim_limits = if shared { self.ori_limits } else { limits(&sim.values, self.range) };
             self.sim = Some(sim);
             self.difference_limit = match look.scale {
                 MapScale::Decibel => 0.5 * (self.ori_limits.1 - self.ori_limits.0).abs().max(1.0),

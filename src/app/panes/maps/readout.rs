@@ -63,7 +63,7 @@ fn lines(session: &Session, state: &State, view: &View, index: usize, pixel: [us
             Some((stored, _)) if stored.is_nan() => format!("{name} NaN (filled before the fit)"),
             Some((stored, shown)) => {
                 let rank = pictures.rank(index, k, stored).map_or_else(String::new, |rank| format!(" P{rank:.1}"));
-                format!("{name} {stored:.4e}  {} {unit}{rank}", level(shown, pictures.floor(Content::Ori)))
+                format!("{name} {stored:.4e}  {} {unit}{rank}", level(shown, pictures.floor(index, Content::Ori)))
             }
             None => format!("{name} —"),
         });

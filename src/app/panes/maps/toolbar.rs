@@ -119,7 +119,7 @@ fn colours(ui: &mut Ui, shared: &mut Shared<'_>) {
     let view = &shared.session.view;
     if scale != view.scale || name != view.colormap {
         shared.set_view(|v| {
-            if scale != v.scale {
+            if scale != v.scale && matches!(v.range, ColorRange::Fixed { .. }) {
                 // Limits in dB mean nothing on a linear scale.
                 v.range = ColorRange::default();
             }
@@ -152,11 +152,14 @@ fn more(ui: &mut Ui, shared: &mut Shared<'_>) {
         if let ColorRange::Percentile { lo, hi } = &mut view.range {
             ui.add(egui::Slider::new(lo, 0.0..=50.0).text("lower percentile"));
             ui.add(egui::Slider::new(hi, 50.0..=100.0).text("upper percentile"));
-        } else {
-            ui.label("set on the colour bar");
         }
-        if ui.button("Auto-contrast").on_hover_text("2nd and 99.8th percentile. Key: C").clicked() {
-            view.range = ColorRange::default();
+        let by_hand: Vec<&str> = views(shared).filter(|array| view.limits_of(array).is_some()).collect();
+        if !by_hand.is_empty() {
+            ui.label(RichText::new(format!("by hand: {}", by_hand.join(", "))).small());
+        }
+        if ui.button("Auto-contrast").on_hover_text("Every map from its 2nd to its 99.8th percentile. Key: C").clicked()
+        {
+            view.auto_contrast();
         }
     });
     menu.response.on_hover_text("What is drawn on the maps, and how the colour limits are found.");
@@ -200,6 +203,11 @@ fn legend(ui: &mut Ui) {
         (theme::MASK_SIM, "H_sim only", "Simulated, not measured."),
     ];
     for (color, text, tip) in entries.into_iter().rev() {
+/// Keys of the maps' arrays.
+fn views<'a>(shared: &Shared<'a>) -> impl Iterator<Item = &'a str> {
+    shared.session.data.dataset.iter().flat_map(|dataset| &dataset.info().views).map(|view| view.array.as_str())
+}
+
         ui.label(RichText::new(text).small()).on_hover_text(tip);
         let (rect, _) = ui.allocate_exact_size(vec2(9.0, 9.0), Sense::hover());
         ui.painter().rect(rect, 1.0, color, egui::Stroke::new(1.0, tokens.dim), egui::StrokeKind::Inside);

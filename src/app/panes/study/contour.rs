@@ -5,6 +5,7 @@
 //! no point without a value.
 
 use super::measure::{PlottedQuantity, Values, levels, limits};
+use crate::app::map_image::Histogram;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{ColorBar, Named as _, colorbar};
 use crate::render::Colormap;
@@ -82,10 +83,10 @@ pub(super) fn show(
     iso_lines(ui, &field, limits, &place, tokens);
     axes(ui, run, &field, area, &place, tokens);
     let bar = Rect::from_min_max(pos2(area.max.x + 10.0, area.min.y - 10.0), pos2(rect.max.x, area.max.y));
-    let (floor, name) = (f64::NEG_INFINITY, format!("{} scale", measure.short()));
-    let bar = ColorBar { rect: bar, map, limits, floor, unit: measure.unit(), name };
-    // The scale is the table's own: its handles ask for nothing.
-    let _ = colorbar(ui, &bar);
+    // The scale is the table's own: there is nothing to set.
+    let histogram = Histogram { span: limits, heights: Vec::new() };
+    let floor = f64::NEG_INFINITY;
+    let _ = colorbar(ui, &ColorBar { rect: bar, map, limits, histogram, floor, unit: measure.unit(), row: None });
     points(ui, run, &field, measure, &place, tokens)
 }
 

@@ -1,0 +1,93 @@
+//! The maps pane: colour limits by hand and over frames.
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "tests fail by panicking")]
+
+use crate::window::Window;
+use egui::{Key, vec2};
+use egui_kittest::kittest::Queryable as _;
+use mhp_inspector::session::{ColorRange, Command, MapScale};
+
+/// The limits of a map that were set by hand.
+fn limits(window: &Window, array: &str) -> Option<(f64, f64, bool)> {
+    window.session().view.limits_of(array).map(|limits| (limits.lo, limits.hi, limits.locked))
+}
+
+/// Types a limit in the form that its number opens.
+fn type_limit(window: &mut Window, side: &str, array: &str, text: &str) {
+    window.click(&format!("{side} limit of {array}"));
+    let field = format!("{side} limit of {array} value");
+    window.harness.run_steps(2);
+    let node = window.harness.get_by_role_and_label(egui::accesskit::Role::TextInput, &field);
+    node.focus();
+    window.harness.run_steps(1);
+    window.key_with(egui::Modifiers::COMMAND, Key::A);
+    window.type_text(text);
+    window.key(Key::Enter);
+    window.harness.run_steps(2);
+}
+
+#[test]
+fn a_limit_is_dragged_on_the_bar_for_its_row_alone() {
+    let mut window = Window::open(2);
+    assert_eq!(limits(&window, "hori"), None);
+    let handle = window.node("H_ori map of hori lower limit").rect().center();
+    window.harness.hover_at(handle);
+    window.harness.drag_at(handle);
+    window.harness.run_steps(2);
+    window.harness.hover_at(handle - vec2(0.0, 30.0));
+    window.harness.run_steps(2);
+    window.harness.drop_at(handle - vec2(0.0, 30.0));
+    window.harness.run_steps(2);
+    let (lo, hi, locked) = limits(&window, "hori").expect("set by hand");
+    assert!(locked && lo > -60.0 && lo < hi, "{lo} {hi}");
+    assert_eq!(limits(&window, "vert"), None);
+    assert!(!window.named("H_sim map of hori lower limit"), "H_sim has the same limits, and no bar of its own");
+    assert!(window.is_on("Lock the limits of hori over frames") && !window.is_on("Automatic limits of hori"));
+    window.click("Automatic limits of hori");
+    assert_eq!(limits(&window, "hori"), None);
+}
+
+#[test]
+fn a_limit_is_typed_and_what_is_no_number_is_told() {
+    let mut window = Window::open(1);
+    type_limit(&mut window, "Lower", "vert", "−33,5");
+    assert_eq!(limits(&window, "vert").map(|(lo, ..)| lo), Some(-33.5));
+    window.key(Key::Escape);
+    type_limit(&mut window, "Upper", "vert", "loud");
+    assert!(window.says("“loud” is not a number."), "{:?}", window.names());
+    assert_eq!(limits(&window, "vert").map(|(lo, ..)| lo), Some(-33.5));
+    window.key(Key::Escape);
+    type_limit(&mut window, "Upper", "vert", "-40");
+    assert!(window.says("The lower limit must be below the upper one."));
+    window.click("Automatic");
+    assert_eq!(limits(&window, "vert"), None);
+    window.key(Key::Escape);
+
+    // Below the shown floor: what is shown goes down with it, never the other way round.
+    type_limit(&mut window, "Lower", "vert", "-90");
+    assert_eq!(
+        window.session().view.range_of("vert"),
+        ColorRange::Fixed { lo: -90.0, hi: limits(&window, "vert").unwrap().1 }
+    );
+    window.key(Key::Escape);
+    let mut linear = window.session().view.clone();
+    linear.scale = MapScale::Linear;
+    window.apply(Command::SetView(Box::new(linear)));
+    assert_eq!(limits(&window, "vert"), None, "dB mean nothing on a linear scale");
+    window.key(Key::C);
+    assert!(window.session().view.limits.is_empty());
+}
+
+#[test]
+fn locked_limits_stay_over_frames_and_others_are_found_again() {
+    let mut window = Window::open(3);
+    window.click("Lock the limits of hori over frames");
+    let held = limits(&window, "hori").expect("those on screen");
+    type_limit(&mut window, "Lower", "vert", "-30");
+    window.key(Key::Escape);
+    window.click("Lock the limits of vert over frames");
+    assert!(matches!(limits(&window, "vert"), Some((-30.0, _, false))), "taken from the lock, and still set");
+    window.key(Key::ArrowRight);
+    window.ready(1);
+    assert_eq!(limits(&window, "hori"), Some(held));
+    assert_eq!(limits(&window, "vert"), None);
+}
