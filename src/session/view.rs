@@ -220,6 +220,8 @@ pub struct ViewState {
     /// Opacity of the mask overlay over H_ori.
     pub mask_opacity: f32,
     /// Splats or ellipsoids.
+    /// Tell the cells round the cursor too.
+    pub neighbours: bool,
     pub splat_mode: SplatMode,
     /// Gaussians are drawn up to this many standard deviations.
     pub splat_sigma: f32,
@@ -300,6 +302,7 @@ impl Default for ViewState {
             splat_mode: SplatMode::default(),
             splat_sigma: 2.0,
             show_velocity: true,
+            neighbours: false,
             show_truth: true,
             show_grid: true,
             show_frustum: true,

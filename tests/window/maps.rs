@@ -91,3 +91,32 @@ fn locked_limits_stay_over_frames_and_others_are_found_again() {
     assert_eq!(limits(&window, "hori"), Some(held));
     assert_eq!(limits(&window, "vert"), None);
 }
+
+/// What the strip says of a place on a map, shares of its size.
+fn told(window: &mut Window, map: &str, at: [f32; 2]) -> String {
+    let rect = window.node(map).rect();
+    window.harness.hover_at(rect.lerp_inside(vec2(at[0], at[1])));
+    window.harness.run_steps(3);
+    window.text_of("Cell under the pointer")
+}
+
+/// Nine cells round the cursor, in a place of their own.
+#[test]
+fn the_nine_cells_round_the_cursor_are_told() {
+    let mut window = Window::open(1);
+    let map = "H_ori map of hori";
+    let before = window.node(map).rect();
+    window.click("3 × 3 cells");
+    window.harness.run_steps(2);
+    assert!(window.session().view.neighbours && window.is_on("3 × 3 cells"));
+    assert!(window.node(map).rect().height() < before.height(), "they have room of their own");
+    let one = told(&mut window, map, [0.5, 0.5]);
+    let grid = window.text_of("Nine cells of H_ori");
+    assert_eq!(grid.lines().count(), 3, "{grid}");
+    assert!(grid.lines().all(|line| line.split_whitespace().count() == 3), "{grid}");
+    let middle: f64 =
+        grid.lines().nth(1).and_then(|line| line.split_whitespace().nth(1)?.parse().ok()).expect("a number");
+    let shown = one.lines().nth(1).and_then(|line| line.split("  ").nth(1)).expect("a value").to_owned();
+    assert!(shown.starts_with(&format!("{middle:.2}")), "{middle} in {shown}");
+    assert!(window.named("Nine cells of H_sim"));
+}

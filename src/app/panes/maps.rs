@@ -209,7 +209,8 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     state.follow(session, views);
     // A toolbar that is wider than the pane must not push the maps out of it.
     let area = ui.available_rect_before_wrap().intersect(shared.pane);
-    let (maps, readout) = area.split_top_bottom_at_y((area.max.y - grid::READOUT).max(area.min.y));
+    let strip = grid::READOUT + if session.view.neighbours { grid::NEIGHBOURS } else { 0.0 };
+    let (maps, readout) = area.split_top_bottom_at_y((area.max.y - strip).max(area.min.y));
     let rows = grid::rows(maps.shrink2(vec2(4.0, 1.0)), views.len(), state.solo);
     let pointer = ui.input(|i| i.pointer.hover_pos());
     let over = |column: usize| pointer.is_some_and(|p| rows.iter().any(|row| row.maps[column].contains(p)));
@@ -231,7 +232,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             }
         });
     }
-    readout::show(ui, shared.session, state, readout);
+    readout::show(ui, shared, state, readout);
 }
 
 /// What a column shows now.

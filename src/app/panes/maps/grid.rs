@@ -23,6 +23,8 @@ const BELOW: f32 = 15.0;
 const GAP: f32 = 5.0;
 /// What is said of the cell under the pointer.
 pub(super) const READOUT: f32 = 36.0;
+/// What is said of the nine cells round it.
+pub(super) const NEIGHBOURS: f32 = 46.0;
 /// A map that is smaller has neither axes nor colour bar.
 const LEAST: [f32; 2] = [70.0, 56.0];
 

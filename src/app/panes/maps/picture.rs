@@ -261,6 +261,17 @@ impl Pictures {
         let (below, all) = known.fold((0usize, 0usize), |(below, all), &x| (below + usize::from(x < stored), all + 1));
         (all > 0).then(|| 100.0 * below as f64 / all as f64)
     }
+    /// Shown values of the nine cells round a pixel, of H_ori and of H_sim, row by row; `None` beyond the map.
+    pub(super) fn around(&self, view: usize, [column, row]: [usize; 2]) -> [Option<[[Option<f64>; 3]; 3]>; 2] {
+        let Some(p) = self.views.get(view) else { return [None, None] };
+        let cell = |shown: &Shown, dx: usize, dy: usize| {
+            let (x, y) = ((column + dx).checked_sub(1)?, (row + dy).checked_sub(1)?);
+            (x < p.size[0] && y < p.size[1]).then(|| shown.values.get(y * p.size[0] + x).copied())?
+        };
+        let nine = |shown: &Shown| std::array::from_fn(|dy| std::array::from_fn(|dx| cell(shown, dx, dy)));
+        [p.ori.as_ref().map(nine), p.sim.as_ref().map(nine)]
+    }
+
 
     /// Corners of the EM region in picture coordinates.
     pub(super) fn region(&self, view: usize) -> Option<[[f32; 2]; 2]> {

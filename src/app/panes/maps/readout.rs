@@ -1,16 +1,17 @@
 //! The strip under the maps: what is under the pointer, in a place of its own so that it covers no picture.
 
-use super::State;
 use super::picture::Content;
+use super::{Shared, State};
 use crate::app::figure;
 use crate::app::map_image::{Orientation, level};
 use crate::app::theme::{self, Tokens};
 use crate::radar::{AxisKind, View};
 use crate::session::{Compare, Session, ThirdAxis};
-use egui::{FontId, Rect, Ui, vec2};
+use egui::{Align2, FontId, Rect, Ui, vec2};
 
 /// Draws the strip.
-pub(super) fn show(ui: &Ui, session: &Session, state: &State, rect: Rect) {
+pub(super) fn show(ui: &Ui, shared: &mut Shared<'_>, state: &State, rect: Rect) {
+    let session = shared.session;
     let tokens = Tokens::of(ui);
     let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
     painter.hline(rect.x_range(), rect.min.y, egui::Stroke::new(1.0, tokens.stroke));
@@ -25,10 +26,77 @@ pub(super) fn show(ui: &Ui, session: &Session, state: &State, rect: Rect) {
     let mut job = egui::text::LayoutJob::simple(lines.join("\n"), font, color, rect.width() - 16.0);
     job.wrap.max_rows = 2;
     painter.galley(rect.min + vec2(8.0, 4.0), painter.layout_job(job), color);
+    job.wrap.max_width -= SWITCH.x + 8.0;
     let response = ui.interact(rect, ui.scope_id().with("read-out"), egui::Sense::hover());
     let told = pointed.is_some().then(|| lines.join("\n"));
     response.widget_info(|| figure::spoken("Cell under the pointer", told.as_deref()));
 }
+    switch(ui, shared, rect, &tokens);
+    if session.view.neighbours {
+        let below = rect.with_min_y(rect.min.y + super::grid::READOUT);
+        nine(ui, state, pointed.map(|(view, pixel, _)| (view, pixel)), below, &tokens);
+    }
+}
+
+/// Size of the switch of the nine cells.
+const SWITCH: egui::Vec2 = vec2(34.0, 16.0);
+
+fn switch(ui: &Ui, shared: &mut Shared<'_>, rect: Rect, tokens: &Tokens) {
+    let on = shared.session.view.neighbours;
+    let rect = Rect::from_min_size(rect.right_top() + vec2(-SWITCH.x - 8.0, 4.0), SWITCH);
+    let response = ui.interact(rect, ui.scope_id().with("nine cells"), egui::Sense::click());
+    response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, on, "3 × 3 cells"));
+    let ground = match (on, response.hovered()) {
+        (true, _) => tokens.accent.gamma_multiply(0.3),
+        (false, true) => tokens.raised,
+        (false, false) => tokens.panel,
+    };
+    let color = if on || response.hovered() { tokens.text } else { tokens.dim };
+    ui.painter().rect(rect, 3.0, ground, egui::Stroke::new(1.0, tokens.stroke), egui::StrokeKind::Inside);
+    ui.painter().text(rect.center(), Align2::CENTER_CENTER, "3 × 3", FontId::proportional(10.0), color);
+    if response.on_hover_text("The values of the nine cells round the cursor, in the unit shown.").clicked() {
+        shared.set_view(|view| view.neighbours = !on);
+    }
+}
+
+/// The cells round the cursor of both maps, as they lie in the array's picture, the cursor's own in the middle.
+fn nine(ui: &Ui, state: &State, cell: Option<(usize, [usize; 2])>, rect: Rect, tokens: &Tokens) {
+    const CELL: egui::Vec2 = vec2(58.0, 14.0);
+    let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
+    let maps = cell.map_or([None, None], |(view, pixel)| state.pictures.around(view, pixel));
+    for (k, (name, values)) in ["H_ori", "H_sim"].into_iter().zip(maps).enumerate() {
+        let corner = rect.min + vec2(8.0 + k as f32 * (3.0 * CELL.x + 64.0), 0.0);
+        let unit = state.pictures.unit(Content::Ori);
+        painter.text(corner, Align2::LEFT_TOP, name, FontId::proportional(theme::CAPTION), tokens.dim);
+        painter.text(corner + vec2(0.0, CELL.y), Align2::LEFT_TOP, unit, FontId::proportional(9.0), tokens.dim);
+        let grid = Rect::from_min_size(corner + vec2(46.0, 0.0), 3.0 * CELL);
+        let values = values.unwrap_or_default();
+        let text = |value: Option<f64>| match (value, cell) {
+            (Some(value), _) if value.is_nan() => "NaN".to_owned(),
+            (Some(value), Some((view, _))) => level(value, state.pictures.floor(view, Content::Ori)).replace(' ', ""),
+            _ => "—".to_owned(),
+        };
+        for (row, column) in (0..9).map(|i| (i / 3, i % 3)) {
+            let at = Rect::from_min_size(grid.min + vec2(column as f32 * CELL.x, row as f32 * CELL.y), CELL);
+            let middle = (row, column) == (1, 1);
+            if middle {
+                let stroke = egui::Stroke::new(1.0, tokens.accent);
+                painter.rect_stroke(at, 2.0, stroke, egui::StrokeKind::Inside);
+            }
+            let color = if middle { tokens.text } else { tokens.dim };
+            let text = text(values[row][column]);
+            painter.text(
+                at.right_center() - vec2(4.0, 0.0),
+                Align2::RIGHT_CENTER,
+                text,
+                theme::mono(theme::CAPTION),
+                color,
+            );
+        }
+        let response = ui.interact(grid, ui.scope_id().with(("nine", k)), egui::Sense::hover());
+        let told = values.map(|row| row.map(text).join(" ")).join("\n");
+        response.widget_info(|| figure::spoken(&format!("Nine cells of {name}"), Some(&told)));
+    }
 
 fn hint(session: &Session) -> String {
     let flip = if session.view.compare == Compare::Flip { " · Shift flips H_ori and H_sim" } else { "" };
