@@ -3,12 +3,13 @@
 //! Conventions: range or depth upward, left as seen from the radar on the left, height upward only where no depth is.
 //! Arrays are never flipped in memory; only the picture is.
 
+use super::map_plane::Plane;
 use crate::radar::{Axis, AxisKind, View};
 use crate::render::Colormap;
 use crate::session::{ColorRange, CubeAxes, CubeView, MapScale, ThirdAxis};
 use egui::{Color32, ColorImage};
 
-/// How a view's array becomes a picture. Pixel (column, row), row 0 at the top.
+/// How a view's array becomes a grid of cells, cell (column, row), row 0 at the top; and that a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Orientation {
     /// The array axis drawn upward.
@@ -23,6 +24,8 @@ pub(crate) struct Orientation {
     pub(crate) vertical_from_top: bool,
     /// Bin 0 of the horizontal axis is at the left.
     pub(crate) horizontal_from_left: bool,
+    /// The coordinates that the grid of cells is drawn in.
+    pub(crate) plane: Plane,
 }
 
 /// The way through an array that goes along the rows of its picture.
@@ -64,6 +67,12 @@ impl Orientation {
         let grows_left = |axis: &Axis| matches!(axis.kind, AxisKind::Azimuth | AxisKind::Cone | AxisKind::Y);
         let rising = |axis: usize| axes.get(axis).is_some_and(|axis| axis.step() > 0.0);
         let leftward = axes.get(horizontal).is_some_and(grows_left);
+        let plane = match (axes.get(vertical), axes.get(horizontal)) {
+            (Some(v), Some(h)) => Plane::other(v, h),
+            _ => Plane::Cells,
+        };
+        let chosen =
+            matches!((plane, cube.birds_eye, cube.polar), (Plane::BirdsEye, true, _) | (Plane::Polar, _, true));
         Self {
             vertical,
             horizontal,
@@ -71,28 +80,39 @@ impl Orientation {
             third: cube.third,
             vertical_from_top: !rising(vertical),
             horizontal_from_left: rising(horizontal) != leftward,
+            plane: if chosen { plane } else { Plane::Cells },
         }
     }
 
-    /// Width and height of the picture in cells.
+    /// Width and height of the grid in cells.
     pub(crate) fn size(&self, view: &View) -> [usize; 2] {
         [view.axes[self.horizontal].bins, view.axes[self.vertical].bins]
     }
 
     /// Picture coordinates, (0, 0) the upper left corner and (1, 1) the lower right, of bin coordinates.
     pub(crate) fn unit_from_bins(&self, view: &View, bins: &[f64]) -> [f64; 2] {
-        let across = (bins[self.horizontal] + 0.5) / view.axes[self.horizontal].bins as f64;
-        let down = (bins[self.vertical] + 0.5) / view.axes[self.vertical].bins as f64;
+        self.to_shown(view, self.grid_from_bins(view, [bins[self.horizontal], bins[self.vertical]]))
+    }
+
+    /// (horizontal bin, vertical bin), fractional, of picture coordinates.
+    pub(crate) fn bins_from_unit(&self, view: &View, unit: [f64; 2]) -> [f64; 2] {
+        self.bins_from_grid(view, self.to_grid(view, unit))
+    }
+
+    /// The place in the grid, (0, 0) its upper left corner and (1, 1) its lower right, of (horizontal bin, vertical bin).
+    pub(crate) fn grid_from_bins(&self, view: &View, [across, up]: [f64; 2]) -> [f64; 2] {
+        let across = (across + 0.5) / view.axes[self.horizontal].bins as f64;
+        let down = (up + 0.5) / view.axes[self.vertical].bins as f64;
         [
             if self.horizontal_from_left { across } else { 1.0 - across },
             if self.vertical_from_top { down } else { 1.0 - down },
         ]
     }
 
-    /// (horizontal bin, vertical bin), fractional, of picture coordinates.
-    pub(crate) fn bins_from_unit(&self, view: &View, unit: [f64; 2]) -> [f64; 2] {
-        let across = if self.horizontal_from_left { unit[0] } else { 1.0 - unit[0] };
-        let down = if self.vertical_from_top { unit[1] } else { 1.0 - unit[1] };
+    /// (horizontal bin, vertical bin), fractional, of a place in the grid.
+    pub(crate) fn bins_from_grid(&self, view: &View, grid: [f64; 2]) -> [f64; 2] {
+        let across = if self.horizontal_from_left { grid[0] } else { 1.0 - grid[0] };
+        let down = if self.vertical_from_top { grid[1] } else { 1.0 - grid[1] };
         [across * view.axes[self.horizontal].bins as f64 - 0.5, down * view.axes[self.vertical].bins as f64 - 0.5]
     }
 
@@ -137,13 +157,6 @@ impl Orientation {
     pub(crate) fn mask_picture(&self, view: &View, mask: &[bool]) -> Vec<bool> {
         let is_in = |at: usize| mask.get(at) == Some(&true);
         self.walk(view).each(|at, (bins, apart)| (0..bins).any(|bin| is_in(at + bin * apart)))
-    }
-
-    /// True where one cell is as wide as it is high in metres when drawn to scale.
-    pub(crate) fn metric_aspect(&self, view: &View) -> Option<f32> {
-        let metric = |axis: &Axis| !axis.kind.is_angular() && axis.kind != AxisKind::Doppler;
-        let (h, v) = (&view.axes[self.horizontal], &view.axes[self.vertical]);
-        (metric(h) && metric(v)).then(|| ((h.hi - h.lo).abs() / (v.hi - v.lo).abs()) as f32)
     }
 }
 
@@ -209,19 +222,6 @@ pub(crate) fn limits(values: &[f64], range: ColorRange) -> (f64, f64) {
     if hi > lo { (lo, hi) } else { (lo - 1.0, lo + 1.0) }
 }
 
-/// Colours shown values between limits. Cells outside are hatched where `hatch`, cells without a number are `nan`.
-pub(crate) fn colorize(
-    size: [usize; 2],
-    values: &[f64],
-    (lo, hi): (f64, f64),
-    map: Colormap,
-    hatch: bool,
-    nan: Color32,
-) -> ColorImage {
-    let lut = map.lut();
-    let span = hi - lo;
-    let mut image = ColorImage::filled(size, Color32::BLACK);
-    for (i, (pixel, &value)) in image.pixels.iter_mut().zip(values).enumerate() {
 /// How often shown values occur, over the whole of a colour bar.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Histogram {
@@ -249,6 +249,19 @@ impl Histogram {
     }
 }
 
+/// Colours shown values between limits. Cells outside are hatched where `hatch`, cells without a number are `nan`.
+pub(crate) fn colorize(
+    size: [usize; 2],
+    values: &[f64],
+    (lo, hi): (f64, f64),
+    map: Colormap,
+    hatch: bool,
+    nan: Color32,
+) -> ColorImage {
+    let lut = map.lut();
+    let span = hi - lo;
+    let mut image = ColorImage::filled(size, Color32::BLACK);
+    for (i, (pixel, &value)) in image.pixels.iter_mut().zip(values).enumerate() {
         if value.is_nan() {
             *pixel = nan;
             continue;
@@ -333,7 +346,7 @@ mod tests {
         let map: Vec<f64> = (0..12).map(f64::from).collect();
         assert_eq!(o.picture(&v, &map), vec![2.0, 5.0, 8.0, 11.0]);
         // Range falls with its bins and azimuth too; element (r, a, e) is 6 r + 3 a + e.
-        let of = |axes, third| Orientation::of(&v, CubeView { axes, third }).picture(&v, &map);
+        let of = |axes, third| Orientation::of(&v, CubeView { axes, third, ..CubeView::default() }).picture(&v, &map);
         assert_eq!(of(CubeAxes::First, ThirdAxis::Mean), vec![1.0, 4.0, 7.0, 10.0]);
         assert_eq!(of(CubeAxes::First, ThirdAxis::Bin(1)), vec![1.0, 4.0, 7.0, 10.0]);
         assert_eq!(of(CubeAxes::First, ThirdAxis::Bin(99)), vec![2.0, 5.0, 8.0, 11.0], "no further than the last");
@@ -367,12 +380,6 @@ mod tests {
         assert_eq!((linear.values[180], level(0.0, linear.floor)), (0.0, "0.00".into()));
     }
 
-    #[test]
-    fn a_constant_map_still_has_limits() {
-        let (lo, hi) = limits(&[3.0; 9], ColorRange::default());
-        assert!(lo < hi);
-    }
-}
     /// The bar reaches over all that occurs and over the limits; what occurs most often is highest.
     #[test]
     fn a_histogram_reaches_over_values_and_limits() {
@@ -384,3 +391,9 @@ mod tests {
         assert!((heights[19] - 2f32.ln() / 4f32.ln()).abs() < 1e-6, "-31 is 29/70 of the way up: {heights:?}");
     }
 
+    #[test]
+    fn a_constant_map_still_has_limits() {
+        let (lo, hi) = limits(&[3.0; 9], ColorRange::default());
+        assert!(lo < hi);
+    }
+}

@@ -8,6 +8,7 @@ mod commands;
 mod figure;
 mod layout;
 mod map_image;
+mod map_plane;
 mod menu;
 mod overlay;
 mod panes;

@@ -172,13 +172,18 @@ pub enum ThirdAxis {
     Bin(usize),
 }
 
-/// How maps with three axes are drawn.
+/// Which axes of a map are drawn, and in which coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct CubeView {
-    /// What is drawn.
+    /// What is drawn of three axes.
     pub axes: CubeAxes,
     /// What is not.
     pub third: ThirdAxis,
+    /// Maps of range and angle are drawn on metres.
+    pub birds_eye: bool,
+    /// Maps in metres are drawn on range and angle.
+    pub polar: bool,
 }
 
 /// Everything about the view that a person sets.
@@ -191,19 +196,19 @@ pub struct ViewState {
     pub scale: MapScale,
     /// Limits of the colour bars that have none of their own.
     pub range: ColorRange,
+    /// Limits of single maps.
+    pub limits: Vec<MapLimits>,
     /// H_sim uses H_ori's limits.
     pub shared_range: bool,
     /// Name of the colour map, in lower case.
     pub colormap: String,
     /// What the H_sim pane shows.
-    /// Limits of single maps.
-    pub limits: Vec<MapLimits>,
     pub compare: Compare,
     /// What flip, wipe and difference compare H_sim with.
     pub against: Against,
     /// Where the wipe's line is, 0..1 of the map's width.
     pub wipe: f32,
-    /// How maps with three axes are drawn.
+    /// Which axes of the maps are drawn, and in which coordinates.
     pub cube: CubeView,
     /// Draw maps whose axes are metres to scale.
     pub true_proportions: bool,
@@ -215,13 +220,13 @@ pub struct ViewState {
     pub show_skeleton: bool,
     /// Draw labelled boxes on the maps.
     pub show_boxes: bool,
+    /// Tell the cells round the cursor too.
+    pub neighbours: bool,
     /// Hatch cells outside the colour range.
     pub show_clipped: bool,
     /// Opacity of the mask overlay over H_ori.
     pub mask_opacity: f32,
     /// Splats or ellipsoids.
-    /// Tell the cells round the cursor too.
-    pub neighbours: bool,
     pub splat_mode: SplatMode,
     /// Gaussians are drawn up to this many standard deviations.
     pub splat_sigma: f32,
@@ -285,6 +290,7 @@ impl Default for ViewState {
             theme: ThemeChoice::default(),
             scale: MapScale::default(),
             range: ColorRange::default(),
+            limits: Vec::new(),
             shared_range: true,
             colormap: "viridis".into(),
             compare: Compare::default(),
@@ -292,17 +298,16 @@ impl Default for ViewState {
             wipe: 0.5,
             cube: CubeView::default(),
             true_proportions: false,
-            limits: Vec::new(),
             follow: true,
             show_region: true,
             show_skeleton: true,
             show_boxes: true,
+            neighbours: false,
             show_clipped: false,
             mask_opacity: 0.65,
             splat_mode: SplatMode::default(),
             splat_sigma: 2.0,
             show_velocity: true,
-            neighbours: false,
             show_truth: true,
             show_grid: true,
             show_frustum: true,
@@ -339,10 +344,9 @@ impl ViewState {
         self.wipe = self.wipe.clamp(0.0, 1.0);
         self.mask_opacity = self.mask_opacity.clamp(0.0, 1.0);
         self.splat_sigma = self.splat_sigma.clamp(0.5, 4.0);
+        self.limits.retain(|limits| limits.lo.is_finite() && limits.hi.is_finite() && limits.lo < limits.hi);
         self
     }
-}
-        self.limits.retain(|limits| limits.lo.is_finite() && limits.hi.is_finite() && limits.lo < limits.hi);
 
     /// The limits of a map that were set by hand in the scale shown.
     pub fn limits_of(&self, array: &str) -> Option<&MapLimits> {
@@ -389,3 +393,4 @@ impl ViewState {
     pub(super) fn leave_frame(&mut self) {
         self.limits.retain(|limits| limits.locked);
     }
+}

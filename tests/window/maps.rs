@@ -1,5 +1,5 @@
-//! The maps pane: colour limits by hand and over frames.
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "tests fail by panicking")]
+//! The maps pane: colour limits by hand and over frames, the cells round the cursor, the coordinates that maps are drawn in.
+#![expect(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests fail by panicking")]
 
 use crate::window::Window;
 use egui::{Key, vec2};
@@ -92,12 +92,78 @@ fn locked_limits_stay_over_frames_and_others_are_found_again() {
     assert_eq!(limits(&window, "vert"), None);
 }
 
+/// Opens one of the samples.
+fn sample(name: &str) -> Window {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("samples").join(name);
+    let harness = Window::empty(&[folder], [1440.0, 900.0]);
+    let mut window = Window { harness, folder: tempfile::tempdir().expect("a folder") };
+    window.ready(0);
+    window
+}
+
 /// What the strip says of a place on a map, shares of its size.
 fn told(window: &mut Window, map: &str, at: [f32; 2]) -> String {
     let rect = window.node(map).rect();
     window.harness.hover_at(rect.lerp_inside(vec2(at[0], at[1])));
     window.harness.run_steps(3);
     window.text_of("Cell under the pointer")
+}
+
+/// The number after a name in the strip.
+fn number(told: &str, name: &str) -> f64 {
+    let rest = told.split(&format!("{name} ")).nth(1).unwrap_or_else(|| panic!("{name} in {told}"));
+    rest.split([' ', '°']).next().and_then(|text| text.parse().ok()).unwrap_or_else(|| panic!("{name} in {told}"))
+}
+
+/// A polar map on metres: what is told of the cell under the pointer is where the pointer is.
+#[test]
+fn a_polar_map_is_seen_from_above() {
+    let mut window = sample("xrf55");
+    window.key(Key::F);
+    let array = window.session().data.dataset.as_ref().expect("a data set").info().views[0].array.clone();
+    let map = format!("H_ori map of {array}");
+    let before = window.node(&map).rect();
+    window.click("Bird's-eye");
+    window.harness.run_steps(3);
+    assert!(window.session().view.cube.birds_eye);
+    let after = window.node(&map).rect();
+    assert!((after.width() / after.height() - before.width() / before.height()).abs() > 0.05, "to scale");
+    // The fan is symmetric: ahead is in the middle, and as far to one side as to the other.
+    let (left, ahead, right) = (
+        told(&mut window, &map, [0.25, 0.35]),
+        told(&mut window, &map, [0.5, 0.35]),
+        told(&mut window, &map, [0.75, 0.35]),
+    );
+    assert!(number(&left, "   y") > 0.0 && number(&right, "   y") < 0.0, "{left}\n{right}");
+    assert!(number(&ahead, "cone angle").abs() < 2.0 && number(&ahead, "range") < number(&left, "range"));
+    let metres = number(&left, "   y") - number(&right, "   y");
+    let depth =
+        number(&told(&mut window, &map, [0.5, 0.2]), "depth") - number(&told(&mut window, &map, [0.5, 0.7]), "depth");
+    let (across, down) = (f64::from(after.width()) * 0.5, f64::from(after.height()) * 0.5);
+    assert!((metres / across - depth / down).abs() < 0.06 * depth / down, "{metres} m and {depth} m in {after}");
+    window.click("Bird's-eye");
+    window.harness.run_steps(2);
+    assert_eq!(window.node(&map).rect(), before);
+}
+
+/// A map in metres on range and angle, and back; what cannot be drawn otherwise says why.
+#[test]
+fn a_cartesian_map_is_seen_in_polar_coordinates() {
+    let mut window = sample("walk");
+    assert!(!window.named("Bird's-eye"));
+    window.key(Key::F);
+    let array = window.session().data.dataset.as_ref().expect("a data set").info().views[0].array.clone();
+    let map = format!("H_ori map of {array}");
+    window.click("Polar");
+    window.harness.run_steps(3);
+    let near = told(&mut window, &map, [0.5, 0.6]);
+    let far = told(&mut window, &map, [0.5, 0.3]);
+    assert!(number(&far, "range") > number(&near, "range") + 1.0, "{near}\n{far}");
+    assert!(number(&near, "azimuth").abs() < 3.0 && number(&far, "azimuth").abs() < 3.0, "{near}\n{far}");
+    let side = told(&mut window, &map, [0.3, 0.85]);
+    assert!(number(&side, "azimuth") > 20.0, "left of ahead: {side}");
+    // A corner where the map has no cell has no read-out.
+    assert!(!told(&mut window, &map, [0.02, 0.02]).contains("range"), "beyond the map");
 }
 
 /// Nine cells round the cursor, in a place of their own.

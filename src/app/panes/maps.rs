@@ -12,6 +12,7 @@ use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::{AppAct, CommandRow, Menu, NONE, UiAction, has_frame};
 use crate::app::figure;
 use crate::app::map_image::Orientation;
+use crate::app::map_plane::Plane;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{BarRow, ColorBar, LimitsEdit, colorbar};
 use crate::radar::View;
@@ -106,6 +107,8 @@ struct State {
     flipped: Option<MapColumn>,
     highlight: Option<region::Highlight>,
     marking: region::Marking,
+    /// The coordinates that the windows belong to: bird's-eye, polar.
+    planes: Option<[bool; 2]>,
     /// The data set that the windows belong to.
     dataset: Option<std::sync::Weak<crate::dataset::Dataset>>,
 }
@@ -147,6 +150,7 @@ impl PaneState for State {
             |w: &[f32; 4]| w.iter().all(|x| (0.0..=1.0).contains(x)) && w[2] - w[0] > 0.01 && w[3] - w[1] > 0.01;
         let window = |w: [f32; 4]| MapExtent { min: [w[0], w[1]], max: [w[2], w[3]] };
         self.focus.whole = true;
+        self.planes = None;
         self.windows = stored.into_iter().map(|w| if valid(&w) { window(w) } else { MapExtent::default() }).collect();
         Ok(())
     }
@@ -202,6 +206,12 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         state.windows.clear();
         state.solo = None;
         state.focus = Focus::default();
+    }
+    let planes = [session.view.cube.birds_eye, session.view.cube.polar];
+    if state.planes.replace(planes).is_some_and(|known| known != planes) {
+        // What was seen in other coordinates means nothing: the person is found again.
+        state.windows.clear();
+        state.focus.again();
     }
     state.windows.resize(views.len(), MapExtent::default());
     state.leave_highlight(Some(session.data.frame_index));
@@ -269,7 +279,10 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
     let unit = if content == Content::Masks { "masks" } else { state.pictures.unit(content) };
     let caption = figure::of(session, &format!("{what} {} · {unit}", view.array));
     let rect = figure::print(ui, rect, caption.as_deref());
-    let plot = if session.view.true_proportions { fit_aspect(rect, view, orientation) } else { rect };
+    // What is on metres for its shape's sake is to scale in any case.
+    let to_scale = session.view.true_proportions || orientation.plane == Plane::BirdsEye;
+    let aspect = orientation.metric_aspect(view).filter(|_| to_scale);
+    let plot = fit_aspect(rect, aspect, state.windows[index]);
     if plot.width() < 12.0 || plot.height() < 12.0 {
         return;
     }
@@ -292,7 +305,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
     }
     let to_screen = |unit: [f64; 2]| screen(plot, window, unit);
     let region = state.pictures.region(index);
-    overlay::draw(&painter, session, view, index, region, &to_screen, &tokens);
+    overlay::draw(&painter, session, view, index, region, &to_screen);
     state.draw_regions(&painter, session, index, view, &to_screen, &tokens);
     overlay::title(&painter, plot, view, content, state.pictures.reference(), session);
     if row.axes {
@@ -302,7 +315,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
     ui.painter().rect_stroke(plot, 0.0, egui::Stroke::new(1.0, tokens.stroke), egui::StrokeKind::Outside);
     if let Some(pointer) = response.hover_pos() {
         let unit = unit_at(plot, window, pointer);
-        if let Some(pixel) = overlay::pixel_at(view, orientation, unit) {
+        if let Some(pixel) = orientation.pixel_at(view, unit) {
             state.hovered_next = Some((index, pixel));
         }
         if response.clicked() {
@@ -320,7 +333,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
         state.enlarge();
     }
     if let Some((_, pixel)) = state.hovered.filter(|(hovered, _)| *hovered == index) {
-        overlay::crosshair(&painter, plot, &to_screen, view, orientation, pixel, &tokens);
+        overlay::crosshair(&painter, &to_screen, view, orientation, pixel);
     }
 }
 
@@ -331,8 +344,11 @@ fn beside(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, row: &GridRow
     let rest = if state.windows[index] == MapExtent::default() {
         row.beside
     } else {
-        let [width, height] = Orientation::of(view, shared.session.view.cube).size(view);
-        let high = (row.beside.width() * height as f32 / width.max(1) as f32).clamp(20.0, 0.36 * row.beside.height());
+        let o = Orientation::of(view, shared.session.view.cube);
+        let [width, height] = o.size(view);
+        let on_metres = o.metric_aspect(view).filter(|_| o.plane == Plane::BirdsEye);
+        let aspect = on_metres.unwrap_or(width as f32 / height.max(1) as f32);
+        let high = (row.beside.width() / aspect).clamp(20.0, 0.36 * row.beside.height());
         let (above, rest) = row.beside.split_top_bottom_at_y(row.beside.min.y + high);
         overview(ui, state, view, index, above);
         rest.with_min_y(rest.min.y + 6.0)
@@ -356,6 +372,7 @@ fn beside(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, row: &GridRow
             bars.push((content, limits));
         }
     }
+    let set = shared.session.view.limits_of(&view.array);
     let height = rest.height() / bars.len().max(1) as f32;
     for (k, (content, limits)) in bars.into_iter().enumerate() {
         let rect = Rect::from_min_size(rest.min + vec2(0.0, height * k as f32), vec2(rest.width(), height));
@@ -380,7 +397,6 @@ fn beside(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, row: &GridRow
             LimitsEdit::Lock(on) => v.lock_limits(&view.array, limits, on),
         });
     }
-    let set = shared.session.view.limits_of(&view.array);
 }
 
 /// The whole map, small, with what is seen of it, which can be dragged.
@@ -408,9 +424,10 @@ fn overview(ui: &mut Ui, state: &mut State, view: &View, index: usize, rect: Rec
     response.on_hover_text("The whole map. Drag the frame to look elsewhere; F shows all of it.");
 }
 
-/// The largest rectangle of the map's own proportions; where an axis is not in metres, all of it.
-fn fit_aspect(inner: Rect, view: &View, orientation: Orientation) -> Rect {
-    let Some(aspect) = orientation.metric_aspect(view) else { return inner };
+/// The largest rectangle in which what is seen of a map is to scale; all of it where the map has no scale.
+fn fit_aspect(inner: Rect, aspect: Option<f32>, window: MapExtent) -> Rect {
+    let Some(aspect) = aspect else { return inner };
+    let aspect = aspect * (window.max[0] - window.min[0]) / (window.max[1] - window.min[1]);
     let width = inner.width().min(inner.height() * aspect);
     Rect::from_min_size(inner.min, vec2(width, width / aspect))
 }

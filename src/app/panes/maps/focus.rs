@@ -19,6 +19,13 @@ pub(super) struct Focus {
     job: Option<JobId>,
 }
 
+impl Focus {
+    /// The person is looked for anew, and zoomed to, unless the whole was asked for.
+    pub(super) fn again(&mut self) {
+        self.job = None;
+    }
+}
+
 impl State {
     /// Keeps the person in the middle from frame to frame: the first time with a margin, then with the zoom that is set.
     pub(super) fn follow(&mut self, session: &Session, views: &[View]) {
@@ -57,7 +64,7 @@ fn person_box(session: &Session, view: &View, index: usize) -> Option<[[f32; 2];
     let region = inside.and_then(|inside| super::overlay::region_box(o.size(view), &inside));
     let covers = |[min, max]: [[f32; 2]; 2]| (0..2).all(|axis| max[axis] - min[axis] > 0.95);
     if let Some(region) = region.filter(|region| !covers(*region)) {
-        return Some(region);
+        return Some(o.shown_box(view, region));
     }
     let (mut min, mut max) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
     for &p in session.shown_positions() {

@@ -3,6 +3,7 @@
 use super::MapExtent;
 use super::picture::Content;
 use crate::app::map_image::Orientation;
+use crate::app::map_plane::Plane;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{round_step, tick};
 use crate::body::Skeleton;
@@ -63,8 +64,8 @@ pub(super) fn axes(ui: &Ui, plot: Rect, view: &View, o: Orientation, window: Map
     let stroke = Stroke::new(1.0, tokens.dim);
     let font = theme::mono(10.0);
     let caption = FontId::proportional(10.0);
-    let across = &view.axes[o.horizontal];
-    for (t, text) in ticks(across, window.min[0], window.max[0], o.horizontal_from_left, plot.width() / 52.0) {
+    let [(across, from_left), (up, from_top)] = &o.shown_axes(view);
+    for (t, text) in ticks(across, window.min[0], window.max[0], *from_left, plot.width() / 52.0) {
         let x = plot.min.x + t * plot.width();
         painter.vline(x, plot.max.y..=plot.max.y + 3.0, stroke);
         painter.text(pos2(x, plot.max.y + 3.0), Align2::CENTER_TOP, text, font.clone(), tokens.dim);
@@ -72,8 +73,7 @@ pub(super) fn axes(ui: &Ui, plot: Rect, view: &View, o: Orientation, window: Map
     if !first {
         return;
     }
-    let up = &view.axes[o.vertical];
-    for (t, text) in ticks(up, window.min[1], window.max[1], o.vertical_from_top, plot.height() / 34.0) {
+    for (t, text) in ticks(up, window.min[1], window.max[1], *from_top, plot.height() / 34.0) {
         let y = plot.min.y + t * plot.height();
         painter.hline(plot.min.x - 3.0..=plot.min.x, y, stroke);
         painter.text(pos2(plot.min.x - 5.0, y), Align2::RIGHT_CENTER, text, font.clone(), tokens.dim);
@@ -128,7 +128,7 @@ fn ticks(axis: &Axis, from: f32, to: f32, forward: bool, wanted: f32) -> Vec<(f3
         .collect()
 }
 
-/// The corners of the EM region, a picture of its mask, in picture coordinates.
+/// The corners of the EM region, a picture of its mask, in the grid of cells.
 pub(super) fn region_box([width, height]: [usize; 2], mask: &[bool]) -> Option<[[f32; 2]; 2]> {
     let (mut min, mut max) = ([usize::MAX; 2], [0usize; 2]);
     for (row, cells) in mask.chunks_exact(width.max(1)).enumerate() {
@@ -153,20 +153,20 @@ pub(super) fn draw(
     index: usize,
     region: Option<[[f32; 2]; 2]>,
     to_screen: &dyn Fn([f64; 2]) -> Pos2,
-    tokens: &Tokens,
 ) {
     let (look, o) = (&session.view, Orientation::of(view, session.view.cube));
+    field_of_view(painter, view, o, to_screen);
     if look.show_region
-        && let Some([min, max]) = region
+        && let Some(region) = region
     {
-        let corner = |p: [f32; 2]| to_screen([f64::from(p[0]), f64::from(p[1])]);
-        dashed(painter, Rect::from_two_pos(corner(min), corner(max)), Color32::from_white_alpha(150));
+        let stroke = Stroke::new(1.0, Color32::from_white_alpha(150));
+        painter.extend(egui::Shape::dashed_line(&outline(view, o, region, to_screen), stroke, 5.0, 4.0));
     }
     if look.show_boxes
         && let Some(frame) = &session.data.frame
     {
         for b in frame.map_boxes.get(index).into_iter().flatten() {
-            boxed(painter, view, o, *b, to_screen, tokens);
+            boxed(painter, view, o, *b, to_screen);
         }
     }
     if look.show_truth
@@ -224,63 +224,76 @@ fn bones(painter: &Painter, skeleton: &Skeleton, joints: &[Pos2], stroke: &dyn F
     }
 }
 
-fn boxed(
-    painter: &Painter,
-    view: &View,
-    o: Orientation,
-    b: [f64; 4],
-    to_screen: &dyn Fn([f64; 2]) -> Pos2,
-    _: &Tokens,
-) {
+fn boxed(painter: &Painter, view: &View, o: Orientation, b: [f64; 4], to_screen: &dyn Fn([f64; 2]) -> Pos2) {
     // Box edges are pixel edges: half a bin before the centre of their first pixel.
     let corner = |row: f64, column: f64| {
-        let mut bins = vec![0.0; view.axes.len()];
-        bins[0] = row - 0.5;
-        if let Some(second) = bins.get_mut(1) {
-            *second = column - 0.5;
-        }
-        to_screen(o.unit_from_bins(view, &bins))
+        let of = |axis: usize| [row, column].get(axis).map_or(0.0, |edge| edge - 0.5);
+        o.grid_from_bins(view, [of(o.horizontal), of(o.vertical)])
     };
-    let rect = Rect::from_two_pos(corner(b[0], b[1]), corner(b[2], b[3]));
-    painter.rect_stroke(rect, 0.0, Stroke::new(1.5, Color32::from_rgb(0xF2, 0x65, 0x5C)), egui::StrokeKind::Middle);
-    painter.text(
-        rect.left_top() + vec2(1.0, -1.0),
-        Align2::LEFT_BOTTOM,
-        "label",
-        FontId::proportional(9.0),
-        Color32::WHITE,
-    );
+    let line = outline(view, o, grid_box(corner(b[0], b[1]), corner(b[2], b[3])), to_screen);
+    let first = line.first().copied().unwrap_or_default();
+    painter.line(line, Stroke::new(1.5, Color32::from_rgb(0xF2, 0x65, 0x5C)));
+    let font = FontId::proportional(9.0);
+    painter.text(first + vec2(1.0, -1.0), Align2::LEFT_BOTTOM, "label", font, Color32::WHITE);
 }
 
-fn dashed(painter: &Painter, rect: Rect, color: Color32) {
-    let corners = [rect.left_top(), rect.right_top(), rect.right_bottom(), rect.left_bottom(), rect.left_top()];
-    painter.extend(egui::Shape::dashed_line(&corners, Stroke::new(1.0, color), 5.0, 4.0));
+/// The box between two places in the grid of cells.
+pub(super) fn grid_box(a: [f64; 2], b: [f64; 2]) -> [[f32; 2]; 2] {
+    [std::array::from_fn(|k| a[k].min(b[k]) as f32), std::array::from_fn(|k| a[k].max(b[k]) as f32)]
 }
 
-/// The pixel at picture coordinates.
-pub(super) fn pixel_at(view: &View, o: Orientation, unit: [f64; 2]) -> Option<[usize; 2]> {
-    let [width, height] = o.size(view);
-    let (x, y) = ((unit[0] * width as f64).floor(), (unit[1] * height as f64).floor());
-    (x >= 0.0 && y >= 0.0 && x < width as f64 && y < height as f64).then_some([x as usize, y as usize])
+/// The closed outline on the screen of a box of the grid of cells, from its upper left corner.
+pub(super) fn outline(
+    view: &View,
+    o: Orientation,
+    grid: [[f32; 2]; 2],
+    to_screen: &dyn Fn([f64; 2]) -> Pos2,
+) -> Vec<Pos2> {
+    o.outline(view, grid).into_iter().map(to_screen).collect()
+}
+
+/// The edges of what the radar sees, and on metres rings of round ranges.
+fn field_of_view(painter: &Painter, view: &View, o: Orientation, to_screen: &dyn Fn([f64; 2]) -> Pos2) {
+    if o.plane == Plane::Cells {
+        return;
+    }
+    let stroke = |alpha| Stroke::new(1.0, Color32::from_white_alpha(alpha));
+    painter.line(outline(view, o, [[0.0; 2], [1.0; 2]], to_screen), stroke(110));
+    if o.plane != Plane::BirdsEye {
+        return;
+    }
+    let range = |y: f64| o.values_at(view, [0.5, y])[1];
+    let (far, near) = (range(0.0), range(1.0));
+    let step = round_step((far - near) / 6.0);
+    for ring in (near / step).ceil() as i64..=(far / step).floor() as i64 {
+        let at = ring as f64 * step;
+        let y = (at - far) / (near - far);
+        let arc: Vec<Pos2> = o.line(view, [0.0, y], [1.0, y]).into_iter().map(to_screen).collect();
+        let end = arc.last().copied().unwrap_or_default();
+        painter.line(arc, stroke(55));
+        // Beyond the edge of what is seen, where no cell is.
+        let text = format!("{} m", tick(at, step * 10.0));
+        painter.text(end + vec2(4.0, 0.0), Align2::LEFT_TOP, text, FontId::proportional(9.0), theme::DARK.dim);
+    }
 }
 
 /// The linked cursor: the outline of the cell and hair lines.
 pub(super) fn crosshair(
     painter: &Painter,
-    plot: Rect,
     to_screen: &dyn Fn([f64; 2]) -> Pos2,
     view: &View,
     o: Orientation,
     pixel: [usize; 2],
-    _tokens: &Tokens,
 ) {
-    let [width, height] = o.size(view);
-    let corner = |x: usize, y: usize| to_screen([x as f64 / width as f64, y as f64 / height as f64]);
-    let cell = Rect::from_two_pos(corner(pixel[0], pixel[1]), corner(pixel[0] + 1, pixel[1] + 1));
+    let size = o.size(view);
+    let at = |by: f64| -> [f64; 2] { std::array::from_fn(|k| (pixel[k] as f64 + by) / size[k] as f64) };
     let hair = Stroke::new(1.0, Color32::from_white_alpha(70));
-    painter.vline(cell.center().x, plot.y_range(), hair);
-    painter.hline(plot.x_range(), cell.center().y, hair);
-    painter.rect_stroke(cell.expand(1.0), 0.0, Stroke::new(1.0, Color32::WHITE), egui::StrokeKind::Outside);
+    // Along one range and along one angle, whatever the picture's coordinates are.
+    let [x, y] = at(0.5);
+    for (from, to) in [([0.0, y], [1.0, y]), ([x, 0.0], [x, 1.0])] {
+        painter.line(o.line(view, from, to).into_iter().map(to_screen).collect(), hair);
+    }
+    painter.line(outline(view, o, grid_box(at(0.0), at(1.0)), to_screen), Stroke::new(1.5, Color32::WHITE));
 }
 
 /// The joint drawn within 10 points of the pointer.

@@ -8,7 +8,7 @@ use crate::radar::View;
 use crate::render::Colormap;
 use crate::session::{Against, ColorRange, CubeView, MapLimits, MapScale, Session, ViewState};
 use crate::worker::Snapshot;
-use egui::{Color32, ColorImage, Painter, Rect, TextureHandle, TextureOptions, Ui};
+use egui::{Color32, ColorImage, Painter, Rect, TextureHandle, TextureOptions, Ui, vec2};
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -39,6 +39,8 @@ impl Content {
 /// The maps of one view as shown.
 #[derive(Default)]
 struct ViewPictures {
+    /// What the maps are of, and how they lie.
+    of: Option<(View, Orientation)>,
     size: [usize; 2],
     ori_stored: Vec<f64>,
     ori: Option<Shown>,
@@ -46,14 +48,14 @@ struct ViewPictures {
     sim: Option<Shown>,
     base: Option<Shown>,
     masks: Option<[Vec<bool>; 3]>,
-    /// Corners of the EM region, picture coordinates.
+    /// Corners of the EM region, in the grid of cells.
     region: Option<[[f32; 2]; 2]>,
-    ori_limits: (f64, f64),
-    sim_limits: (f64, f64),
     /// How the limits are found.
     range: ColorRange,
-    difference_limit: f64,
+    ori_limits: (f64, f64),
     ori_histogram: Histogram,
+    sim_limits: (f64, f64),
+    difference_limit: f64,
 }
 
 /// Every view's pictures and the textures made of them.
@@ -73,9 +75,9 @@ pub(super) struct Pictures {
 struct Look {
     scale: MapScale,
     range: ColorRange,
+    limits: Vec<MapLimits>,
     shared_range: bool,
     colormap: Colormap,
-    limits: Vec<MapLimits>,
     hatch: bool,
     mask_opacity: f32,
     against: Against,
@@ -88,9 +90,9 @@ impl Look {
         Self {
             scale: view.scale,
             range: view.range,
+            limits: view.limits.clone(),
             shared_range: view.shared_range,
             colormap: colormap.unwrap_or_default(),
-            limits: view.limits.clone(),
             hatch: view.show_clipped,
             mask_opacity: view.mask_opacity,
             against: view.against,
@@ -125,6 +127,9 @@ impl Pictures {
             let pictures = &mut self.views[i];
             let orientation = Orientation::of(view, look.cube);
             pictures.size = orientation.size(view);
+            if all {
+                pictures.of = Some((view.clone(), orientation));
+            }
             pictures.range = session.view.range_of(&view.array);
             let range = pictures.range;
             if all && let Some(map) = frame.maps.get(i) {
@@ -167,8 +172,11 @@ impl Pictures {
                 textures.insert((view, content), (texture, true));
             }
         }
-        if let Some((texture, _)) = textures.get(&(view, content)) {
-            painter.image(texture.id(), rect, uv, Color32::WHITE);
+        let of = self.views.get(view).and_then(|pictures| pictures.of.as_ref());
+        if let (Some((texture, _)), Some((view, o))) = (textures.get(&(view, content)), of) {
+            let to_screen =
+                |p: [f64; 2]| rect.min + (vec2(p[0] as f32, p[1] as f32) - uv.min.to_vec2()) * rect.size() / uv.size();
+            painter.add(o.mesh(view, texture.id(), painter.clip_rect(), &to_screen));
         }
     }
 
@@ -253,14 +261,6 @@ impl Pictures {
         [pair(&p.ori_stored, &p.ori), pair(&p.sim_stored, &p.sim)]
     }
 
-    /// The percentile of a stored value among the cells of H_ori (0) or H_sim (1).
-    pub(super) fn rank(&self, view: usize, map: usize, stored: f64) -> Option<f64> {
-        let p = self.views.get(view)?;
-        let cells = if map == 0 { &p.ori_stored } else { &p.sim_stored };
-        let known = cells.iter().filter(|x| x.is_finite());
-        let (below, all) = known.fold((0usize, 0usize), |(below, all), &x| (below + usize::from(x < stored), all + 1));
-        (all > 0).then(|| 100.0 * below as f64 / all as f64)
-    }
     /// Shown values of the nine cells round a pixel, of H_ori and of H_sim, row by row; `None` beyond the map.
     pub(super) fn around(&self, view: usize, [column, row]: [usize; 2]) -> [Option<[[Option<f64>; 3]; 3]>; 2] {
         let Some(p) = self.views.get(view) else { return [None, None] };
@@ -272,8 +272,16 @@ impl Pictures {
         [p.ori.as_ref().map(nine), p.sim.as_ref().map(nine)]
     }
 
+    /// The percentile of a stored value among the cells of H_ori (0) or H_sim (1).
+    pub(super) fn rank(&self, view: usize, map: usize, stored: f64) -> Option<f64> {
+        let p = self.views.get(view)?;
+        let cells = if map == 0 { &p.ori_stored } else { &p.sim_stored };
+        let known = cells.iter().filter(|x| x.is_finite());
+        let (below, all) = known.fold((0usize, 0usize), |(below, all), &x| (below + usize::from(x < stored), all + 1));
+        (all > 0).then(|| 100.0 * below as f64 / all as f64)
+    }
 
-    /// Corners of the EM region in picture coordinates.
+    /// Corners of the EM region in the grid of cells.
     pub(super) fn region(&self, view: usize) -> Option<[[f32; 2]; 2]> {
         self.views.get(view)?.region
     }

@@ -4,6 +4,7 @@ use super::picture::Content;
 use super::{Shared, State};
 use crate::app::figure;
 use crate::app::map_image::{Orientation, level};
+use crate::app::map_plane::Plane;
 use crate::app::theme::{self, Tokens};
 use crate::radar::{AxisKind, View};
 use crate::session::{Compare, Session, ThirdAxis};
@@ -25,12 +26,11 @@ pub(super) fn show(ui: &Ui, shared: &mut Shared<'_>, state: &State, rect: Rect) 
     };
     let mut job = egui::text::LayoutJob::simple(lines.join("\n"), font, color, rect.width() - 16.0);
     job.wrap.max_rows = 2;
-    painter.galley(rect.min + vec2(8.0, 4.0), painter.layout_job(job), color);
     job.wrap.max_width -= SWITCH.x + 8.0;
+    painter.galley(rect.min + vec2(8.0, 4.0), painter.layout_job(job), color);
     let response = ui.interact(rect, ui.scope_id().with("read-out"), egui::Sense::hover());
     let told = pointed.is_some().then(|| lines.join("\n"));
     response.widget_info(|| figure::spoken("Cell under the pointer", told.as_deref()));
-}
     switch(ui, shared, rect, &tokens);
     if session.view.neighbours {
         let below = rect.with_min_y(rect.min.y + super::grid::READOUT);
@@ -97,6 +97,7 @@ fn nine(ui: &Ui, state: &State, cell: Option<(usize, [usize; 2])>, rect: Rect, t
         let told = values.map(|row| row.map(text).join(" ")).join("\n");
         response.widget_info(|| figure::spoken(&format!("Nine cells of {name}"), Some(&told)));
     }
+}
 
 fn hint(session: &Session) -> String {
     let flip = if session.view.compare == Compare::Flip { " · Shift flips H_ori and H_sim" } else { "" };
@@ -106,16 +107,14 @@ fn hint(session: &Session) -> String {
 /// Where a cell is, and what is there.
 fn lines(session: &Session, state: &State, view: &View, index: usize, pixel: [usize; 2]) -> Vec<String> {
     let (o, pictures) = (Orientation::of(view, session.view.cube), &state.pictures);
-    let [width, height] = o.size(view);
-    let unit = [(pixel[0] as f64 + 0.5) / width as f64, (pixel[1] as f64 + 0.5) / height as f64];
-    let [across, up] = o.bins_from_unit(view, unit);
+    let [across, up] = o.bins_of_pixel(view, pixel);
     let (first, second) = if o.vertical == 0 { (up, across) } else { (across, up) };
     let mut place = vec![format!("{}[{}, {}]", view.array, first.round(), second.round())];
     for (axis, bin) in [(o.vertical, up), (o.horizontal, across)] {
         let a = &view.axes[axis];
         place.push(format!("{} {:.3} {}", a.shown_name(), a.shown_at(bin), a.shown_unit()));
     }
-    place.extend(polar(view, o, up, across));
+    place.extend(other(view, o, up, across));
     if let Some(axis) = o.collapsed {
         let a = &view.axes[axis];
         place.push(match o.third {
@@ -155,14 +154,23 @@ fn lines(session: &Session, state: &State, view: &View, index: usize, pixel: [us
     vec![place.join("   "), values.join("   ")]
 }
 
-/// Range and angle of a cell of a Cartesian map, in the map's own plane.
-fn polar(view: &View, o: Orientation, up: f64, across: f64) -> Option<String> {
+/// A cell in the coordinates that its map is not in, in the map's own plane: range and angle, or metres.
+fn other(view: &View, o: Orientation, up: f64, across: f64) -> Option<String> {
     let (v, h) = (&view.axes[o.vertical], &view.axes[o.horizontal]);
-    let depth = matches!(v.kind, AxisKind::X | AxisKind::DepthH | AxisKind::DepthV);
-    if !depth || !matches!(h.kind, AxisKind::Y | AxisKind::Z) {
-        return None;
+    let (up, across) = (v.value_at(up), h.value_at(across));
+    match Plane::other(v, h) {
+        Plane::Cells => None,
+        Plane::BirdsEye => {
+            let [depth, side] = match h.kind {
+                AxisKind::Elevation => ["depth", "z"],
+                AxisKind::Cone => ["depth", "y"],
+                _ => ["x", "y"],
+            };
+            Some(format!("{depth} {:.3} m   {side} {:.3} m", up * across.cos(), up * across.sin()))
+        }
+        Plane::Polar => {
+            let name = if h.kind == AxisKind::Y { "azimuth" } else { "elevation" };
+            Some(format!("range {:.3} m   {name} {:.2}°", up.hypot(across), across.atan2(up).to_degrees()))
+        }
     }
-    let (x, y) = (v.value_at(up), h.value_at(across));
-    let name = if h.kind == AxisKind::Y { "azimuth" } else { "elevation" };
-    Some(format!("range {:.3} m   {name} {:.2}°", x.hypot(y), y.atan2(x).to_degrees()))
 }

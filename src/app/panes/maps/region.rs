@@ -1,6 +1,6 @@
 //! Boxes of cells: those that a label marks, drawn with the mouse, and those that a finding points at.
 
-use super::{MapExtent, State, unit_at};
+use super::{MapExtent, State, overlay, unit_at};
 use crate::app::map_image::Orientation;
 use crate::app::theme::Tokens;
 use crate::labels::CellRegion;
@@ -48,7 +48,8 @@ impl State {
     /// Points at cells and zooms the map to them.
     pub(super) fn show_cells(&mut self, session: &Session, view: usize, lo: &[usize], hi: &[usize]) {
         let Some(v) = session.data.dataset.as_ref().and_then(|dataset| dataset.info().views.get(view)) else { return };
-        let Some([min, max]) = unit_box(v, Orientation::of(v, session.view.cube), lo, hi) else { return };
+        let o = Orientation::of(v, session.view.cube);
+        let Some([min, max]) = grid_box(v, o, lo, hi).map(|cells| o.shown_box(v, cells)) else { return };
         let frame = session.data.frame_index;
         self.leave_highlight(None);
         let before = self.windows.get(view).copied().unwrap_or_default();
@@ -84,8 +85,9 @@ impl State {
     ) {
         let o = Orientation::of(view, session.view.cube);
         if let Some(begun) = self.marking.from.filter(|begun| begun.view == index) {
-            let rect = Rect::from_two_pos(to_screen(begun.at), to_screen(self.marking.to));
-            painter.rect_stroke(rect, 0.0, Stroke::new(1.5, tokens.accent), egui::StrokeKind::Middle);
+            let corners = [begun.at, self.marking.to].map(|at| o.to_grid(view, at).map(|x| x.clamp(0.0, 1.0)));
+            let line = overlay::outline(view, o, overlay::grid_box(corners[0], corners[1]), to_screen);
+            painter.line(line, Stroke::new(1.5, tokens.accent));
         }
         let label = session.labels.label(session.data.frame_index);
         if let Some(region) = label.region.as_ref().filter(|region| region.view == view.array) {
@@ -132,32 +134,26 @@ impl State {
 
 /// The cells between two points of the picture.
 fn region(view: &View, o: Orientation, from: [f64; 2], to: [f64; 2]) -> Option<CellRegion> {
-    let [width, height] = o.size(view);
-    let pixel = |at: f64, size: usize| ((at * size as f64).floor().max(0.0) as usize).min(size.saturating_sub(1));
-    let columns = [from[0], to[0]].map(|x| pixel(x, width));
-    let rows = [from[1], to[1]].map(|y| pixel(y, height));
-    let across = columns.map(|column| if o.horizontal_from_left { column } else { width - 1 - column });
-    let up = rows.map(|row| if o.vertical_from_top { row } else { height - 1 - row });
+    let corners = [from, to].map(|at| o.bins_from_unit(view, at));
     let mut lo = vec![0; view.axes.len()];
     let mut hi: Vec<usize> = view.axes.iter().map(|axis| axis.bins.saturating_sub(1)).collect();
-    for (axis, ends) in [(o.horizontal, across), (o.vertical, up)] {
+    for (k, axis) in [o.horizontal, o.vertical].into_iter().enumerate() {
+        let last = *hi.get(axis)?;
+        let ends = corners.map(|bins| ((bins[k] + 0.5).floor().max(0.0) as usize).min(last));
         *lo.get_mut(axis)? = ends[0].min(ends[1]);
         *hi.get_mut(axis)? = ends[0].max(ends[1]);
     }
     Some(CellRegion { view: view.array.clone(), lo, hi })
 }
 
-/// Corners of a box of cells in picture coordinates, lower first; `None` where the box is not of this view.
-fn unit_box(view: &View, o: Orientation, lo: &[usize], hi: &[usize]) -> Option<[[f32; 2]; 2]> {
+/// Corners of a box of cells in the grid of cells, lower first; `None` where the box is not of this view.
+fn grid_box(view: &View, o: Orientation, lo: &[usize], hi: &[usize]) -> Option<[[f32; 2]; 2]> {
     if lo.len() != view.axes.len() || hi.len() != view.axes.len() {
         return None;
     }
     let corner = |bins: &[usize], by: f64| -> Vec<f64> { bins.iter().map(|&bin| bin as f64 + by).collect() };
-    let a = o.unit_from_bins(view, &corner(lo, -0.5));
-    let b = o.unit_from_bins(view, &corner(hi, 0.5));
-    let ends = |axis: usize| (a[axis].min(b[axis]) as f32, a[axis].max(b[axis]) as f32);
-    let ((x0, x1), (y0, y1)) = (ends(0), ends(1));
-    Some([[x0, y0], [x1, y1]])
+    let place = |bins: Vec<f64>| o.grid_from_bins(view, [bins[o.horizontal], bins[o.vertical]]);
+    Some(overlay::grid_box(place(corner(lo, -0.5)), place(corner(hi, 0.5))))
 }
 
 fn outline(
@@ -169,16 +165,11 @@ fn outline(
     text: &str,
     tokens: &Tokens,
 ) {
-    let Some([min, max]) = unit_box(view, o, lo, hi) else { return };
-    let at = |p: [f32; 2]| to_screen([f64::from(p[0]), f64::from(p[1])]);
-    let rect = Rect::from_two_pos(at(min), at(max));
-    painter.rect_stroke(
-        rect.expand(2.0),
-        0.0,
-        Stroke::new(3.0, egui::Color32::from_black_alpha(120)),
-        egui::StrokeKind::Middle,
-    );
-    painter.rect_stroke(rect.expand(2.0), 0.0, Stroke::new(1.5, egui::Color32::WHITE), egui::StrokeKind::Middle);
+    let Some(cells) = grid_box(view, o, lo, hi) else { return };
+    let line = overlay::outline(view, o, cells, to_screen);
+    let rect = Rect::from_points(&line);
+    painter.line(line.clone(), Stroke::new(3.5, egui::Color32::from_black_alpha(120)));
+    painter.line(line, Stroke::new(1.5, egui::Color32::WHITE));
     let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(10.0), egui::Color32::WHITE);
     let size = galley.size();
     let corner = rect.left_top() + vec2(-2.0, -3.0 - size.y);
@@ -213,7 +204,7 @@ mod tests {
         for (from, to) in [([0.101, 0.201], [0.349, 0.399]), ([0.349, 0.399], [0.101, 0.201])] {
             let Some(region) = region(&view, o, from, to) else { panic!("a region") };
             assert_eq!((region.view.as_str(), region.lo.len()), ("hm", 2));
-            let Some([min, max]) = unit_box(&view, o, &region.lo, &region.hi) else { panic!("a box") };
+            let Some([min, max]) = grid_box(&view, o, &region.lo, &region.hi) else { panic!("a box") };
             let near = |a: f32, b: f32| (a - b).abs() < 1e-5;
             assert!(
                 near(min[0], 0.1) && near(max[0], 0.35) && near(min[1], 0.2) && near(max[1], 0.4),
@@ -224,6 +215,6 @@ mod tests {
 
     #[test]
     fn a_box_of_another_view_is_not_drawn() {
-        assert_eq!(unit_box(&view(), Orientation::of(&view(), CubeView::default()), &[1], &[2]), None);
+        assert_eq!(grid_box(&view(), Orientation::of(&view(), CubeView::default()), &[1], &[2]), None);
     }
 }

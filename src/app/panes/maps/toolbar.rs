@@ -4,6 +4,7 @@ use super::super::PaneState as _;
 use super::{Shared, State};
 use crate::app::commands::AppAct;
 use crate::app::map_image::Orientation;
+use crate::app::map_plane::Plane;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::render::Colormap;
@@ -22,6 +23,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
             ui.separator();
             focus(ui, shared, state);
             cube(ui, shared);
+            planes(ui, shared);
             // The legend goes where there is no room for it: its colours are told on the masks' read-out too.
             if ui.available_width() > 230.0 {
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), legend);
@@ -82,6 +84,39 @@ fn cube(ui: &mut Ui, shared: &mut Shared<'_>) {
             // What was seen of other axes means nothing.
             shared.app(AppAct::ResetViews);
         }
+    }
+}
+
+/// The other coordinates of the maps, as far as they have some.
+fn planes(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let Some(dataset) = &shared.session.data.dataset else { return };
+    let old = shared.session.view.cube;
+    let mut cube = old;
+    let others = |plane: Plane| {
+        let other = |view| {
+            let o = Orientation::of(view, old);
+            Plane::other(&view.axes[o.vertical], &view.axes[o.horizontal])
+        };
+        dataset.info().views.iter().any(move |view| other(view) == plane)
+    };
+    let (fan, unrolled) = (others(Plane::BirdsEye), others(Plane::Polar));
+    if fan || !unrolled {
+        let button = ui.add_enabled(fan, egui::Button::selectable(cube.birds_eye && fan, "Bird's-eye"));
+        let tip = "Draw maps of range and angle on metres, with range rings and the edges of the field of view.";
+        let why =
+            "No map here has range and angle, nor depth and a side in metres: none can be drawn in other coordinates.";
+        if button.on_hover_text(tip).on_disabled_hover_text(why).clicked() {
+            cube.birds_eye = !cube.birds_eye;
+        }
+    }
+    if unrolled {
+        let button = ui.add(egui::Button::selectable(cube.polar, "Polar"));
+        if button.on_hover_text("Draw maps whose axes are metres on range and angle.").clicked() {
+            cube.polar = !cube.polar;
+        }
+    }
+    if cube != old {
+        shared.set_view(|view| view.cube = cube);
     }
 }
 
@@ -168,6 +203,11 @@ fn more(ui: &mut Ui, shared: &mut Shared<'_>) {
     }
 }
 
+/// Keys of the maps' arrays.
+fn views<'a>(shared: &Shared<'a>) -> impl Iterator<Item = &'a str> {
+    shared.session.data.dataset.iter().flat_map(|dataset| &dataset.info().views).map(|view| view.array.as_str())
+}
+
 fn comparison(ui: &mut Ui, shared: &mut Shared<'_>) {
     let mut mode = shared.session.view.compare;
     ui.selectable_value(&mut mode, Compare::Flip, "H_sim")
@@ -203,11 +243,6 @@ fn legend(ui: &mut Ui) {
         (theme::MASK_SIM, "H_sim only", "Simulated, not measured."),
     ];
     for (color, text, tip) in entries.into_iter().rev() {
-/// Keys of the maps' arrays.
-fn views<'a>(shared: &Shared<'a>) -> impl Iterator<Item = &'a str> {
-    shared.session.data.dataset.iter().flat_map(|dataset| &dataset.info().views).map(|view| view.array.as_str())
-}
-
         ui.label(RichText::new(text).small()).on_hover_text(tip);
         let (rect, _) = ui.allocate_exact_size(vec2(9.0, 9.0), Sense::hover());
         ui.painter().rect(rect, 1.0, color, egui::Stroke::new(1.0, tokens.dim), egui::StrokeKind::Inside);
