@@ -81,7 +81,7 @@ fn form(
             ui.add_sized([44.0, 20.0], egui::Label::new(side(upper)));
             let text = &mut draft.texts[usize::from(upper)];
             let field = egui::TextEdit::singleline(text).font(theme::mono(12.0)).desired_width(90.0);
-            let field = field.vertical_align(egui::Align::Center);
+            let field = field.align(egui::Align2::LEFT_CENTER);
             let name = format!("{} limit of {} value", side(upper), row.array);
             let response = ui.add(field);
             response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, &name));
