@@ -165,6 +165,7 @@ impl Tokens {
             "total" => self.text,
             "majpe" => self.pick(0xA6ECF4, 0x095258),
             "iou 0" => self.pick(0xA0BE66, 0x637D21),
+            "iou 1" => self.pick(0x2A9187, 0x5D7BF1),
             name => self.hue(TermId::of(name).map_or(Hue::Rose, |term| term.hue)),
         }
     }
@@ -349,7 +350,7 @@ mod tests {
             ("middle", t.dim),
         ];
         let terms = TERMS.iter().filter(|term| term.key != "dummy").map(|term| (term.key, t.curve(term.key)));
-        let curves = ["total", "iou 0", "majpe"].map(|key| (key, t.curve(key)));
+        let curves = ["total", "iou 0", "iou 1", "majpe"].map(|key| (key, t.curve(key)));
         let tags = Tag::ALL.map(|tag| (tag.code(), t.tag(tag)));
         let strata = [Stratum::Easy, Stratum::Medium, Stratum::Hard].map(|s| (s.word(), t.stratum(s)));
         let states = [("ok", t.ok), ("warn", t.warn), ("bad", t.bad), ("accent", t.accent)];
