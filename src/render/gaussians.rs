@@ -53,11 +53,12 @@ impl SplatPrimitive {
         let sigma = Vec2::new((mid + spread).sqrt(), (mid - spread).max(LOW_PASS_PX2).sqrt());
         let center = projection.pixel(view);
         let reach = projection.globals.sigma * sigma.x + 1.0;
+        let [red, green, blue, alpha] = splat.color;
         projection.on_screen(center, Vec2::splat(reach)).then(|| Self {
             center: center.to_array(),
             axis: [angle.cos(), angle.sin()],
             sigma: sigma.to_array(),
-            color: splat.color,
+            color: [red, green, blue, alpha * projection.fade(splat)],
             z: projection.globals.buffer_depth(view.z),
         })
     }

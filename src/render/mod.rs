@@ -31,7 +31,7 @@ pub use colormap::{Colormap, NAN_COLOR};
 pub use offscreen::{HeadlessRenderer, RenderError, render_to_image};
 pub use pick::pick;
 pub use renderer::{MAX_SIDE_PX, SceneRenderer, clamped_size};
-pub use scene::{LineInstance, NOT_PICKABLE, Scene, SceneMode, SplatInstance};
+pub use scene::{LineInstance, NOT_PICKABLE, Scene, SceneMode, SplatInstance, Undrawable};
 
 /// The one wgpu of the program; every other room takes it from here.
 pub use eframe::wgpu;

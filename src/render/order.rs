@@ -95,12 +95,18 @@ impl DrawList {
         lines: impl Iterator<Item = LinePrimitive>,
         projection: &Projection,
     ) {
-        self.ellipsoids = splats.filter_map(|splat| EllipsoidPrimitive::project(splat, projection)).collect();
+        // One that would hide everything is drawn as what it is: a cloud.
+        let (whole, faded): (Vec<_>, Vec<_>) = splats.partition(|splat| projection.fade(splat) >= 1.0);
+        self.splats = faded.into_iter().filter_map(|splat| SplatPrimitive::project(splat, projection)).collect();
+        self.splats.sort_by(|a, b| b.z.total_cmp(&a.z));
+        let whole = whole.into_iter();
+        self.ellipsoids = whole.filter_map(|splat| EllipsoidPrimitive::project(splat, projection)).collect();
         self.ellipsoids.sort_by(|a, b| b.depth().total_cmp(&a.depth()));
         self.lines = lines.collect();
         self.lines.sort_by(|a, b| b.mid_z().total_cmp(&a.mid_z()));
         self.push_run(Kind::Ellipsoid, 0..self.ellipsoids.len());
         self.push_run(Kind::Line, 0..self.lines.len());
+        self.push_run(Kind::Splat, 0..self.splats.len());
     }
 
     fn push_run(&mut self, kind: Kind, range: Range<usize>) {

@@ -1,7 +1,7 @@
 //! Which Gaussian is under the cursor: the nearest surface the pixel's ray meets, else the closest centre near by.
 
 use super::camera::{Camera, NEAR_M, Ray};
-use super::projection::{Symmetric, apply, invert};
+use super::projection::{Projection, Symmetric, apply, invert};
 use super::scene::{NOT_PICKABLE, Scene, SplatInstance};
 use glam::{Vec2, Vec3};
 
@@ -14,7 +14,11 @@ pub fn pick(scene: &Scene, camera: &Camera, px: Vec2, viewport: Vec2) -> Option<
     let ray = camera.ray(px, viewport);
     let k = scene.effective_sigma();
     let candidates = || scene.splats.iter().filter(|splat| splat.id != NOT_PICKABLE && splat.is_valid());
-    let hits = candidates().filter_map(|splat| Some((hit(splat, &ray, k)?, splat.id)));
+    let size = [viewport.x.max(1.0) as u32, viewport.y.max(1.0) as u32];
+    let projection = Projection::new(camera, size, scene);
+    let hits = candidates()
+        .filter(|splat| projection.fade(splat) >= 1.0)
+        .filter_map(|splat| Some((hit(splat, &ray, k)?, splat.id)));
     let nearest = hits.min_by(|a, b| a.0.total_cmp(&b.0));
     let closest = || {
         candidates()

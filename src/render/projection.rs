@@ -4,7 +4,7 @@
 //! left corner, y down, pixel centres at half integers.
 
 use super::camera::{Basis, Camera, FAR_M, NEAR_M};
-use super::scene::Scene;
+use super::scene::{Scene, SplatInstance};
 use glam::{Vec2, Vec3};
 
 /// A symmetric 3×3 matrix: xx, xy, xz, yy, yz, zz.
@@ -43,7 +43,12 @@ pub(super) struct Projection {
     eye: Vec3,
     pub(super) viewport: Vec2,
     pub(super) globals: Globals,
+    /// See [`Scene::largest`].
+    largest: f32,
 }
+
+/// What is left of the opacity of a Gaussian that fills everything.
+const FAINTEST: f32 = 0.04;
 
 impl Projection {
     pub(super) fn new(camera: &Camera, size: [u32; 2], scene: &Scene) -> Self {
@@ -57,7 +62,7 @@ impl Projection {
             depth_scale: FAR_M * NEAR_M / (FAR_M - NEAR_M),
             padding: 0.0,
         };
-        Self { basis: camera.basis(), eye: camera.eye(), viewport, globals }
+        Self { basis: camera.basis(), eye: camera.eye(), viewport, globals, largest: scene.largest }
     }
 
     /// View coordinates of a world point, m.
@@ -76,6 +81,16 @@ impl Projection {
         let Basis { right, up, forward } = self.basis;
         let (sr, su, sf) = (apply(&world, right), apply(&world, up), apply(&world, forward));
         [right.dot(sr), right.dot(su), right.dot(sf), up.dot(su), up.dot(sf), forward.dot(sf)]
+    }
+
+    /// What is left of the opacity of a Gaussian: 1 up to [`Scene::largest`], less the more of the picture it takes.
+    pub(super) fn fade(&self, splat: &SplatInstance) -> f32 {
+        let [xx, xy, _, yy, ..] = self.view_covariance(splat.covariance);
+        let largest = f32::midpoint(xx, yy) + ((xx - yy) / 2.0).hypot(xy);
+        let reach = self.globals.sigma * largest.sqrt();
+        let depth = self.view_point(splat.center).z.max(NEAR_M);
+        let share = 2.0 * reach * self.globals.focal / (depth * self.viewport.min_element().max(1.0));
+        if share <= self.largest { 1.0 } else { (self.largest / share).powi(2).max(FAINTEST) }
     }
 
     /// Whether a box of half size `half` px around `center` px touches the picture.

@@ -5,7 +5,7 @@ use super::cpu::premultiplied;
 use super::order::{DrawList, DrawRun, Kind};
 use super::pipeline::DEPTH_FORMAT;
 use super::projection::Globals;
-use super::scene::{Scene, SceneMode};
+use super::scene::{Scene, SceneMode, Undrawable};
 use super::{ellipsoids, gaussians, lines, wgpu};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -36,7 +36,7 @@ pub struct SceneRenderer {
     drawn: Option<u64>,
     pictures: u64,
     target_generation: u64,
-    skipped: usize,
+    skipped: Undrawable,
 }
 
 /// A pipeline and the instances it draws.
@@ -90,7 +90,7 @@ impl SceneRenderer {
             drawn: None,
             pictures: 0,
             target_generation: 0,
-            skipped: 0,
+            skipped: Undrawable::default(),
         }
     }
 
@@ -113,7 +113,7 @@ impl SceneRenderer {
                 self.target_generation += 1;
             }
             self.draw(device, queue, &DrawList::new(scene, camera, size), scene.background);
-            self.skipped = scene.invalid_instances();
+            self.skipped = scene.undrawable();
             self.drawn = Some(key);
             self.pictures += 1;
         }
@@ -130,8 +130,8 @@ impl SceneRenderer {
         self.target_generation
     }
 
-    /// How many instances of the last scene could not be drawn ([`Scene::invalid_instances`]).
-    pub fn skipped(&self) -> usize {
+    /// How many instances of the last scene could not be drawn ([`Scene::undrawable`]).
+    pub fn skipped(&self) -> Undrawable {
         self.skipped
     }
 
@@ -258,8 +258,9 @@ fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
 fn fingerprint(size: [u32; 2], scene: &Scene, camera: &Camera) -> u64 {
     let mut hasher = DefaultHasher::new();
     let Camera { target, distance, yaw, pitch, fov_y } = camera;
-    let numbers = [target.x, target.y, target.z, *distance, *yaw, *pitch, *fov_y, scene.sigma, scene.contour];
-    (size, numbers.map(f32::to_bits), scene.background.map(f32::to_bits)).hash(&mut hasher);
+    let look = [scene.sigma, scene.contour, scene.largest, *fov_y];
+    let numbers = [target.x, target.y, target.z, *distance, *yaw, *pitch];
+    (size, look.map(f32::to_bits), numbers.map(f32::to_bits), scene.background.map(f32::to_bits)).hash(&mut hasher);
     (scene.mode == SceneMode::Ellipsoid).hash(&mut hasher);
     bytemuck::cast_slice::<_, u8>(&scene.splats).hash(&mut hasher);
     bytemuck::cast_slice::<_, u8>(&scene.lines).hash(&mut hasher);

@@ -59,6 +59,18 @@ pub struct Scene {
     pub contour: f32,
     /// Translucent or opaque.
     pub mode: SceneMode,
+    /// Share of the picture's shorter side that a Gaussian may take; a larger one fades, in both modes, and only its
+    /// middle is hit by [`super::pick`]: it would hide everything else.
+    pub largest: f32,
+}
+
+/// How many instances cannot be drawn, and why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Undrawable {
+    /// A number that is not finite, or a line without width.
+    pub not_finite: usize,
+    /// A finite covariance that is not positive definite.
+    pub not_definite: usize,
 }
 
 impl Default for Scene {
@@ -71,6 +83,7 @@ impl Default for Scene {
             sigma: 2.0,
             contour: 0.0,
             mode: SceneMode::Splat,
+            largest: f32::INFINITY,
         }
     }
 }
@@ -83,19 +96,32 @@ impl Scene {
 
     /// How many instances cannot be drawn: not finite, or a covariance that is not positive definite.
     pub fn invalid_instances(&self) -> usize {
-        self.splats.iter().filter(|splat| !splat.is_valid()).count()
-            + self.lines.iter().chain(&self.overlay).filter(|line| !line.is_valid()).count()
+        let Undrawable { not_finite, not_definite } = self.undrawable();
+        not_finite + not_definite
+    }
+
+    /// The same by the reason.
+    pub fn undrawable(&self) -> Undrawable {
+        let finite = |splat: &&SplatInstance| splat.is_finite();
+        let lines = self.lines.iter().chain(&self.overlay).filter(|line| !line.is_valid()).count();
+        let not_definite = self.splats.iter().filter(finite).filter(|splat| !splat.is_valid()).count();
+        let not_finite = self.splats.iter().filter(|splat| !finite(splat)).count() + lines;
+        Undrawable { not_finite, not_definite }
     }
 }
 
 impl SplatInstance {
+    /// Whether all its numbers are finite.
+    fn is_finite(&self) -> bool {
+        self.center.iter().chain(&self.covariance).chain(&self.color).all(|x| x.is_finite())
+    }
+
     /// Whether it can be drawn: finite, and its covariance positive definite (Sylvester's criterion in f64).
     pub fn is_valid(&self) -> bool {
-        let finite = self.center.iter().chain(&self.covariance).chain(&self.color).all(|x| x.is_finite());
         let [xx, xy, xz, yy, yz, zz] = self.covariance.map(f64::from);
         let minor = xx * yy - xy * xy;
         let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
-        finite && xx > 0.0 && minor > 0.0 && determinant > 0.0
+        self.is_finite() && xx > 0.0 && minor > 0.0 && determinant > 0.0
     }
 }
 

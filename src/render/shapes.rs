@@ -25,7 +25,8 @@ impl Stroke {
         LineInstance { a: a.to_array(), b: b.to_array(), color: self.color, width_px: self.width_px }
     }
 
-    fn polyline(self, points: impl IntoIterator<Item = Vec3>) -> Vec<LineInstance> {
+    /// Lines from point to point.
+    pub fn polyline(self, points: impl IntoIterator<Item = Vec3>) -> Vec<LineInstance> {
         let points: Vec<Vec3> = points.into_iter().collect();
         points.windows(2).filter_map(|pair| Some(self.line(*pair.first()?, *pair.last()?))).collect()
     }

@@ -85,3 +85,17 @@ proptest! {
         }
     }
 }
+
+/// One that takes more than half of the picture is hit in its middle only: what is behind it can be picked.
+#[test]
+fn a_gaussian_as_large_as_the_picture_hides_nothing() {
+    let camera = Camera::from_radar();
+    let splats = vec![ball([2.0, 0.0, 0.0], 1.0, 1), ball([4.0, 0.5, 0.0], 0.05, 2)];
+    let small = px(&camera, &splats[1]);
+    let mut scene = Scene { splats, ..Scene::default() };
+    assert_eq!(pick(&scene, &camera, small, VIEWPORT), Some(1));
+    scene.largest = 0.5;
+    assert_eq!(pick(&scene, &camera, small, VIEWPORT), Some(2));
+    assert_eq!(pick(&scene, &camera, VIEWPORT / 2.0, VIEWPORT), Some(1));
+    assert_eq!(pick(&scene, &camera, VIEWPORT / 2.0 + Vec2::new(40.0, 90.0), VIEWPORT), None);
+}

@@ -196,3 +196,17 @@ fn colour_maps_are_what_they_are_called() {
         assert!(map.lut().windows(2).all(|w| luma(w[1]) > luma(w[0]) - 1.0), "{} gets brighter", map.name());
     }
 }
+
+/// A Gaussian that would fill the picture fades, in both modes; one of ordinary size does not.
+#[test]
+fn a_gaussian_as_large_as_the_picture_fades() {
+    for mode in [SceneMode::Splat, SceneMode::Ellipsoid] {
+        let at = |sigma: f32, largest: f32| {
+            let splats = vec![ball([3.0, 0.0, 0.0], sigma, RED)];
+            pixel(&Scene { splats, mode, largest, ..Scene::default() }, 100, 100)[0]
+        };
+        assert!(at(1.5, f32::INFINITY) > 120, "{mode:?}");
+        assert!(at(1.5, 0.5) < 60, "{mode:?}: {}", at(1.5, 0.5));
+        assert_eq!(at(0.1, 0.5), at(0.1, f32::INFINITY), "{mode:?}");
+    }
+}
