@@ -1,7 +1,7 @@
 //! The only two mutators: a command or a report in, effects out.
 //!
 //! Here are the tables from both to functions; `data` opens and loads, `queue` filters and orders the frames, `labels`
-//! writes what people say, `diagnosis` takes in strata and evidence, `fit` steers the optimiser, `reports` takes in what the
+//! writes what people say, `diagnosis` takes in strata and evidence, `fit` steers the optimiser, `hand` moves the body, `reports` takes in what the
 //! worker says.
 
 mod batch;
@@ -10,6 +10,7 @@ mod data;
 mod diagnosis;
 mod export;
 mod fit;
+mod hand;
 mod labels;
 mod live;
 mod pins;
@@ -142,6 +143,7 @@ impl Session {
                 Vec::new()
             }
             Command::EditParams(params) => self.edit(*params),
+            Command::DragBody(moved) => self.drag_body(moved),
             Command::SelectJoint(joint) => {
                 self.joint = joint;
                 Vec::new()

@@ -1,5 +1,6 @@
 //! What a person asks of a session.
 
+use super::body_move::BodyMove;
 use super::compared::ResultSide;
 use super::effect::BackgroundTask;
 use super::queue::Sort;
@@ -135,6 +136,8 @@ pub enum Command {
     SetWarmStart(bool),
     /// Parameters edited by hand.
     EditParams(Box<Pppr>),
+    /// The body under a finger: moved from where it was when the finger went down; until [`Command::EndDrag`] one act.
+    DragBody(BodyMove),
     /// Select a joint (flat index).
     SelectJoint(Option<usize>),
     /// How things are shown.

@@ -49,6 +49,8 @@ pub struct Branch {
     pub rows: Vec<IterationRow>,
     /// Changes of settings.
     pub flags: Vec<Flag>,
+    /// What was moved by hand where it begins, in words; empty while it is still moved.
+    pub edit: Option<String>,
 }
 
 impl Branch {
@@ -133,9 +135,30 @@ impl History {
     pub fn begin(&mut self, parent: Option<(u32, usize)>, config: FitConfig) -> u32 {
         let id = self.next_id;
         self.next_id += 1;
-        self.branches.push(Branch { id, parent, config, rows: Vec::new(), flags: Vec::new() });
+        self.branches.push(Branch { id, parent, config, rows: Vec::new(), flags: Vec::new(), edit: None });
         self.activate(id);
         id
+    }
+
+    /// Says what was moved by hand where a branch begins.
+    pub(super) fn edit(&mut self, branch: u32, words: String) {
+        if let Some(branch) = self.branches.iter_mut().find(|b| b.id == branch) {
+            branch.edit = Some(words);
+            self.revision += 1;
+        }
+    }
+
+    /// The branch and iteration that a fit of `branch` from its start begins at: where the body was moved by hand last on
+    /// the way to it, else the start of the first branch.
+    pub(super) fn start_of(&self, branch: u32) -> (u32, usize) {
+        let mut next = self.branch(branch);
+        while let Some(here) = next {
+            if here.edit.is_some() {
+                return (here.id, here.start());
+            }
+            next = here.parent.and_then(|(parent, _)| self.branch(parent));
+        }
+        (0, 0)
     }
 
     /// Forgets the rows of a branch: it is written anew with other settings.
@@ -165,10 +188,12 @@ impl History {
         self.branches.iter().find(|branch| branch.id == id)
     }
 
-    /// What a branch sets otherwise than the iteration that it began at, in words.
+    /// What was moved by hand and what is set otherwise than at the iteration that a branch began at, in words.
     pub fn departure(&self, branch: &Branch) -> String {
         let before = branch.parent.and_then(|(id, at)| Some(self.branch(id)?.config_at(at)));
-        before.map_or_else(String::new, |before| difference(&before, &branch.config))
+        let set = before.map_or_else(String::new, |before| difference(&before, &branch.config));
+        let parts = branch.edit.iter().cloned().chain([set]).filter(|part| !part.is_empty());
+        parts.collect::<Vec<_>>().join(", ")
     }
 
     /// The branch that a run continues.

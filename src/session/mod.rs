@@ -15,6 +15,7 @@
 mod acts;
 mod apply;
 mod batch;
+mod body_move;
 mod command;
 mod compared;
 mod effect;
@@ -43,6 +44,7 @@ mod work;
 pub use acts::{ActKind, Asked, Changes, Done, LabelAct};
 pub use apply::OutputCheck;
 pub use batch::{Batch, BatchRequest};
+pub use body_move::{BodyMove, root_of};
 pub use command::{Command, Export, PickKind, StartAt};
 pub use compared::{ComparedNumber, ResultSet, ResultSets, ResultSide, SetDifference};
 pub use effect::{BackgroundTask, Commit, Effect, PinRequest, Trash};

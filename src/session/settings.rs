@@ -1,4 +1,4 @@
-//! Acts on settings: one from where a finger goes down until it is lifted, whatever it did in between.
+//! Acts on settings and on the body: one from where a finger goes down until it is lifted, whatever it did in between.
 
 use crate::config::FitConfig;
 use serde::{Deserialize, Serialize};
@@ -95,6 +95,8 @@ pub(super) struct SettingsAct {
     /// The frame, and the branches that were active before and after.
     pub(super) frame: usize,
     pub(super) branches: [u32; 2],
+    /// The body was moved by hand, where the second branch begins; the iteration of the first that it left.
+    pub(super) moved_at: Option<usize>,
 }
 
 /// Acts on settings, done and undone.

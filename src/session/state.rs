@@ -1,6 +1,7 @@
 //! The session's fields.
 
 use super::batch::Batch;
+use super::body_move::Moving;
 use super::command::StartAt;
 use super::compared::ResultSets;
 use super::evidence::EvidenceState;
@@ -213,6 +214,8 @@ pub struct Session {
     pub(super) jobs: JobId,
     /// Settings under a finger.
     pub(super) drag: Option<Drag>,
+    /// The body under a finger.
+    pub(super) moving: Option<Moving>,
     /// Acts on settings.
     pub(super) settings: SettingsActs,
     /// Acts so far, on labels or on settings.

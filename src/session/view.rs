@@ -232,6 +232,10 @@ pub struct ViewState {
     pub splat_sigma: f32,
     /// Draw velocity arrows.
     pub show_velocity: bool,
+    /// Bones keep their length where a joint is moved by hand.
+    pub keep_bones: bool,
+    /// Show the handles that move and turn a whole person.
+    pub move_body: bool,
     /// Draw the truth skeleton.
     pub show_truth: bool,
     /// Draw the ground grid.
@@ -308,6 +312,8 @@ impl Default for ViewState {
             splat_mode: SplatMode::default(),
             splat_sigma: 2.0,
             show_velocity: true,
+            keep_bones: true,
+            move_body: false,
             show_truth: true,
             show_grid: true,
             show_frustum: true,

@@ -88,7 +88,7 @@ pub enum WorkerCommand {
         /// Settings from there on.
         config: Box<FitConfig>,
     },
-    /// Replace the parameters at the current iteration by hand.
+    /// Replace the parameters at the current iteration by hand; of those that wait the newest is done.
     Edit(Box<Pppr>),
     /// Show an earlier state without going back to it: answers with a snapshot.
     Inspect {

@@ -131,8 +131,7 @@ impl Thread {
         }
         let mut commands = first.into_iter().chain(self.inbox.try_iter()).collect::<Vec<_>>().into_iter().peekable();
         while let Some(command) = commands.next() {
-            let is_refit = |command: &WorkerCommand| matches!(command, WorkerCommand::Refit { .. });
-            let overtaken = is_refit(&command) && commands.peek().is_some_and(is_refit);
+            let overtaken = commands.peek().is_some_and(|next| is_overtaken(&command, next));
             if !overtaken && !self.handle(command) {
                 return false;
             }
@@ -254,6 +253,12 @@ impl Thread {
         let _ = self.outbox.send(WorkerMessage::Event(self.current, event));
         (self.wake)();
     }
+}
+
+/// Whether what a finger asks next leaves nothing of what it asked before.
+fn is_overtaken(command: &WorkerCommand, next: &WorkerCommand) -> bool {
+    use WorkerCommand::{Edit, Refit};
+    matches!((command, next), (Refit { .. }, Refit { .. }) | (Edit(_), Edit(_)))
 }
 
 /// Milliseconds of a step, the least of a few that are taken back again.

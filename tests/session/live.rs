@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_mins(1);
 
 /// A session with its threads on a data set of blobs, fitted by the baseline.
-struct Rig {
-    runtime: Runtime,
+pub(crate) struct Rig {
+    pub(crate) runtime: Runtime,
     _folder: tempfile::TempDir,
 }
 
@@ -20,7 +20,7 @@ fn config() -> FitConfig {
 }
 
 impl Rig {
-    fn new(live: Live) -> Self {
+    pub(crate) fn new(live: Live) -> Self {
         let folder = tempfile::tempdir().unwrap();
         blob::write_dataset(folder.path(), 2);
         let view = ViewState { live, ..ViewState::default() };
@@ -33,11 +33,11 @@ impl Rig {
         rig
     }
 
-    fn session(&self) -> &Session {
+    pub(crate) fn session(&self) -> &Session {
         self.runtime.session()
     }
 
-    fn until(&mut self, what: &str, done: impl Fn(&Session) -> bool) {
+    pub(crate) fn until(&mut self, what: &str, done: impl Fn(&Session) -> bool) {
         let deadline = Instant::now() + PATIENCE;
         while !done(self.session()) {
             let log: Vec<&str> = self.session().log.iter().map(|line| line.text.as_str()).collect();
@@ -48,7 +48,7 @@ impl Rig {
     }
 
     /// The worker has done what it was asked, with the settings that hold.
-    fn settled(&mut self) {
+    pub(crate) fn settled(&mut self) {
         self.until("the end of the fit", |s| {
             let shown = s.fit.shown.as_ref().map(|shown| (shown.iteration, shown.config));
             s.fit.status == FitStatus::Paused && shown == Some((s.fit.head(), s.config))
@@ -61,7 +61,7 @@ impl Rig {
         self.runtime.poll();
     }
 
-    fn lines(&self, text: &str) -> usize {
+    pub(crate) fn lines(&self, text: &str) -> usize {
         self.session().log.iter().filter(|line| line.text.contains(text)).count()
     }
 }

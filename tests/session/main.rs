@@ -7,6 +7,7 @@ mod blob;
 mod acts;
 mod another;
 mod batch;
+mod hand;
 mod labels;
 mod live;
 mod state;

@@ -126,7 +126,8 @@ fn blank(session: &Session) -> Option<Blank> {
 
 /// The branch on screen; one without an iteration while a fit is prepared.
 fn branch_of(session: &Session) -> Cow<'_, Branch> {
-    let none = || Branch { id: 0, parent: None, config: session.config, rows: Vec::new(), flags: Vec::new() };
+    let none =
+        || Branch { id: 0, parent: None, config: session.config, rows: Vec::new(), flags: Vec::new(), edit: None };
     begun(session).map_or_else(|| Cow::Owned(none()), Cow::Borrowed)
 }
 
@@ -424,7 +425,8 @@ mod dummy_tests {
         let terms = Terms::from_fn(|term| if term.key == "dummy" { 0.7 } else { 0.1 });
         let report = StepReport { iteration: 0, loss: 1.0, terms, iou: vec![None].into(), converged: false };
         let row = IterationRow { report, state: None, majpe_mm: None };
-        let branch = Branch { id: 0, parent: None, config: *config, rows: vec![row.clone()], flags: Vec::new() };
+        let branch =
+            Branch { id: 0, parent: None, config: *config, rows: vec![row.clone()], flags: Vec::new(), edit: None };
         loss_curves(1, &[branch]).into_iter().map(|curve| (curve.key, (curve.value)(&row))).collect()
     }
 

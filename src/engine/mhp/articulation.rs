@@ -14,8 +14,29 @@ use crate::geometry::{Vec3, add, add_scaled, cross, mat_vec, norm, rotation_from
 #[derive(Debug, Clone, PartialEq)]
 struct Hinge {
     inner: usize,
+    outer: usize,
     /// The joints that it carries, the bone's outer end among them.
     carried: Vec<usize>,
+}
+
+/// What turns with a joint about the bone that it hangs on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Limb {
+    /// The bone's end that stays.
+    pub inner: usize,
+    /// The bone's end that moves.
+    pub outer: usize,
+    /// The joints that move with it, itself among them, ascending.
+    pub carried: Vec<usize>,
+}
+
+impl Limb {
+    /// The smallest limb that a joint is of; `None` where it is of the root, which moves as a whole.
+    pub fn of(skeleton: &Skeleton, joint: usize) -> Option<Self> {
+        // Outermost first, so the first is the smallest.
+        let hinge = Articulation::new(skeleton).hinges.into_iter().find(|hinge| hinge.carried.contains(&joint))?;
+        Some(Self { inner: hinge.inner, outer: hinge.outer, carried: hinge.carried })
+    }
 }
 
 /// A skeleton's hinges, outermost first.
@@ -57,9 +78,11 @@ impl Articulation {
                 let inside = reached(skeleton, start, |other| other != bone);
                 let (inner, outer) = if inside.contains(&m) { (m, n) } else { (n, m) };
                 // A bone of a part that hangs nowhere on the root stays where it is.
-                inside
-                    .contains(&inner)
-                    .then(|| Hinge { inner, carried: reached(skeleton, outer, |other| other != bone) })
+                inside.contains(&inner).then(|| Hinge {
+                    inner,
+                    outer,
+                    carried: reached(skeleton, outer, |other| other != bone),
+                })
             })
             .collect();
         hinges.sort_by_key(|hinge| (hinge.carried.len(), hinge.inner));

@@ -57,6 +57,7 @@ mod triad;
 mod types;
 
 pub use adam::Adam;
+pub use articulation::Limb;
 pub use context::{Neighbour, Peak};
 pub use fill::fill_missing;
 pub use fill::for_neighbours;

@@ -199,6 +199,10 @@ impl Session {
 
     /// Puts the fit on screen aside, so that coming back finds it again.
     pub(super) fn leave_frame(&mut self) -> Vec<Effect> {
+        // What is in the hand is put down here, not in the next frame.
+        if let Some(moving) = self.moving.take() {
+            self.end_move(moving);
+        }
         let mut fit = std::mem::take(&mut self.fit);
         if fit.problem.is_none() {
             return Vec::new();

@@ -64,7 +64,7 @@ impl Session {
 
     /// Asks for the evidence of the fit on screen, once it has come to rest.
     pub(super) fn ask_evidence(&mut self) -> Vec<Effect> {
-        if self.fit.status != FitStatus::Paused || self.drag.is_some() || self.fit.replay.is_some() {
+        if self.fit.status != FitStatus::Paused || self.is_dragging() || self.fit.replay.is_some() {
             return Vec::new();
         }
         let (Some(dataset), Some(frame), Some(problem), Some(snapshot), Some(fit)) =

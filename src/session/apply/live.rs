@@ -31,9 +31,9 @@ impl Session {
         }
     }
 
-    /// Whether settings are under a finger.
+    /// Whether settings or the body are under a finger.
     pub fn is_dragging(&self) -> bool {
-        self.drag.is_some()
+        self.drag.is_some() || self.moving.is_some()
     }
 
     /// Whether a new start would be another one than that of the fit on screen: settings that only a start reads have
@@ -77,6 +77,9 @@ impl Session {
 
     /// The finger is lifted: what it did is one act.
     pub(super) fn end_drag(&mut self) -> Vec<Effect> {
+        if let Some(moving) = self.moving.take() {
+            return self.end_move(moving);
+        }
         let Some(Drag { before, from, live }) = self.drag.take() else { return Vec::new() };
         let name = difference(&before, &self.config);
         let there = live.filter(|(branch, _)| self.fit.history.active_id() == *branch);
@@ -110,6 +113,7 @@ impl Session {
             settings: [before, self.config],
             frame: self.fit.frame,
             branches: [from, self.fit.history.active_id()],
+            moved_at: None,
         });
         Vec::new()
     }
@@ -155,7 +159,7 @@ impl Session {
                 None => return Vec::new(),
             },
             (None, LiveFrom::Shown) => (drag.from, self.fit.shown_iteration()),
-            (None, LiveFrom::Start) => (0, 0),
+            (None, LiveFrom::Start) => self.fit.history.start_of(drag.from),
         };
         let Some((at, state, row)) = self.fit.history.branch(parent).and_then(|branch| {
             let (at, state) = branch.state_at(at)?;
@@ -249,6 +253,9 @@ impl Session {
 
     /// The settings before (0) or after (1) an act, on the branch that was active then where it is still there and still has them.
     fn put_back(&mut self, act: &SettingsAct, side: usize) -> Vec<Effect> {
+        if let Some(at) = act.moved_at {
+            return self.put_back_body(act, side, at);
+        }
         let (config, id) = (act.settings[side], act.branches[side]);
         let has_them = |branch: &Branch| branch.newest_config() == config;
         let there = self.fit.is_ready() && self.fit.frame == act.frame;
