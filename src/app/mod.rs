@@ -7,6 +7,7 @@ mod closing;
 mod commands;
 mod figure;
 mod layout;
+mod locate;
 mod map_image;
 mod map_plane;
 mod menu;
@@ -22,7 +23,7 @@ use crate::session::{Command, LogLevel, Report, Runtime, Session, StartAt, ViewS
 use commands::{AppAct, UiAction};
 use layout::PaneLayout;
 use overlay::Overlay;
-use panes::{PaneStates, Shared, study};
+use panes::{PaneStates, Pointed, Shared, study};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -67,6 +68,8 @@ pub struct InspectorApp {
     layout: PaneLayout,
     panes: PaneStates,
     timeline: timeline::Timeline,
+    /// What the pointer was on in the pass before.
+    pointed: Pointed,
     gpu: Option<eframe::egui_wgpu::RenderState>,
     overlay: Overlay,
     pictures: sharing::PendingPictures,
@@ -131,6 +134,7 @@ impl InspectorApp {
             layout,
             panes: PaneStates::default(),
             timeline: timeline::Timeline::default(),
+            pointed: Pointed::default(),
             gpu: cc.wgpu_render_state.clone(),
             overlay: Overlay::default(),
             pictures: sharing::PendingPictures::default(),
@@ -379,7 +383,8 @@ impl eframe::App for InspectorApp {
         if self.runtime.is_busy() {
             ctx.request_repaint_after(std::time::Duration::from_millis(100));
         }
-        if !self.overlay.is_modal() {
+        // While the body is in the hand, keys say along which axis it goes.
+        if !self.overlay.is_modal() && !self.session().is_moving() {
             for command in commands::pressed(ctx) {
                 if command.enabled(self.runtime.session()) {
                     let act = command.action(self.runtime.session());
@@ -392,16 +397,21 @@ impl eframe::App for InspectorApp {
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         let mut acts: Vec<UiAction> = Vec::new();
+        let mut points = Pointed::default();
         {
             let gpu = self.gpu.as_ref();
-            let mut shared =
-                Shared { session: self.runtime.session(), acts: &mut acts, gpu, pane: egui::Rect::NOTHING };
+            let (session, pointed) = (self.runtime.session(), self.pointed);
+            let pane = egui::Rect::NOTHING;
+            let mut shared = Shared { session, acts: &mut acts, gpu, pane, pointed, points: &mut points };
             menu::bar(ui, &mut shared);
             timeline::show(ui, &mut shared, &mut self.timeline);
             self.layout.show(ui, &mut shared, &mut self.panes);
             self.overlay.show(ui, &mut shared);
         }
         let ctx = ui.ctx().clone();
+        if std::mem::replace(&mut self.pointed, points) != points {
+            ctx.request_repaint();
+        }
         acts.extend(self.layout.take_asked().map(UiAction::App));
         for act in acts {
             self.act(&ctx, act);

@@ -112,7 +112,12 @@ pub(crate) const NAN_CELL: Color32 = Color32::from_rgb(0xB0, 0x3A, 0x9A);
 impl Tokens {
     /// The tokens of the theme that `ui` is drawn in.
     pub(crate) fn of(ui: &egui::Ui) -> Self {
-        if ui.visuals().dark_mode { DARK } else { LIGHT }
+        Self::of_visuals(ui.visuals())
+    }
+
+    /// The tokens of what is drawn with these visuals.
+    pub(crate) fn of_visuals(visuals: &egui::Visuals) -> Self {
+        if visuals.dark_mode { DARK } else { LIGHT }
     }
 
     /// The colour of a side of the body.

@@ -11,6 +11,7 @@ mod tree;
 mod window;
 
 mod compare;
+mod hand;
 mod journey;
 mod labels;
 mod large;

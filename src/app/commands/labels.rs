@@ -29,7 +29,7 @@ pub(super) const COMMANDS: &[CommandRow] = &[
     CommandRow {
         label: "Undo",
         title: Some(|s| s.undo_name().map_or_else(|| "Undo".into(), |name| format!("Undo: {name}"))),
-        tooltip: "Take the last act of labelling back.",
+        tooltip: "Take the last act back: of labelling, on settings, or on the body.",
         menu: Menu::Edit,
         keys: &[(CTRL, Key::Z)],
         enabled: |s| s.undo_name().is_some(),

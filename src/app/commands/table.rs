@@ -362,6 +362,7 @@ pub(super) const COMMANDS: &[CommandRow] = &[
     scene::FROM_RADAR,
     scene::FROM_ABOVE,
     scene::FROM_SIDE,
+    scene::MOVE_BODY,
     CommandRow {
         label: "Clear selection",
         title: None,

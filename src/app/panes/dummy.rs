@@ -82,7 +82,9 @@ fn a_pane_of_the_list_is_drawn_where_it_is_in_front() {
     theme::install(&ctx);
     let (mut layout, mut states, mut acts) = (PaneLayout::default(), PaneStates::default(), Vec::new());
     let mut pass = |layout: &mut PaneLayout| {
-        let mut shared = Shared { session: &session, acts: &mut acts, gpu: None, pane: egui::Rect::NOTHING };
+        let (pointed, mut points) = (super::Pointed::default(), super::Pointed::default());
+        let pane = egui::Rect::NOTHING;
+        let mut shared = Shared { session: &session, acts: &mut acts, gpu: None, pane, pointed, points: &mut points };
         let size = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(1440.0, 900.0));
         let input = egui::RawInput { screen_rect: Some(size), ..Default::default() };
         ctx.run_ui(input, |ui| layout.show(ui, &mut shared, &mut states)).textures_delta.clear();

@@ -1,5 +1,6 @@
 //! The maps: a row a view with H_ori, H_sim and the masks, one zoom, one cursor and one read-out for all of them.
 
+mod drag;
 mod focus;
 mod grid;
 mod overlay;
@@ -109,6 +110,8 @@ struct State {
     marking: region::Marking,
     /// The coordinates that the windows belong to: bird's-eye, polar.
     planes: Option<[bool; 2]>,
+    /// A joint that is moved.
+    held: Option<drag::Held>,
     /// The data set that the windows belong to.
     dataset: Option<std::sync::Weak<crate::dataset::Dataset>>,
 }
@@ -293,7 +296,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
     if let Some(region) = marked {
         shared.send(crate::session::Command::SetRegion(session.data.frame_index, Some(region)));
     }
-    if !marking {
+    if !marking && !drag::joint(ui, shared, state, &response, plot, (index, view, orientation)) {
         navigate(ui, &response, plot, &mut state.windows[index]);
     }
     let window = state.windows[index];
@@ -317,14 +320,14 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
         let unit = unit_at(plot, window, pointer);
         if let Some(pixel) = orientation.pixel_at(view, unit) {
             state.hovered_next = Some((index, pixel));
+            shared.points.cell = Some((index, pixel));
         }
-        if response.clicked() {
-            let joint = overlay::joint_near(session, view, orientation, &to_screen, pointer);
-            if joint != session.joint {
-                shared.send(crate::session::Command::SelectJoint(joint));
-                if joint.is_some() {
-                    shared.app(AppAct::ShowPane(&super::joint::PANE));
-                }
+        let joint = overlay::joint_near(session, view, orientation, &to_screen, pointer);
+        shared.points.joint = joint.or(shared.points.joint);
+        if response.clicked() && joint != session.joint {
+            shared.send(crate::session::Command::SelectJoint(joint));
+            if joint.is_some() {
+                shared.app(AppAct::ShowPane(&super::joint::PANE));
             }
         }
     }
@@ -332,6 +335,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
         state.pointed = Some((index, MapColumn::ALL.iter().position(|one| *one == column).unwrap_or_default()));
         state.enlarge();
     }
+    drag::ring(&painter, shared, (view, orientation), &to_screen);
     if let Some((_, pixel)) = state.hovered.filter(|(hovered, _)| *hovered == index) {
         overlay::crosshair(&painter, &to_screen, view, orientation, pixel);
     }

@@ -62,6 +62,19 @@ pub(super) struct Shared<'a> {
     pub(super) gpu: Option<&'a eframe::egui_wgpu::RenderState>,
     /// The pane that is drawn, its toolbar included.
     pub(super) pane: egui::Rect,
+    /// What the pointer was on in the pass before, in whichever pane.
+    pub(super) pointed: Pointed,
+    /// What it is on in this one.
+    pub(super) points: &'a mut Pointed,
+}
+
+/// What the pointer is on: every pane shows it in its own way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Pointed {
+    /// View and (column, row) pixel of a map.
+    cell: Option<(usize, [usize; 2])>,
+    /// A joint, flat index.
+    joint: Option<usize>,
 }
 
 impl Shared<'_> {

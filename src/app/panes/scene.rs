@@ -4,18 +4,22 @@
 //! camera or the size changed.
 
 mod build;
+mod gizmo;
+mod hand;
 
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
-use crate::app::commands::{AppAct, CTRL, CommandRow, Menu, NONE, UiAction, always};
+use crate::app::commands::{AppAct, CTRL, CommandRow, Menu, NONE, UiAction, always, has_frame};
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::Named as _;
-use crate::render::{Camera, Scene, SceneRenderer, Vec2, Vec3, pick, shapes};
+use crate::app::widgets::{Named as _, grounded};
+use crate::render::{Camera, Scene, SceneRenderer, Undrawable, Vec2, Vec3, pick, shapes};
 use crate::session::{Command, Session, SplatMode};
 use crate::worker::JobId;
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
 use egui::{Align2, Color32, Key, Rect, RichText, Sense, TextureId, Ui, pos2, vec2};
+use gizmo::Gizmo;
+use hand::{Grab, Holds, Sight};
 use serde_json::Value;
 
 /// Radius that a camera at its start shows, m.
@@ -68,6 +72,21 @@ pub(in crate::app) const FROM_SIDE: CommandRow = CommandRow {
     act: |_| look(|session| Camera::side(centre(session) * 0.7, RADIUS_M)),
 };
 
+/// Handles that move and turn a whole person.
+pub(in crate::app) const MOVE_BODY: CommandRow = CommandRow {
+    label: "Move body",
+    title: None,
+    tooltip: "Show handles in 3-D that move and turn the whole body of the selected person; again to hide them.",
+    menu: Menu::Edit,
+    keys: &[(NONE, Key::H)],
+    enabled: has_frame,
+    act: |s| {
+        let mut view = s.view.clone();
+        view.move_body = !view.move_body;
+        UiAction::Session(Command::SetView(Box::new(view)))
+    },
+};
+
 fn look(camera: fn(&Session) -> Camera) -> UiAction {
     UiAction::panes(move |states, session| states.of::<State>().camera = Some(camera(session)))
 }
@@ -77,6 +96,8 @@ fn look(camera: fn(&Session) -> Camera) -> UiAction {
 struct State {
     renderer: Option<SceneRenderer>,
     texture: Option<(TextureId, u64)>,
+    /// What of the body is in the hand.
+    grab: Option<Grab>,
     camera: Option<Camera>,
     /// The fit that was on screen in the pass before, and where its person was, m.
     person: Option<(JobId, Vec3)>,
@@ -187,13 +208,25 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         return;
     }
     let response = ui.interact(rect, ui.scope_id().with("scene"), Sense::click_and_drag());
-    response.widget_info(|| figure::spoken("3-D scene", caption.as_deref()));
     let mut camera = state.camera.unwrap_or_else(|| overview(shared.session));
     let tokens = Tokens::of(ui);
     let scale = ui.ctx().pixels_per_point();
     let viewport = Vec2::new(rect.width() * scale, rect.height() * scale);
-    steer(ui, &response, rect, viewport, scale, &mut camera);
+    let sight = Sight { camera, rect, viewport, scale };
+    take_joint(ui, shared, state, &response, &sight, &tokens);
+    let readout = move_body(ui, shared, state, &response, &sight);
+    let spoken = readout.as_ref().map(|(_, text)| text.as_str()).or(caption.as_deref());
+    response.widget_info(|| figure::spoken("3-D scene", spoken));
+    if state.grab.is_none() {
+        steer(ui, &response, rect, viewport, scale, &mut camera);
+    }
+    let sight = Sight { camera, ..sight };
     let (mut scene, labels) = build::scene(shared.session, &camera, &tokens, scale);
+    build::cell(&mut scene, shared, &tokens, scale);
+    let gizmo = Gizmo::of(shared.session, &sight);
+    if let Some(gizmo) = &gizmo {
+        gizmo.draw(&mut scene, scale);
+    }
     let corner = Vec2::new(34.0 * scale, viewport.y - 34.0 * scale);
     let (triad, letters) = shapes::corner_triad(&camera, viewport, corner, 20.0 * scale, 1.6 * scale);
     scene.overlay.extend(triad);
@@ -209,11 +242,81 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     for (world, text, color) in labels {
         if let Some(seen) = camera.project(world, viewport) {
             let at = rect.min + vec2(seen.px.x, seen.px.y) / scale + vec2(6.0, -6.0);
-            painter.text(at, Align2::LEFT_BOTTOM, text, egui::FontId::proportional(theme::CAPTION), color);
+            grounded(&painter, at, Align2::LEFT_BOTTOM, text, egui::FontId::proportional(theme::CAPTION), color);
         }
     }
     captions(&painter, rect, shared.session, &tokens, state);
+    ring(&painter, shared, &sight, &tokens);
+    if let Some((at, text)) = readout {
+        let font = theme::mono(theme::CAPTION);
+        grounded(&painter, at + vec2(14.0, 14.0), Align2::LEFT_TOP, text, font, tokens.text);
+    }
+    if let Some((taken, held)) = gizmo.map(|gizmo| gizmo.show(ui, &sight)) {
+        let lost = matches!(state.grab, Some(Grab { holds: Holds::Arrow(..) | Holds::Ring(_), .. })) && !held;
+        state.grab = if lost { None } else { taken.or(state.grab) };
+    }
     interact(ui, shared, state, &response, rect, viewport, scale, &scene, &camera);
+}
+
+/// A drag that begins on a joint takes hold of it.
+fn take_joint(
+    ui: &Ui,
+    shared: &Shared<'_>,
+    state: &mut State,
+    response: &egui::Response,
+    sight: &Sight,
+    tokens: &Tokens,
+) {
+    let is_joint = matches!(state.grab, Some(Grab { holds: Holds::Joint(_), .. }));
+    if is_joint && !response.dragged_by(egui::PointerButton::Primary) {
+        state.grab = None;
+    }
+    if !response.drag_started_by(egui::PointerButton::Primary) {
+        return;
+    }
+    let Some(press) = ui.input(|i| i.pointer.press_origin()) else { return };
+    let (scene, _) = build::scene(shared.session, &sight.camera, tokens, sight.scale);
+    let hit = pick(&scene, &sight.camera, sight.pixel(press), sight.viewport).map(|id| id as usize);
+    state.grab = hit.and_then(|joint| {
+        let start = *shared.session.shown_positions().get(joint)?;
+        Some(Grab { holds: Holds::Joint(joint), start, press })
+    });
+}
+
+/// What is in the hand follows the pointer. Answers where it is, and what is to be said of it.
+fn move_body(
+    ui: &Ui,
+    shared: &mut Shared<'_>,
+    state: &State,
+    response: &egui::Response,
+    sight: &Sight,
+) -> Option<(egui::Pos2, String)> {
+    let grab = state.grab?;
+    let (pointer, delta) = ui.input(|i| (i.pointer.interact_pos(), i.pointer.delta()));
+    let (pointer, axis) = (pointer?, hand::held_axis(ui));
+    let session = shared.session;
+    // A finger that rests asks for nothing, unless a key has turned it to another axis.
+    if (delta != egui::Vec2::ZERO || ui.input(|i| !i.raw.events.is_empty()) || response.drag_started())
+        && pointer != grab.press
+        && let Some(moved) = grab.moved(sight, pointer, axis, session.view.keep_bones)
+    {
+        shared.send(Command::DragBody(moved));
+    }
+    let Holds::Joint(joint) = grab.holds else { return None };
+    let (problem, p) = (session.fit.problem.as_ref()?, session.shown_positions().get(joint)?);
+    let name = problem.skeleton.shown_name(joint % problem.skeleton.joints.len().max(1));
+    let along = axis.map_or("X, Y or Z held: one axis", |axis| ["along x", "along y", "along z"][axis]);
+    let text = format!("{name}  x {:.2}  y {:.2}  z {:.2} m · {along}", p[0], p[1], p[2]);
+    Some((pointer, text.replace('-', "−")))
+}
+
+/// A ring around the joint that is pointed at, here or on a map.
+fn ring(painter: &egui::Painter, shared: &Shared<'_>, sight: &Sight, tokens: &Tokens) {
+    let joint = shared.pointed.joint.and_then(|joint| shared.session.shown_positions().get(joint));
+    if let Some(at) = joint.and_then(|p| sight.on_screen(Vec3::from(p.map(|x| x as f32)))) {
+        painter.circle_stroke(at, 9.0, egui::Stroke::new(3.0, tokens.canvas.gamma_multiply(0.7)));
+        painter.circle_stroke(at, 9.0, egui::Stroke::new(1.5, tokens.text));
+    }
 }
 
 /// Drag orbits, right or middle drag pans, the wheel zooms to the pointer.
@@ -289,6 +392,7 @@ fn interact(
     let Some(pointer) = response.hover_pos() else { return };
     let px = Vec2::new((pointer.x - rect.min.x) * scale, (pointer.y - rect.min.y) * scale);
     let hit = (!response.dragged()).then(|| pick(scene, camera, px, viewport)).flatten().map(|id| id as usize);
+    shared.points.joint = hit.or(shared.points.joint);
     if response.double_clicked() {
         match hit {
             Some(joint) => {
@@ -309,7 +413,10 @@ fn interact(
     }
     if let (Some(joint), Some(problem)) = (hit, &shared.session.fit.problem) {
         let joints = problem.skeleton.joints.len().max(1);
-        let text = format!("{}\nclick: select · double click: focus", problem.skeleton.shown_name(joint % joints));
+        let text = format!(
+            "{}\ndrag: move · click: select · double click: focus",
+            problem.skeleton.shown_name(joint % joints)
+        );
         ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
         response.clone().on_hover_text_at_pointer(text);
     }
@@ -320,27 +427,30 @@ fn captions(painter: &egui::Painter, rect: Rect, session: &Session, tokens: &Tok
     let small = egui::FontId::proportional(theme::CAPTION);
     let mode = if session.view.splat_mode == SplatMode::Splat { "splats" } else { "ellipsoids" };
     let text = format!("Gaussian {mode} at {:.1} σ · grid 1 m", session.view.splat_sigma);
-    painter.text(rect.right_bottom() - vec2(8.0, 6.0), Align2::RIGHT_BOTTOM, text, small.clone(), tokens.dim);
-    let mut x = rect.right() - 8.0;
+    grounded(painter, rect.right_bottom() - vec2(5.0, 5.0), Align2::RIGHT_BOTTOM, text, small.clone(), tokens.dim);
+    let mut x = rect.right() - 5.0;
     let has_truth = session.data.frame.as_ref().is_some_and(|f| f.truth.is_some()) && session.view.show_truth;
     let baseline = session.pins.baseline().filter(|_| session.view.show_baseline);
-    let name = baseline.map_or_else(String::new, |pin| format!("baseline {}", pin.name));
-    let keys = [
-        ("right", tokens.right, true),
-        ("left", tokens.left, true),
-        ("truth", tokens.truth, has_truth),
-        (name.as_str(), tokens.pin, baseline.is_some()),
-    ];
-    for (word, color, shown) in keys {
-        if shown {
-            let drawn = painter.text(pos2(x, rect.top() + 6.0), Align2::RIGHT_TOP, word, small.clone(), color);
-            x = drawn.left() - 10.0;
-        }
+    let mut keys = build::who(session, tokens);
+    keys.reverse();
+    keys.extend(has_truth.then(|| ("truth".to_owned(), tokens.truth)));
+    keys.extend(baseline.map(|pin| (format!("baseline {}", pin.name), tokens.pin)));
+    for (word, color) in keys {
+        let at = pos2(x, rect.top() + 5.0);
+        x = grounded(painter, at, Align2::RIGHT_TOP, word, small.clone(), color).left() - 4.0;
     }
-    if let Some(skipped) = state.renderer.as_ref().map(SceneRenderer::skipped).filter(|n| *n > 0) {
-        let text = format!("{skipped} Gaussians cannot be drawn (not finite)");
-        painter.text(rect.left_top() + vec2(8.0, 6.0), Align2::LEFT_TOP, text, small, tokens.bad);
+    let skipped = state.renderer.as_ref().map(SceneRenderer::skipped).unwrap_or_default();
+    if let Some(text) = not_drawn(skipped) {
+        grounded(painter, rect.left_top() + vec2(5.0, 5.0), Align2::LEFT_TOP, text, small, tokens.bad);
     }
+}
+
+/// What of the scene cannot be drawn, and why.
+fn not_drawn(Undrawable { not_finite, not_definite }: Undrawable) -> Option<String> {
+    let of = |count: usize, why: &str| (count > 0).then(|| format!("{count} not drawn: {why}"));
+    let parts = [of(not_finite, "not finite"), of(not_definite, "covariance not positive definite")];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    (!parts.is_empty()).then(|| parts.join(" · "))
 }
 
 fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
@@ -376,6 +486,18 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
             })
             .response
             .on_hover_text("What is drawn in the scene.");
+            ui.menu_button("By hand", |ui| {
+                ui.checkbox(&mut view.keep_bones, "Bones keep their length").on_hover_text(
+                    "A joint that is dragged stays at its distance from the one that it hangs on, and takes along what hangs on it; off: it moves alone.",
+                );
+                ui.checkbox(&mut view.move_body, "Move body").on_hover_text(
+                    "Handles that move and turn the whole body of the selected person.\nKey: H",
+                );
+                let how = "Drag a joint, here or on a map;\nX, Y or Z held: along that axis only.";
+                ui.label(RichText::new(how).small());
+            })
+            .response
+            .on_hover_text("Moving the body by hand.");
             ui.menu_button("Camera", |ui| {
                 for row in [FROM_RADAR, FROM_ABOVE, FROM_SIDE] {
                     if ui.button(row.label).clicked() {
@@ -389,5 +511,18 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
     });
     if view != shared.session.view {
         shared.set_view(|v| *v = view);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn why_something_is_not_drawn_is_said() {
+        let said = |not_finite, not_definite| not_drawn(Undrawable { not_finite, not_definite }).unwrap_or_default();
+        assert_eq!(said(0, 0), "");
+        assert_eq!(said(2, 0), "2 not drawn: not finite");
+        assert_eq!(said(1, 3), "1 not drawn: not finite · 3 not drawn: covariance not positive definite");
     }
 }

@@ -13,6 +13,23 @@ pub(crate) fn chip(ui: &mut Ui, text: &str, color: Color32) -> Response {
         .response
 }
 
+/// A text on a ground of its own, to be read over a picture; answers where it is.
+pub(crate) fn grounded(
+    painter: &egui::Painter,
+    at: egui::Pos2,
+    align: egui::Align2,
+    text: impl Into<String>,
+    font: egui::FontId,
+    color: Color32,
+) -> egui::Rect {
+    let tokens = Tokens::of_visuals(&painter.ctx().global_style().visuals);
+    let galley = painter.layout_no_wrap(text.into(), font, color);
+    let ground = align.anchor_size(at, galley.size() + egui::vec2(6.0, 2.0));
+    painter.rect_filled(ground, 2.0, tokens.canvas.gamma_multiply(0.8));
+    painter.galley(ground.min + egui::vec2(3.0, 1.0), galley, color);
+    ground
+}
+
 /// The colour of an IoU: bad, attention, good. The number beside it says the same.
 pub(crate) fn iou_color(tokens: &Tokens, iou: f64) -> Color32 {
     if iou >= 0.5 {

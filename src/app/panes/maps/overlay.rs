@@ -207,7 +207,12 @@ pub(super) fn draw(
 }
 
 /// Where the shown joints are on a map; on a Doppler axis at their own radial velocities.
-fn joints_on(session: &Session, view: &View, o: Orientation, to_screen: &dyn Fn([f64; 2]) -> Pos2) -> Vec<Pos2> {
+pub(super) fn joints_on(
+    session: &Session,
+    view: &View,
+    o: Orientation,
+    to_screen: &dyn Fn([f64; 2]) -> Pos2,
+) -> Vec<Pos2> {
     let moving = session.fit.shown.iter().flat_map(|shown| {
         let velocities = shown.params.velocities().iter().copied();
         shown.params.positions().iter().copied().zip(velocities)

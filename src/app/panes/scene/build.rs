@@ -1,5 +1,8 @@
 //! The scene of a session: Gaussians and lines.
 
+use crate::app::locate::seen_by;
+use crate::app::map_image::Orientation;
+use crate::app::panes::Shared;
 use crate::app::theme::Tokens;
 use crate::body::{Group, Pppr, Side, Skeleton};
 use crate::geometry::{self, rotation_from_quaternion};
@@ -16,6 +19,8 @@ const VELOCITY_S: f32 = 0.3;
 /// Length of the longest gradient arrow, m.
 const GRADIENT_M: f64 = 0.35;
 
+/// Share of the picture that a Gaussian may take before it fades.
+const LARGEST: f32 = 0.5;
 /// A person's number stands this far above the highest joint, m.
 const ABOVE_HEAD_M: f64 = 0.12;
 
@@ -29,6 +34,7 @@ pub(super) fn scene(session: &Session, camera: &Camera, tokens: &Tokens, px: f32
         background: rgba(tokens.canvas, 1.0),
         sigma: look.splat_sigma,
         contour: if look.splat_mode == SplatMode::Splat { 0.6 } else { 0.0 },
+        largest: LARGEST,
         mode: if look.splat_mode == SplatMode::Splat { SceneMode::Splat } else { SceneMode::Ellipsoid },
         ..Scene::default()
     };
@@ -43,7 +49,7 @@ pub(super) fn scene(session: &Session, camera: &Camera, tokens: &Tokens, px: f32
     if let (Some(snapshot), Some(skeleton)) = (&session.fit.shown, skeleton) {
         person(&mut scene, &mut labels, session, &snapshot.params, skeleton, tokens, px);
         if look.show_velocity {
-            velocities(&mut scene, &snapshot.params, skeleton, camera, tokens, px);
+            velocities(&mut scene, session, &snapshot.params, skeleton, camera, tokens, px);
         }
         if look.show_gradients {
             gradients(&mut scene, snapshot, camera, tokens, px);
@@ -69,6 +75,28 @@ pub(super) fn scene(session: &Session, camera: &Camera, tokens: &Tokens, px: f32
         bones(&mut scene.lines, &dataset.info().skeleton, pin.params.positions(), &|_, _| stroke);
     }
     (scene, labels)
+}
+
+/// The places that the cell under the pointer sees, whichever map it is of.
+pub(super) fn cell(scene: &mut Scene, shared: &Shared<'_>, tokens: &Tokens, px: f32) {
+    let (Some((index, pixel)), Some(dataset)) = (shared.pointed.cell, &shared.session.data.dataset) else { return };
+    let views = &dataset.info().views;
+    let Some(view) = views.get(index) else { return };
+    let points = seen_by(views, view, Orientation::of(view, shared.session.view.cube), pixel);
+    let stroke = |color, alpha, width| Stroke { color: rgba(color, alpha), width_px: width * px };
+    let curve = |stroke: Stroke| stroke.polyline(points.iter().copied().map(vec3));
+    scene.overlay.extend(curve(stroke(tokens.canvas, 0.7, 4.0)));
+    scene.overlay.extend(curve(stroke(tokens.accent, 0.95, 2.0)));
+}
+
+/// Who is in the scene, and in which colour: of one person the sides, of several each of them.
+pub(super) fn who(session: &Session, tokens: &Tokens) -> Vec<(String, Color32)> {
+    let persons = session.fit.shown.as_ref().map_or(0, |shown| shown.params.shape().persons);
+    if persons < 2 {
+        return vec![("left".into(), tokens.left), ("right".into(), tokens.right)];
+    }
+    let person = |person| session.identity(person);
+    (0..persons).map(|k| (person_name(person(k)), tokens.person(person(k)))).collect()
 }
 
 fn rgba(color: Color32, alpha: f32) -> [f32; 4] {
@@ -170,12 +198,23 @@ fn bones(
     }
 }
 
-fn velocities(scene: &mut Scene, params: &Pppr, skeleton: &Skeleton, camera: &Camera, tokens: &Tokens, px: f32) {
+fn velocities(
+    scene: &mut Scene,
+    session: &Session,
+    params: &Pppr,
+    skeleton: &Skeleton,
+    camera: &Camera,
+    tokens: &Tokens,
+    px: f32,
+) {
+    let joints = skeleton.joints.len().max(1);
+    let several = params.shape().persons > 1;
     for joint in 0..params.shape().total_joints() {
         let velocity = vec3(params.velocity(joint)) * VELOCITY_S;
         if velocity.length() > 0.01 {
-            let side = skeleton.side(joint % skeleton.joints.len().max(1));
-            let stroke = Stroke { color: rgba(tokens.side(side), 1.0), width_px: 1.5 * px };
+            let side = tokens.side(skeleton.side(joint % joints));
+            let color = if several { tokens.person(session.identity(joint / joints)) } else { side };
+            let stroke = Stroke { color: rgba(color, 1.0), width_px: 1.5 * px };
             let from = vec3(params.position(joint));
             scene.lines.extend(shapes::arrow(from, from + velocity, camera.eye(), stroke));
         }

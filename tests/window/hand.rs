@@ -1,0 +1,136 @@
+//! The body moved with the mouse, in 3-D and on a map.
+#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+
+use crate::window::Window;
+use egui::{Key, Modifiers, Pos2, Rect, pos2, vec2};
+use mhp_inspector::geometry::{norm, sub};
+use mhp_inspector::render::{Camera, Vec2, Vec3};
+use mhp_inspector::session::Command;
+
+/// COCO's joints.
+const RIGHT_WRIST: usize = 10;
+const NOSE: usize = 0;
+
+impl Window {
+    fn joint(&self, joint: usize) -> [f64; 3] {
+        self.session().shown_positions()[joint]
+    }
+
+    /// Where the camera that nobody has moved sees a place.
+    fn seen(&self, rect: Rect, at: [f64; 3]) -> Pos2 {
+        let positions = self.session().shown_positions();
+        let places = positions.iter().map(|p| Vec3::from(p.map(|x| x as f32)));
+        let middle = places.fold(Vec3::ZERO, |sum, p| sum + p) / positions.len() as f32;
+        let camera = Camera::overview(middle * 0.62, (middle.length() * 0.62).max(2.4 * 0.8));
+        let seen = camera.project(Vec3::from(at.map(|x| x as f32)), Vec2::new(rect.width(), rect.height())).unwrap();
+        rect.min + vec2(seen.px.x, seen.px.y)
+    }
+
+    /// Presses the mouse, moves it in small steps, and lets it go.
+    fn pull(&mut self, from: Pos2, by: egui::Vec2) {
+        self.harness.hover_at(from);
+        self.harness.step();
+        self.harness.drag_at(from);
+        for k in 1..=6 {
+            self.harness.hover_at(from + by * k as f32 / 6.0);
+            self.harness.step();
+        }
+        self.harness.drop_at(from + by);
+        self.until("the lifted finger", |w| !w.session().is_dragging());
+    }
+
+    fn moved(&mut self, joint: usize, from: [f64; 3]) -> [f64; 3] {
+        self.until("a joint that moved", |w| norm(sub(w.joint(joint), from)) > 0.02);
+        sub(self.joint(joint), from)
+    }
+}
+
+#[test]
+fn a_joint_dragged_in_3d_moves_and_comes_back() {
+    let mut window = Window::fitted(1);
+    let from = window.joint(RIGHT_WRIST);
+    let scene = window.node("3-D scene").rect();
+    let at = window.seen(scene, from);
+    window.pull(at, vec2(40.0, -10.0));
+    window.moved(RIGHT_WRIST, from);
+    assert_eq!(window.fit().history.branches().len(), 2);
+    let name = window.session().undo_name().unwrap().to_owned();
+    assert!(name.starts_with("right wrist moved 0."), "{name}");
+    assert_eq!(window.session().log.iter().filter(|line| line.text.contains(&name)).count(), 1);
+    window.key_with(Modifiers::COMMAND, Key::Z);
+    window.until("the joint where it was", |w| w.joint(RIGHT_WRIST) == from);
+    window.key_with(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
+    window.moved(RIGHT_WRIST, from);
+}
+
+#[test]
+fn empty_space_turns_the_camera_and_a_click_selects() {
+    let mut window = Window::fitted(1);
+    let scene = window.node("3-D scene").rect();
+    window.pull(scene.left_center() + vec2(8.0, 40.0), vec2(30.0, 5.0));
+    assert_eq!(window.fit().history.branches().len(), 1);
+    window.key(Key::R);
+    window.harness.run_steps(2);
+    let at = window.seen(scene, window.joint(RIGHT_WRIST));
+    window.pull(at, vec2(0.0, 0.0));
+    window.harness.run_steps(3);
+    assert!(window.session().joint.is_some());
+    assert_eq!(window.fit().history.branches().len(), 1);
+}
+
+#[test]
+fn a_joint_dragged_on_a_map_stays_at_its_height() {
+    let mut window = Window::fitted(1);
+    let from = window.joint(RIGHT_WRIST);
+    window.key(Key::R);
+    window.harness.run_steps(3);
+    let rect = window.node("H_ori map of hori").rect();
+    // Depth 0..6 m upward, 2 m at the left.
+    let bins = window.session().data.dataset.as_ref().unwrap().info().views[0].bins_of(from);
+    let share = |bin: f64, bins: f32| (bin as f32 + 0.5) / bins;
+    let at = pos2(rect.left() + share(bins[1], 32.0) * rect.width(), rect.top() + share(bins[0], 48.0) * rect.height());
+    window.apply(Command::SetView(Box::new(mhp_inspector::session::ViewState {
+        keep_bones: false,
+        ..window.session().view.clone()
+    })));
+    window.pull(at, vec2(0.2 * rect.width(), 0.0));
+    let by = window.moved(RIGHT_WRIST, from);
+    assert!((by[1] + 0.8).abs() < 0.1 && by[2].abs() < 1e-6, "to the right, level: {by:?}");
+}
+
+#[test]
+fn a_body_is_moved_and_turned_by_its_handles() {
+    let mut window = Window::fitted(1);
+    assert!(!window.named("Move along x"));
+    window.key(Key::H);
+    window.harness.run_steps(2);
+    let from = window.joint(NOSE);
+    let tip = window.node("Move along z").rect().center();
+    window.pull(tip, vec2(0.0, -25.0));
+    let by = window.moved(NOSE, from);
+    assert!(by[2] > 0.05 && by[0].abs() + by[1].abs() < 1e-9, "{by:?}");
+    assert!(window.session().undo_name().unwrap().starts_with("body moved 0."));
+    let (nose, wrist) = (window.joint(NOSE), window.joint(RIGHT_WRIST));
+    let knob = window.node("Turn").rect().center();
+    window.pull(knob, vec2(-30.0, 4.0));
+    let by = window.moved(RIGHT_WRIST, wrist);
+    assert!(by[2].abs() < 1e-9);
+    let apart = |a, b| norm(sub(a, b));
+    let now = apart(window.joint(NOSE), window.joint(RIGHT_WRIST));
+    assert!((now - apart(nose, wrist)).abs() < 1e-9, "a turn keeps every distance");
+    assert!(window.session().undo_name().unwrap().contains("turned"));
+    window.key(Key::H);
+    window.harness.run_steps(2);
+    assert!(!window.named("Move along z"));
+}
+
+#[test]
+fn a_run_is_told_to_be_paused_first() {
+    let mut window = Window::open(1);
+    window.run_forever();
+    let scene = window.node("3-D scene").rect();
+    let at = window.seen(scene, window.joint(RIGHT_WRIST));
+    window.pull(at, vec2(30.0, 0.0));
+    assert!(window.told("pause the run to move the body by hand"));
+    assert_eq!(window.fit().history.branches().len(), 1);
+}
