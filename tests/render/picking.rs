@@ -90,7 +90,7 @@ proptest! {
 #[test]
 fn a_gaussian_as_large_as_the_picture_hides_nothing() {
     let camera = Camera::from_radar();
-    let splats = vec![ball([2.0, 0.0, 0.0], 1.0, 1), ball([4.0, 0.5, 0.0], 0.05, 2)];
+    let splats = vec![ball([2.0, 0.0, 0.0], 0.6, 1), ball([4.0, 0.5, 0.0], 0.05, 2)];
     let small = px(&camera, &splats[1]);
     let mut scene = Scene { splats, ..Scene::default() };
     assert_eq!(pick(&scene, &camera, small, VIEWPORT), Some(1));

@@ -215,7 +215,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let sight = Sight { camera, rect, viewport, scale };
     take_joint(ui, shared, state, &response, &sight, &tokens);
     let readout = move_body(ui, shared, state, &response, &sight);
-    let spoken = readout.as_ref().map(|(_, text)| text.as_str()).or(caption.as_deref());
+    let spoken = readout.as_deref().or(caption.as_deref());
     response.widget_info(|| figure::spoken("3-D scene", spoken));
     if state.grab.is_none() {
         steer(ui, &response, rect, viewport, scale, &mut camera);
@@ -247,9 +247,10 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     }
     captions(&painter, rect, shared.session, &tokens, state);
     ring(&painter, shared, &sight, &tokens);
-    if let Some((at, text)) = readout {
+    if let Some(text) = readout {
         let font = theme::mono(theme::CAPTION);
-        grounded(&painter, at + vec2(14.0, 14.0), Align2::LEFT_TOP, text, font, tokens.text);
+        // In a corner, where it covers nothing of what is moved and is never cut off.
+        grounded(&painter, rect.left_top() + vec2(5.0, 24.0), Align2::LEFT_TOP, text, font, tokens.text);
     }
     if let Some((taken, held)) = gizmo.map(|gizmo| gizmo.show(ui, &sight)) {
         let lost = matches!(state.grab, Some(Grab { holds: Holds::Arrow(..) | Holds::Ring(_), .. })) && !held;
@@ -283,14 +284,14 @@ fn take_joint(
     });
 }
 
-/// What is in the hand follows the pointer. Answers where it is, and what is to be said of it.
+/// What is in the hand follows the pointer. Answers what is to be said of it.
 fn move_body(
     ui: &Ui,
     shared: &mut Shared<'_>,
     state: &State,
     response: &egui::Response,
     sight: &Sight,
-) -> Option<(egui::Pos2, String)> {
+) -> Option<String> {
     let grab = state.grab?;
     let (pointer, delta) = ui.input(|i| (i.pointer.interact_pos(), i.pointer.delta()));
     let (pointer, axis) = (pointer?, hand::held_axis(ui));
@@ -306,8 +307,8 @@ fn move_body(
     let (problem, p) = (session.fit.problem.as_ref()?, session.shown_positions().get(joint)?);
     let name = problem.skeleton.shown_name(joint % problem.skeleton.joints.len().max(1));
     let along = axis.map_or("X, Y or Z held: one axis", |axis| ["along x", "along y", "along z"][axis]);
-    let text = format!("{name}  x {:.2}  y {:.2}  z {:.2} m · {along}", p[0], p[1], p[2]);
-    Some((pointer, text.replace('-', "−")))
+    let text = format!("{name}\nx {:.2}  y {:.2}  z {:.2} m\n{along}", p[0], p[1], p[2]);
+    Some(text.replace('-', "−"))
 }
 
 /// A ring around the joint that is pointed at, here or on a map.

@@ -7,7 +7,7 @@ use crate::session::{Session, root_of};
 use egui::{Color32, CursorIcon, Role, Sense, Ui, WidgetInfo, vec2};
 use std::f32::consts::TAU;
 
-/// Length of an arrow on the screen, points, and the ring's radius as a share of it.
+/// Most length of an arrow on the screen, points, and the ring's radius as a share of it.
 const LENGTH: f32 = 58.0;
 const RING: f32 = 0.8;
 /// Where on the ring its knob is, rad: where no arrow is.
@@ -35,7 +35,8 @@ impl Gizmo {
         let at = Vec3::from(root.map(|x| x as f32));
         let depth = sight.camera.project(at, sight.viewport)?.depth;
         let height = 2.0 * depth * (0.5 * sight.camera.fov_y).tan();
-        let length = LENGTH * height / sight.rect.height().max(1.0);
+        let shorter = sight.rect.size().min_elem().max(1.0);
+        let length = LENGTH.min(0.18 * shorter) * height / sight.rect.height().max(1.0);
         (session.view.move_body && !body.is_empty()).then_some(Self { person, root, at, length })
     }
 
