@@ -72,13 +72,12 @@ fn point_at(wanted: [(AxisKind, f64); 3], near: Vec3) -> Option<Vec3> {
 pub(super) fn moved_on(view: &View, o: Orientation, from: Vec3, unit: [f64; 2]) -> Option<Vec3> {
     let third = third(view, o)?;
     let p = view.pose.view_from_world(from);
-    let at = point_at(of_pixel(view, o, unit, third, coordinate(third, p)), p)?;
+    let at = point_at(of_bins(view, o, o.bins_from_unit(view, unit), third, coordinate(third, p)), p)?;
     at.iter().all(|x| x.is_finite()).then(|| view.pose.world_from_view(at))
 }
 
-/// The coordinates at a place of the picture, and a third one.
-fn of_pixel(view: &View, o: Orientation, unit: [f64; 2], third: AxisKind, value: f64) -> [(AxisKind, f64); 3] {
-    let [across, up] = o.bins_from_unit(view, unit);
+/// The coordinates at a horizontal and a vertical bin, and a third one.
+fn of_bins(view: &View, o: Orientation, [across, up]: [f64; 2], third: AxisKind, value: f64) -> [(AxisKind, f64); 3] {
     let at = |axis: usize, bin: f64| (view.axes[axis].kind, view.axes[axis].value_at(bin));
     [at(o.horizontal, across), at(o.vertical, up), (third, value)]
 }
@@ -86,13 +85,12 @@ fn of_pixel(view: &View, o: Orientation, unit: [f64; 2], third: AxisKind, value:
 /// The places that a cell of a map sees, one after the other, world frame, m: along the coordinate that it leaves open, as
 /// far as another view has that coordinate. Of a cell with a Doppler axis, level with the radar.
 pub(super) fn seen_by(views: &[View], view: &View, o: Orientation, pixel: [usize; 2]) -> Vec<Vec3> {
-    let [width, height] = o.size(view);
-    let unit = [(pixel[0] as f64 + 0.5) / width as f64, (pixel[1] as f64 + 0.5) / height as f64];
+    let cell = o.bins_of_pixel(view, pixel);
     let (wanted, open) = if let Some(open) = third(view, o) {
-        let [a, b, _] = of_pixel(view, o, unit, open, 0.0);
+        let [a, b, _] = of_bins(view, o, cell, open, 0.0);
         ([a, b], open)
     } else {
-        let [a, b, _] = of_pixel(view, o, unit, AxisKind::Azimuth, 0.0);
+        let [a, b, _] = of_bins(view, o, cell, AxisKind::Azimuth, 0.0);
         let known = if a.0 == AxisKind::Doppler { b } else { a };
         let open = match known.0 {
             AxisKind::Doppler | AxisKind::Elevation => return Vec::new(),

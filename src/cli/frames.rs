@@ -1,7 +1,7 @@
 //! `--frames A..B`: which frames, as a range is written in Rust.
 
 use crate::dataset::Dataset;
-use crate::study::shard::FrameSet;
+use crate::study::shard::FrameRanges;
 use std::ops::Range;
 use std::path::Path;
 use std::str::FromStr;
@@ -21,12 +21,12 @@ pub(super) fn chosen(asked: Option<FrameRange>, path: &Path, dataset: &Dataset) 
 ///
 /// # Errors
 /// Where a range reaches past the end.
-pub(super) fn chosen_set(asked: &[FrameRange], path: &Path, dataset: &Dataset) -> anyhow::Result<FrameSet> {
+pub(super) fn chosen_set(asked: &[FrameRange], path: &Path, dataset: &Dataset) -> anyhow::Result<FrameRanges> {
     if asked.is_empty() {
         return Ok(chosen(None, path, dataset)?.into());
     }
     let ranges = asked.iter().map(|range| chosen(Some(*range), path, dataset));
-    Ok(FrameSet::of_ranges(ranges.collect::<anyhow::Result<Vec<_>>>()?))
+    Ok(FrameRanges::of_ranges(ranges.collect::<anyhow::Result<Vec<_>>>()?))
 }
 
 /// A range of frames as typed; the end is open where none was given.

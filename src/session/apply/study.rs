@@ -6,7 +6,7 @@ use crate::session::state::{LogLevel, Session};
 use crate::session::study::{ROW_FILTER, StudyOrder, StudyRequest};
 use crate::session::work::WorkStatus;
 use crate::study::run::{Run, RunRequest, points};
-use crate::study::shard::{FrameSet, Subset};
+use crate::study::shard::{FrameRanges, Subset};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ impl Session {
             self.note(LogLevel::Warning, "a study is under way: let it end, or cancel it".into());
             return Vec::new();
         }
-        let frames = FrameSet::of_frames(self.batch_frames().iter().map(|&frame| frame as usize));
+        let frames = FrameRanges::of_frames(self.batch_frames().iter().map(|&frame| frame as usize));
         if frames.is_empty() {
             self.note(LogLevel::Warning, "no frame matches the filter: there is nothing to study".into());
             return Vec::new();

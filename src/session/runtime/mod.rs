@@ -22,12 +22,16 @@ use evidence::{Ask, EvidenceKeeper};
 use labels::LabelKeeper;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// Called from any thread when there is something to poll.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
 /// Shows a file dialog and answers the choice; runs on a thread of its own.
 pub type Picker = Arc<dyn Fn(PickKind) -> Option<PathBuf> + Send + Sync>;
+
+/// The next pass takes in what is left after this time.
+const LONGEST_POLL: Duration = Duration::from_millis(6);
 
 /// Smaller data sets are graded faster than a cache is worth.
 const CACHE_FROM: usize = 200;
@@ -101,15 +105,21 @@ impl Runtime {
         self.carry_out(effects);
     }
 
-    /// Takes in every report that waits. True where there was one.
+    /// Takes in the reports that wait, for a few milliseconds: a run that reports faster than this thread takes in does not hold
+    /// it up. True where there was one.
     pub fn poll(&mut self) -> bool {
         let mut any = false;
         if let Some(text) = self.startup_error.take() {
             self.report(Report::Log(LogLevel::Error, text));
         }
+        let began = Instant::now();
         while let Some(report) = self.next_report() {
             self.report(report);
             any = true;
+            if began.elapsed() > LONGEST_POLL {
+                (self.wake)();
+                break;
+            }
         }
         any
     }

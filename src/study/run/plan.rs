@@ -12,7 +12,7 @@ use crate::config::FitConfig;
 use crate::dataset::Dataset;
 use crate::mhp::Precision;
 use crate::study::complexity::{Complexity, Stratum};
-use crate::study::shard::{DataSpec, FrameSet, Shard, Subset};
+use crate::study::shard::{DataSpec, FrameRanges, Shard, Subset};
 use std::collections::BTreeSet;
 
 /// What is asked for.
@@ -27,7 +27,7 @@ pub struct RunRequest {
     /// Scalar of the per-cell kernel.
     pub precision: Precision,
     /// The frames.
-    pub frames: FrameSet,
+    pub frames: FrameRanges,
     /// Which of them.
     pub subset: Subset,
     /// The axes of a sweep.

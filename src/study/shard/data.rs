@@ -1,6 +1,6 @@
 //! The data that rows are of, as specifications name them.
 
-use super::{FrameSet, stamp};
+use super::{FrameRanges, stamp};
 use crate::dataset::Dataset;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -43,12 +43,12 @@ pub struct DataSpec {
     pub subset: Subset,
     /// The frames asked for where they are no range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub listed: Option<FrameSet>,
+    pub listed: Option<FrameRanges>,
 }
 
 impl DataSpec {
     /// Of frames of a data set, of which `frames` are studied.
-    pub fn of(dataset: &Dataset, asked: &FrameSet, frames: usize, subset: Subset) -> Self {
+    pub fn of(dataset: &Dataset, asked: &FrameRanges, frames: usize, subset: Subset) -> Self {
         let (info, range) = (dataset.info(), asked.hull());
         Self {
             name: info.name.clone(),
@@ -67,7 +67,7 @@ impl DataSpec {
 
     /// The frames asked for, as text.
     pub fn asked(&self) -> String {
-        self.listed.as_ref().map_or_else(|| format!("{}..{}", self.first, self.end), FrameSet::to_string)
+        self.listed.as_ref().map_or_else(|| format!("{}..{}", self.first, self.end), FrameRanges::to_string)
     }
 
     /// In words, what tells one data set from another.

@@ -7,9 +7,9 @@ use std::ops::Range;
 /// Frames of a data set by their indices: ranges that ascend and do not touch. As text `0..5,7,9..12`, the ends not included.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
-pub struct FrameSet(Vec<Range<usize>>);
+pub struct FrameRanges(Vec<Range<usize>>);
 
-impl FrameSet {
+impl FrameRanges {
     /// The frames of any of these ranges.
     pub fn of_ranges(ranges: impl IntoIterator<Item = Range<usize>>) -> Self {
         let mut ranges: Vec<Range<usize>> = ranges.into_iter().filter(|range| !range.is_empty()).collect();
@@ -56,13 +56,13 @@ impl FrameSet {
     }
 }
 
-impl From<Range<usize>> for FrameSet {
+impl From<Range<usize>> for FrameRanges {
     fn from(range: Range<usize>) -> Self {
         Self::of_ranges([range])
     }
 }
 
-impl fmt::Display for FrameSet {
+impl fmt::Display for FrameRanges {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (k, range) in self.0.iter().enumerate() {
             let comma = if k > 0 { "," } else { "" };
@@ -75,13 +75,13 @@ impl fmt::Display for FrameSet {
     }
 }
 
-impl From<FrameSet> for String {
-    fn from(frames: FrameSet) -> Self {
+impl From<FrameRanges> for String {
+    fn from(frames: FrameRanges) -> Self {
         frames.to_string()
     }
 }
 
-impl TryFrom<String> for FrameSet {
+impl TryFrom<String> for FrameRanges {
     type Error = String;
 
     fn try_from(text: String) -> Result<Self, String> {
@@ -104,13 +104,13 @@ mod tests {
 
     #[test]
     fn frames_are_joined_to_ranges_and_read_back() {
-        let frames = FrameSet::of_frames([7, 1, 0, 2, 9, 10, 2]);
+        let frames = FrameRanges::of_frames([7, 1, 0, 2, 9, 10, 2]);
         assert_eq!((frames.to_string().as_str(), frames.len(), frames.hull()), ("0..3,7,9..11", 6, 0..11));
         assert_eq!(frames.iter().collect::<Vec<_>>(), [0, 1, 2, 7, 9, 10]);
-        assert!(frames.has_gaps() && !FrameSet::from(3..9).has_gaps());
-        assert_eq!(FrameSet::try_from(frames.to_string()).unwrap(), frames);
-        assert_eq!(FrameSet::of_ranges([4..6, 0..4, 9..9]).to_string(), "0..6");
-        assert!(FrameSet::default().is_empty() && FrameSet::default().hull().is_empty());
-        assert!(FrameSet::try_from("0..3,x".to_owned()).is_err_and(|why| why.contains("`x` is no range")));
+        assert!(frames.has_gaps() && !FrameRanges::from(3..9).has_gaps());
+        assert_eq!(FrameRanges::try_from(frames.to_string()).unwrap(), frames);
+        assert_eq!(FrameRanges::of_ranges([4..6, 0..4, 9..9]).to_string(), "0..6");
+        assert!(FrameRanges::default().is_empty() && FrameRanges::default().hull().is_empty());
+        assert!(FrameRanges::try_from("0..3,x".to_owned()).is_err_and(|why| why.contains("`x` is no range")));
     }
 }

@@ -26,7 +26,7 @@ mod stamp;
 pub use data::{DataSpec, Subset};
 pub use error::ShardError;
 pub use folder::{SHARD_FILE, ShardFolder, is_shard_folder};
-pub use frames::FrameSet;
+pub use frames::FrameRanges;
 pub(in crate::study) use gather::{Difference, Part, gather};
 pub use part::Shard;
 pub use rows::{ShardRow, Whole};
