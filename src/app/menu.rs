@@ -27,12 +27,14 @@ pub(super) fn bar(ui: &mut Ui, shared: &mut Shared<'_>) {
 }
 
 /// Commands before which a menu has a line.
-const BEGIN_A_GROUP: [&str; 14] = [
+const BEGIN_A_GROUP: [&str; 16] = [
     "Quit",
     "Save session",
     "Export labels as CSV…",
     "Save picture…",
     "Fit listed frames",
+    "Sweep settings…",
+    "Move body",
     "Replay",
     "Reset fit",
     "Person or whole",

@@ -347,7 +347,8 @@ impl InspectorApp {
 
     /// Settings stay under the finger until it is lifted.
     fn lift_finger(&mut self, ctx: &egui::Context) {
-        if self.session().is_dragging() && !ctx.input(|i| i.pointer.any_down()) {
+        // What arrow keys move is held by the key that they are pressed with.
+        if self.session().is_dragging() && !ctx.input(|i| i.pointer.any_down() || i.modifiers.alt) {
             self.apply(Command::EndDrag);
         }
     }
@@ -383,8 +384,9 @@ impl eframe::App for InspectorApp {
         if self.runtime.is_busy() {
             ctx.request_repaint_after(std::time::Duration::from_millis(100));
         }
-        // While the body is in the hand, keys say along which axis it goes.
-        if !self.overlay.is_modal() && !self.session().is_moving() {
+        // While the mouse has the body, keys say along which axis it goes.
+        let in_hand = self.session().is_moving() && ctx.input(|i| i.pointer.any_down());
+        if !self.overlay.is_modal() && !in_hand {
             for command in commands::pressed(ctx) {
                 if command.enabled(self.runtime.session()) {
                     let act = command.action(self.runtime.session());

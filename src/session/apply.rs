@@ -144,6 +144,7 @@ impl Session {
             }
             Command::EditParams(params) => self.edit(*params),
             Command::DragBody(moved) => self.drag_body(moved),
+            Command::NudgeBody(by) => self.nudge_body(by),
             Command::SelectJoint(joint) => {
                 self.joint = joint;
                 Vec::new()

@@ -9,6 +9,7 @@ use super::view::ViewState;
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::BareChoice;
+use crate::geometry::Vec3;
 use crate::labels::{CellRegion, Tag, Verdict};
 use crate::mhp::Precision;
 use std::collections::BTreeSet;
@@ -138,6 +139,9 @@ pub enum Command {
     EditParams(Box<Pppr>),
     /// The body under a finger: moved from where it was when the finger went down; until [`Command::EndDrag`] one act.
     DragBody(BodyMove),
+    /// The selected joint, or with handles shown the whole person, moved by so much, m, world frame, from where it is; until
+    /// [`Command::EndDrag`] all that follow are one act.
+    NudgeBody(Vec3),
     /// Select a joint (flat index).
     SelectJoint(Option<usize>),
     /// How things are shown.

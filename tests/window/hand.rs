@@ -12,12 +12,12 @@ const RIGHT_WRIST: usize = 10;
 const NOSE: usize = 0;
 
 impl Window {
-    fn joint(&self, joint: usize) -> [f64; 3] {
+    pub(crate) fn joint(&self, joint: usize) -> [f64; 3] {
         self.session().shown_positions()[joint]
     }
 
     /// Where the camera that nobody has moved sees a place.
-    fn seen(&self, rect: Rect, at: [f64; 3]) -> Pos2 {
+    pub(crate) fn seen(&self, rect: Rect, at: [f64; 3]) -> Pos2 {
         let positions = self.session().shown_positions();
         let places = positions.iter().map(|p| Vec3::from(p.map(|x| x as f32)));
         let middle = places.fold(Vec3::ZERO, |sum, p| sum + p) / positions.len() as f32;
@@ -27,7 +27,7 @@ impl Window {
     }
 
     /// Presses the mouse, moves it in small steps, and lets it go.
-    fn pull(&mut self, from: Pos2, by: egui::Vec2) {
+    pub(crate) fn pull(&mut self, from: Pos2, by: egui::Vec2) {
         self.harness.hover_at(from);
         self.harness.step();
         self.harness.drag_at(from);
@@ -37,6 +37,22 @@ impl Window {
         }
         self.harness.drop_at(from + by);
         self.until("the lifted finger", |w| !w.session().is_dragging());
+    }
+
+    /// Presses a key so many times while Alt is held, and lifts both.
+    pub(crate) fn nudge(&mut self, key: Key, times: usize) {
+        let modifiers = Modifiers::ALT;
+        self.harness.event(egui::Event::ModifiersChanged(modifiers));
+        for _ in 0..times {
+            for pressed in [true, false] {
+                let event = egui::Event::Key { key, physical_key: None, pressed, repeat: false, modifiers };
+                self.harness.event(event);
+            }
+            self.harness.step();
+        }
+        assert!(self.session().is_moving(), "held until Alt is lifted");
+        self.harness.event(egui::Event::ModifiersChanged(Modifiers::NONE));
+        self.until("Alt lifted", |w| !w.session().is_dragging());
     }
 
     fn moved(&mut self, joint: usize, from: [f64; 3]) -> [f64; 3] {
@@ -133,4 +149,35 @@ fn a_run_is_told_to_be_paused_first() {
     window.pull(at, vec2(30.0, 0.0));
     assert!(window.told("pause the run to move the body by hand"));
     assert_eq!(window.fit().history.branches().len(), 1);
+}
+
+#[test]
+fn a_joint_and_a_body_are_moved_by_keys() {
+    let mut window = Window::fitted(1);
+    window.key_with(Modifiers::ALT, Key::ArrowLeft);
+    assert!(window.told("select a joint to move it"));
+    window.harness.run_steps(2);
+    window.key(Key::J);
+    assert_eq!(window.session().joint, Some(NOSE));
+    window.key_with(Modifiers::SHIFT, Key::J);
+    let last = window.session().shown_positions().len() - 1;
+    assert_eq!(window.session().joint, Some(last), "round the body");
+    while window.session().joint != Some(RIGHT_WRIST) {
+        window.key(Key::J);
+    }
+    let from = window.joint(RIGHT_WRIST);
+    window.nudge(Key::ArrowRight, 3);
+    let by = window.moved(RIGHT_WRIST, from);
+    assert!(by[1] < -0.02, "{by:?}");
+    assert_eq!(window.fit().history.branches().len(), 2, "three presses are one act");
+    assert!(window.session().undo_name().unwrap().starts_with("right wrist moved 0."));
+    window.key_with(Modifiers::COMMAND, Key::Z);
+    window.until("the joint where it was", |w| w.joint(RIGHT_WRIST) == from);
+    window.key(Key::H);
+    window.harness.run_steps(2);
+    let from = window.joint(NOSE);
+    window.nudge(Key::ArrowLeft, 3);
+    let by = window.moved(NOSE, from);
+    assert!((by[1] - 0.06).abs() < 1e-9 && by[0].abs() + by[2].abs() < 1e-9, "{by:?}");
+    assert_eq!(window.session().undo_name().unwrap(), "body moved 0.06 m");
 }

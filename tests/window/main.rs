@@ -1,8 +1,10 @@
-//! The real window without a display: panes, commands, labels, studies, a journey through all of it, and 100,000 frames.
+//! The real window without a display: panes, commands, labels, studies, journeys through all of it, and 100,000 frames.
 #![cfg(feature = "viewer")]
 
 #[path = "../common/blob.rs"]
 mod blob;
+#[path = "../journey/mod.rs"]
+mod journey;
 #[path = "../common/scenes.rs"]
 mod scenes;
 #[path = "../common/tree.rs"]
@@ -12,7 +14,6 @@ mod window;
 
 mod compare;
 mod hand;
-mod journey;
 mod labels;
 mod large;
 mod maps;

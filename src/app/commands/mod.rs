@@ -2,13 +2,14 @@
 //! keys all read it; a test holds that no two commands share a key. The commands that show a pane come from the list of
 //! panes.
 
+mod body;
 mod labels;
 mod search;
 mod sharing;
 mod table;
 
 pub(crate) use search::found;
-pub(crate) use table::{CTRL, NONE, always, has_frame};
+pub(crate) use table::{CTRL, CTRL_SHIFT, NONE, SHIFT, always, has_frame};
 
 use super::panes::{Pane, PaneStates};
 use crate::session::{Command, Export, Session};
@@ -27,6 +28,8 @@ pub(crate) enum Menu {
     Frame,
     /// The optimiser.
     Fit,
+    /// The body, moved by hand.
+    Body,
     /// Tags and notes.
     Labels,
     /// How things are shown.
@@ -37,8 +40,8 @@ pub(crate) enum Menu {
 
 impl Menu {
     /// In the order of the menu bar.
-    pub(crate) const ALL: [Self; 7] =
-        [Self::File, Self::Edit, Self::Frame, Self::Fit, Self::Labels, Self::View, Self::Help];
+    pub(crate) const ALL: [Self; 8] =
+        [Self::File, Self::Edit, Self::Frame, Self::Fit, Self::Body, Self::Labels, Self::View, Self::Help];
 
     /// The title on the bar.
     pub(crate) fn title(self) -> &'static str {
@@ -47,6 +50,7 @@ impl Menu {
             Self::Edit => "Edit",
             Self::Frame => "Frame",
             Self::Fit => "Fit",
+            Self::Body => "Body",
             Self::Labels => "Labels",
             Self::View => "View",
             Self::Help => "Help",
@@ -244,7 +248,7 @@ impl UserCommand {
 
 /// Every command; those of one menu are in its order.
 pub(crate) fn all() -> impl Iterator<Item = UserCommand> {
-    let rows = table::COMMANDS.iter().chain(labels::COMMANDS).chain(sharing::COMMANDS);
+    let rows = table::COMMANDS.iter().chain(body::COMMANDS).chain(labels::COMMANDS).chain(sharing::COMMANDS);
     rows.map(UserCommand::Row).chain(Pane::all().iter().map(|pane| UserCommand::Show(pane)))
 }
 
@@ -274,10 +278,7 @@ pub(crate) fn pressed(ctx: &egui::Context) -> Vec<UserCommand> {
     ctx.input_mut(|input| {
         input.events.retain(|event| {
             let egui::Event::Key { key, pressed: true, modifiers, .. } = event else { return true };
-            let held = (modifiers.command || modifiers.ctrl, modifiers.shift);
-            if modifiers.alt {
-                return true;
-            }
+            let held = (modifiers.command || modifiers.ctrl, modifiers.shift, modifiers.alt);
             if typing
                 && !(held.0 && matches!(key, Key::K | Key::P | Key::Q | Key::O | Key::T | Key::S | Key::F)
                     || *key == Key::F1)
@@ -296,8 +297,8 @@ pub(crate) fn pressed(ctx: &egui::Context) -> Vec<UserCommand> {
             if focused.is_some() && !held.0 && matches!(key, Key::Space | Key::Enter | Key::Escape | Key::Tab) {
                 return true;
             }
-            let hit =
-                all().find(|command| command.keys().iter().any(|(m, k)| k == key && (m.command, m.shift) == held));
+            let is = |&(m, k): &Shortcut| k == *key && (m.command, m.shift, m.alt) == held;
+            let hit = all().find(|command| command.keys().iter().any(is));
             found.extend(hit);
             hit.is_none()
         });
@@ -319,7 +320,7 @@ mod tests {
             assert!(!command.tooltip().is_empty(), "{} has no tooltip", command.label());
             for &(m, k) in command.keys() {
                 assert!(
-                    keys.insert((m.command, m.shift, k)),
+                    keys.insert((m.command, m.shift, m.alt, k)),
                     "{} clashes on {}",
                     command.label(),
                     shortcut_text((m, k))

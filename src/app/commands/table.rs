@@ -1,14 +1,15 @@
 //! The commands about data, frames, fits and views.
 
 use super::{AppAct, CommandRow, Menu, UiAction};
-use crate::app::panes::{maps, scene};
+use crate::app::panes::{maps, scene, study};
 use crate::session::{Command, Compare, Live, PickKind, Session, ThemeChoice, ViewState};
 use egui::{Key, Modifiers};
 
 pub(crate) const NONE: Modifiers = Modifiers::NONE;
-pub(super) const SHIFT: Modifiers = Modifiers::SHIFT;
+pub(crate) const SHIFT: Modifiers = Modifiers::SHIFT;
 pub(crate) const CTRL: Modifiers = Modifiers::COMMAND;
-pub(super) const CTRL_SHIFT: Modifiers = Modifiers::COMMAND.plus(Modifiers::SHIFT);
+pub(super) const ALT: Modifiers = Modifiers::ALT;
+pub(crate) const CTRL_SHIFT: Modifiers = Modifiers::COMMAND.plus(Modifiers::SHIFT);
 
 pub(crate) fn always(_: &Session) -> bool {
     true
@@ -247,6 +248,8 @@ pub(super) const COMMANDS: &[CommandRow] = &[
         enabled: |s| !s.batch.is_running() && !s.queue.rows().is_empty(),
         act: |_| UiAction::Session(Command::FitListed),
     },
+    study::SWEEP,
+    study::RUN_STUDY,
     CommandRow {
         label: "Pause batch",
         title: None,
@@ -362,7 +365,6 @@ pub(super) const COMMANDS: &[CommandRow] = &[
     scene::FROM_RADAR,
     scene::FROM_ABOVE,
     scene::FROM_SIDE,
-    scene::MOVE_BODY,
     CommandRow {
         label: "Clear selection",
         title: None,

@@ -100,7 +100,12 @@ fn column(
     }
     numbers(ui, fit);
     ui.add_space(4.0);
-    let take = ui.button(format!("Take {}", preset.name())).clicked();
+    let take = ui.button(format!("Take {}", preset.name()));
+    // Enter takes what is recommended, the arrow keys lead to the other one.
+    if preset == Preset::Recommended && ui.memory(|memory| memory.focused().is_none()) {
+        take.request_focus();
+    }
+    let take = take.clicked();
     if take {
         shared.send(Command::SetConfig(Box::new(preset.config())));
     }

@@ -77,7 +77,7 @@ pub(in crate::app) const MOVE_BODY: CommandRow = CommandRow {
     label: "Move body",
     title: None,
     tooltip: "Show handles in 3-D that move and turn the whole body of the selected person; again to hide them.",
-    menu: Menu::Edit,
+    menu: Menu::Body,
     keys: &[(NONE, Key::H)],
     enabled: has_frame,
     act: |s| {

@@ -5,6 +5,8 @@
 //! EndDrag ──▶ one line of the log, one act to undo
 //! ```
 
+use crate::body::Pppr;
+use crate::geometry::{Vec3, add};
 use crate::session::body_move::{BodyMove, Held, Moving};
 use crate::session::effect::Effect;
 use crate::session::fit::FitStatus;
@@ -33,10 +35,41 @@ impl Session {
         }
         let (Some(Moving::Held(held)), Some(problem)) = (&mut self.moving, &self.fit.problem) else { return effects };
         held.moved = moved;
-        if let Some(params) = moved.of(&held.base, &problem.skeleton).filter(crate::body::Pppr::is_finite) {
+        if let Some(params) = moved.of(&held.base, &problem.skeleton).filter(Pppr::is_finite) {
             effects.push(Effect::Send(WorkerCommand::Edit(Box::new(params))));
         }
         effects
+    }
+
+    /// The selected joint, or with handles shown its person, moved on by so much, m, from where the hand has it.
+    pub(super) fn nudge_body(&mut self, by: Vec3) -> Vec<Effect> {
+        let Some(problem) = &self.fit.problem else { return Vec::new() };
+        let joints = problem.skeleton.joints.len().max(1);
+        let held = match &self.moving {
+            Some(Moving::Held(held)) => Some(held.as_ref()),
+            _ => None,
+        };
+        let moved = match (self.view.move_body, self.joint) {
+            (true, joint) => {
+                let person = joint.unwrap_or(0) / joints;
+                let (so_far, yaw) = match held.map(|held| held.moved) {
+                    Some(BodyMove::Person { by, yaw, .. }) => (by, yaw),
+                    _ => ([0.0; 3], 0.0),
+                };
+                BodyMove::Person { person, by: add(so_far, by), yaw }
+            }
+            (false, Some(joint)) => {
+                let in_hand = held.and_then(|held| held.moved.of(&held.base, &problem.skeleton));
+                let positions = in_hand.as_ref().map_or_else(|| self.shown_positions(), Pppr::positions);
+                let Some(&from) = positions.get(joint) else { return Vec::new() };
+                BodyMove::Joint { joint, to: add(from, by), keep_bones: self.view.keep_bones }
+            }
+            (false, None) => {
+                self.hint("select a joint to move it: J, or a click on it; H moves the whole body".into());
+                return Vec::new();
+            }
+        };
+        self.drag_body(moved)
     }
 
     /// Begins the branch that what is in the hand belongs to, at the iteration on screen.

@@ -130,9 +130,10 @@ fn click(shared: &mut Shared<'_>, state: &mut State, index: usize, ctrl: bool, s
     }
     state.anchor = Some(index);
     if ctrl {
-        if selection.is_empty() {
+        let on_screen = session.data.frame_index;
+        if selection.is_empty() && session.queue.position(on_screen).is_some() {
             // The frame on screen is marked like a selected one, and is the first of them.
-            selection.insert(session.data.frame_index);
+            selection.insert(on_screen);
         }
         if !selection.remove(&index) {
             selection.insert(index);

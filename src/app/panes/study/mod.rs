@@ -9,13 +9,13 @@ mod parallel;
 mod table;
 
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
-use crate::app::commands::AppAct;
+use crate::app::commands::{AppAct, CTRL_SHIFT, CommandRow, Menu, SHIFT, UiAction, has_frame};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::session::{Command, Session};
 use crate::study::run::{Run, StudyKind};
 use crate::study::shard::Subset;
-use egui::{RichText, Role, Ui};
+use egui::{Key, RichText, Role, Ui};
 use measure::{PlottedQuantity, Values};
 
 /// A pane of less than this width, points, has a list of quantities instead of a button for each.
@@ -37,6 +37,32 @@ pub(in crate::app) static PANE: Pane = Pane {
     }),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };
+
+/// Asks for a sweep.
+pub(in crate::app) const SWEEP: CommandRow = CommandRow {
+    label: "Sweep settings…",
+    title: None,
+    tooltip: "Type the values of one or two settings that the listed frames are fitted with; Enter runs the study.",
+    menu: Menu::Fit,
+    keys: &[(SHIFT, Key::S)],
+    enabled: has_frame,
+    act: |_| UiAction::in_front(&PANE, |states, session| order(states, session).type_sweep()),
+};
+
+/// Runs the study that the pane describes.
+pub(in crate::app) const RUN_STUDY: CommandRow = CommandRow {
+    label: "Run study",
+    title: None,
+    tooltip: "Run the study that the Study pane describes, on the listed frames; a sweep where nothing else was chosen.",
+    menu: Menu::Fit,
+    keys: &[(CTRL_SHIFT, Key::Enter)],
+    enabled: |s| has_frame(s) && !s.study.work.is_running(),
+    act: |_| UiAction::in_front(&PANE, |states, session| order(states, session).ask()),
+};
+
+fn order<'a>(states: &'a mut PaneStates, session: &Session) -> &'a mut order::Order {
+    states.of::<State>().order.get_or_insert_with(|| order::Order::around(&session.config))
+}
 
 /// Which quantity is plotted, and the values that were made from the run.
 #[derive(Default)]

@@ -20,6 +20,10 @@ pub(super) struct Order {
     axes: [Axis; 2],
     /// Whether the form is unfolded where a study is on screen.
     open: bool,
+    /// The keyboard is to go to the values of the first setting.
+    typing: bool,
+    /// It was asked for by a command.
+    asked: bool,
 }
 
 /// An axis of a sweep while it is being typed.
@@ -32,12 +36,28 @@ struct Axis {
 
 impl Order {
     /// A sweep of the two settings that are tuned most, around what they are set to.
-    fn around(config: &FitConfig) -> Self {
+    pub(super) fn around(config: &FitConfig) -> Self {
         let axis = |key: &str| {
             let field = Field::of_key(key);
             Axis { field, values: field.map(|field| offered(field, config)).unwrap_or_default() }
         };
-        Self { study: StudyKind::Sweep, axes: [axis("w_em"), axis("tau_pct")], open: false }
+        Self {
+            study: StudyKind::Sweep,
+            axes: [axis("w_em"), axis("tau_pct")],
+            open: false,
+            typing: false,
+            asked: false,
+        }
+    }
+
+    /// Unfolds the form of a sweep and gives it the keyboard.
+    pub(super) fn type_sweep(&mut self) {
+        (self.study, self.open, self.typing) = (StudyKind::Sweep, true, true);
+    }
+
+    /// Begins the study as soon as it is known whether it can be.
+    pub(super) fn ask(&mut self) {
+        (self.open, self.asked) = (true, true);
     }
 
     /// The axes, or what is wrong with them.
@@ -60,6 +80,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, order: &mut Option<Orde
     let config = shared.session.config;
     let order = order.get_or_insert_with(|| Order::around(&config));
     let tokens = Tokens::of(ui);
+    let mut begin = std::mem::take(&mut order.asked);
     let study = &shared.session.study;
     match work(ui, &study.work, "the study") {
         Some(WorkAsked::Pause) => shared.send(Command::PauseStudy),
@@ -85,7 +106,13 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, order: &mut Option<Orde
         kind(ui, order);
         if order.study == StudyKind::Sweep {
             for k in 0..order.axes.len() {
-                axis(ui, &mut order.axes[k], k, &config);
+                let edit = axis(ui, &mut order.axes[k], k, &config);
+                if let Some(edit) = edit {
+                    if std::mem::take(&mut order.typing) {
+                        edit.request_focus();
+                    }
+                    begin |= edit.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+                }
             }
         }
     });
@@ -94,7 +121,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, order: &mut Option<Orde
             let run = ui.add_enabled(frames > 0, egui::Button::new("Run study"));
             let tip = "On all cores, from the settings in force. It is kept: the same study goes on where it was stopped, and \
                        one that is done is there at once.";
-            if run.on_hover_text(tip).clicked() {
+            if run.on_hover_text(tip).clicked() || begin && frames > 0 {
                 order.open = false;
                 shared.send(Command::RunStudy(StudyOrder { study: order.study, grid }));
             }
@@ -142,8 +169,8 @@ fn kind(ui: &mut Ui, order: &mut Order) {
     }
 }
 
-/// A setting and its values.
-fn axis(ui: &mut Ui, axis: &mut Axis, number: usize, config: &FitConfig) {
+/// A setting and its values; answers the field of these.
+fn axis(ui: &mut Ui, axis: &mut Axis, number: usize, config: &FitConfig) -> Option<egui::Response> {
     let title = axis.field.map_or("no second setting", |field| field.key);
     let menu = egui::ComboBox::from_id_salt(("axis", number)).width(110.0).selected_text(title).height(420.0);
     let response = menu.show_ui(ui, |ui| {
@@ -161,11 +188,10 @@ fn axis(ui: &mut Ui, axis: &mut Axis, number: usize, config: &FitConfig) {
         }
     });
     response.response.named(Role::ComboBox, &format!("Setting {}", number + 1));
-    if let Some(field) = axis.field {
-        let edit = egui::TextEdit::singleline(&mut axis.values).desired_width(130.0);
-        let tip = format!("Values with commas between: {}.", field.expected());
-        ui.add(edit).named(Role::TextInput, &format!("Values of setting {}", number + 1)).on_hover_text(tip);
-    }
+    let field = axis.field?;
+    let edit = egui::TextEdit::singleline(&mut axis.values).desired_width(130.0);
+    let tip = format!("Values with commas between: {}. Enter runs the study.", field.expected());
+    Some(ui.add(edit).named(Role::TextInput, &format!("Values of setting {}", number + 1)).on_hover_text(tip))
 }
 
 /// Values around what a setting is set to, over what the screen offers where that is nothing; every answer of a choice.
