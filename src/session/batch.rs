@@ -4,6 +4,7 @@ use super::state::FrameSummary;
 use super::work::Work;
 use crate::config::{FitConfig, difference};
 use crate::study::{BatchRow, FitsOf};
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// The batch of the open data set.
@@ -13,10 +14,10 @@ pub struct Batch {
     pub work: Work,
     /// What the fits in the list are of that a batch made, here or before.
     pub shown: Option<FitsOf>,
-    /// Frames that a batch fitted, and those that it could not.
-    pub fitted: usize,
-    /// Frames that it could not fit.
-    pub failed: usize,
+    /// Frames that a batch had: whether it could fit them. One that goes on tells of frames that were known before.
+    had: HashMap<usize, bool>,
+    /// How many of these it could fit.
+    fitted: usize,
 }
 
 impl Batch {
@@ -24,6 +25,28 @@ impl Batch {
     pub(super) fn begin(&mut self, of: FitsOf, total: usize) {
         self.work.begin(total as u64);
         self.shown = Some(of);
+    }
+
+    /// Says nothing of any frame any more.
+    pub(super) fn forget(&mut self) {
+        self.had.clear();
+        (self.fitted, self.shown) = (0, None);
+    }
+
+    /// A frame was had.
+    pub(super) fn take(&mut self, row: &BatchRow) {
+        let before = self.had.insert(row.index, row.fit.is_ok());
+        self.fitted = self.fitted + usize::from(row.fit.is_ok()) - usize::from(before == Some(true));
+    }
+
+    /// Frames that a batch fitted, here or before.
+    pub fn fitted(&self) -> usize {
+        self.fitted
+    }
+
+    /// Frames that it could not fit.
+    pub fn failed(&self) -> usize {
+        self.had.len() - self.fitted
     }
 
     /// True while frames are being fitted.

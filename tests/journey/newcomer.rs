@@ -257,7 +257,7 @@ fn journey(hands: &dyn Hands) {
 
     // 4. All of them fitted.
     hands.fit_them_all(&mut window);
-    window.until("the batch", |w| w.session().batch.fitted == hard.len());
+    window.until("the batch", |w| w.session().batch.fitted() == hard.len());
     let mean = hard.iter().map(|&frame| window.session().frame_row(frame).majpe_mm.unwrap()).sum::<f64>();
     assert!(mean / (hard.len() as f64) < 250.0, "{mean}");
 

@@ -66,7 +66,7 @@ fn listed_frames_are_fitted_kept_and_found_again() {
 
     // Another day.
     let mut runtime = opened(folder.path(), &config());
-    until(&mut runtime, "the kept fits", |s| s.batch.fitted == 9);
+    until(&mut runtime, "the kept fits", |s| s.batch.fitted() == 9);
     assert!(all.iter().eq(runtime.session().summaries.values()), "to the last digit");
     // With other settings they are told to be others'; a new batch takes their place.
     let other = FitConfig { w_em: 2.0, ..config() };
@@ -113,10 +113,10 @@ fn a_batch_waits_stops_and_goes_on() {
     drop(runtime);
 
     let mut runtime = opened(folder.path(), &config);
-    until(&mut runtime, "the kept fits", |s| s.batch.fitted == there);
+    until(&mut runtime, "the kept fits", |s| s.batch.fitted() == there);
     runtime.apply(Command::FitListed);
     until(&mut runtime, "the others", |s| !s.batch.is_running());
-    assert_eq!(fitted(runtime.session()).len(), 40);
+    assert_eq!((fitted(runtime.session()).len(), runtime.session().batch.fitted()), (40, 40), "no frame counts twice");
 }
 
 /// A data set that nobody can fit fills the list with the reason.
@@ -129,7 +129,7 @@ fn frames_that_cannot_be_fitted_say_why() {
     runtime.apply(Command::FitListed);
     until(&mut runtime, "the end", |s| !s.batch.is_running());
     let session = runtime.session();
-    assert_eq!((session.batch.fitted, session.batch.failed), (2, 1));
+    assert_eq!((session.batch.fitted(), session.batch.failed()), (2, 1));
     let why = session.summaries[&1].reason.clone().unwrap();
     assert!(why.starts_with("error: "), "{why}");
     assert!(session.log.back().unwrap().text.contains("1 could not be fitted"), "{:?}", session.log.back());

@@ -760,7 +760,7 @@ fn listed_frames_are_fitted_by_one_key() {
     let listed = window.session().queue.rows().len();
     assert_eq!(listed, 6);
     window.key_with(Modifiers::COMMAND, Key::Enter);
-    window.until("the batch", |w| !w.session().batch.is_running() && w.session().batch.fitted == listed);
+    window.until("the batch", |w| !w.session().batch.is_running() && w.session().batch.fitted() == listed);
     assert!(window.session().log.iter().any(|line| line.text.contains("frames fitted")));
     assert!(window.session().summaries.values().filter(|summary| summary.iou.is_some()).count() >= listed - 1);
     window.click("Fit listed");

@@ -36,7 +36,7 @@ impl Session {
 
     /// Takes what a batch said out of the list.
     pub(super) fn forget_batch(&mut self) {
-        (self.batch.fitted, self.batch.failed, self.batch.shown) = (0, 0, None);
+        self.batch.forget();
         if self.summaries.values().any(|summary| summary.batch) {
             self.summaries.change().retain(|_, summary| !summary.batch);
         }
@@ -68,8 +68,7 @@ impl Session {
         }
         let summaries = self.summaries.change();
         for row in rows {
-            self.batch.fitted += usize::from(row.fit.is_ok());
-            self.batch.failed += usize::from(row.fit.is_err());
+            self.batch.take(&row);
             let own = summaries.get(&row.index).is_some_and(|summary| summary.hashes.is_some());
             if !own {
                 summaries.insert(row.index, summary(&row));
@@ -89,7 +88,7 @@ impl Session {
         let WorkStatus::Running { done, total, .. } = std::mem::take(&mut self.batch.work).status else {
             return Vec::new();
         };
-        let failed = match self.batch.failed {
+        let failed = match self.batch.failed() {
             0 => String::new(),
             n => format!("; {n} could not be fitted, the list says why (column Reason)"),
         };

@@ -45,7 +45,7 @@ impl Session {
         for (&frame, summary) in own {
             kept += usize::from(summaries.insert(frame, summary.clone()).is_some());
         }
-        (self.batch.fitted, self.batch.failed, self.batch.shown) = (0, 0, None);
+        self.batch.forget();
         let of_row = self.study.shown_row(path);
         self.results_from = of_row.or_else(|| Some(path.file_name()?.to_string_lossy().into_owned()));
         let old = std::mem::replace(self.summaries.change(), summaries);

@@ -5,12 +5,19 @@ use egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, Rect, TouchP
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use mhp_inspector::app::{InspectorApp, Pane};
+use mhp_inspector::config::{FitConfig, Preset};
 use mhp_inspector::labels::Tag;
 use mhp_inspector::session::{Command, LabelStatus, Session, Sort, SortKey, StrataStatus, TimelineStrip};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+/// Asks for nothing but the batch.
+const BATCH_ONLY: &str = "MHP_LARGE_BATCH_ONLY";
+/// How long the first window lets a batch run before it is cancelled.
+const UNTIL_CANCELLED: Duration = Duration::from_secs(20);
+/// Longer than a batch of every frame may take.
+const BATCH_PATIENCE: Duration = Duration::from_mins(40);
 /// Longer than anything here may take.
 const PATIENCE: Duration = Duration::from_mins(5);
 
@@ -19,6 +26,11 @@ struct Window(Harness<'static, InspectorApp>);
 /// Opens the tree and does everything; `warm` where the statistics and labels of a run before are on disk.
 pub(super) fn measure(tree: &Path, warm: bool) {
     let mut window = Window::open(tree, warm);
+    if std::env::var_os(BATCH_ONLY).is_some() {
+        window.until("labels", |s| s.labels.status == LabelStatus::Ready);
+        window.batch(warm);
+        return print_memory();
+    }
     if !warm {
         window.measured("grading, cold", |s| s.strata.status == StrataStatus::Ready, Some(Command::ComputeStrata));
     }
@@ -32,7 +44,12 @@ pub(super) fn measure(tree: &Path, warm: bool) {
     window.bulk();
     window.panes();
     window.fit();
+    window.batch(warm);
     window.results(tree);
+    print_memory();
+}
+
+fn print_memory() {
     println!(
         "memory: {:.0} MiB now, {:.0} MiB at the most",
         memory_mib().unwrap_or(f64::NAN),
@@ -57,7 +74,7 @@ impl Window {
         println!("the first frame is there after {:.0} ms", begun.elapsed().as_secs_f64() * 1e3);
         window.passes_until(&mut meter, |s| s.labels.status == LabelStatus::Ready);
         println!("labels are there after {:.0} ms", begun.elapsed().as_secs_f64() * 1e3);
-        if warm {
+        if warm && std::env::var_os(BATCH_ONLY).is_none() {
             window.passes_until(&mut meter, |s| s.strata.status == StrataStatus::Ready);
             println!("strata of the run before are there after {:.0} ms", begun.elapsed().as_secs_f64() * 1e3);
         }
@@ -287,6 +304,34 @@ impl Window {
         meter.print();
         self.repeat("idle, curves of 100,000 iterations", 60, |_, _| {});
         self.apply(Command::SetFilter(String::new()));
+    }
+
+    /// Every frame fitted for one iteration: cancelled in the first window, gone on with in the second.
+    fn batch(&mut self, warm: bool) {
+        let config = FitConfig { iterations: 1, ..Preset::Baseline.config() };
+        self.apply(Command::SetConfig(Box::new(config)));
+        self.until("the fit on screen", |s| s.fit.is_ready());
+        let known = self.session().batch.fitted();
+        let mut meter = Meter::new("a batch of every frame");
+        meter.pass_with(&mut self.0, |harness| harness.key_press_modifiers(Modifiers::COMMAND, Key::Enter));
+        self.passes_until(&mut meter, |s| s.batch.is_running());
+        let begun = Instant::now();
+        let patience = if warm { BATCH_PATIENCE } else { UNTIL_CANCELLED };
+        while self.session().batch.is_running() && begun.elapsed() < patience {
+            meter.pass(&mut self.0);
+        }
+        meter.print();
+        let (fitted, all) = (self.session().batch.fitted(), self.session().data.len());
+        let new = (fitted - known) as f64 / begun.elapsed().as_secs_f64();
+        println!("{fitted} of {all} frames are fitted, {known} of them before: {new:.0} frames a second");
+        if warm {
+            assert!(known > 0, "the window before has left fits");
+            assert_eq!(fitted, all);
+            self.repeat("idle, every frame fitted", 60, |_, _| {});
+        } else {
+            self.measured("cancelling it", |s| !s.batch.is_running(), Some(Command::CancelBatch));
+            assert!(self.session().batch.fitted() < all, "there is something left to do");
+        }
     }
 
     /// A table with a row for every frame, as `fit --out` writes it.

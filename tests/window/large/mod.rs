@@ -2,7 +2,8 @@
 //!
 //! `cargo test --release --test window large -- --ignored --nocapture` makes the tree and opens it twice, each time in a process
 //! and with a home of its own, so that the peak of memory is that of the window alone: first without, then with what the
-//! first left on disk. `MHP_LARGE_FRAMES` asks for another number of frames. Nothing is asserted about times: they are
+//! first left on disk. `MHP_LARGE_FRAMES` asks for another number of frames, `MHP_LARGE_BATCH_ONLY=1`
+//! for nothing but the batch of all of them. Nothing is asserted about times: they are
 //! this machine's.
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
