@@ -6,7 +6,7 @@ use crate::window::Window;
 use egui::accesskit::Toggled;
 use egui::{Key, Modifiers, pos2};
 use egui_kittest::Harness;
-use egui_kittest::kittest::NodeT as _;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use mhp_inspector::app::{Begin, InspectorApp, Pane};
 use mhp_inspector::body::Group;
 use mhp_inspector::config::{FitConfig, Preset};
@@ -809,4 +809,26 @@ fn a_cube_is_seen_along_another_axis() {
     let second = told(&mut window);
     assert!(second.contains("cone angle") && !second.contains("largest over"), "{second}");
     assert_ne!(first.lines().last(), second.lines().last());
+}
+
+/// A row of words that has no room goes on in the next line, and does not push the pane's edge out of sight.
+#[test]
+fn what_is_said_of_a_fit_stays_in_its_pane() {
+    let sample = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/xrf55");
+    let begin = Begin { paths: vec![sample], config: Some(Preset::Recommended.config()), ..Begin::default() };
+    let harness = Harness::builder()
+        .with_size([1280.0, 800.0])
+        .with_max_steps(200)
+        .build_eframe(|cc| InspectorApp::begin(cc, &begin));
+    let mut window = Window { harness, folder: tempfile::tempdir().unwrap() };
+    window.ready(0);
+    window.apply(Command::StepFit(30));
+    window.paused_at(30);
+    window.harness.run_steps(3);
+    assert!(window.says("not explained"), "{:#?}", window.names());
+    let pane = window.harness.state().pane_rect(Pane::called("Fit").unwrap()).unwrap();
+    for name in ["not explained", "Convergence criterion holds", "Branch", "People value"] {
+        let rect = window.harness.get_by_label(name).rect();
+        assert!(rect.right() <= pane.right(), "{name}: {rect:?} in {pane:?}");
+    }
 }

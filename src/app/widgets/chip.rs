@@ -5,12 +5,13 @@ use egui::{Color32, Response, RichText, Sense, Ui, WidgetInfo};
 
 /// A word in a rounded frame.
 pub(crate) fn chip(ui: &mut Ui, text: &str, color: Color32) -> Response {
-    egui::Frame::new()
-        .stroke(egui::Stroke::new(1.0, color))
-        .corner_radius(3)
-        .inner_margin(egui::Margin::symmetric(4, 0))
-        .show(ui, |ui| ui.add(egui::Label::new(RichText::new(text).small().color(color)).extend()))
-        .response
+    // Allocated as one piece, so that it goes to the next line where a row has no room for it.
+    let font = egui::TextStyle::Small.resolve(ui.style());
+    let galley = ui.painter().layout_no_wrap(text.to_owned(), font, color);
+    let (rect, response) = ui.allocate_exact_size(galley.size() + egui::vec2(10.0, 2.0), egui::Sense::hover());
+    ui.painter().rect_stroke(rect, 3.0, egui::Stroke::new(1.0, color), egui::StrokeKind::Inside);
+    ui.painter().galley(rect.min + egui::vec2(5.0, 1.0), galley, color);
+    response.named(egui::Role::Label, text)
 }
 
 /// A text on a ground of its own, to be read over a picture; answers where it is.
