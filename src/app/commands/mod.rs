@@ -263,7 +263,14 @@ pub(crate) fn shortcut_text((modifiers, key): Shortcut) -> String {
     const NAMES: ModifierNames<'_> = ModifierNames { is_short: true, ..ModifierNames::NAMES };
     let text = KeyboardShortcut::new(modifiers, key).format(&NAMES, cfg!(target_os = "macos"));
     // The arrows of egui are in none of the window's fonts.
-    text.replace('⏴', "←").replace('⏵', "→")
+    let drawn = |sign: char| match sign {
+        '⏴' => '←',
+        '⏵' => '→',
+        '⏶' => '↑',
+        '⏷' => '↓',
+        other => other,
+    };
+    text.chars().map(drawn).collect()
 }
 
 /// The commands whose keys were pressed in this pass; their key events are taken out of the input.
@@ -310,6 +317,18 @@ pub(crate) fn pressed(ctx: &egui::Context) -> Vec<UserCommand> {
 mod tests {
     use super::*;
     use std::collections::HashSet;
+
+    #[test]
+    fn shortcuts_are_written_in_signs_that_the_fonts_have() {
+        for (command, &keys) in all().flat_map(|command| command.keys().iter().map(move |keys| (command, keys))) {
+            let text = shortcut_text(keys);
+            assert!(
+                text.chars().all(|sign| sign.is_ascii() || "←→↑↓−⌘⌃⇧⌥".contains(sign)),
+                "{}: {text}",
+                command.label()
+            );
+        }
+    }
 
     #[test]
     fn no_two_commands_share_a_key_or_a_label() {
