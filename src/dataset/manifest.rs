@@ -3,6 +3,7 @@
 //! Unknown keys are errors with their line, because a typo in `bandwidth_hz` would otherwise silently become a default.
 
 use super::DatasetError;
+use super::capture::CaptureText;
 use super::layout::{LAYOUTS, Layout};
 use super::npz::MAX_ELEMENTS;
 use super::set::MANIFEST_NAME;
@@ -45,6 +46,8 @@ pub struct Manifest {
     pub radar: Option<RadarConfig>,
     /// The views; empty where the layout's own are meant.
     pub views: Vec<View>,
+    /// What is said of a raw capture.
+    pub capture: Option<CaptureText>,
 }
 
 #[derive(Deserialize)]
@@ -59,6 +62,7 @@ struct ManifestText {
     radar: Option<Spanned<RadarConfig>>,
     #[serde(default)]
     view: Vec<Spanned<ViewText>>,
+    capture: Option<CaptureText>,
 }
 
 /// A view as written; also the form in which chosen axes are remembered.
@@ -207,6 +211,7 @@ impl Manifest {
             skeleton: parsed.skeleton.map(|skeleton| skeleton.into_inner().0),
             radar: parsed.radar.map(Spanned::into_inner),
             views,
+            capture: parsed.capture,
         })
     }
 
@@ -232,6 +237,7 @@ impl Manifest {
             skeleton: None,
             radar: None,
             views: Vec::new(),
+            capture: None,
         }
     }
 }

@@ -14,6 +14,7 @@
 
 mod axes_text;
 mod cache;
+pub mod capture;
 mod error;
 mod frame;
 mod inputs;

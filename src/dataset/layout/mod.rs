@@ -9,6 +9,7 @@
 
 mod arrays;
 mod bare;
+mod capture;
 #[cfg(test)]
 mod dummy;
 mod frames;
@@ -40,6 +41,7 @@ pub static LAYOUTS: &[&dyn Layout] = &[
     &mmvr::Mmvr,
     &hupr::Hupr,
     &xrf55::Xrf55,
+    &capture::Capture,
     #[cfg(test)]
     &dummy::Dummy,
     &bare::Bare,

@@ -157,8 +157,12 @@ impl Chain {
 
     /// The whole chain to the polar map; the cube is summed as it is made and never held.
     pub fn polar(&self, fmcw: &Fmcw, spacing_m: f64, adc: &AdcCube) -> PolarMap {
-        let angle = Stage::new(self.angle_window, adc.channels, self.angle_fft, true);
-        let spectra = self.range_doppler(fmcw, adc);
+        self.polar_of(fmcw, spacing_m, &self.range_doppler(fmcw, adc))
+    }
+
+    /// The angle FFT of channels that are an even line, summed in power over Doppler.
+    pub fn polar_of(&self, fmcw: &Fmcw, spacing_m: f64, spectra: &RangeDoppler) -> PolarMap {
+        let angle = Stage::new(self.angle_window, spectra.channels, self.angle_fft, true);
         let sines = angle.plan.len();
         let mut data = Vec::with_capacity(spectra.ranges * sines);
         let (mut power, mut bench) = (vec![0.0; sines], angle.bench());
@@ -228,7 +232,36 @@ impl Chain {
     }
 }
 
+impl AdcCube {
+    /// Energy of the range spectra beyond half the sampling rate over that below, without bin 0. Echoes of a room lie below
+    /// where I and Q of the samples are in order: their delays are short against what the sampling rate could tell.
+    pub fn upper_to_lower(&self) -> f64 {
+        let stage = Stage::new(Window::Rectangular, self.samples, self.samples, false);
+        let (mut bench, half) = (stage.bench(), self.samples / 2);
+        let energy = |bins: &[Complex64]| bins.iter().map(Complex64::norm_sqr).sum::<f64>();
+        let (mut lower, mut upper) = (0.0, 0.0);
+        for chirp in self.data.chunks_exact(self.samples.max(1)) {
+            let spectrum = stage.run_in(chirp.iter().copied(), &mut bench);
+            lower += energy(spectrum.get(1..half).unwrap_or_default());
+            upper += energy(spectrum.get(half + 1..).unwrap_or_default());
+        }
+        upper / lower.max(f64::MIN_POSITIVE)
+    }
+}
+
 impl RangeDoppler {
+    /// These channels of it, in this order.
+    pub fn of_channels(&self, channels: &[usize]) -> Self {
+        let line = |range: usize, channel: usize| {
+            let from = (range * self.channels + channel) * self.dopplers;
+            self.data.get(from..from + self.dopplers).unwrap_or_default()
+        };
+        let ranges = 0..self.ranges;
+        let data =
+            ranges.flat_map(|range| channels.iter().flat_map(move |&channel| line(range, channel).iter().copied()));
+        Self { channels: channels.len(), data: data.collect(), ..*self }
+    }
+
     /// The channels of one range and Doppler bin.
     fn channels_at(&self, range: usize, doppler: usize) -> impl Iterator<Item = Complex64> + '_ {
         let from = range * self.channels * self.dopplers + doppler;

@@ -4,6 +4,7 @@
 mod array;
 mod axis;
 mod camera;
+mod chirp;
 mod config;
 mod fft;
 mod fmcw;
@@ -17,6 +18,7 @@ mod window;
 pub use array::MimoArray;
 pub use axis::{Axis, AxisKind, Spacing};
 pub use camera::PinholeCamera;
+pub use chirp::{Board, ChirpSettings};
 pub use config::{RadarConfig, SPEED_OF_LIGHT};
 pub use fft::{Chain, PolarMap, RadarCube, RangeDoppler};
 pub use fmcw::{AdcCube, Echo, Fmcw, PointMotion, Receiver, add_leakage, path_gain};
