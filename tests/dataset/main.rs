@@ -1,6 +1,7 @@
 //! Data sets: every layout opened, read and written, what is damaged or hostile, and the threads that load.
 
 mod bad_input;
+mod captures;
 mod info;
 mod layouts;
 mod npz;

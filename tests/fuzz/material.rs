@@ -75,6 +75,41 @@ pub(crate) fn npz(entries: &[(&str, Vec<u8>)], deflate: bool) -> Vec<u8> {
     archive.finish().unwrap().into_inner()
 }
 
+/// A raw capture of two frames with its configuration: words alone, with packet headers, as a `.pcap`, or with a JSON.
+pub(crate) fn capture(which: usize) -> Vec<File> {
+    let words: Vec<u8> = (0..2 * 2 * 2 * 2 * 8 * 2_u16).flat_map(|k| (k * 37 % 101).to_le_bytes()).collect();
+    let packet = |number: u32, at: usize, data: &[u8]| {
+        let count = (at as u64).to_le_bytes();
+        [&number.to_le_bytes()[..], &count[..6], data].concat()
+    };
+    let cfg = "channelCfg 3 3 0\nadcCfg 2 1\nprofileCfg 0 77 7 5 60 0 0 60 1 8 5000 0 0 30\nchirpCfg 0 0 0 0 0 0 0 1\n\
+               chirpCfg 1 1 0 0 0 0 0 2\nframeCfg 0 1 2 0 100 1 0\n";
+    let json = r#"{"mmWaveDevices":[{"rfConfig":{"rlChanCfg_t":{"rxChannelEn":"0x3"},"rlAdcOutCfg_t":{"fmt":{"b2AdcBits":2,
+        "b2AdcOutFmt":1}},"rlProfiles":[{"rlProfileCfg_t":{"profileId":0,"startFreqConst_GHz":77.0,"idleTimeConst_usec":7.0,
+        "adcStartTimeConst_usec":5.0,"rampEndTime_usec":60.0,"freqSlopeConst_MHz_usec":60.0,"numAdcSamples":8,
+        "digOutSampleRate":5000}}],"rlChirps":[{"rlChirpCfg_t":{"chirpStartIdx":0,"chirpEndIdx":0,"profileId":0,"txEnable":"0x1"}},
+        {"rlChirpCfg_t":{"chirpStartIdx":1,"chirpEndIdx":1,"profileId":0,"txEnable":"0x2"}}],"rlFrameCfg_t":{"chirpStartIdx":0,
+        "chirpEndIdx":1,"numLoops":2,"framePeriodicity_msec":100.0}},"rawDataCaptureConfig":{"rlDevLaneEnable_t":{"laneEn":"0x3"}}}]}"#;
+    match which {
+        0 => vec![("adc_data.bin", words), ("a.cfg", cfg.into())],
+        1 => vec![("adc_data.bin", packet(1, 0, &words)), ("a.cfg", cfg.into())],
+        2 => {
+            let mut pcap = [&0xA1B2_C3D4_u32.to_le_bytes()[..], &[0; 20]].concat();
+            for (k, data) in words.chunks(100).enumerate() {
+                let udp = packet(k as u32 + 1, 100 * k, data);
+                let len = (udp.len() as u16 + 8).to_be_bytes();
+                let head = [&[0; 12][..], &[8, 0, 0x45], &[0; 8], &[17], &[0; 10], &[0x10, 2, 0x10, 2], &len, &[0; 2]]
+                    .concat();
+                let frame = [head, udp].concat();
+                let size = (frame.len() as u32).to_le_bytes();
+                pcap.extend([&[0; 8][..], &size, &size, &frame].concat());
+            }
+            vec![("a.pcap", pcap), ("a.cfg", cfg.into())]
+        }
+        _ => vec![("adc_data.bin", words), ("a.mmwave.json", json.into())],
+    }
+}
+
 pub(crate) fn f4(numbers: impl IntoIterator<Item = f32>) -> Vec<u8> {
     numbers.into_iter().flat_map(f32::to_le_bytes).collect()
 }

@@ -110,6 +110,11 @@ fn changed(files: &[File], random: &mut StdRng, folder: &Path) {
     material::lay_out(folder, &files.collect::<Vec<_>>());
 }
 
+pub(crate) fn capture(random: &mut StdRng, folder: &Path) {
+    changed(&material::capture(random.random_range(0..4)), random, folder);
+    read_all(folder);
+}
+
 pub(crate) fn generic(random: &mut StdRng, folder: &Path) {
     let mut entries = material::frame();
     if random.random() {

@@ -18,6 +18,8 @@ const PAYLOAD: usize = 1456;
 const DATA_PORT: u16 = 4098;
 /// Packets that are accepted: 48 bytes of memory each.
 const MOST_PACKETS: usize = 8 << 20;
+/// Bytes that may be lost, in multiples of those that are there.
+const MOST_LOST: u64 = 16;
 /// Bytes of a recorded frame on the wire that are accepted.
 const MOST_RECORD: u32 = 1 << 18;
 
@@ -75,6 +77,11 @@ impl Payload {
             Vec::new()
         };
         let (len, gaps) = if packets.is_empty() { (size, Gaps::default()) } else { extent(&packets) };
+        // A damaged count would make a capture of hours out of a few packets.
+        if gaps.bytes > MOST_LOST * size {
+            let message = format!("its packets claim {len} bytes of samples, of which {} are there", len - gaps.bytes);
+            return Err(fault(message));
+        }
         Ok(Self { path: path.to_owned(), file: Mutex::new(file), len, packets, gaps })
     }
 

@@ -107,7 +107,7 @@ pub fn parse_cfg(text: &str, path: &Path) -> Result<CaptureSettings, DatasetErro
     let bits =
         bits.ok_or_else(|| fault(last("adcCfg").map(|line| line.number), "`adcCfg`: bits; expected 0, 1 or 2".into()))?;
     // Whether I or Q comes first depends on the tool that began the capture too: the samples tell.
-    Ok(CaptureSettings { chirp, words: WordOrder { bits, complex, ..WordOrder::default() } })
+    Ok(CaptureSettings { chirp, words: WordOrder { complex, bits, ..WordOrder::default() } })
 }
 
 /// Bits of the converter, as the number in configurations says them.

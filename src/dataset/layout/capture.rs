@@ -5,6 +5,7 @@
 //! virtual elements along y, powers summed over Doppler) and `range_doppler` (powers summed over the antennas). Their point-spread
 //! widths follow from the chain.
 
+use super::pattern::leads_out;
 use super::{DataFolder, FrameSource, Layout, Opened, manifest_beside};
 use crate::dataset::axes_text::axes_badge;
 use crate::dataset::capture::{
@@ -25,7 +26,7 @@ const SINES: usize = 64;
 /// Ranges beyond this are dropped where nothing is said, m.
 const MAX_RANGE_M: f64 = 10.0;
 /// Bytes of a frame that are accepted.
-const MOST_FRAME: u64 = 512 << 20;
+const MOST_FRAME: u64 = 64 << 20;
 /// How much more energy a room's side of the range spectrum must have, for the order of I and Q to be told by it.
 const CLEAR: f64 = 1.2;
 
@@ -53,15 +54,18 @@ impl Layout for Capture {
     fn open(&self, place: &DataFolder<'_>, progress: &Progress) -> Result<Opened, DatasetError> {
         progress.begin("listing files", 0);
         let without = || place.without_frames("a capture (.bin or .pcap) with its .cfg or .mmwave.json".into());
+        if let Some(outside) = names_of(place).find(|name| leads_out(name) && !place.allow_outside) {
+            let (line, path) = (place.manifest.frames_line, place.manifest.path.clone());
+            return Err(DatasetError::Outside { frames: outside.to_owned(), line, path });
+        }
         let named = place.manifest.frames.as_ref().map(|name| place.root.join(name));
         let captures: Vec<PathBuf> = match named {
             Some(path) => vec![path],
             None => files_in(place.root)?.into_iter().filter(|path| is_capture(path)).collect(),
         };
         match &captures[..] {
-            [] => Err(without()),
             [one] if said(place).chirp.is_some() || config_beside(one, place)?.is_some() => open_capture(one, place),
-            [_] => Err(without()),
+            [] | [_] => Err(without()),
             several => {
                 let names = several.iter().map(|path| path.file_name().unwrap_or_default().to_string_lossy());
                 let names = names.collect::<Vec<_>>().join(", ");
@@ -79,6 +83,12 @@ impl Layout for Capture {
 
 fn is_capture(file: &Path) -> bool {
     file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("bin") || ending.eq_ignore_ascii_case("pcap"))
+}
+
+/// The files that a manifest names.
+fn names_of<'a>(place: &DataFolder<'a>) -> impl Iterator<Item = &'a str> {
+    let config = place.manifest.capture.as_ref().and_then(|capture| capture.config.as_deref());
+    place.manifest.frames.as_deref().into_iter().chain(config)
 }
 
 /// The files of a folder, in the order of their names.
@@ -258,7 +268,7 @@ fn open_capture(capture: &Path, place: &DataFolder<'_>) -> Result<Opened, Datase
     if place.manifest.name.is_none() {
         info.name.clone_from(&frames.name);
     }
-    info.assumptions = frames.assumptions(&config, how, board);
+    info.assumptions = frames.assumptions(&config, &how, board);
     info.notes = frames.settings.chirp.warnings();
     info.notes.extend(frames.lost(frame_bytes));
     Ok(Opened { info, frames: Box::new(frames), named: None })
@@ -290,7 +300,7 @@ impl Frames {
         }
         let bytes = self.payload.read(0, self.settings.frame_bytes() as usize)?;
         let ratio = decode(&bytes, &self.settings, IqOrder::IFirst).upper_to_lower();
-        let iq = if ratio > 1.0 { IqOrder::QFirst } else { IqOrder::IFirst };
+        let iq = if ratio > CLEAR { IqOrder::QFirst } else { IqOrder::IFirst };
         let clear = ratio.max(1.0 / ratio.max(f64::MIN_POSITIVE));
         let how = if clear >= CLEAR {
             format!(
@@ -298,13 +308,16 @@ impl Frames {
                 iq.words()
             )
         } else {
-            format!("{}, taken without much reason: both halves of the range spectrum have as much energy", iq.words())
+            format!(
+                "{}, taken without much reason: both halves of the range spectrum have about as much energy",
+                iq.words()
+            )
         };
         Ok((iq, how))
     }
 
     /// What was assumed, in words.
-    fn assumptions(&self, config: &Path, iq: String, board: Board) -> Vec<String> {
+    fn assumptions(&self, config: &Path, iq: &str, board: Board) -> Vec<String> {
         let name = config.file_name().unwrap_or_default().to_string_lossy();
         let still = if self.chain.still_share == 0.0 { "taken away (remove_static)" } else { "kept" };
         vec![
