@@ -1,8 +1,11 @@
 //! Where the panes are: a tree of tiles that can be dragged, resized, stored and reset.
 
+mod collapse;
+
 use super::commands::{AppAct, SaveKind};
 use super::panes::{Dock, Pane, PaneStates, Shared};
 use super::theme::{self, Tokens};
+use collapse::Collapse;
 use egui_tiles::{
     Container, Linear, LinearDir, SimplificationOptions, TabState, Tile, TileId, Tiles, Tree, UiResponse,
 };
@@ -15,6 +18,8 @@ pub(crate) struct PaneLayout {
     tree: Tree<Leaf>,
     /// The default layout, as long as nobody moved one of its borders: it goes with the size of the window.
     fitted: Option<Fitted>,
+    /// What gave way in a small window.
+    collapse: Collapse,
     /// A pane whose tab was right-clicked, and what was chosen.
     asked: Option<AppAct>,
 }
@@ -31,7 +36,8 @@ impl Default for PaneLayout {
         let right = column([(Dock::RightTop, 1.4), (Dock::RightBottom, 1.0)]);
         let root = linear(&mut tiles, LinearDir::Horizontal, &[(left, 1.0), (middle, 4.0), (right, 1.25)]);
         let fitted = Fitted { columns: root, middle, shares: [Vec::new(), Vec::new()] };
-        Self { tree: Tree::new(egui::Id::unique("panes"), root, tiles), fitted: Some(fitted), asked: None }
+        let tree = Tree::new(egui::Id::unique("panes"), root, tiles);
+        Self { tree, fitted: Some(fitted), collapse: Collapse::default(), asked: None }
     }
 }
 
@@ -46,17 +52,25 @@ struct Fitted {
 }
 
 /// Widths of the columns at the edges: a share of the window's within these, points.
-const LEFT: (f32, [f32; 2]) = (0.158, [200.0, 330.0]);
-const RIGHT: (f32, [f32; 2]) = (0.197, [250.0, 430.0]);
+const LEFT: (f32, [f32; 2]) = (0.168, [214.0, 330.0]);
+const RIGHT: (f32, [f32; 2]) = (0.2, [258.0, 430.0]);
 /// Height of what is below the maps.
-const BELOW: (f32, [f32; 2]) = (0.18, [124.0, 300.0]);
+const BELOW: (f32, [f32; 2]) = (0.165, [112.0, 300.0]);
+
+/// A share of the window's size, within bounds, points.
+fn within((share, [least, most]): (f32, [f32; 2]), of: f32) -> f32 {
+    (share * of).clamp(least, most)
+}
 
 impl Fitted {
-    /// Sets the borders for a window; false where somebody moved one.
-    fn set(&mut self, tiles: &mut Tiles<Leaf>, size: egui::Vec2) -> bool {
-        let part = |(share, [least, most]): (f32, [f32; 2]), of: f32| (share * of).clamp(least, most) / of.max(1.0);
-        let (left, right, below) = (part(LEFT, size.x), part(RIGHT, size.x), part(BELOW, size.y));
-        let wanted = [vec![left, (1.0 - left - right).max(0.1), right], vec![(1.0 - below).max(0.1), below]];
+    /// Sets the borders for a window whose sides have these widths, points, 0 where one gave way; false where somebody moved one.
+    fn set(&mut self, tiles: &mut Tiles<Leaf>, size: egui::Vec2, sides: [f32; 2]) -> bool {
+        let [left, right] = sides.map(|width| width / size.x.max(1.0));
+        let below = within(BELOW, size.y) / size.y.max(1.0);
+        // What gave way keeps a share that counts for nothing.
+        let kept = |share: f32| if share > 0.0 { share } else { 0.2 };
+        let middle = (1.0 - left - right).max(0.1);
+        let wanted = [vec![kept(left), middle, kept(right)], vec![(1.0 - below).max(0.1), below]];
         for ((id, shares), set) in [self.columns, self.middle].into_iter().zip(wanted).zip(&mut self.shares) {
             let Some(Tile::Container(Container::Linear(linear))) = tiles.get_mut(id) else { return false };
             let now: Vec<f32> = linear.children.iter().map(|child| linear.shares[*child]).collect();
@@ -96,7 +110,7 @@ impl PaneLayout {
     /// A stored tree; one without a single pane is replaced by the default.
     pub(crate) fn restored(tree: Tree<Leaf>) -> Self {
         if tree.root().is_some() && tree.tiles.iter().any(|(_, tile)| matches!(tile, Tile::Pane(_))) {
-            let mut restored = Self { tree, fitted: None, asked: None };
+            let mut restored = Self { tree, fitted: None, collapse: Collapse::default(), asked: None };
             restored.complete();
             restored
         } else {
@@ -136,6 +150,7 @@ impl PaneLayout {
 
     /// Brings a pane to the front; one that was closed is not brought back.
     pub(crate) fn show_pane(&mut self, pane: Leaf) {
+        self.collapse.open(&self.tree, pane);
         self.tree.make_active(|_, tile| matches!(tile, Tile::Pane(other) if *other == pane));
     }
 
@@ -148,9 +163,16 @@ impl PaneLayout {
     pub(crate) fn show(&mut self, ui: &mut egui::Ui, shared: &mut Shared<'_>, states: &mut PaneStates) {
         let tokens = Tokens::of(ui);
         egui::CentralPanel::default().frame(egui::Frame::new().fill(tokens.stroke)).show(ui, |ui| {
+            let whole = ui.available_size();
+            let (left, right) = (within(LEFT, whole.x), within(RIGHT, whole.x));
+            let sides = self.collapse.decide(&mut self.tree, whole, left, right);
+            if let Some(pane) = self.collapse.strips(ui, &self.tree) {
+                self.tree.make_active(|_, tile| matches!(tile, Tile::Pane(other) if *other == pane));
+                ui.ctx().request_repaint();
+            }
             let size = ui.available_size();
-            self.fitted =
-                self.fitted.take().and_then(|mut fitted| fitted.set(&mut self.tree.tiles, size).then_some(fitted));
+            let set = |mut fitted: Fitted| fitted.set(&mut self.tree.tiles, size, sides).then_some(fitted);
+            self.fitted = self.fitted.take().and_then(set);
             let mut behavior = Behavior { shared, states, asked: &mut self.asked };
             self.tree.ui(&mut behavior, ui);
         });

@@ -42,7 +42,7 @@ targets! {
     manifests: 1500, 200_000, crate::readers::manifest;
     fit_configurations: 1000, 100_000, crate::readers::fit_configuration;
     parameters: 400, 60_000, crate::readers::parameters;
-    captures: 200, 20_000, crate::readers::capture;
+    captures: 200, 50_000, crate::readers::capture;
     generic_frames: 200, 50_000, crate::readers::generic;
     mmvr_frames: 200, 50_000, crate::readers::mmvr;
     hupr_frames: 150, 40_000, crate::readers::hupr;

@@ -832,3 +832,52 @@ fn what_is_said_of_a_fit_stays_in_its_pane() {
         assert!(rect.right() <= pane.right(), "{name}: {rect:?} in {pane:?}");
     }
 }
+
+/// In a small window panes become words at its edge: what is left of the maps first, then what is right of them, then what is
+/// below; a click on a word shows its pane, and with room they are back.
+#[test]
+fn panes_give_way_in_a_stated_order_and_come_back() {
+    let mut window = Window::open(2);
+    let strip = |w: &Window| {
+        let all = ["Frames", "Failure modes", "Fit", "Joint", "3-D", "Image plane", "Curves"];
+        all.into_iter().filter(|pane| w.named(&format!("{pane} on the strip"))).collect::<Vec<_>>()
+    };
+    let resize = |w: &mut Window, width, height| {
+        w.harness.set_size(egui::vec2(width, height));
+        w.harness.run_steps(3);
+    };
+    for (width, height, wanted) in [
+        (1280.0, 800.0, &[][..]),
+        (1024.0, 640.0, &[]),
+        (853.0, 533.0, &["Frames", "Failure modes"]),
+        (640.0, 540.0, &["Frames", "Failure modes", "Fit", "Joint", "3-D", "Image plane"]),
+        (512.0, 320.0, &["Frames", "Failure modes", "Fit", "Joint", "3-D", "Image plane", "Curves"]),
+    ] {
+        resize(&mut window, width, height);
+        assert_eq!(strip(&window), wanted, "{width} x {height}");
+        assert!(window.named("H_ori map of hori"), "the maps are always there");
+    }
+    // A word shows its pane beside the maps, another one in its place, and the same again takes it away.
+    assert!(!window.named("Filter frames") && !window.named("Run fit"));
+    window.click("Frames on the strip");
+    window.harness.run_steps(3);
+    assert!(window.named("Filter frames") && window.named("H_ori map of hori") && !window.named("Run fit"));
+    window.click("Fit on the strip");
+    window.harness.run_steps(3);
+    assert!(window.named("Run fit") && !window.named("Filter frames"));
+    window.click("Joint on the strip");
+    window.harness.run_steps(3);
+    assert!(!window.named("Run fit") && window.harness.state().pane_rect(Pane::called("Joint").unwrap()).is_some());
+    window.click("Joint on the strip");
+    window.harness.run_steps(3);
+    assert!(window.harness.state().pane_rect(Pane::called("Joint").unwrap()).is_none());
+    // A key that brings a pane to the front does so here too.
+    window.harness.state_mut().show_pane(Pane::called("Curves").unwrap());
+    window.harness.run_steps(3);
+    assert!(window.harness.state().pane_rect(Pane::called("Curves").unwrap()).is_some());
+    resize(&mut window, 1280.0, 800.0);
+    assert_eq!(strip(&window), [""; 0]);
+    assert!(
+        window.named("Filter frames") && window.harness.state().pane_rect(Pane::called("Joint").unwrap()).is_some()
+    );
+}

@@ -13,7 +13,7 @@ use crate::app::figure;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, grounded};
 use crate::render::{Camera, Scene, SceneRenderer, Undrawable, Vec2, Vec3, pick, shapes};
-use crate::session::{Command, Session, SplatMode};
+use crate::session::{Command, Session, SplatMode, ViewState};
 use crate::worker::JobId;
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
@@ -454,9 +454,13 @@ fn not_drawn(Undrawable { not_finite, not_definite }: Undrawable) -> Option<Stri
     (!parts.is_empty()).then(|| parts.join(" · "))
 }
 
+/// A pane of less than this width, points, has one menu instead of three.
+const NARROW: f32 = 300.0;
+
 fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
     let mut view = shared.session.view.clone();
     egui::Frame::new().inner_margin(egui::Margin::symmetric(8, 3)).show(ui, |ui| {
+        let narrow = ui.available_width() < NARROW;
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 3.0;
             ui.spacing_mut().button_padding.x = 6.0;
@@ -464,55 +468,76 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
                 .on_hover_text("Alpha-blended Gaussians, sorted by depth.");
             ui.selectable_value(&mut view.splat_mode, SplatMode::Ellipsoid, "Ellipsoids")
                 .on_hover_text("Opaque surfaces at the stated number of standard deviations.");
-            ui.menu_button("Show", |ui| {
-                ui.horizontal(|ui| {
-                    let drag = egui::DragValue::new(&mut view.splat_sigma);
-                    let drag = ui.add(drag.range(0.5..=4.0).speed(0.02).fixed_decimals(1).suffix(" σ"));
-                    let drag = drag.named(egui::Role::SpinButton, "Standard deviations drawn");
-                    drag.on_hover_text("How many standard deviations of each Gaussian are drawn.");
-                    ui.label("of each Gaussian");
-                });
-                ui.checkbox(&mut view.show_velocity, "Velocity").on_hover_text("v of each joint, 0.3 s long.");
-                ui.checkbox(&mut view.show_gradients, "Descent directions")
-                    .on_hover_text(
-                        "−∂L/∂p at each joint: blue the electromagnetic part, orange the kinematic part, rose the temporal part.",
-                    );
-                ui.checkbox(&mut view.show_truth, "Truth")
-                    .on_hover_text("The data set's joints in metres, where it has them.");
-                ui.checkbox(&mut view.show_initial, "Start pose");
-                ui.checkbox(&mut view.show_baseline, "Baseline")
-                    .on_hover_text("The skeleton of the baseline among the pinned fits.");
-                ui.checkbox(&mut view.show_grid, "Ground grid");
-                ui.checkbox(&mut view.show_frustum, "Radar and field of view");
-            })
-            .response
-            .on_hover_text("What is drawn in the scene.");
-            ui.menu_button("By hand", |ui| {
-                ui.checkbox(&mut view.keep_bones, "Bones keep their length").on_hover_text(
-                    "A joint that is dragged stays at its distance from the one that it hangs on, and takes along what hangs on it; off: it moves alone.",
-                );
-                ui.checkbox(&mut view.move_body, "Move body").on_hover_text(
-                    "Handles that move and turn the whole body of the selected person.\nKey: H",
-                );
-                let how = "Drag a joint, here or on a map;\nX, Y or Z held: along that axis only.";
-                ui.label(RichText::new(how).small());
-            })
-            .response
-            .on_hover_text("Moving the body by hand.");
-            ui.menu_button("Camera", |ui| {
-                for row in [FROM_RADAR, FROM_ABOVE, FROM_SIDE] {
-                    if ui.button(row.label).clicked() {
-                        shared.acts.push((row.act)(shared.session));
-                        ui.close();
-                    }
+            let what = if narrow {
+                "What is drawn, moving the body by hand, the camera."
+            } else {
+                "What is drawn in the scene."
+            };
+            let show = ui.menu_button("Show", |ui| {
+                drawn(ui, &mut view);
+                if narrow {
+                    ui.separator();
+                    by_hand(ui, &mut view);
+                    ui.separator();
+                    camera(ui, shared);
                 }
-                ui.label(RichText::new("Drag orbits, right drag pans,\nwheel zooms, double click focuses.").small());
             });
+            show.response.on_hover_text(what);
+            if !narrow {
+                let menu = ui.menu_button("By hand", |ui| by_hand(ui, &mut view));
+                menu.response.on_hover_text("Moving the body by hand.");
+                ui.menu_button("Camera", |ui| camera(ui, shared));
+            }
         });
     });
     if view != shared.session.view {
         shared.set_view(|v| *v = view);
     }
+}
+
+/// What is drawn in the scene.
+fn drawn(ui: &mut Ui, view: &mut ViewState) {
+    ui.horizontal(|ui| {
+        let drag = egui::DragValue::new(&mut view.splat_sigma);
+        let drag = ui.add(drag.range(0.5..=4.0).speed(0.02).fixed_decimals(1).suffix(" σ"));
+        let drag = drag.named(egui::Role::SpinButton, "Standard deviations drawn");
+        drag.on_hover_text("How many standard deviations of each Gaussian are drawn.");
+        ui.label("of each Gaussian");
+    });
+    ui.checkbox(&mut view.show_velocity, "Velocity").on_hover_text("v of each joint, 0.3 s long.");
+    ui.checkbox(&mut view.show_gradients, "Descent directions").on_hover_text(
+        "−∂L/∂p at each joint: blue the electromagnetic part, orange the kinematic part, rose the temporal part.",
+    );
+    ui.checkbox(&mut view.show_truth, "Truth").on_hover_text("The data set's joints in metres, where it has them.");
+    ui.checkbox(&mut view.show_initial, "Start pose");
+    ui.checkbox(&mut view.show_baseline, "Baseline")
+        .on_hover_text("The skeleton of the baseline among the pinned fits.");
+    ui.checkbox(&mut view.show_grid, "Ground grid");
+    ui.checkbox(&mut view.show_frustum, "Radar and field of view");
+}
+
+/// Moving the body by hand.
+fn by_hand(ui: &mut Ui, view: &mut ViewState) {
+    ui.checkbox(&mut view.keep_bones, "Bones keep their length").on_hover_text(
+        "A joint that is dragged stays at its distance from the one that it hangs on, and takes along what hangs on it; off: it \
+         moves alone.",
+    );
+    ui.checkbox(&mut view.move_body, "Move body")
+        .on_hover_text("Handles that move and turn the whole body of the selected person.\nKey: H");
+    let how =
+        "Drag a joint, here or on a map;\nX, Y or Z held: along that axis only.\nAlt and the arrows move it by 2 cm.";
+    ui.label(RichText::new(how).small());
+}
+
+/// Where the scene is seen from.
+fn camera(ui: &mut Ui, shared: &mut Shared<'_>) {
+    for row in [FROM_RADAR, FROM_ABOVE, FROM_SIDE] {
+        if ui.button(row.label).clicked() {
+            shared.acts.push((row.act)(shared.session));
+            ui.close();
+        }
+    }
+    ui.label(RichText::new("Drag orbits, right drag pans,\nwheel zooms, double click focuses.").small());
 }
 
 #[cfg(test)]

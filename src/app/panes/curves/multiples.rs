@@ -10,6 +10,8 @@ use egui_plot::PlotPoint;
 
 /// The least width of a picture, points.
 const LEAST: f32 = 92.0;
+/// The least height of one with its name, points.
+const LOWEST: f32 = TITLE + 22.0;
 /// Between pictures.
 const GAP: f32 = 6.0;
 /// Name and value over a curve.
@@ -94,10 +96,18 @@ pub(super) fn show(
             inside.circle_filled(at(PlotPoint::new(here, y)), 2.5, color);
         }
         let text = now.map_or_else(|| "–".into(), number);
-        let value = painter.text(rect.right_top(), Align2::RIGHT_TOP, &text, theme::mono(theme::CAPTION), tokens.text);
-        let name = painter.with_clip_rect(rect.with_max_x(value.min.x - 4.0).intersect(ui.clip_rect()));
         let font = FontId::proportional(theme::CAPTION);
-        name.text(rect.min + vec2(1.0, 0.0), Align2::LEFT_TOP, &curve.name, font, color);
+        let value = painter.layout_no_wrap(text.clone(), theme::mono(theme::CAPTION), tokens.text);
+        let named = painter.layout_no_wrap(curve.name.clone(), font.clone(), color).size().x;
+        // Where there is no room for both, the name stays: the value is in the pane Fit too.
+        let both = value.size().x + named.min(30.0) + 6.0 < rect.width();
+        let right = if both { rect.max.x - value.size().x } else { rect.max.x + 4.0 };
+        if both {
+            painter.galley(pos2(right, rect.min.y), value, tokens.text);
+        }
+        let mut name = egui::text::LayoutJob::simple_singleline(curve.name.clone(), font, color);
+        name.wrap = egui::text::TextWrapping::truncate_at_width(right - 4.0 - rect.min.x);
+        painter.galley(rect.min + vec2(1.0, 0.0), painter.layout_job(name), color);
         if plot.height() > 60.0 && plot.width() > 140.0 && scale.hi > scale.lo {
             let small = theme::mono(9.0);
             for (place, anchor, y) in
@@ -157,10 +167,11 @@ fn zoom(span: (f64, f64), whole: (f64, f64), about: f64, factor: f64) -> Option<
     Some((lo, lo + width))
 }
 
-/// Places for `count` pictures: as many rows as make them least narrow.
+/// Places for `count` pictures: as many rows as make them least narrow, and no more than leave a curve some height.
 fn cells(area: Rect, count: usize) -> Vec<Rect> {
     let across = ((area.width() / LEAST).floor() as usize).clamp(1, count.max(1));
-    let down = count.div_ceil(across);
+    let most = ((area.height() / LOWEST).floor() as usize).max(1);
+    let down = count.div_ceil(across).min(most);
     // Rows of the same length, not one full and one with the rest.
     let across = count.div_ceil(down.max(1)).max(1);
     let size = vec2(area.width() / across as f32, area.height() / down.max(1) as f32);
