@@ -3,7 +3,8 @@
 
 use crate::window::Window;
 use egui::{Key, vec2};
-use egui_kittest::kittest::Queryable as _;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use mhp_inspector::app::Pane;
 use mhp_inspector::session::{ColorRange, Command, MapScale};
 
 /// The limits of a map that were set by hand.
@@ -185,4 +186,66 @@ fn the_nine_cells_round_the_cursor_are_told() {
     let shown = one.lines().nth(1).and_then(|line| line.split("  ").nth(1)).expect("a value").to_owned();
     assert!(shown.starts_with(&format!("{middle:.2}")), "{middle} in {shown}");
     assert!(window.named("Nine cells of H_sim"));
+}
+
+/// Three linked cuts through a cube: a click in one moves the others, a joint that is selected is gone to, and a session file
+/// keeps the place.
+#[test]
+fn cuts_through_a_cube_are_linked() {
+    let sample = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/hupr");
+    let harness = Window::empty(&[sample], [1440.0, 900.0]);
+    let mut window = Window { harness, folder: tempfile::tempdir().unwrap() };
+    window.ready(0);
+    window.harness.state_mut().show_pane(Pane::called("Orthoview").unwrap());
+    window.harness.run_steps(3);
+    let told = |w: &Window| {
+        let mut texts = w.harness.root().children_recursive().filter_map(|node| node.value());
+        texts.find(|text| text.starts_with("At the place: ")).unwrap()
+    };
+    let cuts =
+        ["Cut of range over radial velocity", "Cut of range over cone angle", "Cut of cone angle over radial velocity"];
+    for cut in cuts {
+        assert!(window.named(cut), "{cut}: {:#?}", window.names());
+    }
+    let peak = told(&window);
+    assert!(peak.contains("H_ori") && peak.contains("0.00 dB re max"), "{peak}");
+    // A click near the lower left corner of a cut: near and approaching; the third axis stays.
+    let rect = window.node(cuts[0]).rect();
+    let corner = rect.left_bottom() + vec2(2.0, -2.0);
+    window.harness.hover_at(corner);
+    window.harness.drag_at(corner);
+    window.harness.drop_at(corner);
+    window.harness.run_steps(3);
+    let moved = told(&window);
+    let bins = |text: &str| -> Vec<usize> {
+        text.split("bin ").skip(1).map(|t| t.split_whitespace().next().unwrap().parse().unwrap()).collect()
+    };
+    let (before, after) = (bins(&peak), bins(&moved));
+    assert_eq!((after[0], after[1], after[2]), (0, 63, before[2]), "{moved}");
+    // A joint.
+    window.key(Key::J);
+    window.harness.run_steps(3);
+    let at_joint = bins(&told(&window));
+    assert!(at_joint != after, "the nose is elsewhere");
+    window.click("To the peak");
+    window.harness.run_steps(2);
+    assert_eq!(bins(&told(&window)), before);
+    window.click("Cuts through H_sim");
+    window.click("largest");
+    window.harness.run_steps(2);
+    assert!(cuts.iter().all(|cut| window.named(cut)), "H_sim is there, the fit is ready");
+    // Kept in a session file, and taken out of it.
+    let path = window.folder.path().join("cuts.mhp-session");
+    window.apply(Command::GotoFrame(0));
+    window.key_with(egui::Modifiers::COMMAND, Key::S);
+    window.answer_path("Save to", &path);
+    window.until("the file", |_| path.is_file());
+    let kept: serde_json::Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    let of_cuts = format!("{kept}");
+    assert!(of_cuts.contains("\"ortho\":{") && of_cuts.contains("\"largest\":true"), "{of_cuts}");
+    // Maps of two axes have no cuts.
+    let mut flat = Window::open(1);
+    flat.harness.state_mut().show_pane(Pane::called("Orthoview").unwrap());
+    flat.harness.run_steps(3);
+    assert!(flat.says("No map with three axes"));
 }

@@ -3,6 +3,7 @@
 mod drag;
 mod focus;
 mod grid;
+pub(super) mod ortho;
 mod overlay;
 mod picture;
 mod readout;

@@ -36,6 +36,7 @@ use crate::session::{Command, Session, ViewState};
 /// Every pane, in the order of the menu; panes of one place are tabs in this order.
 static PANES: &[&Pane] = &[
     &maps::PANE,
+    &maps::ortho::PANE,
     &study::PANE,
     &statistics::PANE,
     &agreement::PANE,
