@@ -11,6 +11,7 @@ use crate::radar::{RadarConfig, ViewSet};
 use crate::task::Progress;
 use sha2::{Digest as _, Sha256};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock};
 
 /// The name of a manifest inside a data set's folder.
@@ -55,6 +56,7 @@ pub struct OpenOptions<'a> {
 /// An open data set: an index of names. Frames are read by [`Self::load`], from any thread.
 #[derive(Debug)]
 pub struct Dataset {
+    id: u64,
     pub(super) info: DatasetInfo,
     pub(super) frames: Box<dyn FrameSource>,
     named: Option<usize>,
@@ -100,7 +102,14 @@ impl Dataset {
     pub(super) fn of(Opened { info, frames, named }: Opened) -> Result<Self, DatasetError> {
         let names = Names::of(&*frames, &info).ok_or_else(|| DatasetError::too_long_names(&info.root))?;
         let (fingerprint, recent) = (OnceLock::new(), Mutex::new(Cache::new(RECENT_BYTES)));
-        Ok(Self { info, frames, named, names, fingerprint, recent })
+        static OPENED: AtomicU64 = AtomicU64::new(0);
+        let id = OPENED.fetch_add(1, Ordering::Relaxed);
+        Ok(Self { id, info, frames, named, names, fingerprint, recent })
+    }
+
+    /// A number that no other data set opened by this process has: what was worked out of one is not taken for another's.
+    pub fn id(&self) -> u64 {
+        self.id
     }
 
     /// What is true of every frame.

@@ -3,6 +3,8 @@
 
 mod people;
 mod problem;
+mod scans;
 
-pub use people::{FoundStart, find_start};
+pub use people::{FoundStart, find_start, find_start_in};
 pub use problem::{problem_alone, problem_of};
+pub use scans::{LEAD_IN, ScanWindow, count_people};

@@ -1,7 +1,8 @@
 //! How many persons a fit has: as many as the settings say, or as many as are counted (paper section 4.4).
 
-use crate::config::{FitConfig, StartPlace};
-use crate::geometry::Vec3;
+use super::scans::count_people;
+use crate::config::{FitConfig, FramesAround, StartPlace};
+use crate::dataset::Dataset;
 use crate::mhp::{FitError, Initialisation, Neighbour, Problem, initialise_people};
 use crate::people::{Count, Counter, Scan};
 use std::sync::Arc;
@@ -15,31 +16,79 @@ pub struct FoundStart {
     pub count: Option<Count>,
 }
 
-/// Finds a start for `config.people` persons, or for as many as are counted where that is 0.
+/// A number of people is believed from this probability on, where the other is that there is nobody at all.
+const SURE: f64 = 0.9;
+
+/// Finds a start for `config.people` persons, or for as many as are counted where that is 0: in the frame and those that the
+/// problem holds around it. One who knows the data set asks [`find_start_in`].
 ///
 /// # Errors
-/// [`FitError::NoStart`] where nothing stands above the background, nobody was counted, or people cannot be counted in
-/// these views.
+/// [`FitError::NoStart`] where nothing stands above the background, or surely nobody is there.
 pub fn find_start(problem: &Arc<Problem>, config: &FitConfig) -> Result<FoundStart, FitError> {
+    found(problem, config, || count(problem, config))
+}
+
+/// As [`find_start`] for frame `frame` of a data set; people are counted with up to two seconds of frames before it
+/// ([`count_people`]), unless the frame is to be taken alone.
+///
+/// # Errors
+/// As [`find_start`].
+pub fn find_start_in(
+    dataset: &Dataset,
+    frame: usize,
+    problem: &Arc<Problem>,
+    config: &FitConfig,
+) -> Result<FoundStart, FitError> {
+    if config.frames_around == FramesAround::None {
+        return find_start(problem, config);
+    }
+    found(problem, config, || count_people(dataset, frame).map_err(|reason| FitError::NoStart { reason }))
+}
+
+fn found(
+    problem: &Arc<Problem>,
+    config: &FitConfig,
+    count: impl FnOnce() -> Result<Count, FitError>,
+) -> Result<FoundStart, FitError> {
     if config.people == 1 {
         // The paper looks for one person without a count, and so it goes where nothing can be counted, or nobody is.
         let asked = config.place == StartPlace::Counted && !problem.neighbours_in(config.frames_around).is_empty();
-        let counted = asked.then(|| count(problem, config).ok()).flatten().filter(|count| count.people() > 0);
-        let seeds = counted.map_or_else(Vec::new, |count| [count.seeds(1), count.seeds(count.people())].concat());
-        return Ok(FoundStart { initialisation: initialise_people(problem, config, &seeds)?, count: None });
+        let counted = asked.then(|| count().ok()).flatten().filter(|count| count.people() > 0);
+        return one(problem, config, counted.as_ref());
     }
-    let count = count(problem, config)?;
+    let count = match count() {
+        Ok(count) => count,
+        // Views that tell no place show one person, as the paper takes it.
+        Err(_) if config.people == 0 && Counter::new(&problem.views).is_err() => {
+            return one(problem, &FitConfig { people: 1, ..*config }, None);
+        }
+        Err(error) => return Err(error),
+    };
     let people = if config.people == 0 { count.people() } else { config.people };
     if people == 0 {
-        let reason = format!("nobody is counted (p = {:.2})", count.probability(0));
-        return Err(FitError::NoStart { reason });
+        let probability = count.probability(0);
+        if probability >= SURE {
+            return Err(FitError::NoStart { reason: format!("nobody is counted (p = {probability:.2})") });
+        }
+        let mut found = one(problem, &FitConfig { people: 1, ..*config }, None)?;
+        found.initialisation.notes.insert(0, format!("nobody is counted (p = {probability:.2}), 1 fitted"));
+        return Ok(FoundStart { count: Some(count), ..found });
     }
-    let seeds: Vec<Vec3> = count.seeds(people);
-    let mut initialisation = initialise_people(problem, config, &seeds)?;
+    let mut initialisation = if people == 1 && config.place == StartPlace::Counted {
+        one(problem, &FitConfig { people: 1, ..*config }, Some(&count))?.initialisation
+    } else {
+        initialise_people(problem, config, &count.seeds(people))?
+    };
     let counted = count.people();
     let note = format!("{counted} counted (p = {:.2}), {people} fitted", count.probability(counted));
     initialisation.notes.insert(0, note);
     Ok(FoundStart { initialisation, count: Some(count) })
+}
+
+/// A start of one person, near where people were counted.
+fn one(problem: &Arc<Problem>, config: &FitConfig, counted: Option<&Count>) -> Result<FoundStart, FitError> {
+    let seeds = counted.map_or_else(Vec::new, |count| [count.seeds(1), count.seeds(count.people())].concat());
+    Ok(FoundStart { initialisation: initialise_people(problem, config, &seeds)?, count: None })
 }
 
 /// Counts the people of a frame, with those of the frames around it that a start may look at: those after it tell as much as

@@ -14,7 +14,7 @@ use crate::geometry::{Vec3, mean};
 use crate::mhp::{Fitter, Precision, StepReport, predict};
 use crate::output::{FileNames, Inputs};
 use crate::people::Tracker;
-use crate::start::{find_start, problem_of};
+use crate::start::{find_start_in, problem_of};
 use crate::task::{milliseconds, panic_as_error};
 use crossbeam_channel::Sender;
 use std::collections::BTreeMap;
@@ -69,7 +69,8 @@ fn fit_watched(
     let (initial, init_ms) = if let Some(params) = start {
         (predict(&problem, &options.config, &params), None)
     } else {
-        let found = find_start(&problem, &options.config).map_err(|error| in_file(&error))?.initialisation;
+        let found =
+            find_start_in(dataset, index, &problem, &options.config).map_err(|error| in_file(&error))?.initialisation;
         (found.params, Some(milliseconds(began)))
     };
     let began = Instant::now();

@@ -8,7 +8,7 @@ use crate::config::FitConfig;
 use crate::mhp::{
     FitError, FitState, Fitter, Objective, Precision, Problem, StepReport, StopReason, masks, predict, simulate,
 };
-use crate::start::{find_start, problem_of};
+use crate::start::{find_start_in, problem_of};
 use crate::task::{catch_panic, milliseconds};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 use std::sync::Arc;
@@ -308,7 +308,7 @@ impl Job {
         let began = Instant::now();
         let (found_start, initial, state) = match start {
             Start::Initialise => {
-                let found = find_start(&problem, &config)?;
+                let found = find_start_in(&dataset, frame.index, &problem, &config)?;
                 let initial = found.initialisation.params.clone();
                 (Some(found), initial, None)
             }

@@ -55,7 +55,7 @@ impl Preset {
             Self::Baseline => "The paper's fit within 1.25 m of the person, from a start that leaves the room out",
             Self::Paper => "The paper to the letter: the whole map, the strongest cluster of peaks, one frame alone",
             Self::Recommended => {
-                "Windows of frames fitted at once: levels instead of masks, skin, and poses that real people have; who stands among reflectors stays where the start has them"
+                "As many people as are counted, in windows of frames fitted at once: levels instead of masks, skin, and poses that real people have; who stands among reflectors stays where the start has them"
             }
         }
     }
@@ -94,6 +94,7 @@ impl Preset {
                 em_region: EmRegion::HalfWidth(1.0),
                 surface_offset_m: 0.04,
                 starts: 17,
+                people: 0,
                 iterations: 60,
                 // How bright and how wide each part is differs from person to person; points of skin have areas.
                 learning_rates: LearningRates {

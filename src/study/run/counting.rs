@@ -5,9 +5,10 @@ use super::variant::Method;
 use crate::dataset::{Dataset, Heatmap, map_cells};
 use crate::mhp::fill_missing;
 use crate::people::{CLASSES, Counter, Network, map_statistics};
-use crate::study::count::{LEAD_IN, ScanWindow};
+use crate::start::{LEAD_IN, ScanWindow};
 use crate::study::row::annotated;
 use crate::task::milliseconds;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Frames of a unit: short enough for all cores, long against the frames that are read before it.
@@ -20,7 +21,7 @@ pub(super) type CountOutcome = (Result<RunNumbers, String>, Option<f64>);
 pub(super) fn count(dataset: &Dataset, method: Method, frames: &[usize]) -> Vec<CountOutcome> {
     let Some(&first) = frames.first() else { return Vec::new() };
     let made = match method {
-        Method::Counter => Counter::new(&dataset.info().views).map(|counter| Tool::Counter(Box::new(counter))),
+        Method::Counter => Counter::new(&dataset.info().views).map(|counter| Tool::Counter(Arc::new(counter))),
         Method::Alone | Method::Fit => Network::alone().map(Tool::Alone),
     };
     let tool = match made {
@@ -44,11 +45,11 @@ pub(super) fn count(dataset: &Dataset, method: Method, frames: &[usize]) -> Vec<
 }
 
 enum Tool {
-    Counter(Box<Counter>),
+    Counter(Arc<Counter>),
     Alone(Network),
 }
 
-fn with_counter(dataset: &Dataset, window: &mut ScanWindow<'_>, frame: usize) -> CountOutcome {
+fn with_counter(dataset: &Dataset, window: &mut ScanWindow, frame: usize) -> CountOutcome {
     let (maps, annotated) = match maps(dataset, frame) {
         Ok((maps, annotated)) => (Ok(maps), annotated),
         Err(why) => (Err(why), None),

@@ -10,7 +10,7 @@ use crate::dataset::{Dataset, Frame};
 use crate::diagnose::{Reprojection, joint_errors, map_box_coverage, reprojection};
 use crate::geometry::Vec3;
 use crate::mhp::{Fitter, Precision, Problem, StopReason, predict};
-use crate::start::{find_start, problem_of};
+use crate::start::{find_start_in, problem_of};
 use crate::study::row::annotated;
 use crate::task::milliseconds;
 use std::sync::Arc;
@@ -70,7 +70,9 @@ impl<'a> LoadedFrame<'a> {
     /// Where nobody is seen.
     pub(super) fn cold(&self, config: &FitConfig) -> Result<TimedStart, String> {
         let began = Instant::now();
-        let found = find_start(&self.problem, config).map_err(|error| self.told(&error))?.initialisation;
+        let found = find_start_in(self.dataset, self.frame.index, &self.problem, config)
+            .map_err(|error| self.told(&error))?
+            .initialisation;
         Ok(TimedStart { params: found.params, unrefined: found.unrefined, init_ms: Some(milliseconds(began)) })
     }
 
@@ -212,6 +214,7 @@ mod tests {
     use crate::geometry::Pose;
     use crate::mhp::simulate;
     use crate::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
+    use crate::start::find_start;
 
     fn view(array: &str, depth: AxisKind, across: AxisKind, [first, last]: [f64; 2]) -> View {
         let axis = |kind, bins, lo, hi| Axis { kind, bins, lo, hi, spacing: Spacing::Linear };
