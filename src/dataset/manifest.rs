@@ -3,7 +3,7 @@
 //! Unknown keys are errors with their line, because a typo in `bandwidth_hz` would otherwise silently become a default.
 
 use super::DatasetError;
-use super::capture::CaptureText;
+use super::adc::AdcText;
 use super::layout::{LAYOUTS, Layout};
 use super::npz::MAX_ELEMENTS;
 use super::set::MANIFEST_NAME;
@@ -47,7 +47,7 @@ pub struct Manifest {
     /// The views; empty where the layout's own are meant.
     pub views: Vec<View>,
     /// What is said of a raw capture.
-    pub capture: Option<CaptureText>,
+    pub capture: Option<AdcText>,
 }
 
 #[derive(Deserialize)]
@@ -62,7 +62,7 @@ struct ManifestText {
     radar: Option<Spanned<RadarConfig>>,
     #[serde(default)]
     view: Vec<Spanned<ViewText>>,
-    capture: Option<CaptureText>,
+    capture: Option<AdcText>,
 }
 
 /// A view as written; also the form in which chosen axes are remembered.

@@ -12,9 +12,9 @@
 //! last two are tested on files synthesised in the published form, no real file was at hand. *Generic*: a folder with
 //! `dataset.toml` and one npz a frame; `samples/walk/dataset.toml` has every key. What is assumed is said on screen and by `info`.
 
+pub mod adc;
 mod axes_text;
 mod cache;
-pub mod capture;
 mod error;
 mod frame;
 mod inputs;

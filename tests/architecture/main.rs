@@ -251,7 +251,10 @@ fn layouts_are_known_by_name_in_their_own_files_alone() {
         for word in layouts.iter().filter(|word| *word != "dummy") {
             let (head, tail) = word.split_at(1);
             let named = [format!("\"{word}\""), format!("{}{tail}", head.to_uppercase()), format!("{word}::")];
-            wrong.extend(named.iter().filter(|name| code.contains(*name)).map(|name| format!("{place}: {name}")));
+            // In the middle of a word it is another word.
+            let begins = |at: usize| !code[..at].ends_with(|c: char| c.is_alphanumeric());
+            let is_there = |name: &&String| code.match_indices(name.as_str()).any(|(at, _)| begins(at));
+            wrong.extend(named.iter().filter(is_there).map(|name| format!("{place}: {name}")));
         }
     }
     assert_eq!(wrong, Vec::<String>::new());

@@ -286,7 +286,8 @@ fn the_table_shows_twenty_rows_and_the_means_of_all() {
     for k in 1..23 {
         std::fs::copy(small.file("a/000"), small.file(&format!("a/{k:03}"))).unwrap();
     }
-    let output = fit(small.path(), &["--iterations", "1"]);
+    // Frames that are all the same show furniture, and nobody is counted.
+    let output = fit(small.path(), &["--people", "1", "--iterations", "1"]);
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     let table = text(&output.stdout);
     let lines: Vec<&str> = table.lines().collect();
@@ -485,7 +486,7 @@ fn started(path: &Path, args: &[&str]) -> std::process::Child {
 fn three_at_once_leave_one_whole_table() {
     let small = many(30);
     let out = small.out("out");
-    let words = ["--iterations", "100", "--out", out.to_str().unwrap()];
+    let words = ["--people", "1", "--iterations", "100", "--out", out.to_str().unwrap()];
     let three: Vec<_> = (0..3).map(|_| started(small.path(), &words)).collect();
     let mut done = 0;
     for child in three {
@@ -508,14 +509,14 @@ fn three_at_once_leave_one_whole_table() {
     assert_eq!(code(&output), 2);
     assert!(text(&output.stderr).contains(&wanted), "{}", text(&output.stderr));
     drop(lock);
-    assert_eq!(code(&fit(small.path(), &["--iterations", "1", "--out", out.to_str().unwrap()])), 0);
+    assert_eq!(code(&fit(small.path(), &["--people", "1", "--iterations", "1", "--out", out.to_str().unwrap()])), 0);
 }
 
 #[test]
 fn a_killed_fit_leaves_a_whole_table_and_the_next_one_cleans_up() {
     let small = many(40);
     let out = small.out("out");
-    let mut child = started(small.path(), &["--iterations", "3000", "--out", out.to_str().unwrap()]);
+    let mut child = started(small.path(), &["--people", "1", "--iterations", "3000", "--out", out.to_str().unwrap()]);
     let rows = || std::fs::read_to_string(out.join("summary.csv")).unwrap_or_default().matches('\n').count();
     while rows() < 3 {
         assert_eq!(child.try_wait().unwrap(), None, "there was time to kill it");
@@ -527,7 +528,7 @@ fn a_killed_fit_leaves_a_whole_table_and_the_next_one_cleans_up() {
     assert!((2..40).contains(&left.len()));
     assert!(left.iter().all(|row| row["reason"] == "iterations" && row["loss"].parse::<f64>().is_ok()));
     assert!(hidden(&out).iter().any(|name| name.contains(".tmp")), "{:?}", hidden(&out));
-    assert_eq!(code(&fit(small.path(), &["--iterations", "1", "--out", out.to_str().unwrap()])), 0);
+    assert_eq!(code(&fit(small.path(), &["--people", "1", "--iterations", "1", "--out", out.to_str().unwrap()])), 0);
     assert_eq!((hidden(&out), summary(&out).len()), (Vec::new(), 40));
 }
 
@@ -536,11 +537,12 @@ fn a_killed_fit_leaves_a_whole_table_and_the_next_one_cleans_up() {
 fn a_limit_of_file_size_is_an_error_and_leaves_what_was_there() {
     let small = many(12);
     let out = small.out("out");
-    assert_eq!(code(&fit(small.path(), &["--iterations", "1", "--out", out.to_str().unwrap()])), 0);
+    assert_eq!(code(&fit(small.path(), &["--people", "1", "--iterations", "1", "--out", out.to_str().unwrap()])), 0);
     let before = lines(&out);
     let mut command = Command::new("bash");
     command.args(["-c", "ulimit -f 0; exec \"$@\"", "bash", env!("CARGO_BIN_EXE_mhp-inspector"), "fit"]);
-    let output = command.arg(small.path()).args(["--iterations", "2", "--out"]).arg(&out).output().unwrap();
+    let output =
+        command.arg(small.path()).args(["--people", "1", "--iterations", "2", "--out"]).arg(&out).output().unwrap();
     assert_eq!(code(&output), 2, "{}", text(&output.stderr));
     assert!(text(&output.stderr).contains("File too large"), "{}", text(&output.stderr));
     assert_eq!((lines(&out), hidden(&out)), (before, Vec::new()));
@@ -553,7 +555,10 @@ fn results_do_not_go_into_the_data_set_and_never_replace_an_input() {
     let names = || std::fs::read_dir(small.path()).unwrap().count();
     let count = names();
     let run = |out: &Path, more: &[&str]| {
-        let output = fit(small.path(), &[&["--iterations", "1", "--out", out.to_str().unwrap()], more].concat());
+        let output = fit(
+            small.path(),
+            &[&["--people", "1", "--iterations", "1", "--out", out.to_str().unwrap()], more].concat(),
+        );
         (code(&output), text(&output.stderr))
     };
     let (inside, round) = (small.path().join("not/yet"), small.out("none/../link/deep"));
@@ -620,7 +625,7 @@ fn frames_of_strange_names_have_a_file_each_inside_the_folder() {
     let text = std::fs::read_to_string(&manifest).unwrap();
     assert!(text.contains("frames = \"*/*.npz\""), "{text}");
     let out = small.out("out");
-    let words = ["--iterations", "1", "--out", out.to_str().unwrap(), "--ply", "--curves"];
+    let words = ["--people", "1", "--iterations", "1", "--out", out.to_str().unwrap(), "--ply", "--curves"];
     let output = fit(small.path(), &words);
     assert_eq!(code(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
     for (folder, ending) in [("pppr", "npz"), ("pppr", "ply"), ("curves", "csv")] {
@@ -633,7 +638,13 @@ fn frames_of_strange_names_have_a_file_each_inside_the_folder() {
     assert!(out.join("pppr/a_CON.npz").is_file(), "no device once the folder is in its name");
     // Whichever frames are chosen, a frame's file is the same, and `export` finds it.
     let part = small.out("part");
-    assert_eq!(code(&fit(small.path(), &["--frames", "1", "--iterations", "1", "--out", part.to_str().unwrap()])), 0);
+    assert_eq!(
+        code(&fit(
+            small.path(),
+            &["--people", "1", "--frames", "1", "--iterations", "1", "--out", part.to_str().unwrap()]
+        )),
+        0
+    );
     let first = std::fs::read_dir(part.join("pppr")).unwrap().next().unwrap().unwrap().file_name();
     assert!(out.join("pppr").join(first).is_file());
     let mut command = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"));

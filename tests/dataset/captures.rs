@@ -1,7 +1,7 @@
 //! Raw captures: real ones, and synthetic ones whose point targets must be where they were put, in every order of words.
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
-use mhp_inspector::dataset::capture::Payload;
+use mhp_inspector::dataset::adc::Payload;
 use mhp_inspector::dataset::{Dataset, DatasetError, Heatmap};
 use mhp_inspector::radar::{AdcCube, AxisKind, Board, ChirpSettings, Echo, Receiver};
 use mhp_inspector::task::Progress;

@@ -306,7 +306,7 @@ pub(crate) fn run_folder() -> &'static [(String, String)] {
         let files = [("dataset.toml", MANIFEST.as_bytes()), ("frames/0.npz", &frame), ("frames/1.npz", &frame)];
         lay_out(&data, &files.map(|(name, bytes)| (name.to_owned(), bytes.to_vec())));
         let study = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"))
-            .args(["study", "sweep", "--grid", "w_em=0.1,0.5", "--iterations", "2"])
+            .args(["study", "sweep", "--preset", "baseline", "--grid", "w_em=0.1,0.5", "--iterations", "2"])
             .arg(&data)
             .arg("--out")
             .arg(&run)

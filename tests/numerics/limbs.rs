@@ -25,6 +25,7 @@ fn starts(problem: &Arc<Problem>) -> [Vec<Vec3>; 2] {
     [Limbs::Posture, Limbs::Learned].map(|limbs| {
         let config = FitConfig {
             limbs,
+            people: 1,
             parameterization: Parameterization::Bones,
             starts: 9,
             w_time: 8.0,

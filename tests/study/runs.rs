@@ -289,7 +289,7 @@ fn a_run_of_a_program_with_fewer_settings_can_be_read() {
 #[test]
 fn complexity_is_cut_by_stratum_and_its_mean_is_of_all() {
     let case = Case::new();
-    case.done(&["complexity", "--iterations", "2"], "run");
+    case.done(&["complexity", "--preset", "baseline", "--iterations", "2"], "run");
     let run = Run::read(&case.run("run")).unwrap();
     let frames: Vec<usize> = run.table.iter().map(|row| row.frames).collect();
     assert_eq!((frames[0] + frames[1] + frames[2], frames[3]), (6, 6));

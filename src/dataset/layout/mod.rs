@@ -9,7 +9,7 @@
 
 mod arrays;
 mod bare;
-mod capture;
+mod dca;
 #[cfg(test)]
 mod dummy;
 mod frames;
@@ -41,7 +41,7 @@ pub static LAYOUTS: &[&dyn Layout] = &[
     &mmvr::Mmvr,
     &hupr::Hupr,
     &xrf55::Xrf55,
-    &capture::Capture,
+    &dca::Dca,
     #[cfg(test)]
     &dummy::Dummy,
     &bare::Bare,

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! file (.bin, .pcap) ──▶ Payload: bytes of the converter ──▶ decode: samples (loop, channel, sample) ──▶ Chain ──▶ maps
-//! .cfg, .mmwave.json ──▶ CaptureSettings ────────────────────────▲
+//! .cfg, .mmwave.json ──▶ AdcSettings ────────────────────────▲
 //! ```
 //!
 //! Files, orders and keys: `notes/datasets.md` section 5. Nothing is held of a capture but where its packets are.
@@ -45,14 +45,14 @@ impl Default for WordOrder {
 
 /// What a configuration file says of a capture.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CaptureSettings {
+pub struct AdcSettings {
     /// Its chirps.
     pub chirp: ChirpSettings,
     /// How its words follow each other.
     pub words: WordOrder,
 }
 
-impl CaptureSettings {
+impl AdcSettings {
     /// Bytes of a frame.
     pub fn frame_bytes(&self) -> u64 {
         let chirp = &self.chirp;
@@ -73,7 +73,7 @@ fn transmitter(mask: u32) -> Result<usize, String> {
 /// The table `[capture]` of a manifest: what no configuration file says, or says wrongly; all of it may be left out.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct CaptureText {
+pub struct AdcText {
     /// The configuration, relative to the folder: a `.cfg` or a `.mmwave.json`; else the one beside the capture.
     pub config: Option<String>,
     /// Its chirps, where there is no such file.

@@ -1,6 +1,6 @@
 //! A TI SDK `.cfg`: one command a line, numbers after it.
 
-use super::{CaptureSettings, WordOrder, transmitter};
+use super::{AdcSettings, WordOrder, transmitter};
 use crate::dataset::DatasetError;
 use crate::radar::ChirpSettings;
 use std::path::Path;
@@ -15,7 +15,7 @@ struct Line<'a> {
 ///
 /// # Errors
 /// Naming the line and the field.
-pub fn parse_cfg(text: &str, path: &Path) -> Result<CaptureSettings, DatasetError> {
+pub fn parse_cfg(text: &str, path: &Path) -> Result<AdcSettings, DatasetError> {
     let lines: Vec<Line<'_>> = text
         .lines()
         .zip(1..)
@@ -107,7 +107,7 @@ pub fn parse_cfg(text: &str, path: &Path) -> Result<CaptureSettings, DatasetErro
     let bits =
         bits.ok_or_else(|| fault(last("adcCfg").map(|line| line.number), "`adcCfg`: bits; expected 0, 1 or 2".into()))?;
     // Whether I or Q comes first depends on the tool that began the capture too: the samples tell.
-    Ok(CaptureSettings { chirp, words: WordOrder { complex, bits, ..WordOrder::default() } })
+    Ok(AdcSettings { chirp, words: WordOrder { complex, bits, ..WordOrder::default() } })
 }
 
 /// Bits of the converter, as the number in configurations says them.

@@ -1,6 +1,6 @@
 //! Words of the converter to samples.
 
-use super::CaptureSettings;
+use super::AdcSettings;
 use crate::radar::AdcCube;
 use num_complex::Complex64;
 
@@ -25,7 +25,7 @@ impl IqOrder {
 
 /// The samples of a frame, ordered (loop, channel, sample); channels are (transmitter in the order of sending, receiver). What
 /// `bytes` lacks at its end is 0.
-pub fn decode(bytes: &[u8], settings: &CaptureSettings, iq: IqOrder) -> AdcCube {
+pub fn decode(bytes: &[u8], settings: &AdcSettings, iq: IqOrder) -> AdcCube {
     let (chirp, words) = (&settings.chirp, settings.words);
     let (samples, rx) = (chirp.samples, chirp.rx);
     let word = |at: usize| -> f64 {

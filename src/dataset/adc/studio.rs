@@ -1,7 +1,7 @@
 //! The JSON that mmWave Studio writes of a device: `*.mmwave.json`.
 
 use super::ti_cfg::bits_of;
-use super::{CaptureSettings, WordOrder, transmitter};
+use super::{AdcSettings, WordOrder, transmitter};
 use crate::dataset::DatasetError;
 use crate::radar::ChirpSettings;
 use serde_json::Value;
@@ -11,13 +11,13 @@ use std::path::Path;
 ///
 /// # Errors
 /// Naming the key and what was expected there.
-pub fn parse_studio(text: &str, path: &Path) -> Result<CaptureSettings, DatasetError> {
+pub fn parse_studio(text: &str, path: &Path) -> Result<AdcSettings, DatasetError> {
     read(text).map_err(|(message, line)| DatasetError::Manifest { message, line, path: path.to_owned() })
 }
 
 type Fault = (String, Option<usize>);
 
-fn read(text: &str) -> Result<CaptureSettings, Fault> {
+fn read(text: &str) -> Result<AdcSettings, Fault> {
     let json: Value = serde_json::from_str(text).map_err(|error| (format!("not JSON: {error}"), Some(error.line())))?;
     let root = At { value: &json, path: String::new() };
     let device = root.get("mmWaveDevices")?.at(0)?;
@@ -82,7 +82,7 @@ fn read(text: &str) -> Result<CaptureSettings, Fault> {
         n @ (2 | 4) => n as usize,
         n => return Err((format!("`{}`: {n} lanes; expected 2 or 4", lanes.path), None)),
     };
-    Ok(CaptureSettings { chirp, words: WordOrder { lanes, complex, bits, ..WordOrder::default() } })
+    Ok(AdcSettings { chirp, words: WordOrder { lanes, complex, bits, ..WordOrder::default() } })
 }
 
 /// A value and the keys that lead to it.

@@ -7,10 +7,8 @@
 
 use super::pattern::leads_out;
 use super::{DataFolder, FrameSource, Layout, Opened, manifest_beside};
+use crate::dataset::adc::{AdcSettings, AdcText, IqOrder, Payload, WordOrder, decode, parse_cfg, parse_studio};
 use crate::dataset::axes_text::axes_badge;
-use crate::dataset::capture::{
-    CaptureSettings, CaptureText, IqOrder, Payload, WordOrder, decode, parse_cfg, parse_studio,
-};
 use crate::dataset::manifest::Manifest;
 use crate::dataset::set::{DatasetInfo, parent};
 use crate::dataset::{DatasetError, Frame, Heatmap, MapArray};
@@ -32,9 +30,9 @@ const CLEAR: f64 = 1.2;
 
 /// The layout.
 #[derive(Debug)]
-pub(super) struct Capture;
+pub(super) struct Dca;
 
-impl Layout for Capture {
+impl Layout for Dca {
     fn word(&self) -> &'static str {
         "capture"
     }
@@ -105,7 +103,7 @@ fn files_in(root: &Path) -> Result<Vec<PathBuf>, DatasetError> {
     Ok(files)
 }
 
-fn said(place: &DataFolder<'_>) -> CaptureText {
+fn said(place: &DataFolder<'_>) -> AdcText {
     place.manifest.capture.clone().unwrap_or_default()
 }
 
@@ -136,10 +134,10 @@ fn config_beside(capture: &Path, place: &DataFolder<'_>) -> Result<Option<PathBu
 }
 
 /// What a capture was recorded with, from a file or the manifest, and which it was.
-fn settings_of(capture: &Path, place: &DataFolder<'_>) -> Result<(CaptureSettings, PathBuf), DatasetError> {
+fn settings_of(capture: &Path, place: &DataFolder<'_>) -> Result<(AdcSettings, PathBuf), DatasetError> {
     let text = said(place);
     let (mut settings, from) = if let Some(chirp) = &text.chirp {
-        let settings = CaptureSettings { chirp: chirp.settings(), words: WordOrder::default() };
+        let settings = AdcSettings { chirp: chirp.settings(), words: WordOrder::default() };
         (settings, place.manifest.path.clone())
     } else {
         let Some(path) = config_beside(capture, place)? else {
@@ -189,7 +187,7 @@ struct Processing {
     chain: Chain,
 }
 
-fn processing_of(settings: &CaptureSettings, place: &DataFolder<'_>) -> Result<Processing, DatasetError> {
+fn processing_of(settings: &AdcSettings, place: &DataFolder<'_>) -> Result<Processing, DatasetError> {
     let text = said(place);
     let fault = |message: String| DatasetError::Manifest { message, line: None, path: place.manifest.path.clone() };
     let board = text.board.as_deref().map_or(Some(Board::default()), Board::named);
@@ -279,7 +277,7 @@ fn open_capture(capture: &Path, place: &DataFolder<'_>) -> Result<Opened, Datase
 struct Frames {
     name: String,
     payload: Payload,
-    settings: CaptureSettings,
+    settings: AdcSettings,
     chain: Chain,
     fmcw: Fmcw,
     /// Channels of the line along y.
