@@ -88,6 +88,21 @@ pub(super) fn settings(file: Option<&Path>, preset: Preset, iterations: Option<u
     }
 }
 
+/// How many persons a fit has.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct PeopleArg {
+    /// Persons that are fitted at once, instead of the configuration's; 0 fits as many as are counted.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=8))]
+    people: Option<u8>,
+}
+
+impl PeopleArg {
+    /// The configuration with that number, where one is given.
+    pub(super) fn of(self, config: &FitConfig) -> FitConfig {
+        FitConfig { people: self.people.map_or(config.people, usize::from), ..*config }
+    }
+}
+
 /// How text stands in the CSV files of a command.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(super) struct CsvArgs {

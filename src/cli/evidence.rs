@@ -1,7 +1,7 @@
 //! `evidence`: what speaks for each failure mode of a fit, as cards, JSON or CSV.
 
 use super::common::{
-    CsvArgs, PrecisionArg, complain, inputs, open, presets, print, print_json, progress_bar, settings,
+    CsvArgs, PeopleArg, PrecisionArg, complain, inputs, open, presets, print, print_json, progress_bar, settings,
 };
 use super::frames::{FrameRange, chosen};
 use super::merge::MergeArgs;
@@ -84,6 +84,8 @@ pub struct EvidenceArgs {
     /// Settings with a name. The scores were calibrated on fits of the baseline.
     #[arg(long, value_name = "NAME", default_value = Preset::Baseline.name(), value_parser = presets())]
     preset: Preset,
+    #[command(flatten)]
+    people: PeopleArg,
     /// Scalar of the per-cell kernel.
     #[arg(long, value_enum, default_value = "f32")]
     precision: PrecisionArg,
@@ -108,7 +110,7 @@ pub struct EvidenceArgs {
 /// Where the configuration, the data set, the range of frames or the parameters are bad, or the table cannot be written.
 pub(super) fn run(args: &EvidenceArgs) -> anyhow::Result<ExitCode> {
     args.cells.apply();
-    let config = settings(args.config.as_deref(), args.preset, args.iterations)?;
+    let config = args.people.of(&settings(args.config.as_deref(), args.preset, args.iterations)?);
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
     let named = [args.params.as_deref(), args.config.as_deref(), args.manifest.as_deref()];

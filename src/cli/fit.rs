@@ -3,7 +3,7 @@
 mod table;
 
 use super::common::{
-    CsvArgs, PrecisionArg, complain, inputs, open, presets, print, print_json, progress_bar, settings,
+    CsvArgs, PeopleArg, PrecisionArg, complain, inputs, open, presets, print, print_json, progress_bar, settings,
 };
 use super::frames::{FrameRange, chosen};
 use super::merge::MergeArgs;
@@ -71,9 +71,8 @@ pub struct FitArgs {
     /// Settings with a name.
     #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = presets())]
     preset: Preset,
-    /// Persons that are fitted at once, instead of the configuration's; 0 fits as many as are counted.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=8))]
-    people: Option<u8>,
+    #[command(flatten)]
+    people: PeopleArg,
     /// Adam steps of a frame, instead of the configuration's.
     #[arg(long, value_name = "N")]
     iterations: Option<usize>,
@@ -113,8 +112,7 @@ pub struct FitArgs {
 /// be fitted.
 pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
     args.cells.apply();
-    let mut config = settings(args.config.as_deref(), args.preset, args.iterations)?;
-    config.people = args.people.map_or(config.people, usize::from);
+    let config = args.people.of(&settings(args.config.as_deref(), args.preset, args.iterations)?);
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
     let arrays: Vec<String> = dataset.info().views.iter().map(|view| view.array.clone()).collect();

@@ -1,6 +1,6 @@
 //! `screenshot`: the real window, drawn offscreen after a number of iterations.
 
-use super::common::{outside_allowed, presets, settings};
+use super::common::{PeopleArg, outside_allowed, presets, settings};
 use crate::app::{Begin, InspectorApp, Pane};
 use crate::config::Preset;
 use crate::output::{Sink, replace_file};
@@ -35,7 +35,7 @@ pub struct ScreenshotArgs {
     #[arg(required_unless_present = "session")]
     path: Option<PathBuf>,
     /// A session file instead of a data set; frame, iterations, settings and theme are then its own.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["path", "frame", "iterations", "config", "preset", "focus", "joint"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["path", "frame", "iterations", "config", "preset", "people", "focus", "joint"])]
     session: Option<PathBuf>,
     /// Show the run folder of a study in its pane.
     #[arg(long, value_name = "RUN")]
@@ -52,6 +52,8 @@ pub struct ScreenshotArgs {
     /// Fit configuration instead of a preset.
     #[arg(long, value_name = "FIT.toml")]
     config: Option<PathBuf>,
+    #[command(flatten)]
+    people: PeopleArg,
     /// Where the picture is written.
     #[arg(long, value_name = "X.png")]
     out: PathBuf,
@@ -128,7 +130,7 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
     let begin = Begin {
         paths: args.path.iter().cloned().collect(),
         study: args.study.clone(),
-        config: Some(settings(args.config.as_deref(), args.preset, None)?),
+        config: Some(args.people.of(&settings(args.config.as_deref(), args.preset, None)?)),
         session: args.session.clone(),
         allow_outside: outside_allowed(),
         ..Begin::default()

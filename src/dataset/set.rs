@@ -19,6 +19,9 @@ pub const MANIFEST_NAME: &str = "dataset.toml";
 /// Maps of frames around others that are kept, bytes.
 const RECENT_BYTES: usize = 64 << 20;
 
+/// Data sets that were opened.
+static OPENED: AtomicU64 = AtomicU64::new(0);
+
 /// What is true of every frame of a data set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DatasetInfo {
@@ -102,7 +105,6 @@ impl Dataset {
     pub(super) fn of(Opened { info, frames, named }: Opened) -> Result<Self, DatasetError> {
         let names = Names::of(&*frames, &info).ok_or_else(|| DatasetError::too_long_names(&info.root))?;
         let (fingerprint, recent) = (OnceLock::new(), Mutex::new(Cache::new(RECENT_BYTES)));
-        static OPENED: AtomicU64 = AtomicU64::new(0);
         let id = OPENED.fetch_add(1, Ordering::Relaxed);
         Ok(Self { id, info, frames, named, names, fingerprint, recent })
     }

@@ -6,3 +6,4 @@ mod blob;
 mod cli;
 mod counter;
 mod identity;
+mod starts;

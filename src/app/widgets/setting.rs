@@ -146,6 +146,12 @@ fn typed(ui: &mut Ui, field: &Field, number: &Number, value: &mut f64) -> Respon
         .speed(speed)
         .max_decimals(if number.whole { 0 } else { 6 })
         .suffix(if number.unit == "m" { " m" } else { number.unit });
+    let drag = match number.zero {
+        Some(word) => drag
+            .custom_formatter(move |x, _| if x == 0.0 { word.to_owned() } else { format!("{x:.0}") })
+            .custom_parser(move |text| if text.trim() == word { Some(0.0) } else { text.trim().parse().ok() }),
+        None => drag,
+    };
     let response = ui.add_sized(VALUE, drag);
     response.named(egui::Role::SpinButton, &format!("{} value", field.label))
 }

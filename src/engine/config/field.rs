@@ -146,6 +146,8 @@ pub struct Number {
     pub logarithmic: bool,
     /// Whether it counts something.
     pub whole: bool,
+    /// What 0 means, where that is no number.
+    pub zero: Option<&'static str>,
     /// What it may be instead.
     pub unset: Option<Unset>,
 }
@@ -268,6 +270,7 @@ impl Field {
     /// A value on screen: numbers with at most four significant digits.
     pub fn told(&self, value: Value) -> String {
         match (value, &self.kind) {
+            (Value::Number(0.0), FieldKind::Number(Number { zero: Some(word), .. })) => (*word).to_owned(),
             (Value::Number(x), _) => short(x),
             (Value::Switch(on), _) => if on { "on" } else { "off" }.to_owned(),
             (Value::Unset, FieldKind::Number(Number { unset: Some(unset), .. })) => unset.answer.label.to_owned(),

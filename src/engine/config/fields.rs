@@ -378,7 +378,10 @@ pub const FIELDS: &[Field] = &[
     },
     Field {
         help: "Persons that are fitted at once; 0 fits as many as are counted.",
-        ..number(Starting, "people", "People", Start, (0.0, 8.0), count_at!(people)).whole().row("people")
+        ..number(Starting, "people", "People", Start, (0.0, 8.0), count_at!(people))
+            .whole()
+            .zero("counted")
+            .row("people")
     },
     Field {
         help: "Postures that are tried at the place of the start, the one with the smallest L_EM is fitted: standing, then for who walks several moments of a stride, for others raised arms and sitting where they are clearly better. 1 is the paper: standing.",

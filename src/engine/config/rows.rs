@@ -11,7 +11,7 @@ pub(super) const fn number(
     range: (f64, f64),
     access: Access,
 ) -> Field {
-    let number = Number { unit: "", range, offered: range, logarithmic: false, whole: false, unset: None };
+    let number = Number { unit: "", range, offered: range, logarithmic: false, whole: false, zero: None, unset: None };
     row(group, key, label, read_by, FieldKind::Number(number), access)
 }
 
@@ -75,6 +75,12 @@ impl Field {
 
     pub(super) const fn whole(self) -> Self {
         let number = Number { whole: true, ..self.as_number() };
+        self.with(number)
+    }
+
+    /// What 0 means, in a word.
+    pub(super) const fn zero(self, zero: &'static str) -> Self {
+        let number = Number { zero: Some(zero), ..self.as_number() };
         self.with(number)
     }
 

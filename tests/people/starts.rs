@@ -1,0 +1,60 @@
+//! Starts of as many as are counted: with the frames before that the counter was taught with, whatever was counted before.
+#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+
+use mhp_inspector::config::{FitConfig, FramesAround, Preset};
+use mhp_inspector::dataset::Dataset;
+use mhp_inspector::start::{FoundStart, count_people, find_start_in, problem_of};
+use mhp_inspector::study::count::count_frames;
+use mhp_inspector::task::Progress;
+use std::path::Path;
+use std::sync::Arc;
+
+fn sample(name: &str) -> Dataset {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples").join(name);
+    Dataset::open(&path, &Progress::new()).unwrap()
+}
+
+fn started(dataset: &Dataset, frame: usize, config: &FitConfig) -> FoundStart {
+    let problem = Arc::new(problem_of(dataset, &dataset.load(frame).unwrap()).unwrap());
+    find_start_in(dataset, frame, &problem, config).unwrap()
+}
+
+#[test]
+fn a_frame_is_counted_alike_in_every_order_and_by_every_command() {
+    let dataset = sample("walk");
+    let rows = count_frames(&dataset, 0..dataset.len(), || {}).unwrap();
+    // Onward, backward, and one alone.
+    let onward: Vec<_> = (0..dataset.len()).map(|frame| count_people(&dataset, frame).unwrap()).collect();
+    for frame in (0..dataset.len()).rev().step_by(5) {
+        assert_eq!(count_people(&dataset, frame).unwrap(), onward[frame], "frame {frame}");
+    }
+    for (row, count) in rows.iter().zip(&onward) {
+        assert_eq!(row.count.as_ref().unwrap().probabilities, count.probabilities, "{}", row.frame);
+        assert_eq!(count.people(), 1, "{}", row.frame);
+    }
+    // Another data set that a thread goes on with is not taken for this one.
+    let other = sample("f3");
+    assert_eq!(count_people(&other, 1).unwrap().people(), 2);
+    assert_eq!(count_people(&dataset, 2).unwrap(), onward[2]);
+}
+
+#[test]
+fn the_recommended_settings_fit_one_counted_person_as_one_that_is_asked_for() {
+    let dataset = sample("walk");
+    let counted = FitConfig { starts: 1, ..Preset::Recommended.config() };
+    assert_eq!(counted.people, 0);
+    for frame in [0, 13, 27] {
+        let found = started(&dataset, frame, &counted);
+        let one = started(&dataset, frame, &FitConfig { people: 1, ..counted });
+        assert_eq!(found.initialisation.params, one.initialisation.params, "frame {frame}");
+        assert!(found.count.is_some_and(|count| count.people() == 1) && one.count.is_none());
+        assert!(found.initialisation.notes[0].starts_with("1 counted (p = 0.9"), "{:?}", found.initialisation.notes);
+    }
+    // Several are as many bodies.
+    let several = started(&sample("f3"), 1, &counted);
+    assert_eq!(several.initialisation.params.shape().persons, 2);
+    // A frame that is to be taken alone is counted alone.
+    let alone = FitConfig { frames_around: FramesAround::None, ..counted };
+    let found = started(&dataset, 13, &alone);
+    assert!(found.count.is_none_or(|count| count.alone));
+}
