@@ -881,3 +881,22 @@ fn panes_give_way_in_a_stated_order_and_come_back() {
         window.named("Filter frames") && window.harness.state().pane_rect(Pane::called("Joint").unwrap()).is_some()
     );
 }
+
+/// What a toolbar switches the palette switches too.
+#[test]
+fn the_palette_switches_how_maps_and_curves_are_drawn() {
+    let mut window = Window::open(1);
+    let mut choose = |words: &str| {
+        window.key_with(Modifiers::COMMAND, Key::K);
+        window.harness.run_steps(2);
+        window.type_text(words);
+        window.key(Key::Enter);
+        window.harness.run_steps(2);
+        window.session().view.clone()
+    };
+    let plain = choose("normal size");
+    assert!(choose("bird's-eye").cube.birds_eye && choose("polar").cube.polar);
+    assert!(choose("cells round").neighbours != plain.neighbours);
+    assert!(choose("logarithmic iterations").log_iterations != plain.log_iterations);
+    assert!(choose("logarithmic losses").log_loss != plain.log_loss);
+}
