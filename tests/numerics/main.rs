@@ -13,6 +13,7 @@ mod initialisation;
 mod limbs;
 mod mmvr;
 mod reference;
+mod signal;
 mod single_precision;
 mod synthesis;
 mod walk;

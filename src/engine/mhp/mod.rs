@@ -12,7 +12,7 @@
 //! 2. a joint in a view: `triad.rs`, `gaussian.rs`, `splat.rs`, `adjoint.rs`; the skin between the joints, `skin.rs`
 //! 3. cells: `kernel.rs`, `tiles/mod.rs`, `cell_box.rs`; masks and levels over them, `levels.rs`, `em.rs`
 //! 4. what the maps of a frame and those around it show: `region.rs`, `template.rs`, `context/mod.rs`
-//! 5. a frame: `frame_em.rs`, `problem.rs`, `simulate.rs`
+//! 5. a frame: `frame_em.rs`, `problem.rs`, `simulate.rs`, `signal.rs`
 //! 6. the objective: `objective.rs`; a window of frames: `motion/mod.rs`
 //! 7. the fit: `convergence.rs`, `articulation.rs`, `adam.rs`, `fitter.rs`; and the start of one: `init/mod.rs`
 //!
@@ -47,6 +47,7 @@ mod percentile;
 mod problem;
 mod region;
 mod scalar;
+mod signal;
 mod simulate;
 mod skin;
 mod splat;
@@ -70,6 +71,7 @@ pub use objective::{Masks, Objective, masks};
 pub use percentile::{percentile, percentiles};
 pub use problem::Problem;
 pub use region::Region;
+pub use signal::{CellValue, simulate_signal};
 pub use simulate::simulate;
 pub use terms::{Hue, Scope, TERMS, Term, TermGroup, TermId, Terms, Weight, formula};
 pub use tiles::simd_path;

@@ -209,6 +209,11 @@ impl<'a> ViewModel<'a> {
 }
 
 impl ViewModel<'_> {
+    /// The variance of axis `k` whose width does not come through Σ', bins².
+    pub(super) fn own_variance(&self, k: usize) -> f64 {
+        self.own_variance.get(k).copied().unwrap_or(0.0)
+    }
+
     /// Number of axes, 1 to 3.
     pub(super) fn dims(&self) -> usize {
         self.view.axes.len().min(3)
@@ -496,7 +501,7 @@ pub(super) fn feature_at(bin: usize, bins: usize, features: usize) -> (usize, f6
 }
 
 /// ω(t) − ω̄ a bin.
-fn spectrum_of(omega: &[f64], bins: usize) -> impl Iterator<Item = f64> {
+pub(super) fn spectrum_of(omega: &[f64], bins: usize) -> impl Iterator<Item = f64> {
     let mean = mean(omega);
     (0..bins).map(move |bin| {
         let (lower, t) = feature_at(bin, bins, omega.len());

@@ -5,35 +5,81 @@
 //! minima, at evenly spaced frequencies. Zero padding interpolates the lobe and does not change its width, so that the width
 //! is stated in *natural* bins (cycles over the number of samples) and then in metres, radians and metres a second.
 
-use super::window::response;
-use super::{PointSpread, RadarConfig, SPEED_OF_LIGHT, Window};
+use super::{AxisKind, PointSpread, RadarConfig, SPEED_OF_LIGHT, Window};
+use num_complex::Complex64;
+use rustfft::FftPlanner;
+use std::f64::consts::PI;
 
 /// Points of the lobe that the least squares sum over.
 const LOBE_POINTS: usize = 400;
-/// Step of the search for the first minimum, natural bins.
-const SEARCH_STEP: f64 = 1.0 / 64.0;
+/// Zero padding of the spectrum that the lobe is read from: points a natural bin.
+const POINTS_A_BIN: usize = 128;
+
+/// Samples from which on a lobe in natural bins changes by less than 3e−4.
+const MOST_POINTS: usize = 4096;
+
+/// The main lobe of `window` over `n` samples by a zero-padded FFT, relative to its peak and about the middle sample, where a
+/// symmetric window's spectrum is real: [`POINTS_A_BIN`] points a natural bin, from the peak to half the sampling rate.
+fn spectrum(window: Window, n: usize) -> Vec<f64> {
+    let n = n.min(MOST_POINTS);
+    let weights = window.weights(n);
+    let length = POINTS_A_BIN * n.max(1);
+    let mut line: Vec<Complex64> = weights.iter().map(|&w| Complex64::new(w, 0.0)).collect();
+    line.resize(length, Complex64::ZERO);
+    FftPlanner::new().plan_fft_forward(length).process(&mut line);
+    let peak = weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let turn = PI * (n as f64 - 1.0) / length as f64;
+    let centred = |(k, x): (usize, &Complex64)| (x * Complex64::cis(turn * k as f64)).re / peak;
+    line.iter().take(length / 2 + 1).enumerate().map(centred).collect()
+}
+
+/// Where the lobe of a spectrum ends, in natural bins: where it crosses 0, or turns before that; half the number of samples where
+/// it does neither.
+fn first_minimum(spectrum: &[f64]) -> f64 {
+    let ends = |i: &usize| spectrum[i + 1] <= 0.0 || spectrum[*i] <= spectrum[i - 1] && spectrum[*i] < spectrum[i + 1];
+    let Some(at) = (1..spectrum.len().saturating_sub(1)).find(ends) else {
+        return spectrum.len().saturating_sub(1) as f64 / POINTS_A_BIN as f64;
+    };
+    let [l, m, h] = [at - 1, at, at + 1].map(|i| spectrum[i]);
+    let shift = if h <= 0.0 && m > h {
+        m / (m - h)
+    } else if l - 2.0 * m + h > 0.0 {
+        0.5 * (l - h) / (l - 2.0 * m + h)
+    } else {
+        0.0
+    };
+    (at as f64 + shift) / POINTS_A_BIN as f64
+}
 
 /// Where the main lobe of `window` over `n` samples ends: the first minimum of its amplitude, in natural bins. Half the
 /// number of samples where it never turns up again (n < 3).
 pub fn first_null_bins(window: Window, n: usize) -> f64 {
-    let weights = window.weights(n);
-    let amplitude = |bins: f64| response(&weights, bins);
-    let limit = n as f64 / 2.0;
-    let mut bins = SEARCH_STEP;
-    while bins + SEARCH_STEP < limit && amplitude(bins + SEARCH_STEP) <= amplitude(bins) {
-        bins += SEARCH_STEP;
-    }
-    minimise(amplitude, bins - SEARCH_STEP, (bins + SEARCH_STEP).min(limit))
+    first_minimum(&spectrum(window, n))
 }
 
 /// Standard deviation, in natural bins, of the unit-peak Gaussian closest to the main lobe of `window` over `n` samples.
 pub fn main_lobe_sigma_bins(window: Window, n: usize) -> f64 {
-    let weights = window.weights(n);
-    let null = first_null_bins(window, n);
+    let spectrum = spectrum(window, n);
+    let null = first_minimum(&spectrum);
+    // Between the points by the cubic through the four nearest; the amplitude is even.
+    let point = |i: i64| spectrum.get(i.unsigned_abs() as usize).copied().unwrap_or(0.0);
+    let amplitude = |bins: f64| {
+        let at = bins * POINTS_A_BIN as f64;
+        let (below, t) = (at.floor() as i64, at - at.floor());
+        let [a, b, c, d] = [-1, 0, 1, 2].map(|k| point(below + k));
+        let (u, v, w) = (t + 1.0, t - 1.0, t - 2.0);
+        (-a * t * v * w + 3.0 * b * u * v * w - 3.0 * c * u * t * w + d * u * t * v) / 6.0
+    };
     let lobe: Vec<(f64, f64)> = (0..LOBE_POINTS)
         .map(|i| null * (i as f64 + 0.5) / LOBE_POINTS as f64)
-        .map(|bins| (bins, response(&weights, bins)))
+        .map(|bins| (bins, amplitude(bins)))
         .collect();
+    closest_sigma(&lobe, null)
+}
+
+/// Standard deviation of the unit-peak Gaussian about 0 that is closest to (place, amplitude) points of a lobe which ends at
+/// `null`.
+pub(super) fn closest_sigma(lobe: &[(f64, f64)], null: f64) -> f64 {
     let misfit = |sigma: f64| lobe.iter().map(|(b, a)| (a - (-b * b / (2.0 * sigma * sigma)).exp()).powi(2)).sum();
     minimise(misfit, 0.05 * null, null)
 }
@@ -53,8 +99,11 @@ pub fn range_sigma_m(window: Window, samples: usize, bandwidth_hz: f64) -> f64 {
     main_lobe_sigma_bins(window, samples) * SPEED_OF_LIGHT / (2.0 * bandwidth_hz)
 }
 
-/// σ_dop, m/s: `chirps` chirps, one every `chirp_interval_s`.
+/// σ_dop, m/s: `chirps` chirps, one every `chirp_interval_s`; 0 where one chirp resolves no speed.
 pub fn doppler_sigma_mps(window: Window, chirps: usize, chirp_interval_s: f64, wavelength_m: f64) -> f64 {
+    if chirps < 2 {
+        return 0.0;
+    }
     main_lobe_sigma_bins(window, chirps) * wavelength_m / (2.0 * chirps as f64 * chirp_interval_s)
 }
 
@@ -90,6 +139,91 @@ impl FftSetup {
             elevation_rad: sine(self.elevation, radar.l_el_m),
             doppler_mps: doppler_sigma_mps(taper, chirps, radar.frame_s / chirps as f64, wavelength),
         }
+    }
+}
+
+/// The FFT configuration of a view: what its widths are computed from, and what the signal-level path runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewFft {
+    /// Samples, chirps, elements and their tapers.
+    pub setup: FftSetup,
+    /// The chirp and the spacings that they are of.
+    pub radar: RadarConfig,
+}
+
+/// What a view resolves with an FFT of its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Resolved {
+    /// Samples, chirps or elements N.
+    pub count: usize,
+    /// Their taper.
+    pub window: Window,
+    /// What one bin of an FFT of N points is: m, m/s, or a sine.
+    pub natural: f64,
+}
+
+impl ViewFft {
+    /// Whether a view with these axes has an angle along y, and one along z.
+    pub fn angles(kinds: impl Iterator<Item = AxisKind>) -> [bool; 2] {
+        let mut seen = [false; 2];
+        for kind in kinds {
+            seen[0] |= matches!(kind, AxisKind::Azimuth | AxisKind::Cone | AxisKind::Y);
+            seen[1] |= matches!(kind, AxisKind::Elevation | AxisKind::Z);
+        }
+        seen
+    }
+
+    /// This configuration for a view with these axes: an angle that they do not resolve has no FFT.
+    pub fn for_axes(&self, kinds: impl Iterator<Item = AxisKind>) -> Self {
+        let [horizontal, vertical] = Self::angles(kinds);
+        let setup = FftSetup {
+            azimuth: self.setup.azimuth.filter(|_| horizontal),
+            elevation: self.setup.elevation.filter(|_| vertical),
+            ..self.setup
+        };
+        Self { setup, radar: self.radar.clone() }
+    }
+
+    /// The widths that follow from it.
+    pub fn point_spread(&self) -> PointSpread {
+        self.setup.point_spread(&self.radar)
+    }
+
+    /// The FFT behind an axis of that kind; `None` where nothing resolves it.
+    pub fn resolved(&self, kind: AxisKind) -> Option<Resolved> {
+        let (radar, wavelength) = (&self.radar, self.radar.wavelength_m());
+        let sine = |(count, window): (usize, Window), spacing: f64| Resolved {
+            count,
+            window,
+            natural: wavelength / (count as f64 * spacing),
+        };
+        match kind {
+            AxisKind::Azimuth | AxisKind::Cone | AxisKind::Y => self.setup.azimuth.map(|set| sine(set, radar.l_az_m)),
+            AxisKind::Elevation | AxisKind::Z => self.setup.elevation.map(|set| sine(set, radar.l_el_m)),
+            AxisKind::Doppler => {
+                let (count, window) = self.setup.doppler;
+                (count > 1).then(|| Resolved { count, window, natural: wavelength / (2.0 * radar.frame_s) })
+            }
+            AxisKind::Range | AxisKind::X | AxisKind::DepthH | AxisKind::DepthV => {
+                let (count, window) = self.setup.range;
+                Some(Resolved { count, window, natural: radar.range_resolution_m() })
+            }
+        }
+    }
+
+    /// In words: samples, chirps and elements with their windows.
+    pub fn words(&self) -> String {
+        let FftSetup { range, doppler, azimuth, elevation } = self.setup;
+        let mut parts = vec![format!("{} samples {}", range.0, range.1.name())];
+        if doppler.0 > 1 {
+            parts.push(format!("{} chirps {}", doppler.0, doppler.1.name()));
+        }
+        for (set, along) in [(azimuth, "along y"), (elevation, "along z")] {
+            if let Some((count, window)) = set {
+                parts.push(format!("{count} elements {along} {}", window.name()));
+            }
+        }
+        parts.join(", ")
     }
 }
 

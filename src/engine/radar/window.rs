@@ -24,6 +24,35 @@ pub enum Window {
 }
 
 impl Window {
+    /// The names in manifests: those of [`Self::named`].
+    pub const NAMES: &str =
+        "\"rectangular\", \"hann\", \"hamming\", \"blackman\" or \"chebyshev-30\" (sidelobes 30 dB down)";
+
+    /// The window of a name in manifests.
+    pub fn named(name: &str) -> Option<Self> {
+        let level = |text: &str| text.parse().ok().filter(|db| (10.0..=120.0).contains(db));
+        match name {
+            "rectangular" => Some(Self::Rectangular),
+            "hann" => Some(Self::Hann),
+            "hamming" => Some(Self::Hamming),
+            "blackman" => Some(Self::Blackman),
+            other => {
+                other.strip_prefix("chebyshev-").and_then(level).map(|sidelobe_db| Self::Chebyshev { sidelobe_db })
+            }
+        }
+    }
+
+    /// The name in manifests.
+    pub fn name(self) -> String {
+        match self {
+            Self::Rectangular => "rectangular".into(),
+            Self::Hann => "hann".into(),
+            Self::Hamming => "hamming".into(),
+            Self::Blackman => "blackman".into(),
+            Self::Chebyshev { sidelobe_db } => format!("chebyshev-{sidelobe_db}"),
+        }
+    }
+
     /// The `n` weights. One sample has weight 1; none gives an empty vector.
     pub fn weights(self, n: usize) -> Vec<f64> {
         if n < 2 {
@@ -95,6 +124,18 @@ mod tests {
 
     const ALL: [Window; 5] =
         [Window::Rectangular, Window::Hann, Window::Hamming, Window::Blackman, Window::Chebyshev { sidelobe_db: 30.0 }];
+
+    #[test]
+    fn names_are_read_back() {
+        for window in ALL {
+            assert_eq!(Window::named(&window.name()), Some(window), "{window:?}");
+        }
+        assert!(
+            ["Hann", "", "chebyshev-", "chebyshev-nan", "chebyshev-1e9"]
+                .iter()
+                .all(|name| Window::named(name).is_none())
+        );
+    }
 
     #[test]
     fn weights_are_symmetric_and_at_most_one() {
