@@ -1,10 +1,10 @@
 //! `info`: what a data set is and what its first frame holds, as text for people or JSON for programs.
 
 use super::common::{open, print, print_json};
-use crate::dataset::{Dataset, DatasetInfo, Frame, Heatmap, view_words};
+use crate::dataset::{Dataset, DatasetInfo, FftText, Frame, Heatmap, ViewCalibration, view_words};
 use crate::escape::one_line;
 use crate::labels::{LabelPlace, LabelStore};
-use crate::radar::View;
+use crate::radar::{PointSpread, View};
 use anyhow::Context as _;
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -93,7 +93,8 @@ fn label_notes(dataset: &Dataset) -> Vec<String> {
 
 fn as_json(dataset: &Dataset, frame: &Frame, label_notes: &[String]) -> Value {
     let info = dataset.info();
-    let views: Vec<Value> = info.views.iter().zip(&frame.maps).map(|(view, map)| view_json(view, map)).collect();
+    let views = info.views.iter().zip(&frame.maps).enumerate();
+    let views: Vec<Value> = views.map(|(k, (view, map))| view_json(view, map, &info.calibration(k))).collect();
     let skeleton = &info.skeleton;
     json!({
         "name": info.name,
@@ -129,7 +130,7 @@ fn as_json(dataset: &Dataset, frame: &Frame, label_notes: &[String]) -> Value {
     })
 }
 
-fn view_json(view: &View, map: &Heatmap) -> Value {
+fn view_json(view: &View, map: &Heatmap, calibration: &ViewCalibration) -> Value {
     let values = Values::of(map);
     json!({
         "array": view.array,
@@ -139,6 +140,8 @@ fn view_json(view: &View, map: &Heatmap) -> Value {
         "axes": view.axes,
         "axes_in_words": view_words(view),
         "psf": view.psf,
+        "psf_source": if calibration.derived { "derived" } else { "stated" },
+        "fft": calibration.fft.as_ref().map(FftText::of),
         "rotation": view.pose.rotation,
         "translation": view.pose.translation,
         "region": view.region,
@@ -166,6 +169,19 @@ fn labels(info: &DatasetInfo, frame: &Frame) -> Vec<String> {
         labels.extend(kinds.iter().filter(|kind| kind.0 > 0).map(|&(n, one, many)| counted(n, one, many)));
     }
     labels
+}
+
+/// The point-spread widths that are not 0.
+fn width_words(psf: &PointSpread) -> String {
+    let widths = [
+        ("range", 100.0 * psf.range_m, "cm"),
+        ("azimuth", psf.azimuth_rad.to_degrees(), "°"),
+        ("elevation", psf.elevation_rad.to_degrees(), "°"),
+        ("speed", psf.doppler_mps, "m/s"),
+    ];
+    let shown = widths.iter().filter(|(_, width, _)| *width > 0.0);
+    let words: Vec<String> = shown.map(|(name, width, unit)| format!("{name} {width:.3} {unit}")).collect();
+    if words.is_empty() { "none".into() } else { words.join(", ") }
 }
 
 fn counted(n: usize, one: &str, many: &str) -> String {
@@ -220,7 +236,7 @@ fn as_text(dataset: &Dataset, frame: &Frame, label_notes: &[String]) -> String {
     for text in &frame.notes {
         line("note", text);
     }
-    for (view, map) in info.views.iter().zip(&frame.maps) {
+    for (k, (view, map)) in info.views.iter().zip(&frame.maps).enumerate() {
         let values = Values::of(map);
         let shape = map.shape.iter().map(usize::to_string).collect::<Vec<_>>().join("×");
         line("", "");
@@ -233,6 +249,7 @@ fn as_text(dataset: &Dataset, frame: &Frame, label_notes: &[String]) -> String {
             let words = crate::dataset::axis_words(axis, &singular);
             line(&format!("  {plural}"), &format!("{words}; {} bins of {:.4}", axis.bins, axis.step().abs()));
         }
+        line("  widths", &format!("{}, {}", width_words(&view.psf), info.calibration(k).words()));
         let range = values.range().map_or_else(|| "no finite cell".into(), |(lo, hi)| format!("{lo:.4e} to {hi:.4e}"));
         line("  values", &range);
         let other = values.cells - values.finite - values.nan;

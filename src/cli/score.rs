@@ -4,7 +4,7 @@ use super::common::{PrecisionArg, config, inputs, open, print_json};
 use crate::body::{Group, Pppr};
 use crate::dataset::npz::{ArrayView, write};
 use crate::dataset::read_pppr;
-use crate::mhp::{Evaluation, Objective, Problem, TERMS, simulate};
+use crate::mhp::{CellValue, Evaluation, Objective, Problem, TERMS, simulate, simulate_signal};
 use crate::radar::View;
 use crate::start::problem_of;
 use anyhow::Context as _;
@@ -22,7 +22,9 @@ Examples:
   mhp-inspector score --dataset case --frame 0 --params case/params.npz --out answer.npz
       Maps, losses and gradients at these parameters, with the default configuration.
   mhp-inspector score --dataset case --frame 0 --params p.npz --config fit.toml --precision f32 --out a.npz
-      The same under other settings, in single precision.";
+      The same under other settings, in single precision.
+  mhp-inspector score --dataset case --frame 0 --params p.npz --signal --out a.npz
+      Also the maps that the signals themselves give, which the closed form approximates.";
 
 /// What `score --help` says it does.
 pub(super) fn about() -> String {
@@ -60,6 +62,10 @@ pub struct ScoreArgs {
     /// A manifest (as `dataset.toml`) that says what the data set is, instead of its own or the preset.
     #[arg(long, value_name = "FILE")]
     manifest: Option<PathBuf>,
+    /// Also write `signal_<array>`: the same joints as signals over samples, chirps and antennas through windowed FFTs, the exact
+    /// version of the closed form. Every view needs an FFT configuration (`[view.fft]` in a manifest).
+    #[arg(long)]
+    signal: bool,
 }
 
 /// Runs `score`.
@@ -84,7 +90,11 @@ pub(super) fn run(args: &ScoreArgs) -> anyhow::Result<ExitCode> {
         tracing::warn!("{warning}");
     }
     let evaluation = objective.evaluate(&params);
-    let maps = simulate(&problem, &config, precision, &params);
+    let mut maps = vec![("sim", simulate(&problem, &config, precision, &params))];
+    if args.signal {
+        let ffts = dataset.info().ffts();
+        maps.push(("signal", simulate_signal(&problem, &ffts, &config, &params, CellValue::Centre)?));
+    }
     let scalars = scalars(&problem.views, &evaluation);
     write_answer(args, &problem, &evaluation, &maps, &scalars)?;
     let json: Map<String, Value> = scalars.into_iter().map(|(key, x)| (key, Value::from(x))).collect();
@@ -105,12 +115,14 @@ fn write_answer(
     args: &ScoreArgs,
     problem: &Problem,
     evaluation: &Evaluation,
-    maps: &[Vec<f64>],
+    maps: &[(&str, Vec<Vec<f64>>)],
     scalars: &[(String, f64)],
 ) -> anyhow::Result<()> {
     let mut arrays: Vec<(String, ArrayView<'_>)> = Vec::new();
-    for (view, map) in problem.views.iter().zip(maps) {
-        arrays.push((format!("sim_{}", view.array), ArrayView::f64(&view.shape(), map)));
+    for (prefix, maps) in maps {
+        for (view, map) in problem.views.iter().zip(maps) {
+            arrays.push((format!("{prefix}_{}", view.array), ArrayView::f64(&view.shape(), map)));
+        }
     }
     for (key, value) in scalars {
         arrays.push((key.clone(), ArrayView::f64(&[], std::slice::from_ref(value))));

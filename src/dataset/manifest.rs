@@ -4,13 +4,14 @@
 
 use super::DatasetError;
 use super::adc::AdcText;
+use super::calibration::{FftText, RadarPreset, ViewCalibration, fft_fault};
 use super::layout::{LAYOUTS, Layout};
 use super::npz::MAX_ELEMENTS;
 use super::set::MANIFEST_NAME;
 use crate::body::Skeleton;
 use crate::geometry::{IDENTITY, Mat3, Pose, Vec3, dot};
 use crate::input::{MOST_TEXT, read_text};
-use crate::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
+use crate::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View, ViewFft};
 use serde::de::{self, MapAccess, Visitor, value::MapAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::f64::consts::TAU;
@@ -46,6 +47,8 @@ pub struct Manifest {
     pub radar: Option<RadarConfig>,
     /// The views; empty where the layout's own are meant.
     pub views: Vec<View>,
+    /// Where the widths of each come from.
+    pub calibrations: Vec<ViewCalibration>,
     /// What is said of a raw capture.
     pub capture: Option<AdcText>,
 }
@@ -59,7 +62,7 @@ struct ManifestText {
     frames: Option<Spanned<String>>,
     frame_rate_hz: Option<Spanned<f64>>,
     skeleton: Option<Spanned<SkeletonText>>,
-    radar: Option<Spanned<RadarConfig>>,
+    radar: Option<Spanned<RadarText>>,
     #[serde(default)]
     view: Vec<Spanned<ViewText>>,
     capture: Option<AdcText>,
@@ -72,7 +75,10 @@ pub(super) struct ViewText {
     array: String,
     #[serde(default)]
     quantity: Quantity,
-    psf: PointSpread,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    psf: Option<PointSpread>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    fft: Option<Spanned<FftText>>,
     #[serde(default = "identity")]
     rotation: Mat3,
     #[serde(default)]
@@ -98,13 +104,40 @@ impl ViewText {
     pub(super) fn into_view(self) -> View {
         let pose = Pose { rotation: self.rotation, translation: self.translation };
         let axes = self.axes.into_iter().map(Spanned::into_inner).collect();
-        View { array: self.array, quantity: self.quantity, psf: self.psf, pose, axes, region: self.region }
+        let psf = self.psf.unwrap_or_default();
+        View { array: self.array, quantity: self.quantity, psf, pose, axes, region: self.region }
     }
 
     pub(super) fn of(view: &View) -> Self {
         let View { array, quantity, psf, pose, axes, region } = view.clone();
         let axes = axes.into_iter().map(|axis| Spanned::new(0..0, axis)).collect();
-        Self { array, quantity, psf, rotation: pose.rotation, translation: pose.translation, axes, region }
+        let psf = Some(psf);
+        Self { array, quantity, psf, fft: None, rotation: pose.rotation, translation: pose.translation, axes, region }
+    }
+}
+
+/// A radar's name, or a table.
+enum RadarText {
+    Named(String),
+    Said(RadarConfig),
+}
+
+impl<'de> Deserialize<'de> for RadarText {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = RadarText;
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                write!(f, "the name of a radar or a table")
+            }
+            fn visit_str<E: de::Error>(self, name: &str) -> Result<RadarText, E> {
+                Ok(RadarText::Named(name.to_owned()))
+            }
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<RadarText, A::Error> {
+                RadarConfig::deserialize(MapAccessDeserializer::new(map)).map(RadarText::Said)
+            }
+        }
+        deserializer.deserialize_any(Either)
     }
 }
 
@@ -164,9 +197,25 @@ impl Manifest {
         if let Some(rate) = &parsed.frame_rate_hz {
             check(outside("frame_rate_hz", *rate.get_ref(), 1e-6, 1e6), rate.span())?;
         }
-        if let Some(radar) = &parsed.radar {
-            check(radar_fault(radar.get_ref()).map(|m| format!("[radar]: {m}")), radar.span())?;
-        }
+        let mut preset = None;
+        let radar = match &parsed.radar {
+            None => None,
+            Some(said) => Some(match said.get_ref() {
+                RadarText::Said(radar) => {
+                    check(radar_fault(radar).map(|m| format!("[radar]: {m}")), said.span())?;
+                    radar.clone()
+                }
+                RadarText::Named(name) => {
+                    let named = RadarPreset::named(name).map_err(|error| match error {
+                        DatasetError::Manifest { message, line: None, path } if *path == **name => {
+                            fault(format!("`radar`: {message}"), Some(said.span()))
+                        }
+                        other => other,
+                    })?;
+                    preset.insert(named).radar.clone()
+                }
+            }),
+        };
         if let Some(skeleton) = &parsed.skeleton {
             check(skeleton.get_ref().0.fault().map(|m| format!("[skeleton]: {m}")), skeleton.span())?;
         }
@@ -176,12 +225,13 @@ impl Manifest {
         if let Some(one_more) = parsed.view.get(MAX_VIEWS) {
             check(Some(format!("more than {MAX_VIEWS} views; expected at most so many")), one_more.span())?;
         }
-        let mut views: Vec<View> = Vec::new();
+        let (mut views, mut calibrations): (Vec<View>, Vec<ViewCalibration>) = (Vec::new(), Vec::new());
         for spanned in parsed.view {
             let span = spanned.span();
-            let text = spanned.into_inner();
+            let mut text = spanned.into_inner();
             let lines: Vec<Range<usize>> = text.axes.iter().map(Spanned::span).collect();
-            let view = text.into_view();
+            let (said, fft) = (text.psf.is_some(), text.fft.take());
+            let mut view = text.into_view();
             let twice = views.iter().any(|other| other.array == view.array);
             let twice = twice.then(|| format!("view `{}` is described twice", view.array));
             check(twice, span.clone())?;
@@ -189,7 +239,54 @@ impl Manifest {
                 let at = axis.and_then(|axis| lines.get(axis).cloned()).unwrap_or(span);
                 return Err(fault(message, Some(at)));
             }
+            let preset = preset.as_ref();
+            let fft_said = fft;
+            let (fft, at, padding) = match (&fft_said, preset) {
+                (Some(text), _) => {
+                    let known = || parsed.layout.preset().ok().and_then(|preset| preset.radar);
+                    let chirp = radar.clone().or_else(known).ok_or_else(|| {
+                        let message = format!("view `{}`: [view.fft] needs a chirp; expected [radar]", view.array);
+                        fault(message, Some(text.span()))
+                    })?;
+                    let wrong = |m: String| fault(format!("view `{}`: [view.fft]: {m}", view.array), Some(text.span()));
+                    let (fft, padding) = text.get_ref().resolve(&chirp).map_err(wrong)?;
+                    (Some(fft), text.span(), padding)
+                }
+                (None, Some(preset)) => {
+                    (preset.view_fft().map_err(|m| fault(m, Some(span.clone())))?, span.clone(), [None; 3])
+                }
+                (None, None) => (None, span.clone(), [None; 3]),
+            };
+            let fft = fft.map(|fft| fft.for_axes(view.axes.iter().map(|axis| axis.kind)));
+            let refined = preset.and_then(|preset| preset.psf).filter(|_| fft_said.is_none());
+            let derived = !said && refined.is_none();
+            match &fft {
+                // What a preset's radar does not resolve, widths that are stated may.
+                Some(fft) if derived || padding != [None; 3] => {
+                    let wrong = fft_fault(&view, fft, padding).map(|m| format!("view `{}`: {m}", view.array));
+                    check(wrong, at)?;
+                }
+                None if !said && refined.is_none() => {
+                    let message =
+                        format!("view `{}`: missing key `psf`, or [view.fft] from which it follows", view.array);
+                    return Err(fault(message, Some(span)));
+                }
+                _ => {}
+            }
+            if let Some(fft) = fft.as_ref().filter(|_| derived) {
+                view.psf = fft.point_spread();
+            } else if let Some(psf) = refined.filter(|_| !said) {
+                let [horizontal, vertical] = ViewFft::angles(view.axes.iter().map(|axis| axis.kind));
+                let only = |on: bool, width: f64| if on { width } else { 0.0 };
+                let (azimuth_rad, elevation_rad) =
+                    (only(horizontal, psf.azimuth_rad), only(vertical, psf.elevation_rad));
+                view.psf = PointSpread { azimuth_rad, elevation_rad, ..psf };
+            }
+            if let Some(message) = psf_fault(&view) {
+                return Err(fault(format!("view `{}`: {message}", view.array), Some(span)));
+            }
             views.push(view);
+            calibrations.push(ViewCalibration { fft, derived });
             check(cells_fault(&views), span)?;
         }
         let frames_line = parsed.frames.as_ref().map(|frames| line_of(text, frames.span().start));
@@ -209,8 +306,9 @@ impl Manifest {
             frames_line,
             frame_rate_hz: parsed.frame_rate_hz.map(Spanned::into_inner),
             skeleton: parsed.skeleton.map(|skeleton| skeleton.into_inner().0),
-            radar: parsed.radar.map(Spanned::into_inner),
+            radar,
             views,
+            calibrations,
             capture: parsed.capture,
         })
     }
@@ -237,6 +335,7 @@ impl Manifest {
             skeleton: None,
             radar: None,
             views: Vec::new(),
+            calibrations: Vec::new(),
             capture: None,
         }
     }
@@ -248,7 +347,7 @@ fn line_of(text: &str, offset: usize) -> usize {
 }
 
 /// `unknown field` is the parser's word; a manifest has keys.
-fn in_our_words(message: &str) -> String {
+pub(super) fn in_our_words(message: &str) -> String {
     let message = message.trim_end().replace('\n', "; ");
     match message.strip_prefix("unknown field ") {
         Some(rest) => format!("unknown key {}", rest.replacen(", expected", "; expected", 1)),
@@ -266,7 +365,7 @@ fn outside(key: &str, value: f64, least: f64, most: f64) -> Option<String> {
 }
 
 /// The bounds are wider than any radar that exists, and narrow enough for their products to stay finite.
-fn radar_fault(radar: &RadarConfig) -> Option<String> {
+pub(super) fn radar_fault(radar: &RadarConfig) -> Option<String> {
     let numbers = [
         ("start_hz", radar.start_hz, 1e6, 1e13),
         ("bandwidth_hz", radar.bandwidth_hz, 1.0, 1e13),
@@ -330,7 +429,12 @@ pub(super) fn cells_fault(views: &[View]) -> Option<String> {
 }
 
 fn psf_fault(view: &View) -> Option<String> {
-    let PointSpread { range_m, azimuth_rad, elevation_rad, doppler_mps } = view.psf;
+    widths_fault(&view.psf).map(|message| format!("psf {message}"))
+}
+
+/// What is wrong with widths, naming the key.
+pub(super) fn widths_fault(psf: &PointSpread) -> Option<String> {
+    let PointSpread { range_m, azimuth_rad, elevation_rad, doppler_mps } = *psf;
     let widths = [
         ("range_m", range_m, 100.0),
         ("azimuth_rad", azimuth_rad, TAU),
@@ -338,7 +442,7 @@ fn psf_fault(view: &View) -> Option<String> {
         ("doppler_mps", doppler_mps, MAX_SPEED_MPS),
     ];
     let bad = widths.into_iter().find(|(_, value, most)| !(0.0..=*most).contains(value));
-    bad.map(|(key, value, most)| format!("psf `{key}` is {value}; expected 0 to {most:.4}"))
+    bad.map(|(key, value, most)| format!("`{key}` is {value}; expected 0 to {most:.4}"))
 }
 
 /// A rotation keeps lengths and angles; a mirror does too, and is let pass.

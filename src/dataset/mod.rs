@@ -9,13 +9,14 @@
 //! points and masks shown as what they are, image pixels; neither chirp nor point-spread function is published. *HuPR*:
 //! `single_<k>/{hori,vert}/*.npy` cubes; the map is the amplitude at the elevation bin where all twelve antennas sum, which side
 //! is left is assumed. *XRF55*: stacks of 17 maps, assumed to be range × azimuth, as the data set publishes no axes. The loaders of the
-//! last two are tested on files synthesised in the published form, no real file was at hand. *Captures* of a DCA1000: the configuration
-//! beside them says the chirp; which side is left and the antennas' places are assumed. *Generic*: a folder with
+//! last two are tested on files synthesised in the published form, no real file was at hand. *Captures* of a DCA1000 or a cascade, and
+//! cubes of samples: the configuration beside them, or `[capture.chirp]`, says the chirp; which side is left and the antennas' places are assumed. *Generic*: a folder with
 //! `dataset.toml` and one npz a frame; `samples/walk/dataset.toml` has every key. What is assumed is said on screen and by `info`.
 
 pub mod adc;
 mod axes_text;
 mod cache;
+mod calibration;
 mod error;
 mod frame;
 mod inputs;
@@ -37,6 +38,7 @@ pub const MAX_PERSONS: usize = 256;
 
 pub use axes_text::{axes_badge, axis_position, axis_words, system_words, view_words};
 pub use cache::{Cache, DEFAULT_BUDGET, FrameCache};
+pub use calibration::{ArrayText, FftText, RadarPreset, SweepText, ViewCalibration, user_radars};
 pub use error::DatasetError;
 pub use frame::{Frame, Heatmap, ImageAnnotations, Truth, map_cells};
 pub use job::OpenJob;

@@ -1,13 +1,14 @@
 //! `Dataset`: what was opened, and its frames one at a time.
 
+use super::adc::ChainStages;
 use super::cache::Cache;
 use super::layout::{DataFolder, FrameSource, LAYOUTS, Layout, Opened, open_unknown};
 use super::manifest::Manifest;
 use super::names::Names;
-use super::{DatasetError, Frame, Heatmap};
+use super::{DatasetError, Frame, Heatmap, ViewCalibration};
 use crate::body::Skeleton;
 use crate::digest;
-use crate::radar::{RadarConfig, ViewSet};
+use crate::radar::{RadarConfig, ViewFft, ViewSet};
 use crate::task::Progress;
 use sha2::{Digest as _, Sha256};
 use std::path::{Path, PathBuf};
@@ -39,12 +40,26 @@ pub struct DatasetInfo {
     pub radar: RadarConfig,
     /// The maps of a frame, in the order of [`Frame::maps`].
     pub views: ViewSet,
+    /// Where the widths of each view come from; views that are not listed state theirs.
+    pub calibrations: Vec<ViewCalibration>,
     /// The convention of the axes in words.
     pub axes_badge: String,
     /// What was assumed because the data set does not publish it.
     pub assumptions: Vec<String>,
     /// What was found on opening that somebody should know: folders that could not be read.
     pub notes: Vec<String>,
+}
+
+impl DatasetInfo {
+    /// Where the widths of a view come from.
+    pub fn calibration(&self, view: usize) -> ViewCalibration {
+        self.calibrations.get(view).cloned().unwrap_or_default()
+    }
+
+    /// The FFT configuration of each view, where it is known.
+    pub fn ffts(&self) -> Vec<Option<ViewFft>> {
+        (0..self.views.len()).map(|view| self.calibration(view).fft).collect()
+    }
 }
 
 /// How a data set is opened.
@@ -187,6 +202,24 @@ impl Dataset {
         }
         let frame = self.frames.load(i, &self.info)?;
         Ok(Frame { index: i, name: self.frame_name(i).to_owned(), ..frame })
+    }
+}
+
+impl Dataset {
+    /// Whether its frames are made of the samples of a converter: [`Self::stages`] has something to show.
+    pub fn has_samples(&self) -> bool {
+        self.frames.has_samples()
+    }
+
+    /// The stages of frame `i` from the converter's samples on; `None` where the data set holds maps only.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn stages(&self, i: usize) -> Result<Option<ChainStages>, DatasetError> {
+        if i >= self.len() {
+            return Err(DatasetError::NoSuchFrame { index: i, count: self.len(), path: self.info.root.clone() });
+        }
+        self.frames.stages(i)
     }
 }
 

@@ -147,7 +147,8 @@ impl DataFolder<'_> {
     /// What the manifest says, filled up from its layout's `preset`; what neither says is assumed, and told.
     fn info(&self, preset: &Manifest) -> DatasetInfo {
         let manifest = self.manifest;
-        let views = if manifest.views.is_empty() { &preset.views } else { &manifest.views };
+        let said = if manifest.views.is_empty() { preset } else { manifest };
+        let (views, calibrations) = (&said.views, said.calibrations.clone());
         let mut assumptions = Vec::new();
         let radar = manifest.radar.clone().or_else(|| preset.radar.clone()).unwrap_or_else(|| {
             assumptions.push(
@@ -165,6 +166,7 @@ impl DataFolder<'_> {
             radar,
             axes_badge: axes_badge(views),
             views: views.clone().into(),
+            calibrations,
             assumptions,
             notes: Vec::new(),
         }

@@ -98,6 +98,7 @@ fn open_chosen(catalog: &BareCatalog, choice: &BareChoice) -> Result<Opened, Dat
         axes_badge: axes_badge(&choice.views),
         assumptions: assumptions(&choice.views),
         views: choice.views.clone().into(),
+        calibrations: Vec::new(),
         notes: Vec::new(),
     };
     opened(info, count, choice.first_axis_is_frame)
