@@ -9,7 +9,7 @@ use rand::SeedableRng as _;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-fn shared() -> Option<PathBuf> {
+pub(super) fn shared() -> Option<PathBuf> {
     let named = std::env::var_os("MHP_SHARED").map(PathBuf::from);
     let path = named.unwrap_or_else(|| Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared")).to_owned());
     let there = path.join("data").is_dir();
@@ -19,12 +19,12 @@ fn shared() -> Option<PathBuf> {
     there.then_some(path)
 }
 
-fn open(path: &Path) -> Result<Dataset, DatasetError> {
+pub(super) fn open(path: &Path) -> Result<Dataset, DatasetError> {
     Dataset::open(path, &Progress::new())
 }
 
 /// Three transmitters, the raised one last, as captures often have them.
-fn chirp() -> ChirpSettings {
+pub(super) fn chirp() -> ChirpSettings {
     ChirpSettings {
         start_hz: 77e9,
         slope_hz_per_s: 60.5e12,
@@ -41,7 +41,7 @@ fn chirp() -> ChirpSettings {
 }
 
 /// The commands of a `.cfg`, numbers with fractions among them.
-fn cfg(chirp: &ChirpSettings) -> String {
+pub(super) fn cfg(chirp: &ChirpSettings) -> String {
     let mut text = "% a comment\nchannelCfg 15 7 0\nadcCfg 2 1 % complex\n".to_owned();
     let micro = |s: f64| 1e6 * s;
     let (idle, start, ramp) = (micro(chirp.idle_s), micro(chirp.adc_start_s), micro(chirp.ramp_s));
@@ -56,14 +56,24 @@ fn cfg(chirp: &ChirpSettings) -> String {
 
 /// How a test writes the words of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Order {
-    TwoLanes { q_first: bool },
+pub(super) enum Order {
+    TwoLanes {
+        q_first: bool,
+    },
     FourLanes,
+    /// Real samples, a receiver after the other.
+    Real,
 }
 
-fn words(adc: &AdcCube, rx: usize, order: Order, offset: bool) -> Vec<u8> {
+pub(super) fn words(adc: &AdcCube, rx: usize, order: Order, offset: bool) -> Vec<u8> {
+    let change = move |word: u16| word ^ if offset { 0x8000 } else { 0 };
+    words_as(adc, rx, order, change)
+}
+
+/// As a converter with fewer bits, or another middle, writes its words.
+fn words_as(adc: &AdcCube, rx: usize, order: Order, change: impl Fn(u16) -> u16) -> Vec<u8> {
     let mut out = Vec::new();
-    let mut put = |x: f64| out.extend(((x as i16 as u16) ^ if offset { 0x8000 } else { 0 }).to_le_bytes());
+    let mut put = |x: f64| out.extend(change(x as i16 as u16).to_le_bytes());
     for chirp in adc.data.chunks(rx * adc.samples) {
         match order {
             Order::TwoLanes { q_first } => {
@@ -77,6 +87,7 @@ fn words(adc: &AdcCube, rx: usize, order: Order, offset: bool) -> Vec<u8> {
                     }
                 }
             }
+            Order::Real => chirp.iter().for_each(|x| put(x.re)),
             Order::FourLanes => {
                 for sample in 0..adc.samples {
                     (0..rx).for_each(|k| put(chirp[k * adc.samples + sample].re));
@@ -89,7 +100,7 @@ fn words(adc: &AdcCube, rx: usize, order: Order, offset: bool) -> Vec<u8> {
 }
 
 /// A frame of a mover at 3 m, 20° to the left, and of a wall.
-fn scene(chirp: &ChirpSettings) -> AdcCube {
+pub(super) fn scene(chirp: &ChirpSettings) -> AdcCube {
     let fmcw = chirp.fmcw(Board::Isk, 10.0);
     let (sin, cos) = 20f64.to_radians().sin_cos();
     let place = [3.0 * cos, 3.0 * sin, 0.0];
@@ -102,13 +113,14 @@ fn scene(chirp: &ChirpSettings) -> AdcCube {
     adc
 }
 
-fn peak(map: &Heatmap) -> (f64, f64) {
-    let at = map.data.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).unwrap().0;
+pub(super) fn peak(map: &Heatmap) -> (f64, f64) {
+    let finite = map.data.iter().enumerate().filter(|(_, x)| x.is_finite());
+    let at = finite.max_by(|a, b| a.1.total_cmp(b.1)).unwrap().0;
     ((at / map.shape[1]) as f64, (at % map.shape[1]) as f64)
 }
 
 /// The mover is where it was put: range, angle, speed; the wall is taken away.
-fn check(dataset: &Dataset) {
+pub(super) fn check(dataset: &Dataset) {
     let frame = dataset.load(0).unwrap();
     let views = &dataset.info().views;
     assert_eq!(views.iter().map(|view| view.array.as_str()).collect::<Vec<_>>(), ["range_azimuth", "range_doppler"]);
@@ -151,6 +163,34 @@ fn a_target_is_where_it_was_put_in_every_order_of_words() {
         assert!(info.notes.iter().any(|note| note.starts_with("10 bytes at the end")), "{:?}", info.notes);
         check(&dataset);
         check(&open(&home.path().join("adc_data.bin")).unwrap());
+    }
+}
+
+/// Real samples have no sign of the beat frequency, and converters of fewer bits write no sign into the upper ones.
+#[test]
+fn real_samples_and_fewer_bits_are_understood() {
+    let adc = scene(&chirp());
+    let quieter = |bits: u32| {
+        let mut adc = adc.clone();
+        let by = 2f64.powi(14 - bits as i32);
+        adc.data.iter_mut().for_each(|x| *x = num_complex::Complex64::new((x.re / by).round(), (x.im / by).round()));
+        adc
+    };
+    let cases = [
+        (words(&adc, 4, Order::Real, false), "complex = false\n", "samples are real"),
+        (words(&adc, 4, Order::Real, true), "complex = false\noffset_binary = true\n", "samples are real"),
+        (words_as(&quieter(12), 4, Order::FourLanes, |w| w & 0x0FFF), "bits = 12\nlanes = 4\n", "I first"),
+        (words_as(&quieter(14), 4, Order::TwoLanes { q_first: true }, |w| w & 0x3FFF), "bits = 14\n", "Q first"),
+    ];
+    for (bytes, said, how) in cases {
+        let home = tempfile::tempdir().unwrap();
+        std::fs::write(home.path().join("adc_data.bin"), bytes).unwrap();
+        std::fs::write(home.path().join("chirps.cfg"), cfg(&chirp())).unwrap();
+        let manifest = format!("layout = \"capture\"\nskeleton = \"coco17\"\n[capture]\n{said}");
+        std::fs::write(home.path().join("dataset.toml"), manifest).unwrap();
+        let dataset = open(home.path()).unwrap();
+        assert!(dataset.info().assumptions[1].contains(how), "{said}: {:?}", dataset.info().assumptions);
+        check(&dataset);
     }
 }
 
@@ -264,7 +304,7 @@ fn what_is_wrong_is_named() {
         ("lanes = 3", "`lanes` is 3; expected 2 or 4"),
         ("iq = \"maybe\"", "`iq` is \"maybe\"; expected \"i_first\" or \"q_first\""),
         ("window = \"round\"", "`window` is \"round\"; expected"),
-        ("board = \"ods\"", "`board` is unknown; expected \"isk\" or \"line\""),
+        ("board = \"ods\"", "`board` is unknown; expected \"isk\", \"line\" or \"cascade\""),
         ("config = \"../elsewhere.cfg\"", "leads out of the data set's folder"),
         ("colour = 1", "unknown key `colour`"),
     ] {

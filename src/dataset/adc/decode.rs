@@ -66,7 +66,7 @@ pub fn decode(bytes: &[u8], settings: &AdcSettings, iq: IqOrder) -> AdcCube {
 }
 
 /// A word of the converter: fewer than 16 bits have a sign of their own.
-fn number(bytes: [u8; 2], bits: u32, offset_binary: bool) -> f64 {
+pub(super) fn number(bytes: [u8; 2], bits: u32, offset_binary: bool) -> f64 {
     let word = u16::from_le_bytes(bytes) ^ if offset_binary { 0x8000 } else { 0 };
     let shift = 16_u32.saturating_sub(bits);
     f64::from(((word << shift) as i16) >> shift)

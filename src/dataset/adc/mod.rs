@@ -10,11 +10,17 @@
 
 mod decode;
 mod payload;
+mod source;
+mod stages;
 mod studio;
 mod ti_cfg;
 
+use decode::number;
 pub use decode::{IqOrder, decode};
 pub use payload::{Gaps, Payload};
+pub use source::SampleSource;
+pub(in crate::dataset) use source::{cascade_of, chip_of, is_npy};
+pub use stages::{ChainStages, StageLimit, limits};
 pub use studio::parse_studio;
 pub use ti_cfg::parse_cfg;
 
@@ -78,8 +84,10 @@ pub struct AdcText {
     pub config: Option<String>,
     /// Its chirps, where there is no such file.
     pub chirp: Option<ChirpText>,
-    /// `isk` or `line`: where the antennas are.
+    /// `isk`, `line` or `cascade`: where the antennas are.
     pub board: Option<String>,
+    /// `flat`, or `upright` where the board stands on its side and its line of antennas measures height.
+    pub mount: Option<String>,
     /// `i_first` or `q_first`; else the first frame tells.
     pub iq: Option<String>,
     /// LVDS lanes: 2 or 4.
@@ -93,12 +101,15 @@ pub struct AdcText {
     /// Whether the mean over the chirps of a frame, the echo of what stands still, is taken away; so it is where nothing is
     /// said.
     pub remove_static: Option<bool>,
-    /// `rectangular`, `hann`, `hamming` or `blackman`, over samples and chirps; Hann where nothing is said.
-    pub window: Option<String>,
-    /// Length of an FFT in multiples of its samples: 1 to 4.
-    pub padding: Option<usize>,
+    /// A window's name, over samples and chirps; or `{ range = …, doppler = …, angle = … }`. Hann, and none over the antennas,
+    /// where nothing is said.
+    pub window: Option<toml::Value>,
+    /// Length of an FFT in multiples of its samples and chirps, 1 to 4; or `{ range = …, doppler = …, angle = … }`.
+    pub padding: Option<toml::Value>,
     /// Ranges beyond this are dropped, m; 10 where nothing is said.
     pub max_range_m: Option<f64>,
+    /// What maps are made: `range_azimuth`, `range_elevation`, `range_doppler`, `cartesian`, `cube`.
+    pub views: Option<Vec<String>>,
 }
 
 /// The chirps of a capture as a person writes them, in the units of configuration files.

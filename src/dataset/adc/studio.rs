@@ -7,7 +7,8 @@ use crate::radar::ChirpSettings;
 use serde_json::Value;
 use std::path::Path;
 
-/// What an mmWave Studio JSON says of its first device.
+/// What an mmWave Studio JSON says of its device, or of the four chips of a cascade: transmitter n of chip c is 3 c + n, and the
+/// chirps are those of the first.
 ///
 /// # Errors
 /// Naming the key and what was expected there.
@@ -20,7 +21,8 @@ type Fault = (String, Option<usize>);
 fn read(text: &str) -> Result<AdcSettings, Fault> {
     let json: Value = serde_json::from_str(text).map_err(|error| (format!("not JSON: {error}"), Some(error.line())))?;
     let root = At { value: &json, path: String::new() };
-    let device = root.get("mmWaveDevices")?.at(0)?;
+    let devices = root.get("mmWaveDevices")?;
+    let device = devices.at(0)?;
     let rf = device.get("rfConfig")?;
     let frame = rf.get("rlFrameCfg_t")?;
     let (first, end) = (frame.get("chirpStartIdx")?.count()?, frame.get("chirpEndIdx")?.count()?);
@@ -31,17 +33,13 @@ fn read(text: &str) -> Result<AdcSettings, Fault> {
     let mut profile = None;
     let chirps = rf.get("rlChirps")?;
     for chirp in first..=end {
-        let mut found = None;
-        for k in 0..chirps.len() {
-            let of = chirps.at(k)?.get("rlChirpCfg_t")?;
-            if (of.get("chirpStartIdx")?.count()?..=of.get("chirpEndIdx")?.count()?).contains(&chirp) {
-                found = Some(of);
-            }
+        let found = chirp_of(&chirps, chirp)?;
+        let mut mask = found.get("txEnable")?.mask()?;
+        for chip in 1..devices.len().min(4) {
+            let chirps = devices.at(chip)?.get("rfConfig")?.get("rlChirps")?;
+            mask |= chirp_of(&chirps, chirp)?.get("txEnable")?.mask()?.checked_shl(3 * chip as u32).unwrap_or(0);
         }
-        let found =
-            found.ok_or_else(|| (format!("`{}`: chirp {chirp} of the frame is not there", chirps.path), None))?;
-        let mask = found.get("txEnable")?;
-        tx.push(transmitter(mask.mask()?).map_err(|why| (format!("`{}`: {why}", mask.path), None))?);
+        tx.push(transmitter(mask).map_err(|why| (format!("`{}.txEnable`: {why}", found.path), None))?);
         let of = found.get("profileId")?;
         if *profile.get_or_insert(of.count()?) != of.count()? {
             return Err((format!("`{}`: chirps of a frame have different profiles; expected one", of.path), None));
@@ -57,6 +55,12 @@ fn read(text: &str) -> Result<AdcSettings, Fault> {
     }
     let of =
         found.ok_or_else(|| (format!("`{}`: the profile of the frame's chirps is not there", profiles.path), None))?;
+    // The chips of a cascade have receivers each.
+    let mut rx = 0;
+    for chip in 0..devices.len().min(4) {
+        let channels = devices.at(chip)?.get("rfConfig")?.get("rlChanCfg_t")?.get("rxChannelEn")?;
+        rx += channels.mask()?.count_ones() as usize;
+    }
     let chirp = ChirpSettings {
         start_hz: 1e9 * of.get("startFreqConst_GHz")?.number()?,
         slope_hz_per_s: 1e12 * of.get("freqSlopeConst_MHz_usec")?.number()?,
@@ -67,7 +71,7 @@ fn read(text: &str) -> Result<AdcSettings, Fault> {
         sample_rate_hz: 1e3 * of.get("digOutSampleRate")?.number()?,
         loops: frame.get("numLoops")?.count()?,
         tx,
-        rx: rf.get("rlChanCfg_t")?.get("rxChannelEn")?.mask()?.count_ones() as usize,
+        rx,
         period_s: 1e-3 * frame.get("framePeriodicity_msec")?.number()?,
     };
     if let Some(message) = chirp.fault() {
@@ -77,12 +81,28 @@ fn read(text: &str) -> Result<AdcSettings, Fault> {
     let code = format.get("b2AdcBits")?;
     let bits = bits_of(code.count()?).ok_or_else(|| (format!("`{}`: expected 0, 1 or 2", code.path), None))?;
     let complex = format.get("b2AdcOutFmt")?.count()? != 0;
+    if devices.len() > 1 {
+        // A file a chip, whose order is its own.
+        return Ok(AdcSettings { chirp, words: WordOrder { complex, bits, ..WordOrder::default() } });
+    }
     let lanes = device.get("rawDataCaptureConfig")?.get("rlDevLaneEnable_t")?.get("laneEn")?;
     let lanes = match lanes.mask()?.count_ones() {
         n @ (2 | 4) => n as usize,
         n => return Err((format!("`{}`: {n} lanes; expected 2 or 4", lanes.path), None)),
     };
     Ok(AdcSettings { chirp, words: WordOrder { lanes, complex, bits, ..WordOrder::default() } })
+}
+
+/// The settings of a chirp of the frame.
+fn chirp_of<'a>(chirps: &At<'a>, chirp: usize) -> Result<At<'a>, Fault> {
+    let mut found = None;
+    for k in 0..chirps.len() {
+        let of = chirps.at(k)?.get("rlChirpCfg_t")?;
+        if (of.get("chirpStartIdx")?.count()?..=of.get("chirpEndIdx")?.count()?).contains(&chirp) {
+            found = Some(of);
+        }
+    }
+    found.ok_or_else(|| (format!("`{}`: chirp {chirp} of the frame is not there", chirps.path), None))
 }
 
 /// A value and the keys that lead to it.

@@ -1,5 +1,6 @@
 //! The frames of an open data set, as its layout gives them.
 
+use crate::dataset::adc::ChainStages;
 use crate::dataset::{DatasetError, DatasetInfo, Frame, Heatmap};
 use std::fmt::{self, Debug, Write};
 use std::ops::Range;
@@ -69,6 +70,19 @@ pub trait FrameSource: Debug + Send + Sync {
     /// # Errors
     /// As [`Self::maps`].
     fn load(&self, i: usize, info: &DatasetInfo) -> Result<Frame, DatasetError>;
+
+    /// Whether frames are made of the samples of a converter: [`Self::stages`] has something to show.
+    fn has_samples(&self) -> bool {
+        false
+    }
+
+    /// The stages of frame `i` from the converter on; `None` where its samples are not there.
+    ///
+    /// # Errors
+    /// As [`Self::maps`].
+    fn stages(&self, _i: usize) -> Result<Option<ChainStages>, DatasetError> {
+        Ok(None)
+    }
 }
 
 /// One array of a file that holds a map.

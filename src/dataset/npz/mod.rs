@@ -6,6 +6,7 @@
 //! compare its checksum. Numbers of every width and byte order become `f64`; Fortran order is transposed to C order.
 
 mod archive;
+mod cube;
 mod decode;
 mod error;
 mod form;
@@ -13,6 +14,7 @@ mod header;
 mod write;
 
 pub use archive::{Entry, MAX_ELEMENTS, NPY_KEY, NpzArchive, read_array};
+pub use cube::NpyCube;
 pub use decode::Array;
 pub use error::NpzError;
 pub(crate) use error::{shape_text, shown};

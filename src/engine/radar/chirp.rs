@@ -2,7 +2,8 @@
 //! person should know of.
 
 use super::{Fmcw, MimoArray, RadarConfig, SPEED_OF_LIGHT};
-use crate::geometry::Vec3;
+use crate::geometry::{Vec3, add, scale, sub};
+use std::collections::BTreeMap;
 
 /// The chirps of a capture: one profile, sent by one transmitter after the other (TDM-MIMO).
 #[derive(Debug, Clone, PartialEq)]
@@ -81,8 +82,10 @@ impl ChirpSettings {
 
     /// The source and the chain of these chirps with a board's array.
     pub fn fmcw(&self, board: Board, r_max_m: f64) -> Fmcw {
-        let radar = self.radar(r_max_m);
-        let array = board.array(&self.tx, self.rx, radar.l_az_m);
+        let mut radar = self.radar(r_max_m);
+        let spacing_m = board.spacing_m(radar.l_az_m);
+        (radar.l_az_m, radar.l_el_m) = (spacing_m, spacing_m);
+        let array = board.array(&self.tx, self.rx, radar.l_az_m).centred(spacing_m);
         Fmcw { radar, samples: self.samples, loops: self.loops, array }
     }
 
@@ -173,7 +176,30 @@ pub enum Board {
     Isk,
     /// All transmitters in one line, spaced so that the virtual elements are half a wave apart.
     Line,
+    /// Four AWR2243 on MMWCAS-RF-EVM: transmitters 3 to 11 and sixteen receivers make a line of 86 elements, transmitters 0 to 2
+    /// lie six, four and one element higher. Receivers in the order master, slave 1 to 3.
+    Cascade,
 }
+
+/// Places of the cascade's transmitters (across, up) and receivers (across), in half waves at [`CASCADE_HZ`], by their numbers.
+const CASCADE_TX: [[f64; 2]; 12] = [
+    [11.0, 6.0],
+    [10.0, 4.0],
+    [9.0, 1.0],
+    [32.0, 0.0],
+    [28.0, 0.0],
+    [24.0, 0.0],
+    [20.0, 0.0],
+    [16.0, 0.0],
+    [12.0, 0.0],
+    [8.0, 0.0],
+    [4.0, 0.0],
+    [0.0, 0.0],
+];
+const CASCADE_RX: [f64; 16] =
+    [11.0, 12.0, 13.0, 14.0, 50.0, 51.0, 52.0, 53.0, 46.0, 47.0, 48.0, 49.0, 0.0, 1.0, 2.0, 3.0];
+/// The frequency that the cascade's antennas are spaced for.
+const CASCADE_HZ: f64 = 76.8e9;
 
 impl Board {
     /// The name in manifests.
@@ -181,56 +207,86 @@ impl Board {
         match self {
             Self::Isk => "isk",
             Self::Line => "line",
+            Self::Cascade => "cascade",
         }
+    }
+
+    /// Distance of neighbouring virtual elements, m, where half a wave is `half_wave_m`.
+    pub fn spacing_m(self, half_wave_m: f64) -> f64 {
+        if self == Self::Cascade { SPEED_OF_LIGHT / CASCADE_HZ / 2.0 } else { half_wave_m }
     }
 
     /// The board of that name.
     pub fn named(name: &str) -> Option<Self> {
-        [Self::Isk, Self::Line].into_iter().find(|board| board.name() == name)
+        [Self::Isk, Self::Line, Self::Cascade].into_iter().find(|board| board.name() == name)
     }
 
-    /// Transmitters in the order in which they send, and receivers, m; `spacing_m` is half a wave. y grows from the first
+    /// Transmitters in the order in which they send, and receivers, m; elements are `spacing_m` apart. y grows from the first
     /// element to the last.
     pub fn array(self, tx: &[usize], rx: usize, spacing_m: f64) -> MimoArray {
         let at = |y: f64, z: f64| -> Vec3 { [0.0, y * spacing_m, z * spacing_m] };
         let transmitter = |&tx: &usize| match (self, tx) {
             (Self::Isk, 1) => at(2.0, 1.0),
             (Self::Isk, 2) => at(4.0, 0.0),
+            (Self::Cascade, n) => CASCADE_TX.get(n).map_or(at(0.0, 0.0), |&[across, up]| at(across, up)),
             (Self::Isk | Self::Line, n) => at((n * rx) as f64, 0.0),
         };
-        MimoArray { tx: tx.iter().map(transmitter).collect(), rx: (0..rx).map(|n| at(n as f64, 0.0)).collect() }
+        let receiver = |n: usize| match self {
+            Self::Cascade => at(CASCADE_RX.get(n).copied().unwrap_or(n as f64), 0.0),
+            _ => at(n as f64, 0.0),
+        };
+        MimoArray { tx: tx.iter().map(transmitter).collect(), rx: (0..rx).map(receiver).collect() }
     }
 }
 
 impl MimoArray {
-    /// The channels whose virtual elements make the longest even line along y at the height of the first transmitter, in its
-    /// order; their spacing is `spacing_m`.
-    pub fn line_along_y(&self, spacing_m: f64) -> Vec<usize> {
-        let height = self.tx.first().map_or(0.0, |tx| tx[2]);
-        let mut elements: Vec<(i64, usize)> = Vec::new();
+    /// With the middle of its longest line along y at the origin: angles and ranges are seen from there.
+    #[must_use]
+    pub fn centred(mut self, spacing_m: f64) -> Self {
+        let line = self.lines(1, spacing_m).into_iter().next().unwrap_or_default();
+        let place = |&channel: &usize| add(self.tx[channel / self.rx.len()], self.rx[channel % self.rx.len()]);
+        let sum = line.iter().map(place).fold([0.0; 3], add);
+        // Half of a virtual element's place is the transmitter's share, half the receiver's.
+        let middle = scale(sum, 0.5 / line.len().max(1) as f64);
+        self.tx.iter_mut().chain(&mut self.rx).for_each(|at| *at = sub(*at, middle));
+        self
+    }
+
+    /// The longest even lines of virtual elements along y (`axis` 1) or z (2), channel by channel, `spacing_m` between
+    /// neighbours; several where lines beside each other are as long.
+    pub fn lines(&self, axis: usize, spacing_m: f64) -> Vec<Vec<usize>> {
+        let other = 3 - axis;
+        let mut rows: BTreeMap<i64, Vec<(i64, usize)>> = BTreeMap::new();
+        let first = self.tx.first().zip(self.rx.first()).map_or([0.0; 3], |(tx, rx)| add(*tx, *rx));
         for channel in 0..self.channels() {
             let (tx, rx) = (self.tx[channel / self.rx.len()], self.rx[channel % self.rx.len()]);
-            if (tx[2] + rx[2] - height).abs() < 0.1 * spacing_m {
-                let place = ((tx[1] + rx[1]) / spacing_m).round() as i64;
-                // Two channels at one place measure the same: the first is taken.
-                if elements.iter().all(|(known, _)| *known != place) {
-                    elements.push((place, channel));
-                }
+            let place = |k: usize| ((tx[k] + rx[k] - first[k]) / spacing_m).round() as i64;
+            let row = rows.entry(place(other)).or_default();
+            // Two channels at one place measure the same: the first is taken.
+            if row.iter().all(|(known, _)| *known != place(axis)) {
+                row.push((place(axis), channel));
             }
         }
-        elements.sort_unstable();
-        let mut best: &[(i64, usize)] = &[];
-        let mut from = 0;
-        for to in 1..=elements.len() {
-            if to == elements.len() || elements[to].0 != elements[to - 1].0 + 1 {
-                if to - from > best.len() {
-                    best = &elements[from..to];
-                }
-                from = to;
-            }
-        }
-        best.iter().map(|(_, channel)| *channel).collect()
+        let lines: Vec<Vec<usize>> = rows.into_values().map(longest_run).collect();
+        let most = lines.iter().map(Vec::len).max().unwrap_or(0);
+        lines.into_iter().filter(|line| line.len() == most).collect()
     }
+}
+
+/// The channels of the longest run of neighbours.
+fn longest_run(mut elements: Vec<(i64, usize)>) -> Vec<usize> {
+    elements.sort_unstable();
+    let mut best: &[(i64, usize)] = &[];
+    let mut from = 0;
+    for to in 1..=elements.len() {
+        if to == elements.len() || elements[to].0 != elements[to - 1].0 + 1 {
+            if to - from > best.len() {
+                best = &elements[from..to];
+            }
+            from = to;
+        }
+    }
+    best.iter().map(|(_, channel)| *channel).collect()
 }
 
 #[cfg(test)]
@@ -275,10 +331,27 @@ mod tests {
 
     #[test]
     fn the_line_of_a_board_is_found_in_every_order_of_its_transmitters() {
-        let line = |board: Board, tx: &[usize]| board.array(tx, 4, 0.002).line_along_y(0.002);
+        let line = |board: Board, tx: &[usize]| board.array(tx, 4, 0.002).lines(1, 0.002).concat();
         assert_eq!(line(Board::Isk, &[0, 1, 2]), [0, 1, 2, 3, 8, 9, 10, 11]);
         assert_eq!(line(Board::Isk, &[0, 2, 1]), [0, 1, 2, 3, 4, 5, 6, 7]);
         assert_eq!(line(Board::Isk, &[0]), [0, 1, 2, 3]);
         assert_eq!(line(Board::Line, &[0, 1]), (0..8).collect::<Vec<_>>());
+        // One above the other, four times beside each other.
+        let upward = Board::Isk.array(&[0, 1, 2], 4, 0.002).lines(2, 0.002);
+        assert_eq!(upward, [[2, 4], [3, 5], [8, 6], [9, 7]]);
+    }
+
+    #[test]
+    fn the_cascade_has_a_line_of_86_elements() {
+        let tx: Vec<usize> = (0..12).rev().collect();
+        let array = Board::Cascade.array(&tx, 16, Board::Cascade.spacing_m(1.0));
+        let spacing_m = Board::Cascade.spacing_m(1.0);
+        assert!((spacing_m - 0.001_951_8).abs() < 1e-6);
+        let lines = array.lines(1, spacing_m);
+        assert_eq!((lines.len(), lines[0].len()), (1, 86));
+        for pair in lines[0].windows(2) {
+            let y = |channel: usize| array.tx[channel / 16][1] + array.rx[channel % 16][1];
+            assert!((y(pair[1]) - y(pair[0]) - spacing_m).abs() < 1e-12);
+        }
     }
 }

@@ -130,13 +130,24 @@ impl Stage {
 }
 
 impl Chain {
+    /// Range bins that are kept.
+    pub fn ranges(&self, fmcw: &Fmcw) -> usize {
+        let length = self.range_fft.max(fmcw.samples);
+        let step_m = fmcw.unambiguous_range_m() / length as f64;
+        ((self.max_range_m / step_m).ceil() as usize).saturating_add(2).min(length)
+    }
+
     /// Range, Doppler and angle FFTs of a frame whose channels are an even line.
     ///
     /// The angle transform has the sign that gives a scatterer on the side of the last element a positive sine: its delay
     /// falls along the array, and with it the phase.
     pub fn cube(&self, fmcw: &Fmcw, spacing_m: f64, adc: &AdcCube) -> RadarCube {
-        let angle = Stage::new(self.angle_window, adc.channels, self.angle_fft, true);
-        let spectra = self.range_doppler(fmcw, adc);
+        self.cube_of(fmcw, spacing_m, &self.range_doppler(fmcw, adc))
+    }
+
+    /// The angle FFT of channels that are an even line.
+    pub fn cube_of(&self, fmcw: &Fmcw, spacing_m: f64, spectra: &RangeDoppler) -> RadarCube {
+        let angle = Stage::new(self.angle_window, spectra.channels, self.angle_fft, true);
         let sines = angle.plan.len();
         let mut data = Vec::with_capacity(spectra.ranges * spectra.dopplers * sines);
         for range in 0..spectra.ranges {
@@ -153,6 +164,15 @@ impl Chain {
             sine_step: fmcw.radar.wavelength_m() / (spacing_m * sines as f64),
             data,
         }
+    }
+
+    /// Amplitude over the sine, from negative to positive, of one range and Doppler bin of channels that are an even line.
+    pub fn angle_spectrum(&self, spectra: &RangeDoppler, range: usize, doppler: usize) -> Vec<f64> {
+        if range >= spectra.ranges || doppler >= spectra.dopplers {
+            return Vec::new();
+        }
+        let angle = Stage::new(self.angle_window, spectra.channels, self.angle_fft, true);
+        angle.run_centred(spectra.channels_at(range, doppler)).iter().map(|x| x.norm()).collect()
     }
 
     /// The whole chain to the polar map; the cube is summed as it is made and never held.
@@ -192,7 +212,7 @@ impl Chain {
         let range = Stage::new(self.range_window, adc.samples, self.range_fft, false);
         let doppler = Stage::new(self.doppler_window, adc.loops, self.doppler_fft, false);
         let range_step_m = fmcw.unambiguous_range_m() / range.plan.len() as f64;
-        let ranges = ((self.max_range_m / range_step_m).ceil() as usize).saturating_add(2).min(range.plan.len());
+        let ranges = self.ranges(fmcw);
         let (channels, dopplers) = (adc.channels, doppler.plan.len());
         let mut lines = Vec::with_capacity(adc.loops * channels * ranges);
         let mut bench = range.bench();
@@ -233,6 +253,31 @@ impl Chain {
 }
 
 impl AdcCube {
+    /// Amplitudes over range, roots of the mean power over channels and chirps: of everything, and without the mean over the
+    /// chirps, which is what stands still. As long as the samples.
+    pub fn range_profiles(&self, window: Window) -> (Vec<f64>, Vec<f64>) {
+        let stage = Stage::new(window, self.samples, self.samples, false);
+        let mut bench = stage.bench();
+        let (block, lines) = (self.channels * self.samples, (self.loops * self.channels).max(1) as f64);
+        let (mut all, mut mean) = (vec![0.0; self.samples], vec![Complex64::ZERO; block]);
+        for chirp in self.data.chunks_exact(block.max(1)) {
+            for (channel, line) in chirp.chunks_exact(self.samples.max(1)).enumerate() {
+                let spectrum = stage.run_in(line.iter().copied(), &mut bench);
+                for (bin, x) in spectrum.iter().enumerate() {
+                    all[bin] += x.norm_sqr();
+                    mean[channel * self.samples + bin] += x / self.loops as f64;
+                }
+            }
+        }
+        // The variance over the chirps is what is left without their mean.
+        let mut still = vec![0.0; self.samples];
+        for line in mean.chunks_exact(self.samples.max(1)) {
+            still.iter_mut().zip(line).for_each(|(sum, x)| *sum += self.loops as f64 * x.norm_sqr());
+        }
+        let moving = all.iter().zip(&still).map(|(all, still)| ((all - still).max(0.0) / lines).sqrt()).collect();
+        (all.iter().map(|power| (power / lines).sqrt()).collect(), moving)
+    }
+
     /// Energy of the range spectra beyond half the sampling rate over that below, without bin 0. Echoes of a room lie below
     /// where I and Q of the samples are in order: their delays are short against what the sampling rate could tell.
     pub fn upper_to_lower(&self) -> f64 {
