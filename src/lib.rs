@@ -51,7 +51,7 @@
 //! | [`simulate`] * | the synthetic source: people and rooms before a radar, as frames with truth |
 //! | [`people`] * | counting, places and identities of several people |
 //! | [`body`] * | skeleton topologies, the PPPR parameters, bodies that move, how people move |
-//! | [`radar`] * | chirp, axes, views, point-spread functions, FMCW synthesis of a MIMO array and the FFT chain |
+//! | [`radar`] * | chirp, axes, views, point-spread functions from FFTs and from reflectors, FMCW synthesis of a MIMO array and the FFT chain |
 //! | [`config`] * | `FitConfig`: defaults, ranges, help text; the only source for files, command line and sliders; [where the program differs from the paper](config::deviations) |
 //! | [`output`] | where results are written: safe names, guarded and locked folders, files whole or not at all |
 //! | [`task`] | work off the caller's thread: progress, cancelling, panics that become errors |

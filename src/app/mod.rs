@@ -187,6 +187,11 @@ impl InspectorApp {
         self.layout.show_pane(pane);
     }
 
+    /// Whether panes wait for something that is computed for them alone.
+    pub fn panes_are_working(&self) -> bool {
+        self.panes.are_working()
+    }
+
     /// Where a pane was drawn in the last pass, points; `None` where it is behind another tab.
     pub fn pane_rect(&self, pane: &'static Pane) -> Option<egui::Rect> {
         self.layout.rect(pane)

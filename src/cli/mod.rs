@@ -1,8 +1,11 @@
 //! The command line: one file a subcommand. Arguments as typed become a validated configuration and one library call.
 
 pub mod bench;
+mod calibrate;
+mod chain;
 mod common;
 mod complexity;
+mod convert;
 mod count;
 mod evidence;
 mod export;
@@ -11,6 +14,7 @@ mod frames;
 mod info;
 mod labels;
 mod merge;
+mod radars;
 mod score;
 #[cfg(feature = "viewer")]
 mod screenshot;
@@ -25,6 +29,7 @@ mod train_evidence;
 mod train_limbs;
 #[cfg(feature = "train")]
 mod train_motion;
+mod transfer;
 
 pub use common::allow_outside;
 
@@ -144,10 +149,19 @@ pub enum CliCommand {
     /// Measure what an iteration, a simulation and a whole frame cost on this machine.
     #[command(after_help = bench::HELP)]
     Bench(bench::BenchArgs),
+    /// Measure point-spread widths on a frame's reflectors, beside those that the data set states or derives.
+    #[command(after_help = calibrate::HELP)]
+    Calibrate(calibrate::CalibrateArgs),
+    /// Show the stages of a capture's processing: what each resolves, and what the numbers warn of.
+    #[command(after_help = chain::HELP)]
+    Chain(chain::ChainArgs),
     /// Tell which frames of a data set are hard, before anything is fitted: three statistics of each frame's maps, the
     /// hardness that follows from their ranks, and the stratum.
     #[command(after_help = complexity::HELP)]
     Complexity(complexity::ComplexityArgs),
+    /// Write a data set, a raw capture above all, as a folder with `dataset.toml` and one npz a frame.
+    #[command(after_help = convert::HELP)]
+    Convert(convert::ConvertArgs),
     /// Count the people of each frame: the number with its probabilities, and where they are.
     #[command(after_help = count::HELP)]
     Count(count::CountArgs),
@@ -177,6 +191,9 @@ pub enum CliCommand {
     /// Make one whole of the shards of `fit`, `complexity`, `count`, `evidence` or a study: what each did with --shard.
     #[command(after_help = merge::HELP)]
     Merge(merge::MergeArgs),
+    /// List the radars that manifests can name, or print one.
+    #[command(after_help = radars::HELP)]
+    Radars(radars::RadarsArgs),
     /// Evaluate the objective at given parameters: simulated maps, losses and gradients.
     #[command(long_about = score::about(), after_help = score::HELP)]
     Score(score::ScoreArgs),
@@ -190,6 +207,9 @@ pub enum CliCommand {
     /// Compare variants of a configuration over many frames: the paper's tables, sweeps, shards of them.
     #[command(subcommand, after_help = study::HELP)]
     Study(study::StudyCommand),
+    /// Simulate a fitted pose for another radar; fit one body from three radars by calibration alone.
+    #[command(subcommand, after_help = transfer::HELP)]
+    Transfer(transfer::TransferCommand),
     /// Train the person counter on synthetic recordings and write its weights.
     #[cfg(feature = "train")]
     #[command(after_help = train_counter::HELP)]
@@ -226,7 +246,10 @@ pub fn begin_again(command: Option<&CliCommand>) {
 pub fn run(command: CliCommand) -> anyhow::Result<ExitCode> {
     match command {
         CliCommand::Bench(args) => bench::run(&args),
+        CliCommand::Calibrate(args) => calibrate::run(&args),
+        CliCommand::Chain(args) => chain::run(&args),
         CliCommand::Complexity(args) => complexity::run(&args),
+        CliCommand::Convert(args) => convert::run(&args),
         CliCommand::Count(args) => count::run(&args),
         CliCommand::Evidence(args) => evidence::run(&args),
         CliCommand::Export(args) => export::run(&args),
@@ -234,11 +257,13 @@ pub fn run(command: CliCommand) -> anyhow::Result<ExitCode> {
         CliCommand::Info(args) => info::run(&args),
         CliCommand::Labels(command) => labels::run(&command),
         CliCommand::Merge(args) => merge::run(&args),
+        CliCommand::Radars(args) => radars::run(&args),
         CliCommand::Score(args) => score::run(&args),
         #[cfg(feature = "viewer")]
         CliCommand::Screenshot(args) => screenshot::run(&args),
         CliCommand::Study(command) => study::run(&command),
         CliCommand::Simulate(args) => simulate::run(&args),
+        CliCommand::Transfer(command) => transfer::run(&command),
         #[cfg(feature = "train")]
         CliCommand::TrainCounter(args) => train_counter::run(&args),
         #[cfg(feature = "train")]

@@ -153,6 +153,8 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
         harness.state_mut().show_pane(pane);
     }
     harness.run_steps(3);
+    until(&mut harness, "the panes", |app| !app.panes_are_working())?;
+    harness.run_steps(1);
     let mut picture = harness.render().map_err(|e| anyhow::anyhow!("the window cannot be drawn: {e}"))?;
     if let Some(pane) = pane {
         let rect = harness.state().pane_rect(pane).with_context(|| format!("the pane {} is not open", pane.title()))?;

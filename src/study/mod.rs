@@ -13,6 +13,7 @@ mod evidence;
 mod export;
 mod file_error;
 mod kept;
+pub mod radars;
 mod results;
 mod row;
 pub mod run;

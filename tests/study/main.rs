@@ -14,5 +14,6 @@ mod clouds;
 mod evidence;
 mod export;
 mod maps;
+mod radars;
 mod runs;
 mod shards;

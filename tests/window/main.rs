@@ -17,6 +17,7 @@ mod hand;
 mod labels;
 mod large;
 mod maps;
+mod radar;
 mod results;
 mod study;
 mod ui;

@@ -9,6 +9,8 @@
 //! a person do beyond being shown are rows that its file makes and the tables of commands name where the menus have them.
 
 mod agreement;
+mod calibration;
+mod chain;
 mod compare;
 mod curves;
 #[cfg(test)]
@@ -22,6 +24,7 @@ pub(super) mod maps;
 pub(super) mod modes;
 mod pane;
 pub(super) mod scene;
+mod signal;
 mod statistics;
 pub(super) mod study;
 
@@ -37,6 +40,9 @@ use crate::session::{Command, Session, ViewState};
 static PANES: &[&Pane] = &[
     &maps::PANE,
     &maps::ortho::PANE,
+    &chain::PANE,
+    &calibration::PANE,
+    &signal::PANE,
     &study::PANE,
     &statistics::PANE,
     &agreement::PANE,

@@ -232,6 +232,11 @@ pub(crate) trait PaneState: Any {
         true
     }
 
+    /// Whether something is computed for it that will be drawn.
+    fn is_working(&self) -> bool {
+        false
+    }
+
     /// The name under which a session file keeps something of it.
     fn stored_as(&self) -> Option<&'static str> {
         None
@@ -301,6 +306,11 @@ impl PaneStates {
     /// One step back from what was singled out in a pane; false where nothing was.
     pub(in crate::app) fn back(&mut self) -> bool {
         self.0.iter_mut().any(|state| state.back())
+    }
+
+    /// Whether something is computed for a pane that will be drawn.
+    pub(in crate::app) fn are_working(&self) -> bool {
+        self.0.iter().any(|state| state.is_working())
     }
 
     /// The person, or where that is shown already, all there is.

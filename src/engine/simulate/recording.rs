@@ -1,6 +1,6 @@
 //! A recording: frames by number, sequences as they are needed.
 
-use super::{Device, Options, Sequence, SimulateError, SimulatedFrame};
+use super::{Device, Options, Sequence, SimulateError, SimulatedFrame, SimulatedLayout};
 use crate::radar::{RadarConfig, View};
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -14,6 +14,8 @@ const READY: usize = 16;
 pub struct Recording {
     options: Options,
     device: Arc<Device>,
+    /// Whose maps the people are placed for.
+    stage: Arc<Device>,
     ready: Mutex<VecDeque<(usize, Arc<Sequence>)>>,
 }
 
@@ -25,7 +27,15 @@ impl Recording {
     pub fn new(options: &Options) -> Result<Self, SimulateError> {
         options.check()?;
         let device = Arc::new(Device::new(options.layout));
-        Ok(Self { options: options.clone(), device, ready: Mutex::default() })
+        Ok(Self { options: options.clone(), stage: Arc::clone(&device), device, ready: Mutex::default() })
+    }
+
+    /// The same people, motions and rooms as [`Self::new`] plans, at the same times, before the radars of another layout.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn seen_by(options: &Options, layout: SimulatedLayout) -> Result<Self, SimulateError> {
+        Ok(Self { device: Arc::new(Device::new(layout)), ..Self::new(options)? })
     }
 
     /// What was asked for.
@@ -76,7 +86,7 @@ impl Recording {
 
     /// Draws a sequence. [`Self::frame`] does so by itself; to make all frames of a sequence, draw it once.
     pub fn sequence(&self, sequence: usize) -> Sequence {
-        Sequence::new(&self.options, &self.device, sequence)
+        Sequence::new(&self.options, (&self.device, &self.stage), sequence)
     }
 
     /// Frame `index` of the recording. Past the end the sequences go on.

@@ -70,8 +70,8 @@ pub struct SimulatedFrame {
 }
 
 impl Sequence {
-    /// Draws sequence `index` of a recording.
-    pub(super) fn new(options: &Options, device: &Arc<Device>, index: usize) -> Self {
+    /// Draws sequence `index` of a recording: people placed for the maps of `stage`, before the radars of `device`.
+    pub(super) fn new(options: &Options, (device, stage_of): (&Arc<Device>, &Device), index: usize) -> Self {
         let preset = options.presets[index % options.presets.len()];
         let recipe = preset.recipe();
         let rate_hz = options.layout.frame_rate_hz();
@@ -81,7 +81,7 @@ impl Sequence {
         let count = draw.random_range(people);
         let drawn_height_m = draw.random_range(0.90..1.10);
         let stage = Stage {
-            distance_m: reachable(recipe.distance_m, device),
+            distance_m: reachable(recipe.distance_m, stage_of),
             lateral_m: options.layout.lateral_m(),
             floor_z_m: -options.radar_height_m.unwrap_or(drawn_height_m),
             lasts_s: (options.sequence_length.saturating_sub(1)) as f64 / rate_hz,
