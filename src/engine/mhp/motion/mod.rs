@@ -5,15 +5,18 @@
 //! frame compares its own maps (`mhp/frame_em.rs`), and
 //!
 //! ```text
-//! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior,  L_prior = (‖c‖² + ((s − s₀)/σ_s)²)/(K + 1)
+//! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior
+//! L_prior = (‖c‖² + ((s − s₀)/σ_s)²)/(K + 1) + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)²
 //! ```
 //!
-//! the kinematic terms those of the frame that is fitted. PPPR stays the state that is shown, kept and exported: positions and
-//! velocities follow the coordinates, opacities, scales and the rest move by themselves and are the same in all frames of the
-//! window. The frame stands as near the window's middle as its sequence lets it; without frames around the window is one frame.
-//! A start is searched from clusters of the prior and from several headings, coarse then fine ([`search`]).
+//! the last part of it that of the body's proportions (`proportions.rs`), the kinematic terms those of the frame that is fitted.
+//! PPPR stays the state that is shown, kept and exported: positions and velocities follow the coordinates, opacities, scales and
+//! the rest move by themselves and are the same in all frames of the window. The frame stands as near the window's middle as its
+//! sequence lets it; without frames around the window is one frame. A start is searched from clusters of the prior and from
+//! several headings, coarse then fine ([`search`]).
 
 mod clutter;
+mod proportions;
 mod search;
 mod space;
 #[cfg(test)]
@@ -248,7 +251,8 @@ impl Window {
         loss.gradient.clear();
         loss.gradient.resize(coordinates.len(), 0.0);
         let share = 1.0 / frames.len().div_ceil(every) as f64;
-        loss.em = 0.0;
+        let persons = (coordinates.len() / *stride).max(1) as f64;
+        (loss.em, loss.prior) = (0.0, 0.0);
         let mut kept = looks;
         for (frame, of) in frames.iter_mut().enumerate().step_by(every) {
             for group in Group::ALL[1..].iter().filter(|&&group| group != Group::Velocity) {
@@ -263,19 +267,23 @@ impl Window {
             of.gradient.reset(params.shape());
             let em = of.em.evaluate((&problem.radar, config), precision, &of.params, &mut of.gradient, None);
             loss.em += share * em;
-            let persons = coordinates.chunks_exact(*stride).zip(loss.gradient.chunks_exact_mut(*stride));
-            for (person, (own, bars)) in persons.enumerate() {
-                let joints = person * joints..(person + 1) * joints;
-                let pose = (&of.params.positions()[joints.clone()], &of.gradient.positions()[joints]);
-                space.pull_back(own, frame, pose, bars);
+            let each = coordinates.chunks_exact(*stride).zip(loss.gradient.chunks_exact_mut(*stride));
+            for (person, (own, bars)) in each.enumerate() {
+                let of_person = person * joints..(person + 1) * joints;
+                let pose = &of.params.positions()[of_person.clone()];
+                let mut pose_bar = [[0.0; 3]; MOST_JOINTS];
+                for (bar, em) in pose_bar.iter_mut().zip(&of.gradient.positions()[of_person]) {
+                    *bar = em.map(|x| share * config.w_em * x);
+                }
+                let gain = share * config.w_prior / persons;
+                let misfit = space.proportions.misfit(own, pose, gain, (&mut pose_bar, &mut *bars));
+                loss.prior += share * misfit / persons;
+                space.pull_back(own, frame, (pose, &pose_bar[..joints]), bars);
             }
             if let Some(looks) = kept.as_deref_mut() {
                 looks.add_scaled(share, &of.gradient);
             }
         }
-        loss.gradient.iter_mut().for_each(|bar| *bar *= share * config.w_em);
-        let persons = (coordinates.len() / *stride).max(1) as f64;
-        loss.prior = 0.0;
         for (own, bars) in coordinates.chunks_exact(*stride).zip(loss.gradient.chunks_exact_mut(*stride)) {
             loss.prior += space.unlikeliness(own, config.w_prior / persons, bars) / persons;
         }

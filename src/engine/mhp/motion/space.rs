@@ -7,11 +7,12 @@
 //!
 //! Coordinates of a person are t (3, m), y (rad), s (ln m) and c.
 
+use super::proportions::Proportions;
 use crate::body::{MotionPrior, Skeleton};
 use crate::geometry::Vec3;
 
-/// Components of the prior that are used.
-const MOST_COMPONENTS: usize = 20;
+/// Components of the prior that are used: with more a search ends in other poses more often, with fewer poses are no people's.
+const MOST_COMPONENTS: usize = 24;
 /// Half the time over which a velocity is taken, s.
 const HALF_STEP_S: f64 = 0.05;
 /// t, y and s.
@@ -36,6 +37,8 @@ pub(super) struct PoseSpace {
     /// Of each component: 1 where it is the same of left and right, −1 where it is opposite. The mirror image of a pose has c
     /// times this.
     signs: Vec<f64>,
+    /// How long bones are.
+    pub(super) proportions: Proportions,
     /// From where a search may begin: c, and how high the hips are, sizes.
     pub(super) starts: Vec<(Vec<f64>, f64)>,
 }
@@ -111,6 +114,7 @@ impl PoseSpace {
             changes: times_s.iter().map(change).collect(),
             ln_size: prior.ln_size(),
             signs: prior.components()[..components].iter().map(|of| symmetry(prior, of)).collect(),
+            proportions: Proportions::of(skeleton),
             starts: starts.collect(),
         })
     }

@@ -5,9 +5,9 @@ use super::{Evaluate, Hue, Scope, Term, Weight};
 pub(super) const PRIOR: Term = Term {
     key: "prior",
     label: "L_prior",
-    formula: "(‖c‖² + ((s − s₀)/σ_s)²)/(K + 1)",
+    formula: "(‖c‖² + ((s − s₀)/σ_s)²)/(K + 1) + ⟨((l/(e^s λ) − 1)/σ_b)²⟩",
     unit: "",
-    help: "How far a window's pose, motion and size are from what real people do, mean square in standard deviations.",
+    help: "How far a window's pose, motion and size are from what real people do, and its bones from their lengths for that size; mean squares in standard deviations.",
     weight: Weight::Prior,
     scope: Scope::Weighed,
     hue: Hue::Teal,

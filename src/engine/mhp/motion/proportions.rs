@@ -1,0 +1,114 @@
+//! How long bones are for the size of a body.
+//!
+//! A space of poses that is linear does not keep bones as long as they are: between two poses a limb is shorter than in either,
+//! and where maps say little of a limb its bones shrink. L_prior therefore has a part for the bones between shoulders, elbows,
+//! wrists, hips, knees and ankles,
+//!
+//! ```text
+//! mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)²,  σ_b = 0.12,  λ = ℓ/size of the skeleton's reference lengths
+//! ```
+//!
+//! the size of a body being that of the prior (`body::MotionPrior`): of its height, 0.635. Of a skeleton it is the height at which
+//! the long bones that it has are as long together as Winter's. It asks nothing of s: a larger body has longer bones.
+
+use super::LN_SIZE;
+use crate::body::{Skeleton, is_named};
+use crate::geometry::{Vec3, add_scaled, norm, sub};
+
+/// How far a bone is from its length, share of it, standard deviation.
+const SPREAD: f64 = 0.12;
+/// Sizes of a height.
+const SIZES: f64 = 0.635;
+/// The ends of long bones and their length, heights; Winter, *Biomechanics and Motor Control of Human Movement*.
+const LONG: [([&str; 2], f64); 4] =
+    [(["shoulder", "elbow"], 0.186), (["elbow", "wrist"], 0.146), (["hip", "knee"], 0.245), (["knee", "ankle"], 0.246)];
+/// Joints between which bones are rigid.
+const RIGID: [&str; 6] = ["shoulder", "elbow", "wrist", "hip", "knee", "ankle"];
+
+/// The bones of a skeleton that are rigid, as long as bodies of size 1 have them.
+#[derive(Debug, Clone)]
+pub(super) struct Proportions {
+    bones: Vec<([usize; 2], f64)>,
+}
+
+impl Proportions {
+    /// Of the skeleton's reference lengths; no bones where it has no long one.
+    pub(super) fn of(skeleton: &Skeleton) -> Self {
+        let is = |joint: usize, name: &str| is_named(skeleton, joint, &[name]);
+        let joins = |[a, b]: [usize; 2], [from, to]: [&str; 2]| is(a, from) && is(b, to) || is(b, from) && is(a, to);
+        let all = || skeleton.bones.iter().copied().zip(skeleton.bone_lengths_m.iter().copied());
+        let (found, expected) = all()
+            .filter_map(|(bone, length_m)| Some((length_m, LONG.iter().find(|(ends, _)| joins(bone, *ends))?.1)))
+            .fold((0.0, 0.0), |(found, expected), (length_m, heights)| (found + length_m, expected + heights));
+        let size_m = SIZES * found / expected;
+        if !size_m.is_finite() || size_m <= 0.0 {
+            return Self { bones: Vec::new() };
+        }
+        let rigid = |joint: usize| RIGID.iter().any(|name| is(joint, name));
+        let bones = all().filter(|&([a, b], length_m)| rigid(a) && rigid(b) && length_m > 0.0);
+        Self { bones: bones.map(|(bone, length_m)| (bone, length_m / size_m)).collect() }
+    }
+
+    /// How far the bones of `pose` (m) are from those of a body with these coordinates, mean square in standard deviations; adds
+    /// `gain` times its gradient to the adjoints of the pose and of the coordinates.
+    pub(super) fn misfit(
+        &self,
+        coordinates: &[f64],
+        pose: &[Vec3],
+        gain: f64,
+        (pose_bar, bars): (&mut [Vec3], &mut [f64]),
+    ) -> f64 {
+        let size_m = coordinates[LN_SIZE].exp();
+        let share = 1.0 / (self.bones.len().max(1) as f64 * SPREAD * SPREAD);
+        let mut sum = 0.0;
+        for &([a, b], sizes) in &self.bones {
+            let along = sub(pose[a], pose[b]);
+            let (length_m, wanted_m) = (norm(along).max(1e-9), size_m * sizes);
+            let off = length_m / wanted_m - 1.0;
+            sum += share * off * off;
+            let slope = 2.0 * gain * share * off / wanted_m;
+            add_scaled(&mut pose_bar[a], along, slope / length_m);
+            add_scaled(&mut pose_bar[b], along, -slope / length_m);
+            bars[LN_SIZE] -= slope * length_m;
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_named_skeleton_has_limbs_of_its_size() {
+        for name in ["coco17", "h36m17", "hupr14"] {
+            let skeleton = Skeleton::preset(name).unwrap();
+            let proportions = Proportions::of(&skeleton);
+            assert!(proportions.bones.len() >= 8, "{name}: {}", proportions.bones.len());
+            let thigh = proportions.bones.iter().find(|(bone, _)| {
+                bone.iter().any(|&j| is_named(&skeleton, j, &["hip"]))
+                    && bone.iter().any(|&j| is_named(&skeleton, j, &["knee"]))
+            });
+            let sizes = thigh.map_or(0.0, |(_, sizes)| *sizes);
+            assert!((sizes - 0.245 / SIZES).abs() < 0.01, "{name}: {sizes}");
+        }
+    }
+
+    #[test]
+    fn a_body_of_any_size_with_its_bones_fits_and_one_with_short_limbs_does_not() {
+        let skeleton = Skeleton::preset("coco17").unwrap();
+        let proportions = Proportions::of(&skeleton);
+        // A star in which every bone stands alone has any length that is wanted.
+        let misfit = |scale: f64, ln_size: f64| {
+            let (bone, sizes) = proportions.bones[0];
+            let one = Proportions { bones: vec![(bone, sizes)] };
+            let mut pose = vec![[0.0; 3]; skeleton.joints.len()];
+            pose[bone[0]] = [0.0, scale * sizes, 0.0];
+            one.misfit(&[0.0, 0.0, 0.0, 0.0, ln_size], &pose, 0.0, (&mut pose.clone(), &mut [0.0; 5]))
+        };
+        assert!(misfit(1.0, 0.0) < 1e-12);
+        assert!(misfit(1.2, 1.2_f64.ln()) < 1e-12);
+        assert!((misfit(0.76, 0.0) - 4.0).abs() < 1e-9, "two standard deviations");
+    }
+}
