@@ -3,7 +3,7 @@
 use super::commands::{Menu, all, shortcut_text};
 use super::panes::Shared;
 use super::theme::{self, Tokens};
-use crate::session::{Command, FitStatus, LabelMode};
+use crate::session::{Command, Compare, FitStatus, LabelMode, Session};
 use egui::{RichText, Ui};
 
 pub(super) fn bar(ui: &mut Ui, shared: &mut Shared<'_>) {
@@ -63,19 +63,34 @@ fn items(ui: &mut Ui, shared: &mut Shared<'_>, menu: Menu) {
         if let Some(&keys) = command.keys().first() {
             button = button.shortcut_text(shortcut_text(keys));
         }
-        let mark = match command.label().as_ref() {
-            "Warm start" => shared.session.warm_start,
-            "Play frames" => shared.session.data.playing,
-            "Explore" => shared.session.view.label_mode == LabelMode::Explore,
-            "Label for agreement" => shared.session.view.label_mode == LabelMode::Agreement,
-            "Review counts" => shared.session.view.label_mode == LabelMode::CountReview,
-            _ => false,
-        };
-        let response = ui.add_enabled(enabled, button.selected(mark));
+        let response = ui.add_enabled(enabled, button.selected(is_on(&command.label(), shared.session)));
         if response.on_hover_text(command.tip()).clicked() {
             shared.acts.push(command.action(shared.session));
             ui.close();
         }
+    }
+}
+
+/// Whether what a command switches is on.
+fn is_on(label: &str, session: &Session) -> bool {
+    let view = &session.view;
+    match label {
+        "Warm start" => session.warm_start,
+        "Play frames" => session.data.playing,
+        "Live fit" => session.is_live(),
+        "Difference H_sim − H_ori" => view.compare == Compare::Difference,
+        "Wipe H_ori | H_sim" => view.compare == Compare::Wipe,
+        "Bird's-eye" => view.cube.birds_eye,
+        "Polar" => view.cube.polar,
+        "Cells round the cursor" => view.neighbours,
+        "Logarithmic losses" => view.log_loss,
+        "Logarithmic iterations" => view.log_iterations,
+        "Move body" => view.move_body,
+        "Figure captions" => view.figure,
+        "Explore" => view.label_mode == LabelMode::Explore,
+        "Label for agreement" => view.label_mode == LabelMode::Agreement,
+        "Review counts" => view.label_mode == LabelMode::CountReview,
+        _ => false,
     }
 }
 

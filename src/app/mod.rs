@@ -19,7 +19,7 @@ mod timeline;
 mod widgets;
 
 use crate::config::FitConfig;
-use crate::session::{Command, LogLevel, Report, Runtime, Session, StartAt, ViewState, Wake};
+use crate::session::{Command, LogLevel, PickKind, Report, Runtime, Session, StartAt, ViewState, Wake};
 use commands::{AppAct, UiAction};
 use layout::PaneLayout;
 use overlay::Overlay;
@@ -60,6 +60,8 @@ pub struct Begin {
     pub session: Option<PathBuf>,
     /// Whether manifests may name frames outside their own folder.
     pub allow_outside: bool,
+    /// What is asked instead of the desktop's file dialog.
+    pub pick: Option<fn(PickKind) -> Option<PathBuf>>,
 }
 
 /// The application behind the window.
@@ -118,9 +120,10 @@ impl InspectorApp {
         }
         let no_dialog = Arc::new(AtomicBool::new(false));
         let (unanswered, waker) = (Arc::clone(&no_dialog), cc.egui_ctx.clone());
+        let dialog = begin.pick.unwrap_or(overlay::pick);
         let pick = move |kind| {
             let asked = std::time::Instant::now();
-            let picked = overlay::pick(kind);
+            let picked = dialog(kind);
             if picked.is_none() && asked.elapsed() < TOO_QUICK {
                 unanswered.store(true, Ordering::Relaxed);
                 waker.request_repaint();

@@ -141,7 +141,7 @@ impl Overlay {
     fn path(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
         let mut done = false;
         let response = modal(ui, "path").show(ui.ctx(), |ui| {
-            ui.set_width(560.0);
+            ui.set_width(width(ui, 560.0));
             ui.label("Path of an MMVR folder, a folder with dataset.toml, a *_radar.npz, or an .npy or .npz of maps");
             let field = ui.add(
                 egui::TextEdit::singleline(&mut self.query)
@@ -162,6 +162,11 @@ impl Overlay {
         });
         done || response.should_close()
     }
+}
+
+/// The width of a sheet that wants so much, points: in a small window less.
+fn width(ui: &Ui, wanted: f32) -> f32 {
+    wanted.min(ui.ctx().content_rect().width() - 60.0).max(120.0)
 }
 
 /// A sheet in the middle of the window.

@@ -139,6 +139,7 @@ impl WindowArgs {
             config: Some(common::settings(self.config.as_deref(), self.preset, None)?),
             session: self.session,
             allow_outside: common::outside_allowed(),
+            pick: None,
         })
     }
 }

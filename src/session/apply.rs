@@ -128,6 +128,7 @@ impl Session {
             Command::SelectBranch(id) => self.select_branch(id),
             Command::SetConfig(config) => self.set_config(&config),
             Command::DragConfig(config) => self.drag_config(&config),
+            Command::DragErase(region) => self.drag_erase(&region),
             Command::EndDrag => self.end_drag(),
             Command::ToggleReplay => self.toggle_replay(),
             Command::PlayOn(seconds) => self.play_on(seconds),

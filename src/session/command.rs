@@ -125,6 +125,8 @@ pub enum Command {
     SetConfig(Box<FitConfig>),
     /// The same while they are under a finger: until [`Command::EndDrag`] it is one act.
     DragConfig(Box<FitConfig>),
+    /// Cells under an eraser: the fit is done anew without them; until [`Command::EndDrag`] it is one act.
+    DragErase(CellRegion),
     /// The finger is lifted.
     EndDrag,
     /// Play the iterations of the branch on screen, or stop playing them.

@@ -15,6 +15,7 @@ use crate::config::FitConfig;
 use crate::input::read_bytes;
 use crate::mhp::{FitState, Precision};
 use crate::output::replace_file;
+use crate::worker::ErasedCells;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -140,6 +141,9 @@ pub struct SavedFit {
     pub changes: Vec<SavedChange>,
     /// Parameters were edited by hand.
     pub edited: bool,
+    /// Cells that the fit does not see.
+    #[serde(default)]
+    pub erased: Vec<ErasedCells>,
 }
 
 /// A change of settings along the lineage.
@@ -302,6 +306,7 @@ fn saved_fit(session: &Session) -> Option<SavedFit> {
         config: config.to_toml(),
         changes: changes.collect(),
         edited: fit.edited,
+        erased: branch.erased.to_vec(),
     })
 }
 

@@ -7,7 +7,7 @@ use crate::config::FitConfig;
 use crate::geometry::{norm, sub};
 use crate::mhp::Problem;
 use crate::start::FoundStart;
-use crate::worker::{JobId, Snapshot};
+use crate::worker::{ErasedCells, JobId, Snapshot};
 use std::sync::Arc;
 
 /// Iterations that a fit is looked at over to say that it has settled, and how little may change meanwhile: share of the
@@ -81,6 +81,11 @@ impl Fit {
     /// The active branch.
     pub fn branch(&self) -> Option<&Branch> {
         self.history.active()
+    }
+
+    /// Cells that the fit of the active branch does not see.
+    pub fn erased(&self) -> Arc<[ErasedCells]> {
+        self.branch().map(|branch| Arc::clone(&branch.erased)).unwrap_or_default()
     }
 
     /// The newest iteration of the active branch.

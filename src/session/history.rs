@@ -2,6 +2,7 @@
 
 use crate::config::{FitConfig, difference};
 use crate::mhp::{FitState, StepReport};
+use crate::worker::ErasedCells;
 use std::sync::Arc;
 
 /// Bytes of states that one fit may keep; beyond it every second state is forgotten (its report stays).
@@ -49,8 +50,10 @@ pub struct Branch {
     pub rows: Vec<IterationRow>,
     /// Changes of settings.
     pub flags: Vec<Flag>,
-    /// What was moved by hand where it begins, in words; empty while it is still moved.
+    /// What was moved or erased by hand where it begins, in words; empty while it is still in hand.
     pub edit: Option<String>,
+    /// Cells that its fit does not see.
+    pub erased: Arc<[ErasedCells]>,
 }
 
 impl Branch {
@@ -110,15 +113,17 @@ impl History {
         history
     }
 
-    /// A history with one branch, as a file kept it: the settings at its beginning, every row, few states, and where the
-    /// settings changed.
+    /// A history with one branch, as a file kept it: the settings at its beginning, every row, few states, where the
+    /// settings changed, and what its fit does not see.
     pub(super) fn restored(
         config: &FitConfig,
         rows: Vec<super::pins::PinRow>,
         states: Vec<FitState>,
         changes: Vec<(usize, FitConfig)>,
+        erased: Vec<ErasedCells>,
     ) -> Self {
         let mut history = Self::new(*config);
+        history.branches.iter_mut().for_each(|first| first.erased = erased.clone().into());
         let mut states: Vec<Arc<FitState>> = states.into_iter().map(Arc::new).collect();
         for super::pins::PinRow { report, majpe_mm } in rows {
             let at = states.iter().position(|state| state.iteration == report.iteration);
@@ -131,16 +136,29 @@ impl History {
         history
     }
 
-    /// Starts a branch, makes it the active one and answers its number.
+    /// Starts a branch, makes it the active one and answers its number. Its fit does not see what its parent's does not.
     pub fn begin(&mut self, parent: Option<(u32, usize)>, config: FitConfig) -> u32 {
         let id = self.next_id;
         self.next_id += 1;
-        self.branches.push(Branch { id, parent, config, rows: Vec::new(), flags: Vec::new(), edit: None });
+        let of_parent = parent.and_then(|(parent, _)| self.branch(parent)).map(|parent| Arc::clone(&parent.erased));
+        let erased = of_parent.unwrap_or_default();
+        self.branches.push(Branch { id, parent, config, rows: Vec::new(), flags: Vec::new(), edit: None, erased });
         self.activate(id);
         id
     }
 
-    /// Says what was moved by hand where a branch begins.
+    /// A branch's fit does not see these cells, besides those that its parent's does not see.
+    pub(super) fn erase(&mut self, id: u32, cells: ErasedCells) {
+        let parent = self.branch(id).and_then(|branch| branch.parent);
+        let before = parent.and_then(|(parent, _)| self.branch(parent)).map(|parent| Arc::clone(&parent.erased));
+        let all = before.iter().flat_map(|before| before.iter().cloned()).chain([cells]).collect();
+        if let Some(branch) = self.branches.iter_mut().find(|branch| branch.id == id) {
+            branch.erased = all;
+            self.revision += 1;
+        }
+    }
+
+    /// Says what was moved or erased by hand where a branch begins.
     pub(super) fn edit(&mut self, branch: u32, words: String) {
         if let Some(branch) = self.branches.iter_mut().find(|b| b.id == branch) {
             branch.edit = Some(words);
@@ -148,8 +166,8 @@ impl History {
         }
     }
 
-    /// The branch and iteration that a fit of `branch` from its start begins at: where the body was moved by hand last on
-    /// the way to it, else the start of the first branch.
+    /// The branch and iteration that a fit of `branch` from its start begins at: where the body was moved or cells were erased
+    /// by hand last on the way to it, else the start of the first branch.
     pub(super) fn start_of(&self, branch: u32) -> (u32, usize) {
         let mut next = self.branch(branch);
         while let Some(here) = next {
@@ -188,7 +206,7 @@ impl History {
         self.branches.iter().find(|branch| branch.id == id)
     }
 
-    /// What was moved by hand and what is set otherwise than at the iteration that a branch began at, in words.
+    /// What was moved or erased by hand and what is set otherwise than at the iteration that a branch began at, in words.
     pub fn departure(&self, branch: &Branch) -> String {
         let before = branch.parent.and_then(|(id, at)| Some(self.branch(id)?.config_at(at)));
         let set = before.map_or_else(String::new, |before| difference(&before, &branch.config));
@@ -232,6 +250,20 @@ impl History {
             changes.push((before, newest));
         }
         Some((begin, changes))
+    }
+
+    /// Where something was set, moved or erased on the way to the head of the active branch: the last iteration before, and what
+    /// in words.
+    pub fn flags(&self) -> Vec<(usize, String)> {
+        let mut flags = Vec::new();
+        for (branch, rows) in self.ancestry() {
+            let departure = branch.parent.map(|_| (branch.start(), self.departure(branch)));
+            let end = rows.last().map_or(0, |row| row.report.iteration);
+            let set = branch.flags.iter().filter(|flag| flag.iteration <= end);
+            flags.extend(departure.into_iter().chain(set.map(|flag| (flag.iteration, flag.text.clone()))));
+        }
+        flags.retain(|(_, text)| !text.is_empty());
+        flags
     }
 
     /// The branches that led to the head of the active one, each with its rows of the lineage.

@@ -1,6 +1,7 @@
 //! Acts on settings and on the body: one from where a finger goes down until it is lifted, whatever it did in between.
 
 use crate::config::FitConfig;
+use crate::worker::ErasedCells;
 use serde::{Deserialize, Serialize};
 
 /// Acts that can be undone.
@@ -81,6 +82,8 @@ pub(super) struct Drag {
     pub(super) from: u32,
     /// The branch that is fitted anew meanwhile, and the iteration of `from` that it begins at.
     pub(super) live: Option<(u32, usize)>,
+    /// Cells that the finger takes away from what was measured, and what that is called.
+    pub(super) erasing: Option<(ErasedCells, String)>,
 }
 
 /// An act that can be undone.
@@ -97,6 +100,8 @@ pub(super) struct SettingsAct {
     pub(super) branches: [u32; 2],
     /// The body was moved by hand, where the second branch begins; the iteration of the first that it left.
     pub(super) moved_at: Option<usize>,
+    /// Cells were erased by hand where the second branch begins.
+    pub(super) erased: bool,
 }
 
 /// Acts on settings, done and undone.

@@ -1,5 +1,6 @@
 //! What the window and the worker say to each other.
 
+use super::erased::ErasedCells;
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::{Dataset, Frame};
@@ -44,6 +45,8 @@ pub struct Prepare {
     pub precision: Precision,
     /// Where to begin.
     pub start: Start,
+    /// Cells that the fit is not to see; a start that is sought sees them.
+    pub erased: Arc<[ErasedCells]>,
 }
 
 /// Window to worker.
@@ -71,6 +74,8 @@ pub enum WorkerCommand {
         target: usize,
         /// Comes back with the end, as that of [`WorkerCommand::RunTo`].
         run: u64,
+        /// Cells that the fit is not to see.
+        erased: Arc<[ErasedCells]>,
     },
     /// Runs take at most so many iterations a second from now on, `None` as fast as they go; a fit that is done anew
     /// always does.
@@ -87,6 +92,8 @@ pub enum WorkerCommand {
         state: Arc<FitState>,
         /// Settings from there on.
         config: Box<FitConfig>,
+        /// Cells that the fit is not to see.
+        erased: Arc<[ErasedCells]>,
     },
     /// Replace the parameters at the current iteration by hand; of those that wait the newest is done.
     Edit(Box<Pppr>),

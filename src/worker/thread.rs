@@ -1,9 +1,11 @@
 //! The worker's loop: drain every command, take one step, publish; block while nothing runs.
 
+use super::erased::{ErasedCells, without};
 use super::handle::Latest;
 use super::protocol::{
     HistoryRow, JobId, Kept, Prepare, PreparedFit, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
 };
+use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::mhp::{
     FitError, FitState, Fitter, Objective, Precision, Problem, StepReport, StopReason, masks, predict, simulate,
@@ -40,7 +42,13 @@ struct Job {
     branch: u32,
     /// The iteration of the branch's first row.
     branch_start: usize,
+    /// What was measured.
     problem: Arc<Problem>,
+    /// The pose that fixes the EM region.
+    initial: Pppr,
+    precision: Precision,
+    /// What of it the fit does not see.
+    erased: Arc<[ErasedCells]>,
     fitter: Fitter,
     /// A second objective with the same EM region, for looking at states that are not the current one.
     viewer: Objective,
@@ -303,7 +311,7 @@ enum Reply {
 
 impl Job {
     fn new(prepare: Prepare) -> Result<(Self, PreparedFit), FitError> {
-        let Prepare { job, branch, dataset, frame, config, precision, start } = prepare;
+        let Prepare { job, branch, dataset, frame, config, precision, start, erased } = prepare;
         let problem = Arc::new(problem_of(&dataset, &frame)?);
         let began = Instant::now();
         let (found_start, initial, state) = match start {
@@ -316,8 +324,9 @@ impl Job {
             Start::Resume { initial, state } => (None, initial, Some(state)),
         };
         let init_ms = milliseconds(began);
-        let mut fitter = Fitter::new(Arc::clone(&problem), config, precision, initial.clone())?;
-        let viewer = Objective::new(Arc::clone(&problem), config, precision, &initial)?;
+        let seen = without(&problem, &erased)?;
+        let mut fitter = Fitter::new(Arc::clone(&seen), config, precision, initial.clone())?;
+        let viewer = Objective::new(seen, config, precision, &initial)?;
         let warnings = viewer.warnings().to_vec();
         let resumed = state.is_some();
         if let Some(state) = state {
@@ -330,6 +339,9 @@ impl Job {
             branch,
             branch_start: if resumed { NOWHERE } else { 0 },
             problem: Arc::clone(&problem),
+            initial: initial.clone(),
+            precision,
+            erased,
             fitter,
             viewer,
             target: 0,
@@ -354,6 +366,18 @@ impl Job {
 
     fn iteration(&self) -> usize {
         self.fitter.iteration()
+    }
+
+    /// From now on the fit does not see these cells, and sees all others.
+    fn erase(&mut self, erased: Arc<[ErasedCells]>) -> Result<(), FitError> {
+        if self.erased == erased {
+            return Ok(());
+        }
+        let (seen, config) = (without(&self.problem, &erased)?, *self.fitter.config());
+        self.viewer = Objective::new(Arc::clone(&seen), config, self.precision, &self.initial)?;
+        self.fitter = Fitter::new(seen, config, self.precision, self.initial.clone())?;
+        self.erased = erased;
+        Ok(())
     }
 
     fn is_running(&self) -> bool {
@@ -446,8 +470,9 @@ impl Job {
                     return Ok(Reply::Event(self.finished(StopReason::Iterations)));
                 }
             }
-            WorkerCommand::Refit { branch, state, config, target, run } => {
+            WorkerCommand::Refit { branch, state, config, target, run, erased } => {
                 self.rows.clear();
+                self.erase(erased)?;
                 self.fitter.set_config(*config)?;
                 self.fitter.restore(state)?;
                 (self.branch, self.branch_start) = (branch, self.iteration());
@@ -476,8 +501,9 @@ impl Job {
                 }
                 return Ok(Reply::Event(WorkerEvent::ConfigApplied { branch, iteration, config }));
             }
-            WorkerCommand::Branch { branch, state, config } => {
+            WorkerCommand::Branch { branch, state, config, erased } => {
                 self.target = 0;
+                self.erase(erased)?;
                 self.fitter.set_config(*config)?;
                 self.fitter.restore(state)?;
                 self.branch = branch;

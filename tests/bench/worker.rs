@@ -45,6 +45,7 @@ fn watched(dataset: &Arc<Dataset>, precision: Precision, iterations: usize) -> (
         config: FitConfig::default(),
         precision,
         start,
+        erased: Arc::default(),
     })));
     worker.send(WorkerCommand::RunTo { target: iterations, run: 1 });
     let (mut pictures, mut longest) = (0, 0.0_f64);

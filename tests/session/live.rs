@@ -85,6 +85,7 @@ fn a_drag_is_one_branch_one_line_and_one_act() {
     assert_eq!((rig.lines("w_EM 0.5 → 3.5"), rig.lines("w_EM")), (1, 1), "{:?}", rig.session().log);
     assert_eq!(rig.session().undo_name(), Some("w_EM 0.5 → 3.5"));
     // As if it had been fitted with these settings from the start.
+    assert_eq!(fit.history.flags(), [(0, "w_EM 0.5 → 3.5".to_owned())], "one flag");
     let dragged = fit.shown.clone().unwrap();
     let mut alone = Rig::new(Live::Off);
     alone.runtime.apply(Command::SetConfig(Box::new(FitConfig { w_em: 3.5, ..config() })));
@@ -103,6 +104,18 @@ fn a_drag_is_one_branch_one_line_and_one_act() {
     rig.settled();
     assert_eq!((rig.session().config.w_em, rig.session().fit.history.active_id()), (3.5, 1));
     assert_eq!(rig.session().fit.shown.as_ref().unwrap().params, dragged.params);
+}
+
+/// By itself a fit follows a finger where it takes less than 50 ms.
+#[test]
+fn live_is_on_by_itself_where_a_fit_is_quick() {
+    let mut rig = Rig::new(Live::Auto);
+    let ms = rig.session().fit_ms().unwrap();
+    assert!(rig.session().is_live() == (ms < Live::QUICK_MS) && ms > 0.0, "{ms} ms");
+    rig.runtime.apply(Command::SetConfig(Box::new(FitConfig { iterations: 1_000_000, ..config() })));
+    assert!(rig.session().fit_ms().unwrap() > Live::QUICK_MS && !rig.session().is_live());
+    rig.runtime.apply(Command::SetConfig(Box::new(FitConfig { iterations: 1, ..config() })));
+    assert!(rig.session().is_live(), "{:?} ms", rig.session().fit_ms());
 }
 
 #[test]

@@ -468,7 +468,7 @@ fn a_setting_changed_at_an_earlier_iteration_starts_a_branch() {
     bench.apply(Command::GotoIteration(6));
     let config = FitConfig { w_em: 2.0, ..FitConfig::default() };
     let effects = bench.apply(Command::SetConfig(Box::new(config)));
-    let WorkerCommand::Branch { branch: 1, state, config: told } = sent(&effects) else { panic!("{effects:?}") };
+    let WorkerCommand::Branch { branch: 1, state, config: told, .. } = sent(&effects) else { panic!("{effects:?}") };
     assert_eq!((state.iteration, **told), (6, config));
     let history = &bench.session.fit.history;
     let branches: Vec<_> = history.branches().iter().map(|b| (b.id, b.parent, b.config.w_em, b.head())).collect();
@@ -486,7 +486,7 @@ fn a_setting_changed_at_an_earlier_iteration_starts_a_branch() {
     // Back on the first branch with its own settings, and on the second again.
     let effects = bench.apply(Command::SelectBranch(0));
     assert!(
-        matches!(sent(&effects), WorkerCommand::Branch { branch: 0, state, config } if state.iteration == 10 && config.w_em == 0.5)
+        matches!(sent(&effects), WorkerCommand::Branch { branch: 0, state, config, .. } if state.iteration == 10 && config.w_em == 0.5)
     );
     assert_eq!(bench.session.config.w_em, 0.5);
     bench.rows(job, 0, 10..=10);

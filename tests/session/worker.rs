@@ -56,6 +56,7 @@ impl Rig {
             config: *config,
             precision: Precision::F64,
             start,
+            erased: Arc::default(),
         })));
     }
 
@@ -209,7 +210,12 @@ fn a_long_run_keeps_fewer_states_but_every_pose_and_always_the_last() {
     let mut rig = Rig::new();
     let (row, prepared) = rig.prepared();
     let late = FitState { iteration: 2044, ..FitState::clone(state(&row)) };
-    rig.send(WorkerCommand::Branch { branch: 0, state: Arc::new(late), config: Box::new(FitConfig::default()) });
+    rig.send(WorkerCommand::Branch {
+        branch: 0,
+        state: Arc::new(late),
+        config: Box::new(FitConfig::default()),
+        erased: Arc::default(),
+    });
     rig.send(WorkerCommand::RunTo { target: 2053, run: 1 });
     let (rows, ..) = rig.finish();
     assert_eq!(iterations(&rows), (2044..=2053).collect::<Vec<_>>());
@@ -220,7 +226,12 @@ fn a_long_run_keeps_fewer_states_but_every_pose_and_always_the_last() {
     let (before, after) = (&rows[4], &rows[5]);
     assert_ne!(before.kept.positions(), after.kept.positions());
     assert_eq!(after.kept.positions().len(), prepared.initial.positions().len());
-    rig.send(WorkerCommand::Branch { branch: 1, state: Arc::clone(state(before)), config: Box::default() });
+    rig.send(WorkerCommand::Branch {
+        branch: 1,
+        state: Arc::clone(state(before)),
+        config: Box::default(),
+        erased: Arc::default(),
+    });
     rig.send(WorkerCommand::RunTo { target: 2049, run: 2 });
     let (again, ..) = rig.finish();
     assert_eq!(again[1].kept.positions(), after.kept.positions(), "a pose without its state is the pose all the same");
@@ -234,7 +245,7 @@ fn a_branch_that_begins_late_keeps_where_it_begins_and_where_the_one_before_ende
     // Odd iterations, of which nothing would be kept there; the commands come at once, so that rows wait together.
     let config = Box::<FitConfig>::default();
     for (branch, begins) in [(1, 2049), (2, 4099)] {
-        rig.send(WorkerCommand::Branch { branch, state: late(begins), config: config.clone() });
+        rig.send(WorkerCommand::Branch { branch, state: late(begins), config: config.clone(), erased: Arc::default() });
         rig.send(WorkerCommand::RunTo { target: begins + 4, run: u64::from(branch) });
         if branch == 1 {
             let (rows, ..) = rig.finish();
@@ -342,14 +353,24 @@ fn a_branch_with_the_same_settings_repeats_the_run_bit_for_bit() {
     rig.send(WorkerCommand::RunTo { target: 30, run: 1 });
     rig.finish();
     let config = FitConfig::default();
-    rig.send(WorkerCommand::Branch { branch: 1, state: Arc::clone(state(&rows[7])), config: Box::new(config) });
+    rig.send(WorkerCommand::Branch {
+        branch: 1,
+        state: Arc::clone(state(&rows[7])),
+        config: Box::new(config),
+        erased: Arc::default(),
+    });
     rig.send(WorkerCommand::RunTo { target: 25, run: 1 });
     let (again, at, _) = rig.finish();
     assert_eq!(at, 25);
     assert!(again.iter().all(|row| row.branch == 1));
     same(&again, &rows[7..]);
     // And with other settings it is another run from the first step on.
-    rig.send(WorkerCommand::Branch { branch: 2, state: Arc::clone(state(&rows[7])), config: Box::new(other) });
+    rig.send(WorkerCommand::Branch {
+        branch: 2,
+        state: Arc::clone(state(&rows[7])),
+        config: Box::new(other),
+        erased: Arc::default(),
+    });
     rig.send(WorkerCommand::RunTo { target: 8, run: 1 });
     let (differs, ..) = rig.finish();
     assert_eq!(iterations(&differs), [7, 8]);
@@ -521,7 +542,12 @@ fn every_command_in_the_queue_is_obeyed_in_order() {
     let (first, _) = rig.prepared();
     let state = Arc::clone(state(&first));
     for branch in 1..=200 {
-        rig.send(WorkerCommand::Branch { branch, state: Arc::clone(&state), config: Box::new(FitConfig::default()) });
+        rig.send(WorkerCommand::Branch {
+            branch,
+            state: Arc::clone(&state),
+            config: Box::new(FitConfig::default()),
+            erased: Arc::default(),
+        });
         rig.send(WorkerCommand::RunTo { target: 1, run: 1 });
         rig.send(WorkerCommand::Pause);
     }
@@ -549,7 +575,14 @@ fn of_the_fits_that_wait_to_be_done_anew_the_newest_is() {
     rig.prepare_with(2, &FitConfig::default(), Start::Warm(prepared.initial));
     for k in 1..=40_u32 {
         let config = Box::new(FitConfig { w_em: f64::from(k), ..FitConfig::default() });
-        rig.send(WorkerCommand::Refit { branch: 1, state: Arc::clone(&begin), config, target: 5, run: u64::from(k) });
+        rig.send(WorkerCommand::Refit {
+            branch: 1,
+            state: Arc::clone(&begin),
+            config,
+            target: 5,
+            run: u64::from(k),
+            erased: Arc::default(),
+        });
     }
     let (rows, _) = rig.rows_until(2, |event| matches!(event, WorkerEvent::Prepared(_)));
     assert_eq!(iterations(&rows), [0]);
@@ -562,4 +595,66 @@ fn of_the_fits_that_wait_to_be_done_anew_the_newest_is() {
     assert!(rows.iter().all(|row| row.branch == 1));
     let snapshot = rig.snapshot(|snapshot| snapshot.iteration == 5);
     assert_eq!((snapshot.branch, snapshot.config.w_em), (1, 40.0));
+}
+
+/// A fit that takes longer than a picture is shown as far as it came, and goes on.
+#[test]
+fn a_long_fit_that_is_done_anew_is_shown_on_the_way() {
+    let mut rig = Rig::new();
+    let (row, _) = rig.prepared();
+    let began = Instant::now();
+    let (state, config) = (Arc::clone(state(&row)), Box::new(FitConfig { w_em: 2.0, ..FitConfig::default() }));
+    rig.send(WorkerCommand::Refit { branch: 1, state, config, target: FOREVER, run: 7, erased: Arc::default() });
+    let first = rig.snapshot(|snapshot| snapshot.branch == 1);
+    assert!(first.iteration > 0 && first.iteration < 10_000, "{} after {:?}", first.iteration, began.elapsed());
+    let later = rig.snapshot(|snapshot| snapshot.branch == 1 && snapshot.iteration > first.iteration);
+    assert_eq!((first.config.w_em, later.config.w_em), (2.0, 2.0));
+    rig.send(WorkerCommand::Pause);
+    let (rows, event) = rig.rows_until(1, |event| matches!(event, WorkerEvent::Finished { run: 7, .. }));
+    assert!(matches!(event, WorkerEvent::Finished { reason: StopReason::Stopped, .. }), "{event:?}");
+    assert!(iterations(&rows).windows(2).all(|pair| pair[1] == pair[0] + 1), "no iteration is lost");
+}
+
+/// A fit that is not to see some cells is the fit of a frame in which they were not measured; told otherwise, it sees them.
+#[test]
+fn erased_cells_are_as_if_they_had_not_been_measured() {
+    use mhp_inspector::mhp::{Fitter, Problem};
+    use mhp_inspector::worker::ErasedCells;
+    let mut rig = Rig::new();
+    let (row, prepared) = rig.prepared();
+    let erased: Arc<[ErasedCells]> = [ErasedCells { view: 0, bins: vec![[10, 30], [8, 20]] }].into();
+    let config = FitConfig { iterations: 5, ..FitConfig::default() };
+    let (begin, told) = (Arc::clone(state(&row)), Box::new(config));
+    let again = |erased: &Arc<[ErasedCells]>, run: u64| WorkerCommand::Refit {
+        branch: 1,
+        state: Arc::clone(&begin),
+        config: told.clone(),
+        target: 5,
+        run,
+        erased: Arc::clone(erased),
+    };
+    rig.send(again(&erased, 1));
+    let (without, _) = rig.rows_until(1, |event| matches!(event, WorkerEvent::Finished { .. }));
+    rig.send(again(&Arc::default(), 2));
+    let (with, _) = rig.rows_until(1, |event| matches!(event, WorkerEvent::Finished { .. }));
+
+    let problem = &prepared.problem;
+    let mut map = problem.map(0).to_vec();
+    let width = problem.views[0].axes[1].bins;
+    (10..30).for_each(|row| map[row * width + 8..row * width + 20].fill(f64::NAN));
+    let maps = [map.as_slice(), problem.map(1)];
+    let (radar, skeleton) = (problem.radar.clone(), problem.skeleton.clone());
+    let mut holed = Problem::new(radar, skeleton, problem.views.clone(), &maps).unwrap();
+    for neighbour in problem.neighbours() {
+        let mut map = neighbour.map(0).to_vec();
+        (10..30).for_each(|row| map[row * width + 8..row * width + 20].fill(f64::NAN));
+        holed.add_neighbour(neighbour.offset_s, &[&map, neighbour.map(1)]).unwrap();
+    }
+    for (problem, rows) in [(Arc::new(holed), &without), (Arc::clone(problem), &with)] {
+        let mut fitter = Fitter::new(problem, config, Precision::F64, prepared.initial.clone()).unwrap();
+        let mut losses = vec![fitter.report().loss];
+        losses.extend((0..5).map(|_| fitter.step().unwrap().loss));
+        assert_eq!(rows.iter().map(|row| row.report.loss).collect::<Vec<_>>(), losses);
+    }
+    assert_ne!(with[0].report.loss, without[0].report.loss);
 }

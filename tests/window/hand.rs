@@ -3,6 +3,7 @@
 
 use crate::window::Window;
 use egui::{Key, Modifiers, Pos2, Rect, pos2, vec2};
+use mhp_inspector::app::Pane;
 use mhp_inspector::geometry::{norm, sub};
 use mhp_inspector::render::{Camera, Vec2, Vec3};
 use mhp_inspector::session::Command;
@@ -91,7 +92,42 @@ fn empty_space_turns_the_camera_and_a_click_selects() {
     window.pull(at, vec2(0.0, 0.0));
     window.harness.run_steps(3);
     assert!(window.session().joint.is_some());
+    assert!(window.harness.state().pane_rect(Pane::called("Joint").unwrap()).is_some(), "its pane is in front");
     assert_eq!(window.fit().history.branches().len(), 1);
+}
+
+/// The cell under the pointer is drawn in the room, and the joint under it on the maps, whichever of them it is over.
+#[test]
+fn what_is_pointed_at_is_shown_in_3d_and_on_the_maps() {
+    let mut window = Window::fitted(1);
+    window.key(Key::R);
+    window.harness.run_steps(3);
+    let circles = |w: &Window, inside: Rect| -> usize {
+        let is_ring = |shape: &egui::Shape| matches!(shape, egui::Shape::Circle(ring) if ring.radius == 9.0);
+        let shapes = w.harness.output().shapes.iter();
+        shapes.filter(|s| is_ring(&s.shape) && inside.contains(s.shape.visual_bounding_rect().center())).count()
+    };
+    let (scene, map) = (window.node("3-D scene").rect(), window.node("H_ori map of hori").rect());
+    assert_eq!((circles(&window, scene), circles(&window, map)), (0, 0));
+    // Over the joint in 3-D: a ring there and on the map.
+    let at = window.seen(scene, window.joint(RIGHT_WRIST));
+    window.harness.hover_at(at);
+    window.harness.run_steps(3);
+    assert!(circles(&window, scene) > 0 && circles(&window, map) > 0);
+    // Over its mark on the map, which is not where the pointer was.
+    let bins = window.session().data.dataset.as_ref().unwrap().info().views[0].bins_of(window.joint(RIGHT_WRIST));
+    let share = |bin: f64, bins: f32| (bin as f32 + 0.5) / bins;
+    window.harness.hover_at(map.lerp_inside(vec2(share(bins[1], 32.0), share(bins[0], 48.0))));
+    window.harness.run_steps(3);
+    assert!(circles(&window, scene) > 0 && circles(&window, map) > 0);
+    assert!(window.text_of("3-D scene").contains("cell of hori"), "{}", window.text_of("3-D scene"));
+    window.harness.hover_at(map.right_top() + vec2(-3.0, 3.0));
+    window.harness.run_steps(3);
+    assert_eq!(circles(&window, map), 0);
+    assert!(window.text_of("3-D scene").contains("cell of hori"));
+    window.harness.remove_cursor();
+    window.harness.run_steps(3);
+    assert!(!window.text_of("3-D scene").contains("cell of hori"));
 }
 
 #[test]

@@ -13,11 +13,14 @@ mod tree;
 mod window;
 
 mod compare;
+mod erase;
 mod hand;
 mod labels;
 mod large;
 mod maps;
 mod radar;
 mod results;
+mod sizes;
 mod study;
 mod ui;
+mod visits;

@@ -765,6 +765,15 @@ fn listed_frames_are_fitted_by_one_key() {
     assert!(window.session().summaries.values().filter(|summary| summary.iou.is_some()).count() >= listed - 1);
     window.click("Fit listed");
     window.until("the kept ones", |w| !w.session().batch.is_running());
+    // The statistics say what they come to.
+    let ious: Vec<f64> = (0..listed).filter_map(|frame| window.session().frame_row(frame).iou).collect();
+    window.click("Statistics");
+    window.harness.run_steps(3);
+    let mean = format!("{:.3}", ious.iter().sum::<f64>() / ious.len() as f64);
+    assert!(window.named("fitted") && window.named(&mean), "{mean} in {:?}", window.names());
+    window.click("By scene");
+    window.harness.run_steps(2);
+    assert!(window.named(&mean));
 }
 
 /// Each curve has a picture of its own; a click shows the iteration under it, and the head is followed again from its end.

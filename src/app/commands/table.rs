@@ -289,6 +289,7 @@ pub(super) const COMMANDS: &[CommandRow] = &[
             view(s, |view| view.live = if live { Live::Off } else { Live::On })
         },
     },
+    maps::ERASE_CELLS,
     CommandRow {
         label: "Reset fit",
         title: None,

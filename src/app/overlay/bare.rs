@@ -34,7 +34,7 @@ impl BareQuestion {
         let path = path.clone();
         let mut send = None;
         let response = super::modal(ui, "bare file").show(ui.ctx(), |ui| {
-            ui.set_width(640.0);
+            ui.set_width(super::width(ui, 640.0));
             let tokens = Tokens::of(ui);
             ui.label(RichText::new("What do these maps measure?").font(theme::strong(16.0)));
             let text = "The file does not say which arrays are maps and what their axes are. Your answer is remembered for files with the same arrays.";

@@ -1,29 +1,35 @@
 //! Sheets that ask for a file: one to write, or a session file or a table of results to read.
 
 use super::{Overlay, modal};
+use crate::app::TOO_QUICK;
 use crate::app::commands::{SaveKind, UiAction};
 use crate::app::panes::Shared;
 use crate::app::theme::Tokens;
 use crate::session::Command;
 use egui::{Key, RichText, Ui};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// What a file dialog answered, once it did.
 #[derive(Default)]
 pub(super) struct FileDialog {
     picked: Arc<Mutex<Option<PathBuf>>>,
+    /// It was closed before anybody could have answered it: there is none.
+    missing: Arc<AtomicBool>,
 }
 
 impl FileDialog {
     /// Shows a dialog on a thread of its own; its answer comes into the field.
     fn browse(&self, ctx: &egui::Context, pick: impl FnOnce() -> Option<PathBuf> + Send + 'static) {
-        let (picked, ctx) = (Arc::clone(&self.picked), ctx.clone());
+        let (picked, missing, ctx) = (Arc::clone(&self.picked), Arc::clone(&self.missing), ctx.clone());
         let spawned = std::thread::Builder::new().name("file-dialog".into()).spawn(move || {
-            if let Some(path) = pick() {
-                *picked.lock().unwrap_or_else(PoisonError::into_inner) = Some(path);
-                ctx.request_repaint();
+            let asked = std::time::Instant::now();
+            match pick() {
+                Some(path) => *picked.lock().unwrap_or_else(PoisonError::into_inner) = Some(path),
+                None => missing.store(asked.elapsed() < TOO_QUICK, Ordering::Relaxed),
             }
+            ctx.request_repaint();
         });
         if let Err(error) = spawned {
             tracing::error!("no thread for the file dialog: {error}");
@@ -84,7 +90,7 @@ impl Overlay {
         let (title, how) = what(kind);
         let mut done = false;
         let response = modal(ui, "save").show(ui.ctx(), |ui| {
-            ui.set_width(620.0);
+            ui.set_width(super::width(ui, 620.0));
             ui.label(RichText::new(title).font(crate::app::theme::strong(16.0)));
             ui.label(RichText::new(how).small().color(tokens.dim));
             let browse = |suggested: PathBuf| move || super::pick_save(&suggested);
@@ -103,7 +109,7 @@ impl Overlay {
     pub(super) fn session_path(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
         let mut done = false;
         let response = modal(ui, "session").show(ui.ctx(), |ui| {
-            ui.set_width(620.0);
+            ui.set_width(super::width(ui, 620.0));
             ui.label(RichText::new("Open a session").font(crate::app::theme::strong(16.0)));
             let browse = |_: PathBuf| super::pick_session;
             if let Some(path) = self.path_field(ui, "Session file", "Open", browse) {
@@ -118,7 +124,7 @@ impl Overlay {
         let tokens = Tokens::of(ui);
         let mut done = false;
         let response = modal(ui, "results").show(ui.ctx(), |ui| {
-            ui.set_width(620.0);
+            ui.set_width(super::width(ui, 620.0));
             ui.label(RichText::new("Load results").font(crate::app::theme::strong(16.0)));
             let how =
                 "The summary.csv of `mhp-inspector fit --out`. Frames that were fitted in this window keep theirs.";
@@ -136,7 +142,7 @@ impl Overlay {
         let tokens = Tokens::of(ui);
         let mut done = false;
         let response = modal(ui, "study").show(ui.ctx(), |ui| {
-            ui.set_width(620.0);
+            ui.set_width(super::width(ui, 620.0));
             ui.label(RichText::new("Open a study").font(crate::app::theme::strong(16.0)));
             let how = "The run folder of `mhp-inspector study NAME --out RUN`, finished or not.";
             ui.label(RichText::new(how).small().color(tokens.dim));
@@ -174,6 +180,10 @@ impl Overlay {
                 self.files.browse(ui.ctx(), browse(PathBuf::from(&typed)));
             }
         });
+        if self.files.missing.load(Ordering::Relaxed) {
+            let text = "▲ This desktop shows no file dialog: type the path.";
+            ui.label(RichText::new(text).small().color(Tokens::of(ui).warn));
+        }
         let enter = ui.input(|i| i.key_pressed(Key::Enter));
         (!typed.is_empty() && (clicked || enter)).then(|| PathBuf::from(typed))
     }

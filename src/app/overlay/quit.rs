@@ -19,7 +19,7 @@ impl Overlay {
         let under_way = shared.session.under_way();
         let mut stay = false;
         let response = modal(ui, "quit").show(ui.ctx(), |ui| {
-            ui.set_width(440.0);
+            ui.set_width(super::width(ui, 440.0));
             ui.label(RichText::new("Quit now?").font(theme::strong(16.0)));
             ui.add_space(6.0);
             for said in &under_way {

@@ -126,8 +126,15 @@ fn blank(session: &Session) -> Option<Blank> {
 
 /// The branch on screen; one without an iteration while a fit is prepared.
 fn branch_of(session: &Session) -> Cow<'_, Branch> {
-    let none =
-        || Branch { id: 0, parent: None, config: session.config, rows: Vec::new(), flags: Vec::new(), edit: None };
+    let none = || Branch {
+        id: 0,
+        parent: None,
+        config: session.config,
+        rows: Vec::new(),
+        flags: Vec::new(),
+        edit: None,
+        erased: std::sync::Arc::default(),
+    };
     begun(session).map_or_else(|| Cow::Owned(none()), Cow::Borrowed)
 }
 
@@ -205,7 +212,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         }
     }
     let pinned = pinned(shared, *tab, window, (along, log));
-    let shown = fit.shown_iteration();
+    let (shown, flags) = (fit.shown_iteration(), fit.history.flags());
     let response = plot.show(ui, |plot| {
         for (id, pieces) in &others {
             for piece in pieces {
@@ -229,8 +236,8 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
                 plot.line(Line::new(c.name.clone(), PlotPoints::Borrowed(piece)).color(color).width(width));
             }
         }
-        for flag in &branch.flags {
-            let line = VLine::new(flag.text.clone(), along.x(flag.iteration as f64));
+        for (iteration, text) in &flags {
+            let line = VLine::new(text.clone(), along.x(*iteration as f64));
             plot.vline(line.color(tokens.warn.gamma_multiply(0.7)).width(1.0));
         }
         plot.vline(VLine::new("shown iteration", along.x(shown as f64)).color(tokens.accent).width(1.0));
@@ -239,7 +246,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         }
         (plot.pointer_coordinate(), plot.response().clone())
     });
-    flag_texts(ui, &response, branch, along, &tokens);
+    flag_texts(ui, &response, &flags, along, &tokens);
     let [lo, hi] = response.transform.bounds().range_x().into_inner().into();
     state.window =
         (hi > lo).then(|| VisibleSpan::new(lo, hi, response.transform.frame().width() * ui.pixels_per_point(), along));
@@ -283,13 +290,19 @@ fn pinned(
 
 /// What changed at each flag, where there is room: a dragged slider leaves many. Painted over the plot, not in it, so
 /// that no text takes part in the plot's bounds.
-fn flag_texts<R>(ui: &Ui, response: &egui_plot::PlotResponse<R>, branch: &Branch, along: Along, tokens: &Tokens) {
+fn flag_texts<R>(
+    ui: &Ui,
+    response: &egui_plot::PlotResponse<R>,
+    flags: &[(usize, String)],
+    along: Along,
+    tokens: &Tokens,
+) {
     let frame = *response.transform.frame();
     let painter = ui.painter().with_clip_rect(frame.intersect(ui.clip_rect()));
     let font = egui::FontId::proportional(10.0);
-    let shown = branch.flags.iter().filter_map(|flag| {
-        let x = response.transform.position_from_point(&PlotPoint::new(along.x(flag.iteration as f64), 0.0)).x;
-        let text = format!("◆ {}", flag.text);
+    let shown = flags.iter().filter_map(|(iteration, text)| {
+        let x = response.transform.position_from_point(&PlotPoint::new(along.x(*iteration as f64), 0.0)).x;
+        let text = format!("◆ {text}");
         let inside = (frame.left()..=frame.right()).contains(&x);
         inside.then(|| (x + 3.0, painter.layout_no_wrap(text, font.clone(), tokens.warn)))
     });
@@ -425,8 +438,9 @@ mod dummy_tests {
         let terms = Terms::from_fn(|term| if term.key == "dummy" { 0.7 } else { 0.1 });
         let report = StepReport { iteration: 0, loss: 1.0, terms, iou: vec![None].into(), converged: false };
         let row = IterationRow { report, state: None, majpe_mm: None };
-        let branch =
-            Branch { id: 0, parent: None, config: *config, rows: vec![row.clone()], flags: Vec::new(), edit: None };
+        let mut history = crate::session::History::new(*config);
+        history.push(0, row.clone());
+        let branch = history.branches()[0].clone();
         loss_curves(1, &[branch]).into_iter().map(|curve| (curve.key, (curve.value)(&row))).collect()
     }
 

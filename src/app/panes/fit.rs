@@ -5,7 +5,7 @@ use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, chip, icon_button, iou_color, rows, settings, value_row};
 use crate::config::{Convergence, FIELDS, Field, FieldGroup, FitConfig, Preset, difference};
-use crate::mhp::{Precision, Scope, TERMS, TermId, Terms, formula};
+use crate::mhp::{Precision, Scope, StopReason, TERMS, TermId, Terms, formula};
 use crate::session::{Command, FitStatus, IterationRow, Live, LiveFrom, RunSpeed, Session};
 use egui::{Key, RichText, Ui};
 
@@ -32,13 +32,15 @@ struct State {
 
 impl PaneState for State {}
 
-/// The setting of the top row that is no weight.
+/// The setting beside the presets.
 const PEOPLE: &str = "people";
 
 fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
     let old = shared.session.config;
     let mut config = old;
     presets(ui, &mut config);
+    let people: Vec<&Field> = FIELDS.iter().filter(|field| field.key == PEOPLE).collect();
+    rows(ui, &people, &mut config);
     transport(ui, shared);
     watching(ui, shared);
     // In scopes of their own: what appears in them must not shift the identity of a number that is being typed below.
@@ -61,8 +63,6 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         let old = shared.session.config;
         let mut config = old;
         settings(ui, FieldGroup::Weights, &mut config);
-        let people: Vec<&Field> = FIELDS.iter().filter(|field| field.key == PEOPLE).collect();
-        rows(ui, &people, &mut config);
         ui.separator();
         ui.scope(|ui| numbers(ui, shared));
         ui.separator();
@@ -163,7 +163,8 @@ fn status(ui: &mut Ui, shared: &mut Shared<'_>) {
             if row.report.iteration > 0 && !fit.is_running() {
                 judgement(ui, shared.session, row, &tokens);
             }
-            if let Some(reason) = fit.reason {
+            // In the fit's own words "converged" reads as success: the criterion has a chip of its own.
+            if let Some(reason) = fit.reason.filter(|reason| *reason != StopReason::Converged.text()) {
                 ui.add(egui::Label::new(RichText::new(reason).small().color(tokens.dim)).extend());
             }
         }
@@ -288,7 +289,7 @@ fn numbers(ui: &mut Ui, shared: &Shared<'_>) {
         let (people, chances) = (count.people(), count.probabilities.map(|p| format!("{:.0} %", 100.0 * p)));
         let chance = chances.get(people).cloned().unwrap_or_default();
         value_row(ui, "People counted", &format!("{people} ({chance})"), "").on_hover_text(format!(
-            "0 to 4 and more: {}. Fitted: {}; “people” under Start overrides the count.",
+            "0 to 4 and more: {}. Fitted: {}; “people” above overrides the count.",
             chances.join(", "),
             fit.initial.as_ref().map_or(0, |initial| initial.shape().persons)
         ));
@@ -406,8 +407,12 @@ fn presets(ui: &mut Ui, config: &mut FitConfig) {
         }
     });
     let chosen = Preset::ALL.into_iter().find(|preset| *config == preset.config());
-    let what = chosen.map_or("Settings of your own; a preset sets them all", Preset::help);
-    ui.add(egui::Label::new(RichText::new(what).small().color(tokens.dim)).truncate());
+    let nearest = Preset::nearest(config);
+    let (what, color) = match chosen {
+        Some(preset) => (preset.help().to_owned(), tokens.dim),
+        None => (format!("{}, modified: {}", nearest.name(), difference(&nearest.config(), config)), tokens.warn),
+    };
+    ui.add(egui::Label::new(RichText::new(what).small().color(color)).truncate());
 }
 
 #[cfg(all(test, feature = "dummies"))]

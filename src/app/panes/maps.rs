@@ -11,7 +11,7 @@ mod region;
 mod toolbar;
 
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
-use crate::app::commands::{AppAct, CommandRow, Menu, NONE, UiAction, has_frame};
+use crate::app::commands::{AppAct, CommandRow, Menu, NONE, SHIFT, UiAction, has_frame};
 use crate::app::figure;
 use crate::app::map_image::Orientation;
 use crate::app::map_plane::Plane;
@@ -23,6 +23,7 @@ use egui::{Key, Rect, Sense, Ui, UiBuilder, pos2, vec2};
 use focus::Focus;
 use grid::GridRow;
 use picture::{Content, Pictures};
+use region::{BoxOf, Drawn};
 use serde_json::Value;
 
 /// The pane.
@@ -58,7 +59,18 @@ pub(in crate::app) const MARK_CELLS: CommandRow = CommandRow {
     menu: Menu::Labels,
     keys: &[(NONE, Key::G)],
     enabled: has_frame,
-    act: |_| UiAction::panes(|states, _| states.of::<State>().mark_cells()),
+    act: |_| UiAction::panes(|states, _| states.of::<State>().draw_box(BoxOf::Label)),
+};
+
+/// The next drag on a map erases cells; again to leave it.
+pub(in crate::app) const ERASE_CELLS: CommandRow = CommandRow {
+    label: "Erase cells",
+    title: None,
+    tooltip: "Drag a box on a map: the fit is done anew as if nothing had been measured there, in this frame and in those around it, on a branch of its own. Live, the body follows the box.",
+    menu: Menu::Fit,
+    keys: &[(SHIFT, Key::G)],
+    enabled: has_frame,
+    act: |_| UiAction::panes(|states, _| states.of::<State>().draw_box(BoxOf::Eraser)),
 };
 
 /// Points at cells of a view, first and last bin of each axis, and zooms its maps to them.
@@ -130,7 +142,7 @@ impl PaneState for State {
     }
 
     fn back(&mut self) -> bool {
-        self.solo.take().is_some()
+        self.marking.armed.take().is_some() || self.solo.take().is_some()
     }
 
     fn shows_all(&self) -> bool {
@@ -293,11 +305,16 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
     let tokens = Tokens::of(ui);
     let response = ui.interact(plot, ui.scope_id().with("plot"), Sense::click_and_drag());
     response.widget_info(|| figure::spoken(&name, caption.as_deref()));
-    let (marking, marked) = state.mark(ui, &response, plot, index, (view, orientation));
-    if let Some(region) = marked {
-        shared.send(crate::session::Command::SetRegion(session.data.frame_index, Some(region)));
+    let drawn = state.mark(ui, &response, plot, index, (view, orientation));
+    let drawing = !matches!(drawn, Drawn::Nothing);
+    match drawn {
+        Drawn::Marked(cells) => {
+            shared.send(crate::session::Command::SetRegion(session.data.frame_index, Some(cells)));
+        }
+        Drawn::Erased(cells) => shared.send(crate::session::Command::DragErase(cells)),
+        Drawn::Begun | Drawn::Nothing => {}
     }
-    if !marking && !drag::joint(ui, shared, state, &response, plot, (index, view, orientation)) {
+    if !drawing && !drag::joint(ui, shared, state, &response, plot, (index, view, orientation)) {
         navigate(ui, &response, plot, &mut state.windows[index]);
     }
     let window = state.windows[index];

@@ -215,7 +215,8 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let sight = Sight { camera, rect, viewport, scale };
     take_joint(ui, shared, state, &response, &sight, &tokens);
     let readout = move_body(ui, shared, state, &response, &sight);
-    let spoken = readout.as_deref().or(caption.as_deref());
+    let cell = pointed_cell(shared);
+    let spoken = readout.as_deref().or(cell.as_deref()).or(caption.as_deref());
     response.widget_info(|| figure::spoken("3-D scene", spoken));
     if state.grab.is_none() {
         steer(ui, &response, rect, viewport, scale, &mut camera);
@@ -309,6 +310,13 @@ fn move_body(
     let along = axis.map_or("X, Y or Z held: one axis", |axis| ["along x", "along y", "along z"][axis]);
     let text = format!("{name}\nx {:.2}  y {:.2}  z {:.2} m\n{along}", p[0], p[1], p[2]);
     Some(text.replace('-', "−"))
+}
+
+/// The cell whose places are drawn, in words.
+fn pointed_cell(shared: &Shared<'_>) -> Option<String> {
+    let (view, [column, row]) = shared.pointed.cell?;
+    let array = &shared.session.data.dataset.as_ref()?.info().views.get(view)?.array;
+    Some(format!("places of the cell of {array} at column {column}, row {row}"))
 }
 
 /// A ring around the joint that is pointed at, here or on a map.

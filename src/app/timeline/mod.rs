@@ -132,8 +132,8 @@ fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
     let (shown, head, running, ready, back) =
         (fit.shown_iteration(), fit.head(), fit.is_running(), fit.is_ready(), fit.cursor.is_some());
     let start = fit.branch().map_or(0, crate::session::Branch::start);
-    let flags: Vec<(usize, String)> =
-        fit.branch().map_or_else(Vec::new, |b| b.flags.iter().map(|f| (f.iteration, f.text.clone())).collect());
+    // What was set before the branch on screen begins is not on its strip.
+    let flags: Vec<_> = fit.history.flags().into_iter().filter(|(at, _)| (start..=head).contains(at)).collect();
     caption(ui, "Iteration");
     for (sign, name, label, enabled) in [
         ("◂", "Iteration back", "One step back", ready && shown > start),

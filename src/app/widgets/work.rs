@@ -29,9 +29,10 @@ pub(in crate::app) fn work(ui: &mut Ui, work: &Work, what: &str) -> Option<WorkA
         };
         let share = if total > 0 { done as f32 / total as f32 } else { 0.0 };
         let bar = egui::ProgressBar::new(share).desired_height(14.0).text(RichText::new(text).small());
-        ui.add(bar.desired_width((ui.available_width() - 50.0).clamp(60.0, 420.0)));
+        ui.add(bar.desired_width((ui.available_width() - if paused { 76.0 } else { 50.0 }).clamp(60.0, 420.0)));
+        // A word, for ▶ plays frames.
         let (sign, name) =
-            if paused { ("▶", format!("Go on with {what}")) } else { ("‖", format!("Pause {what}")) };
+            if paused { ("Go on", format!("Go on with {what}")) } else { ("‖", format!("Pause {what}")) };
         if ui.small_button(sign).on_hover_text(&name).named(Role::Button, &name).clicked() {
             asked = Some(WorkAsked::Pause);
         }

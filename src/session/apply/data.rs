@@ -257,6 +257,7 @@ impl Session {
             config: self.config,
             precision: self.precision,
             start,
+            erased: self.fit.erased(),
         })))]
     }
 }

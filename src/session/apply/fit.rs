@@ -188,7 +188,8 @@ impl Session {
         let (id, config, state) = (branch.id, branch.newest_config(), Arc::clone(state));
         self.config = FitConfig { iterations: self.config.iterations, ..config };
         self.summarise();
-        vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: Box::new(self.config) })]
+        let erased = self.fit.erased();
+        vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: Box::new(self.config), erased })]
     }
 
     /// Where an earlier iteration is looked at: starts a branch there with the current settings.
@@ -210,7 +211,8 @@ impl Session {
             let text = format!("branch {id} begins at iteration {kept} of branch {parent}: edited by hand");
             self.note(LogLevel::Info, text);
         }
-        Some(vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: Box::new(self.config) })])
+        let erased = self.fit.erased();
+        Some(vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: Box::new(self.config), erased })])
     }
 
     pub(super) fn edit(&mut self, params: Pppr) -> Vec<Effect> {

@@ -93,7 +93,8 @@ impl Session {
         (self.fit.replay, self.fit.reason, self.fit.edited) = (None, None, true);
         let base = state.params.clone();
         self.moving = Some(Moving::Held(Box::new(Held { base, from: (parent, at), earlier, branch, moved })));
-        Ok(vec![Effect::Send(WorkerCommand::Branch { branch, state, config: Box::new(self.config) })])
+        let erased = self.fit.erased();
+        Ok(vec![Effect::Send(WorkerCommand::Branch { branch, state, config: Box::new(self.config), erased })])
     }
 
     /// The finger is lifted: what it did is one act.
@@ -122,21 +123,23 @@ impl Session {
             frame: self.fit.frame,
             branches: [from, branch],
             moved_at: Some(at),
+            erased: false,
         });
         Vec::new()
     }
 
-    /// The body before (0) or after (1) it was moved, on the frame that it was moved on.
-    pub(super) fn put_back_body(&mut self, act: &SettingsAct, side: usize, at: usize) -> Vec<Effect> {
+    /// The fit before (0) or after (1) its body was moved or cells were erased, on the frame where that was done.
+    pub(super) fn put_back_by_hand(&mut self, act: &SettingsAct, side: usize) -> Vec<Effect> {
         let [from, branch] = act.branches;
         let on_screen = self.fit.frame == act.frame && self.fit.problem.is_some();
         let fit = if on_screen { Some(&mut self.fit) } else { self.fits.get_mut(&act.frame) };
         let made_by = |fit: &&mut crate::session::Fit| {
             let branch = fit.history.branch(branch);
-            branch.is_some_and(|b| b.edit.as_ref() == Some(&act.name) && b.parent == Some((from, at)))
+            let there = |at: usize, b: &crate::session::Branch| b.parent == Some((from, at));
+            branch.is_some_and(|b| b.edit.as_ref() == Some(&act.name) && act.moved_at.is_none_or(|at| there(at, b)))
         };
         let Some(fit) = fit.filter(made_by) else {
-            self.note(LogLevel::Warning, format!("the branch of “{}” is gone: the body stays as it is", act.name));
+            self.note(LogLevel::Warning, format!("the branch of “{}” is gone: the fit stays as it is", act.name));
             return Vec::new();
         };
         if !on_screen {
@@ -145,7 +148,7 @@ impl Session {
             return Vec::new();
         }
         let mut effects = self.select_branch(act.branches[side]);
-        if side == 0 {
+        if let Some(at) = act.moved_at.filter(|_| side == 0) {
             effects.extend(self.goto_iteration(at));
         }
         effects

@@ -7,13 +7,14 @@
 //! ```
 
 use crate::config::{FitConfig, ReadBy, difference};
+use crate::labels::CellRegion;
 use crate::session::acts::ActKind;
 use crate::session::effect::Effect;
 use crate::session::fit::FitStatus;
 use crate::session::history::Branch;
 use crate::session::settings::{Drag, Live, LiveFrom, SettingsAct};
 use crate::session::state::{LogLevel, Session};
-use crate::worker::WorkerCommand;
+use crate::worker::{ErasedCells, WorkerCommand, leaves_any};
 use std::sync::Arc;
 
 impl Session {
@@ -64,7 +65,7 @@ impl Session {
         }
         let before = std::mem::replace(&mut self.config, config);
         let from = self.fit.history.active_id();
-        self.drag.get_or_insert(Drag { before, from, live: None });
+        self.drag.get_or_insert(Drag { before, from, live: None, erasing: None });
         if !same_start(&config, &before) && self.fit.is_untouched() {
             return self.reset();
         }
@@ -75,13 +76,46 @@ impl Session {
         if self.is_live() && !self.steers_only(&before) { self.refit() } else { self.configure(&before) }
     }
 
+    /// Cells under the eraser: the fit is done anew without them, where that is live, else when the finger is lifted.
+    pub(super) fn drag_erase(&mut self, region: &CellRegion) -> Vec<Effect> {
+        let views = self.data.dataset.as_ref().map(|dataset| &dataset.info().views[..]).unwrap_or_default();
+        let Some(view) = views.iter().position(|view| view.array == region.view) else { return Vec::new() };
+        let bins: Vec<[usize; 2]> = region.lo.iter().zip(&region.hi).map(|(&lo, &hi)| [lo, hi + 1]).collect();
+        if bins.len() != views[view].axes.len() {
+            return Vec::new();
+        }
+        if !self.fit.is_ready() {
+            self.hint("there is no fit that could do without these cells".into());
+            return Vec::new();
+        }
+        let cells = ErasedCells { view, bins };
+        let all: Vec<ErasedCells> = self.fit.erased().iter().cloned().chain([cells.clone()]).collect();
+        if !leaves_any((view, &views[view]), &all) {
+            let text = format!("nothing of {} would be left: erase less of it", region.view);
+            if self.notice.as_ref().is_none_or(|notice| notice.text != text) {
+                self.hint(text);
+            }
+            return Vec::new();
+        }
+        let (before, from) = (self.config, self.fit.history.active_id());
+        let drag = self.drag.get_or_insert(Drag { before, from, live: None, erasing: None });
+        if drag.erasing.as_ref().is_some_and(|(known, _)| *known == cells) {
+            return Vec::new();
+        }
+        drag.erasing = Some((cells, format!("erased {region}")));
+        if self.is_live() { self.refit() } else { Vec::new() }
+    }
+
     /// The finger is lifted: what it did is one act.
     pub(super) fn end_drag(&mut self) -> Vec<Effect> {
         if let Some(moving) = self.moving.take() {
             return self.end_move(moving);
         }
-        let Some(Drag { before, from, live }) = self.drag.take() else { return Vec::new() };
-        let name = difference(&before, &self.config);
+        let waits = self.drag.as_ref().is_some_and(|drag| drag.erasing.is_some() && drag.live.is_none());
+        let effects = if waits { self.refit() } else { Vec::new() };
+        let Some(Drag { before, from, live, erasing }) = self.drag.take() else { return effects };
+        let set = difference(&before, &self.config);
+        let name = erasing.as_ref().map_or(set, |(_, erased)| erased.clone());
         let there = live.filter(|(branch, _)| self.fit.history.active_id() == *branch);
         if name.is_empty() {
             // Back where it was: so is the fit.
@@ -109,13 +143,17 @@ impl Session {
         self.labels.redo.clear();
         self.settings.push(SettingsAct {
             at: self.acts_done,
-            name,
+            name: name.clone(),
             settings: [before, self.config],
             frame: self.fit.frame,
             branches: [from, self.fit.history.active_id()],
             moved_at: None,
+            erased: erasing.is_some(),
         });
-        Vec::new()
+        if let (Some((branch, _)), true) = (there, erasing.is_some()) {
+            self.fit.history.edit(branch, name);
+        }
+        effects
     }
 
     /// Whether only when a run ends is set otherwise than before.
@@ -176,6 +214,10 @@ impl Session {
             },
             |(branch, _)| branch,
         );
+        if let Some((cells, _)) = drag.erasing {
+            self.fit.history.erase(branch, cells);
+            self.fit.history.edit(branch, String::new());
+        }
         if let Some(drag) = &mut self.drag {
             drag.live = Some((branch, at));
         }
@@ -185,13 +227,14 @@ impl Session {
         self.fit.status = FitStatus::Running;
         self.fit.run = (self.fit.run.0 + 1, at);
         self.fit.refit_run = self.fit.run.0;
-        let target = self.config.iterations.max(at + 1);
+        let (target, erased) = (self.config.iterations.max(at + 1), self.fit.erased());
         vec![Effect::Send(WorkerCommand::Refit {
             branch,
             state,
             config: Box::new(self.config),
             target,
             run: self.fit.run.0,
+            erased,
         })]
     }
 
@@ -253,8 +296,8 @@ impl Session {
 
     /// The settings before (0) or after (1) an act, on the branch that was active then where it is still there and still has them.
     fn put_back(&mut self, act: &SettingsAct, side: usize) -> Vec<Effect> {
-        if let Some(at) = act.moved_at {
-            return self.put_back_body(act, side, at);
+        if act.moved_at.is_some() || act.erased {
+            return self.put_back_by_hand(act, side);
         }
         let (config, id) = (act.settings[side], act.branches[side]);
         let has_them = |branch: &Branch| branch.newest_config() == config;

@@ -2,6 +2,7 @@
 
 use super::diagnosis::hashes;
 use crate::diagnose::joint_errors;
+use crate::mhp::StopReason;
 use crate::session::effect::Effect;
 use crate::session::fit::FitStatus;
 use crate::session::history::IterationRow;
@@ -99,10 +100,11 @@ impl Session {
                     // A single step is seen on the screen; the log is for runs.
                     // What a finger asks for is told when it is lifted.
                     if iteration > self.fit.run.1 + 1 && run != self.fit.refit_run {
-                        self.note(
-                            LogLevel::Info,
-                            format!("{} at iteration {iteration} after {run_ms:.0} ms", reason.text()),
-                        );
+                        let why = match reason {
+                            StopReason::Converged => "the convergence criterion holds",
+                            other => other.text(),
+                        };
+                        self.note(LogLevel::Info, format!("{why} at iteration {iteration} after {run_ms:.0} ms"));
                     }
                 }
                 Vec::new()

@@ -125,7 +125,8 @@ fn resumed(saved: SavedFit, frame: usize, path: &Path) -> Option<Fit> {
         return None;
     }
     let changes = saved.changes.iter().filter_map(|change| Some((change.after, config(&change.config, path)?)));
-    let history = History::restored(&config(&saved.config, path)?, saved.rows, saved.states, changes.collect());
+    let history =
+        History::restored(&config(&saved.config, path)?, saved.rows, saved.states, changes.collect(), saved.erased);
     Some(Fit {
         frame,
         status: FitStatus::Paused,

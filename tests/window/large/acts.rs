@@ -18,6 +18,8 @@ const BATCH_ONLY: &str = "MHP_LARGE_BATCH_ONLY";
 const UNTIL_CANCELLED: Duration = Duration::from_secs(20);
 /// Longer than a batch of every frame may take.
 const BATCH_PATIENCE: Duration = Duration::from_mins(40);
+/// What a window may take whose batch is as large as MMVR: `src/session/mod.rs` says of what.
+const MOST_MEMORY_MIB: f64 = 1024.0;
 /// Longer than anything here may take.
 const PATIENCE: Duration = Duration::from_mins(5);
 
@@ -29,7 +31,10 @@ pub(super) fn measure(tree: &Path, warm: bool) {
     if std::env::var_os(BATCH_ONLY).is_some() {
         window.until("labels", |s| s.labels.status == LabelStatus::Ready);
         window.batch(warm);
-        return print_memory();
+        print_memory();
+        let peak = peak_memory_mib();
+        assert!(peak.is_none_or(|peak| peak < MOST_MEMORY_MIB), "{peak:?} MiB of {MOST_MEMORY_MIB}");
+        return;
     }
     if !warm {
         window.measured("grading, cold", |s| s.strata.status == StrataStatus::Ready, Some(Command::ComputeStrata));

@@ -36,7 +36,7 @@ pub(super) fn show(
         return;
     };
     let (first, head) = (first.report.iteration, last.report.iteration);
-    let shown = fit.shown_iteration();
+    let (shown, flags) = (fit.shown_iteration(), fit.history.flags());
     let shown_row = fit.shown_row();
     let end = others.iter().map(|b| b.head()).chain([head, first + 1]).max().unwrap_or_default();
     let along = state.along;
@@ -91,6 +91,13 @@ pub(super) fn show(
         }
         let now = shown_row.and_then(|row| (curve.value)(row));
         let here = along.x(shown as f64);
+        for (iteration, _) in &flags {
+            inside.vline(
+                x(along.x(*iteration as f64)),
+                plot.y_range(),
+                Stroke::new(1.0, tokens.warn.gamma_multiply(0.7)),
+            );
+        }
         inside.vline(x(here), plot.y_range(), Stroke::new(1.0, tokens.accent));
         if let Some(y) = now {
             inside.circle_filled(at(PlotPoint::new(here, y)), 2.5, color);

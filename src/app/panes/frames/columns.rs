@@ -154,8 +154,8 @@ const COLUMNS: &[Column] = &[
     Column {
         key: "converged",
         title: "C",
-        name: "Converged",
-        tip: "✓ the fit met the paper's convergence criterion, ✕ it did not. It says nothing of how well the echo is explained: that is the IoU.",
+        name: "Criterion",
+        tip: "The paper's convergence criterion: ✓ it holds, ✕ it does not. It says nothing of how well the echo is explained: that is the IoU.",
         sort: SortKey::Converged,
         width: 14.0,
         right: false,
@@ -334,7 +334,7 @@ pub(super) fn spoken(row: &FrameRow<'_>) -> String {
     let mut parts = Vec::new();
     parts.extend(row.stratum.map(|stratum| stratum.word().to_owned()));
     parts.extend(row.iou.map(|iou| format!("IoU {iou:.2}")));
-    parts.extend(row.converged.map(|yes| if yes { "converged" } else { "not converged" }.to_owned()));
+    parts.extend(row.converged.map(|yes| if yes { "criterion holds" } else { "criterion open" }.to_owned()));
     if !row.tags.is_empty() {
         parts.push(format!("tagged {}", row.tags));
     }

@@ -198,7 +198,7 @@ fn tooltip(ui: &mut Ui, session: &Session, index: usize) {
         ui.label(format!("ρ_peak {peaks} · s_static {stat} · r_human {human}"));
     }
     if let (Some(n), Some(loss)) = (row.iterations, row.loss) {
-        let word = if row.converged == Some(true) { "converged" } else { "not converged" };
+        let word = if row.converged == Some(true) { "the paper's criterion holds" } else { "the criterion is open" };
         let majpe = row.majpe_mm.map_or_else(String::new, |mm| format!(" · MAJPE {mm:.1} mm"));
         ui.label(format!("{n} iterations · L {loss:.4} · {word}{majpe}"));
     }

@@ -19,15 +19,36 @@ pub(super) struct Highlight {
     before: MapExtent,
 }
 
-/// Whether the mouse marks cells.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+/// What a box that is drawn is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum BoxOf {
+    /// The cells that a label is about.
+    Label,
+    /// Cells that the fit is not to see.
+    Eraser,
+}
+
+/// Whether the mouse draws a box of cells.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Marking {
-    /// The next drag marks, with or without Ctrl.
-    pub(super) armed: bool,
-    /// Where the drag began.
-    pub(super) from: Option<DragStart>,
+    /// The next drag draws, with or without Ctrl.
+    pub(super) armed: Option<BoxOf>,
+    /// Where the drag began, and what for.
+    from: Option<(DragStart, BoxOf)>,
     /// Where the pointer is.
     to: [f64; 2],
+}
+
+/// What a drag on a map comes to.
+pub(super) enum Drawn {
+    /// Nothing: it is no box.
+    Nothing,
+    /// A box that is not done, or none.
+    Begun,
+    /// What the fit is not to see, so far.
+    Erased(CellRegion),
+    /// What a label is about.
+    Marked(CellRegion),
 }
 
 /// Where a drag began. The three columns draw the same views: the drag is that of one of them.
@@ -40,9 +61,9 @@ pub(super) struct DragStart {
 }
 
 impl State {
-    /// The next drag on a map marks cells; again to leave it.
-    pub(super) fn mark_cells(&mut self) {
-        self.marking.armed = !self.marking.armed;
+    /// The next drag on a map draws a box of cells; again to leave it.
+    pub(super) fn draw_box(&mut self, what: BoxOf) {
+        self.marking.armed = (self.marking.armed != Some(what)).then_some(what);
     }
 
     /// Points at cells and zooms the map to them.
@@ -84,10 +105,15 @@ impl State {
         tokens: &Tokens,
     ) {
         let o = Orientation::of(view, session.view.cube);
-        if let Some(begun) = self.marking.from.filter(|begun| begun.view == index) {
+        if let Some((begun, _)) = self.marking.from.filter(|(begun, _)| begun.view == index) {
             let corners = [begun.at, self.marking.to].map(|at| o.to_grid(view, at).map(|x| x.clamp(0.0, 1.0)));
             let line = overlay::outline(view, o, overlay::grid_box(corners[0], corners[1]), to_screen);
             painter.line(line, Stroke::new(1.5, tokens.accent));
+        }
+        for cells in session.fit.erased().iter().filter(|cells| cells.view == index) {
+            let [lo, hi] = [|b: &[usize; 2]| b[0], |b: &[usize; 2]| b[1].saturating_sub(1)]
+                .map(|end: fn(&[usize; 2]) -> usize| cells.bins.iter().map(end).collect::<Vec<_>>());
+            outline(painter, (view, o), &lo, &hi, to_screen, "erased", tokens);
         }
         let label = session.labels.label(session.data.frame_index);
         if let Some(region) = label.region.as_ref().filter(|region| region.view == view.array) {
@@ -99,7 +125,7 @@ impl State {
         }
     }
 
-    /// A drag with Ctrl, or any drag while armed, marks cells. True while it does, so that it does not pan.
+    /// A drag with Ctrl, or any drag while armed, draws a box of cells, and does not pan meanwhile.
     pub(super) fn mark(
         &mut self,
         ui: &Ui,
@@ -107,28 +133,36 @@ impl State {
         plot: Rect,
         index: usize,
         (view, o): (&View, Orientation),
-    ) -> (bool, Option<CellRegion>) {
+    ) -> Drawn {
         let window = self.windows.get(index).copied().unwrap_or_default();
         let pointer = response.interact_pointer_pos();
+        let what = self.marking.armed.or_else(|| ui.input(|i| i.modifiers.command).then_some(BoxOf::Label));
         if response.drag_started()
-            && (self.marking.armed || ui.input(|i| i.modifiers.command))
-            && let Some(origin) = ui.input(|i| i.pointer.press_origin())
+            && let (Some(what), Some(origin)) = (what, ui.input(|i| i.pointer.press_origin()))
         {
-            self.marking.from = Some(DragStart { column: response.id, view: index, at: unit_at(plot, window, origin) });
+            let begun = DragStart { column: response.id, view: index, at: unit_at(plot, window, origin) };
+            self.marking.from = Some((begun, what));
         }
-        if self.marking.armed && response.hovered() {
+        if self.marking.armed.is_some() && response.hovered() {
             ui.ctx().set_cursor_icon(egui::CursorIcon::Crosshair);
         }
-        let Some(DragStart { at: from, .. }) = self.marking.from.filter(|begun| begun.column == response.id) else {
-            return (false, None);
+        let Some((DragStart { at: from, .. }, what)) =
+            self.marking.from.filter(|(begun, _)| begun.column == response.id)
+        else {
+            return Drawn::Nothing;
         };
         let to = pointer.map_or(from, |pointer| unit_at(plot, window, pointer));
         self.marking.to = to;
-        if response.dragged() {
-            return (true, None);
+        let dragged = response.dragged();
+        if !dragged {
+            self.marking = Marking::default();
         }
-        self.marking = Marking::default();
-        (true, region(view, o, from, to))
+        let cells = region(view, o, from, to);
+        match (what, cells) {
+            (BoxOf::Eraser, Some(cells)) if dragged => Drawn::Erased(cells),
+            (BoxOf::Label, Some(cells)) if !dragged => Drawn::Marked(cells),
+            _ => Drawn::Begun,
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::super::PaneState as _;
 use super::{Shared, State};
-use crate::app::commands::AppAct;
+use crate::app::commands::{AppAct, UserCommand, command};
 use crate::app::map_image::Orientation;
 use crate::app::map_plane::Plane;
 use crate::app::theme::{self, Tokens};
@@ -22,6 +22,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
             comparison(ui, shared);
             ui.separator();
             focus(ui, shared, state);
+            eraser(ui, shared, state);
             cube(ui, shared);
             planes(ui, shared);
             // The legend goes where there is no room for it: its colours are told on the masks' read-out too.
@@ -37,6 +38,15 @@ fn focus(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
     let person = ui.selectable_label(!state.shows_all(), "Person").named(egui::Role::Button, "Show the person");
     if person.on_hover_text("The part of each map around the person, or all of it. Key: F").clicked() {
         shared.invoke("Person or whole");
+    }
+}
+
+/// The eraser: what would the fit do without that echo?
+fn eraser(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
+    let armed = state.marking.armed == Some(super::region::BoxOf::Eraser);
+    let tip = command("Erase cells").map(UserCommand::tip).unwrap_or_default();
+    if ui.selectable_label(armed, "Erase").named(egui::Role::Button, "Erase cells").on_hover_text(tip).clicked() {
+        shared.invoke("Erase cells");
     }
 }
 
