@@ -180,6 +180,11 @@ impl InspectorApp {
         self.runtime.session()
     }
 
+    /// The title of the window: it names the data, so that windows can be told apart.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
     /// Applies a command as if a person had given it.
     pub fn apply(&mut self, command: Command) {
         self.runtime.apply(command);

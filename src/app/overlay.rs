@@ -201,16 +201,18 @@ impl PipeClose for egui::ModalResponse<bool> {
 
 fn help(ui: &mut Ui) {
     let tokens = Tokens::of(ui);
-    ui.columns(2, |columns| {
+    // One below the other where two have no room beside each other.
+    let count = if ui.available_width() < 620.0 { 1 } else { 2 };
+    ui.columns(count, |columns| {
         for (i, menu) in Menu::ALL.into_iter().enumerate() {
-            let ui = &mut columns[usize::from(i >= 4)];
+            let ui = &mut columns[usize::from(i >= 4 && count > 1)];
             ui.label(RichText::new(menu.title()).font(theme::strong(13.0)));
             for command in all().filter(|c| c.menu() == menu && !c.keys().is_empty()) {
                 key_row(ui, &shortcut_text(command.keys()[0]), &command.label(), &tokens);
             }
             ui.add_space(8.0);
         }
-        let ui = &mut columns[1];
+        let ui = &mut columns[count - 1];
         ui.label(RichText::new("Mouse").font(theme::strong(13.0)));
         for (gesture, what) in [
             ("Shift held", "flip H_ori and H_sim under the pointer"),
@@ -233,7 +235,7 @@ fn key_row(ui: &mut Ui, key: &str, what: &str, tokens: &Tokens) {
             ui.set_min_width(104.0);
             ui.label(RichText::new(key).font(theme::mono(12.0)).color(tokens.accent));
         });
-        ui.label(what);
+        ui.add(egui::Label::new(what).wrap());
     });
 }
 

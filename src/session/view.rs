@@ -324,7 +324,9 @@ impl Default for ViewState {
             smoothing: Smoothing::default(),
             hidden_curves: Vec::new(),
             sort: Sort::default(),
-            hidden_columns: ["peaks", "static", "saliency", "reason", "by"].map(str::to_owned).to_vec(),
+            hidden_columns: ["hardness", "peaks", "static", "saliency", "converged", "reason", "by"]
+                .map(str::to_owned)
+                .to_vec(),
             shown_terms: Vec::new(),
             compared: ComparedNumber::default(),
             saved_views: Vec::new(),

@@ -112,7 +112,7 @@ fn live_is_on_by_itself_where_a_fit_is_quick() {
     let mut rig = Rig::new(Live::Auto);
     let ms = rig.session().fit_ms().unwrap();
     assert!(rig.session().is_live() == (ms < Live::QUICK_MS) && ms > 0.0, "{ms} ms");
-    rig.runtime.apply(Command::SetConfig(Box::new(FitConfig { iterations: 1_000_000, ..config() })));
+    rig.runtime.apply(Command::SetConfig(Box::new(FitConfig { iterations: 100_000, ..config() })));
     assert!(rig.session().fit_ms().unwrap() > Live::QUICK_MS && !rig.session().is_live());
     rig.runtime.apply(Command::SetConfig(Box::new(FitConfig { iterations: 1, ..config() })));
     assert!(rig.session().is_live(), "{:?} ms", rig.session().fit_ms());

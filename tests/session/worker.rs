@@ -610,6 +610,7 @@ fn a_long_fit_that_is_done_anew_is_shown_on_the_way() {
     let later = rig.snapshot(|snapshot| snapshot.branch == 1 && snapshot.iteration > first.iteration);
     assert_eq!((first.config.w_em, later.config.w_em), (2.0, 2.0));
     rig.send(WorkerCommand::Pause);
+    rig.rows_until(1, |event| matches!(event, WorkerEvent::Refitted { .. }));
     let (rows, event) = rig.rows_until(1, |event| matches!(event, WorkerEvent::Finished { run: 7, .. }));
     assert!(matches!(event, WorkerEvent::Finished { reason: StopReason::Stopped, .. }), "{event:?}");
     assert!(iterations(&rows).windows(2).all(|pair| pair[1] == pair[0] + 1), "no iteration is lost");
@@ -634,8 +635,10 @@ fn erased_cells_are_as_if_they_had_not_been_measured() {
         erased: Arc::clone(erased),
     };
     rig.send(again(&erased, 1));
+    rig.rows_until(1, |event| matches!(event, WorkerEvent::Refitted { .. }));
     let (without, _) = rig.rows_until(1, |event| matches!(event, WorkerEvent::Finished { .. }));
     rig.send(again(&Arc::default(), 2));
+    rig.rows_until(1, |event| matches!(event, WorkerEvent::Refitted { .. }));
     let (with, _) = rig.rows_until(1, |event| matches!(event, WorkerEvent::Finished { .. }));
 
     let problem = &prepared.problem;

@@ -5,9 +5,9 @@ use crate::window::Window;
 use egui::{Key, Modifiers, Rect, pos2};
 use mhp_inspector::session::Command;
 
-/// Cells of H_ori's mask, in a view.
-fn measured(window: &Window, view: usize) -> usize {
-    window.fit().shown.as_ref().unwrap().masks[view].ori.iter().filter(|&&cell| cell).count()
+/// H_ori's mask of a view.
+fn measured(window: &Window, view: usize) -> Vec<bool> {
+    window.fit().shown.as_ref().unwrap().masks[view].ori.clone()
 }
 
 /// Draws a box over a map with the eraser, and stops while it is under the finger.
@@ -65,7 +65,7 @@ fn the_fit_follows_the_eraser() {
     assert_eq!((measured(&window, 0), &window.fit().shown.as_ref().unwrap().params), (seen, &before.params));
     window.key_with(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
     window.until("the second", |w| w.fit().shown.as_ref().is_some_and(|shown| shown.branch == 1));
-    assert_eq!((measured(&window, 0), &window.fit().shown.as_ref().unwrap().params), (without, &fitted));
+    assert_eq!((&measured(&window, 0), &window.fit().shown.as_ref().unwrap().params), (&without, &fitted));
     // Left and found again, it still does not see them.
     window.key(Key::ArrowRight);
     window.ready(1);
@@ -98,7 +98,8 @@ fn what_is_erased_stays_erased() {
     window.paused_at(20);
     assert_eq!(window.fit().erased().len(), 2);
     // A session file keeps it.
-    let path = window.folder.path().join("kept.mhp-session");
+    let elsewhere = tempfile::tempdir().unwrap();
+    let path = elsewhere.path().join("kept.mhp-session");
     let without = measured(&window, 1);
     window.key_with(Modifiers::COMMAND, Key::S);
     window.answer_path("Save to", &path);

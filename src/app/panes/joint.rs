@@ -69,9 +69,9 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let tokens = Tokens::of(ui);
     let editable = session.fit.is_ready() && !session.fit.is_running();
     let mut committed = false;
-    egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+    egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
         derived(ui, &snapshot.params, joint, &tokens);
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("gradient of").size(10.0).color(tokens.dim));
             for part in &parts {
                 ui.label(RichText::new(format!("■ {}", part.label)).size(10.0).color(tokens.group(part.group)))
@@ -79,7 +79,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             }
         });
         let grid = egui::Grid::new("joint parameters").num_columns(2 + parts.len());
-        grid.spacing([8.0, 2.0]).min_col_width(58.0).show(ui, |ui| {
+        grid.spacing([6.0, 2.0]).min_col_width(44.0).show(ui, |ui| {
             for group in Group::ALL.into_iter().filter(|g| *g != Group::Omega) {
                 let (title, names, unit, speed) = components(group);
                 let title_text = if unit.is_empty() { title.to_owned() } else { format!("{title} / {unit}") };
@@ -198,7 +198,7 @@ fn derived(ui: &mut Ui, params: &Pppr, joint: usize, tokens: &Tokens) {
 
 fn gradient(value: f64, color: egui::Color32, tokens: &Tokens) -> RichText {
     let color = if value == 0.0 { tokens.dim } else { color };
-    let text = if value == 0.0 { "0".to_owned() } else { format!("{value:+.2e}") };
+    let text = if value == 0.0 { "0".to_owned() } else { format!("{value:+.1e}") };
     RichText::new(text.replace('-', "−")).font(theme::mono(theme::CAPTION)).color(color)
 }
 

@@ -347,6 +347,14 @@ fn steer(ui: &Ui, response: &egui::Response, rect: Rect, viewport: Vec2, scale: 
     }
 }
 
+/// Says why there is no picture.
+fn no_adapter(ui: &Ui, rect: Rect) {
+    let how = "No graphics adapter: the 3-D view is not drawn.".to_owned();
+    let font = egui::FontId::proportional(12.0);
+    let galley = ui.painter().layout(how, font, Color32::GRAY, (rect.width() - 16.0).max(20.0));
+    ui.painter().galley(rect.center() - 0.5 * galley.size(), galley, Color32::GRAY);
+}
+
 fn paint(
     ui: &Ui,
     gpu: Option<&RenderState>,
@@ -357,9 +365,7 @@ fn paint(
     camera: &Camera,
 ) {
     let Some(gpu) = gpu else {
-        let how = "No graphics adapter: the 3-D view is not drawn.";
-        ui.painter().text(rect.center(), Align2::CENTER_CENTER, how, egui::FontId::proportional(12.0), Color32::GRAY);
-        return;
+        return no_adapter(ui, rect);
     };
     let made = || SceneRenderer::new(&gpu.device, &gpu.queue, gpu.target_format);
     let renderer = state.renderer.get_or_insert_with(made);

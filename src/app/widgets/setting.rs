@@ -2,12 +2,15 @@
 
 use super::Named as _;
 use crate::config::{Answer, Field, FieldGroup, FieldKind, FitConfig, Number, Preset, Value};
-use egui::{Response, Ui};
+use egui::{Color32, Response, Ui, vec2};
 
-/// The box of a number, the label and the button beside it, points.
-const VALUE: egui::Vec2 = egui::vec2(62.0, 20.0);
-const NAME: egui::Vec2 = egui::vec2(96.0, 20.0);
-const BACK: egui::Vec2 = egui::vec2(18.0, 20.0);
+/// The box of a number and the button beside it, points.
+const VALUE: egui::Vec2 = egui::vec2(72.0, 20.0);
+const BACK: egui::Vec2 = egui::vec2(14.0, 20.0);
+/// The column of labels: as wide as the longest of a group, within these, points.
+const NAME: [f32; 2] = [46.0, 92.0];
+/// Between the columns.
+const GAP: f32 = 4.0;
 
 /// The settings of a group, one a line; switches that follow each other share one.
 pub(in crate::app) fn settings(ui: &mut Ui, group: FieldGroup, config: &mut FitConfig) {
@@ -17,6 +20,7 @@ pub(in crate::app) fn settings(ui: &mut Ui, group: FieldGroup, config: &mut FitC
 /// These settings, one a line; switches that follow each other share one.
 pub(in crate::app) fn rows(ui: &mut Ui, fields: &[&Field], config: &mut FitConfig) {
     let preset = Preset::nearest(config);
+    let width = names(ui, fields);
     for run in fields.chunk_by(|a, b| matches!((&a.kind, &b.kind), (FieldKind::Switch, FieldKind::Switch))) {
         if let [Field { kind: FieldKind::Switch, .. }, ..] = run {
             ui.horizontal_wrapped(|ui| run.iter().for_each(|field| switch(ui, field, config)));
@@ -24,9 +28,9 @@ pub(in crate::app) fn rows(ui: &mut Ui, fields: &[&Field], config: &mut FitConfi
         }
         for field in run {
             match &field.kind {
-                FieldKind::Choice(answers) => choice(ui, field, answers, config),
-                FieldKind::Number(number) if number.unset.is_some() => optional(ui, field, number, config),
-                FieldKind::Number(number) => slider(ui, field, number, preset, config),
+                FieldKind::Choice(answers) => choice(ui, field, width, answers, config),
+                FieldKind::Number(number) if number.unset.is_some() => optional(ui, field, width, number, config),
+                FieldKind::Number(number) => slider(ui, field, width, number, preset, config),
                 FieldKind::Switch => {}
             }
         }
@@ -41,9 +45,10 @@ fn switch(ui: &mut Ui, field: &Field, config: &mut FitConfig) {
 }
 
 /// Label and answers.
-fn choice(ui: &mut Ui, field: &Field, answers: &[Answer], config: &mut FitConfig) {
+fn choice(ui: &mut Ui, field: &Field, width: f32, answers: &[Answer], config: &mut FitConfig) {
     ui.horizontal_wrapped(|ui| {
-        name(ui, field);
+        ui.spacing_mut().item_spacing.x = GAP;
+        name(ui, field, width);
         for (k, answer) in answers.iter().enumerate() {
             let given = field.get(config) == Value::Answer(k);
             if ui.selectable_label(given, answer.label).on_hover_text(field.answer_tip(answer)).clicked() {
@@ -53,27 +58,34 @@ fn choice(ui: &mut Ui, field: &Field, answers: &[Answer], config: &mut FitConfig
     });
 }
 
+/// The width of the column of these labels, points.
+fn names(ui: &Ui, fields: &[&Field]) -> f32 {
+    let font = egui::TextStyle::Body.resolve(ui.style());
+    let wide = |field: &&Field| ui.painter().layout_no_wrap(field.label.into(), font.clone(), Color32::GRAY).size().x;
+    let labels = fields.iter().filter(|field| !matches!(field.kind, FieldKind::Switch));
+    labels.map(wide).fold(0.0, f32::max).ceil().clamp(NAME[0], NAME[1])
+}
+
 /// The label, in the column that all of them share.
-fn name(ui: &mut Ui, field: &Field) {
+fn name(ui: &mut Ui, field: &Field, width: f32) {
     let layout = egui::Layout::left_to_right(egui::Align::Center);
-    let label = ui.allocate_ui_with_layout(NAME, layout, |ui| {
-        ui.set_min_width(NAME.x);
+    let label = ui.allocate_ui_with_layout(vec2(width, VALUE.y), layout, |ui| {
+        ui.set_min_width(width);
         ui.add(egui::Label::new(field.label).truncate())
     });
     label.inner.on_hover_text(field.tip());
 }
 
 /// Label, slider, value, and a button back to what the nearest preset sets where the value differs from it.
-fn slider(ui: &mut Ui, field: &Field, number: &Number, preset: Preset, config: &mut FitConfig) {
+fn slider(ui: &mut Ui, field: &Field, width: f32, number: &Number, preset: Preset, config: &mut FitConfig) {
     let (Value::Number(old), Value::Number(usual)) = (field.get(config), field.get(&preset.config())) else { return };
     let mut value = old;
     let (lo, hi) = number.offered;
     let tip = field.tip();
     ui.horizontal(|ui| {
-        name(ui, field);
-        let beside = VALUE.x + BACK.x + 2.0 * ui.spacing().item_spacing.x;
-        let width = (ui.available_width() - beside).max(40.0);
-        ui.spacing_mut().slider_width = width;
+        ui.spacing_mut().item_spacing.x = GAP;
+        name(ui, field, width);
+        ui.spacing_mut().slider_width = (ui.available_width() - beside()).max(40.0);
         // Every point of the way is another value, of three digits: a live fit follows as finely as the finger moves.
         let mut slider = egui::Slider::new(&mut value, lo..=hi).show_value(false).smart_aim(false);
         if number.logarithmic {
@@ -98,6 +110,11 @@ fn slider(ui: &mut Ui, field: &Field, number: &Number, preset: Preset, config: &
     }
 }
 
+/// What stands right of a slider, points.
+fn beside() -> f32 {
+    VALUE.x + BACK.x + 2.0 * GAP
+}
+
 /// The nearest number of three digits that count.
 fn three_digits(value: f64) -> f64 {
     if value == 0.0 || !value.is_finite() {
@@ -108,11 +125,12 @@ fn three_digits(value: f64) -> f64 {
 }
 
 /// Label, the answer that needs no number, and the number.
-fn optional(ui: &mut Ui, field: &Field, number: &Number, config: &mut FitConfig) {
+fn optional(ui: &mut Ui, field: &Field, width: f32, number: &Number, config: &mut FitConfig) {
     let Some(unset) = number.unset else { return };
     ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = GAP;
         let tip = field.tip();
-        name(ui, field);
+        name(ui, field, width);
         let given = field.get(config);
         let without = given == Value::Unset;
         // What has no word is left out of FIT.toml.
@@ -128,6 +146,8 @@ fn optional(ui: &mut Ui, field: &Field, number: &Number, config: &mut FitConfig)
         }
         if let Value::Number(old) = field.get(config) {
             let mut value = old;
+            // In the column of all numbers.
+            ui.add_space((ui.available_width() - beside()).max(0.0));
             typed(ui, field, number, &mut value).on_hover_text(&tip);
             if value != old {
                 field.set(config, Value::Number(value));
@@ -145,15 +165,24 @@ fn typed(ui: &mut Ui, field: &Field, number: &Number, value: &mut f64) -> Respon
         .range(lo..=hi)
         .speed(speed)
         .max_decimals(if number.whole { 0 } else { 6 })
-        .suffix(if number.unit == "m" { " m" } else { number.unit });
+        .suffix(suffix(number.unit));
     let drag = match number.zero {
         Some(word) => drag
             .custom_formatter(move |x, _| if x == 0.0 { word.to_owned() } else { format!("{x:.0}") })
             .custom_parser(move |text| if text.trim() == word { Some(0.0) } else { text.trim().parse().ok() }),
         None => drag,
     };
-    let response = ui.add_sized(VALUE, drag);
+    let response = ui.scope(|ui| {
+        ui.spacing_mut().button_padding.x = 3.0;
+        ui.add_sized(VALUE, drag)
+    });
+    let response = response.inner;
     response.named(egui::Role::SpinButton, &format!("{} value", field.label))
+}
+
+/// A unit behind a number: letters stand apart from it.
+fn suffix(unit: &str) -> String {
+    if unit.starts_with(char::is_alphabetic) { format!(" {unit}") } else { unit.to_owned() }
 }
 
 #[cfg(test)]

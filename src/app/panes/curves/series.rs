@@ -5,6 +5,9 @@ use super::thin::VisibleSpan;
 use egui_plot::PlotPoint;
 use std::collections::HashMap;
 
+/// What is less is no value of a loss, an IoU or a distance.
+const NOTHING: f64 = 1e-12;
+
 /// A curve's values by iteration; NaN where there is none. From each on, of stretches of 2, 4, 8, … values, where the lowest
 /// and the highest lie: a part is drawn from stretches that are shorter than a pixel.
 #[derive(Debug, Default)]
@@ -41,11 +44,11 @@ impl Series {
         }
     }
 
-    /// Whether it is 0 wherever it has a value.
+    /// Whether it is 0 wherever it has a value, but for the last digits of a sum.
     pub(super) fn is_zero(&self) -> bool {
         // Of the longest stretches the lowest and the highest.
         let ends = self.levels.last().into_iter().flatten().flatten();
-        ends.map(|&at| self.values[at]).all(|value| value == 0.0 || value.is_nan())
+        ends.map(|&at| self.values[at]).all(|value| value.abs() < NOTHING || value.is_nan())
     }
 
     /// The points that a curve in `window` is drawn from, in pieces: it breaks where there is no value, or on a logarithmic

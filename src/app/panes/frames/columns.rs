@@ -175,7 +175,7 @@ const COLUMNS: &[Column] = &[
         name: "Tags",
         tip: "Tags that have been given, those of others faint; in agreement mode only your own.",
         sort: SortKey::Tags,
-        width: 52.0,
+        width: 38.0,
         right: false,
     },
     Column {
@@ -324,9 +324,27 @@ pub(super) fn cell(
             } else {
                 (pos2(rect.left(), y), Align2::LEFT_CENTER)
             };
-            painter.text(at, align, text, font, color);
+            let galley = painter.layout_no_wrap(text.clone(), font.clone(), color);
+            if column.key == "frame" && galley.size().x > rect.width() {
+                tail(&painter, rect, &text, &font, color);
+            } else {
+                painter.galley(align.anchor_size(at, galley.size()).min, galley, color);
+            }
         }
     }
+}
+
+/// As much of the end of a name as has room: frames of a sequence begin alike.
+fn tail(painter: &Painter, rect: Rect, text: &str, font: &FontId, color: Color32) {
+    let mut rest = text.chars();
+    let mut galley = painter.layout_no_wrap(String::new(), font.clone(), color);
+    while rest.next().is_some() {
+        galley = painter.layout_no_wrap(format!("…{}", rest.as_str()), font.clone(), color);
+        if galley.size().x <= rect.width() {
+            break;
+        }
+    }
+    painter.galley(Align2::LEFT_CENTER.anchor_size(rect.left_center(), galley.size()).min, galley, color);
 }
 
 /// What a screen reader says of a row besides its name.

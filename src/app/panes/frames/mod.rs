@@ -12,7 +12,9 @@ use egui::{Key, RichText, Sense, Ui, pos2, vec2};
 use std::collections::BTreeSet;
 
 const ROW: f32 = 20.0;
-const GAP: f32 = 5.0;
+/// Width of a digit of an index, points.
+const DIGIT: f32 = 6.7;
+const GAP: f32 = 4.0;
 
 /// The pane.
 pub(super) static PANE: Pane = Pane {
@@ -65,11 +67,14 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let columns: Vec<&Column> = columns::columns()
         .filter(|column| column.is_shown(&session.view) && column.has_any(&session.results))
         .collect();
-    let wanted: f32 = columns.iter().map(|column| column.width + GAP).sum::<f32>() + 4.0;
+    // As many digits as the last index has.
+    let digits = session.data.len().saturating_sub(1).max(9).ilog10() as f32 + 1.0;
+    let own = |column: &Column| if column.key == "index" { DIGIT * digits + 2.0 } else { column.width };
+    let wanted: f32 = columns.iter().map(|column| own(column) + GAP).sum::<f32>() + 4.0;
     let width = wanted.max(ui.available_width());
     // The name takes what the numbers leave.
     let spare = width - wanted;
-    let extent = |column: &Column| column.width + if column.key == "frame" { spare } else { 0.0 };
+    let extent = |column: &Column| own(column) + if column.key == "frame" { spare } else { 0.0 };
     egui::ScrollArea::horizontal().auto_shrink(false).show(ui, |ui| {
         ui.set_min_width(width);
         header::titles(ui, shared, &columns, &extent, &tokens);

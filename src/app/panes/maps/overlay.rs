@@ -78,14 +78,18 @@ pub(super) fn axes(ui: &Ui, plot: Rect, view: &View, o: Orientation, window: Map
         painter.hline(plot.min.x - 3.0..=plot.min.x, y, stroke);
         painter.text(pos2(plot.min.x - 5.0, y), Align2::RIGHT_CENTER, text, font.clone(), tokens.dim);
     }
-    let galley = painter.layout_no_wrap(axis_caption(across), caption.clone(), theme::DARK.dim);
-    let at = pos2(plot.center().x - 0.5 * galley.size().x, plot.max.y - galley.size().y - 2.0);
-    painter.rect_filled(
-        Rect::from_min_size(at, galley.size()).expand2(vec2(4.0, 1.0)),
-        0.0,
-        theme::DARK.canvas.gamma_multiply(0.72),
-    );
-    painter.galley(at, galley, theme::DARK.dim);
+    let words =
+        [axis_caption(across), format!("{} {}", across.shown_name(), across.shown_unit()), across.shown_unit().into()];
+    let fits = |text: String| {
+        let galley = painter.layout_no_wrap(text, caption.clone(), theme::DARK.dim);
+        (galley.size().x + 8.0 <= plot.width()).then_some(galley)
+    };
+    if let Some(galley) = words.into_iter().find_map(fits) {
+        let at = pos2(plot.center().x - 0.5 * galley.size().x, plot.max.y - galley.size().y - 2.0);
+        let ground = Rect::from_min_size(at, galley.size()).expand2(vec2(4.0, 1.0));
+        painter.rect_filled(ground, 0.0, theme::DARK.canvas.gamma_multiply(0.72));
+        painter.galley(at, galley, theme::DARK.dim);
+    }
     let name = format!("{} {} →", up.shown_name(), up.shown_unit());
     let galley = painter.layout_no_wrap(name, caption, tokens.dim);
     let at = pos2(plot.min.x - 40.0, plot.center().y + galley.size().x / 2.0);

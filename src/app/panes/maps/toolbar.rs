@@ -14,9 +14,8 @@ use egui::{Color32, RichText, Sense, Ui, vec2};
 
 pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
     egui::Frame::new().inner_margin(egui::Margin::symmetric(8, 2)).show(ui, |ui| {
-        ui.horizontal(|ui| {
-            ui.set_height(22.0);
-            ui.spacing_mut().item_spacing.x = 4.0;
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
             colours(ui, shared);
             ui.separator();
             comparison(ui, shared);
@@ -26,7 +25,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
             cube(ui, shared);
             planes(ui, shared);
             // The legend goes where there is no room for it: its colours are told on the masks' read-out too.
-            if ui.available_width() > 230.0 {
+            if ui.available_size_before_wrap().x > 230.0 {
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), legend);
             }
         });
