@@ -123,7 +123,8 @@ impl History {
         erased: Vec<ErasedCells>,
     ) -> Self {
         let mut history = Self::new(*config);
-        history.branches.iter_mut().for_each(|first| first.erased = erased.clone().into());
+        let erased: Arc<[ErasedCells]> = erased.into();
+        history.branches.iter_mut().for_each(|first| first.erased = Arc::clone(&erased));
         let mut states: Vec<Arc<FitState>> = states.into_iter().map(Arc::new).collect();
         for super::pins::PinRow { report, majpe_mm } in rows {
             let at = states.iter().position(|state| state.iteration == report.iteration);
@@ -279,6 +280,8 @@ impl History {
             (from, parent) = (before.start().min(last), before.parent);
         }
         ancestry.reverse();
+        // A branch that begins where its parent does takes nothing of it.
+        ancestry.retain(|(_, rows)| !rows.is_empty());
         ancestry
     }
 

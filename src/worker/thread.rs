@@ -18,7 +18,9 @@ use std::time::{Duration, Instant};
 
 /// Snapshots are published at most this often while running.
 const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(50);
-/// A running fit spends at most one part in this many on snapshots.
+/// However busy the machine is, a run is seen to go on.
+const LONGEST_SNAPSHOT_INTERVAL: Duration = Duration::from_millis(500);
+/// A running fit spends at most one part in this many on snapshots, as long as these are not too far apart.
 const SNAPSHOT_SHARE: u32 = 40;
 /// Rows are sent in batches at most this often while running.
 const ROWS_INTERVAL: Duration = Duration::from_millis(33);
@@ -233,7 +235,7 @@ impl Thread {
             }
             return;
         }
-        let pause = SNAPSHOT_INTERVAL.max(job.snapshot_cost * SNAPSHOT_SHARE);
+        let pause = SNAPSHOT_INTERVAL.max(job.snapshot_cost * SNAPSHOT_SHARE).min(LONGEST_SNAPSHOT_INTERVAL);
         if job.snapshot_sent.elapsed() >= pause {
             self.snapshot.put(job.snapshot());
             self.send_rows();

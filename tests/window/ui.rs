@@ -678,6 +678,7 @@ fn a_dragged_weight_fits_anew_under_the_finger() {
         shown.insert(window.fit().shown.as_ref().unwrap().config.w_em.to_bits());
         assert!(window.session().is_dragging());
         assert_eq!(window.fit().history.branches().len(), 2, "one branch, written anew");
+        assert!(window.named("Curve of L") && window.named("Curve of IoU hori"), "its curves are on screen");
     }
     window.harness.drop_at(at(0.9));
     window.until("the lifted finger", |w| !w.session().is_dragging());
@@ -840,6 +841,34 @@ fn what_is_said_of_a_fit_stays_in_its_pane() {
         let rect = window.harness.get_by_label(name).rect();
         assert!(rect.right() <= pane.right(), "{name}: {rect:?} in {pane:?}");
     }
+}
+
+/// What is said of a fit takes the same room whatever is said: the sliders below it stay under the finger. Settings that only
+/// a start reads offer a new one there.
+#[test]
+fn nothing_moves_when_a_run_begins_or_ends_or_needs_a_new_start() {
+    let mut window = Window::open(1);
+    let place = |w: &Window| w.node("w_EM").rect();
+    window.apply(Command::SetConfig(Box::new(FitConfig { iterations: 100_000, ..window.session().config })));
+    window.harness.run_steps(3);
+    let at = place(&window);
+    window.key(Key::Enter);
+    window.until("some iterations", |w| w.fit().is_running() && w.fit().head() > 0);
+    let at_run = place(&window);
+    window.key(Key::Enter);
+    window.until("the pause", |w| w.fit().status == FitStatus::Paused);
+    window.harness.run_steps(3);
+    assert_eq!((at_run, place(&window)), (at, at));
+    assert!(window.named("paused") && !window.named("↺ new start needed"));
+    window.switch_live_off();
+    window.type_value("People value", "2");
+    window.harness.run_steps(3);
+    assert_eq!(place(&window), at);
+    assert!(window.says("recommended, modified: ") || window.says(", modified: People"), "{:?}", window.names());
+    window.click("↺ new start needed");
+    window.until("two people", |w| w.fit().is_ready() && w.fit().head() == 0);
+    assert_eq!(window.fit().initial.as_ref().unwrap().shape().persons, 2);
+    assert!(!window.named("↺ new start needed"));
 }
 
 /// In a small window panes become words at its edge: what is left of the maps first, then what is right of them, then what is

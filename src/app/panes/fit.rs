@@ -63,7 +63,10 @@ fn change(ui: &Ui, shared: &mut Shared<'_>, old: &FitConfig, config: &FitConfig)
 }
 
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
-    egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+    // What is above is as wide as if it scrolled too: numbers stand in one column.
+    let area =
+        egui::ScrollArea::vertical().scroll_bar_visibility(egui::scroll_area::ScrollBarVisibility::AlwaysVisible);
+    area.auto_shrink(false).show(ui, |ui| {
         let old = shared.session.config;
         let mut config = old;
         settings(ui, FieldGroup::Weights, &mut config);
@@ -161,32 +164,30 @@ fn status(ui: &mut Ui, shared: &mut Shared<'_>) {
         FitStatus::Running => ("running", tokens.accent),
         FitStatus::Failed(_) => ("failed", tokens.bad),
     };
+    // One line in every state: what is below must not move from under the pointer when a run begins or ends.
     ui.horizontal_wrapped(|ui| {
-        chip(ui, word, color);
-        if let Some(row) = fit.shown_row() {
-            if row.report.iteration > 0 && !fit.is_running() {
-                judgement(ui, shared.session, row, &tokens);
-            }
-            // In the fit's own words "converged" reads as success: the criterion has a chip of its own.
-            if let Some(reason) = fit.reason.filter(|reason| *reason != StopReason::Converged.text()) {
-                ui.add(egui::Label::new(RichText::new(reason).small().color(tokens.dim)).extend());
-            }
+        ui.spacing_mut().item_spacing.x = 3.0;
+        let state = chip(ui, word, color);
+        if let Some(row) = fit.shown_row()
+            && row.report.iteration > 0
+            && !fit.is_running()
+        {
+            judgement(ui, shared.session, row, &tokens);
         }
+        // In the fit's own words "converged" reads as success: the criterion has a chip of its own.
+        let reason = fit.reason.filter(|reason| *reason != StopReason::Converged.text());
+        state.on_hover_text(reason.unwrap_or("What the fit of this frame is doing."));
         if let FitStatus::Failed(why) = &fit.status {
             ui.label(RichText::new(why).small().color(tokens.bad));
-        }
-        if shared.session.needs_new_start() {
-            let button = egui::Button::new(RichText::new("↺ new start needed").small().color(tokens.warn)).small();
-            let changed = fit.start_config.map_or_else(String::new, |old| difference(&old, &shared.session.config));
-            let tip = format!("Settings that only a start reads have changed since this one was found: {changed}.\nFinds a new start and fits from there; the iterations of this frame are forgotten.");
-            if ui.add(button).on_hover_text(tip).clicked() {
-                shared.invoke("Reset fit");
-            }
         }
     });
     // Always there: a branch that begins while a slider is dragged must not move the slider.
     branches(ui, shared);
-    start(ui, shared);
+    let line = egui::vec2(ui.available_width(), START_LINE);
+    ui.allocate_ui_with_layout(line, egui::Layout::left_to_right(egui::Align::Center), |ui| {
+        ui.set_min_height(START_LINE);
+        start(ui, shared);
+    });
 }
 
 /// Three questions that are not one: does the paper's criterion hold, does the fit still move, is the echo explained.
@@ -217,6 +218,8 @@ fn judgement(ui: &mut Ui, session: &Session, row: &IterationRow, tokens: &Tokens
     }
 }
 
+/// Height of what is said of the start, points.
+const START_LINE: f32 = 18.0;
 /// An IoU below which a view is not explained, whatever the others are.
 const LITTLE: f64 = 0.3;
 
@@ -224,14 +227,18 @@ const LITTLE: f64 = 0.3;
 fn explained(mean: f64, least: f64, tokens: &Tokens) -> (&'static str, egui::Color32) {
     match (mean >= 0.5, least >= LITTLE) {
         (true, true) => ("explained", tokens.ok),
-        (true, false) => ("explained in part", tokens.warn),
+        (true, false) => ("partly explained", tokens.warn),
         (false, _) => ("not explained", iou_color(tokens, mean)),
     }
 }
 
-/// How the start came about, a line that is always there: the rest is its tooltip.
-fn start(ui: &mut Ui, shared: &Shared<'_>) {
+/// How the start came about, a line that is always there: the rest is its tooltip. Where settings ask for another one, the
+/// button that finds it.
+fn start(ui: &mut Ui, shared: &mut Shared<'_>) {
     let tokens = Tokens::of(ui);
+    if shared.session.needs_new_start() {
+        return new_start(ui, shared, &tokens);
+    }
     let found = shared.session.fit.found_start.as_ref().map(|found| &found.initialisation);
     let (text, color) = match found {
         None => ("Start: —", tokens.dim),
@@ -244,6 +251,18 @@ fn start(ui: &mut Ui, shared: &Shared<'_>) {
     let line = ui.add(egui::Label::new(RichText::new(text).small().color(color)).truncate());
     if let Some(found) = found.filter(|found| !found.notes.is_empty()) {
         line.on_hover_text(found.notes.join("\n"));
+    }
+}
+
+fn new_start(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
+    let session = shared.session;
+    let changed = session.fit.start_config.map_or_else(String::new, |old| difference(&old, &session.config));
+    let tip = format!(
+        "Settings that only a start reads have changed since this one was found: {changed}.\nFinds a new start and fits from there; the iterations of this frame are forgotten."
+    );
+    let button = egui::Button::new(RichText::new("↺ new start needed").small().color(tokens.warn)).small();
+    if ui.add(button).on_hover_text(tip).clicked() {
+        shared.invoke("Reset fit");
     }
 }
 
@@ -445,7 +464,7 @@ mod explained_tests {
             let red = [first, second].iter().any(|iou| iou_color(&tokens, *iou) == tokens.bad);
             assert!(!(red && color == tokens.ok), "{word} with {first} and {second}");
         }
-        assert_eq!(explained(0.51, 0.29, &tokens).0, "explained in part");
+        assert_eq!(explained(0.51, 0.29, &tokens).0, "partly explained");
         assert_eq!(explained(0.6, 0.5, &tokens), ("explained", tokens.ok));
     }
 }

@@ -8,9 +8,9 @@ pub(crate) fn chip(ui: &mut Ui, text: &str, color: Color32) -> Response {
     // Allocated as one piece, so that it goes to the next line where a row has no room for it.
     let font = egui::TextStyle::Small.resolve(ui.style());
     let galley = ui.painter().layout_no_wrap(text.to_owned(), font, color);
-    let (rect, response) = ui.allocate_exact_size(galley.size() + egui::vec2(10.0, 2.0), egui::Sense::hover());
+    let (rect, response) = ui.allocate_exact_size(galley.size() + egui::vec2(8.0, 2.0), egui::Sense::hover());
     ui.painter().rect_stroke(rect, 3.0, egui::Stroke::new(1.0, color), egui::StrokeKind::Inside);
-    ui.painter().galley(rect.min + egui::vec2(5.0, 1.0), galley, color);
+    ui.painter().galley(rect.min + egui::vec2(4.0, 1.0), galley, color);
     response.named(egui::Role::Label, text)
 }
 

@@ -93,7 +93,7 @@ const COLUMNS: &[Column] = &[
         name: "Frame",
         tip: "The frame's name; the whole of it is in the tooltip of a row.",
         sort: SortKey::Index,
-        width: 50.0,
+        width: 44.0,
         right: false,
     },
     Column {
@@ -102,7 +102,7 @@ const COLUMNS: &[Column] = &[
         name: "Stratum",
         tip: "Easy, medium or hard: thirds of the data set by hardness.",
         sort: SortKey::Stratum,
-        width: 14.0,
+        width: 12.0,
         right: false,
     },
     Column {
@@ -148,7 +148,7 @@ const COLUMNS: &[Column] = &[
         name: "IoU",
         tip: "Mean forward-consistency IoU of the frame's newest fit.",
         sort: SortKey::Iou,
-        width: 30.0,
+        width: 27.0,
         right: true,
     },
     Column {
@@ -175,7 +175,7 @@ const COLUMNS: &[Column] = &[
         name: "Tags",
         tip: "Tags that have been given, those of others faint; in agreement mode only your own.",
         sort: SortKey::Tags,
-        width: 38.0,
+        width: 34.0,
         right: false,
     },
     Column {
@@ -184,7 +184,7 @@ const COLUMNS: &[Column] = &[
         name: "MAJPE",
         tip: "MAJPE in mm, where the data set has joints in metres.",
         sort: SortKey::Majpe,
-        width: 30.0,
+        width: 24.0,
         right: true,
     },
     Column {

@@ -68,7 +68,11 @@ pub(super) fn axes(ui: &Ui, plot: Rect, view: &View, o: Orientation, window: Map
     for (t, text) in ticks(across, window.min[0], window.max[0], *from_left, plot.width() / 52.0) {
         let x = plot.min.x + t * plot.width();
         painter.vline(x, plot.max.y..=plot.max.y + 3.0, stroke);
-        painter.text(pos2(x, plot.max.y + 3.0), Align2::CENTER_TOP, text, font.clone(), tokens.dim);
+        // Never over the edge: the next map's numbers begin there.
+        let galley = painter.layout_no_wrap(text, font.clone(), tokens.dim);
+        let half = 0.5 * galley.size().x;
+        let left = (x - half).min(plot.max.x - 2.0 * half).max(plot.min.x);
+        painter.galley(pos2(left, plot.max.y + 3.0), galley, tokens.dim);
     }
     if !first {
         return;

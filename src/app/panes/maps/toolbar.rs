@@ -15,7 +15,8 @@ use egui::{Color32, RichText, Sense, Ui, vec2};
 pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
     egui::Frame::new().inner_margin(egui::Margin::symmetric(8, 2)).show(ui, |ui| {
         ui.horizontal_wrapped(|ui| {
-            ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
+            ui.spacing_mut().item_spacing = vec2(3.0, 2.0);
+            ui.spacing_mut().button_padding.x = 5.0;
             colours(ui, shared);
             ui.separator();
             comparison(ui, shared);
