@@ -218,6 +218,7 @@ fn help(ui: &mut Ui) {
             ("Shift held", "flip H_ori and H_sim under the pointer"),
             ("drag", "pan a map; orbit in 3-D; scrub a strip"),
             ("drag a joint", "move it, on a map or in 3-D; X, Y or Z held: along that axis"),
+            ("Ctrl+drag", "mark the cells that a label is about"),
             ("right drag", "pan in 3-D; zoom to a box in the curves"),
             ("wheel", "zoom at the pointer"),
             ("click", "select a joint; show an iteration"),

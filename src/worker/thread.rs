@@ -6,7 +6,7 @@ use super::protocol::{
     HistoryRow, JobId, Kept, Prepare, PreparedFit, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
 };
 use crate::body::Pppr;
-use crate::config::FitConfig;
+use crate::config::{FitConfig, Parameterization};
 use crate::mhp::{
     FitError, FitState, Fitter, Objective, Precision, Problem, StepReport, StopReason, masks, predict, simulate,
 };
@@ -49,6 +49,8 @@ struct Job {
     /// The pose that fixes the EM region.
     initial: Pppr,
     precision: Precision,
+    /// What of it the fit sees.
+    seen: Arc<Problem>,
     /// What of it the fit does not see.
     erased: Arc<[ErasedCells]>,
     fitter: Fitter,
@@ -328,7 +330,7 @@ impl Job {
         let init_ms = milliseconds(began);
         let seen = without(&problem, &erased)?;
         let mut fitter = Fitter::new(Arc::clone(&seen), config, precision, initial.clone())?;
-        let viewer = Objective::new(seen, config, precision, &initial)?;
+        let viewer = Objective::new(Arc::clone(&seen), config, precision, &initial)?;
         let warnings = viewer.warnings().to_vec();
         let resumed = state.is_some();
         if let Some(state) = state {
@@ -343,6 +345,7 @@ impl Job {
             problem: Arc::clone(&problem),
             initial: initial.clone(),
             precision,
+            seen,
             erased,
             fitter,
             viewer,
@@ -370,15 +373,20 @@ impl Job {
         self.fitter.iteration()
     }
 
-    /// From now on the fit does not see these cells, and sees all others.
-    fn erase(&mut self, erased: Arc<[ErasedCells]>) -> Result<(), FitError> {
-        if self.erased == erased {
-            return Ok(());
+    /// From now on the fit has these settings and does not see these cells, as if it had been begun so. A window of frames is
+    /// laid around the initial pose: where the fit stood before must not be in it.
+    fn begin_with(&mut self, config: FitConfig, erased: Arc<[ErasedCells]>) -> Result<(), FitError> {
+        let same = self.erased == erased;
+        let in_window = |config: &FitConfig| config.parameterization == Parameterization::Motion;
+        if same && !in_window(&config) && !in_window(self.fitter.config()) {
+            return self.fitter.set_config(config);
         }
-        let (seen, config) = (without(&self.problem, &erased)?, *self.fitter.config());
-        self.viewer = Objective::new(Arc::clone(&seen), config, self.precision, &self.initial)?;
-        self.fitter = Fitter::new(seen, config, self.precision, self.initial.clone())?;
-        self.erased = erased;
+        if !same {
+            let seen = without(&self.problem, &erased)?;
+            self.viewer = Objective::new(Arc::clone(&seen), config, self.precision, &self.initial)?;
+            (self.seen, self.erased) = (seen, erased);
+        }
+        self.fitter = Fitter::new(Arc::clone(&self.seen), config, self.precision, self.initial.clone())?;
         Ok(())
     }
 
@@ -474,8 +482,7 @@ impl Job {
             }
             WorkerCommand::Refit { branch, state, config, target, run, erased } => {
                 self.rows.clear();
-                self.erase(erased)?;
-                self.fitter.set_config(*config)?;
+                self.begin_with(*config, erased)?;
                 self.fitter.restore(state)?;
                 (self.branch, self.branch_start) = (branch, self.iteration());
                 self.push_row(self.fitter.report());
@@ -505,8 +512,7 @@ impl Job {
             }
             WorkerCommand::Branch { branch, state, config, erased } => {
                 self.target = 0;
-                self.erase(erased)?;
-                self.fitter.set_config(*config)?;
+                self.begin_with(*config, erased)?;
                 self.fitter.restore(state)?;
                 self.branch = branch;
                 self.branch_start = self.iteration();

@@ -23,10 +23,14 @@ impl Rig {
     pub(crate) fn new(live: Live) -> Self {
         let folder = tempfile::tempdir().unwrap();
         blob::write_dataset(folder.path(), 2);
+        let path = folder.path().to_owned();
+        Self::on(&path, folder, live, config())
+    }
+
+    fn on(path: &Path, folder: tempfile::TempDir, live: Live, config: FitConfig) -> Self {
         let view = ViewState { live, ..ViewState::default() };
         let mut runtime = Runtime::new(Session::remembered(view, Vec::new()), Arc::new(|| ()), None);
-        runtime.apply(Command::SetConfig(Box::new(config())));
-        let path: &Path = folder.path();
+        runtime.apply(Command::SetConfig(Box::new(config)));
         runtime.apply(Command::Open(path.into()));
         let mut rig = Self { runtime, _folder: folder };
         rig.until("a fit that is ready", |s| s.fit.is_ready() && s.fit.shown.is_some());
@@ -104,6 +108,42 @@ fn a_drag_is_one_branch_one_line_and_one_act() {
     rig.settled();
     assert_eq!((rig.session().config.w_em, rig.session().fit.history.active_id()), (3.5, 1));
     assert_eq!(rig.session().fit.shown.as_ref().unwrap().params, dragged.params);
+}
+
+/// In a window of frames too: what a finger leaves is the fit that these settings give, wherever it had been before, and going
+/// back is going back to the last digit.
+#[test]
+fn a_dragged_fit_of_a_window_is_that_of_its_settings() {
+    let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/walk");
+    let recommended = FitConfig { iterations: 12, ..Preset::Recommended.config() };
+    let rig = |live, config| Rig::on(&sample, tempfile::tempdir().unwrap(), live, config);
+    let mut dragged = rig(Live::On, recommended);
+    dragged.runtime.apply(Command::ToggleRun);
+    dragged.settled();
+    let (plain, row) = {
+        let fit = &dragged.session().fit;
+        (fit.shown.clone().unwrap(), fit.shown_row().unwrap().report.clone())
+    };
+    for w_em in [0.8, 2.0, 1.3] {
+        let config = FitConfig { w_em, ..dragged.session().config };
+        dragged.runtime.apply(Command::DragConfig(Box::new(config)));
+        dragged.settled();
+    }
+    dragged.runtime.apply(Command::EndDrag);
+    dragged.settled();
+    let mut alone = rig(Live::Off, recommended);
+    alone.runtime.apply(Command::SetConfig(Box::new(FitConfig { w_em: 1.3, ..recommended })));
+    alone.settled();
+    alone.runtime.apply(Command::ToggleRun);
+    alone.settled();
+    let of = |rig: &Rig| rig.session().fit.shown.clone().unwrap();
+    assert_eq!(of(&dragged).params, of(&alone).params);
+    assert_eq!(of(&dragged).evaluation.loss, of(&alone).evaluation.loss);
+    dragged.runtime.apply(Command::Undo);
+    dragged.settled();
+    let back = of(&dragged);
+    assert_eq!((&back.params, back.evaluation.loss), (&plain.params, plain.evaluation.loss));
+    assert_eq!(back.evaluation.loss, row.loss, "what is shown is what the curve says");
 }
 
 /// By itself a fit follows a finger where it takes less than 50 ms.

@@ -129,6 +129,7 @@ fn optional(ui: &mut Ui, field: &Field, width: f32, number: &Number, config: &mu
     let Some(unset) = number.unset else { return };
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = GAP;
+        ui.spacing_mut().button_padding.x = GAP;
         let tip = field.tip();
         name(ui, field, width);
         let given = field.get(config);

@@ -73,6 +73,22 @@ impl Bed {
         self.path(run)
     }
 
+    /// What a command of this project prints that needs the window, as a block; with what it reads from the environment.
+    pub(crate) fn with_window(command: &str, environment: &[(&str, &str)]) -> String {
+        let mut words = command.split(' ').skip(1);
+        let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
+        let mut run = Command::new(cargo);
+        run.args(&mut words).envs(environment.iter().copied()).current_dir(env!("CARGO_MANIFEST_DIR"));
+        let output = run.output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let said = String::from_utf8(output.stdout).unwrap();
+        // Of a test what it says, not that it is one.
+        let lines: Vec<&str> =
+            said.lines().filter(|line| !line.starts_with("test ") && !line.starts_with("running ")).collect();
+        let set: String = environment.iter().map(|(name, value)| format!("{name}={value} ")).collect();
+        format!("`{set}{command}`:\n\n```text\n{}\n```", lines.join("\n").trim())
+    }
+
     /// Another bench of this project: what it printed, as a block.
     pub(crate) fn bench(name: &str) -> String {
         let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());

@@ -33,6 +33,8 @@ const SECTIONS: &[Section] = &[
     Section { key: "speed", heading: "Speed", write: speed::section },
     Section { key: "growth", heading: "How an iteration grows", write: speed::growth },
     Section { key: "watched", heading: "What being watched costs", write: speed::watched },
+    Section { key: "live", heading: "How a fit follows a finger", write: speed::live },
+    Section { key: "large", heading: "A batch as large as MMVR", write: speed::large },
 ];
 
 const TITLE: &str = "\

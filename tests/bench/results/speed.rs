@@ -106,3 +106,12 @@ pub(crate) fn growth(_: &Bed) -> String {
 pub(crate) fn watched(_: &Bed) -> String {
     Bed::bench("worker")
 }
+
+pub(crate) fn live(_: &Bed) -> String {
+    Bed::with_window("cargo bench --locked --bench live", &[])
+}
+
+pub(crate) fn large(_: &Bed) -> String {
+    let size = [("MHP_LARGE_FRAMES", "355500"), ("MHP_LARGE_BATCH_ONLY", "1")];
+    Bed::with_window("cargo test --locked --release --test window large -- --ignored --nocapture", &size)
+}
