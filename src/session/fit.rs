@@ -55,6 +55,8 @@ pub struct Fit {
     pub run: (u64, usize),
     /// Number of the newest run that a finger asked for.
     pub(super) refit_run: u64,
+    /// A branch that is written anew with the rows that come next, and the settings that they are fitted with.
+    pub(super) restart: Option<(u32, Box<FitConfig>)>,
     /// Milliseconds that a step takes, about.
     pub step_ms: f64,
     /// The settings that the start was found with.

@@ -375,18 +375,18 @@ impl Job {
 
     /// From now on the fit has these settings and does not see these cells, as if it had been begun so. A window of frames is
     /// laid around the initial pose: where the fit stood before must not be in it.
-    fn begin_with(&mut self, config: FitConfig, erased: Arc<[ErasedCells]>) -> Result<(), FitError> {
+    fn begin_with(&mut self, config: &FitConfig, erased: Arc<[ErasedCells]>) -> Result<(), FitError> {
         let same = self.erased == erased;
         let in_window = |config: &FitConfig| config.parameterization == Parameterization::Motion;
-        if same && !in_window(&config) && !in_window(self.fitter.config()) {
-            return self.fitter.set_config(config);
+        if same && !in_window(config) && !in_window(self.fitter.config()) {
+            return self.fitter.set_config(*config);
         }
         if !same {
             let seen = without(&self.problem, &erased)?;
-            self.viewer = Objective::new(Arc::clone(&seen), config, self.precision, &self.initial)?;
+            self.viewer = Objective::new(Arc::clone(&seen), *config, self.precision, &self.initial)?;
             (self.seen, self.erased) = (seen, erased);
         }
-        self.fitter = Fitter::new(Arc::clone(&self.seen), config, self.precision, self.initial.clone())?;
+        self.fitter = Fitter::new(Arc::clone(&self.seen), *config, self.precision, self.initial.clone())?;
         Ok(())
     }
 
@@ -482,7 +482,7 @@ impl Job {
             }
             WorkerCommand::Refit { branch, state, config, target, run, erased } => {
                 self.rows.clear();
-                self.begin_with(*config, erased)?;
+                self.begin_with(&config, erased)?;
                 self.fitter.restore(state)?;
                 (self.branch, self.branch_start) = (branch, self.iteration());
                 self.push_row(self.fitter.report());
@@ -512,7 +512,7 @@ impl Job {
             }
             WorkerCommand::Branch { branch, state, config, erased } => {
                 self.target = 0;
-                self.begin_with(*config, erased)?;
+                self.begin_with(&config, erased)?;
                 self.fitter.restore(state)?;
                 self.branch = branch;
                 self.branch_start = self.iteration();

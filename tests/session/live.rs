@@ -24,13 +24,13 @@ impl Rig {
         let folder = tempfile::tempdir().unwrap();
         blob::write_dataset(folder.path(), 2);
         let path = folder.path().to_owned();
-        Self::on(&path, folder, live, config())
+        Self::on(&path, folder, live, &config())
     }
 
-    fn on(path: &Path, folder: tempfile::TempDir, live: Live, config: FitConfig) -> Self {
+    fn on(path: &Path, folder: tempfile::TempDir, live: Live, config: &FitConfig) -> Self {
         let view = ViewState { live, ..ViewState::default() };
         let mut runtime = Runtime::new(Session::remembered(view, Vec::new()), Arc::new(|| ()), None);
-        runtime.apply(Command::SetConfig(Box::new(config)));
+        runtime.apply(Command::SetConfig(Box::new(*config)));
         runtime.apply(Command::Open(path.into()));
         let mut rig = Self { runtime, _folder: folder };
         rig.until("a fit that is ready", |s| s.fit.is_ready() && s.fit.shown.is_some());
@@ -116,8 +116,8 @@ fn a_drag_is_one_branch_one_line_and_one_act() {
 fn a_dragged_fit_of_a_window_is_that_of_its_settings() {
     let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/walk");
     let recommended = FitConfig { iterations: 12, ..Preset::Recommended.config() };
-    let rig = |live, config| Rig::on(&sample, tempfile::tempdir().unwrap(), live, config);
-    let mut dragged = rig(Live::On, recommended);
+    let rig = |live| Rig::on(&sample, tempfile::tempdir().unwrap(), live, &recommended);
+    let mut dragged = rig(Live::On);
     dragged.runtime.apply(Command::ToggleRun);
     dragged.settled();
     let (plain, row) = {
@@ -131,10 +131,8 @@ fn a_dragged_fit_of_a_window_is_that_of_its_settings() {
     }
     dragged.runtime.apply(Command::EndDrag);
     dragged.settled();
-    let mut alone = rig(Live::Off, recommended);
+    let mut alone = rig(Live::On);
     alone.runtime.apply(Command::SetConfig(Box::new(FitConfig { w_em: 1.3, ..recommended })));
-    alone.settled();
-    alone.runtime.apply(Command::ToggleRun);
     alone.settled();
     let of = |rig: &Rig| rig.session().fit.shown.clone().unwrap();
     assert_eq!(of(&dragged).params, of(&alone).params);

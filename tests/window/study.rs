@@ -246,6 +246,34 @@ fn a_sweep_is_put_together_and_run_in_the_pane() {
     assert!(window.named("Sort by Difference of results"), "{:#?}", window.names());
 }
 
+/// Whatever the command line studies is chosen by name and run on the listed frames.
+#[test]
+fn every_study_of_the_command_line_is_run_from_the_pane() {
+    let mut window = Window::open(3);
+    window.switch_live_off();
+    window.apply(Command::SetConfig(Box::new(FitConfig { iterations: 2, ..Preset::Baseline.config() })));
+    window.at_rest();
+    window.harness.state_mut().show_pane(Pane::called("Study").unwrap());
+    window.harness.run_steps(3);
+    for kind in StudyKind::ALL {
+        if window.named("New study") {
+            window.click("New study");
+            window.harness.run_steps(2);
+        }
+        window.click("Which study");
+        window.harness.run_steps(2);
+        window.click(kind.word());
+        window.harness.run_steps(2);
+        window.click("Run study");
+        window.until(kind.word(), |w| {
+            let run = w.session().study.shown();
+            !w.session().study.work.is_running() && run.is_some_and(|run| run.complete && run.spec.study == kind)
+        });
+        assert!(window.session().study.shown().unwrap().rows.iter().all(|row| row.fit.is_ok()), "{}", kind.word());
+        window.harness.run_steps(3);
+    }
+}
+
 #[test]
 fn two_presets_are_compared_on_one_frame() {
     let mut window = Window::open(3);

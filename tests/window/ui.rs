@@ -644,6 +644,7 @@ fn a_picture_without_a_session_is_drawn_in_silence() {
     let picture = home.path().join("window.png");
     let drawn = std::process::Command::new(env!("CARGO_BIN_EXE_mhp-inspector"))
         .args(["screenshot", folder.path().to_str().unwrap(), "--iterations", "2", "--size", "640x400"])
+        .args(["--preset", "baseline", "--people", "2"])
         .args(["--out", picture.to_str().unwrap()])
         .env("MHP_INSPECTOR_HOME", home.path().join("home"))
         .env_remove("XDG_RUNTIME_DIR")
@@ -653,6 +654,13 @@ fn a_picture_without_a_session_is_drawn_in_silence() {
     let told = String::from_utf8_lossy(&drawn.stderr);
     assert!(drawn.status.success() && picture.exists(), "{told}");
     assert_eq!(told, "");
+    let wrong = std::process::Command::new(env!("CARGO_BIN_EXE_mhp-inspector"))
+        .args(["screenshot", folder.path().to_str().unwrap(), "--preset", "bold"])
+        .args(["--out", picture.to_str().unwrap()])
+        .output()
+        .unwrap();
+    let told = String::from_utf8_lossy(&wrong.stderr);
+    assert!(wrong.status.code() == Some(2) && told.contains("bold") && told.contains("recommended"), "{told}");
 }
 
 /// The body follows the finger; when it is lifted one branch, one line and one act are left.
@@ -678,7 +686,13 @@ fn a_dragged_weight_fits_anew_under_the_finger() {
         shown.insert(window.fit().shown.as_ref().unwrap().config.w_em.to_bits());
         assert!(window.session().is_dragging());
         assert_eq!(window.fit().history.branches().len(), 2, "one branch, written anew");
-        assert!(window.named("Curve of L") && window.named("Curve of IoU hori"), "its curves are on screen");
+        let curves: Vec<String> = window.names().into_iter().filter(|name| name.starts_with("Curve of ")).collect();
+        let rows = window.fit().branch().unwrap().rows.len();
+        assert!(
+            curves.len() > 3,
+            "its curves are on screen: {curves:?} of {rows} rows, {}",
+            window.fit().history.active_id()
+        );
     }
     window.harness.drop_at(at(0.9));
     window.until("the lifted finger", |w| !w.session().is_dragging());
@@ -780,6 +794,8 @@ fn listed_frames_are_fitted_by_one_key() {
 /// Each curve has a picture of its own; a click shows the iteration under it, and the head is followed again from its end.
 #[test]
 fn every_curve_has_its_own_picture_and_leads_to_an_iteration() {
+    let start = Window::open(1);
+    assert!(start.named("Curve of L") && start.text_of("Curve of L") != "–", "its value, before the first step");
     let mut window = Window::fitted(1);
     for name in ["Curve of L", "Curve of L_EM", "Curve of IoU hori", "Curve of MAJPE / m"] {
         assert!(window.named(name), "{name}: {:?}", window.names());

@@ -148,7 +148,7 @@ fn optional(ui: &mut Ui, field: &Field, width: f32, number: &Number, config: &mu
         if let Value::Number(old) = field.get(config) {
             let mut value = old;
             // In the column of all numbers.
-            ui.add_space((ui.available_width() - beside()).max(0.0));
+            ui.add_space((ui.available_width() - beside() + GAP).max(0.0));
             typed(ui, field, number, &mut value).on_hover_text(&tip);
             if value != old {
                 field.set(config, Value::Number(value));

@@ -14,6 +14,10 @@ impl Session {
     pub(super) fn worker_message(&mut self, message: WorkerMessage) -> Vec<Effect> {
         match message {
             WorkerMessage::Rows(job, rows) if job == self.fit.job => {
+                // What was fitted before is on screen until there is something in its place.
+                if let Some((branch, config)) = self.fit.restart.take() {
+                    self.fit.history.restart(branch, *config);
+                }
                 for row in rows {
                     self.push_row(row);
                 }
@@ -88,7 +92,7 @@ impl Session {
                 Vec::new()
             }
             WorkerEvent::Refitted { branch, config } => {
-                self.fit.history.restart(branch, *config);
+                self.fit.restart = Some((branch, config));
                 Vec::new()
             }
             WorkerEvent::Finished { run, branch, iteration, reason, run_ms } => {

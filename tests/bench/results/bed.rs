@@ -85,8 +85,8 @@ impl Bed {
         // Of a test what it says, not that it is one.
         let lines: Vec<&str> =
             said.lines().filter(|line| !line.starts_with("test ") && !line.starts_with("running ")).collect();
-        let set: String = environment.iter().map(|(name, value)| format!("{name}={value} ")).collect();
-        format!("`{set}{command}`:\n\n```text\n{}\n```", lines.join("\n").trim())
+        let set: Vec<String> = environment.iter().map(|(name, value)| format!("{name}={value} ")).collect();
+        format!("`{}{command}`:\n\n```text\n{}\n```", set.concat(), lines.join("\n").trim())
     }
 
     /// Another bench of this project: what it printed, as a block.

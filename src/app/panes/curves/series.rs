@@ -46,9 +46,10 @@ impl Series {
 
     /// Whether it is 0 wherever it has a value, but for the last digits of a sum.
     pub(super) fn is_zero(&self) -> bool {
-        // Of the longest stretches the lowest and the highest.
-        let ends = self.levels.last().into_iter().flatten().flatten();
-        ends.map(|&at| self.values[at]).all(|value| value.abs() < NOTHING || value.is_nan())
+        let nothing = |value: f64| value.abs() < NOTHING || value.is_nan();
+        // Of the longest stretches the lowest and the highest; one value alone has none.
+        let Some(longest) = self.levels.last() else { return self.values.iter().all(|&value| nothing(value)) };
+        longest.iter().flatten().all(|&at| nothing(self.values[at]))
     }
 
     /// The points that a curve in `window` is drawn from, in pieces: it breaks where there is no value, or on a logarithmic

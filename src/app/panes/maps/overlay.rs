@@ -71,8 +71,9 @@ pub(super) fn axes(ui: &Ui, plot: Rect, view: &View, o: Orientation, window: Map
         // Never over the edge: the next map's numbers begin there.
         let galley = painter.layout_no_wrap(text, font.clone(), tokens.dim);
         let half = 0.5 * galley.size().x;
-        let left = (x - half).min(plot.max.x - 2.0 * half).max(plot.min.x);
-        painter.galley(pos2(left, plot.max.y + 3.0), galley, tokens.dim);
+        if x - half >= plot.min.x - 1.0 && x + half <= plot.max.x + 1.0 {
+            painter.galley(pos2(x - half, plot.max.y + 3.0), galley, tokens.dim);
+        }
     }
     if !first {
         return;
