@@ -229,8 +229,11 @@ fn menus_are_in_groups_and_quit_is_last() {
         items.sort_by(|a, b| a.0.total_cmp(&b.0));
         items.dedup_by(|a, b| (a.0 - b.0).abs() < 1.0);
         let least = items.windows(2).map(|pair| pair[1].0 - pair[0].1).fold(f32::INFINITY, f32::min);
-        let groups = items.chunk_by(|a, b| b.0 - a.1 < least + 3.0).map(<[_]>::len).collect::<Vec<_>>();
-        assert!(groups.len() > 2 && groups.iter().all(|&n| n <= 14), "{menu}: {groups:?} {items:#?}");
+        // The list of panes is as long as there are panes.
+        let pane = |item: &(f32, f32, String)| item.2.starts_with("Show ");
+        let groups = items.chunk_by(|a, b| b.0 - a.1 < least + 3.0);
+        let groups = groups.filter(|group| !group.iter().all(pane)).map(<[_]>::len).collect::<Vec<_>>();
+        assert!(groups.len() > 2 && groups.iter().all(|&n| n <= 12), "{menu}: {groups:?} {items:#?}");
         if menu == "File" {
             assert!(items.last().unwrap().2.starts_with("Quit"), "{items:#?}");
         }
