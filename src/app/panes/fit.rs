@@ -227,7 +227,7 @@ const LITTLE: f64 = 0.3;
 fn explained(mean: f64, least: f64, tokens: &Tokens) -> (&'static str, egui::Color32) {
     match (mean >= 0.5, least >= LITTLE) {
         (true, true) => ("explained", tokens.ok),
-        (true, false) => ("partly explained", tokens.warn),
+        (true, false) => ("part explained", tokens.warn),
         (false, _) => ("not explained", iou_color(tokens, mean)),
     }
 }
@@ -464,7 +464,7 @@ mod explained_tests {
             let red = [first, second].iter().any(|iou| iou_color(&tokens, *iou) == tokens.bad);
             assert!(!(red && color == tokens.ok), "{word} with {first} and {second}");
         }
-        assert_eq!(explained(0.51, 0.29, &tokens).0, "partly explained");
+        assert_eq!(explained(0.51, 0.29, &tokens).0, "part explained");
         assert_eq!(explained(0.6, 0.5, &tokens), ("explained", tokens.ok));
     }
 }
