@@ -46,7 +46,9 @@ fn cut_off(window: &Window) -> Vec<String> {
         let out = rect.left() < screen.left() - SLACK || rect.right() > screen.right() + SLACK;
         let scrolled = !rect.y_range().intersects(clip.y_range());
         let listed = tables.iter().flatten().any(|table| table.contains_rect(clip.shrink(4.0)));
-        if (beside || out) && !scrolled && !listed && !words.is_empty() && clip.is_positive() {
+        // Tabs that have no room scroll too, with arrows at both ends.
+        let tab = Pane::all().iter().any(|pane| pane.title() == words);
+        if (beside || out) && !scrolled && !listed && !tab && !words.is_empty() && clip.is_positive() {
             cut.push(format!("{words:?} at {rect:?} in {clip:?}"));
         }
     }
