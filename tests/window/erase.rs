@@ -47,7 +47,8 @@ fn the_fit_follows_the_eraser() {
     let map = window.node("H_ori map of hori").rect();
     draw(&mut window, map, [[0.02, 0.02], [0.98, 0.98]]);
     window.until("a fit without these cells", |w| {
-        w.fit().shown.as_ref().is_some_and(|shown| shown.branch == 1 && shown.iteration == 20)
+        let shown = w.fit().shown.as_ref();
+        shown.is_some_and(|shown| shown.branch == 1 && shown.iteration == 20) && measured(w, 0) != seen
     });
     assert!(window.session().is_dragging());
     assert_eq!(window.fit().history.branches().len(), 2, "one branch, written anew");
