@@ -3,6 +3,7 @@
 pub mod bench;
 mod calibrate;
 mod chain;
+mod calibrate_room;
 mod common;
 mod complexity;
 mod convert;
@@ -156,6 +157,11 @@ pub enum CliCommand {
     /// Show the stages of a capture's processing: what each resolves, and what the numbers warn of.
     #[command(after_help = chain::HELP)]
     Chain(chain::ChainArgs),
+    /// Find where the radars of a data set stand in the room whose frame its joints are in (HIBER), and remember it.
+    ///
+    /// Nothing is written into the data set, unless --into-data says so.
+    #[command(after_help = calibrate_room::HELP)]
+    CalibrateRoom(calibrate_room::CalibrateRoomArgs),
     /// Tell which frames of a data set are hard, before anything is fitted: three statistics of each frame's maps, the
     /// hardness that follows from their ranks, and the stratum.
     #[command(after_help = complexity::HELP)]
@@ -249,6 +255,7 @@ pub fn run(command: CliCommand) -> anyhow::Result<ExitCode> {
         CliCommand::Bench(args) => bench::run(&args),
         CliCommand::Calibrate(args) => calibrate::run(&args),
         CliCommand::Chain(args) => chain::run(&args),
+        CliCommand::CalibrateRoom(args) => calibrate_room::run(&args),
         CliCommand::Complexity(args) => complexity::run(&args),
         CliCommand::Convert(args) => convert::run(&args),
         CliCommand::Count(args) => count::run(&args),

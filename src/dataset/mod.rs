@@ -9,7 +9,10 @@
 //! points and masks shown as what they are, image pixels; neither chirp nor point-spread function is published. *HuPR*:
 //! `single_<k>/{hori,vert}/*.npy` cubes; the map is the amplitude at the elevation bin where all twelve antennas sum, which side
 //! is left is assumed. *XRF55*: stacks of 17 maps, assumed to be range × azimuth, as the data set publishes no axes. The loaders of the
-//! last two are tested on files synthesised in the published form, no real file was at hand. *Captures* of a DCA1000 or a cascade, and
+//! last two are tested on files synthesised in the published form, no real file was at hand. *HIBER*: two Cartesian maps a frame with
+//! what stands still subtracted, chirp and array published; its joints are in the room's frame, and where the radars stand in it is
+//! found by `calibrate-room`. *RT-Pose*: Cartesian cubes, Doppler bins summed, joints in the radar's frame; its chirp is assumed. No real
+//! file of these was at hand either. *Captures* of a DCA1000 or a cascade, and
 //! cubes of samples: the configuration beside them, or `[capture.chirp]`, says the chirp; which side is left and the antennas' places are assumed. *Generic*: a folder with
 //! `dataset.toml` and one npz a frame; `samples/walk/dataset.toml` has every key. What is assumed is said on screen and by `info`.
 
@@ -29,6 +32,7 @@ mod names;
 mod natural;
 pub mod npz;
 mod pppr_io;
+mod room;
 mod sample;
 mod set;
 mod walk;
@@ -48,5 +52,6 @@ pub use manifest::Manifest;
 pub use maps::MapReader;
 pub use npz::NpzError;
 pub use pppr_io::{read_pppr, write_pppr};
+pub use room::{ROOMS_NAME, RoomJoints, RoomTransform, RoomTransforms, remember_room, write_stated_rooms};
 pub use sample::bundled_sample;
 pub use set::{Dataset, DatasetInfo, MANIFEST_NAME, OpenOptions};

@@ -5,6 +5,7 @@ use super::cache::Cache;
 use super::layout::{DataFolder, FrameSource, LAYOUTS, Layout, Opened, open_unknown};
 use super::manifest::Manifest;
 use super::names::Names;
+use super::room::RoomJoints;
 use super::{DatasetError, Frame, Heatmap, ViewCalibration};
 use crate::body::Skeleton;
 use crate::digest;
@@ -42,6 +43,8 @@ pub struct DatasetInfo {
     pub views: ViewSet,
     /// Where the widths of each view come from; views that are not listed state theirs.
     pub calibrations: Vec<ViewCalibration>,
+    /// Whether the data set itself took away what stands still, by a difference of frames: static dominance cannot be measured then.
+    pub static_removed: bool,
     /// The convention of the axes in words.
     pub axes_badge: String,
     /// What was assumed because the data set does not publish it.
@@ -157,6 +160,11 @@ impl Dataset {
     /// Sequences: consecutive frames with the same [`Self::sequence`].
     pub fn sequences(&self) -> usize {
         self.frames.sequences()
+    }
+
+    /// The joints in a room's frame, where the data set has them and not in the radar's.
+    pub fn room_joints(&self) -> Option<&dyn RoomJoints> {
+        self.frames.room_joints()
     }
 
     /// Tells this data set from others wherever it lies: 16 hexadecimal digits of the SHA-256 of its layout, its views'

@@ -22,6 +22,11 @@ pub fn allow_into_data(allowed: bool) {
     INTO_DATA.store(allowed, Ordering::Relaxed);
 }
 
+/// What [`allow_into_data`] said.
+pub fn into_data_allowed() -> bool {
+    INTO_DATA.load(Ordering::Relaxed)
+}
+
 /// Calls its argument with every file of a data set.
 type Visit<'a> = Box<dyn Fn(&mut dyn FnMut(&Path)) + Send + Sync + 'a>;
 
@@ -88,7 +93,7 @@ impl<'a> Inputs<'a> {
     pub fn check_folder(&self, folder: &Path) -> Result<(), OutputError> {
         let real = resolved(folder).map_err(OutputError::writing(folder))?;
         let inside = self.folders.iter().find(|data| real.starts_with(data));
-        match inside.filter(|_| !INTO_DATA.load(Ordering::Relaxed)) {
+        match inside.filter(|_| !into_data_allowed()) {
             Some(data) => Err(OutputError::IntoData { data: data.clone(), path: folder.to_owned() }),
             None => Ok(()),
         }

@@ -20,7 +20,7 @@ mod sweep;
 pub use error::OutputError;
 pub use folder::FolderGuard;
 pub(crate) use growing::Growing;
-pub use inputs::{INTO_DATA_FLAG, Inputs, allow_into_data};
+pub use inputs::{INTO_DATA_FLAG, Inputs, allow_into_data, into_data_allowed};
 pub use lock::FolderLock;
 pub use names::FileNames;
 #[cfg(feature = "viewer")]

@@ -17,7 +17,10 @@ const USUAL_RATE_HZ: f64 = 10.0;
 /// As [`Problem::new`].
 pub fn problem_alone(dataset: &Dataset, frame: &Frame) -> Result<Problem, FitError> {
     let info = dataset.info();
-    Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &map_cells(&frame.maps))
+    let maps = map_cells(&frame.maps);
+    let mut problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &maps)?;
+    problem.static_removed = info.static_removed;
+    Ok(problem)
 }
 
 /// The problem of `frame`. A neighbour that cannot be read, or does not fit, is left out.

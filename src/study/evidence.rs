@@ -97,7 +97,8 @@ pub fn state_evidence(
     let annotated = Annotated {
         persons: frame.person_count,
         map_boxes: &frame.map_boxes,
-        image_boxes: frame.image.as_ref().map(|image| image.boxes.len()),
+        image_boxes: frame.image.as_ref().map(|image| image.boxes.len().max(image.keypoints.len())),
+        static_removed: dataset.info().static_removed,
     };
     evidence(&EvidenceInput { problem, config, params, masks, before: &before, annotated })
 }

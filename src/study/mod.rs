@@ -2,7 +2,7 @@
 //!
 //! [`run_batch`] fits, [`Summary`] writes the rows to a CSV as they come and [`read_summary`] reads them back, [`Means`] sums them up. [`complexity`] says
 //! which frames are hard before anything is fitted, [`frame_evidence`] judges a fit; [`write_ply`] and [`write_curves`]
-//! export a state. [`shard`] cuts what is done a frame into parts for several machines. Nothing here knows a window or a terminal.
+//! export a state. [`estimate_room`] finds where a radar stands in a room. [`shard`] cuts what is done a frame into parts for several machines. Nothing here knows a window or a terminal.
 
 mod batch;
 #[cfg(feature = "train")]
@@ -15,6 +15,7 @@ mod file_error;
 mod kept;
 pub mod radars;
 mod results;
+mod room;
 mod row;
 pub mod run;
 pub mod shard;
@@ -29,5 +30,6 @@ pub use export::{
 pub use file_error::FileError;
 pub use kept::{FitsFile, FitsOf, KeptFits, kept_fits};
 pub use results::{SummaryRow, read_summary};
+pub use room::{RoomError, RoomEstimate, environments, estimate_room};
 pub use row::{BatchRow, FitNumbers, FrameFit, Means};
 pub use summary::{StudyError, Summary, columns};

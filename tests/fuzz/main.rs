@@ -47,6 +47,9 @@ targets! {
     mmvr_frames: 200, 50_000, crate::readers::mmvr;
     hupr_frames: 150, 40_000, crate::readers::hupr;
     xrf55_frames: 150, 40_000, crate::readers::xrf55;
+    hiber_frames: 150, 40_000, crate::readers::hiber;
+    rt_pose_frames: 150, 40_000, crate::readers::rt_pose;
+    room_transforms: 300, 20_000, crate::readers::rooms;
     stacked_files: 200, 40_000, crate::readers::stacked;
     label_journals: 200, 40_000, crate::readers::journal;
     label_tables: 300, 40_000, crate::readers::label_table;

@@ -282,6 +282,65 @@ pub(crate) fn xrf55() -> Vec<File> {
     ]
 }
 
+/// Where a radar stands in a room.
+pub(crate) const ROOMS: &str = r#"[[room]]
+environment = "01"
+rotation = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+translation_m = [1.0, 2.0, -1.0]
+residual_m = 0.05
+frames = [180, 200]
+"#;
+
+/// A group of HIBER of two frames of 12 × 8 maps with all labels, and where its radar stands.
+pub(crate) fn hiber() -> Vec<File> {
+    let manifest = MANIFEST
+        .replace("layout = \"npz\"\nframes = \"frames/*.npz\"", "layout = \"hiber\"")
+        .replace("coco17", "hiber14");
+    let both: Vec<u8> = [map(), map()].concat();
+    let joints = f4((0..84).map(|k| 1.0 + (k % 7) as f32 * 0.1));
+    let label = |shape: &str, n: usize| npy("<f4", shape, false, &f4((0..n).map(|k| k as f32)));
+    vec![
+        ("dataset.toml", manifest.into_bytes()),
+        ("WALK/HORIZONTAL_HEATMAPS/01_02/0000.npy", npy("<f4", "(2, 12, 8)", false, &both)),
+        ("WALK/VERTICAL_HEATMAPS/01_02/0000.npy", npy("<f4", "(12, 8, 2)", false, &both)),
+        ("WALK/HORIZONTAL_HEATMAPS/01_02/0001.npy", npy("<c8", "(12, 8)", false, &both)),
+        ("WALK/VERTICAL_HEATMAPS/01_02/0001.npy", npy("<f4", "(12, 8)", false, &map())),
+        ("WALK/ANNOTATIONS/3DPOSE/01_02.npy", npy("<f4", "(2, 1, 14, 3)", false, &joints)),
+        ("WALK/ANNOTATIONS/2DPOSE/01_02.npy", label("(2, 1, 14, 2)", 56)),
+        ("WALK/ANNOTATIONS/BOUNDINGBOX/HORIZONTAL/01_02.npy", label("(2, 1, 4)", 8)),
+        ("WALK/ANNOTATIONS/BOUNDINGBOX/VERTICAL/01_02.npy", label("(2, 1, 4)", 8)),
+        ("WALK/ANNOTATIONS/SILHOUETTE/01_02/0000.npy", npy("|b1", "(1, 6, 8)", false, &[1; 48])),
+        ("WALK/ANNOTATIONS/SILHOUETTE/01_02/0001.npy", npy("|u1", "(1, 6, 8)", false, &[1; 48])),
+        ("rooms.toml", ROOMS.as_bytes().to_vec()),
+    ]
+}
+
+/// A sequence of RT-Pose of cubes of 4 × 3 × 8 cells with three Doppler bins and without, with its labels.
+pub(crate) fn rt_pose() -> Vec<File> {
+    let manifest = MANIFEST.replace("layout = \"npz\"\nframes = \"frames/*.npz\"", "layout = \"rt_pose\"");
+    let manifest = manifest[..manifest.find("[[view]]").unwrap_or(0)].replace("coco17", "rt_pose15")
+        + r#"[[view]]
+array = "cube"
+psf = { range_m = 0.05, azimuth_rad = 0.02, elevation_rad = 0.14, doppler_mps = 0.2 }
+axes = [
+  { kind = "z", bins = 4, lo = -1.0, hi = 1.0 },
+  { kind = "y", bins = 3, lo = -1.5, hi = 1.5 },
+  { kind = "x", bins = 8, lo = 0.0, hi = 4.0 },
+]
+"#;
+    let cube: Vec<u8> = (0..96 * 3_u16).flat_map(|k| (0x3c00 + k % 77).to_le_bytes()).collect();
+    let joints = vec!["[1.0, 2.0, 0.5]"; 15].join(", ");
+    let labels = format!("{{\"1\": {{\"0\": [{{\"Radar_frameID\": \"000000\", \"pose\": [{joints}]}}]}}}}");
+    vec![
+        ("dataset.toml", manifest.into_bytes()),
+        ("2023_0001/DZYX_npy_f16/000000.npy", npy("<f2", "(3, 4, 3, 8)", false, &cube)),
+        ("2023_0002/npy/000000.npy", npy("<f4", "(4, 3, 8)", false, &map())),
+        ("Train.json", labels.into_bytes()),
+        ("file_meta.txt", b"1,2023_0001\n2,2023_0002\n".to_vec()),
+        ("calib/calib.json", br#"{"radar": {"extrinsic": [1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}"#.to_vec()),
+    ]
+}
+
 /// A session file.
 pub(crate) fn session() -> String {
     let config = mhp_inspector::config::FitConfig::default().to_toml();

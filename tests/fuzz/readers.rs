@@ -4,7 +4,7 @@ use crate::material::{self, File};
 use crate::mutate;
 use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::npz::{NPY_KEY, NpzArchive};
-use mhp_inspector::dataset::{Dataset, Manifest, OpenOptions, read_pppr};
+use mhp_inspector::dataset::{Dataset, Manifest, OpenOptions, RoomTransforms, read_pppr};
 use mhp_inspector::labels::{LabelPlace, LabelStore, read_journal, read_table};
 use mhp_inspector::session::SessionFile;
 use mhp_inspector::study::read_summary;
@@ -150,6 +150,42 @@ pub(crate) fn xrf55(random: &mut StdRng, folder: &Path) {
     read_all(folder);
 }
 
+pub(crate) fn hiber(random: &mut StdRng, folder: &Path) {
+    let mut files = material::hiber();
+    if random.random_bool(0.3) {
+        let chosen = random.random_range(1..3);
+        let mut entry = [("array", files[chosen].1.clone())];
+        material::hostile_entry(&mut entry, random);
+        files[chosen].1 = std::mem::take(&mut entry[0].1);
+    }
+    changed(&files, random, folder);
+    read_all(folder);
+    let Ok(dataset) = Dataset::open(folder, &Progress::new()) else { return };
+    if let Some(rooms) = dataset.room_joints() {
+        let _ = (0..dataset.len().min(20)).map(|i| (rooms.environment(i).is_some(), rooms.joints(i))).count();
+    }
+}
+
+pub(crate) fn rt_pose(random: &mut StdRng, folder: &Path) {
+    let mut files = material::rt_pose();
+    if random.random_bool(0.3) {
+        let mut entry = [("array", files[1].1.clone())];
+        material::hostile_entry(&mut entry, random);
+        files[1].1 = std::mem::take(&mut entry[0].1);
+    }
+    changed(&files, random, folder);
+    read_all(folder);
+}
+
+/// A file of room transforms.
+pub(crate) fn rooms(random: &mut StdRng, folder: &Path) {
+    std::fs::write(folder.join("rooms.toml"), mutate::text(material::ROOMS, random)).unwrap();
+    let read = RoomTransforms::of(folder, None);
+    if let Some(room) = read.of_environment("01") {
+        assert!(room.radar_from_room.translation.iter().all(|x| x.is_finite()));
+    }
+}
+
 /// A file of frames along the first axis, with the manifest that describes it.
 pub(crate) fn stacked(random: &mut StdRng, folder: &Path) {
     let stack: Vec<u8> = (0..3).flat_map(|_| material::map()).collect();
@@ -250,6 +286,8 @@ fn what_the_mutations_begin_with_is_sound() {
         ("mmvr", material::mmvr()),
         ("hupr", material::hupr()),
         ("xrf55", material::xrf55()),
+        ("hiber", material::hiber()),
+        ("rt_pose", material::rt_pose()),
     ];
     for (name, files) in sets {
         let folder = home.path().join(name);

@@ -512,7 +512,7 @@ proptest! {
         }).collect());
         let scene = Scene { frames: made.collect(), views, fitted, config: FitConfig::default() };
         let boxes = vec![vec![[draw() * 9.0, draw() * 9.0, draw() * 9.0, draw() * 9.0]; 2]; 3];
-        let found = scene.judge_with(Annotated { persons: Some(frames), map_boxes: &boxes, image_boxes: None });
+        let found = scene.judge_with(Annotated { persons: Some(frames), map_boxes: &boxes, ..Annotated::default() });
         prop_assert!(found[0].score.is_none() || frames >= STATIC_FRAMES);
         prop_assert!(found[3].score.is_some(), "there is a Doppler axis");
     }

@@ -21,6 +21,8 @@ Examples:
       Two or three people who walk, 0.6 to 2 m apart.
   mhp-inspector simulate data/hupr --layout hupr --frames 40
       HuPR's folders and cubes.
+  mhp-inspector simulate data/hiber --layout hiber --frames 200 --sequence-length 50
+      HIBER's tree, and where each environment's radars stand; `calibrate-room data/hiber` finds it again.
   mhp-inspector simulate data/worst --preset hard --bits 16 --noise-db 6 --still-share 1
       A better converter, twice the noise, walls not attenuated.";
 
@@ -62,7 +64,8 @@ pub struct SimulateArgs {
     /// Name of the data set; without it, layout and presets.
     #[arg(long)]
     pub name: Option<String>,
-    /// Store complex64 instead of complex128 (hupr) and float16 instead of float32 (xrf55-stack): half the bytes.
+    /// Store complex64 instead of complex128 (hupr), float16 instead of float32 (xrf55-stack, rt-pose), float32 instead of
+    /// float64 (hiber): half the bytes.
     #[arg(long)]
     pub narrow: bool,
     /// More (or less) thermal noise than the preset has, dB.
@@ -100,6 +103,10 @@ pub enum LayoutArg {
     Xrf55Stack,
     /// Polar maps with a Doppler axis, one npz a frame.
     Generic,
+    /// HIBER's tree of Cartesian maps, with joints in the room's frame.
+    Hiber,
+    /// RT-Pose's Cartesian cubes, with joints in the radar's frame.
+    RtPose,
 }
 
 impl From<LayoutArg> for SimulatedLayout {
@@ -111,6 +118,8 @@ impl From<LayoutArg> for SimulatedLayout {
             LayoutArg::Xrf55 => Self::Xrf55,
             LayoutArg::Xrf55Stack => Self::Xrf55Stack,
             LayoutArg::Generic => Self::Generic,
+            LayoutArg::Hiber => Self::Hiber,
+            LayoutArg::RtPose => Self::RtPose,
         }
     }
 }

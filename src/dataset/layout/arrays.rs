@@ -13,6 +13,22 @@ pub(super) fn read_map(file: &mut NpzArchive, view: &View) -> Result<Heatmap, Np
     Ok(Heatmap { shape, data, dtype })
 }
 
+/// The share of zeros of which a map was rounded to few steps, as one that was taken from a picture is.
+const ROUNDED_SHARE: f64 = 0.01;
+
+/// Takes the zeros of a map that was rounded for half of its smallest number: nothing would stand out from a background of 0 by any
+/// finite ratio. What was done, in words; `None` where there are few zeros.
+pub(super) fn lift_zeros(data: &mut [f64]) -> Option<String> {
+    let least = data.iter().copied().filter(|x| *x > 0.0).fold(f64::INFINITY, f64::min);
+    let zeros = data.iter().filter(|x| **x == 0.0).count();
+    let share = zeros as f64 / data.len().max(1) as f64;
+    if !least.is_finite() || share < ROUNDED_SHARE {
+        return None;
+    }
+    data.iter_mut().filter(|x| **x == 0.0).for_each(|x| *x = 0.5 * least);
+    Some(format!("{:.0} % of its cells are 0: taken for half of the smallest number, {least:.3e}", 100.0 * share))
+}
+
 /// A number: 0-d, or one element.
 pub(super) fn scalar(file: &mut NpzArchive, key: &str) -> Result<Option<f64>, NpzError> {
     if !file.contains(key) {

@@ -1,6 +1,7 @@
 //! The frames of an open data set, as its layout gives them.
 
 use crate::dataset::adc::ChainStages;
+use crate::dataset::room::RoomJoints;
 use crate::dataset::{DatasetError, DatasetInfo, Frame, Heatmap};
 use std::fmt::{self, Debug, Write};
 use std::ops::Range;
@@ -64,6 +65,11 @@ pub trait FrameSource: Debug + Send + Sync {
     /// One error that names file, key and expectation.
     fn maps(&self, frames: Range<usize>, info: &DatasetInfo) -> Result<Vec<Vec<Heatmap>>, DatasetError>;
 
+    /// The joints in the frame of a room in which the radar stands, where the data set has those.
+    fn room_joints(&self) -> Option<&dyn RoomJoints> {
+        None
+    }
+
     /// Frame `i` with its labels; its index and name are filled in by the data set. Missing companions are notes, not errors.
     /// Truth is in the joints of `info.skeleton`, whatever the files' own are.
     ///
@@ -107,5 +113,14 @@ pub enum Stored {
         every: usize,
         /// The one that is taken.
         first: usize,
+    },
+    /// It has several numbers of each cell, real or complex, and the map is the root of their summed or mean power.
+    Folded {
+        /// Numbers of a cell along the axes before the map's.
+        before: usize,
+        /// Numbers of a cell along the axes after the map's.
+        after: usize,
+        /// By what the sum of their squares is divided.
+        over: usize,
     },
 }

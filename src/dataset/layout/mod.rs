@@ -14,10 +14,12 @@ mod dca;
 mod dummy;
 mod frames;
 mod generic;
+mod hiber;
 mod hupr;
 mod index;
 mod mmvr;
 mod pattern;
+mod rt_pose;
 mod write;
 mod xrf55;
 
@@ -39,8 +41,10 @@ use std::path::Path;
 pub static LAYOUTS: &[&dyn Layout] = &[
     &generic::Generic,
     &mmvr::Mmvr,
+    &hiber::Hiber,
     &hupr::Hupr,
     &xrf55::Xrf55,
+    &rt_pose::RtPose,
     &dca::Dca,
     #[cfg(test)]
     &dummy::Dummy,
@@ -167,6 +171,7 @@ impl DataFolder<'_> {
             axes_badge: axes_badge(views),
             views: views.clone().into(),
             calibrations,
+            static_removed: false,
             assumptions,
             notes: Vec::new(),
         }

@@ -75,7 +75,7 @@ pub struct NewPlace<'a> {
 pub struct NewFrame<'a> {
     /// One map a view, C order.
     pub maps: &'a [Vec<f32>],
-    /// One complex cube a view, whose amplitudes its map is taken of; for layouts that store those.
+    /// What is stored instead of the maps, one a view: a complex cube, or several maps one after the other; for layouts that do.
     pub cubes: &'a [Vec<Complex64>],
     /// COCO's joints of each person, m.
     pub joints: &'a [Vec<Vec3>],
@@ -167,6 +167,20 @@ pub(super) fn image_box(camera: &PinholeCamera, size: [usize; 2], joints: &[Vec3
         bounds[2].clamp(0.0, width),
         bounds[3].clamp(0.0, height),
     ]
+}
+
+/// The box about a body on a map of two axes, with so much about its joints: column 0, row 0, column 1, row 1.
+pub(super) fn map_box(view: &View, joints: &[Vec3], margin_m: f64) -> [f64; 4] {
+    let bins: Vec<Vec<f64>> = joints.iter().map(|&joint| view.bins_of(joint)).collect();
+    let span = |axis: usize| {
+        let (margin, last) = view.axes.get(axis).map_or((0.0, 0.0), |a| (margin_m / a.step().abs(), a.bins as f64));
+        let values = bins.iter().filter_map(|bins| bins.get(axis).copied());
+        let low = values.clone().fold(f64::INFINITY, f64::min) - margin;
+        let high = values.fold(f64::NEG_INFINITY, f64::max) + margin;
+        [low.clamp(0.0, last), high.clamp(0.0, last)]
+    };
+    let ([row0, row1], [column0, column1]) = (span(0), span(1));
+    [column0, row0, column1, row1]
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ pub const NPY_KEY: &str = "array";
 /// Elements of an array that are held at once: 2²⁴, 128 MiB once they are `f64`. A cube of 256 × 256 × 256 cells has as many.
 pub const MAX_ELEMENTS: usize = 1 << 24;
 /// Bytes of an array that are held at once as they lie in the file: elements of text can be wide.
-const MAX_BYTES: u64 = 8 * MAX_ELEMENTS as u64;
+pub(super) const MAX_BYTES: u64 = 8 * MAX_ELEMENTS as u64;
 /// Deflate cannot pack tighter than this, so an entry that claims more lies about its size.
 const MAX_RATIO: u64 = 1032;
 /// Rows of the last axis that are read at a time where an array is read in pieces.
@@ -260,7 +260,7 @@ impl NpzArchive {
         NpzError::WrongShape { key: key.to_owned(), got: shape_text(got), expected, path: self.path.clone() }
     }
 
-    fn wrong_type(&self, key: &str, header: &Header, expected: &'static str) -> NpzError {
+    pub(super) fn wrong_type(&self, key: &str, header: &Header, expected: &'static str) -> NpzError {
         let (key, path) = (key.to_owned(), self.path.clone());
         if header.scalar == Scalar::Object {
             return NpzError::Pickled { key, path };
@@ -276,7 +276,7 @@ impl NpzArchive {
     }
 
     /// Calls `read` with the entry, its header parsed and the reader at the first byte of data.
-    fn with_entry<T>(
+    pub(super) fn with_entry<T>(
         &mut self,
         key: &str,
         read: impl FnOnce(&mut Source<'_>) -> Result<T, NpzError>,
@@ -332,9 +332,9 @@ fn parse(reader: &mut dyn Read, key: &str, path: &Path) -> Result<Header, NpzErr
 }
 
 /// One entry, about to be read.
-struct Source<'a> {
+pub(super) struct Source<'a> {
     reader: &'a mut dyn Read,
-    header: Header,
+    pub(super) header: Header,
     /// Bytes that the entry can hold at most, header included.
     available: u64,
     key: &'a str,
@@ -348,7 +348,7 @@ impl Source<'_> {
 
     /// Refuses object arrays, sizes that cannot be there, and reading more than `most` bytes at once, before anything is
     /// allocated; `bytes` is what is about to be held.
-    fn check(&self, bytes: u64, most: u64) -> Result<(), NpzError> {
+    pub(super) fn check(&self, bytes: u64, most: u64) -> Result<(), NpzError> {
         let (key, path) = (self.key.to_owned(), self.path.to_owned());
         let elements = usize::try_from(bytes / self.header.width.max(1) as u64).unwrap_or(usize::MAX);
         if self.header.scalar == Scalar::Object {
@@ -371,7 +371,7 @@ impl Source<'_> {
     }
 
     /// Reads exactly `count` bytes.
-    fn take(&mut self, count: u64) -> Result<Vec<u8>, NpzError> {
+    pub(super) fn take(&mut self, count: u64) -> Result<Vec<u8>, NpzError> {
         let mut bytes = Vec::with_capacity(usize::try_from(count).unwrap_or(0));
         let got = (&mut *self.reader).take(count).read_to_end(&mut bytes);
         match got {
@@ -385,8 +385,14 @@ impl Source<'_> {
     fn all(&mut self) -> Result<Vec<u8>, NpzError> {
         self.check(self.header.data_bytes(), MAX_BYTES)?;
         let bytes = self.take(self.header.data_bytes())?;
+        self.end()?;
+        Ok(bytes)
+    }
+
+    /// The read past the data, which must give nothing.
+    pub(super) fn end(&mut self) -> Result<(), NpzError> {
         match self.reader.read(&mut [0_u8]) {
-            Ok(0) => Ok(bytes),
+            Ok(0) => Ok(()),
             Ok(_) => Err(self.corrupt("it goes on after the declared shape is full".into())),
             Err(error) => Err(self.corrupt(error.to_string())),
         }
@@ -410,11 +416,8 @@ impl Source<'_> {
             });
             data.extend(picked);
         }
-        match self.reader.read(&mut [0_u8]) {
-            Ok(0) => Ok(data),
-            Ok(_) => Err(self.corrupt("it goes on after the declared shape is full".into())),
-            Err(error) => Err(self.corrupt(error.to_string())),
-        }
+        self.end()?;
+        Ok(data)
     }
 
     /// The bytes of these slabs, of `cells` elements each.

@@ -21,6 +21,10 @@ impl Form {
         Self { header }
     }
 
+    pub(super) fn header(&self) -> &Header {
+        &self.header
+    }
+
     /// Its shape.
     pub fn shape(&self) -> &[usize] {
         &self.header.shape
@@ -129,7 +133,7 @@ impl Form {
     }
 
     /// Magic, version, length and text, as numpy writes them: a multiple of 64 bytes.
-    fn head(&self) -> Vec<u8> {
+    pub(super) fn head(&self) -> Vec<u8> {
         let Header { dtype, fortran, shape, .. } = &self.header;
         let order = if *fortran { "True" } else { "False" };
         let mut text = format!("{{'descr': '{dtype}', 'fortran_order': {order}, 'shape': {}, }}", shape_text(shape));
@@ -180,7 +184,7 @@ fn complex_numbers(bytes: &[u8], header: &Header) -> Vec<Complex<f64>> {
     bytes.chunks_exact(header.width.max(1)).map(number).collect()
 }
 
-fn push(bytes: &mut Vec<u8>, x: f64, header: &Header) -> Result<(), String> {
+pub(super) fn push(bytes: &mut Vec<u8>, x: f64, header: &Header) -> Result<(), String> {
     macro_rules! put {
         ($value:expr) => {{
             let value = $value;

@@ -141,7 +141,7 @@ pub struct EarlierFrame<'a> {
     pub maps: Vec<&'a [f64]>,
 }
 
-/// What the data set says of how many people there are.
+/// What the data set says of how many people there are, and of its maps.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Annotated<'a> {
     /// The annotated number of people.
@@ -150,6 +150,8 @@ pub struct Annotated<'a> {
     pub map_boxes: &'a [Vec<[f64; 4]>],
     /// Labelled people in the camera image, where there is one.
     pub image_boxes: Option<usize>,
+    /// Whether the data set took away by itself what stands still: then nothing static is left to be measured.
+    pub static_removed: bool,
 }
 
 /// One fitted frame.

@@ -19,6 +19,8 @@
 //!
 //! Noise and sidelobes of who moves fade within five frames (for noise alone it is about 0.3); an echo that was not removed
 //! does not. The second is how much stronger than the body the strongest such echo is.
+//!
+//! Maps that a data set made of differences of frames (HIBER) have no static echoes: there is no score then, and it is said.
 
 use super::cells::{largest_patch, members, place};
 use super::number_text::{cell_box, cells, percent};
@@ -48,7 +50,14 @@ struct Seen<'a> {
 /// Cells farther than so many resolution cells from every joint are beside the body.
 const BESIDE: f64 = 2.0;
 
+/// Why F1 has no score where a data set's maps are differences of frames.
+const REMOVED: &str = "It cannot be measured here: the data set subtracts what stands still from its maps, so that static reflectors, and \
+                       people who stand still, are not in them.";
+
 pub(super) fn judge(input: &EvidenceInput<'_>, past: &[Past<'_>]) -> Found {
+    if input.annotated.static_removed {
+        return Found::unknown(Tag::F1, REMOVED);
+    }
     let frames = past.len() + 1;
     let seen: Vec<Seen<'_>> = (0..input.problem.views.len()).filter_map(|view| look(input, past, view)).collect();
     let share = mean(seen.iter().filter_map(Seen::share));

@@ -15,6 +15,10 @@ const HALF_SHOULDERS: f64 = 0.129 * HEIGHT_M;
 const HALF_HIPS: f64 = 0.0955 * HEIGHT_M;
 const TRUNK: f64 = (0.818 - 0.530) * HEIGHT_M;
 const NECK_TO_TOP: f64 = (1.0 - 0.818) * HEIGHT_M;
+/// From the middle of the shoulders to a hip, √(trunk² + half hips²) = 0.30342 H.
+const NECK_TO_HIP: f64 = 0.515_815_55;
+/// From the middle of the shoulders to the nose of a person who looks ahead: 0.1 m before it and 0.17 m above.
+const NECK_TO_NOSE: f64 = 0.197_230_8;
 
 /// The joints of COCO's 17 keypoints.
 pub(super) const COCO_JOINTS: [&str; 17] = [
@@ -67,7 +71,7 @@ struct Preset {
     angles: &'static [[usize; 3]],
 }
 
-const PRESETS: [Preset; 3] = [
+const PRESETS: [Preset; 5] = [
     Preset {
         name: "coco17",
         joints: &COCO_JOINTS,
@@ -139,9 +143,8 @@ const PRESETS: [Preset; 3] = [
             (3, 4, THIGH),
             (4, 5, SHANK),
             (0, 3, 2.0 * HALF_HIPS),
-            // √(trunk² + half hips²) = 0.30342 H
-            (6, 0, 0.515_815_55),
-            (6, 3, 0.515_815_55),
+            (6, 0, NECK_TO_HIP),
+            (6, 3, NECK_TO_HIP),
             (6, 7, NECK_TO_TOP),
             (6, 8, HALF_SHOULDERS),
             (8, 9, UPPER_ARM),
@@ -151,6 +154,80 @@ const PRESETS: [Preset; 3] = [
             (12, 13, FOREARM),
         ],
         angles: &[[8, 9, 10], [11, 12, 13], [3, 4, 5], [0, 1, 2]],
+    },
+    // The published bones, and one between the hips: with it the trunk is one rigid part.
+    Preset {
+        name: "hiber14",
+        joints: &[
+            "nose",
+            "neck",
+            "right_shoulder",
+            "right_elbow",
+            "right_wrist",
+            "left_shoulder",
+            "left_elbow",
+            "left_wrist",
+            "right_hip",
+            "right_knee",
+            "right_ankle",
+            "left_hip",
+            "left_knee",
+            "left_ankle",
+        ],
+        bones: &[
+            (0, 1, NECK_TO_NOSE),
+            (1, 2, HALF_SHOULDERS),
+            (1, 5, HALF_SHOULDERS),
+            (2, 3, UPPER_ARM),
+            (3, 4, FOREARM),
+            (5, 6, UPPER_ARM),
+            (6, 7, FOREARM),
+            (8, 9, THIGH),
+            (9, 10, SHANK),
+            (11, 12, THIGH),
+            (12, 13, SHANK),
+            (1, 8, NECK_TO_HIP),
+            (1, 11, NECK_TO_HIP),
+            (8, 11, 2.0 * HALF_HIPS),
+        ],
+        angles: &[[5, 6, 7], [2, 3, 4], [11, 12, 13], [8, 9, 10]],
+    },
+    Preset {
+        name: "rt_pose15",
+        joints: &[
+            "pelvis",
+            "right_hip",
+            "right_knee",
+            "right_ankle",
+            "left_hip",
+            "left_knee",
+            "left_ankle",
+            "thorax",
+            "head",
+            "left_shoulder",
+            "left_elbow",
+            "left_wrist",
+            "right_shoulder",
+            "right_elbow",
+            "right_wrist",
+        ],
+        bones: &[
+            (0, 1, HALF_HIPS),
+            (1, 2, THIGH),
+            (2, 3, SHANK),
+            (0, 4, HALF_HIPS),
+            (4, 5, THIGH),
+            (5, 6, SHANK),
+            (0, 7, TRUNK),
+            (7, 8, NECK_TO_TOP),
+            (7, 9, HALF_SHOULDERS),
+            (9, 10, UPPER_ARM),
+            (10, 11, FOREARM),
+            (7, 12, HALF_SHOULDERS),
+            (12, 13, UPPER_ARM),
+            (13, 14, FOREARM),
+        ],
+        angles: &[[9, 10, 11], [12, 13, 14], [4, 5, 6], [1, 2, 3]],
     },
 ];
 
@@ -163,7 +240,7 @@ const MAX_BONE_M: f64 = 10.0;
 
 impl Skeleton {
     /// The names that [`Self::preset`] knows.
-    pub const PRESETS: [&'static str; 3] = ["coco17", "h36m17", "hupr14"];
+    pub const PRESETS: [&'static str; 5] = ["coco17", "h36m17", "hupr14", "hiber14", "rt_pose15"];
 
     /// The skeleton called `name`; SPEC section 5.
     pub fn preset(name: &str) -> Option<Self> {
@@ -249,7 +326,8 @@ mod tests {
             let sided = (0..skeleton.joints.len()).filter(|&j| skeleton.side(j) == Side::Left).count();
             assert_eq!(sided * 2, (0..skeleton.joints.len()).filter(|&j| skeleton.side(j) != Side::Middle).count());
         }
-        assert!((0.288_f64.hypot(0.0955) * HEIGHT_M - 0.515_815_55).abs() < 1e-6);
+        assert!((0.288_f64.hypot(0.0955) * HEIGHT_M - NECK_TO_HIP).abs() < 1e-6);
+        assert!((0.10_f64.hypot(0.17) - NECK_TO_NOSE).abs() < 1e-6);
         assert_eq!(Skeleton::preset("smpl"), None);
     }
 }

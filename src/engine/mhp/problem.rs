@@ -18,6 +18,8 @@ pub struct Problem {
     pub skeleton: Skeleton,
     /// One view a map.
     pub views: ViewSet,
+    /// Whether what stands still was taken away from the maps before: what is left beside a person is sidelobes, no reflectors.
+    pub static_removed: bool,
     maps: Vec<Vec<f64>>,
     filled: Vec<usize>,
     neighbours: Vec<Neighbour>,
@@ -44,7 +46,8 @@ impl Problem {
         check_skeleton(&skeleton)?;
         views.iter().try_for_each(check_view)?;
         let (maps, filled) = fill(&views, maps)?;
-        Ok(Self { radar, skeleton, views, maps, filled, neighbours: Vec::new(), contexts: Contexts::default() })
+        let (static_removed, neighbours, contexts) = (false, Vec::new(), Contexts::default());
+        Ok(Self { radar, skeleton, views, static_removed, maps, filled, neighbours, contexts })
     }
 
     /// Adds the maps of a frame shortly before or after: (seconds after this frame, one map a view). The start reads

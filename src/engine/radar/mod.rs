@@ -9,6 +9,7 @@ mod config;
 mod fft;
 mod fmcw;
 mod native;
+mod hupr;
 mod psf;
 mod reflector;
 mod spatial;
@@ -29,6 +30,7 @@ pub use psf::{
     FftSetup, Resolved, ViewFft, doppler_sigma_mps, first_null_bins, main_lobe_sigma_bins, range_sigma_m, sine_sigma,
 };
 pub use reflector::{LobeCut, Reflector, ReflectorMap, ReflectorPlace, refined_widths, width_of, with_width};
+pub use hupr::{HUPR_SHAPE, hupr_amplitudes, hupr_cube};
 pub(crate) use spatial::{NEAREST_M, SpatialGrid};
 pub use view::unravel;
 pub use view::{PointSpread, Quantity, View};

@@ -1,11 +1,14 @@
 //! The radars of each layout, and how their ADC samples become its maps.
 
 use super::SimulatedLayout;
-use super::hupr::{HUPR_SHAPE, hupr_amplitudes, hupr_cube};
+use super::cascade::{
+    HIBER_FRAME_S, RT_POSE_CUBE, hiber, hiber_axes, hiber_planes, hiber_setup, root_mean_square, rt_pose, rt_pose_cube,
+    rt_pose_setup,
+};
 use crate::geometry::Pose;
 use crate::radar::{
-    AdcCube, Axis, AxisKind, Chain, FftSetup, Fmcw, MimoArray, PointSpread, Quantity, RadarConfig, SPEED_OF_LIGHT,
-    Spacing, View, Window,
+    AdcCube, Axis, AxisKind, Chain, FftSetup, Fmcw, HUPR_SHAPE, MimoArray, PointSpread, Quantity, RadarConfig,
+    SPEED_OF_LIGHT, Spacing, View, Window, hupr_amplitudes, hupr_cube,
 };
 use num_complex::Complex64;
 
@@ -54,6 +57,8 @@ impl Device {
             }
             SimulatedLayout::Xrf55 | SimulatedLayout::Xrf55Stack => vec![xrf55(layout)],
             SimulatedLayout::Hupr => hupr(),
+            SimulatedLayout::Hiber => hiber(),
+            SimulatedLayout::RtPose => rt_pose(),
         };
         let views = views(layout, &radars);
         Self { layout, radars, views }
@@ -64,13 +69,20 @@ impl Device {
         self.radars.first().map_or_else(RadarConfig::default, |radar| radar.fmcw.radar.clone())
     }
 
-    /// The maps of a frame, in the order of the views, from the ADC samples of each radar. `still_share` is what is kept of the
-    /// mean over the chirps (HuPR's processing keeps none).
+    /// Times of the radar frames that a frame is made of, s after its own: one, or for HIBER three, of which two are subtracted from
+    /// those after them.
+    pub fn times_s(&self) -> &'static [f64] {
+        if self.layout == SimulatedLayout::Hiber { &[-HIBER_FRAME_S, 0.0, HIBER_FRAME_S] } else { &[0.0] }
+    }
+
+    /// The maps of a frame, in the order of the views, from the ADC samples of each radar, as many for each as there are
+    /// [`Self::times_s`]. `still_share` is what is kept of the mean over the chirps (HuPR's and HIBER's processing keeps none).
     pub fn maps(&self, cubes: &[AdcCube], still_share: f64) -> Vec<Vec<f32>> {
-        let both = self.radars.iter().zip(cubes);
+        let both = self.radars.iter().zip(self.of_radars(cubes));
         let narrow = |map: Vec<f64>| -> Vec<f32> { map.into_iter().map(|x| x as f32).collect() };
         both.enumerate()
-            .flat_map(|(index, (radar, adc))| {
+            .flat_map(|(index, (radar, frames))| {
+                let Some(adc) = frames.first() else { return Vec::new() };
                 let chain = Chain { still_share, ..radar.chain };
                 let polar = || chain.polar(&radar.fmcw, radar.spacing_m, adc);
                 match (self.layout, self.views.get(index).map(|view| &view.axes[..])) {
@@ -90,15 +102,37 @@ impl Device {
                         vec![narrow(first(polar().data, STACK[0] * STACK[1]))]
                     }
                     (SimulatedLayout::Hupr, _) => vec![narrow(hupr_amplitudes(&hupr_cube(adc)))],
+                    (SimulatedLayout::Hiber, Some(_)) => {
+                        vec![narrow(root_mean_square(&hiber_planes(radar, &self.views[index], frames)))]
+                    }
+                    (SimulatedLayout::RtPose, Some(_)) => {
+                        vec![narrow(rt_pose_cube(radar, &self.views[index], &chain, adc))]
+                    }
                     _ => Vec::new(),
                 }
             })
             .collect()
     }
 
-    /// The complex cubes of a frame, one a view, where the layout stores those and no maps; else none.
+    /// What a layout stores instead of maps, one a view: HuPR's complex cubes, HIBER's two maps (real numbers) one after the other;
+    /// else none.
     pub fn cubes(&self, cubes: &[AdcCube]) -> Vec<Vec<Complex64>> {
-        if self.layout == SimulatedLayout::Hupr { cubes.iter().map(hupr_cube).collect() } else { Vec::new() }
+        match self.layout {
+            SimulatedLayout::Hupr => cubes.iter().map(hupr_cube).collect(),
+            SimulatedLayout::Hiber => {
+                let planes = self.radars.iter().zip(&self.views).zip(self.of_radars(cubes));
+                planes
+                    .map(|((radar, view), frames)| hiber_planes(radar, view, frames).concat())
+                    .map(|cells| cells.into_iter().map(|h| Complex64::new(h, 0.0)).collect())
+                    .collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// The cubes of each radar.
+    fn of_radars<'a>(&self, cubes: &'a [AdcCube]) -> impl Iterator<Item = &'a [AdcCube]> + use<'a> {
+        cubes.chunks((cubes.len() / self.radars.len().max(1)).max(1))
     }
 }
 
@@ -320,6 +354,19 @@ fn views(layout: SimulatedLayout, radars: &[Radar]) -> Vec<View> {
         (SimulatedLayout::Xrf55Stack, [radar]) => {
             let axes = vec![range(radar, STACK[0]), sine(AxisKind::Cone, STACK[1], -1.0, 1.0)];
             vec![view("array", radar.point_spread(true), axes)]
+        }
+        (SimulatedLayout::Hiber, [hori, vert]) => {
+            // One chirp a frame tells no speed.
+            let psf =
+                |radar: &Radar| PointSpread { doppler_mps: 0.0, ..hiber_setup(radar).point_spread(&radar.fmcw.radar) };
+            vec![
+                view("horizontal", psf(hori), hiber_axes(AxisKind::DepthH, AxisKind::Y)),
+                view("vertical", psf(vert), hiber_axes(AxisKind::DepthV, AxisKind::Z)),
+            ]
+        }
+        (SimulatedLayout::RtPose, [radar]) => {
+            let axes = RT_POSE_CUBE.map(|(kind, bins, lo, hi)| linear(kind, bins, lo, hi)).to_vec();
+            vec![view("cube", rt_pose_setup(radar).point_spread(&radar.fmcw.radar), axes)]
         }
         (SimulatedLayout::Hupr, [hori, vert]) => {
             let axes = |radar: &Radar, kind| {

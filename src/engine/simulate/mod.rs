@@ -6,10 +6,10 @@
 //!
 //! From the outside in: `options.rs` is what is asked for, `preset.rs` what a scenario means in numbers, `device.rs` the radars
 //! and the processing of each layout, `performers.rs` who moves how and where, `room.rs` what else is there, `sequence.rs` puts them
-//! together, `recording.rs` counts the frames.
+//! together, `recording.rs` counts the frames, `cascade.rs` has the radars of HIBER and RT-Pose.
 
+mod cascade;
 mod device;
-mod hupr;
 mod options;
 mod performers;
 mod preset;
@@ -17,8 +17,8 @@ mod recording;
 mod room;
 mod sequence;
 
+pub use cascade::HIBER_FRAME_S;
 pub use device::{Device, Radar};
-pub use hupr::{HUPR_SHAPE, hupr_amplitudes, hupr_cube};
 pub use options::{Action, Options, SimulateError, SimulatedLayout};
 pub use preset::{Recipe, ScenePreset};
 pub use recording::Recording;

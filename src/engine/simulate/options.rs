@@ -22,11 +22,25 @@ pub enum SimulatedLayout {
     Xrf55Stack,
     /// Polar maps: range × cone angle × Doppler, and range × elevation; 10 frames a second.
     Generic,
+    /// HIBER's tree: two Cartesian maps (2, 160, 200), static echoes subtracted, joints in the room's frame; 10 frames a second
+    /// of two radar frames each.
+    Hiber,
+    /// RT-Pose's Cartesian cubes (32, 128, 256), joints in the radar's frame; 10 frames a second.
+    RtPose,
 }
 
 impl SimulatedLayout {
     /// All.
-    pub const ALL: [Self; 6] = [Self::Mmvr, Self::MmvrTree, Self::Hupr, Self::Xrf55, Self::Xrf55Stack, Self::Generic];
+    pub const ALL: [Self; 8] = [
+        Self::Mmvr,
+        Self::MmvrTree,
+        Self::Hupr,
+        Self::Xrf55,
+        Self::Xrf55Stack,
+        Self::Generic,
+        Self::Hiber,
+        Self::RtPose,
+    ];
 
     /// The word on the command line.
     pub fn word(self) -> &'static str {
@@ -37,6 +51,8 @@ impl SimulatedLayout {
             Self::Xrf55 => "xrf55",
             Self::Xrf55Stack => "xrf55-stack",
             Self::Generic => "generic",
+            Self::Hiber => "hiber",
+            Self::RtPose => "rt-pose",
         }
     }
 
@@ -47,13 +63,15 @@ impl SimulatedLayout {
             Self::MmvrTree => "mmvr",
             Self::Hupr => "hupr",
             Self::Xrf55Stack => "xrf55",
+            Self::Hiber => "hiber",
+            Self::RtPose => "rt_pose",
         }
     }
 
     /// Frames a second.
     pub fn frame_rate_hz(self) -> f64 {
         match self {
-            Self::Mmvr | Self::Hupr | Self::Generic => 10.0,
+            Self::Mmvr | Self::Hupr | Self::Generic | Self::Hiber | Self::RtPose => 10.0,
             Self::MmvrTree => 15.0,
             Self::Xrf55 => 20.0,
             Self::Xrf55Stack => 3.4,

@@ -46,7 +46,7 @@ pub struct Sequence {
 /// The ADC samples of a frame, one cube a radar.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawFrame {
-    /// In the order of [`Device::radars`].
+    /// In the order of [`Device::radars`]; of each as many as [`Device::times_s`] says, one after the other.
     pub cubes: Vec<AdcCube>,
     /// Share of the I and Q values that clipped.
     pub clipped: f64,
@@ -173,13 +173,18 @@ impl Sequence {
     pub fn raw(&self, number: usize) -> RawFrame {
         let t = number as f64 / self.rate_hz;
         let (mut cubes, mut clipped, mut values) = (Vec::new(), 0, 0);
+        let times_s = self.device.times_s();
         for (k, radar) in self.device.radars.iter().enumerate() {
-            let echoes = self.echoes(t, 0.5 * radar.fmcw.radar.frame_s);
-            let mut adc = radar.fmcw.synthesise(&self.backgrounds[k], &echoes);
-            let purpose = Purpose::Noise as u64 + (number * self.device.radars.len() + k) as u64;
-            clipped += adc.digitise(&self.receivers[k], &mut generator(self.seed, self.index, purpose));
-            values += 2 * adc.data.len();
-            cubes.push(adc);
+            for (nth, after_s) in times_s.iter().enumerate() {
+                let echoes = self.echoes(t + after_s, 0.5 * radar.fmcw.radar.frame_s);
+                let mut adc = radar.fmcw.synthesise(&self.backgrounds[k], &echoes);
+                // The last radar frame of a frame is the one before the next: it has the same noise.
+                let radar_frame = number * times_s.len().saturating_sub(1).max(1) + nth;
+                let purpose = Purpose::Noise as u64 + (radar_frame * self.device.radars.len() + k) as u64;
+                clipped += adc.digitise(&self.receivers[k], &mut generator(self.seed, self.index, purpose));
+                values += 2 * adc.data.len();
+                cubes.push(adc);
+            }
         }
         RawFrame { cubes, clipped: clipped as f64 / values.max(1) as f64 }
     }

@@ -1,15 +1,15 @@
 //! PPPR-Heatmap: H_sim in the place of H_ori, file by file, so that a model made for the data set reads it unchanged.
 //!
 //! A file keeps its place in the tree, its keys, each map's shape, dtype, byte and memory order; arrays that are no maps are copied,
-//! and so are labels beside it. Of complex cubes the amplitude that is the map becomes H_sim, and the phases stay. H_sim is
-//! in units of its own: [`ExportScale::Match`] brings it to the input's. The manifest comes last: where it is missing the copy is
-//! not complete.
+//! and so are labels beside it. Of complex cubes the amplitude that is the map becomes H_sim, and the phases stay; of several
+//! numbers a cell the ratios. H_sim is in units of its own: [`ExportScale::Match`] brings it to the input's. The manifest comes
+//! last: where it is missing the copy is not complete.
 
 use super::ExportError;
 use super::layout::{MapFile, STRANGERS_PATTERN, Tree};
 use crate::body::Pppr;
 use crate::config::FitConfig;
-use crate::dataset::npz::{Form, NpzArchive, copy_with, shape_text};
+use crate::dataset::npz::{Fold, Form, NpzArchive, copy_with, shape_text};
 use crate::dataset::{Dataset, MANIFEST_NAME, MapArray, Stored};
 use crate::mhp::{Objective, Precision, Problem, masks, simulate};
 use crate::output::{FolderGuard, Inputs, replace_file, resolved};
@@ -135,6 +135,9 @@ impl<'a> HeatmapExport<'a> {
                         form.stack_axis(view.axes.len()).map_or_else(|| form.clone(), one).fits(view.cells())
                     }
                     Stored::Amplitude { every, .. } => form.fits_amplitudes(view.cells(), every),
+                    Stored::Folded { before, after, over } => {
+                        form.fits_folded(view.cells(), Fold { before, cells: view.cells(), after, over })
+                    }
                 };
                 fits.map_err(|reason| wrong(&file, array, form, reason))?;
             }
@@ -273,6 +276,10 @@ fn encoded<'m>(
                 Stored::Amplitude { every, first } => {
                     let measured = NpzArchive::open(&file.from)?.bytes(&array.key)?;
                     form.with_amplitudes(&measured, cells, every, first)
+                }
+                Stored::Folded { before, after, over } => {
+                    let measured = NpzArchive::open(&file.from)?.bytes(&array.key)?;
+                    form.with_folded(&measured, cells, Fold { before, cells: cells.len(), after, over })
                 }
             };
             Ok((array.key.clone(), bytes.map_err(|reason| wrong(file, array, form, reason))?))

@@ -95,6 +95,7 @@ fn open_chosen(catalog: &BareCatalog, choice: &BareChoice) -> Result<Opened, Dat
         frame_rate_hz: choice.frame_rate_hz,
         skeleton: Skeleton::preset(&choice.skeleton).unwrap_or_else(default_skeleton),
         radar: RadarConfig::default(),
+        static_removed: false,
         axes_badge: axes_badge(&choice.views),
         assumptions: assumptions(&choice.views),
         views: choice.views.clone().into(),

@@ -151,6 +151,21 @@ impl Annotations {
     }
 }
 
+/// Which of these sequences are in which of HuPR's splits, in words.
+pub(super) fn splits_of(segments: &[Segment]) -> String {
+    let numbers: Vec<u32> = segments.iter().filter_map(|segment| number(&segment.sequence)).collect();
+    let Ok(splits) = toml::from_str::<Splits>(include_str!("../../../../assets/hupr_splits.toml")) else {
+        return "splits are not known".into();
+    };
+    let count = |ids: &[u32]| numbers.iter().filter(|number| ids.contains(number)).count();
+    let [train, val, test] = [&splits.train, &splits.val, &splits.test].map(|ids| count(ids));
+    let none = segments.len() - (train + val + test).min(segments.len());
+    format!(
+        "splits: of {} sequences {train} are of HuPR's training, {val} of validation, {test} of test, {none} of none",
+        segments.len()
+    )
+}
+
 /// `7` of `single_7`.
 fn number(sequence: &str) -> Option<u32> {
     sequence.rsplit('_').next()?.parse().ok()

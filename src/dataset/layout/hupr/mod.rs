@@ -3,8 +3,12 @@
 //! The last axis is no angle: four of the eight antennas of the line skip its FFT, so that a target stays in bin 3 whatever its
 //! height. Bin 3 is also the one at which all twelve antennas are summed in phase; its amplitude is the map, (16, 64, 64).
 //! A cube is 8 MiB; it is read in pieces, and only the map is held.
+//!
+//! Raw captures, `single_<k>/{hori,vert}/adc_data.bin`, become the same maps by the same processing, a frame when it is asked for
+//! (`raw.rs`). The chirp is not published: what is inferred of it is said, and `[capture.chirp]` of a manifest says another.
 
 mod annotations;
+mod raw;
 mod write;
 
 use super::arrays::truth_beside;
@@ -56,11 +60,12 @@ impl Layout for Hupr {
         progress.begin("listing folders", 0);
         let (segments, notes) = sequences(place.root, progress)?;
         if segments.is_empty() {
-            let expected = "HuPR's single_<k>/hori/NNNNNNNNN.npy and vert/ in it or in a folder below";
-            return Err(place.without_frames(expected.into()));
+            return raw::open(place, progress);
         }
         let mut info = place.info(&place.manifest.layout.preset()?);
+        raw::with_chirp(place, &mut info)?;
         info.notes = notes;
+        info.notes.push(annotations::splits_of(&segments));
         info.assumptions.extend(assumptions());
         let labels = Annotations::beside(place.root, &segments);
         let frames = Frames { folders: Folders::new(segments), labels };
@@ -201,7 +206,8 @@ fn read_map(folder: &Path, stem: &str, view: &View) -> Result<Heatmap, DatasetEr
 /// What was assumed, in words.
 fn assumptions() -> [String; 3] {
     [
-        "chirp: HuPR does not publish it; 77 GHz, 60.012 MHz/µs and 4.4 Msps follow from its range step of 4.3 cm"
+        "chirp: inferred, HuPR does not publish it; 77 GHz, 60.012 MHz/µs and 4.4 Msps follow from its range step of 4.3 cm; \
+         [capture.chirp] in a dataset.toml says another"
             .into(),
         "elevation: the cube's last axis is no angle; its bin 3, where all antennas are summed, is the map".into(),
         "left and right: the antennas are taken to be numbered from left to right (hori), from top to bottom (vert)"

@@ -103,8 +103,10 @@ fn open(place: &DataFolder<'_>, named: Option<&str>, progress: &Progress) -> Res
 /// As [`Walk::of`].
 fn segments(root: &Path, depth: usize, progress: &Progress) -> Result<(Vec<Segment>, Vec<String>), DatasetError> {
     progress.begin("listing folders", 0);
-    // Links to companions are not asked whether they are folders.
-    let skip = |name: &str| Path::new(name).extension().is_some_and(|ending| ending == "npz");
+    // Links to companions are not asked whether they are folders; HIBER's folders hold hundreds of thousands of names.
+    let skip = |name: &str| {
+        Path::new(name).extension().is_some_and(|ending| ending == "npz") || super::hiber::FOLDERS.contains(&name)
+    };
     let (folders, notes) = Walk { depth, stem: radar_stem, skip, progress }.of(root)?;
     // The root itself keeps the path that was typed: without a separator at its end.
     let path = |below: &Path| if below.as_os_str().is_empty() { root.to_owned() } else { root.join(below) };

@@ -3,7 +3,7 @@
 use super::{CAMERA, IMAGE_SIZE, Mmvr};
 use crate::dataset::DatasetError;
 use crate::dataset::layout::write::{
-    COCO_JOINTS, FrameWriter, NewFrame, NewPlace, SKIN_M, TruthArrays, image_box, named, pixel, rounded_maps,
+    COCO_JOINTS, FrameWriter, NewFrame, NewPlace, SKIN_M, TruthArrays, image_box, map_box, named, pixel, rounded_maps,
 };
 use crate::dataset::npz::{ArrayView, NpzError, write_deflated};
 use crate::geometry::Vec3;
@@ -43,7 +43,7 @@ fn write_frame(at: &NewPlace<'_>, views: &[View], frame: &NewFrame<'_>) -> Resul
     let image = narrow(frame.joints.iter().flat_map(with_score).collect());
     let on_maps: Vec<Vec<f32>> = views
         .iter()
-        .map(|view| narrow(frame.joints.iter().flat_map(|joints| map_box(view, joints)).collect()))
+        .map(|view| narrow(frame.joints.iter().flat_map(|joints| map_box(view, joints, SKIN_M)).collect()))
         .collect();
     let mut boxes = vec![("bbox_i", ArrayView::f32(&[people, 5], &image))];
     for (key, numbers) in ["bbox_hori", "bbox_vert"].into_iter().zip(&on_maps) {
@@ -60,18 +60,4 @@ fn write_frame(at: &NewPlace<'_>, views: &[View], frame: &NewFrame<'_>) -> Resul
     let id = format!("{:05}", at.number);
     write_deflated(&path(at, "meta"), &[("global_frame_id", ArrayView::text(&id))])?;
     write_deflated(&path(at, "truth"), &TruthArrays::of(frame, COCO_JOINTS).arrays())
-}
-
-/// The box about a body on a view's map: column 0, row 0, column 1, row 1.
-fn map_box(view: &View, joints: &[Vec3]) -> [f64; 4] {
-    let bins: Vec<Vec<f64>> = joints.iter().map(|&joint| view.bins_of(joint)).collect();
-    let span = |axis: usize| {
-        let (margin, last) = view.axes.get(axis).map_or((0.0, 0.0), |a| (SKIN_M / a.step().abs(), a.bins as f64));
-        let values = bins.iter().filter_map(|bins| bins.get(axis).copied());
-        let low = values.clone().fold(f64::INFINITY, f64::min) - margin;
-        let high = values.fold(f64::NEG_INFINITY, f64::max) + margin;
-        [low.clamp(0.0, last), high.clamp(0.0, last)]
-    };
-    let ([row0, row1], [column0, column1]) = (span(0), span(1));
-    [column0, row0, column1, row1]
 }

@@ -14,6 +14,7 @@ use crate::dataset::set::DatasetInfo;
 use crate::dataset::walk::{Folder, Walk};
 use crate::dataset::{DatasetError, Frame, Heatmap};
 use crate::task::Progress;
+use std::collections::BTreeSet;
 use std::fmt::{self, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -22,6 +23,8 @@ use std::path::{Path, PathBuf};
 const STEPS: usize = 17;
 /// Folders inside each other that are looked into.
 const MAX_DEPTH: usize = 6;
+/// The last repetition of the training split.
+const LAST_OF_TRAINING: u32 = 14;
 /// The other sensors' folders, whose files have the same names.
 const OTHERS: [&str; 2] = ["rfid", "wifi"];
 
@@ -55,6 +58,8 @@ impl Layout for Xrf55 {
         let preset = place.manifest.layout.preset()?;
         let mut info = place.info(&preset);
         info.notes = notes;
+        info.notes.push(told(&files));
+        info.assumptions.push("joints: XRF55 publishes none, and none are made up".into());
         if *info.views == *preset.views {
             info.assumptions.extend(assumptions());
         }
@@ -86,6 +91,43 @@ fn is_stack(stem: &str) -> bool {
     let number = |part: &str| !part.is_empty() && part.len() <= 4 && part.bytes().all(|b| b.is_ascii_digit());
     let parts: Vec<&str> = stem.split('_').collect();
     parts.len() == 3 && parts.into_iter().all(number)
+}
+
+/// Volunteer, action and repetition of a stack, however they are padded.
+fn numbers(file: &Path) -> Option<[u32; 3]> {
+    let stem = file.file_stem()?.to_str()?;
+    let mut parts = stem.split('_').map(str::parse::<u32>);
+    let mut next = || parts.next()?.ok();
+    Some([next()?, next()?, next()?])
+}
+
+/// `Scene2` of `Scene2/mmWave/01_01_01.npy`.
+fn scene(file: &Path) -> Option<String> {
+    let names = file.components().map(|part| part.as_os_str().to_string_lossy().into_owned());
+    names
+        .into_iter()
+        .find(|name| name.to_lowercase().strip_prefix("scene").is_some_and(|rest| rest.parse::<u32>().is_ok()))
+}
+
+/// How many volunteers, actions and scenes there are, in words.
+fn told(files: &[PathBuf]) -> String {
+    let distinct = |of: &dyn Fn(&PathBuf) -> Option<u32>| files.iter().filter_map(of).collect::<BTreeSet<u32>>().len();
+    let number = |k: usize| distinct(&|file: &PathBuf| numbers(file).and_then(|numbers| numbers.get(k).copied()));
+    let scenes: BTreeSet<String> = files.iter().filter_map(|file| scene(file)).collect();
+    let scenes = if scenes.is_empty() {
+        String::new()
+    } else {
+        format!(", in {}", scenes.into_iter().collect::<Vec<_>>().join(", "))
+    };
+    format!("{} clips: volunteers {}, actions {}, repetitions {}{scenes}", files.len(), number(0), number(1), number(2))
+}
+
+/// What a clip is, as its name and folder say; repetitions up to 14 are the published training split.
+fn clip_words(file: &Path) -> Option<String> {
+    let [volunteer, action, repetition] = numbers(file)?;
+    let split = if repetition <= LAST_OF_TRAINING { "training" } else { "test" };
+    let scene = scene(file).map(|scene| format!(", {scene}")).unwrap_or_default();
+    Some(format!("volunteer {volunteer}, action {action}, repetition {repetition} ({split}){scene}"))
 }
 
 /// The truth beside a file, one for each of its maps.
@@ -157,6 +199,7 @@ impl FrameSource for Frames {
         let mut notes = Vec::new();
         let known = truth_beside(&self.truth_path(i, info), info.skeleton.joints.len(), &mut notes);
         Ok(Frame {
+            global_id: self.files.get(i / self.steps).and_then(|file| clip_words(file)),
             timestamp_s: known.timestamp_s.or_else(|| info.frame_rate_hz.map(|rate| step as f64 / rate)),
             maps,
             map_boxes: vec![Vec::new(); info.views.len()],
@@ -202,4 +245,21 @@ fn assumptions() -> [String; 2] {
             .into(),
         "chirp: that of XRF55's capture script, 60 GHz and 27.013 MHz/µs over 256 samples".into(),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_numbers_however_they_are_padded_and_folders_are_scenes() {
+        let words = |file: &str| clip_words(Path::new(file));
+        assert_eq!(words("mmWave/15_4_3.npy"), words("mmWave/015_04_03.npy"));
+        assert_eq!(
+            words("Scene2/mmWave/03_07_15.npy").as_deref(),
+            Some("volunteer 3, action 7, repetition 15 (test), Scene2")
+        );
+        let files = ["Scene1/1_2_3.npy", "Scene2/01_05_03.npy"].map(PathBuf::from);
+        assert_eq!(told(&files), "2 clips: volunteers 1, actions 2, repetitions 1, in Scene1, Scene2");
+    }
 }

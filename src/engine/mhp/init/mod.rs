@@ -44,7 +44,7 @@ use super::template::Template;
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
 use crate::config::{BodyModel, EmLoss, FitConfig, Height, Limbs, Parameterization, StartPlace, Summation, Yaw};
-use crate::geometry::{Vec3, flat_distance, norm, sub};
+use crate::geometry::{Vec3, add, flat_distance, mean, norm, sub};
 use find::{find_one, middle_of_views};
 use notes::notes_of;
 use pose::Posture;
@@ -221,21 +221,34 @@ pub fn initialise_people(
     };
     let model = ScattererModel::new(&problem.skeleton, config.scatterers);
     // A search in a space of motion begins at standing persons: its own starts are the postures.
-    let (mut searched, mut told) = (None, None);
+    let (mut searched, mut told, mut moved_by) = (None, None, Vec::new());
     if config.parameterization == Parameterization::Motion {
         let mut standing = assemble(problem, config, &model, &persons);
+        let before = standing.clone();
         match motion::search(problem, config, &mut standing)? {
             Ok(found) => {
                 told = Some(Ok(found.note()));
                 searched = Some(standing);
             }
-            Err(held) => told = Some(Err(held.note())),
+            Err(held) => {
+                // The pose stays that of the start; the place may be another.
+                let way = |k: usize| sub(mean(standing.person(k)), mean(before.person(k)));
+                moved_by = (0..persons.len()).map(way).collect();
+                told = Some(Err(held.note()));
+            }
         }
     }
     if config.starts > 1 && searched.is_none() {
         choose_postures(problem, config, &template, &mut persons)?;
     }
     let mut params = searched.unwrap_or_else(|| assemble(problem, config, &model, &persons));
+    let joints = params.shape().joints;
+    for (k, &way) in moved_by.iter().enumerate().filter(|(_, way)| norm(**way) > 0.0) {
+        for joint in k * joints..(k + 1) * joints {
+            params.set_vec3(Group::Position, joint, add(params.position(joint), way));
+        }
+        notes.push(format!("moved by {:.2} m to where a body explains the maps better", norm(way)));
+    }
     notes.extend(told.as_ref().map(|told| told.as_ref().map_or_else(|held| (*held).to_owned(), String::clone)));
     if matches!(told, Some(Err(_))) {
         notes.extend(motion::turn(problem, config, &mut params)?);

@@ -170,11 +170,9 @@ impl Window {
                 clutter::background(&maps, views[view].quantity)
             })
             .collect();
-        let cluttered = views
-            .iter()
-            .zip(&backgrounds)
-            .zip(&own_regions)
-            .any(|((view, background), region)| clutter::is_cluttered(background, &view.shape(), region));
+        let mut seen = views.iter().zip(&backgrounds).zip(&own_regions);
+        let cluttered = !problem.static_removed
+            && seen.any(|((view, background), region)| clutter::is_cluttered(background, &view.shape(), region));
         let stands = neighbours.is_empty() || ways.iter().any(|way| norm(*way) < WALKING_MPS);
         if cluttered && stands {
             return Ok(Err(Held::Clutter));

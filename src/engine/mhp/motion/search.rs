@@ -4,9 +4,9 @@
 //! runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
 
 use super::{Held, LN_SIZE, MotionState, PLACE, Window, WindowLoss, YAW, ways};
-use crate::body::Pppr;
+use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::{norm, sub};
+use crate::geometry::{add, norm, sub};
 use crate::mhp::{FitError, Precision, Problem};
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -25,6 +25,9 @@ const ONE_M: f64 = 0.03;
 const AMBIGUOUS: f64 = 0.1;
 /// Headings farther apart than this are different ones.
 const ANOTHER_HEADING: f64 = PI / 3.0;
+/// The share of the start's L_EM below which another place is believed even where the pose there is not, and how far it may be, m.
+const CLEARER: f64 = 0.85;
+const MOST_MOVED_M: f64 = 0.5;
 
 /// Moves every start by some steps and keeps the few with the lowest loss.
 struct Sieve {
@@ -150,6 +153,7 @@ pub(in crate::mhp) fn search(
         every: 1,
     };
     let begun = search.evaluate(&coordinates);
+    let begun_em = search.loss.em;
     let mut answer = (begun, None);
     for person in 0..params.shape().persons {
         let own = person * stride..(person + 1) * stride;
@@ -203,11 +207,33 @@ pub(in crate::mhp) fn search(
     }
     search.every = 1;
     search.evaluate(&coordinates);
-    if super::is_unlike(config, search.loss.em) {
+    let em = search.loss.em;
+    if super::is_unlike(config, em) {
+        if em < CLEARER * begun_em {
+            move_there(problem, &window, &coordinates, params);
+        }
         return Ok(Err(Held::Unlike));
     }
     window.place(&coordinates, params);
     Ok(Ok(Searched { losses: [begun, answer.0], runner_up: answer.1 }))
+}
+
+/// Moves the persons as they are to where the search found them, by no more than [`MOST_MOVED_M`]: maps with few looks are explained
+/// well by no pose, and still tell the place better than what is lit does.
+fn move_there(problem: &Problem, window: &Window, coordinates: &[f64], params: &mut Pppr) {
+    let mut found = params.clone();
+    window.place(coordinates, &mut found);
+    let joints = params.shape().joints.max(1);
+    for person in 0..params.shape().persons {
+        let [from, to] = [&*params, &found].map(|of| hips_of(problem, of, person, joints));
+        let way = sub(to, from);
+        if norm(way) <= MOST_MOVED_M {
+            for joint in person * joints..(person + 1) * joints {
+                let moved = add(params.position(joint), way);
+                params.set_vec3(Group::Position, joint, moved);
+            }
+        }
+    }
 }
 
 /// The middle of a person's hips, or of all its joints where it has none, world frame, m.

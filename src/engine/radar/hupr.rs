@@ -5,7 +5,7 @@
 //! FFT everywhere; of 256 range bins 94 down to 31 are kept, of 64 Doppler bins the middle 16. The Doppler phase between the
 //! transmitters' turns is *not* taken out, as in the original.
 
-use crate::radar::AdcCube;
+use super::AdcCube;
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 use std::f64::consts::TAU;
