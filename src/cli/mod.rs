@@ -2,8 +2,8 @@
 
 pub mod bench;
 mod calibrate;
-mod chain;
 mod calibrate_room;
+mod chain;
 mod common;
 mod complexity;
 mod convert;

@@ -8,8 +8,8 @@ mod chirp;
 mod config;
 mod fft;
 mod fmcw;
-mod native;
 mod hupr;
+mod native;
 mod psf;
 mod reflector;
 mod spatial;
@@ -25,12 +25,12 @@ pub use chirp::{Board, ChirpSettings};
 pub use config::{RadarConfig, SPEED_OF_LIGHT};
 pub use fft::{Chain, PolarMap, RadarCube, RangeDoppler};
 pub use fmcw::{AdcCube, Echo, Fmcw, PointMotion, Receiver, add_leakage, path_gain};
+pub use hupr::{HUPR_SHAPE, hupr_amplitudes, hupr_cube};
 pub use native::{NativeAxes, interpolate, sine_deg};
 pub use psf::{
     FftSetup, Resolved, ViewFft, doppler_sigma_mps, first_null_bins, main_lobe_sigma_bins, range_sigma_m, sine_sigma,
 };
 pub use reflector::{LobeCut, Reflector, ReflectorMap, ReflectorPlace, refined_widths, width_of, with_width};
-pub use hupr::{HUPR_SHAPE, hupr_amplitudes, hupr_cube};
 pub(crate) use spatial::{NEAREST_M, SpatialGrid};
 pub use view::unravel;
 pub use view::{PointSpread, Quantity, View};

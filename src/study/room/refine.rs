@@ -225,8 +225,9 @@ fn updated(inverse: Option<&[[f64; N]; N]>, step: &[f64; N], change: &[f64; N]) 
         return None;
     }
     let first = curvature / product(change, change);
-    let h =
-        inverse.unwrap_or_else(|| std::array::from_fn(|i| std::array::from_fn(|k| if i == k { first } else { 0.0 })));
+    let h = inverse
+        .copied()
+        .unwrap_or_else(|| std::array::from_fn(|i| std::array::from_fn(|k| if i == k { first } else { 0.0 })));
     let hy: [f64; N] = std::array::from_fn(|i| product(&h[i], change));
     let share = 1.0 + product(change, &hy) / curvature;
     Some(std::array::from_fn(|i| {
