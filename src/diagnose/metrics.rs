@@ -7,6 +7,8 @@ use super::assign::assign;
 use crate::geometry::{Vec3, add, dot, mat_vec, mean, norm, rotation_from_quaternion, scale, sub};
 
 const MM_PER_M: f64 = 1000.0;
+/// What a person who is missed or invented costs, and the most that one who is found does, mm.
+pub const OSPA_CUTOFF_MM: f64 = 500.0;
 
 /// Errors of an estimate against truth, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,6 +17,9 @@ pub struct JointErrors {
     pub majpe_mm: f64,
     /// The same after the best rotation, translation and scale of each person.
     pub pa_majpe_mm: f64,
+    /// Optimal sub-pattern assignment (Schuhmacher, Vo, Vo, 2008) of order 1: the mean over the larger number of persons of what
+    /// each costs, its MAJPE up to [`OSPA_CUTOFF_MM`] where it is paired and [`OSPA_CUTOFF_MM`] where it is missed or invented.
+    pub ospa_mm: f64,
 }
 
 /// Mean distance of corresponding joints (m), in mm; `None` where the lists are empty or differ in length.
@@ -32,7 +37,8 @@ pub fn pa_majpe_mm(estimate: &[Vec3], truth: &[Vec3]) -> Option<f64> {
 }
 
 /// Errors of several persons of `joints` joints each (flat lists, person by person). Persons carry no identity: they are
-/// paired so that the sum of their distances is smallest, and where the counts differ the smaller number of persons counts.
+/// paired so that the sum of their distances is smallest, and where the counts differ the smaller number of persons counts in
+/// MAJPE and PA-MAJPE; those who are missed or invented count in OSPA, whose pairs are those of the smallest sum up to its cutoff.
 /// `None` where either list is empty or no whole number of persons.
 pub fn joint_errors(estimate: &[Vec3], truth: &[Vec3], joints: usize) -> Option<JointErrors> {
     if joints == 0 || !estimate.len().is_multiple_of(joints) || !truth.len().is_multiple_of(joints) {
@@ -44,12 +50,22 @@ pub fn joint_errors(estimate: &[Vec3], truth: &[Vec3], joints: usize) -> Option<
         majpe_mm(estimated[a], true_persons[b]).unwrap_or(f64::INFINITY)
     });
     let count = pairs.len() as f64;
-    let mut errors = JointErrors { majpe_mm: 0.0, pa_majpe_mm: 0.0 };
+    let ospa_mm = ospa_mm(&estimated, &true_persons);
+    let mut errors = JointErrors { majpe_mm: 0.0, pa_majpe_mm: 0.0, ospa_mm };
     for &(a, b) in &pairs {
         errors.majpe_mm += majpe_mm(estimated[a], true_persons[b])? / count;
         errors.pa_majpe_mm += pa_majpe_mm(estimated[a], true_persons[b])? / count;
     }
     (!pairs.is_empty()).then_some(errors)
+}
+
+fn ospa_mm(estimated: &[&[Vec3]], true_persons: &[&[Vec3]]) -> f64 {
+    let cost = |a: usize, b: usize| {
+        majpe_mm(estimated[a], true_persons[b]).map_or(OSPA_CUTOFF_MM, |mm| mm.min(OSPA_CUTOFF_MM))
+    };
+    let (most, least) = (estimated.len().max(true_persons.len()), estimated.len().min(true_persons.len()));
+    let paired: f64 = assign(estimated.len(), true_persons.len(), cost).into_iter().map(|(a, b)| cost(a, b)).sum();
+    (paired + (most - least) as f64 * OSPA_CUTOFF_MM) / most.max(1) as f64
 }
 
 /// `estimate` after the similarity transform (no reflection) that brings it closest to `truth`.
@@ -169,6 +185,18 @@ mod tests {
         assert!(joint_errors(&swapped, &truth, 5).unwrap().majpe_mm < 1e-9);
         assert!(joint_errors(&BODY, &truth, 5).unwrap().pa_majpe_mm < 1e-9);
         assert_eq!(joint_errors(&BODY, &truth, 4), None);
+    }
+
+    #[test]
+    fn whoever_is_missed_or_invented_costs_the_cutoff() {
+        let shifted = |x: f64| BODY.iter().map(move |&p| add(p, [x, 0.0, 0.0]));
+        let truth: Vec<Vec3> = shifted(0.0).chain(shifted(2.0)).collect();
+        let ospa = |estimate: Vec<Vec3>| joint_errors(&estimate, &truth, 5).unwrap().ospa_mm;
+        assert!((ospa(shifted(0.1).chain(shifted(2.0)).collect()) - 50.0).abs() < 1e-9, "two found");
+        assert!((ospa(shifted(0.1).collect()) - 300.0).abs() < 1e-9, "one of two missed");
+        let invented = shifted(0.0).chain(shifted(2.0)).chain(shifted(4.0)).collect();
+        assert!((ospa(invented) - 500.0 / 3.0).abs() < 1e-9, "a third invented");
+        assert!((ospa(shifted(0.0).chain(shifted(9.0)).collect()) - 250.0).abs() < 1e-9, "who is far off is no find");
     }
 
     #[test]

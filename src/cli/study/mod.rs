@@ -16,7 +16,8 @@ same command, however often it was killed, with any number of threads, and for s
 
 Columns of a table: MAJPE and PA-MAJPE (mm, persons paired best) of the fit and of its start, the share of frames that are \
 nearer to truth than their start, forward-consistency IoU, the share that converged; pixels and shares where there are only \
-image labels. Frames where another number of persons was fitted than is annotated are counted and left out.
+image labels. Frames where another number of persons was fitted than is annotated are counted and left out; OSPA is of all \
+frames, a person who is missed or invented costs 500 mm in it.
 
 Exit codes: 0 every row was fitted; 1 some were not; 2 none was, or the input is bad.
 

@@ -166,6 +166,7 @@ impl<'a> LoadedFrame<'a> {
         RunNumbers {
             majpe_mm: errors.map(|errors| errors.majpe_mm),
             pa_majpe_mm: errors.map(|errors| errors.pa_majpe_mm),
+            ospa_mm: errors.map(|errors| errors.ospa_mm),
             persons: params.shape().persons,
             annotated: annotated(frame),
             reprojection_px: image.reprojection_px,

@@ -77,6 +77,7 @@ fn columns<'a>(spec: &'a RunSpec, rows: &[TableRow]) -> Vec<Column<'a>> {
     add("MAJPE, mm", false, Box::new(|row| spread(row.majpe_mm, 1)));
     add("median, mm", true, Box::new(|row| row.median_majpe_mm.map(|x| format!("{x:.1}"))));
     add("PA-MAJPE, mm", false, Box::new(|row| spread(row.pa_majpe_mm, 1)));
+    add("OSPA, mm", true, Box::new(|row| spread(row.ospa_mm, 1)));
     add("start MAJPE, mm", true, Box::new(|row| spread(row.init_majpe_mm, 1)));
     add("start PA-MAJPE, mm", true, Box::new(|row| spread(row.init_pa_majpe_mm, 1)));
     add("better than start", true, Box::new(|row| percent(row.share_improved)));

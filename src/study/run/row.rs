@@ -26,6 +26,9 @@ pub struct RunNumbers {
     pub majpe_mm: Option<f64>,
     /// After similarity alignment of each person, mm.
     pub pa_majpe_mm: Option<f64>,
+    /// OSPA, mm: MAJPE in which persons who are missed or invented count.
+    #[serde(default)]
+    pub ospa_mm: Option<f64>,
     /// The same two of the start.
     pub init_majpe_mm: Option<f64>,
     /// The same of the start, after alignment.
@@ -167,6 +170,7 @@ pub(super) fn cells(spec: &RunSpec, row: &RunRow) -> Vec<(String, Cell)> {
     }
     add("majpe_mm", number(&|fit| fit.majpe_mm));
     add("pa_majpe_mm", number(&|fit| fit.pa_majpe_mm));
+    add("ospa_mm", number(&|fit| fit.ospa_mm));
     add("init_majpe_mm", number(&|fit| fit.init_majpe_mm));
     add("init_pa_majpe_mm", number(&|fit| fit.init_pa_majpe_mm));
     add("persons", count(fit.map(|fit| fit.persons)));

@@ -82,6 +82,10 @@ pub struct TableRow {
     pub median_majpe_mm: Option<f64>,
     /// PA-MAJPE, mm.
     pub pa_majpe_mm: Option<Spread>,
+    /// OSPA of all fitted frames, those with another number of persons among them, mm; where a frame has several persons, or
+    /// another number than annotated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ospa_mm: Option<Spread>,
     /// MAJPE of the start, mm.
     pub init_majpe_mm: Option<Spread>,
     /// PA-MAJPE of the start, mm.
@@ -209,6 +213,7 @@ fn summed(labels: Vec<String>, variant: usize, rows: &[&RunRow]) -> TableRow {
     let fitted: Vec<&RunNumbers> = rows.iter().filter_map(|row| row.fit.as_ref().ok()).collect();
     let used: Vec<&RunNumbers> = fitted.iter().copied().filter(|fit| fit.count_matched()).collect();
     let spread = |get: fn(&RunNumbers) -> Option<f64>| Spread::of(used.iter().filter_map(|fit| get(fit)));
+    let several = fitted.iter().any(|fit| !fit.count_matched() || fit.annotated.is_some_and(|people| people > 1));
     let share = |known: Vec<bool>| {
         (!known.is_empty()).then(|| known.iter().filter(|&&yes| yes).count() as f64 / known.len() as f64)
     };
@@ -222,6 +227,7 @@ fn summed(labels: Vec<String>, variant: usize, rows: &[&RunRow]) -> TableRow {
         majpe_mm: spread(|fit| fit.majpe_mm),
         median_majpe_mm: None,
         pa_majpe_mm: spread(|fit| fit.pa_majpe_mm),
+        ospa_mm: Spread::of(fitted.iter().filter(|_| several).filter_map(|fit| fit.ospa_mm)),
         init_majpe_mm: spread(|fit| fit.init_majpe_mm),
         init_pa_majpe_mm: spread(|fit| fit.init_pa_majpe_mm),
         share_improved: share(used.iter().filter_map(|fit| fit.improved()).collect()),
