@@ -8,7 +8,7 @@ mod chirp;
 mod config;
 mod fft;
 mod fmcw;
-mod hupr;
+mod vrdae;
 mod native;
 mod psf;
 mod reflector;
@@ -25,7 +25,7 @@ pub use chirp::{Board, ChirpSettings};
 pub use config::{RadarConfig, SPEED_OF_LIGHT};
 pub use fft::{Chain, PolarMap, RadarCube, RangeDoppler};
 pub use fmcw::{AdcCube, Echo, Fmcw, PointMotion, Receiver, add_leakage, path_gain};
-pub use hupr::{HUPR_SHAPE, hupr_amplitudes, hupr_cube};
+pub use vrdae::{HUPR_SHAPE, hupr_amplitudes, hupr_cube};
 pub use native::{NativeAxes, interpolate, sine_deg};
 pub use psf::{
     FftSetup, Resolved, ViewFft, doppler_sigma_mps, first_null_bins, main_lobe_sigma_bins, range_sigma_m, sine_sigma,
