@@ -8,7 +8,6 @@ mod chirp;
 mod config;
 mod fft;
 mod fmcw;
-mod vrdae;
 mod native;
 mod psf;
 mod reflector;
@@ -16,6 +15,7 @@ mod spatial;
 mod tones;
 mod view;
 mod view_set;
+mod vrdae;
 mod window;
 
 pub use array::MimoArray;
@@ -25,7 +25,6 @@ pub use chirp::{Board, ChirpSettings};
 pub use config::{RadarConfig, SPEED_OF_LIGHT};
 pub use fft::{Chain, PolarMap, RadarCube, RangeDoppler};
 pub use fmcw::{AdcCube, Echo, Fmcw, PointMotion, Receiver, add_leakage, path_gain};
-pub use vrdae::{HUPR_SHAPE, hupr_amplitudes, hupr_cube};
 pub use native::{NativeAxes, interpolate, sine_deg};
 pub use psf::{
     FftSetup, Resolved, ViewFft, doppler_sigma_mps, first_null_bins, main_lobe_sigma_bins, range_sigma_m, sine_sigma,
@@ -35,4 +34,5 @@ pub(crate) use spatial::{NEAREST_M, SpatialGrid};
 pub use view::unravel;
 pub use view::{PointSpread, Quantity, View};
 pub use view_set::ViewSet;
+pub use vrdae::{HUPR_SHAPE, hupr_amplitudes, hupr_cube};
 pub use window::Window;
