@@ -221,7 +221,7 @@ mod tests {
         remember_room(&tree, &tree.join(ROOMS_NAME), &room("02", 5.0)).unwrap();
         assert_eq!(all().of_environment("02"), Some(&room("02", 5.0)));
         for (text, wanted) in [
-            ("room = 3", "line 1"),
+            ("room = 3", "rooms.toml:1: invalid type"),
             (
                 "[[room]]\nenvironment = \"01\"\nrotation = [[1,0,0],[0,1,0],[0,1,0]]\ntranslation_m = [0,0,0]",
                 "right angles",

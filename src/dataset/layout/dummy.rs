@@ -216,7 +216,7 @@ mod tests {
         }
         assert_eq!(
             unknown,
-            "m.toml:1: unknown variant `x`, expected one of `npz`, `mmvr`, `hupr`, `xrf55`, `capture`, `dummy`"
+            "m.toml:1: unknown variant `x`, expected one of `npz`, `mmvr`, `hiber`, `hupr`, `xrf55`, `rt_pose`, `capture`, `dummy`"
         );
     }
 
