@@ -54,7 +54,9 @@ fn captures_become_the_maps_of_the_published_cubes() {
     }
     assert_eq!(captures[0].len(), 2 * 786_432);
     // Half a frame more is none.
-    captures.iter_mut().for_each(|capture| capture.extend([0; 1000]));
+    for capture in &mut captures {
+        capture.extend([0; 1000]);
+    }
     let raw = home.path().join("raw_data/iwr1843/HuPR");
     write_captures(&raw.join("single_14"), &captures);
     let (processed, dataset) = (open(&cubes), open(&raw));

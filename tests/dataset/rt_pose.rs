@@ -8,6 +8,8 @@ use mhp_inspector::task::Progress;
 use num_complex::Complex32;
 use std::path::{Path, PathBuf};
 
+type Write = Box<dyn Fn(&Path)>;
+
 /// A manifest of small cubes: 2 × 3 × 4 cells.
 const SMALL: &str = r#"
 layout = "rt_pose"
@@ -53,7 +55,6 @@ fn cubes_of_every_form_become_maps_of_three_axes() {
     let ramp: Vec<f32> = (0..24).map(|k| k as f32 + 1.0).collect();
     // Of three Doppler bins with the amplitudes a, 2a and 2a the root of the summed power is 3a.
     let dopplers: Vec<f32> = [1.0, 2.0, 2.0].iter().flat_map(|gain| ramp.iter().map(move |x| gain * x)).collect();
-    type Write = Box<dyn Fn(&Path)>;
     let halves = |numbers: &[f32]| numbers.iter().map(|&x| f16::from_f32(x)).collect::<Vec<_>>();
     let (plain, half, parts) = (ramp.clone(), halves(&dopplers), [halves(&dopplers), halves(&dopplers)].concat());
     let turned: Vec<Complex32> = dopplers.iter().map(|&x| Complex32::from_polar(x, 1.0)).collect();

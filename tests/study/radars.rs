@@ -40,7 +40,7 @@ fn a_fitted_pose_is_simulated_for_another_radar() {
     assert!(fine && told.contains("sim_range_cone"), "{told}");
     for (args, wanted) in [
         (vec!["--radar", "mmvr", "--signal"], "its FFT configuration is not known"),
-        (vec!["--radar", "lidar"], "no published views; expected one of mmvr, hupr, xrf55"),
+        (vec!["--radar", "lidar"], "no published views; expected one of mmvr, hiber, hupr, xrf55, rt_pose"),
         (vec!["--radar", "hupr", "--skeleton", "hupr14"], "parameters have joints = 17; expected 14"),
     ] {
         let (fine, told) = program(&[&["transfer", "map", "--params", params, "--out", &out][..], &args[..]].concat());

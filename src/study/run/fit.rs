@@ -1,11 +1,11 @@
 //! One frame under one or several variants: load once, start once, fit, measure.
 //!
 //! Variants that differ only in what no start depends on share their start ([`start_key`]); those that differ only in the
-//! number of iterations share the fit itself, because k steps of a longer run are the shorter run.
+//! number of iterations share the fit itself where k steps of a longer run are the shorter run ([`fit_key`]).
 
 use super::row::RunNumbers;
 use crate::body::Pppr;
-use crate::config::{FIELDS, FitConfig};
+use crate::config::{FIELDS, FitConfig, Parameterization};
 use crate::dataset::{Dataset, Frame};
 use crate::diagnose::{Reprojection, joint_errors, map_box_coverage, reprojection};
 use crate::geometry::Vec3;
@@ -24,9 +24,13 @@ pub(super) fn start_key(config: &FitConfig) -> FitConfig {
     key
 }
 
-/// A configuration without its number of iterations: variants with the same key are one fit.
+/// A configuration without its number of iterations: variants with the same key are one fit. The steps in a window of frames
+/// shorten towards the end of a run, and so a run's length stays in the key there.
 pub(super) fn fit_key(config: &FitConfig) -> FitConfig {
-    FitConfig { iterations: FitConfig::default().iterations, ..*config }
+    match config.parameterization {
+        Parameterization::Motion => *config,
+        _ => FitConfig { iterations: FitConfig::default().iterations, ..*config },
+    }
 }
 
 /// A frame, loaded.
