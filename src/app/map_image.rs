@@ -39,13 +39,22 @@ struct Walk {
 }
 
 impl Walk {
-    /// What `of` makes of the cells behind each pixel: the first of them, how many they are and how far apart.
-    fn each<T>(&self, of: impl Fn(usize, (usize, usize)) -> T) -> Vec<T> {
+    /// The picture of `map`: its cells where no axis is collapsed, else what `collapse` makes of the first cell behind a pixel and of
+    /// how many there are how far apart; `unknown` beyond the map.
+    fn each<T: Copy>(&self, map: &[T], unknown: T, collapse: impl Fn(usize, (usize, usize)) -> T) -> Vec<T> {
         let [width, height] = self.size;
-        let mut out = Vec::with_capacity(width * height);
-        for row in 0..height as isize {
-            let begin = self.first + row * self.down;
-            out.extend((0..width as isize).map(|column| of((begin + column * self.across) as usize, self.third)));
+        let mut out = vec![unknown; width * height];
+        // Plain loops: every fit that is shown goes through here, and adaptors are calls where little is optimised.
+        for (row, pixels) in out.chunks_exact_mut(width.max(1)).enumerate() {
+            let mut at = self.first + row as isize * self.down;
+            for pixel in pixels {
+                if self.third.0 != 1 {
+                    *pixel = collapse(at as usize, self.third);
+                } else if let Some(&value) = map.get(at as usize) {
+                    *pixel = value;
+                }
+                at += self.across;
+            }
         }
         out
     }
@@ -142,21 +151,21 @@ impl Orientation {
     /// The picture of a map, row by row: the cell itself, or what the collapsed axis is taken for; means of what is finite.
     pub(crate) fn picture(&self, view: &View, map: &[f64]) -> Vec<f64> {
         let value = |at: usize| map.get(at).copied().unwrap_or(f64::NAN);
-        self.walk(view).each(|at, third| match third {
-            (1, _) => value(at),
-            (bins, apart) if self.third == ThirdAxis::Mean => {
+        self.walk(view).each(map, f64::NAN, |at, (bins, apart)| {
+            if self.third == ThirdAxis::Mean {
                 let finite = (0..bins).map(|bin| value(at + bin * apart)).filter(|x| x.is_finite());
                 let (sum, count) = finite.fold((0.0, 0), |(sum, count), x| (sum + x, count + 1));
                 if count > 0 { sum / f64::from(count) } else { f64::NAN }
+            } else {
+                (0..bins).map(|bin| value(at + bin * apart)).fold(f64::NAN, f64::max)
             }
-            (bins, apart) => (0..bins).map(|bin| value(at + bin * apart)).fold(f64::NAN, f64::max),
         })
     }
 
     /// The picture of a mask: true where any cell over the collapsed axis is.
     pub(crate) fn mask_picture(&self, view: &View, mask: &[bool]) -> Vec<bool> {
         let is_in = |at: usize| mask.get(at) == Some(&true);
-        self.walk(view).each(|at, (bins, apart)| (0..bins).any(|bin| is_in(at + bin * apart)))
+        self.walk(view).each(mask, false, |at, (bins, apart)| (0..bins).any(|bin| is_in(at + bin * apart)))
     }
 }
 
@@ -267,7 +276,7 @@ pub(crate) fn colorize(
             continue;
         }
         let t = ((value - lo) / span).clamp(0.0, 1.0);
-        let [r, g, b] = lut[(t * 255.0).round() as usize];
+        let [r, g, b] = lut[(t * 255.0 + 0.5) as usize];
         *pixel = Color32::from_rgb(r, g, b);
         let outside = value < lo || value > hi;
         if hatch && outside && (i % size[0] + i / size[0]).is_multiple_of(4) {

@@ -100,10 +100,12 @@ fn horn_quaternion(from: &[Vec3], to: &[Vec3]) -> [f64; 4] {
 /// Cyclic Jacobi rotations on a symmetric 4×4 matrix; a handful of sweeps reach machine precision.
 fn largest_eigenvector(mut a: [[f64; 4]; 4]) -> [f64; 4] {
     let mut vectors: [[f64; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|k| f64::from(u8::from(i == k))));
+    // What is smaller moves no digit of what it would be turned into.
+    let negligible = 1e-18 * a.iter().flatten().map(|x| x.abs()).sum::<f64>();
     for _sweep in 0..30 {
         for p in 0..4 {
             for q in p + 1..4 {
-                if a[p][q] != 0.0 {
+                if a[p][q].abs() > negligible {
                     rotate(&mut a, &mut vectors, p, q);
                 }
             }

@@ -333,20 +333,38 @@ impl ViewPictures {
         let masks = self.masks.as_ref()?;
         let ori = self.ori.as_ref()?;
         let mut image = colorize(self.size, &ori.values, self.ori_limits, Colormap::Grey, false, theme::NAN_CELL);
+        let colors = MaskColors::new(opacity);
+        for (i, pixel) in image.pixels.iter_mut().enumerate() {
+            *pixel = colors.of(*pixel, masks[0][i], masks[1][i], masks[2][i]);
+        }
+        Some(image)
+    }
+}
+
+/// The colour of a cell by its grey and the three masks, worked out once a picture.
+struct MaskColors(Vec<Color32>);
+
+impl MaskColors {
+    fn new(opacity: f32) -> Self {
         let mix = |a: Color32, b: Color32, t: f32| {
             let channel = |x: u8, y: u8| (f32::from(x) + (f32::from(y) - f32::from(x)) * t).round() as u8;
             Color32::from_rgb(channel(a.r(), b.r()), channel(a.g(), b.g()), channel(a.b(), b.b()))
         };
-        for (i, pixel) in image.pixels.iter_mut().enumerate() {
-            let (in_ori, in_sim, inside) = (masks[0][i], masks[1][i], masks[2][i]);
-            let ground = mix(theme::MASK_GROUND, *pixel, if inside { 0.45 } else { 0.18 });
-            *pixel = match (in_ori, in_sim) {
-                (true, true) => mix(ground, theme::MASK_BOTH, opacity.max(0.05)),
-                (true, false) => mix(ground, theme::MASK_ORI, opacity),
-                (false, true) => mix(ground, theme::MASK_SIM, opacity),
-                (false, false) => ground,
-            };
-        }
-        Some(image)
+        let of = |grey: Color32, masks: usize| {
+            let ground = mix(theme::MASK_GROUND, grey, if masks & 4 != 0 { 0.45 } else { 0.18 });
+            match masks & 3 {
+                3 => mix(ground, theme::MASK_BOTH, opacity.max(0.05)),
+                1 => mix(ground, theme::MASK_ORI, opacity),
+                2 => mix(ground, theme::MASK_SIM, opacity),
+                _ => ground,
+            }
+        };
+        let greys = (0..=255u8).map(Color32::from_gray).chain([theme::NAN_CELL]);
+        Self(greys.flat_map(|grey| (0..8).map(move |masks| of(grey, masks))).collect())
+    }
+
+    fn of(&self, pixel: Color32, in_ori: bool, in_sim: bool, inside: bool) -> Color32 {
+        let grey = if pixel == theme::NAN_CELL { 256 } else { usize::from(pixel.r()) };
+        self.0[8 * grey + usize::from(in_ori) + 2 * usize::from(in_sim) + 4 * usize::from(inside)]
     }
 }
