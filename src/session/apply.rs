@@ -227,7 +227,7 @@ impl Session {
             Report::ResultsRead(path, result) => self.results_read(&path, result),
             Report::BatchRows(dataset, rows, done) => self.batch_rows(&dataset, rows, done),
             Report::BatchDone(dataset, result) => self.batch_done(&dataset, result),
-            Report::KeptFound(dataset, kept) => self.kept_found(&dataset, kept),
+            Report::KeptFound { dataset, kept, faults } => self.kept_found(&dataset, kept, faults),
             Report::PresetsFitted(fits) => self.presets_fitted(fits),
             Report::StudyProgress(done, total) => {
                 self.study.work.advance(done, total);

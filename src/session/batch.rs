@@ -3,6 +3,7 @@
 use super::state::FrameSummary;
 use super::work::Work;
 use crate::config::{FitConfig, difference};
+use crate::mhp::Precision;
 use crate::study::{BatchRow, FitsOf};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -54,16 +55,19 @@ impl Batch {
         self.work.is_running()
     }
 
-    /// What sets the fits in the list apart from what would be fitted now: other settings, another program; `None` where
-    /// nothing does.
-    pub fn stale(&self, config: &FitConfig) -> Option<String> {
+    /// What sets the fits in the list apart from what would be fitted now: another program, another scalar, other settings;
+    /// `None` where nothing does. (Those of files that changed are not in the list.)
+    pub fn stale(&self, config: &FitConfig, precision: Precision) -> Option<String> {
         let of = self.shown.as_ref()?;
         if of.program != env!("CARGO_PKG_VERSION") {
-            return Some(format!("by version {}", of.program));
+            return Some(format!("by version {} of the program", of.program));
+        }
+        if of.precision != precision {
+            return Some(format!("in {:?}", of.precision).to_lowercase());
         }
         // How long a run takes is a setting of the fits of a batch too.
         let what = difference(config, &of.config);
-        (!what.is_empty()).then_some(what)
+        (!what.is_empty()).then(|| format!("with {what}"))
     }
 }
 

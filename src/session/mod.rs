@@ -66,7 +66,7 @@ pub use strata::{Strata, StrataStatus};
 pub use study::{StudyOrder, StudyRequest, StudyView};
 pub use tracked::Tracked;
 pub use view::{
-    Against, ColorRange, Compare, CubeAxes, CubeView, MapLimits, MapScale, Smoothing, SplatMode, ThemeChoice,
-    ThirdAxis, TimelineStrip, ViewState,
+    Against, ColorRange, Compare, CubeAxes, CubeView, CurvesShown, MapLimits, MapScale, Smoothing, SplatMode,
+    ThemeChoice, ThirdAxis, TimelineStrip, ViewState,
 };
 pub use work::{Work, WorkStatus};

@@ -70,7 +70,14 @@ pub enum Report {
     /// A batch ended: with all frames, or cancelled; or it could not go on.
     BatchDone(Arc<Dataset>, Result<bool, String>),
     /// What earlier batches left of a data set.
-    KeptFound(Arc<Dataset>, Vec<KeptFits>),
+    KeptFound {
+        /// Whose.
+        dataset: Arc<Dataset>,
+        /// A file of them each.
+        kept: Vec<KeptFits>,
+        /// What was left out, and why, a line each.
+        faults: Vec<String>,
+    },
     /// A frame was fitted with two presets.
     PresetsFitted(Arc<PresetFits>),
     /// The study that was begun here got on: fits done, of how many.

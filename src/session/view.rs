@@ -113,6 +113,18 @@ pub enum TimelineStrip {
     Tags,
 }
 
+/// What the curves over the iterations show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum CurvesShown {
+    /// Each curve with a scale of its own.
+    #[default]
+    Each,
+    /// The total and its unweighted terms.
+    Loss,
+    /// IoU and errors.
+    Quality,
+}
+
 /// How much curves over the iterations are smoothed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Smoothing {
@@ -250,6 +262,8 @@ pub struct ViewState {
     pub log_loss: bool,
     /// Log₁₀ of the iterations, from 1 on.
     pub log_iterations: bool,
+    /// What the curves show.
+    pub curves: CurvesShown,
     /// How much curves are smoothed.
     pub smoothing: Smoothing,
     /// Curves switched off, by name.
@@ -321,6 +335,7 @@ impl Default for ViewState {
             show_gradients: false,
             log_loss: true,
             log_iterations: false,
+            curves: CurvesShown::default(),
             smoothing: Smoothing::default(),
             hidden_curves: Vec::new(),
             sort: Sort::default(),

@@ -28,7 +28,7 @@ pub use export::{
     scaled_maps, write_cloud_npz, write_cloud_pcd, write_cloud_ply, write_curves, write_ply,
 };
 pub use file_error::FileError;
-pub use kept::{FitsFile, FitsOf, KeptFits, kept_fits};
+pub use kept::{FitsFile, FitsOf, FrameStamps, KeptFits, kept_fits};
 pub use results::{SummaryRow, read_summary};
 pub use room::{RoomError, RoomEstimate, environments, estimate_room};
 pub use row::{BatchRow, FitNumbers, FrameFit, Means};

@@ -2,7 +2,7 @@
 
 use crate::state::Bench;
 use mhp_inspector::body::Group;
-use mhp_inspector::config::FitConfig;
+use mhp_inspector::config::{FitConfig, Preset};
 use mhp_inspector::session::{Command, Session, ViewState};
 use std::collections::BTreeSet;
 
@@ -69,5 +69,17 @@ fn another_data_set_begins_as_if_it_were_the_first() {
         bench.open_another();
         assert_eq!(of_the_data(&bench.session), first, "after {done:?}");
         assert_eq!(bench.session.view, view, "how things are shown stays");
+    }
+}
+
+/// Nobody modified anything: the preset is the one that was chosen, and people are counted where it counts them.
+#[test]
+fn another_data_set_is_fitted_with_the_same_preset() {
+    for preset in Preset::ALL {
+        let mut bench = Bench::new();
+        bench.apply(Command::SetConfig(Box::new(preset.config())));
+        bench.apply(Command::SetConfig(Box::new(FitConfig { people: 3, ..preset.config() })));
+        bench.open_another();
+        assert_eq!(bench.session.config, preset.config(), "{}", preset.name());
     }
 }

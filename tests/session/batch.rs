@@ -60,7 +60,7 @@ fn listed_frames_are_fitted_kept_and_found_again() {
     assert_eq!(fitted(session), (0..9).collect::<Vec<_>>());
     let summary = &session.summaries[&4];
     assert!(summary.iou.is_some() && summary.majpe_mm.is_some() && summary.iterations == Some(5), "{summary:?}");
-    assert_eq!(session.batch.stale(&session.config), None);
+    assert_eq!(session.batch.stale(&session.config, session.precision), None);
     let all: Vec<_> = session.summaries.values().cloned().collect();
     drop(runtime);
 
@@ -70,12 +70,13 @@ fn listed_frames_are_fitted_kept_and_found_again() {
     assert!(all.iter().eq(runtime.session().summaries.values()), "to the last digit");
     // With other settings they are told to be others'; a new batch takes their place.
     let other = FitConfig { w_em: 2.0, ..config() };
+    let precision = runtime.session().precision;
     runtime.apply(Command::SetConfig(Box::new(other)));
-    assert_eq!(runtime.session().batch.stale(&other).as_deref(), Some("w_EM 2 → 0.5"));
+    assert_eq!(runtime.session().batch.stale(&other, precision).as_deref(), Some("with w_EM 2 → 0.5"));
     runtime.apply(Command::FitListed);
     assert_eq!(fitted(runtime.session()), [0; 0], "two settings are not mixed in one list");
     until(&mut runtime, "all fits", |s| !s.batch.is_running());
-    assert_eq!((runtime.session().batch.stale(&other), fitted(runtime.session()).len()), (None, 9));
+    assert_eq!((runtime.session().batch.stale(&other, precision), fitted(runtime.session()).len()), (None, 9));
     // Back to the first ones: nothing is fitted, all of it is there.
     runtime.apply(Command::SetConfig(Box::new(config())));
     let began = runtime.session().log.len();
@@ -238,4 +239,25 @@ fn results_are_kept_as_a_and_b_and_compared() {
     assert!(differences.is_sorted(), "{differences:?}");
     runtime.apply(Command::ForgetResults(ResultSide::A));
     assert_eq!(runtime.session().queue.rows().len(), 0, "what is not known satisfies no comparison");
+}
+
+/// A file that changed under its name is other data: what was fitted of it is no result any more.
+#[test]
+fn fits_of_files_that_changed_are_done_again() {
+    let folder = tempfile::tempdir().unwrap();
+    blob::write_dataset(folder.path(), 3);
+    let mut runtime = opened(folder.path(), &config());
+    runtime.apply(Command::FitListed);
+    until(&mut runtime, "all fits", |s| !s.batch.is_running() && s.batch.fitted() == 3);
+    drop(runtime);
+    let frame = std::fs::read_dir(folder.path().join("frames")).unwrap().next().unwrap().unwrap().path();
+    let file = std::fs::OpenOptions::new().append(true).open(frame).unwrap();
+    file.set_modified(std::time::SystemTime::now() + Duration::from_secs(5)).unwrap();
+    drop(file);
+    let mut runtime = opened(folder.path(), &config());
+    // One frame is read by the fits of all three.
+    until(&mut runtime, "what is stale", |s| s.log.iter().any(|line| line.text.contains("3 fits are stale")));
+    assert_eq!((runtime.session().batch.fitted(), fitted(runtime.session())), (0, vec![]));
+    runtime.apply(Command::FitListed);
+    until(&mut runtime, "all fits", |s| !s.batch.is_running() && s.batch.fitted() == 3);
 }

@@ -92,7 +92,15 @@ fn empty_space_turns_the_camera_and_a_click_selects() {
     window.pull(at, vec2(0.0, 0.0));
     window.harness.run_steps(3);
     assert!(window.session().joint.is_some());
-    assert!(window.harness.state().pane_rect(Pane::called("Joint").unwrap()).is_some(), "its pane is in front");
+    let joint_pane = |w: &Window| w.harness.state().pane_rect(Pane::called("Joint").unwrap());
+    assert!(joint_pane(&window).is_some(), "its pane is in front");
+    // Behind another pane, a click on the same joint brings it back.
+    window.key_with(Modifiers::COMMAND, Key::Num6);
+    window.until("another pane in front", |w| joint_pane(w).is_none());
+    // No double click.
+    window.harness.run_steps(60);
+    window.pull(at, vec2(0.0, 0.0));
+    window.until("the joint's pane", |w| joint_pane(w).is_some());
     assert_eq!(window.fit().history.branches().len(), 1);
 }
 

@@ -391,6 +391,16 @@ fn two_windows_on_one_data_set_see_each_other() {
     ada.until("the other window's", |w| w.tags(0) == "F1 F3");
 }
 
+/// Nobody touches the second window.
+#[test]
+fn another_windows_tag_is_seen_without_a_touch() {
+    let mut ada = open(2);
+    let mut again = second(&ada, "ada");
+    press(&mut ada, Key::Num1, "F1");
+    again.until("the tag of the other window", |w| w.tags(0) == "F1");
+    assert!(again.is_on("Tag F1"));
+}
+
 #[test]
 fn a_new_fit_leaves_the_tag_and_says_that_it_was_judged_on_another() {
     let mut window = open(1);

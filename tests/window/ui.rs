@@ -334,6 +334,9 @@ fn curves_have_a_log_axis_of_iterations_smoothing_and_a_wheel() {
     let mut window = Window::fitted(1);
     let view = |w: &Window| (w.session().view.log_iterations, w.session().view.smoothing);
     assert_eq!(view(&window), (false, Smoothing::Off));
+    window.click("Loss");
+    assert_eq!(window.session().view.curves, mhp_inspector::session::CurvesShown::Loss);
+    window.click("Each");
     window.click("log x");
     window.click("Smoothing");
     window.click("smooth 0.95");
@@ -712,6 +715,15 @@ fn settings_are_found_by_what_is_said_of_them() {
     window.type_text("adam step size");
     window.harness.run_steps(2);
     assert!(window.named("Learning rate value") && !window.named("d_sep value"));
+    // Those that stand above are found too.
+    for (words, name) in [("kinematic weight", "w_kine value"), ("people", "People value")] {
+        let times = |w: &Window| w.harness.query_all_by_label(name).count();
+        let before = times(&window);
+        window.key_with(Modifiers::COMMAND, Key::A);
+        window.type_text(words);
+        window.harness.run_steps(2);
+        assert_eq!(times(&window), before + 1, "{words}");
+    }
     window.type_text(" no such thing");
     window.harness.run_steps(2);
     assert!(window.says("No setting is called that"));

@@ -11,7 +11,7 @@ use crate::app::commands::CTRL;
 use crate::app::figure;
 use crate::app::theme::Tokens;
 use crate::mhp::{Scope, TermId, Weight};
-use crate::session::{Branch, Command, FitStatus, IterationRow, PinRow, Session, numbers};
+use crate::session::{Branch, Command, CurvesShown, FitStatus, IterationRow, PinRow, Session, numbers};
 use crate::worker::JobId;
 use along::Along;
 use egui::{Key, Sense, Ui};
@@ -36,7 +36,7 @@ pub(super) static PANE: Pane = Pane {
     margin: 8,
     state: PaneStates::prepare::<State>,
     blank,
-    toolbar: Some(|ui, shared, states| toolbar::show(ui, shared, states.of())),
+    toolbar: Some(|ui, shared, _| toolbar::show(ui, shared)),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };
 
@@ -44,7 +44,6 @@ pub(super) static PANE: Pane = Pane {
 #[derive(Default)]
 struct State {
     reset: bool,
-    tab: Tab,
     /// The shown iteration before the last click, and when that was, s.
     before_click: Option<(usize, f64)>,
     /// What was on screen in the pass before.
@@ -61,15 +60,6 @@ impl PaneState for State {
     fn reset_view(&mut self) {
         self.reset = true;
     }
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-enum Tab {
-    /// Each curve with a scale of its own.
-    #[default]
-    Each,
-    Loss,
-    Quality,
 }
 
 /// What is left of the colour of a raw line behind its smoothed one.
@@ -143,13 +133,14 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let branch = &*branch_of(shared.session);
     let lineage = fit.history.lineage();
     let first = lineage.first().and_then(|rows| rows.first()).map_or(0, |row| row.report.iteration);
-    let curves = curves(shared, branch, state.tab);
+    let tab = shared.session.view.curves;
+    let curves = curves(shared, branch, tab);
     let along = Along::of(shared.session.view.log_iterations);
     // What was zoomed to on one scale is no place on the other.
     if std::mem::replace(&mut state.along, along) != along {
         state.reset = true;
     }
-    if state.tab == Tab::Each {
+    if tab == CurvesShown::Each {
         let caption = figure::of(shared.session, "each curve with its own scale");
         let area = figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref());
         ui.interact(area, ui.scope_id().with("curves"), Sense::hover())
@@ -162,10 +153,10 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         }
         return multiples::show(ui, shared, state, &visible, branch.id, area);
     }
-    let log = shared.session.view.log_loss && state.tab == Tab::Loss;
+    let log = shared.session.view.log_loss && tab == CurvesShown::Loss;
     let hidden = &shared.session.view.hidden_curves;
     let tokens = Tokens::of(ui);
-    let mut plot = Plot::new(("curves", state.tab == Tab::Loss))
+    let mut plot = Plot::new(("curves", tab == CurvesShown::Loss))
         .x_axis_formatter(move |mark, _| along.tick(mark.value))
         .x_grid_spacer(move |input| along.grid(input))
         .show_grid([true, true])
@@ -176,21 +167,21 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         .include_x(along.x(shared.session.config.iterations.min(20_000).max(fit.head()) as f64))
         .y_axis_min_width(44.0)
         .label_formatter(move |hover| label(hover, along, log));
-    let what = if state.tab == Tab::Loss { "L and its unweighted terms" } else { "IoU; MAJPE in m" };
+    let what = if tab == CurvesShown::Loss { "L and its unweighted terms" } else { "IoU; MAJPE in m" };
     let caption = figure::of(shared.session, what);
     let area = figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref());
     plot = plot.height(area.height()).width((area.width() - LAST_NUMBER).max(1.0));
     if log {
         plot = plot.y_axis_formatter(|mark, _| power(mark.value)).y_grid_spacer(|input| decades(input.bounds));
     }
-    if state.tab == Tab::Quality {
+    if tab == CurvesShown::Quality {
         plot = plot.include_y(0.0).include_y(1.0);
     }
     if std::mem::take(&mut state.reset) {
         plot = plot.reset();
         state.window = None;
     }
-    let State { series, window, tab, .. } = &mut *state;
+    let State { series, window, .. } = &mut *state;
     let window = window.as_ref();
     series.begin((fit.job, fit.history.revision()));
     let smoothing = shared.session.view.smoothing.weight();
@@ -211,7 +202,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
             others.push((b.id, series.pieces(window, along, log)));
         }
     }
-    let pinned = pinned(shared, *tab, window, (along, log));
+    let pinned = pinned(shared, tab, window, (along, log));
     let (shown, flags) = (fit.shown_iteration(), fit.history.flags());
     let response = plot.show(ui, |plot| {
         for (id, pieces) in &others {
@@ -270,17 +261,17 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
 /// The main curve of each pinned fit: L, or the mean IoU.
 fn pinned(
     shared: &Shared<'_>,
-    tab: Tab,
+    tab: CurvesShown,
     window: Option<&VisibleSpan>,
     (along, log): (Along, bool),
 ) -> Vec<(String, Vec<Vec<PlotPoint>>)> {
     let pins = shared.session.pins.list().iter();
     pins.map(|pin| {
         let value = |row: &PinRow| match tab {
-            Tab::Each | Tab::Loss => Some(row.report.loss),
-            Tab::Quality => numbers(&row.report, None)[1],
+            CurvesShown::Each | CurvesShown::Loss => Some(row.report.loss),
+            CurvesShown::Quality => numbers(&row.report, None)[1],
         };
-        let what = if tab == Tab::Loss { "L" } else { "mean IoU" };
+        let what = if tab == CurvesShown::Loss { "L" } else { "mean IoU" };
         let first = pin.rows.first().map_or(0, |row| row.report.iteration);
         let pieces = series(first, pin.rows.iter().map(value)).pieces(window, along, log);
         (format!("{} · {what}", pin.name), pieces)
@@ -329,7 +320,7 @@ fn apart(wanted: &[(f32, f32)], end: f32) -> Vec<Option<f32>> {
     wanted.iter().map(place).collect()
 }
 
-fn curves(shared: &Shared<'_>, branch: &Branch, tab: Tab) -> Vec<Curve> {
+fn curves(shared: &Shared<'_>, branch: &Branch, tab: CurvesShown) -> Vec<Curve> {
     let arrays: Vec<String> =
         shared.session.fit.problem.iter().flat_map(|p| &p.views).map(|view| view.array.clone()).collect();
     let losses = || {
@@ -337,12 +328,12 @@ fn curves(shared: &Shared<'_>, branch: &Branch, tab: Tab) -> Vec<Curve> {
         loss_curves(fit.initial.as_ref().map_or(1, |p| p.shape().persons), fit.history.branches())
     };
     match tab {
-        Tab::Each => {
-            let quality = self::curves(shared, branch, Tab::Quality);
+        CurvesShown::Each => {
+            let quality = self::curves(shared, branch, CurvesShown::Quality);
             losses().into_iter().chain(quality).collect()
         }
-        Tab::Loss => losses(),
-        Tab::Quality => {
+        CurvesShown::Loss => losses(),
+        CurvesShown::Quality => {
             let mut curves: Vec<Curve> = arrays
                 .iter()
                 .enumerate()

@@ -366,7 +366,7 @@ fn sections(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, config: &mu
     ui.add(search).named(egui::Role::SearchInput, "Search the settings");
     let rest = |field: &&Field| field.group != FieldGroup::Weights && field.key != PEOPLE;
     if !state.search.trim().is_empty() {
-        let found: Vec<&Field> = FIELDS.iter().filter(rest).filter(|field| fits(field, &state.search)).collect();
+        let found: Vec<&Field> = FIELDS.iter().filter(|field| fits(field, &state.search)).collect();
         if found.is_empty() {
             ui.label(RichText::new("No setting is called that.").small().color(Tokens::of(ui).dim));
         }

@@ -2,7 +2,7 @@
 //! frames around contribute, and fields to edit it by hand.
 
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
-use crate::app::commands::CTRL;
+use crate::app::commands::{AppAct, CTRL};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::body::{Group, Pppr};
@@ -24,6 +24,17 @@ pub(super) static PANE: Pane = Pane {
     toolbar: Some(|ui, shared, _| picker(ui, shared)),
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };
+
+/// What a click on a joint does, or on none where there is no joint: it is selected, and this pane shows it, also where it was
+/// selected already and the pane is behind another.
+pub(super) fn select(shared: &mut Shared<'_>, joint: Option<usize>) {
+    if joint != shared.session.joint {
+        shared.send(Command::SelectJoint(joint));
+    }
+    if joint.is_some() {
+        shared.app(AppAct::ShowPane(&PANE));
+    }
+}
 
 /// Values that are being edited.
 #[derive(Default)]

@@ -11,7 +11,7 @@ mod region;
 mod toolbar;
 
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
-use crate::app::commands::{AppAct, CommandRow, Menu, NONE, SHIFT, UiAction, has_frame};
+use crate::app::commands::{CommandRow, Menu, NONE, SHIFT, UiAction, has_frame};
 use crate::app::figure;
 use crate::app::map_image::Orientation;
 use crate::app::map_plane::Plane;
@@ -125,6 +125,8 @@ struct State {
     planes: Option<[bool; 2]>,
     /// A joint that is moved.
     held: Option<drag::Held>,
+    /// What the read-out says instead of the cell under the pointer, in this pass.
+    told: Option<&'static str>,
     /// The data set that the windows belong to.
     dataset: Option<std::sync::Weak<crate::dataset::Dataset>>,
 }
@@ -342,11 +344,8 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
         }
         let joint = overlay::joint_near(session, view, orientation, &to_screen, pointer);
         shared.points.joint = joint.or(shared.points.joint);
-        if response.clicked() && joint != session.joint {
-            shared.send(crate::session::Command::SelectJoint(joint));
-            if joint.is_some() {
-                shared.app(AppAct::ShowPane(&super::joint::PANE));
-            }
+        if response.clicked() {
+            super::joint::select(shared, joint);
         }
     }
     if response.double_clicked() {

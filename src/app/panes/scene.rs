@@ -8,7 +8,7 @@ mod gizmo;
 mod hand;
 
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
-use crate::app::commands::{AppAct, CTRL, CommandRow, Menu, NONE, UiAction, always, has_frame};
+use crate::app::commands::{CTRL, CommandRow, Menu, NONE, UiAction, always, has_frame};
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Named as _, grounded};
@@ -420,11 +420,8 @@ fn interact(
             }
             None => state.camera = None,
         }
-    } else if response.clicked() && hit != shared.session.joint {
-        shared.send(Command::SelectJoint(hit));
-        if hit.is_some() {
-            shared.app(AppAct::ShowPane(&super::joint::PANE));
-        }
+    } else if response.clicked() {
+        super::joint::select(shared, hit);
     }
     if let (Some(joint), Some(problem)) = (hit, &shared.session.fit.problem) {
         let joints = problem.skeleton.joints.len().max(1);

@@ -103,8 +103,19 @@ impl Session {
     }
 
     /// What earlier batches left beside the data that was just opened: those with the settings in force, else the newest.
-    pub(super) fn kept_found(&mut self, dataset: &Arc<Dataset>, mut kept: Vec<KeptFits>) -> Vec<Effect> {
-        if !self.is_open(dataset) || self.batch.shown.is_some() {
+    pub(super) fn kept_found(
+        &mut self,
+        dataset: &Arc<Dataset>,
+        mut kept: Vec<KeptFits>,
+        faults: Vec<String>,
+    ) -> Vec<Effect> {
+        if !self.is_open(dataset) {
+            return Vec::new();
+        }
+        for fault in faults {
+            self.note(LogLevel::Warning, format!("kept fits: {fault}"));
+        }
+        if self.batch.shown.is_some() {
             return Vec::new();
         }
         let of = FitsOf::new(dataset.fingerprint(), self.config, self.precision);
@@ -116,9 +127,8 @@ impl Session {
         let (count, of) = (rows.len(), self.data.len());
         self.batch.shown = Some(found.of);
         self.take_rows(rows);
-        let stale = self.batch.stale(&self.config);
-        let what =
-            stale.map_or_else(|| "with the settings in force".into(), |stale| format!("with other settings: {stale}"));
+        let stale = self.batch.stale(&self.config, self.precision);
+        let what = stale.map_or_else(|| "with the settings in force".into(), |stale| format!("stale: {stale}"));
         self.note(LogLevel::Info, format!("fits of {count} of {of} frames were kept by an earlier batch, {what}"));
         Vec::new()
     }

@@ -1,7 +1,7 @@
 //! Opening data sets, changing frames, putting fits aside and finding them again.
 
 use crate::body::Pppr;
-use crate::config::FitConfig;
+use crate::config::Preset;
 use crate::dataset::{Dataset, DatasetError, Frame};
 use crate::session::batch::Batch;
 use crate::session::command::StartAt;
@@ -105,11 +105,11 @@ impl Session {
     }
 
     /// Forgets what was said of the scene, when another data set takes the place of one: which of its frames are listed, how
-    /// many people are in it, and the file that its session is kept in.
+    /// many people are in it (the preset says again whether they are counted), and the file that its session is kept in.
     fn forget_scene(&mut self) {
         self.queue.set_text(String::new());
         self.session_path = None;
-        let people = FitConfig::default().people;
+        let people = Preset::nearest(&self.config).config().people;
         if self.config.people != people {
             self.note(LogLevel::Info, format!("people {} → {people}: this is another data set", self.config.people));
             self.config.people = people;

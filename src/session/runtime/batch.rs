@@ -5,7 +5,7 @@ use crate::dataset::Dataset;
 use crate::labels::LabelPlace;
 use crate::session::batch::BatchRequest;
 use crate::session::report::Report;
-use crate::study::{BatchOptions, BatchRow, FitsFile, KeptFits, StudyError, kept_fits, run_batch};
+use crate::study::{BatchOptions, BatchRow, FitsFile, FrameStamps, KeptFits, StudyError, kept_fits, run_batch};
 use crate::task::{Job, Progress};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -75,7 +75,9 @@ impl Drop for BatchRun {
 fn work(request: &BatchRequest, waiting: &Waiting, progress: &Progress, wake: &Wake) -> Result<bool, String> {
     let BatchRequest { dataset, frames, of } = request;
     let place = LabelPlace::of(&dataset.info().root, dataset.fingerprint()).map_err(|error| error.to_string())?;
-    let (mut file, mut known) = FitsFile::open(&place.folder, of).map_err(|error| error.to_string())?;
+    let mut stamps = FrameStamps::new(dataset);
+    let opened = FitsFile::open(&place.folder, of, |index| stamps.of(index));
+    let (mut file, mut known) = opened.map_err(|error| error.to_string())?;
     known.retain(|&index, row| index < dataset.len() && dataset.frame_name(index) == row.frame && row.fit.is_ok());
     let (mut there, mut todo) = (Vec::new(), Vec::new());
     for &frame in frames.iter() {
@@ -107,7 +109,7 @@ fn work(request: &BatchRequest, waiting: &Waiting, progress: &Progress, wake: &W
     };
     let fitted = run_batch(dataset, &todo, &options, |row| {
         progress.wait_while_paused();
-        file.add(&row).map_err(|error| StudyError::Internal { message: error.to_string() })?;
+        file.add(&row, stamps.of(row.index)).map_err(|error| StudyError::Internal { message: error.to_string() })?;
         done += 1;
         tell(&mut vec![row], done, false);
         progress.check().map_err(|_| StudyError::Cancelled)
@@ -123,5 +125,6 @@ fn work(request: &BatchRequest, waiting: &Waiting, progress: &Progress, wake: &W
 pub(super) fn kept(dataset: &Dataset) -> (Vec<KeptFits>, Vec<String>) {
     let place = LabelPlace::to_read(&dataset.info().root, dataset.fingerprint());
     let folders: Vec<PathBuf> = std::iter::once(place.folder).chain(place.also).collect();
-    kept_fits(&folders, dataset.fingerprint())
+    let mut stamps = FrameStamps::new(dataset);
+    kept_fits(&folders, dataset.fingerprint(), |index| if index < dataset.len() { stamps.of(index) } else { None })
 }

@@ -9,13 +9,16 @@ use crate::session::effect::Commit;
 use crate::session::labels::LabelTable;
 use crate::session::records::Records;
 use crate::session::report::{OpenedLabels, Report, Written};
-use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded, unbounded};
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 /// Acts that may wait to be written.
 const WAITING: usize = 256;
+/// How long nobody looks at what others write into the same folder.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
 
 enum Request {
     Open(u64, Arc<Dataset>, String),
@@ -41,7 +44,7 @@ impl LabelKeeper {
         let (answer, waker) = (told.clone(), Arc::clone(wake));
         let spawned = std::thread::Builder::new().name("labels".into()).spawn(move || {
             let mut keeper = Keeper::default();
-            while let Ok(request) = inbox.recv() {
+            while let Some(request) = keeper.next(&inbox) {
                 for report in keeper.answer(request) {
                     if answer.send(report).is_err() {
                         return;
@@ -123,6 +126,18 @@ struct Open {
 }
 
 impl Keeper {
+    /// What is to be done next: what is asked for, or, where nothing is for a while and a journal is open, a look at what others
+    /// wrote. `None` once nobody asks any more.
+    fn next(&self, inbox: &Receiver<Request>) -> Option<Request> {
+        if self.open.is_none() {
+            return inbox.recv().ok();
+        }
+        match inbox.recv_timeout(LOOK_EVERY) {
+            Err(RecvTimeoutError::Timeout) => Some(Request::Refresh),
+            asked => asked.ok(),
+        }
+    }
+
     fn answer(&mut self, request: Request) -> Vec<Report> {
         match request {
             Request::Open(id, dataset, annotator) => {

@@ -271,11 +271,8 @@ impl Runtime {
                 }
             }
             Effect::FindKept(dataset) => self.on_thread("kept-fits", move || {
-                let (kept, wrong) = batch::kept(&dataset);
-                for why in wrong {
-                    tracing::warn!("{why}");
-                }
-                Report::KeptFound(dataset, kept)
+                let (kept, faults) = batch::kept(&dataset);
+                Report::KeptFound { dataset, kept, faults }
             }),
             Effect::ReadRun(folder) => self.on_thread("study", move || {
                 let read = crate::study::run::Run::read(&folder).map(Arc::new).map_err(|error| error.to_string());

@@ -21,7 +21,7 @@ mod plan;
 mod prune;
 mod rank;
 mod scan;
-mod stamps;
+pub(in crate::study) mod stamps;
 mod table;
 mod types;
 

@@ -14,13 +14,18 @@ use std::time::UNIX_EPOCH;
 
 /// Two times 48 bits: exact as two `f64`, and two of a million frames share one once in 10¹⁶ data sets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) struct Key(pub(super) [u64; 2]);
+pub(in crate::study) struct Key(pub(super) [u64; 2]);
 
 impl Key {
     fn of(hash: Sha256) -> Self {
         let digest = hash.finalize();
         let half = |at: usize| digest.iter().skip(at).take(6).fold(0, |bits, &byte| bits << 8 | u64::from(byte));
         Self([half(0), half(6)])
+    }
+
+    /// In hexadecimal digits.
+    pub(in crate::study) fn text(self) -> String {
+        self.0.map(|half| format!("{half:012x}")).concat()
     }
 }
 
@@ -52,7 +57,7 @@ pub(super) fn keys(
 }
 
 /// Path below the root, name, size and time of each file that the maps of one frame are made of.
-fn stamp(dataset: &Dataset, i: usize) -> Option<Key> {
+pub(in crate::study) fn stamp(dataset: &Dataset, i: usize) -> Option<Key> {
     let mut hash = Sha256::new();
     for path in dataset.map_paths(i) {
         let meta = std::fs::metadata(&path).ok()?;
@@ -75,7 +80,7 @@ fn below<'a>(path: &'a Path, root: &Path) -> &'a Path {
 }
 
 /// One key of the stamps of a window, the frame itself last.
-fn joined(stamps: &[Option<Key>]) -> Option<Key> {
+pub(in crate::study) fn joined(stamps: &[Option<Key>]) -> Option<Key> {
     let mut hash = Sha256::new();
     for stamp in stamps {
         let Key(halves) = (*stamp)?;

@@ -1,29 +1,31 @@
 //! What the curves show, and how: above them.
 
-use super::{Curve, Shared, State, Tab, branch_of, curves};
+use super::{Curve, Shared, branch_of, curves};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
-use crate::session::{Smoothing, ViewState};
+use crate::session::{CurvesShown, Smoothing, ViewState};
 use egui::{Color32, Ui};
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
-    let curves = curves(shared, &branch_of(shared.session), state.tab);
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
+    let tab = shared.session.view.curves;
+    let curves = curves(shared, &branch_of(shared.session), tab);
     let tokens = Tokens::of(ui);
     let mut view = shared.session.view.clone();
     ui.horizontal_wrapped(|ui| {
-        ui.selectable_value(&mut state.tab, Tab::Each, "Each")
+        ui.selectable_value(&mut view.curves, CurvesShown::Each, "Each")
             .on_hover_text("Every curve in a picture of its own, with its own scale.");
-        ui.selectable_value(&mut state.tab, Tab::Loss, "Loss").on_hover_text("The total and its unweighted terms.");
-        ui.selectable_value(&mut state.tab, Tab::Quality, "IoU and error")
+        ui.selectable_value(&mut view.curves, CurvesShown::Loss, "Loss")
+            .on_hover_text("The total and its unweighted terms.");
+        ui.selectable_value(&mut view.curves, CurvesShown::Quality, "IoU and error")
             .on_hover_text("Forward-consistency IoU of each view, and MAJPE where the data set has truth.");
-        if state.tab != Tab::Quality {
+        if tab != CurvesShown::Quality {
             ui.toggle_value(&mut view.log_loss, "log y").on_hover_text("Logarithmic vertical axis.");
         }
         ui.toggle_value(&mut view.log_iterations, "log x").on_hover_text(
             "Logarithmic axis of iterations, log₁₀(1 + iteration): the first ten as wide as the next ninety.",
         );
         smoothing(ui, &mut view);
-        if state.tab == Tab::Each {
+        if tab == CurvesShown::Each {
             // Their names are over the pictures.
             ui.menu_button("Show", |ui| choose(ui, &curves, &mut view, &tokens))
                 .response

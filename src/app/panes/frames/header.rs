@@ -239,10 +239,10 @@ fn batch(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
     if batch.is_running() {
         return;
     }
-    if let Some(stale) = batch.stale(&shared.session.config).filter(|_| batch.fitted() > 0) {
-        let text = format!("results of {} frames are of other settings", batch.fitted());
-        let label = egui::Label::new(RichText::new(text).small().color(tokens.warn)).truncate();
-        ui.add(label).on_hover_text(format!("Fitted {stale}.\n“Fit listed” fits with the settings in force."));
+    if let Some(stale) = batch.stale(&shared.session.config, shared.session.precision).filter(|_| batch.fitted() > 0) {
+        let text = format!("results of {} frames are stale: {stale}", batch.fitted());
+        let label = egui::Label::new(RichText::new(&text).small().color(tokens.warn)).truncate();
+        ui.add(label).on_hover_text(format!("{text}.\n“Fit listed” fits with the settings in force."));
     }
 }
 

@@ -4,12 +4,10 @@ use super::{State, overlay, screen, unit_at};
 use crate::app::locate::moved_on;
 use crate::app::map_image::Orientation;
 use crate::app::panes::Shared;
-use crate::app::theme::{self, Tokens};
-use crate::app::widgets::grounded;
 use crate::geometry::Vec3;
 use crate::radar::View;
 use crate::session::{BodyMove, Command};
-use egui::{Align2, Color32, Painter, PointerButton, Pos2, Rect, Stroke, Ui, vec2};
+use egui::{Color32, Painter, PointerButton, Pos2, Rect, Stroke, Ui};
 
 /// A joint in the hand. The three columns draw the same views: it is held in one of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,8 +36,10 @@ pub(super) fn joint(
     {
         let joint = overlay::joint_near(session, view, o, &|unit| screen(plot, window, unit), press);
         state.held = joint.and_then(|joint| {
-            let start = *session.shown_positions().get(joint)?;
-            let (mark, at) = (o.unit_from_bins(view, &view.bins_of(start)), unit_at(plot, window, press));
+            let shown = &session.fit.shown.as_ref()?.params;
+            let (start, velocity) = (*shown.positions().get(joint)?, *shown.velocities().get(joint)?);
+            let mark = o.unit_from_bins(view, &view.bins_of_moving(start, velocity));
+            let at = unit_at(plot, window, press);
             Some(Held { column: response.id, joint, start, off: [at[0] - mark[0], at[1] - mark[1]] })
         });
     }
@@ -56,9 +56,7 @@ pub(super) fn joint(
     if let Some(to) = moved_on(view, o, held.start, [at[0] - held.off[0], at[1] - held.off[1]]) {
         shared.send(Command::DragBody(BodyMove::Joint { joint: held.joint, to, keep_bones }));
     } else {
-        let text = "this map does not say where that is: move the joint on another one, or in 3-D";
-        let font = egui::FontId::proportional(theme::CAPTION);
-        grounded(ui.painter(), pointer + vec2(12.0, 12.0), Align2::LEFT_TOP, text, font, Tokens::of(ui).text);
+        state.told = Some("This map does not say where that is: move the joint on another one, or in 3-D.");
     }
     true
 }

@@ -67,8 +67,8 @@ fn person_box(session: &Session, view: &View, index: usize) -> Option<[[f32; 2];
         return Some(o.shown_box(view, region));
     }
     let (mut min, mut max) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-    for &p in session.shown_positions() {
-        let at = o.unit_from_bins(view, &view.bins_of(p));
+    for (&p, &v) in snapshot.params.positions().iter().zip(snapshot.params.velocities()) {
+        let at = o.unit_from_bins(view, &view.bins_of_moving(p, v));
         for axis in 0..2 {
             min[axis] = min[axis].min(at[axis].clamp(0.0, 1.0) as f32);
             max[axis] = max[axis].max(at[axis].clamp(0.0, 1.0) as f32);

@@ -15,7 +15,7 @@ use crate::app::widgets::Named as _;
 use crate::dataset::Frame;
 use crate::radar::View;
 use crate::render::Colormap;
-use crate::session::{ColorRange, Command, CubeAxes, CubeView, MapScale, Session, ThirdAxis};
+use crate::session::{ColorRange, CubeAxes, CubeView, MapScale, Session, ThirdAxis};
 use crate::worker::Snapshot;
 use egui::{Painter, Pos2, Rect, RichText, Role, Sense, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2};
 use serde::{Deserialize, Serialize};
@@ -206,10 +206,10 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     told(ui, rest, view, place, (ori, sim), session.view.scale, &tokens);
     if let Some((joint, place)) = moved {
         state.look.place = Some(place);
-        if joint != session.joint && joint.is_some() {
+        if joint.is_some() {
             // Its place is the one that was clicked, not quite the joint's own.
             state.joint = joint;
-            shared.send(Command::SelectJoint(joint));
+            crate::app::panes::joint::select(shared, joint);
         }
     }
 }

@@ -7,6 +7,7 @@ use crate::app::map_plane::Plane;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{round_step, tick};
 use crate::body::Skeleton;
+use crate::geometry::Vec3;
 use crate::radar::{Axis, AxisKind, View};
 use crate::session::Session;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, pos2, vec2};
@@ -182,8 +183,8 @@ pub(super) fn draw(
         && let Some(truth) = session.data.frame.as_ref().and_then(|f| f.truth.as_ref())
         && let Some(dataset) = &session.data.dataset
     {
-        let stroke = Stroke::new(1.0, Color32::from_white_alpha(170));
-        let at: Vec<Pos2> = truth.joints.iter().map(|&p| to_screen(o.unit_from_bins(view, &view.bins_of(p)))).collect();
+        let stroke = Stroke::new(1.0, theme::DARK.truth.gamma_multiply(0.85));
+        let at = moving_on(&truth.joints, truth.velocities.as_deref(), view, o, to_screen);
         bones(painter, &dataset.info().skeleton, &at, &|_, _| stroke);
     }
     if look.show_skeleton
@@ -222,11 +223,21 @@ pub(super) fn joints_on(
     o: Orientation,
     to_screen: &dyn Fn([f64; 2]) -> Pos2,
 ) -> Vec<Pos2> {
-    let moving = session.fit.shown.iter().flat_map(|shown| {
-        let velocities = shown.params.velocities().iter().copied();
-        shown.params.positions().iter().copied().zip(velocities)
-    });
-    moving.map(|(p, v)| to_screen(o.unit_from_bins(view, &view.bins_of_moving(p, v)))).collect()
+    let Some(shown) = &session.fit.shown else { return Vec::new() };
+    moving_on(shown.params.positions(), Some(shown.params.velocities()), view, o, to_screen)
+}
+
+/// Where joints are on a map; on a Doppler axis at their own radial velocities, or at rest where none are known.
+fn moving_on(
+    joints: &[Vec3],
+    velocities: Option<&[Vec3]>,
+    view: &View,
+    o: Orientation,
+    to_screen: &dyn Fn([f64; 2]) -> Pos2,
+) -> Vec<Pos2> {
+    let velocity = |k: usize| velocities.and_then(|all| all.get(k)).copied().unwrap_or_default();
+    let at = |(k, &p): (usize, &Vec3)| to_screen(o.unit_from_bins(view, &view.bins_of_moving(p, velocity(k))));
+    joints.iter().enumerate().map(at).collect()
 }
 
 fn bones(painter: &Painter, skeleton: &Skeleton, joints: &[Pos2], stroke: &dyn Fn(usize, crate::body::Side) -> Stroke) {
@@ -246,7 +257,7 @@ fn boxed(painter: &Painter, view: &View, o: Orientation, b: [f64; 4], to_screen:
     };
     let line = outline(view, o, grid_box(corner(b[0], b[1]), corner(b[2], b[3])), to_screen);
     let first = line.first().copied().unwrap_or_default();
-    painter.line(line, Stroke::new(1.5, Color32::from_rgb(0xF2, 0x65, 0x5C)));
+    painter.line(line, Stroke::new(1.5, theme::DARK.truth));
     let font = FontId::proportional(9.0);
     painter.text(first + vec2(1.0, -1.0), Align2::LEFT_BOTTOM, "label", font, Color32::WHITE);
 }

@@ -11,18 +11,19 @@ use crate::session::{Compare, Session, ThirdAxis};
 use egui::{Align2, FontId, Rect, Ui, vec2};
 
 /// Draws the strip.
-pub(super) fn show(ui: &Ui, shared: &mut Shared<'_>, state: &State, rect: Rect) {
+pub(super) fn show(ui: &Ui, shared: &mut Shared<'_>, state: &mut State, rect: Rect) {
     let session = shared.session;
     let tokens = Tokens::of(ui);
     let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
     painter.hline(rect.x_range(), rect.min.y, egui::Stroke::new(1.0, tokens.stroke));
     let views = session.data.dataset.iter().flat_map(|dataset| &dataset.info().views);
     let pointed = state.hovered.and_then(|(view, pixel)| Some((view, pixel, views.clone().nth(view)?)));
-    let (lines, font, color) = match pointed {
-        Some((index, pixel, view)) => {
+    let (lines, font, color) = match (state.told.take(), pointed) {
+        (Some(told), _) => (vec![told.to_owned()], FontId::proportional(theme::CAPTION), tokens.warn),
+        (None, Some((index, pixel, view))) => {
             (lines(session, state, view, index, pixel), theme::mono(theme::CAPTION), tokens.text)
         }
-        None => (vec![hint(session)], FontId::proportional(theme::CAPTION), tokens.dim),
+        (None, None) => (vec![hint(session)], FontId::proportional(theme::CAPTION), tokens.dim),
     };
     let mut job = egui::text::LayoutJob::simple(lines.join("\n"), font, color, rect.width() - 16.0);
     job.wrap.max_rows = 2;

@@ -181,7 +181,7 @@ fn more(ui: &mut Ui, shared: &mut Shared<'_>) {
         ui.checkbox(&mut view.show_skeleton, "Fitted skeleton")
             .on_hover_text("Joints and bones of the shown iteration.");
         ui.checkbox(&mut view.show_truth, "Truth")
-            .on_hover_text("The data set's joints in metres, where it has them (white).");
+            .on_hover_text("The data set's joints in metres, where it has them (green, as in 3-D).");
         ui.checkbox(&mut view.show_boxes, "Labelled boxes").on_hover_text("The data set's boxes on the maps (red).");
         ui.checkbox(&mut view.follow, "Follow the person")
             .on_hover_text("Maps and camera go with the person from frame to frame; the zoom stays.");
