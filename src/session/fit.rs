@@ -11,10 +11,13 @@ use crate::worker::{ErasedCells, JobId, Snapshot};
 use std::sync::Arc;
 
 /// Iterations that a fit is looked at over to say that it has settled, and how little may change meanwhile: share of the
-/// loss, m of each joint.
+/// loss, m of each joint at [`SETTLED_RATE`].
 const SETTLED_OVER: usize = 10;
 const SETTLED_LOSS: f64 = 1e-3;
 const SETTLED_M: f64 = 2e-3;
+/// The learning rate, m, at which joints that all move one way move five times as far. Adam's steps are the mean gradient in units of
+/// its own size times the rate: against the rate, a way that is short says that the gradient is small.
+const SETTLED_RATE: f64 = 1e-3;
 
 /// What the worker is doing for this frame.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -122,7 +125,8 @@ impl Fit {
     }
 
     /// Whether the fit moves no more at the iteration that is looked at: over the last ten iterations the loss changed by
-    /// less than 0.1 % and no joint moved more than 2 mm. `None` before there are as many.
+    /// less than 0.1 %, no joint moved more than 2 mm, and none by more than a fifth of what the learning rate lets it, so that the
+    /// gradient is small too. `None` before there are as many.
     pub fn settled(&self) -> Option<bool> {
         let (branch, now) = (self.branch()?, self.shown_iteration());
         let then = now.checked_sub(SETTLED_OVER).filter(|then| *then >= branch.start())?;
@@ -132,7 +136,10 @@ impl Fit {
         let (_, then) = branch.state_at(then)?;
         let (_, now) = branch.state_at(now)?;
         let joints = then.params.positions().iter().zip(now.params.positions());
-        let still = joints.clone().count() > 0 && joints.into_iter().all(|(a, b)| norm(sub(*a, *b)) <= SETTLED_M);
+        let config = branch.config_at(self.shown_iteration());
+        let rate = config.learning_rates.position.unwrap_or(config.learning_rate);
+        let most_m = SETTLED_M * (rate / SETTLED_RATE).min(1.0);
+        let still = joints.clone().count() > 0 && joints.into_iter().all(|(a, b)| norm(sub(*a, *b)) <= most_m);
         Some(flat && still)
     }
 }

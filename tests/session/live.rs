@@ -1,7 +1,7 @@
 //! Settings under a finger: the fit follows, and what the finger did is one act.
 
 use crate::blob;
-use mhp_inspector::config::{FitConfig, Preset};
+use mhp_inspector::config::{FitConfig, LearningRates, Preset};
 use mhp_inspector::session::{Command, FitStatus, Live, LiveFrom, RunSpeed, Runtime, Session, ViewState};
 use std::path::Path;
 use std::sync::Arc;
@@ -269,4 +269,25 @@ fn settings_of_the_start_are_told_to_need_a_new_one() {
     rig.runtime.apply(Command::Reset);
     rig.settled();
     assert!(!rig.session().needs_new_start());
+}
+
+/// A loss that is flat because steps are tiny is no fit that has settled: the gradient is as large as it was.
+#[test]
+fn a_fit_with_tiny_steps_has_not_settled() {
+    for (position, settled) in [(1e-6, Some(false)), (0.0, Some(true))] {
+        let folder = tempfile::tempdir().unwrap();
+        blob::write_dataset(folder.path(), 1);
+        let path = folder.path().to_owned();
+        let learning_rates = LearningRates { position: Some(position), ..LearningRates::default() };
+        let slow = FitConfig { learning_rate: 1e-6, learning_rates, iterations: 9, ..config() };
+        let mut rig = Rig::on(&path, folder, Live::Off, &slow);
+        rig.runtime.apply(Command::ToggleRun);
+        rig.until("nine iterations", |s| s.fit.head() == 9 && s.fit.status == FitStatus::Paused);
+        assert_eq!(rig.session().fit.settled(), None, "too few to tell");
+        rig.runtime.apply(Command::StepFit(1));
+        rig.until("the tenth", |s| s.fit.head() == 10 && s.fit.status == FitStatus::Paused);
+        let losses = [0, 10].map(|at| rig.session().fit.branch().unwrap().row(at).unwrap().report.loss);
+        assert!((losses[1] / losses[0] - 1.0).abs() < 1e-3, "flat: {losses:?}");
+        assert_eq!(rig.session().fit.settled(), settled, "at {position}");
+    }
 }

@@ -375,6 +375,25 @@ fn curves_have_a_log_axis_of_iterations_smoothing_and_a_wheel() {
     click(&mut window);
     click(&mut window);
     window.until("the same iteration", |w| w.fit().shown_iteration() == shown);
+    // Also where both clicks come in one pass, in each way of drawing.
+    let pane = Pane::called("Curves").unwrap();
+    for way in ["Each", "Loss"] {
+        window.click(way);
+        window.harness.run_steps(60);
+        let pos = match way {
+            "Each" => window.node("Curve of L").rect().center(),
+            _ => window.harness.state().pane_rect(pane).unwrap().center(),
+        } + egui::vec2(40.0, 0.0);
+        let input = window.harness.input_mut();
+        input.events.push(egui::Event::PointerMoved(pos));
+        for pressed in [true, false, true, false] {
+            let (button, modifiers) = (egui::PointerButton::Primary, Modifiers::NONE);
+            input.events.push(egui::Event::PointerButton { pos, button, pressed, modifiers });
+        }
+        window.harness.run_steps(4);
+        assert_eq!(window.fit().shown_iteration(), shown, "{way}");
+    }
+    window.click("Each");
     window.harness.run_steps(60);
     click(&mut window);
     window.until("the start", |w| w.fit().shown_iteration() == 0);
@@ -777,6 +796,75 @@ fn maps_show_the_person_all_or_one_alone() {
     window.key(Key::Escape);
     window.harness.run_steps(2);
     assert_eq!(window.node("H_sim map of vert").rect(), before);
+    // The same by a double click, there and back.
+    let double = |w: &mut Window| {
+        let at = w.node("H_sim map of vert").rect().center();
+        w.harness.run_steps(60);
+        for _ in 0..2 {
+            w.harness.hover_at(at);
+            w.harness.drag_at(at);
+            w.harness.drop_at(at);
+            w.harness.step();
+        }
+        w.harness.run_steps(3);
+        w.node("H_sim map of vert").rect()
+    };
+    assert!(double(&mut window).area() > 4.0 * before.area() && !window.named("H_ori map of vert"));
+    assert_eq!(double(&mut window), before);
+}
+
+/// What is seen of a map follows the frame in its overview: another cell is under the same place.
+#[test]
+fn an_overview_is_dragged() {
+    let mut window = Window::open(1);
+    let cell = |w: &mut Window| {
+        let at = w.node("H_ori map of hori").rect().center();
+        w.harness.hover_at(at);
+        w.harness.run_steps(2);
+        w.text_of("Cell under the pointer")
+    };
+    let before = cell(&mut window);
+    assert!(before.contains("H_ori"), "{before}");
+    let overview = window.node("Overview of hori").rect();
+    window.pull(overview.center(), egui::vec2(0.0, -0.3 * overview.height()));
+    let after = cell(&mut window);
+    assert!(after.contains("H_ori") && after != before, "{before} {after}");
+}
+
+/// A run is seen again at the chosen speed: the iteration on screen and what the curves say of it go on by themselves.
+#[test]
+fn a_run_is_replayed_as_slowly_as_chosen() {
+    let mut window = Window::fitted(1);
+    let last = window.fit().shown_iteration();
+    window.click("Speed of a run");
+    window.click("10/s");
+    window.click("Replay");
+    window.until("the begin of the run", |w| w.fit().shown_iteration() < last);
+    let (first, told) = (window.fit().shown_iteration(), window.text_of("Curve of L"));
+    window.until("a later iteration", |w| w.fit().shown_iteration() > first && w.text_of("Curve of L") != told);
+    window.click("Stop replay");
+    let stopped = window.fit().shown_iteration();
+    window.harness.run_steps(40);
+    assert_eq!((window.fit().shown_iteration(), window.fit().replay), (stopped, None));
+}
+
+/// A batch waits, goes on and is cancelled by its own buttons, and what it had stays in list and strip.
+#[test]
+fn a_batch_is_held_by_its_buttons() {
+    let mut window = Window::open(60);
+    window.at_rest();
+    window.click("Fit listed");
+    window.until("some fits", |w| w.session().batch.fitted() > 2);
+    window.click("Pause the batch");
+    window.until("the pause", |w| w.named("Go on with the batch"));
+    window.click("Go on with the batch");
+    window.until("the batch again", |w| w.named("Pause the batch"));
+    window.click("Cancel the batch");
+    window.until("its end", |w| !w.session().batch.is_running());
+    let (fitted, all) = (window.session().batch.fitted(), window.session().queue.rows().len());
+    assert!(fitted > 2 && fitted < all, "{fitted} of {all}");
+    let kept = window.session().summaries.values().filter(|summary| summary.iou.is_some()).count();
+    assert_eq!(kept, fitted);
 }
 
 /// All that is listed, by one key, with its progress; the results are in the list.

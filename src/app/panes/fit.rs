@@ -202,8 +202,8 @@ fn judgement(ui: &mut Ui, session: &Session, row: &IterationRow, tokens: &Tokens
     if let Some(settled) = session.fit.settled() {
         let (word, color) = if settled { ("settled", tokens.dim) } else { ("moving", tokens.warn) };
         chip(ui, word, color).on_hover_text(
-            "Over the last ten iterations the loss changed by less than 0.1 % and no joint moved more than 2 mm; or not: more \
-             iterations would change the fit.",
+            "Over the last ten iterations the loss changed by less than 0.1 %, no joint moved more than 2 mm, and none by more \
+             than a fifth of what the learning rate lets it: the gradient is small. Or not: more iterations would change the fit.",
         );
     }
     if row.report.converged {
