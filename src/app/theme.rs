@@ -133,7 +133,7 @@ impl Tokens {
     /// the first. The number beside the person says the same.
     pub(crate) fn person(&self, identity: usize) -> Color32 {
         const ON_DARK: [u32; 6] = [0x56B4E9, 0xE69F00, 0x00B886, 0xD98AB3, 0xF0E442, 0xF0733A];
-        const ON_LIGHT: [u32; 6] = [0x1B75B0, 0xA87400, 0x00785A, 0xA34F7C, 0x8A8000, 0xB94700];
+        const ON_LIGHT: [u32; 6] = [0x1B75B0, 0xB96F02, 0x00785A, 0xA34F7C, 0x8A7B00, 0xB94700];
         let colors = if self.dark { ON_DARK } else { ON_LIGHT };
         rgb(colors[identity % colors.len()])
     }
@@ -354,6 +354,9 @@ mod tests {
             ("pin", t.pin),
             ("middle", t.dim),
         ];
+        let people = ["first", "second", "third", "fourth", "fifth", "sixth"];
+        let people = people.into_iter().enumerate().map(|(identity, name)| (name, t.person(identity)));
+        let beside = [("selected", t.selected), ("truth", t.truth)];
         let terms = TERMS.iter().filter(|term| term.key != "dummy").map(|term| (term.key, t.curve(term.key)));
         let curves = ["total", "iou 0", "iou 1", "majpe"].map(|key| (key, t.curve(key)));
         let tags = Tag::ALL.map(|tag| (tag.code(), t.tag(tag)));
@@ -361,6 +364,7 @@ mod tests {
         let states = [("ok", t.ok), ("warn", t.warn), ("bad", t.bad), ("accent", t.accent)];
         vec![
             (bodies.to_vec(), 0.12),
+            (people.chain(beside).collect(), 0.07),
             (terms.chain(curves).collect(), 0.06),
             (tags.to_vec(), 0.09),
             (strata.to_vec(), 0.14),
@@ -393,7 +397,10 @@ mod tests {
     fn no_two_roles_share_a_colour() {
         for t in [DARK, LIGHT] {
             // What has no tag and what is the middle of a body is grey in both.
-            let all: Vec<Role> = pictures(&t).into_iter().flat_map(|(roles, _)| roles).collect();
+            let mut all: Vec<Role> = pictures(&t).into_iter().flat_map(|(roles, _)| roles).collect();
+            // What is selected, and the truth, are the same beside several people.
+            all.sort_by_key(|role| role.0);
+            all.dedup();
             for (i, a) in all.iter().enumerate() {
                 for b in all[i + 1..].iter().filter(|b| (a.1, b.1) != (t.dim, t.dim)) {
                     let apart = distance(a.1, b.1);

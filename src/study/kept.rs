@@ -85,7 +85,7 @@ impl<'a> FrameStamps<'a> {
         let around = around.filter(|&other| dataset.sequence(other) == sequence);
         let stamps: Vec<_> =
             around.map(|other| *self.known.entry(other).or_insert_with(|| stamps::stamp(dataset, other))).collect();
-        stamps::joined(&stamps).map(|key| key.text())
+        stamps::joined(&stamps).map(stamps::Key::text)
     }
 }
 

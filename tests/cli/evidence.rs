@@ -164,3 +164,23 @@ fn where_nothing_can_be_judged_the_code_is_two() {
     assert_eq!(table.status.code(), Some(2));
     assert!(text(&table.stderr).contains("/nowhere/at/all.csv: cannot be written"), "{}", text(&table.stderr));
 }
+
+/// The fit that is judged is that of the preset, and of as many people, that are asked for.
+#[test]
+fn the_preset_and_the_number_of_people_are_those_asked_for() {
+    let folder = blob(2);
+    let of = |args: &[&str]| {
+        let output = evidence(folder.path(), &[&["--frames", "0..1", "--iterations", "3", "--json"], args].concat());
+        assert_eq!(output.status.code(), Some(0), "{args:?}: {}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let usual = of(&[]);
+    assert_eq!(of(&["--preset", "baseline"]), usual, "what the scores are calibrated on");
+    assert_ne!(of(&["--preset", "paper"]), usual);
+    assert_ne!(of(&["--people", "2"]), usual);
+    for (args, expected) in [(["--preset", "best"], "recommended"), (["--people", "many"], "--people")] {
+        let output = evidence(folder.path(), &args);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(text(&output.stderr).contains(expected), "{}", text(&output.stderr));
+    }
+}
