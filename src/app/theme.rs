@@ -170,7 +170,7 @@ impl Tokens {
             "total" => self.text,
             "majpe" => self.pick(0xA6ECF4, 0x095258),
             "iou 0" => self.pick(0xA0BE66, 0x637D21),
-            "iou 1" => self.pick(0x2A9187, 0x5D7BF1),
+            "iou 1" => rgb(0x5D7BF1),
             name => self.hue(TermId::of(name).map_or(Hue::Rose, |term| term.hue)),
         }
     }
@@ -354,6 +354,7 @@ mod tests {
             ("pin", t.pin),
             ("middle", t.dim),
         ];
+        let pulls = TermGroup::ALL.map(|group| (group.terms().next().map_or("", |term| term.key), t.group(group)));
         let people = ["first", "second", "third", "fourth", "fifth", "sixth"];
         let people = people.into_iter().enumerate().map(|(identity, name)| (name, t.person(identity)));
         let beside = [("selected", t.selected), ("truth", t.truth)];
@@ -364,6 +365,8 @@ mod tests {
         let states = [("ok", t.ok), ("warn", t.warn), ("bad", t.bad), ("accent", t.accent)];
         vec![
             (bodies.to_vec(), 0.12),
+            // Descent directions are arrows on the limbs.
+            (bodies.into_iter().chain(pulls).collect(), 0.075),
             (people.chain(beside).collect(), 0.07),
             (terms.chain(curves).collect(), 0.06),
             (tags.to_vec(), 0.09),
@@ -398,7 +401,7 @@ mod tests {
         for t in [DARK, LIGHT] {
             // What has no tag and what is the middle of a body is grey in both.
             let mut all: Vec<Role> = pictures(&t).into_iter().flat_map(|(roles, _)| roles).collect();
-            // What is selected, and the truth, are the same beside several people.
+            // What is selected, the truth and the terms are the same beside others.
             all.sort_by_key(|role| role.0);
             all.dedup();
             for (i, a) in all.iter().enumerate() {

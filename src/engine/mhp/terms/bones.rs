@@ -14,7 +14,7 @@ pub(super) const BONE: Term = Term {
     help: "Length of each bone against its reference, beyond the tolerance.",
     weight: Weight::Kine,
     scope: Scope::Always,
-    hue: Hue::Orange,
+    hue: Hue::Amber,
     evaluate: Evaluate::WithNext(evaluate),
 };
 

@@ -10,6 +10,6 @@ pub(super) const EM: Term = Term {
     help: "How far the masks of H_sim and H_ori differ, mean over the views.",
     weight: Weight::Em,
     scope: Scope::Always,
-    hue: Hue::Blue,
+    hue: Hue::Teal,
     evaluate: Evaluate::Maps,
 };

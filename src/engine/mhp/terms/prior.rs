@@ -10,6 +10,6 @@ pub(super) const PRIOR: Term = Term {
     help: "How far a window's pose, motion and size are from what real people do, and its bones from their lengths for that size; mean squares in standard deviations.",
     weight: Weight::Prior,
     scope: Scope::Weighed,
-    hue: Hue::Teal,
+    hue: Hue::Blue,
     evaluate: Evaluate::Window,
 };

@@ -14,7 +14,7 @@ pub(super) const SEP: Term = Term {
     help: "People whose middles are closer than d_sep.",
     weight: Weight::Kine,
     scope: Scope::People,
-    hue: Hue::Amber,
+    hue: Hue::Orange,
     evaluate: Evaluate::Alone(evaluate),
 };
 
