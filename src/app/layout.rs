@@ -1,13 +1,14 @@
 //! Where the panes are: a tree of tiles that can be dragged, resized, stored and reset.
 
 mod collapse;
+mod tabs;
 
 use super::commands::{AppAct, SaveKind};
 use super::panes::{Dock, Pane, PaneStates, Shared};
 use super::theme::{self, Tokens};
 use collapse::Collapse;
 use egui_tiles::{
-    Container, Linear, LinearDir, SimplificationOptions, TabState, Tile, TileId, Tiles, Tree, UiResponse,
+    Container, Linear, LinearDir, SimplificationOptions, TabState, Tabs, Tile, TileId, Tiles, Tree, UiResponse,
 };
 
 /// A pane in the tree.
@@ -173,7 +174,7 @@ impl PaneLayout {
             let size = ui.available_size();
             let set = |mut fitted: Fitted| fitted.set(&mut self.tree.tiles, size, sides).then_some(fitted);
             self.fitted = self.fitted.take().and_then(set);
-            let mut behavior = Behavior { shared, states, asked: &mut self.asked };
+            let mut behavior = Behavior { shared, states, asked: &mut self.asked, icons: Vec::new() };
             self.tree.ui(&mut behavior, ui);
         });
     }
@@ -203,6 +204,8 @@ struct Behavior<'a, 'b> {
     shared: &'a mut Shared<'b>,
     states: &'a mut PaneStates,
     asked: &'a mut Option<AppAct>,
+    /// Tabs that have no room for their names.
+    icons: Vec<TileId>,
 }
 
 impl egui_tiles::Behavior<Leaf> for Behavior<'_, '_> {
@@ -218,6 +221,31 @@ impl egui_tiles::Behavior<Leaf> for Behavior<'_, '_> {
 
     fn tab_title_for_tile(&mut self, tiles: &Tiles<Leaf>, tile: TileId) -> egui::WidgetText {
         egui::RichText::new(title(tiles, tile)).font(theme::strong(12.0)).into()
+    }
+
+    /// Called before the tabs of a row are drawn.
+    fn top_bar_right_ui(
+        &mut self,
+        tiles: &Tiles<Leaf>,
+        ui: &mut egui::Ui,
+        _tile: TileId,
+        row: &Tabs,
+        _scroll_offset: &mut f32,
+    ) {
+        self.icons.extend(tabs::without_name(ui, tiles, row, ui.available_width()));
+    }
+
+    fn tab_ui(
+        &mut self,
+        tiles: &mut Tiles<Leaf>,
+        ui: &mut egui::Ui,
+        id: egui::Id,
+        tile: TileId,
+        state: &TabState,
+    ) -> egui::Response {
+        let named = !self.icons.contains(&tile);
+        let response = tabs::show(ui, tiles, id, (tile, named), state);
+        self.on_tab_button(tiles, tile, response)
     }
 
     fn on_tab_button(&mut self, tiles: &mut Tiles<Leaf>, tile: TileId, response: egui::Response) -> egui::Response {

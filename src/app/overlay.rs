@@ -226,6 +226,12 @@ fn help(ui: &mut Ui) {
         ] {
             key_row(ui, gesture, what, &tokens);
         }
+        ui.add_space(8.0);
+        ui.label(RichText::new("Small windows").font(theme::strong(13.0)));
+        ui.label(
+            "Panes give way to icons at the edges, a click shows one: first those left of the maps, then those right of them, \
+             then those below. Tabs become icons from the last on.",
+        );
     });
 }
 

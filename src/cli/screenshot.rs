@@ -66,7 +66,7 @@ pub struct ScreenshotArgs {
     /// Theme; without it that of the session file, or dark.
     #[arg(long, value_enum)]
     theme: Option<ThemeArg>,
-    /// Save this pane alone, called as on its tab, for example H_sim.
+    /// Save this pane alone, called as on its tab, for example Maps.
     #[arg(long, value_name = "NAME")]
     pane: Option<String>,
     /// Print units, τ, iteration, seed and version small under every picture.

@@ -241,6 +241,23 @@ fn a_warm_start_follows_a_sequence_and_no_further() {
     assert_eq!(rows[4]["loss"].parse(), Ok(loss));
 }
 
+/// Without a preset the settings are those that are recommended, people counted; the paper's are one option away.
+#[test]
+fn the_recommended_settings_are_taken_unless_others_are_asked_for() {
+    let small = Small::new(&[("a/000", 0.0), ("a/001", 0.05)]);
+    let rows = |args: &[&str]| {
+        let output = fit(small.path(), &[args, &["--iterations", "3", "--json"]].concat());
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let rows = told["frames"].as_array().unwrap().clone();
+        rows.into_iter().map(|row| [row["loss"].clone(), row["people"].clone()]).collect::<Vec<_>>()
+    };
+    let usual = rows(&[]);
+    assert_eq!(usual, rows(&["--preset", "recommended"]));
+    assert_ne!(usual, rows(&["--preset", "paper"]));
+    assert_eq!(Preset::default().config().people, 0, "as many as are counted");
+}
+
 #[test]
 fn json_has_the_keys_of_the_columns_and_the_means() {
     let small = Small::new(&[("a/000", 0.0), ("a/001", 0.1), ("a/002", 0.2)]);

@@ -1,7 +1,7 @@
 //! Settings under a finger: the fit follows, and what the finger did is one act.
 
 use crate::blob;
-use mhp_inspector::config::{FitConfig, LearningRates, Preset};
+use mhp_inspector::config::{FitConfig, LearningRates, Preset, Summation};
 use mhp_inspector::session::{Command, FitStatus, Live, LiveFrom, RunSpeed, Runtime, Session, ViewState};
 use std::path::Path;
 use std::sync::Arc;
@@ -154,6 +154,24 @@ fn live_is_on_by_itself_where_a_fit_is_quick() {
     assert!(rig.session().fit_ms().unwrap() > Live::QUICK_MS && !rig.session().is_live());
     rig.runtime.apply(Command::SetConfig(Box::new(FitConfig { iterations: 1, ..config() })));
     assert!(rig.session().is_live(), "{:?} ms", rig.session().fit_ms());
+}
+
+/// A choice is an act at once: a fit anew with the other answer, on a branch of its own.
+#[test]
+fn a_choice_fits_anew_too() {
+    let mut rig = Rig::new(Live::On);
+    rig.drag(0.9);
+    rig.runtime.apply(Command::EndDrag);
+    rig.settled();
+    let before = rig.session().fit.shown.as_ref().unwrap().params.clone();
+    let other = FitConfig { summation: Summation::Incoherent, ..rig.session().config };
+    assert_ne!(other, rig.session().config);
+    rig.runtime.apply(Command::SetConfig(Box::new(other)));
+    rig.settled();
+    let session = rig.session();
+    assert_eq!((session.fit.history.branches().len(), session.fit.head()), (3, config().iterations));
+    assert_ne!(session.fit.shown.as_ref().unwrap().params, before);
+    assert!(session.undo_name().is_some_and(|name| name.contains("incoherent")), "{:?}", session.undo_name());
 }
 
 #[test]

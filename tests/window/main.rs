@@ -20,6 +20,7 @@ mod large;
 mod maps;
 mod radar;
 mod results;
+mod seen;
 mod sizes;
 mod study;
 mod ui;

@@ -17,7 +17,7 @@ const ZOOMS: [f32; 4] = [0.8, 1.0, 1.5, 2.0];
 const SLACK: f32 = 1.5;
 
 /// Every text that was drawn in the last pass, with what it was clipped to.
-fn texts(window: &Window) -> Vec<(TextShape, Rect)> {
+pub(crate) fn texts(window: &Window) -> Vec<(TextShape, Rect)> {
     fn walk(shape: &Shape, clip: Rect, into: &mut Vec<(TextShape, Rect)>) {
         match shape {
             Shape::Vec(shapes) => shapes.iter().for_each(|shape| walk(shape, clip, into)),
@@ -46,9 +46,7 @@ fn cut_off(window: &Window) -> Vec<String> {
         let out = rect.left() < screen.left() - SLACK || rect.right() > screen.right() + SLACK;
         let scrolled = !rect.y_range().intersects(clip.y_range());
         let listed = tables.iter().flatten().any(|table| table.contains_rect(clip.shrink(4.0)));
-        // Tabs that have no room scroll too, with arrows at both ends.
-        let tab = Pane::all().iter().any(|pane| pane.title() == words);
-        if (beside || out) && !scrolled && !listed && !tab && !words.is_empty() && clip.is_positive() {
+        if (beside || out) && !scrolled && !listed && !words.is_empty() && clip.is_positive() {
             cut.push(format!("{words:?} at {rect:?} in {clip:?}"));
         }
     }
@@ -180,13 +178,92 @@ fn nothing_is_written_over_the_scrubber() {
     }
 }
 
-/// One sign stands for one thing: ▶ plays the frames and nothing else.
+/// One sign stands for one thing: ▶ plays the frames and nothing else, and the signs of frames are not those of iterations.
 #[test]
 fn a_sign_stands_for_one_thing() {
     let mut window = Window::fitted(3);
     window.harness.run_steps(2);
-    let signs = |sign: &str| texts(&window).iter().filter(|(text, _)| text.galley.text().contains(sign)).count();
-    assert_eq!((signs("▶"), signs("∂ Fit")), (1, 1));
+    let signs = |sign: &str| texts(&window).iter().filter(|(text, _)| text.galley.text().trim() == sign).count();
+    for sign in ["▶", "∂ Fit", "◂", "▸", "|◂", "▸|", "⇥"] {
+        assert_eq!(signs(sign), 1, "{sign}");
+    }
+}
+
+/// What gave way is whole: icons with their names, and icons alone where the names have no room.
+#[test]
+fn strips_have_room_for_what_is_on_them() {
+    let mut window = Window::open(2);
+    for (size, right_is_named) in [([853.0, 533.0], true), ([640.0, 540.0], true), ([512.0, 320.0], false)] {
+        resize(&mut window, size.into());
+        let entries: Vec<(String, Rect)> = Pane::all()
+            .iter()
+            .map(|pane| format!("{} on the strip", pane.title()))
+            .filter(|name| window.named(name))
+            .map(|name| (name.clone(), window.node(&name).rect()))
+            .collect();
+        assert!(entries.len() > 1, "{size:?}: {entries:?}");
+        // Between the menus and the strips of frames and iterations.
+        let whole = Rect::from_min_max(egui::pos2(0.0, 24.0), egui::pos2(size[0], size[1] - 56.0));
+        for (k, (name, rect)) in entries.iter().enumerate() {
+            assert!(whole.contains_rect(*rect), "{name} at {rect:?} of {size:?}");
+            assert!(entries[..k].iter().all(|(_, other)| !other.shrink(0.5).intersects(*rect)), "{name} of {size:?}");
+        }
+        let words = texts(&window).into_iter().any(|(text, _)| text.galley.text() == "Image plane");
+        assert_eq!(words, right_is_named, "{size:?}");
+    }
+}
+
+/// Where a row of tabs has no room for all names the last ones are icons, which lead to their panes all the same.
+#[test]
+fn tabs_without_room_are_icons() {
+    let mut window = Window::open(2);
+    let drawn = |w: &Window| -> Vec<&str> {
+        let titles = ["Maps", "Study", "Statistics", "Agreement"].into_iter();
+        titles.filter(|title| texts(w).iter().any(|(text, _)| text.galley.text() == *title)).collect()
+    };
+    resize(&mut window, vec2(1440.0, 900.0));
+    assert_eq!(drawn(&window), ["Maps", "Study", "Statistics", "Agreement"]);
+    resize(&mut window, vec2(1024.0, 640.0));
+    assert_eq!(drawn(&window).last(), Some(&"Statistics"), "{:?}", drawn(&window));
+    window.click("Agreement");
+    window.harness.run_steps(3);
+    assert!(window.harness.state().pane_rect(Pane::called("Agreement").unwrap()).is_some());
+    assert!(drawn(&window).contains(&"Agreement"), "what is in front has its name");
+}
+
+/// The name of an array that has no room is shortened; what the map shows is said whole, in one line.
+#[test]
+fn titles_of_maps_stay_in_one_line() {
+    let sample = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/generic");
+    let harness = Window::empty(&[sample], [1024.0, 640.0]);
+    let mut window = Window { harness, folder: tempfile::tempdir().unwrap() };
+    window.ready(0);
+    for size in [[2560.0, 1440.0], [1024.0, 640.0], [853.0, 533.0], [640.0, 400.0]] {
+        resize(&mut window, size.into());
+        for content in ["H_ori", "H_sim", "IoU 0"] {
+            let titles: Vec<TextShape> = texts(&window)
+                .into_iter()
+                .map(|(text, _)| text)
+                .filter(|text| text.galley.text().contains(content) && text.galley.text().contains("range_"))
+                .collect();
+            assert!(titles.len() >= 2, "{content} of {size:?}");
+            let broken: Vec<&str> =
+                titles.iter().filter(|t| t.galley.rows.len() > 1).map(|t| t.galley.text()).collect();
+            assert!(broken.is_empty(), "{size:?}: {broken:?}");
+        }
+    }
+}
+
+/// A row of maps that is low keeps its colour bar.
+#[test]
+fn a_low_row_of_maps_keeps_its_colour_bar() {
+    let mut window = Window::open(1);
+    for size in [[1280.0, 800.0], [853.0, 533.0], [683.0, 427.0]] {
+        resize(&mut window, size.into());
+        for limit in ["H_ori map of hori lower limit", "H_ori map of vert upper limit"] {
+            assert!(window.named(limit), "{limit} of {size:?}");
+        }
+    }
 }
 
 /// What is told does not lie over the chips that tags are given with.

@@ -1,15 +1,16 @@
-//! What gives way where a window is small: panes beside the maps become words on a strip at the window's edge.
+//! What gives way where a window is small: panes beside the maps become icons with their names on a strip at the window's
+//! edge, and icons alone where the names have no room.
 //!
 //! The order: what lies left of the maps (frames, failure modes), then what lies right of them (fit, 3-D), each where the maps would
 //! have less than [`MIDDLE`]; then what lies below them (curves), and of two panes in a column the lower one, where the window
-//! is lower than [`LOW`]. Nothing is lost: a click on the word shows the pane until it is clicked again or another one
+//! is lower than [`LOW`]. Nothing is lost: a click on the icon shows the pane until it is clicked again or another one
 //! is, and all come back by themselves when there is room. It holds for every arrangement whose outermost split is into columns.
 
 use super::{Leaf, panes_in};
 use crate::app::panes::Pane;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::Named as _;
-use egui::{Role, Sense, Ui, vec2};
+use crate::app::widgets::{Named as _, draw_icon};
+use egui::{Role, Sense, Ui, pos2, vec2};
 use egui_tiles::{Container, LinearDir, Tile, TileId, Tiles, Tree};
 
 /// Width that the maps keep, points.
@@ -18,6 +19,13 @@ const MIDDLE: f32 = 460.0;
 const LOW: f32 = 420.0;
 /// Width of a strip, points.
 pub(super) const STRIP: f32 = 22.0;
+/// Size of an icon, and what an entry has around what it shows, points.
+const ICON: f32 = 14.0;
+const PAD: f32 = 8.0;
+/// Between an icon and its name.
+const GAP: f32 = 4.0;
+/// Between what gave way together and the next, points.
+const APART: f32 = 8.0;
 
 /// Where a pane is that can give way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -108,7 +116,7 @@ impl Collapse {
             let hide = hidden.iter().any(|other| other.tile == slot.tile);
             tree.tiles.set_visible(slot.tile, !hide);
         }
-        // What is shown because it was asked for keeps its word on the strip, to be clicked away.
+        // What is shown because it was asked for keeps its entry on the strip, to be clicked away.
         let asked = opened.filter(|slot| match slot.side {
             Side::Left => no_left || low,
             Side::Right => no_right || low,
@@ -137,13 +145,14 @@ impl Collapse {
         }
     }
 
-    /// Draws the strips, each a word for every pane that gave way there. Answers the pane whose word was clicked.
+    /// Draws the strips, each an entry for every pane that gave way there. Answers the pane whose entry was clicked.
     pub(super) fn strips(&mut self, ui: &mut Ui, tree: &Tree<Leaf>) -> Option<Leaf> {
         let tokens = Tokens::of(ui);
         let frame = egui::Frame::new().fill(tokens.panel);
         let mut clicked = None;
         for side in [Side::Below, Side::Left, Side::Right] {
-            let slots: Vec<Slot> = self.hidden.iter().filter(|slot| slot.side == side).copied().collect();
+            let slots = self.hidden.iter().filter(|slot| slot.side == side);
+            let slots: Vec<(Slot, Vec<Leaf>)> = slots.map(|slot| (*slot, panes_in(&tree.tiles, slot.tile))).collect();
             if slots.is_empty() {
                 continue;
             }
@@ -153,49 +162,76 @@ impl Collapse {
                 Side::Below => egui::Panel::bottom("lower strip"),
             };
             panel.exact_size(STRIP).resizable(false).frame(frame).show(ui, |ui| {
-                let direction = if side == Side::Below {
-                    egui::Layout::left_to_right(egui::Align::Center)
-                } else {
+                let upright = side != Side::Below;
+                let layout = if upright {
                     egui::Layout::top_down(egui::Align::Center)
+                } else {
+                    egui::Layout::left_to_right(egui::Align::Center)
                 };
-                ui.with_layout(direction, |ui| {
-                    for slot in slots {
+                let room = if upright { ui.available_height() } else { ui.available_width() };
+                let named = wanted(ui, &slots) <= room;
+                ui.with_layout(layout, |ui| {
+                    ui.spacing_mut().item_spacing = egui::Vec2::ZERO;
+                    for (slot, panes) in slots {
                         let on = self.opened == Some(slot.tile);
-                        for pane in panes_in(&tree.tiles, slot.tile) {
-                            if word(ui, pane, on, side != Side::Below, &tokens) {
+                        for pane in panes {
+                            if entry(ui, pane, on, Look { upright, named }, &tokens) {
                                 clicked = Some((slot.tile, on, pane));
                             }
                         }
-                        ui.add_space(8.0);
+                        ui.add_space(APART);
                     }
                 });
             });
         }
         let (tile, on, pane) = clicked?;
         let in_front = tree.tiles.rect(tree.tiles.find_pane(&pane)?).is_some();
-        // The word of what is in front takes it away again; that of another tab brings it to the front.
+        // The entry of what is in front takes it away again; that of another tab brings it to the front.
         self.opened = (!(on && in_front)).then_some(tile);
         Some(pane)
     }
 }
 
-/// A pane's name on a strip, along it; answers whether it was clicked.
-fn word(ui: &mut Ui, pane: Leaf, on: bool, upright: bool, tokens: &Tokens) -> bool {
+/// How the entries of a strip look.
+#[derive(Debug, Clone, Copy)]
+struct Look {
+    /// Along the left or right edge: names are read from below.
+    upright: bool,
+    /// Whether there is room for the names.
+    named: bool,
+}
+
+/// The title of a pane as a strip has it.
+fn lettered(ui: &Ui, pane: Leaf, color: egui::Color32) -> std::sync::Arc<egui::Galley> {
+    ui.painter().layout_no_wrap(pane.title().to_owned(), theme::strong(11.0), color)
+}
+
+/// The length of a strip with all of these panes' icons and names, points.
+fn wanted(ui: &Ui, slots: &[(Slot, Vec<Leaf>)]) -> f32 {
+    let long = |pane: &Leaf| ICON + PAD + GAP + lettered(ui, pane, egui::Color32::GRAY).size().x;
+    slots.iter().map(|(_, panes)| panes.iter().map(long).sum::<f32>() + APART).sum()
+}
+
+/// A pane's icon on a strip, and its name along it; answers whether it was clicked.
+fn entry(ui: &mut Ui, pane: Leaf, on: bool, look: Look, tokens: &Tokens) -> bool {
     let color = if on { tokens.text } else { tokens.dim };
-    let galley = ui.painter().layout_no_wrap(pane.title().to_owned(), theme::strong(11.0), color);
-    let along = galley.size() + vec2(14.0, 0.0);
-    let size = if upright { vec2(STRIP, along.x) } else { vec2(along.x, STRIP) };
+    let galley = lettered(ui, pane, color);
+    let along = ICON + PAD + if look.named { GAP + galley.size().x } else { 0.0 };
+    let size = if look.upright { vec2(ui.available_width(), along) } else { vec2(along, ui.available_height()) };
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
     if on || response.hovered() {
         ui.painter().rect_filled(rect.shrink(1.0), 3.0, tokens.raised);
     }
-    if upright {
+    let square = if look.upright { vec2(size.x, ICON + PAD) } else { vec2(ICON + PAD, size.y) };
+    draw_icon(ui.painter(), egui::Rect::from_min_size(rect.min, square), ICON, pane.icon(), color);
+    let high = galley.size().y;
+    if look.named && look.upright {
         // Read from below: a quarter turn to the left.
-        let at = rect.center() + vec2(-0.5 * galley.size().y, 0.5 * galley.size().x);
+        let at = pos2(rect.center().x - 0.5 * high, rect.bottom() - 0.5 * PAD);
         let shape = egui::epaint::TextShape::new(at, galley, color).with_angle(-std::f32::consts::FRAC_PI_2);
         ui.painter().add(shape);
-    } else {
-        ui.painter().galley(rect.center() - 0.5 * galley.size(), galley, color);
+    } else if look.named {
+        ui.painter().galley(pos2(rect.left() + 0.5 * PAD + ICON + GAP, rect.center().y - 0.5 * high), galley, color);
     }
     let verb = if on { "Hide" } else { "Show" };
     let tip = format!("{verb} {}: {}.\nThe window has no room for it beside the maps.", pane.title(), pane.help());

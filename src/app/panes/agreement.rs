@@ -3,7 +3,7 @@
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::Named as _;
+use crate::app::widgets::{Mark, Named as _};
 use crate::labels::{MACHINE_THRESHOLD, Record, Tag, TagAgreement, Tags, against_machine, compare_tags};
 use crate::session::{Command, LabelMode, Labels, Records, Session};
 use egui::{Key, RichText, Role, Ui};
@@ -19,6 +19,7 @@ const LISTED: usize = 200;
 pub(super) static PANE: Pane = Pane {
     key: "Agreement",
     title: "Agreement",
+    icon: &[Mark::Ring([5.7, 8.0], 4.5), Mark::Ring([10.3, 8.0], 4.5)],
     help: "how far two annotators agree, or one and the machine",
     dock: Dock::Centre,
     keys: &[(CTRL, Key::Num3)],

@@ -4,7 +4,7 @@
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::map_image::{Orientation, colorize};
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::Named as _;
+use crate::app::widgets::{Mark, Named as _};
 use crate::dataset::{DatasetInfo, FftText, Frame, RadarPreset};
 use crate::radar::{AxisKind, LobeCut, Reflector, ReflectorMap, View, refined_widths, sine_deg, with_width};
 use crate::session::{CubeView, Session};
@@ -17,6 +17,13 @@ use std::sync::Arc;
 pub(super) static PANE: Pane = Pane {
     key: "Calibration",
     title: "Calibration",
+    icon: &[
+        Mark::Ring([8.0, 8.0], 4.5),
+        Mark::Line(&[[8.0, 1.0], [8.0, 6.0]]),
+        Mark::Line(&[[8.0, 10.0], [8.0, 15.0]]),
+        Mark::Line(&[[1.0, 8.0], [6.0, 8.0]]),
+        Mark::Line(&[[10.0, 8.0], [15.0, 8.0]]),
+    ],
     help: "point-spread widths, modelled and measured on a reflector",
     dock: Dock::Centre,
     keys: &[],

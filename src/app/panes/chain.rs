@@ -4,6 +4,7 @@
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::map_image::colorize;
 use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Mark;
 use crate::dataset::DatasetError;
 use crate::dataset::adc::{ChainStages, StageLimit};
 use crate::radar::sine_deg;
@@ -18,6 +19,12 @@ use egui::{
 pub(super) static PANE: Pane = Pane {
     key: "Chain",
     title: "Radar chain",
+    icon: &[
+        Mark::Box([1.0, 5.0, 5.0, 11.0]),
+        Mark::Box([11.0, 5.0, 15.0, 11.0]),
+        Mark::Line(&[[5.0, 8.0], [10.0, 8.0]]),
+        Mark::Line(&[[8.0, 6.0], [10.2, 8.0], [8.0, 10.0]]),
+    ],
     help: "a capture from its samples to its angles, with what each stage resolves",
     dock: Dock::Centre,
     keys: &[],

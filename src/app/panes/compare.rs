@@ -3,7 +3,7 @@
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::Named as _;
+use crate::app::widgets::{Mark, Named as _};
 use crate::config::{FitConfig, difference, from_preset};
 use crate::session::{Command, Pin, Session, numbers};
 use egui::{Color32, Key, RichText, Role, Ui};
@@ -12,6 +12,7 @@ use egui::{Color32, Key, RichText, Role, Ui};
 pub(super) static PANE: Pane = Pane {
     key: "Compare",
     title: "Compare",
+    icon: &[Mark::Box([1.5, 1.5, 10.0, 10.0]), Mark::Box([6.0, 6.0, 14.5, 14.5])],
     help: "pinned fits, and how far the others are from the baseline",
     dock: Dock::Bottom,
     keys: &[(CTRL, Key::Num2)],

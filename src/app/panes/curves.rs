@@ -10,6 +10,7 @@ use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::CTRL;
 use crate::app::figure;
 use crate::app::theme::Tokens;
+use crate::app::widgets::Mark;
 use crate::mhp::{Scope, TermId, Weight};
 use crate::session::{Branch, Command, CurvesShown, FitStatus, IterationRow, PinRow, Session, numbers};
 use crate::worker::JobId;
@@ -30,6 +31,10 @@ const DOUBLE_CLICK_S: f64 = 0.6;
 pub(super) static PANE: Pane = Pane {
     key: "Curves",
     title: "Curves",
+    icon: &[
+        Mark::Line(&[[2.0, 1.5], [2.0, 14.0], [15.0, 14.0]]),
+        Mark::Line(&[[4.0, 3.0], [5.5, 7.5], [8.0, 10.0], [11.0, 11.2], [14.5, 11.6]]),
+    ],
     help: "loss, its terms, IoU and MAJPE over the iterations",
     dock: Dock::Bottom,
     keys: &[(CTRL, Key::Num1)],
@@ -334,11 +339,13 @@ fn curves(shared: &Shared<'_>, branch: &Branch, tab: CurvesShown) -> Vec<Curve> 
         }
         CurvesShown::Loss => losses(),
         CurvesShown::Quality => {
+            let common = common_prefix(&arrays);
             let mut curves: Vec<Curve> = arrays
                 .iter()
                 .enumerate()
                 .map(|(i, array)| {
-                    curve(&format!("iou {i}"), &format!("IoU {array}"), 1.5, move |r| {
+                    let short = &array[common..];
+                    curve(&format!("iou {i}"), &format!("IoU {short}"), 1.5, move |r| {
                         r.report.iou.get(i).copied().flatten()
                     })
                 })
@@ -349,6 +356,14 @@ fn curves(shared: &Shared<'_>, branch: &Branch, tab: CurvesShown) -> Vec<Curve> 
             curves
         }
     }
+}
+
+/// Length of what all of several names begin with, up to an underscore: `hm_` of `hm_hori` and `hm_vert`.
+fn common_prefix(names: &[String]) -> usize {
+    let [first, others @ ..] = names else { return 0 };
+    let same = |at: usize| others.iter().all(|name| name.len() > at && name.starts_with(&first[..at]));
+    let ends = first.match_indices('_').map(|(at, _)| at + 1).filter(|&at| at < first.len() && same(at));
+    if others.is_empty() { 0 } else { ends.max().unwrap_or(0) }
 }
 
 /// L, and each of its terms that can be other than 0 with so many persons under the settings of these branches.
@@ -405,6 +420,14 @@ fn power(exponent: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn curves_are_called_by_what_tells_them_apart() {
+        let of = |names: &[&str]| common_prefix(&names.iter().map(ToString::to_string).collect::<Vec<_>>());
+        assert_eq!(of(&["hm_hori", "hm_vert"]), 3);
+        assert_eq!(of(&["radar_1_range", "radar_1_doppler"]), 8);
+        assert_eq!((of(&["hm_hori"]), of(&["hori", "vert"]), of(&["a_", "a_b"]), of(&[])), (0, 0, 0, 0));
+    }
 
     #[test]
     fn what_is_told_of_flags_never_overlaps() {

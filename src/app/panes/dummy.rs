@@ -5,6 +5,7 @@ use super::{Dock, PANES, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::{UserCommand, command, found};
 use crate::app::layout::PaneLayout;
 use crate::app::theme;
+use crate::app::widgets::Mark;
 use crate::session::Session;
 use egui_tiles::{Container, Tile, Tree};
 
@@ -12,6 +13,7 @@ use egui_tiles::{Container, Tile, Tree};
 pub(super) static PANE: Pane = Pane {
     key: "Dummy",
     title: "Dummy pane",
+    icon: &[Mark::Dot([8.0, 8.0], 6.0)],
     help: "how often it was drawn",
     dock: Dock::RightTop,
     keys: &[],

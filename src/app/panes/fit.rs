@@ -3,7 +3,7 @@
 use super::{Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::{Named as _, chip, icon_button, iou_color, rows, settings, value_row};
+use crate::app::widgets::{Mark, Named as _, chip, icon_button, iou_color, rows, settings, value_row};
 use crate::config::{Convergence, FIELDS, Field, FieldGroup, FitConfig, Preset, difference};
 use crate::mhp::{Precision, Scope, StopReason, TERMS, TermId, Terms, formula};
 use crate::session::{Command, FitStatus, IterationRow, Live, LiveFrom, RunSpeed, Session};
@@ -13,6 +13,14 @@ use egui::{Key, RichText, Ui};
 pub(super) static PANE: Pane = Pane {
     key: "Fit",
     title: "Fit",
+    icon: &[
+        Mark::Line(&[[1.0, 3.5], [15.0, 3.5]]),
+        Mark::Line(&[[1.0, 8.0], [15.0, 8.0]]),
+        Mark::Line(&[[1.0, 12.5], [15.0, 12.5]]),
+        Mark::Dot([5.0, 3.5], 2.0),
+        Mark::Dot([11.0, 8.0], 2.0),
+        Mark::Dot([6.5, 12.5], 2.0),
+    ],
     help: "the run, the numbers of the iteration that is shown, and every setting",
     dock: Dock::RightTop,
     keys: &[(CTRL, Key::Num6)],
@@ -243,7 +251,8 @@ fn start(ui: &mut Ui, shared: &mut Shared<'_>) {
     let (text, color) = match found {
         None => ("Start: —", tokens.dim),
         Some(found) => match (&found.motion, found.notes.first()) {
-            (Some(Err(held)), _) => (*held, tokens.warn),
+            // Why, and everything else, is told where the pointer rests.
+            (Some(Err(held)), _) => (held.split(';').next().unwrap_or(held), tokens.warn),
             (Some(Ok(note)), _) | (None, Some(note)) => (note.as_str(), tokens.dim),
             (None, None) => ("Start: from the peaks", tokens.dim),
         },
@@ -444,10 +453,13 @@ fn presets(ui: &mut Ui, config: &mut FitConfig) {
     let chosen = Preset::ALL.into_iter().find(|preset| *config == preset.config());
     let nearest = Preset::nearest(config);
     let (what, color) = match chosen {
-        Some(preset) => (preset.help().to_owned(), tokens.dim),
+        Some(preset) => (preset.brief().to_owned(), tokens.dim),
         None => (format!("{}, modified: {}", nearest.name(), difference(&nearest.config(), config)), tokens.warn),
     };
-    ui.add(egui::Label::new(RichText::new(what).small().color(color)).truncate());
+    let line = ui.add(egui::Label::new(RichText::new(what).small().color(color)).truncate());
+    if let Some(preset) = chosen {
+        line.on_hover_text(preset.help());
+    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Mark;
 use crate::body::Skeleton;
 use crate::dataset::{Frame, ImageAnnotations};
 use crate::session::Session;
@@ -14,6 +15,11 @@ use std::sync::Arc;
 pub(super) static PANE: Pane = Pane {
     key: "Image",
     title: "Image plane",
+    icon: &[
+        Mark::Box([1.5, 2.5, 14.5, 13.5]),
+        Mark::Ring([8.0, 6.2], 1.6),
+        Mark::Line(&[[4.5, 13.0], [5.5, 10.0], [10.5, 10.0], [11.5, 13.0]]),
+    ],
     help: "key points, boxes and masks in camera pixels",
     dock: Dock::RightBottom,
     keys: &[(CTRL, Key::Num9)],

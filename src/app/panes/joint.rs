@@ -4,7 +4,7 @@
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::{AppAct, CTRL};
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::Named as _;
+use crate::app::widgets::{Mark, Named as _};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::mhp::{Scope, TermGroup, Weight};
@@ -15,6 +15,11 @@ use egui::{Key, RichText, Ui};
 pub(super) static PANE: Pane = Pane {
     key: "Joint",
     title: "Joint",
+    icon: &[
+        Mark::Line(&[[2.0, 14.5], [6.3, 9.7]]),
+        Mark::Line(&[[9.7, 6.3], [14.5, 2.0]]),
+        Mark::Ring([8.0, 8.0], 2.4),
+    ],
     help: "every parameter of the selected joint, and its gradient",
     dock: Dock::RightTop,
     keys: &[(CTRL, Key::Num7)],

@@ -3,6 +3,7 @@
 use super::{Blank, Dock, Pane, PaneStates, Shared};
 use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Mark;
 use crate::session::{Command, LogLevel, Session};
 use egui::Key;
 
@@ -10,6 +11,12 @@ use egui::Key;
 pub(super) static PANE: Pane = Pane {
     key: "Log",
     title: "Log",
+    icon: &[
+        Mark::Box([2.5, 1.5, 13.5, 14.5]),
+        Mark::Line(&[[5.0, 5.0], [11.0, 5.0]]),
+        Mark::Line(&[[5.0, 8.0], [11.0, 8.0]]),
+        Mark::Line(&[[5.0, 11.0], [9.0, 11.0]]),
+    ],
     help: "what was opened, assumed, repaired and refused",
     dock: Dock::Bottom,
     keys: &[(CTRL, Key::Num5)],

@@ -16,7 +16,7 @@ use crate::app::figure;
 use crate::app::map_image::Orientation;
 use crate::app::map_plane::Plane;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::{BarRow, ColorBar, LimitsEdit, colorbar};
+use crate::app::widgets::{BarRow, ColorBar, LimitsEdit, Mark, colorbar};
 use crate::radar::View;
 use crate::session::{Compare, Session};
 use egui::{Key, Rect, Sense, Ui, UiBuilder, pos2, vec2};
@@ -30,6 +30,12 @@ use serde_json::Value;
 pub(super) static PANE: Pane = Pane {
     key: "Maps",
     title: "Maps",
+    icon: &[
+        Mark::Box([1.5, 1.5, 14.5, 14.5]),
+        Mark::Line(&[[1.5, 8.0], [14.5, 8.0]]),
+        Mark::Line(&[[8.0, 1.5], [8.0, 14.5]]),
+        Mark::Bar([8.0, 1.5, 14.5, 8.0]),
+    ],
     help: "the measured maps, the simulated ones and the masks of both",
     dock: Dock::Centre,
     keys: &[],
@@ -453,7 +459,7 @@ fn fit_aspect(inner: Rect, aspect: Option<f32>, window: MapExtent) -> Rect {
     Rect::from_min_size(inner.min, vec2(width, width / aspect))
 }
 
-/// Drag pans, the wheel zooms at the pointer, a double click shows everything.
+/// Drag pans, the wheel zooms at the pointer.
 fn navigate(ui: &Ui, response: &egui::Response, plot: Rect, window: &mut MapExtent) {
     let span = [window.max[0] - window.min[0], window.max[1] - window.min[1]];
     let mut moved = *window;

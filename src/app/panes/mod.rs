@@ -1,6 +1,6 @@
 //! The panes: each draws a part of the session and sends what is asked of it.
 //!
-//! **A pane is one file** (or folder) in this room with one `static PANE: Pane`: its key in stored layouts, title, help,
+//! **A pane is one file** (or folder) in this room with one `static PANE: Pane`: its key in stored layouts, title, icon, help,
 //! place in the default layout, the keys that bring it to the front, what it says where it has nothing to draw, its toolbar,
 //! and the function that draws it. What it remembers between passes is a type of that file that implements `PaneState`.
 //!

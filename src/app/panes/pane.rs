@@ -3,6 +3,7 @@
 use super::{PANES, Shared};
 use crate::app::commands::Shortcut;
 use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Icon;
 use crate::session::Session;
 use egui::Ui;
 use serde::de::{self, Deserialize, Deserializer, EnumAccess, VariantAccess as _, Visitor};
@@ -21,6 +22,8 @@ pub struct Pane {
     pub(super) key: &'static str,
     /// The title of its tab; `Show TITLE` brings it to the front.
     pub(super) title: &'static str,
+    /// What stands for it where its title has no room.
+    pub(super) icon: Icon,
     /// What it shows, as the end of a sentence.
     pub(super) help: &'static str,
     /// Where it is in the default layout.
@@ -106,6 +109,11 @@ impl Pane {
     /// The title of its tab.
     pub fn title(&self) -> &'static str {
         self.title
+    }
+
+    /// What stands for it where its title has no room.
+    pub(in crate::app) fn icon(&self) -> Icon {
+        self.icon
     }
 
     /// Where it is in the default layout.
@@ -346,5 +354,22 @@ impl PaneStates {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::widgets::icon_extent;
+
+    /// Every pane has an icon of its own, which fills its square and stays in it.
+    #[test]
+    fn panes_are_told_apart_by_their_icons() {
+        for (k, pane) in PANES.iter().enumerate() {
+            assert!(PANES[k + 1..].iter().all(|other| other.icon != pane.icon), "{}", pane.key);
+            let extent = icon_extent(pane.icon);
+            assert!(egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(16.0, 16.0)).contains_rect(extent));
+            assert!(extent.width().max(extent.height()) >= 12.0, "{}: {extent:?}", pane.key);
+        }
     }
 }

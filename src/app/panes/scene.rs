@@ -11,7 +11,7 @@ use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::{CTRL, CommandRow, Menu, NONE, UiAction, always, has_frame};
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::{Named as _, grounded};
+use crate::app::widgets::{Mark, Named as _, grounded};
 use crate::render::{Camera, Scene, SceneRenderer, Undrawable, Vec2, Vec3, pick, shapes};
 use crate::session::{Command, Session, SplatMode, ViewState};
 use crate::worker::JobId;
@@ -29,6 +29,11 @@ const RADIUS_M: f32 = 2.4;
 pub(super) static PANE: Pane = Pane {
     key: "Scene",
     title: "3-D",
+    icon: &[
+        Mark::Line(&[[8.0, 1.0], [14.5, 4.5], [14.5, 11.5], [8.0, 15.0], [1.5, 11.5], [1.5, 4.5], [8.0, 1.0]]),
+        Mark::Line(&[[1.5, 4.5], [8.0, 8.0], [14.5, 4.5]]),
+        Mark::Line(&[[8.0, 8.0], [8.0, 15.0]]),
+    ],
     help: "Gaussians, bones and the radar in the room",
     dock: Dock::RightBottom,
     keys: &[(CTRL, Key::Num8)],
@@ -493,7 +498,7 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>) {
                     camera(ui, shared);
                 }
             });
-            show.response.on_hover_text(what);
+            show.response.named(egui::Role::Button, "What the scene shows").on_hover_text(what);
             if !narrow {
                 let menu = ui.menu_button("By hand", |ui| by_hand(ui, &mut view));
                 menu.response.on_hover_text("Moving the body by hand.");
@@ -517,7 +522,7 @@ fn drawn(ui: &mut Ui, view: &mut ViewState) {
     });
     ui.checkbox(&mut view.show_velocity, "Velocity").on_hover_text("v of each joint, 0.3 s long.");
     ui.checkbox(&mut view.show_gradients, "Descent directions").on_hover_text(
-        "−∂L/∂p at each joint: blue the electromagnetic part, orange the kinematic part, rose the temporal part.",
+        "−∂L/∂p at each joint: teal the electromagnetic part, amber the kinematic part, rose the temporal part.",
     );
     ui.checkbox(&mut view.show_truth, "Truth").on_hover_text("The data set's joints in metres, where it has them.");
     ui.checkbox(&mut view.show_initial, "Start pose");

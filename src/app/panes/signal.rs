@@ -5,6 +5,7 @@ use super::chain::colormap;
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::map_image::{Orientation, colorize};
 use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Mark;
 use crate::mhp::{CellValue, FitError, simulate_signal};
 use crate::radar::View;
 use crate::render::Colormap;
@@ -17,6 +18,17 @@ use std::sync::Arc;
 pub(super) static PANE: Pane = Pane {
     key: "Signal",
     title: "Signal path",
+    icon: &[Mark::Line(&[
+        [1.0, 8.0],
+        [2.5, 4.2],
+        [4.0, 3.0],
+        [5.5, 4.2],
+        [8.0, 8.0],
+        [10.5, 11.8],
+        [12.0, 13.0],
+        [13.5, 11.8],
+        [15.0, 8.0],
+    ])],
     help: "the map that the signals themselves give, beside the closed form",
     dock: Dock::Centre,
     keys: &[],

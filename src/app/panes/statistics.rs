@@ -3,7 +3,7 @@
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::{Named as _, iou_color};
+use crate::app::widgets::{Mark, Named as _, iou_color};
 use crate::labels::Tag;
 use crate::session::{FrameSummary, LabelMode, Records, Session};
 use egui::{Key, RichText, Role, Sense, Ui, vec2};
@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 pub(super) static PANE: Pane = Pane {
     key: "Statistics",
     title: "Statistics",
+    icon: &[Mark::Bar([2.0, 8.5, 5.0, 14.0]), Mark::Bar([6.5, 2.5, 9.5, 14.0]), Mark::Bar([11.0, 6.0, 14.0, 14.0])],
     help: "how often each tag was given, and what the fits come to",
     dock: Dock::Centre,
     keys: &[(CTRL, Key::Num4)],

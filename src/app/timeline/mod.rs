@@ -136,10 +136,10 @@ fn iterations(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
     let flags: Vec<_> = fit.history.flags().into_iter().filter(|(at, _)| (start..=head).contains(at)).collect();
     caption(ui, "Iteration");
     for (sign, name, label, enabled) in [
-        ("◂", "Iteration back", "One step back", ready && shown > start),
+        ("−1", "Iteration back", "One step back", ready && shown > start),
         (if running { PAUSE_FIT } else { RUN_FIT }, "Run or pause fit", "Run or pause", ready),
-        ("▸", "Iteration forward", "One step", ready && (back || !running)),
-        ("▸|", "Follow newest", "Follow newest iteration", back),
+        ("+1", "Iteration forward", "One step", ready && (back || !running)),
+        ("⇥", "Follow newest", "Follow newest iteration", back),
     ] {
         let tip = command(label).map(UserCommand::tip).unwrap_or_default();
         let clicked = if label == "Run or pause" {

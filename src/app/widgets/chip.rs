@@ -31,6 +31,19 @@ pub(crate) fn grounded(
     ground
 }
 
+/// The first of these texts, of that size, that an empty field across `ui` has room for; else the last.
+pub(crate) fn fitting<'a, S: AsRef<str>>(ui: &Ui, texts: &'a [S], size: f32) -> &'a str {
+    /// What a field has around its text, points.
+    const AROUND: f32 = 18.0;
+    let room = ui.available_width() - AROUND;
+    let wide = |text: &str| {
+        let font = egui::FontId::proportional(size);
+        ui.painter().layout_no_wrap(text.to_owned(), font, Color32::GRAY).size().x
+    };
+    let texts = || texts.iter().map(AsRef::as_ref);
+    texts().find(|text| wide(text) <= room).or_else(|| texts().last()).unwrap_or_default()
+}
+
 /// The colour of an IoU: bad, attention, good. The number beside it says the same.
 pub(crate) fn iou_color(tokens: &Tokens, iou: f64) -> Color32 {
     if iou >= 0.5 {

@@ -13,6 +13,8 @@ use egui::{Align2, Color32, Pos2, Rect, Sense, Stroke, Ui, pos2, vec2};
 const HISTOGRAM: f32 = 16.0;
 /// The unit above the bar.
 const ABOVE: f32 = 20.0;
+/// A lower bar is not drawn.
+const LEAST: f32 = 24.0;
 /// Half a line of a number.
 const HALF_LINE: f32 = 6.0;
 
@@ -58,6 +60,11 @@ impl ColorBar<'_> {
         lo + t * (hi - lo)
     }
 
+    /// Whether there are buttons under the bar: where it is low, the form of the limits has them.
+    pub(super) fn has_buttons(&self) -> bool {
+        self.row.is_some() && self.rect.height() > ABOVE + limits::BUTTONS + 2.0 * LEAST
+    }
+
     /// A value as text: `≤` before what may lie anywhere below the floor.
     fn text(&self, value: f64) -> String {
         let (lo, hi) = self.histogram.span;
@@ -69,10 +76,10 @@ impl ColorBar<'_> {
 /// Draws the bar; answers what was done to the limits.
 pub(crate) fn colorbar(ui: &mut Ui, bar: &ColorBar<'_>) -> Option<LimitsEdit> {
     let tokens = Tokens::of(ui);
-    let below = if bar.row.is_some() { limits::BUTTONS + 8.0 } else { HALF_LINE };
+    let below = if bar.has_buttons() { limits::BUTTONS + 8.0 } else { HALF_LINE };
     let left = bar.rect.min.x + 4.0 + if bar.histogram.heights.is_empty() { 0.0 } else { HISTOGRAM + 1.0 };
     let strip = Rect::from_min_max(pos2(left, bar.rect.min.y + ABOVE), pos2(left + 10.0, bar.rect.max.y - below));
-    if strip.height() < 24.0 {
+    if strip.height() < LEAST {
         return None;
     }
     let painter = ui.painter().with_clip_rect(bar.rect.intersect(ui.clip_rect()));

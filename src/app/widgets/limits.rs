@@ -37,7 +37,7 @@ pub(super) fn edit(
 ) -> Option<LimitsEdit> {
     let tokens = Tokens::of(ui);
     let id = ui.scope_id().with(("limits", &row.name));
-    let mut edit = buttons(ui, bar.rect, row, id, &tokens);
+    let mut edit = if bar.has_buttons() { buttons(ui, bar.rect, row, id, &tokens) } else { None };
     let mut open = false;
     for (upper, (text, rect)) in [false, true].into_iter().zip(texts.into_iter().zip(rects)) {
         let response = ui.interact(rect, id.with(upper), Sense::click());

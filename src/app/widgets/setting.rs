@@ -96,8 +96,8 @@ fn slider(ui: &mut Ui, field: &Field, width: f32, number: &Number, preset: Prese
             value = three_digits(value).clamp(lo, hi);
         }
         response.widget_info(|| egui::WidgetInfo::slider(true, value, field.label));
-        response.on_hover_text(&tip);
-        typed(ui, field, number, &mut value).on_hover_text(&tip);
+        unless_held(response, &tip);
+        unless_held(typed(ui, field, number, &mut value), &tip);
         let back = egui::Button::new("↺").small().frame(false).min_size(BACK);
         let back = ui.add_visible(value != usual, back);
         let back = back.named(egui::Role::Button, &format!("Reset {}", field.label));
@@ -107,6 +107,13 @@ fn slider(ui: &mut Ui, field: &Field, width: f32, number: &Number, preset: Prese
     });
     if value != old {
         field.set(config, Value::Number(value));
+    }
+}
+
+/// Tells what a thing is, but not while it is dragged: the maps beside it are what the finger moves.
+fn unless_held(response: Response, tip: &str) {
+    if !response.ctx.input(|i| i.pointer.any_down()) {
+        response.on_hover_text(tip);
     }
 }
 
@@ -149,7 +156,7 @@ fn optional(ui: &mut Ui, field: &Field, width: f32, number: &Number, config: &mu
             let mut value = old;
             // In the column of all numbers.
             ui.add_space((ui.available_width() - beside() + GAP).max(0.0));
-            typed(ui, field, number, &mut value).on_hover_text(&tip);
+            unless_held(typed(ui, field, number, &mut value), &tip);
             if value != old {
                 field.set(config, Value::Number(value));
             }

@@ -49,6 +49,15 @@ impl Preset {
         Self::ALL.into_iter().min_by_key(|preset| preset.config().changes(config).count()).unwrap_or_default()
     }
 
+    /// What it is, in a few words.
+    pub fn brief(self) -> &'static str {
+        match self {
+            Self::Baseline => "the paper's fit, the room left out",
+            Self::Paper => "the paper to the letter",
+            Self::Recommended => "people counted, frames fitted together",
+        }
+    }
+
     /// What it is, in a line.
     pub fn help(self) -> &'static str {
         match self {

@@ -102,12 +102,15 @@ pub(super) fn show(
         if let Some(y) = now {
             inside.circle_filled(at(PlotPoint::new(here, y)), 2.5, color);
         }
-        let text = now.map_or_else(|| "–".into(), number);
+        let text = now.map_or_else(|| "–".into(), |now| number(now, 4));
         let font = FontId::proportional(theme::CAPTION);
-        let value = painter.layout_no_wrap(text.clone(), theme::mono(theme::CAPTION), tokens.text);
         let named = painter.layout_no_wrap(curve.name.clone(), font.clone(), color).size().x;
+        let lettered = |text: String| painter.layout_no_wrap(text, theme::mono(theme::CAPTION), tokens.text);
+        let fits = |value: &std::sync::Arc<egui::Galley>| value.size().x + named + 5.0 < rect.width();
+        let fewer = || now.map_or_else(|| lettered("–".into()), |now| lettered(number(now, 2)));
+        let value = Some(lettered(text.clone())).filter(fits).unwrap_or_else(fewer);
         // Where there is no room for both, the name stays: the value is in the pane Fit too.
-        let both = value.size().x + named.min(30.0) + 6.0 < rect.width();
+        let both = fits(&value);
         let right = if both { rect.max.x - value.size().x } else { rect.max.x + 4.0 };
         if both {
             painter.galley(pos2(right, rect.min.y), value, tokens.text);
@@ -120,7 +123,7 @@ pub(super) fn show(
             for (place, anchor, y) in
                 [(plot.left_top(), Align2::LEFT_TOP, scale.hi), (plot.left_bottom(), Align2::LEFT_BOTTOM, scale.lo)]
             {
-                painter.text(place + vec2(3.0, 0.0), anchor, number(y), small.clone(), tokens.dim);
+                painter.text(place + vec2(3.0, 0.0), anchor, number(y, 4), small.clone(), tokens.dim);
             }
         }
         response.widget_info(|| figure::spoken(&format!("Curve of {}", curve.name), Some(&text)));
@@ -151,8 +154,8 @@ pub(super) fn show(
         response.on_hover_text(format!(
             "{}: {} to {}{}\nClick or drag to show an iteration; the wheel zooms, a double click shows all.",
             curve.name,
-            number(scale.lo),
-            number(scale.hi),
+            number(scale.lo, 4),
+            number(scale.hi, 4),
             if scale.log { ", logarithmic" } else { "" }
         ));
     }
@@ -210,12 +213,12 @@ impl Scale {
     }
 }
 
-/// Four digits that count.
-fn number(y: f64) -> String {
+/// So many digits that count.
+fn number(y: f64, digits: usize) -> String {
     let text = match y.abs() {
         0.0 => "0".to_owned(),
-        a if !(1e-4..1e5).contains(&a) => format!("{y:.2e}"),
-        a => format!("{y:.*}", (3 - a.log10().floor() as i32).clamp(0, 6) as usize),
+        a if !(1e-4..1e5).contains(&a) => format!("{y:.*e}", digits.saturating_sub(2)),
+        a => format!("{y:.*}", (digits as i32 - 1 - a.log10().floor() as i32).clamp(0, 6) as usize),
     };
     text.replace('-', "−")
 }
@@ -252,7 +255,8 @@ mod tests {
         assert!((scale.unit(0.1) - 0.5).abs() < 1e-6);
         assert!(!Scale::of([0.0, 1.0].into_iter(), true).log, "0 has no logarithm");
         assert_eq!(Scale::of([2.0].into_iter(), false).unit(2.0), 0.5);
-        let told = [0.0, 0.023_51, -1.5, 97.94, 12_345.6, 3.2e-7].map(number);
+        let told = [0.0, 0.023_51, -1.5, 97.94, 12_345.6, 3.2e-7].map(|y| number(y, 4));
         assert_eq!(told, ["0", "0.02351", "−1.500", "97.94", "12346", "3.20e−7"]);
+        assert_eq!([0.08595, 0.6048, 128.7].map(|y| number(y, 2)), ["0.086", "0.60", "129"]);
     }
 }

@@ -29,6 +29,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
             // Their names are over the pictures.
             ui.menu_button("Show", |ui| choose(ui, &curves, &mut view, &tokens))
                 .response
+                .named(egui::Role::Button, "Which curves are shown")
                 .on_hover_text("Which curves are shown.");
         } else {
             ui.add_space(4.0);

@@ -4,7 +4,7 @@ use super::columns::{Column, columns};
 use super::{GAP, ROW, State};
 use crate::app::panes::Shared;
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::{Named as _, WorkAsked, work};
+use crate::app::widgets::{Named as _, WorkAsked, fitting, work};
 use crate::session::{Command, ComparedNumber, ResultSide, Sort, SortKey, StrataStatus, syntax};
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Align2, RichText, Role, Sense, Ui, pos2, vec2};
@@ -27,12 +27,15 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     found(ui, shared, tokens);
 }
 
+/// What the empty filter says, where there is room for it.
+const HINTS: [&str; 3] = ["Filter: stratum:hard iou<0.5 -tag:F1", "Filter: stratum:hard iou<0.5", "Filter frames"];
+
 fn filter(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tokens) {
     let session = shared.session;
     let mut text = state.filter.clone().unwrap_or_else(|| session.queue.text.clone());
     let wrong = session.queue.error.clone();
     let field = egui::TextEdit::singleline(&mut text)
-        .hint_text("Filter: stratum:hard iou<0.5 -tag:F1")
+        .hint_text(fitting(ui, &HINTS, theme::BODY))
         .text_color_opt(wrong.is_some().then_some(tokens.bad))
         .desired_width(ui.available_width() - 8.0);
     let response = ui.add(field).named(Role::TextInput, "Filter frames");

@@ -6,6 +6,7 @@ mod header;
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::{CTRL, CommandRow, Menu, UiAction, has_frame};
 use crate::app::theme::{self, Tokens};
+use crate::app::widgets::Mark;
 use crate::session::{Command, Session};
 use columns::{Column, cell, spoken};
 use egui::{Key, RichText, Sense, Ui, pos2, vec2};
@@ -20,6 +21,14 @@ const GAP: f32 = 4.0;
 pub(super) static PANE: Pane = Pane {
     key: "Frames",
     title: "Frames",
+    icon: &[
+        Mark::Bar([1.5, 2.5, 3.5, 4.5]),
+        Mark::Bar([1.5, 7.0, 3.5, 9.0]),
+        Mark::Bar([1.5, 11.5, 3.5, 13.5]),
+        Mark::Line(&[[6.0, 3.5], [14.5, 3.5]]),
+        Mark::Line(&[[6.0, 8.0], [14.5, 8.0]]),
+        Mark::Line(&[[6.0, 12.5], [14.5, 12.5]]),
+    ],
     help: "the list of frames, its filter and its order",
     dock: Dock::LeftTop,
     keys: &[],

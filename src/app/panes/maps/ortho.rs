@@ -11,7 +11,7 @@ use crate::app::figure;
 use crate::app::map_image::{Orientation, colorize, level, limits, shown};
 use crate::app::panes::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::Named as _;
+use crate::app::widgets::{Mark, Named as _};
 use crate::dataset::Frame;
 use crate::radar::View;
 use crate::render::Colormap;
@@ -26,6 +26,12 @@ use std::sync::Arc;
 pub(in crate::app::panes) static PANE: Pane = Pane {
     key: "Ortho",
     title: "Orthoview",
+    icon: &[
+        Mark::Box([1.5, 1.5, 14.5, 14.5]),
+        Mark::Line(&[[5.5, 1.5], [5.5, 14.5]]),
+        Mark::Line(&[[1.5, 10.0], [14.5, 10.0]]),
+        Mark::Dot([5.5, 10.0], 1.8),
+    ],
     help: "three linked cuts through a map with three axes",
     dock: Dock::Centre,
     keys: &[],

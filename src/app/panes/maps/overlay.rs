@@ -38,14 +38,20 @@ pub(super) fn title(
         }
         _ => content.name().to_owned(),
     };
-    let mut job = egui::text::LayoutJob::default();
-    let format =
-        |color| egui::TextFormat { font_id: FontId::proportional(theme::CAPTION), color, ..Default::default() };
-    job.append(&view.array, 0.0, format(theme::DARK.dim));
-    job.append(&text, 6.0, format(theme::DARK.text));
-    job.wrap.max_width = (plot.width() - 8.0).max(20.0);
-    job.wrap.max_rows = 2;
-    let galley = painter.layout_job(job);
+    let room = (plot.width() - 8.0).max(20.0);
+    let lettered = |array: &str| {
+        let mut job = egui::text::LayoutJob::default();
+        let format =
+            |color| egui::TextFormat { font_id: FontId::proportional(theme::CAPTION), color, ..Default::default() };
+        job.append(array, 0.0, format(theme::DARK.dim));
+        job.append(&text, if array.is_empty() { 0.0 } else { 6.0 }, format(theme::DARK.text));
+        job.wrap = egui::text::TextWrapping::truncate_at_width(room);
+        painter.layout_job(job)
+    };
+    // Of a long name the end is left out, and all of it before anything of the content.
+    let shortened = (1..view.array.len()).rev().filter_map(|end| view.array.get(..end)).map(|head| format!("{head}…"));
+    let mut names = std::iter::once(view.array.clone()).chain(shortened).map(|name| lettered(&name));
+    let galley = names.find(|galley| !galley.elided).unwrap_or_else(|| lettered(""));
     let ground = Rect::from_min_size(plot.min, galley.size() + vec2(8.0, 3.0));
     painter.rect_filled(ground, 0.0, theme::DARK.canvas.gamma_multiply(0.72));
     painter.galley(plot.min + vec2(4.0, 1.0), galley, theme::DARK.text);

@@ -207,7 +207,8 @@ fn more(ui: &mut Ui, shared: &mut Shared<'_>) {
             view.auto_contrast();
         }
     });
-    menu.response.on_hover_text("What is drawn on the maps, and how the colour limits are found.");
+    let tip = "What is drawn on the maps, and how the colour limits are found.";
+    menu.response.named(egui::Role::Button, "What the maps show").on_hover_text(tip);
     if view != shared.session.view {
         shared.set_view(|v| *v = view);
     }

@@ -6,7 +6,7 @@ mod journal;
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::{CommandRow, Menu, NONE, UiAction, UserCommand, command, has_frame};
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::Named as _;
+use crate::app::widgets::{Mark, Named as _, fitting};
 use crate::dataset::Dataset;
 use crate::labels::{CellRegion, Tag, Verdict};
 use crate::radar::View;
@@ -18,6 +18,11 @@ use std::sync::Arc;
 pub(super) static PANE: Pane = Pane {
     key: "Modes",
     title: "Failure modes",
+    icon: &[
+        Mark::Line(&[[8.0, 1.5], [15.0, 14.0], [1.0, 14.0], [8.0, 1.5]]),
+        Mark::Line(&[[8.0, 6.0], [8.0, 9.8]]),
+        Mark::Dot([8.0, 11.8], 0.9),
+    ],
     help: "a frame's tags and note, and the machine's evidence",
     dock: Dock::LeftBottom,
     keys: &[],
@@ -244,8 +249,9 @@ fn region(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, known: Option
     let frame = shared.session.data.frame_index;
     let stored = known.map(ToString::to_string).unwrap_or_default();
     let views = shared.session.data.dataset.as_ref().map_or(&[][..], |dataset| &dataset.info().views[..]);
-    let hint =
-        views.first().map_or_else(String::new, |view| format!("cells, for example {}[10..=20, 30..=42]", view.array));
+    let example = views.first().map_or_else(String::new, |view| format!("{}[10..=20, 30..=42]", view.array));
+    let hints = [format!("cells, for example {example}"), example, "cells".to_owned()];
+    let hint = fitting(ui, &hints, theme::CAPTION).to_owned();
     let read = |text: &str| if text.trim().is_empty() { Ok(None) } else { cells(text, views).map(Some) };
     // What was being typed when the frame changed belongs to the frame that it was typed for.
     if let Some((typed_for, typed)) = state.region.take_if(|(typed_for, _)| *typed_for != frame)

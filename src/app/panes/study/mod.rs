@@ -11,7 +11,7 @@ mod table;
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::commands::{AppAct, CTRL_SHIFT, CommandRow, Menu, SHIFT, UiAction, has_frame};
 use crate::app::theme::{self, Tokens};
-use crate::app::widgets::Named as _;
+use crate::app::widgets::{Mark, Named as _};
 use crate::session::{Command, Session};
 use crate::study::run::{Run, StudyKind};
 use crate::study::shard::Subset;
@@ -25,6 +25,12 @@ const NARROW: f32 = 460.0;
 pub(in crate::app) static PANE: Pane = Pane {
     key: "Study",
     title: "Study",
+    icon: &[
+        Mark::Box([1.5, 2.5, 14.5, 13.5]),
+        Mark::Line(&[[1.5, 6.0], [14.5, 6.0]]),
+        Mark::Line(&[[1.5, 9.8], [14.5, 9.8]]),
+        Mark::Line(&[[6.0, 2.5], [6.0, 13.5]]),
+    ],
     help: "a study's table and plot",
     dock: Dock::Centre,
     keys: &[],
@@ -93,7 +99,7 @@ enum Picture {
 }
 
 fn blank(session: &Session) -> Option<Blank> {
-    let how = "Open a data set to run one here, or a run folder of `mhp-inspector study` with File > Open study….";
+    let how = "Open a data set to run one here, or a run folder of `mhp-inspector study` with File > Open study.";
     match &session.study {
         study if study.run.is_some() || session.data.dataset.is_some() => None,
         study if study.reading.is_some() => Some(Blank::new("Reading a run…", "")),
@@ -160,7 +166,7 @@ fn none_yet(ui: &mut Ui, running: bool, tokens: &Tokens) {
         "The table grows here as frames are fitted."
     } else {
         "A study fits the listed frames with several settings and puts their errors side by side. A sweep takes any two \
-         settings; the others ask what the paper asks. A run folder of the command line is shown with File > Open study…."
+         settings; the others ask what the paper asks. A run folder of the command line is shown with File > Open study."
     };
     ui.label(RichText::new(text).small().color(tokens.dim));
 }

@@ -126,7 +126,8 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, order: &mut Option<Orde
                 shared.send(Command::RunStudy(StudyOrder { study: order.study, grid }));
             }
             let fits = variants * frames;
-            let text = format!("{variants} variants × {frames} frames = {fits} fits");
+            let of = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
+            let text = format!("{} × {} = {}", of(variants, "variant"), of(frames, "frame"), of(fits, "fit"));
             let color = if fits > MANY { tokens.warn } else { tokens.dim };
             ui.label(RichText::new(text).small().color(color)).on_hover_text(
                 "Of the frames that are selected in the list, else of all that match its filter: filter, or select, to \

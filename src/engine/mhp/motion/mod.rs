@@ -79,15 +79,15 @@ pub(super) enum Held {
 }
 
 impl Held {
-    /// In words.
+    /// In words: that, and after a semicolon why.
     pub(super) fn note(self) -> &'static str {
         match self {
-            Self::Skeleton => "held at the start: the prior of motion knows nothing of this skeleton",
+            Self::Skeleton => "held at the start: an unknown skeleton; the prior of motion has nothing of it",
             Self::Unlike => {
-                "held at the start: no body of the prior explains the maps (their levels correlate by less than 0.8)"
+                "held at the start: no body explains the maps; their levels correlate by less than 0.8 with each of the prior"
             }
             Self::Clutter => {
-                "held at the start: nobody walks and static echoes were not removed, so body and reflectors cannot be told apart"
+                "held at the start: nobody walks; static echoes were not removed, so body and reflectors cannot be told apart"
             }
         }
     }
