@@ -32,8 +32,8 @@ const CLOSELY: usize = 1024;
 const REFIT_SHOWN: Duration = Duration::from_millis(16);
 /// Steps that are taken to tell how long one takes.
 const TIMED_STEPS: usize = 3;
-/// A step this slow is timed once, ms.
-const SLOW_STEP_MS: f64 = 2.0;
+/// A step this slow is timed once, ms: longer than a busy machine keeps a thread waiting.
+const SLOW_STEP_MS: f64 = 20.0;
 
 /// The start of a branch whose first row this job did not make.
 const NOWHERE: usize = usize::MAX;

@@ -47,16 +47,28 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, card: &Evidence, tokens: &Tokens) {
     let response = frame.show(ui, |ui| {
         ui.set_min_width(ui.available_width());
         ui.spacing_mut().item_spacing.y = 3.0;
-        ui.horizontal(|ui| {
+        let words = || egui::Label::new(RichText::new(card.mode.words()).small());
+        let long = {
+            let font = egui::TextStyle::Small.resolve(ui.style());
+            ui.painter().layout_no_wrap(card.mode.words().to_owned(), font, tokens.text).size().x
+        };
+        let beside = ui.horizontal(|ui| {
             ui.label(RichText::new(card.mode.code()).font(theme::strong(12.0)).color(tokens.tag(card.mode)));
-            // The score has its place first; the words take what is left.
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                score(ui, card, tokens);
-                ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                    ui.add(egui::Label::new(RichText::new(card.mode.words()).small()).truncate());
-                });
-            });
+            // The score has its place first; the words have a line of their own where they do not fit beside it.
+            let score = |ui: &mut Ui| {
+                number(ui, card);
+                let room = ui.available_width() - long - 2.0 * ui.spacing().item_spacing.x;
+                bar(ui, card, if room < SHORTEST { BAR } else { room.min(BAR) }, tokens);
+                if room >= SHORTEST {
+                    ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| ui.add(words()));
+                }
+                room >= SHORTEST
+            };
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), score).inner
         });
+        if !beside.inner {
+            ui.add(words().wrap());
+        }
         ui.add(egui::Label::new(RichText::new(&card.summary).small()).wrap());
         if !card.findings.is_empty() {
             details(ui, shared, card, tokens);
@@ -96,11 +108,19 @@ fn details(ui: &mut Ui, shared: &mut Shared<'_>, card: &Evidence, tokens: &Token
     }
 }
 
-/// The number with a bar of the same length.
-fn score(ui: &mut Ui, card: &Evidence, tokens: &Tokens) {
+/// The length of a bar, and of the shortest one, points.
+const BAR: f32 = 56.0;
+const SHORTEST: f32 = 18.0;
+
+/// The score.
+fn number(ui: &mut Ui, card: &Evidence) {
     let text = card.score.map_or_else(|| "–".into(), |score| format!("{score:.2}"));
     ui.label(RichText::new(text).font(theme::mono(12.0)));
-    let (rect, _) = ui.allocate_exact_size(vec2(56.0, 6.0), Sense::hover());
+}
+
+/// The score as a bar.
+fn bar(ui: &mut Ui, card: &Evidence, length: f32, tokens: &Tokens) {
+    let (rect, _) = ui.allocate_exact_size(vec2(length, 6.0), Sense::hover());
     ui.painter().rect_filled(rect, 2.0, tokens.stroke);
     if let Some(score) = card.score {
         let filled = egui::Rect::from_min_size(rect.min, vec2(rect.width() * score as f32, rect.height()));

@@ -250,7 +250,7 @@ fn region(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, known: Option
     let stored = known.map(ToString::to_string).unwrap_or_default();
     let views = shared.session.data.dataset.as_ref().map_or(&[][..], |dataset| &dataset.info().views[..]);
     let example = views.first().map_or_else(String::new, |view| format!("{}[10..=20, 30..=42]", view.array));
-    let hints = [format!("cells, for example {example}"), example, "cells".to_owned()];
+    let hints = [format!("cells, for example {example}"), format!("e.g. {example}"), "cells".to_owned()];
     let hint = fitting(ui, &hints, theme::CAPTION).to_owned();
     let read = |text: &str| if text.trim().is_empty() { Ok(None) } else { cells(text, views).map(Some) };
     // What was being typed when the frame changed belongs to the frame that it was typed for.
