@@ -43,6 +43,7 @@
 //! | [`session`] | the state behind the window and the only function that changes it |
 //! | [`worker`] | the thread that runs a fit, and its protocol |
 //! | [`study`] | batch runs; studies, their tables and run folders; exports; which frames are hard; shards of all of them |
+//! | [`explore`] | what else a fit could have done: maps over settings, slices of the loss, restarts |
 //! | [`labels`] | tags, notes, verdicts, the journal that keeps them, agreement |
 //! | [`diagnose`] | metrics: MAJPE, PA-MAJPE; evidence for each failure mode |
 //! | [`start`] | where a frame's fit begins: the problem with the frames around it, and for how many people a start is asked |
@@ -65,6 +66,7 @@ pub mod dataset;
 pub mod diagnose;
 mod digest;
 pub mod escape;
+pub mod explore;
 pub mod folders;
 pub mod labels;
 pub mod output;

@@ -58,6 +58,9 @@ const RIGHT: (f32, [f32; 2]) = (0.2, [258.0, 430.0]);
 /// Height of what is below the maps.
 const BELOW: (f32, [f32; 2]) = (0.165, [112.0, 300.0]);
 
+/// The same while a pane is in front there that needs more of it.
+const BELOW_TALL: (f32, [f32; 2]) = (0.42, [200.0, 620.0]);
+
 /// A share of the window's size, within bounds, points.
 fn within((share, [least, most]): (f32, [f32; 2]), of: f32) -> f32 {
     (share * of).clamp(least, most)
@@ -65,9 +68,9 @@ fn within((share, [least, most]): (f32, [f32; 2]), of: f32) -> f32 {
 
 impl Fitted {
     /// Sets the borders for a window whose sides have these widths, points, 0 where one gave way; false where somebody moved one.
-    fn set(&mut self, tiles: &mut Tiles<Leaf>, size: egui::Vec2, sides: [f32; 2]) -> bool {
+    fn set(&mut self, tiles: &mut Tiles<Leaf>, size: egui::Vec2, sides: [f32; 2], tall: bool) -> bool {
         let [left, right] = sides.map(|width| width / size.x.max(1.0));
-        let below = within(BELOW, size.y) / size.y.max(1.0);
+        let below = within(if tall { BELOW_TALL } else { BELOW }, size.y) / size.y.max(1.0);
         // What gave way keeps a share that counts for nothing.
         let kept = |share: f32| if share > 0.0 { share } else { 0.2 };
         let middle = (1.0 - left - right).max(0.1);
@@ -99,7 +102,7 @@ fn linear(tiles: &mut Tiles<Leaf>, dir: LinearDir, children: &[(TileId, f32)]) -
 
 /// The panes of a place: tabs, and one alone as it is.
 fn docked(tiles: &mut Tiles<Leaf>, dock: Dock) -> TileId {
-    let panes = Pane::all().iter().filter(|pane| pane.dock() == dock);
+    let panes = Pane::all().iter().filter(|pane| pane.dock().is_beside(dock));
     let panes: Vec<TileId> = panes.map(|pane| tiles.insert_pane(*pane)).collect();
     match panes[..] {
         [one] => one,
@@ -127,7 +130,7 @@ impl PaneLayout {
                 continue;
             }
             let is_tabs = |id: &TileId| matches!(tiles.get(*id), Some(Tile::Container(Container::Tabs(_))));
-            let neighbours = Pane::all().iter().filter(|other| other.dock() == pane.dock());
+            let neighbours = Pane::all().iter().filter(|other| other.dock().is_beside(pane.dock()));
             let mut homes = neighbours.filter_map(|other| tiles.parent_of(tiles.find_pane(other)?)).filter(is_tabs);
             let Some(home) = homes.next().or_else(|| tiles.tile_ids().filter(is_tabs).min_by_key(|id| id.0)) else {
                 return;
@@ -172,7 +175,9 @@ impl PaneLayout {
                 ui.ctx().request_repaint();
             }
             let size = ui.available_size();
-            let set = |mut fitted: Fitted| fitted.set(&mut self.tree.tiles, size, sides).then_some(fitted);
+            let in_front = self.tree.active_tiles().into_iter().filter_map(|id| self.tree.tiles.get_pane(&id));
+            let tall = in_front.into_iter().any(|pane| pane.dock() == Dock::BottomTall);
+            let set = |mut fitted: Fitted| fitted.set(&mut self.tree.tiles, size, sides, tall).then_some(fitted);
             self.fitted = self.fitted.take().and_then(set);
             let mut behavior = Behavior { shared, states, asked: &mut self.asked, icons: Vec::new() };
             self.tree.ui(&mut behavior, ui);

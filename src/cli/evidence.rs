@@ -49,7 +49,11 @@ The scores rest on these measures (`measures` in JSON):
   F4  quiet, steadiness: strongest change over 5 frames outside the EM region against inside, and how little the body's own echo
       varies (over 2 frames: quiet_pair, steadiness_pair); in a single frame with a Doppler axis slowness, -ln u.
 
-JSON: an array of {frame, index, F1: {score, raw, measures: [{name, value}], summary, findings: [{text, place}]}, F2, F3, \
+With --restarts N each frame is fitted from N starts too (`explore restarts` says how they are spread): `best_basin` is the share
+whose fits end in the best basin. Near 1 every start finds the same; a small one is a frame that is ambiguous, or a fit that does
+not find out of its start.
+
+JSON: an array of {frame, index, best_basin, F1: {score, raw, measures: [{name, value}], summary, findings: [{text, place}]}, F2, F3, \
 F4}; place is null, {cells: {view, \
 lo, hi}}, {joint: N} or {frame: INDEX}. A frame that fails has `error` instead of F1 to F4.
 
@@ -89,10 +93,13 @@ pub struct EvidenceArgs {
     /// Scalar of the per-cell kernel.
     #[arg(long, value_enum, default_value = "f32")]
     precision: PrecisionArg,
+    /// Also fit each frame from this many starts, and tell the share that ends in the best basin.
+    #[arg(long, value_name = "N", value_parser = super::explore::starts)]
+    restarts: Option<usize>,
     /// One JSON array instead of cards.
     #[arg(long)]
     json: bool,
-    /// Also write a table: frame, index, F1 to F4, their summaries, error.
+    /// Also write a table: frame, index, F1 to F4, their summaries, best_basin, error.
     #[arg(long, value_name = "F")]
     csv: Option<PathBuf>,
     #[command(flatten)]
@@ -127,7 +134,10 @@ pub(super) fn run(args: &EvidenceArgs) -> anyhow::Result<ExitCode> {
     let judge = |frames: Range<usize>| -> Vec<FrameEvidence> {
         let bar = progress_bar(frames.len());
         let judge = |index| {
-            let judged = frame_evidence(&dataset, index, &options, params.as_ref());
+            let mut judged = frame_evidence(&dataset, index, &options, params.as_ref());
+            if let Some(starts) = args.restarts {
+                judged.best_basin = super::explore::best_basin(&dataset, index, &options, starts);
+            }
             bar.inc(1);
             judged
         };
@@ -136,7 +146,7 @@ pub(super) fn run(args: &EvidenceArgs) -> anyhow::Result<ExitCode> {
         judged
     };
     if let Some((shard, out)) = args.part.asked() {
-        let settings = Settings { precision: options.precision, fit: config };
+        let settings = Settings { precision: options.precision, fit: config, restarts: args.restarts };
         let spec = ShardSpec::new(FrameCommand::Evidence, &dataset, &frames, shard, &settings)?;
         let folder = ShardFolder::begin(out, &[], spec, &inputs)?;
         let judged = judge(shard.stretch(&frames));
@@ -166,6 +176,8 @@ pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<ExitCode> {
 struct Settings {
     precision: Precision,
     fit: FitConfig,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    restarts: Option<usize>,
 }
 
 /// Writes the table, prints.
@@ -215,6 +227,7 @@ fn json_row(frame: &FrameEvidence) -> Value {
     let mut row = Map::new();
     row.insert("frame".into(), frame.frame.clone().into());
     row.insert("index".into(), frame.index.into());
+    row.insert("best_basin".into(), frame.best_basin.into());
     match &frame.evidence {
         Ok(modes) => row.extend(modes.iter().map(|mode| {
             let Evidence { score, raw, measures, summary, findings, .. } = mode;
@@ -230,13 +243,13 @@ fn json_row(frame: &FrameEvidence) -> Value {
     Value::Object(row)
 }
 
-/// `frame index F1 F2 F3 F4 F1_summary … F4_summary error`.
+/// `frame index F1 F2 F3 F4 F1_summary … F4_summary best_basin error`.
 fn table(judged: &[FrameEvidence]) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let codes = Tag::MODES.map(|mode| mode.code().to_owned());
     let summaries = codes.clone().map(|code| code + "_summary");
     let head = ["frame".to_owned(), "index".to_owned()].into_iter().chain(codes).chain(summaries);
-    writer.write_record(head.chain(["error".to_owned()]))?;
+    writer.write_record(head.chain(["best_basin".to_owned(), "error".to_owned()]))?;
     for frame in judged {
         let modes: &[Evidence] = frame.evidence.as_ref().map_or(&[], Vec::as_slice);
         let find = |tag: Tag| modes.iter().find(|mode| mode.mode == tag);
@@ -245,7 +258,8 @@ fn table(judged: &[FrameEvidence]) -> Result<Vec<u8>, csv::Error> {
         let first = [to_cell(&frame.frame).into_owned(), frame.index.to_string()];
         let cells = first.into_iter().chain(Tag::MODES.map(score)).chain(Tag::MODES.map(summary));
         let error = frame.evidence.as_ref().map_or_else(|why| to_cell(why).into_owned(), |_| String::new());
-        writer.write_record(cells.chain([error]))?;
+        let basin = frame.best_basin.map(|share| share.to_string()).unwrap_or_default();
+        writer.write_record(cells.chain([basin, error]))?;
     }
     writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
 }
@@ -263,6 +277,9 @@ fn cards(judged: &[FrameEvidence], arrays: &[String]) -> String {
                 let _ = writeln!(text, "  cannot be judged: {}", one_line(why));
             }
             Ok(modes) => modes.iter().for_each(|mode| card(&mut text, mode, arrays)),
+        }
+        if let Some(share) = frame.best_basin {
+            let _ = writeln!(text, "  restarts: {:.0} % of the starts end in the best basin", 100.0 * share);
         }
     }
     text

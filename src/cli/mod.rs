@@ -9,6 +9,7 @@ mod complexity;
 mod convert;
 mod count;
 mod evidence;
+mod explore;
 mod export;
 mod fit;
 mod frames;
@@ -178,6 +179,9 @@ pub enum CliCommand {
     /// it in its sequence are read for what stays and what moves.
     #[command(after_help = evidence::HELP)]
     Evidence(evidence::EvidenceArgs),
+    /// Tell what else a fit could have done: under other settings, from other starts, elsewhere in the room.
+    #[command(subcommand, after_help = explore::HELP)]
+    Explore(explore::ExploreCommand),
     /// Write what other programs read: parameters, simulated maps in the input's own files, point clouds.
     ///
     /// Each frame is fitted from its own peaks as `fit` does, unless --params says where fitted parameters lie.
@@ -260,6 +264,7 @@ pub fn run(command: CliCommand) -> anyhow::Result<ExitCode> {
         CliCommand::Convert(args) => convert::run(&args),
         CliCommand::Count(args) => count::run(&args),
         CliCommand::Evidence(args) => evidence::run(&args),
+        CliCommand::Explore(command) => explore::run(&command),
         CliCommand::Export(args) => export::run(&args),
         CliCommand::Fit(args) => fit::run(&args),
         CliCommand::Info(args) => info::run(&args),

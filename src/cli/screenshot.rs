@@ -3,6 +3,7 @@
 use super::common::{PeopleArg, outside_allowed, presets, settings};
 use crate::app::{Begin, InspectorApp, Pane};
 use crate::config::Preset;
+use crate::explore::ExplorationKind;
 use crate::output::{Sink, replace_file};
 use crate::session::{Command, FitStatus, LabelStatus, StrataStatus, ThemeChoice};
 use anyhow::{Context as _, bail};
@@ -151,9 +152,15 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
     }
     if let Some(pane) = pane {
         harness.state_mut().show_pane(pane);
+        // One of an exploration is drawn with it, however long it takes.
+        if let Some(kind) =
+            ExplorationKind::ALL.into_iter().find(|kind| pane.title().eq_ignore_ascii_case(kind.title()))
+        {
+            harness.state_mut().apply(Command::Explore(kind));
+        }
     }
     harness.run_steps(3);
-    until(&mut harness, "the panes", |app| !app.panes_are_working())?;
+    until(&mut harness, "the panes", |app| !app.panes_are_working() && !app.session().explore.any_running())?;
     harness.run_steps(1);
     let mut picture = harness.render().map_err(|e| anyhow::anyhow!("the window cannot be drawn: {e}"))?;
     if let Some(pane) = pane {

@@ -1,13 +1,14 @@
 //! The only two mutators: a command or a report in, effects out.
 //!
 //! Here are the tables from both to functions; `data` opens and loads, `queue` filters and orders the frames, `labels`
-//! writes what people say, `diagnosis` takes in strata and evidence, `fit` steers the optimiser, `hand` moves the body, `reports` takes in what the
-//! worker says.
+//! writes what people say, `diagnosis` takes in strata and evidence, `fit` steers the optimiser, `hand` moves the body,
+//! `explore` tries what else a fit could have done, `reports` takes in what the worker says.
 
 mod batch;
 mod compared;
 mod data;
 mod diagnosis;
+mod explore;
 mod export;
 mod fit;
 mod hand;
@@ -129,6 +130,7 @@ impl Session {
             Command::SetConfig(config) => self.set_config(&config),
             Command::DragConfig(config) => self.drag_config(&config),
             Command::DragErase(region) => self.drag_erase(&region),
+            Command::DragFit(fit) => self.drag_fit(*fit),
             Command::EndDrag => self.end_drag(),
             Command::ToggleReplay => self.toggle_replay(),
             Command::PlayOn(seconds) => self.play_on(seconds),
@@ -174,6 +176,9 @@ impl Session {
             Command::CancelStudy => self.cancel_study(),
             Command::OpenRun(folder) => self.open_run(&folder),
             Command::ShowStudyRow(row) => self.show_study_row(row),
+            Command::Explore(kind) => self.explore(kind),
+            Command::StopExploring(kind) => self.stop_exploring(kind),
+            Command::KeepTuning => self.keep_tuning(),
             Command::RunTask(task) => vec![Effect::Run(task)],
             Command::ClearLog => {
                 self.log.clear();
@@ -236,6 +241,7 @@ impl Session {
             Report::StudyGrew(folder, run) => self.study_grew(folder, run),
             Report::StudyDone(result) => self.study_done(result),
             Report::RunRead(folder, result) => self.run_read(folder, result),
+            Report::Explored(kind, number, news) => self.explored(kind, number, news),
             Report::TaskDone(result) => self.task_done(result),
             Report::Log(level, text) => {
                 self.note(level, text);

@@ -3,12 +3,14 @@
 use super::body_move::BodyMove;
 use super::compared::ResultSide;
 use super::effect::BackgroundTask;
+use super::explore::AdoptedFit;
 use super::queue::Sort;
 use super::study::StudyOrder;
 use super::view::ViewState;
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::BareChoice;
+use crate::explore::ExplorationKind;
 use crate::geometry::Vec3;
 use crate::labels::{CellRegion, Tag, Verdict};
 use crate::mhp::Precision;
@@ -127,6 +129,8 @@ pub enum Command {
     DragConfig(Box<FitConfig>),
     /// Cells under an eraser: the fit is done anew without them; until [`Command::EndDrag`] it is one act.
     DragErase(CellRegion),
+    /// A fit of an exploration under a finger, beside the one on screen; until [`Command::EndDrag`] all are one act.
+    DragFit(Box<AdoptedFit>),
     /// The finger is lifted.
     EndDrag,
     /// Play the iterations of the branch on screen, or stop playing them.
@@ -180,6 +184,12 @@ pub enum Command {
     OpenRun(PathBuf),
     /// Put the frames of a row of the study's table into the list, with what the study says of them.
     ShowStudyRow(usize),
+    /// Explore what is on screen, as is chosen; an older exploration of the kind is given up.
+    Explore(ExplorationKind),
+    /// Give it up.
+    StopExploring(ExplorationKind),
+    /// Keep the tuning map as the run folder of a sweep.
+    KeepTuning,
     /// Write a picture that the window drew.
     RunTask(BackgroundTask),
     /// Empty the log.

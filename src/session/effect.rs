@@ -7,6 +7,7 @@ use super::evidence::EvidenceRequest;
 use super::pins::Pin;
 use super::study::StudyRequest;
 use crate::dataset::{BareChoice, Dataset, Frame};
+use crate::explore::{Exploration, ExplorationKind};
 use crate::labels::Judged;
 use crate::mhp::Precision;
 use crate::study::run::Run;
@@ -143,6 +144,10 @@ pub enum Effect {
     ReadRun(PathBuf),
     /// Find the frames of a row of a run's table in this data set, on a thread.
     FindStudyRow(PathBuf, Arc<Run>, usize, Arc<Dataset>),
+    /// Explore this on idle cores, under this number; an older one of its kind is given up.
+    Explore(u64, Box<Exploration>),
+    /// Give it up.
+    StopExploring(ExplorationKind),
     /// Compute the maps of a pinned fit on a thread.
     DrawPin(Box<PinRequest>),
     /// Gather evidence.

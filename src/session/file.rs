@@ -91,6 +91,9 @@ pub struct SessionFile {
     /// What the frame list knows of frames that were fitted in the session, by index.
     #[serde(default)]
     pub summaries: BTreeMap<usize, FrameSummary>,
+    /// Shares of starts in the best basin, by frame.
+    #[serde(default)]
+    pub best_basins: BTreeMap<usize, f64>,
     /// Results A and B, where they were kept.
     #[serde(default)]
     pub results: [Option<ResultSet>; 2],
@@ -205,6 +208,7 @@ impl SessionFile {
                 .filter(|(_, summary)| summary.hashes.is_some())
                 .map(|(&frame, summary)| (frame, summary.clone()))
                 .collect(),
+            best_basins: (*session.best_basins).clone(),
             results: session.results.saved(),
             pins: pins
                 .list()
@@ -292,7 +296,7 @@ struct Head {
 
 fn saved_fit(session: &Session) -> Option<SavedFit> {
     let fit = &session.fit;
-    let (branch, initial) = (fit.branch()?, fit.initial.clone()?);
+    let (branch, initial) = (fit.branch()?, fit.region_pose()?.clone());
     let head = branch.state_at(branch.head()).filter(|(at, _)| *at == branch.head())?.1;
     let shown = fit.cursor.and_then(|at| branch.state_at(at)).filter(|(at, _)| *at != branch.head());
     let rows = fit.history.lineage().into_iter().flatten();

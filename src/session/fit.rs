@@ -4,20 +4,10 @@ use super::history::{Branch, History, IterationRow};
 use super::state::FitHashes;
 use crate::body::Pppr;
 use crate::config::FitConfig;
-use crate::geometry::{norm, sub};
-use crate::mhp::Problem;
+use crate::mhp::{Problem, SETTLED_OVER, has_settled};
 use crate::start::FoundStart;
 use crate::worker::{ErasedCells, JobId, Snapshot};
 use std::sync::Arc;
-
-/// Iterations that a fit is looked at over to say that it has settled, and how little may change meanwhile: share of the
-/// loss, m of each joint at [`SETTLED_RATE`].
-const SETTLED_OVER: usize = 10;
-const SETTLED_LOSS: f64 = 1e-3;
-const SETTLED_M: f64 = 2e-3;
-/// The learning rate, m, at which joints that all move one way move five times as far. Adam's steps are the mean gradient in units of
-/// its own size times the rate: against the rate, a way that is short says that the gradient is small.
-const SETTLED_RATE: f64 = 1e-3;
 
 /// What the worker is doing for this frame.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -98,6 +88,16 @@ impl Fit {
         self.branch().map_or(0, Branch::head)
     }
 
+    /// The pose that the EM region of the active branch is laid around, where that is not the first start.
+    pub fn around(&self) -> Option<Arc<Pppr>> {
+        self.branch().and_then(|branch| branch.around.clone())
+    }
+
+    /// The pose that fixes the EM region of the active branch.
+    pub fn region_pose(&self) -> Option<&Pppr> {
+        self.branch().and_then(|branch| branch.around.as_deref()).or(self.initial.as_ref())
+    }
+
     /// Whether this is a start that was found, and nothing was done with it yet.
     pub fn is_untouched(&self) -> bool {
         let found = self.found_start.is_some() && !self.edited && self.status == FitStatus::Paused;
@@ -132,14 +132,9 @@ impl Fit {
         let then = now.checked_sub(SETTLED_OVER).filter(|then| *then >= branch.start())?;
         let (before, after) = (branch.row(then)?, branch.row(now)?);
         let losses = [before, after].map(|row| row.report.loss);
-        let flat = (losses[1] - losses[0]).abs() <= SETTLED_LOSS * losses[0].abs();
         let (_, then) = branch.state_at(then)?;
         let (_, now) = branch.state_at(now)?;
-        let joints = then.params.positions().iter().zip(now.params.positions());
         let config = branch.config_at(self.shown_iteration());
-        let rate = config.learning_rates.position.unwrap_or(config.learning_rate);
-        let most_m = SETTLED_M * (rate / SETTLED_RATE).min(1.0);
-        let still = joints.clone().count() > 0 && joints.into_iter().all(|(a, b)| norm(sub(*a, *b)) <= most_m);
-        Some(flat && still)
+        Some(has_settled(&config, losses, [then.params.positions(), now.params.positions()]))
     }
 }

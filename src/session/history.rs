@@ -1,5 +1,6 @@
 //! Every step of a fit: reports for the curves, states to go back to, branches that began at an earlier state.
 
+use crate::body::Pppr;
 use crate::config::{FitConfig, difference};
 use crate::mhp::{FitState, StepReport};
 use crate::worker::ErasedCells;
@@ -54,6 +55,8 @@ pub struct Branch {
     pub edit: Option<String>,
     /// Cells that its fit does not see.
     pub erased: Arc<[ErasedCells]>,
+    /// The pose that its EM region is laid around, where that is not the start that was found first.
+    pub around: Option<Arc<Pppr>>,
 }
 
 impl Branch {
@@ -141,9 +144,19 @@ impl History {
     pub fn begin(&mut self, parent: Option<(u32, usize)>, config: FitConfig) -> u32 {
         let id = self.next_id;
         self.next_id += 1;
-        let of_parent = parent.and_then(|(parent, _)| self.branch(parent)).map(|parent| Arc::clone(&parent.erased));
-        let erased = of_parent.unwrap_or_default();
-        self.branches.push(Branch { id, parent, config, rows: Vec::new(), flags: Vec::new(), edit: None, erased });
+        let of_parent = parent.and_then(|(parent, _)| self.branch(parent));
+        let of_parent = of_parent.map(|parent| (Arc::clone(&parent.erased), parent.around.clone()));
+        let (erased, around) = of_parent.unwrap_or_default();
+        self.branches.push(Branch {
+            id,
+            parent,
+            config,
+            rows: Vec::new(),
+            flags: Vec::new(),
+            edit: None,
+            erased,
+            around,
+        });
         self.activate(id);
         id
     }
@@ -155,6 +168,14 @@ impl History {
         let all = before.iter().flat_map(|before| before.iter().cloned()).chain([cells]).collect();
         if let Some(branch) = self.branches.iter_mut().find(|branch| branch.id == id) {
             branch.erased = all;
+            self.revision += 1;
+        }
+    }
+
+    /// What the fit of a branch does not see, and the pose that its EM region is laid around.
+    pub(super) fn set_sight(&mut self, id: u32, erased: Arc<[ErasedCells]>, around: Option<Arc<Pppr>>) {
+        if let Some(branch) = self.branches.iter_mut().find(|branch| branch.id == id) {
+            (branch.erased, branch.around) = (erased, around);
             self.revision += 1;
         }
     }

@@ -1,6 +1,7 @@
 //! What threads, and the window itself, tell a session.
 
 use super::acts::{ActKind, Done};
+use super::explore::ExploreNews;
 use super::file::SessionFile;
 use super::labels::LabelTable;
 use super::presets::PresetFits;
@@ -8,6 +9,7 @@ use super::results::FoundResults;
 use super::state::{FitHashes, LogLevel};
 use crate::dataset::{Dataset, DatasetError, Frame};
 use crate::diagnose::Evidence;
+use crate::explore::ExplorationKind;
 use crate::labels::LabelPlace;
 use crate::study::complexity::Complexity;
 use crate::study::run::Run;
@@ -88,6 +90,8 @@ pub enum Report {
     StudyDone(Result<Option<(PathBuf, Arc<Run>)>, String>),
     /// A run folder was read, or not.
     RunRead(PathBuf, Result<Arc<Run>, String>),
+    /// An exploration got on, as was asked under this number.
+    Explored(ExplorationKind, u64, ExploreNews),
     /// Something was written, or not.
     TaskDone(Result<String, String>),
     /// A line for the log.

@@ -84,6 +84,8 @@ pub(super) struct Drag {
     pub(super) live: Option<(u32, usize)>,
     /// Cells that the finger takes away from what was measured, and what that is called.
     pub(super) erasing: Option<(ErasedCells, String)>,
+    /// Another start that the finger has taken, and what that is called.
+    pub(super) adopted: Option<String>,
 }
 
 /// An act that can be undone.

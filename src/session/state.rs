@@ -5,6 +5,7 @@ use super::body_move::Moving;
 use super::command::StartAt;
 use super::compared::ResultSets;
 use super::evidence::EvidenceState;
+use super::explore::Explorations;
 use super::file::SessionFile;
 use super::fit::Fit;
 use super::identity::Identities;
@@ -183,6 +184,10 @@ pub struct Session {
     pub presets: PresetCard,
     /// Whether that is done with the first frame that is there.
     pub(super) presets_first: bool,
+    /// What else the fits could have done.
+    pub explore: Explorations,
+    /// Of how many starts of a frame the fits end in the best basin, a share, where that was tried.
+    pub best_basins: Tracked<BTreeMap<usize, f64>>,
     /// Fits that others are compared with.
     pub pins: Pins,
     /// The study on screen.

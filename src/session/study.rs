@@ -46,6 +46,8 @@ pub struct StudyRequest {
     pub run: RunRequest,
     /// The strata of its frames, where they are known.
     pub complexity: Option<Arc<Complexity>>,
+    /// Rows of it that are done already.
+    pub known: Vec<RunRow>,
 }
 
 impl StudyView {

@@ -4,6 +4,12 @@ use super::state::Session;
 use super::work::WorkStatus;
 
 impl Session {
+    /// Whether fits are under way that nothing must slow down: a run as fast as it goes, a batch, a study.
+    pub fn needs_cores(&self) -> bool {
+        let run = self.fit.is_running() && (self.pace.is_none() || self.fit.run.0 == self.fit.refit_run);
+        run || self.batch.work.takes_cores() || self.study.work.takes_cores()
+    }
+
     /// What is under way that leaving would cut off, a sentence each that says what of it is kept; empty where nothing is
     /// lost by leaving.
     pub fn under_way(&self) -> Vec<String> {

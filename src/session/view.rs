@@ -4,6 +4,7 @@ use super::compared::ComparedNumber;
 use super::labels::LabelMode;
 use super::queue::{SavedView, Sort};
 use super::settings::{Live, LiveFrom, RunSpeed};
+use crate::explore::ExploreSettings;
 use crate::labels::Tag;
 use serde::{Deserialize, Serialize};
 
@@ -290,6 +291,8 @@ pub struct ViewState {
     pub figure: bool,
     /// Draw the baseline's skeleton.
     pub show_baseline: bool,
+    /// Draw the basins of the restart cloud.
+    pub show_basins: bool,
     /// Scale of the whole interface.
     pub zoom: f32,
     /// Begin to fit a frame as soon as it is shown.
@@ -300,6 +303,8 @@ pub struct ViewState {
     pub live_from: LiveFrom,
     /// How fast runs and replays are watched.
     pub speed: RunSpeed,
+    /// What is explored.
+    pub explore: ExploreSettings,
 }
 
 impl Default for ViewState {
@@ -351,11 +356,13 @@ impl Default for ViewState {
             open_cards: Vec::new(),
             figure: false,
             show_baseline: true,
+            show_basins: true,
             zoom: 1.0,
             run_on_open: false,
             live: Live::default(),
             live_from: LiveFrom::default(),
             speed: RunSpeed::default(),
+            explore: ExploreSettings::default(),
         }
     }
 }

@@ -81,4 +81,9 @@ impl Work {
     pub fn is_running(&self) -> bool {
         self.status != WorkStatus::Idle
     }
+
+    /// True while it takes cores: under way, and not waiting for somebody.
+    pub(super) fn takes_cores(&self) -> bool {
+        matches!(self.status, WorkStatus::Running { paused: false, .. })
+    }
 }

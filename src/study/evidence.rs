@@ -22,6 +22,9 @@ pub struct FrameEvidence {
     pub frame: String,
     /// F1 to F4, or why the frame cannot be judged: one line that names the file.
     pub evidence: Result<Vec<Evidence>, String>,
+    /// Share of its starts whose fits end in the best basin, where that was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub best_basin: Option<f64>,
 }
 
 impl ShardRow for FrameEvidence {
@@ -47,7 +50,7 @@ pub fn frames_before(dataset: &Dataset, index: usize) -> Range<usize> {
 /// fit, or around the given parameters.
 pub fn frame_evidence(dataset: &Dataset, index: usize, options: &BatchOptions, params: Option<&Pppr>) -> FrameEvidence {
     let evidence = judge(dataset, index, options, params);
-    FrameEvidence { index, frame: dataset.frame_name(index).to_owned(), evidence }
+    FrameEvidence { index, frame: dataset.frame_name(index).to_owned(), evidence, best_basin: None }
 }
 
 fn judge(

@@ -34,7 +34,7 @@ pub fn leaves_any((index, view): (usize, &View), erased: &[ErasedCells]) -> bool
 ///
 /// # Errors
 /// Where nothing is left of a map.
-pub(super) fn without(problem: &Arc<Problem>, erased: &[ErasedCells]) -> Result<Arc<Problem>, FitError> {
+pub fn without(problem: &Arc<Problem>, erased: &[ErasedCells]) -> Result<Arc<Problem>, FitError> {
     if erased.is_empty() {
         return Ok(Arc::clone(problem));
     }

@@ -10,7 +10,7 @@ mod handle;
 mod protocol;
 mod thread;
 
-pub use erased::{ErasedCells, leaves_any};
+pub use erased::{ErasedCells, leaves_any, without};
 pub use handle::Worker;
 pub use protocol::{
     HistoryRow, JobId, Kept, Prepare, PreparedFit, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,

@@ -47,6 +47,8 @@ pub struct Prepare {
     pub start: Start,
     /// Cells that the fit is not to see; a start that is sought sees them.
     pub erased: Arc<[ErasedCells]>,
+    /// The pose that the EM region of the branch is laid around, where it is not the initial one.
+    pub around: Option<Arc<Pppr>>,
 }
 
 /// Window to worker.
@@ -76,6 +78,8 @@ pub enum WorkerCommand {
         run: u64,
         /// Cells that the fit is not to see.
         erased: Arc<[ErasedCells]>,
+        /// The pose that the EM region is laid around, where it is not the initial one.
+        around: Option<Arc<Pppr>>,
     },
     /// Runs take at most so many iterations a second from now on, `None` as fast as they go; a fit that is done anew
     /// always does.
@@ -94,6 +98,8 @@ pub enum WorkerCommand {
         config: Box<FitConfig>,
         /// Cells that the fit is not to see.
         erased: Arc<[ErasedCells]>,
+        /// The pose that the EM region is laid around, where it is not the initial one.
+        around: Option<Arc<Pppr>>,
     },
     /// Replace the parameters at the current iteration by hand; of those that wait the newest is done.
     Edit(Box<Pppr>),

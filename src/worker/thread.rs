@@ -53,6 +53,8 @@ struct Job {
     seen: Arc<Problem>,
     /// What of it the fit does not see.
     erased: Arc<[ErasedCells]>,
+    /// The pose that fixes the EM region instead of the initial one.
+    around: Option<Arc<Pppr>>,
     fitter: Fitter,
     /// A second objective with the same EM region, for looking at states that are not the current one.
     viewer: Objective,
@@ -315,7 +317,7 @@ enum Reply {
 
 impl Job {
     fn new(prepare: Prepare) -> Result<(Self, PreparedFit), FitError> {
-        let Prepare { job, branch, dataset, frame, config, precision, start, erased } = prepare;
+        let Prepare { job, branch, dataset, frame, config, precision, start, erased, around } = prepare;
         let problem = Arc::new(problem_of(&dataset, &frame)?);
         let began = Instant::now();
         let (found_start, initial, state) = match start {
@@ -329,8 +331,9 @@ impl Job {
         };
         let init_ms = milliseconds(began);
         let seen = without(&problem, &erased)?;
-        let mut fitter = Fitter::new(Arc::clone(&seen), config, precision, initial.clone())?;
-        let viewer = Objective::new(Arc::clone(&seen), config, precision, &initial)?;
+        let region = around.as_deref().unwrap_or(&initial);
+        let mut fitter = Fitter::new(Arc::clone(&seen), config, precision, region.clone())?;
+        let viewer = Objective::new(Arc::clone(&seen), config, precision, region)?;
         let warnings = viewer.warnings().to_vec();
         let resumed = state.is_some();
         if let Some(state) = state {
@@ -347,6 +350,7 @@ impl Job {
             precision,
             seen,
             erased,
+            around,
             fitter,
             viewer,
             target: 0,
@@ -373,20 +377,27 @@ impl Job {
         self.fitter.iteration()
     }
 
-    /// From now on the fit has these settings and does not see these cells, as if it had been begun so. A window of frames is
-    /// laid around the initial pose: where the fit stood before must not be in it.
-    fn begin_with(&mut self, config: &FitConfig, erased: Arc<[ErasedCells]>) -> Result<(), FitError> {
-        let same = self.erased == erased;
+    /// From now on the fit has these settings, does not see these cells and has its EM region around this pose, as if it had
+    /// been begun so. A window of frames is laid around that pose: where the fit stood before must not be in it.
+    fn begin_with(
+        &mut self,
+        config: &FitConfig,
+        erased: Arc<[ErasedCells]>,
+        around: Option<Arc<Pppr>>,
+    ) -> Result<(), FitError> {
+        let same = self.erased == erased && self.around == around;
         let in_window = |config: &FitConfig| config.parameterization == Parameterization::Motion;
         if same && !in_window(config) && !in_window(self.fitter.config()) {
             return self.fitter.set_config(*config);
         }
         if !same {
             let seen = without(&self.problem, &erased)?;
-            self.viewer = Objective::new(Arc::clone(&seen), *config, self.precision, &self.initial)?;
-            (self.seen, self.erased) = (seen, erased);
+            let region = around.as_deref().unwrap_or(&self.initial);
+            self.viewer = Objective::new(Arc::clone(&seen), *config, self.precision, region)?;
+            (self.seen, self.erased, self.around) = (seen, erased, around);
         }
-        self.fitter = Fitter::new(Arc::clone(&self.seen), *config, self.precision, self.initial.clone())?;
+        let region = self.around.as_deref().unwrap_or(&self.initial).clone();
+        self.fitter = Fitter::new(Arc::clone(&self.seen), *config, self.precision, region)?;
         Ok(())
     }
 
@@ -480,9 +491,9 @@ impl Job {
                     return Ok(Reply::Event(self.finished(StopReason::Iterations)));
                 }
             }
-            WorkerCommand::Refit { branch, state, config, target, run, erased } => {
+            WorkerCommand::Refit { branch, state, config, target, run, erased, around } => {
                 self.rows.clear();
-                self.begin_with(&config, erased)?;
+                self.begin_with(&config, erased, around)?;
                 self.fitter.restore(state)?;
                 (self.branch, self.branch_start) = (branch, self.iteration());
                 self.push_row(self.fitter.report());
@@ -510,9 +521,9 @@ impl Job {
                 }
                 return Ok(Reply::Event(WorkerEvent::ConfigApplied { branch, iteration, config }));
             }
-            WorkerCommand::Branch { branch, state, config, erased } => {
+            WorkerCommand::Branch { branch, state, config, erased, around } => {
                 self.target = 0;
-                self.begin_with(&config, erased)?;
+                self.begin_with(&config, erased, around)?;
                 self.fitter.restore(state)?;
                 self.branch = branch;
                 self.branch_start = self.iteration();

@@ -40,17 +40,21 @@ const MAY_USE: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "explore",
+        &["task", "geometry", "config", "radar", "body", "mhp", "dataset", "start", "diagnose", "study", "worker"],
+    ),
+    (
         "session",
         &[
-            "digest", "input", "task", "geometry", "escape", "folders", "output", "config", "radar", "body", "mhp",
-            "people", "dataset", "start", "diagnose", "labels", "study", "worker",
+            "explore", "digest", "input", "task", "geometry", "escape", "folders", "output", "config", "radar", "body",
+            "mhp", "people", "dataset", "start", "diagnose", "labels", "study", "worker",
         ],
     ),
     (
         "app",
         &[
             "digest", "input", "task", "geometry", "folders", "output", "config", "radar", "body", "mhp", "dataset",
-            "diagnose", "labels", "study", "worker", "session", "render",
+            "diagnose", "explore", "labels", "study", "worker", "session", "render",
         ],
     ),
 ];
@@ -58,7 +62,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
 /// Rooms that know no window and no GPU.
 const WINDOWLESS: &[&str] = &[
     "digest", "task", "geometry", "folders", "output", "config", "radar", "body", "mhp", "dataset", "diagnose",
-    "labels", "worker", "session", "study", "simulate", "people", "start",
+    "labels", "worker", "session", "study", "simulate", "people", "start", "explore",
 ];
 
 fn files(folder: &Path) -> Vec<PathBuf> {

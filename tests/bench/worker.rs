@@ -46,6 +46,7 @@ fn watched(dataset: &Arc<Dataset>, precision: Precision, iterations: usize) -> (
         precision,
         start,
         erased: Arc::default(),
+        around: None,
     })));
     worker.send(WorkerCommand::RunTo { target: iterations, run: 1 });
     let (mut pictures, mut longest) = (0, 0.0_f64);

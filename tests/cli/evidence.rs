@@ -136,11 +136,11 @@ fn cards_are_read_by_people_and_the_table_by_programs() {
     assert!(cards.contains("[hori[") && cards.contains("[frame 3]") && cards.contains("[joint "), "{cards}");
 
     let mut reader = csv::Reader::from_path(&table).unwrap();
-    let head = "frame,index,F1,F2,F3,F4,F1_summary,F2_summary,F3_summary,F4_summary,error";
+    let head = "frame,index,F1,F2,F3,F4,F1_summary,F2_summary,F3_summary,F4_summary,best_basin,error";
     assert_eq!(reader.headers().unwrap().iter().collect::<Vec<_>>().join(","), head);
     let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
     assert_eq!(rows.len(), 6);
-    assert!(rows[1].iter().take(10).skip(2).all(str::is_empty) && rows[1][10].contains("no finite cell"));
+    assert!(rows[1].iter().take(11).skip(2).all(str::is_empty) && rows[1][11].contains("no finite cell"));
     assert!(
         rows[5][2].is_empty() && rows[5][6].ends_with("this is number 4."),
         "frame 1 breaks the row: {:?}",

@@ -9,6 +9,7 @@ mod reading;
 
 mod bad_input;
 mod evidence;
+mod explore;
 mod fit;
 mod hostile_text;
 mod score;

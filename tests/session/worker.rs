@@ -57,6 +57,7 @@ impl Rig {
             precision: Precision::F64,
             start,
             erased: Arc::default(),
+            around: None,
         })));
     }
 
@@ -215,6 +216,7 @@ fn a_long_run_keeps_fewer_states_but_every_pose_and_always_the_last() {
         state: Arc::new(late),
         config: Box::new(FitConfig::default()),
         erased: Arc::default(),
+        around: None,
     });
     rig.send(WorkerCommand::RunTo { target: 2053, run: 1 });
     let (rows, ..) = rig.finish();
@@ -231,6 +233,7 @@ fn a_long_run_keeps_fewer_states_but_every_pose_and_always_the_last() {
         state: Arc::clone(state(before)),
         config: Box::default(),
         erased: Arc::default(),
+        around: None,
     });
     rig.send(WorkerCommand::RunTo { target: 2049, run: 2 });
     let (again, ..) = rig.finish();
@@ -245,7 +248,13 @@ fn a_branch_that_begins_late_keeps_where_it_begins_and_where_the_one_before_ende
     // Odd iterations, of which nothing would be kept there; the commands come at once, so that rows wait together.
     let config = Box::<FitConfig>::default();
     for (branch, begins) in [(1, 2049), (2, 4099)] {
-        rig.send(WorkerCommand::Branch { branch, state: late(begins), config: config.clone(), erased: Arc::default() });
+        rig.send(WorkerCommand::Branch {
+            branch,
+            state: late(begins),
+            config: config.clone(),
+            erased: Arc::default(),
+            around: None,
+        });
         rig.send(WorkerCommand::RunTo { target: begins + 4, run: u64::from(branch) });
         if branch == 1 {
             let (rows, ..) = rig.finish();
@@ -358,6 +367,7 @@ fn a_branch_with_the_same_settings_repeats_the_run_bit_for_bit() {
         state: Arc::clone(state(&rows[7])),
         config: Box::new(config),
         erased: Arc::default(),
+        around: None,
     });
     rig.send(WorkerCommand::RunTo { target: 25, run: 1 });
     let (again, at, _) = rig.finish();
@@ -370,6 +380,7 @@ fn a_branch_with_the_same_settings_repeats_the_run_bit_for_bit() {
         state: Arc::clone(state(&rows[7])),
         config: Box::new(other),
         erased: Arc::default(),
+        around: None,
     });
     rig.send(WorkerCommand::RunTo { target: 8, run: 1 });
     let (differs, ..) = rig.finish();
@@ -547,6 +558,7 @@ fn every_command_in_the_queue_is_obeyed_in_order() {
             state: Arc::clone(&state),
             config: Box::new(FitConfig::default()),
             erased: Arc::default(),
+            around: None,
         });
         rig.send(WorkerCommand::RunTo { target: 1, run: 1 });
         rig.send(WorkerCommand::Pause);
@@ -582,6 +594,7 @@ fn of_the_fits_that_wait_to_be_done_anew_the_newest_is() {
             target: 5,
             run: u64::from(k),
             erased: Arc::default(),
+            around: None,
         });
     }
     let (rows, _) = rig.rows_until(2, |event| matches!(event, WorkerEvent::Prepared(_)));
@@ -604,7 +617,15 @@ fn a_long_fit_that_is_done_anew_is_shown_on_the_way() {
     let (row, _) = rig.prepared();
     let began = Instant::now();
     let (state, config) = (Arc::clone(state(&row)), Box::new(FitConfig { w_em: 2.0, ..FitConfig::default() }));
-    rig.send(WorkerCommand::Refit { branch: 1, state, config, target: FOREVER, run: 7, erased: Arc::default() });
+    rig.send(WorkerCommand::Refit {
+        branch: 1,
+        state,
+        config,
+        target: FOREVER,
+        run: 7,
+        erased: Arc::default(),
+        around: None,
+    });
     let first = rig.snapshot(|snapshot| snapshot.branch == 1);
     assert!(first.iteration > 0 && first.iteration < 10_000, "{} after {:?}", first.iteration, began.elapsed());
     let later = rig.snapshot(|snapshot| snapshot.branch == 1 && snapshot.iteration > first.iteration);
@@ -633,6 +654,7 @@ fn erased_cells_are_as_if_they_had_not_been_measured() {
         target: 5,
         run,
         erased: Arc::clone(erased),
+        around: None,
     };
     rig.send(again(&erased, 1));
     rig.rows_until(1, |event| matches!(event, WorkerEvent::Refitted { .. }));

@@ -14,6 +14,7 @@ mod window;
 
 mod compare;
 mod erase;
+mod explore;
 mod hand;
 mod labels;
 mod large;

@@ -9,24 +9,29 @@
 //! a person do beyond being shown are rows that its file makes and the tables of commands name where the menus have them.
 
 mod agreement;
+mod ambiguity;
 mod calibration;
 mod chain;
 mod compare;
 mod curves;
 #[cfg(test)]
 mod dummy;
+mod explore;
 mod fit;
 pub(super) mod frames;
 mod image;
 mod joint;
+mod landscape;
 mod log;
 pub(super) mod maps;
 pub(super) mod modes;
 mod pane;
+mod restarts;
 pub(super) mod scene;
 mod signal;
 mod statistics;
 pub(super) mod study;
+mod tuning;
 
 pub use pane::Pane;
 pub(super) use pane::{Blank, Dock, PaneState, PaneStates};
@@ -48,6 +53,10 @@ static PANES: &[&Pane] = &[
     &agreement::PANE,
     &curves::PANE,
     &compare::PANE,
+    &tuning::PANE,
+    &landscape::PANE,
+    &ambiguity::PANE,
+    &restarts::PANE,
     &log::PANE,
     &fit::PANE,
     &joint::PANE,
@@ -76,12 +85,27 @@ pub(super) struct Shared<'a> {
 }
 
 /// What the pointer is on: every pane shows it in its own way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Pointed {
     /// View and (column, row) pixel of a map.
     cell: Option<(usize, [usize; 2])>,
     /// A joint, flat index.
     joint: Option<usize>,
+    /// A basin of the restart cloud.
+    basin: Option<usize>,
+    /// A place of an exploration to which the body would be moved.
+    moved: Option<MovedBody>,
+}
+
+/// A place of an exploration, in the units of its axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum MovedBody {
+    /// Of the ambiguity map: y and x on the floor.
+    Floor([f64; 2]),
+    /// Of the same: turned by, higher by.
+    Turned([f64; 2]),
+    /// Of the loss landscape.
+    Slice([f64; 2]),
 }
 
 impl Shared<'_> {

@@ -89,10 +89,20 @@ pub(crate) enum Dock {
     Centre,
     /// Below the middle.
     Bottom,
+    /// There too, with more height while it is in front: pictures over two axes.
+    BottomTall,
     /// The upper part of the column at the right edge.
     RightTop,
     /// The lower part of the column at the right edge.
     RightBottom,
+}
+
+impl Dock {
+    /// Whether panes of both are tabs of one place.
+    pub(in crate::app) fn is_beside(self, other: Self) -> bool {
+        let place = |dock| if dock == Self::BottomTall { Self::Bottom } else { dock };
+        place(self) == place(other)
+    }
 }
 
 impl Pane {

@@ -229,6 +229,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let sight = Sight { camera, ..sight };
     let (mut scene, labels) = build::scene(shared.session, &camera, &tokens, scale);
     build::cell(&mut scene, shared, &tokens, scale);
+    build::explored(&mut scene, shared, &tokens, scale);
     let gizmo = Gizmo::of(shared.session, &sight);
     if let Some(gizmo) = &gizmo {
         gizmo.draw(&mut scene, scale);

@@ -1,8 +1,17 @@
-//! The convergence criterion of SPEC section 4, or of the paper's section 5.5.4 to the letter.
+//! The convergence criterion of SPEC section 4, or of the paper's section 5.5.4 to the letter; and when a fit has settled.
 
 use crate::body::{Pppr, Skeleton};
-use crate::config::Convergence;
-use crate::geometry::{dot, sub};
+use crate::config::{Convergence, FitConfig};
+use crate::geometry::{Vec3, dot, norm, sub};
+
+/// Iterations that a fit is looked at over to say that it has settled, and how little may change meanwhile: share of the
+/// loss, m of each joint at [`SETTLED_RATE`].
+pub const SETTLED_OVER: usize = 10;
+const SETTLED_LOSS: f64 = 1e-3;
+const SETTLED_M: f64 = 2e-3;
+/// The learning rate, m, at which joints that all move one way move five times as far. Adam's steps are the mean gradient in units of
+/// its own size times the rate: against the rate, a way that is short says that the gradient is small.
+const SETTLED_RATE: f64 = 1e-3;
 
 /// How far back the loss is compared.
 pub(super) const LOOK_BACK: usize = 5;
@@ -22,6 +31,17 @@ pub(super) fn converged(criterion: Convergence, skeleton: &Skeleton, params: &Pp
     };
     let settled = before.is_some_and(|&before| progress(before) < SMALL_CHANGE * before.abs());
     (now < SMALL_LOSS || settled) && params.is_finite() && bones_plausible(skeleton, params)
+}
+
+/// Whether a fit moves no more: from [`SETTLED_OVER`] iterations ago (first) to now (second) the loss changed by less than 0.1 %,
+/// no joint moved more than 2 mm, and none by more than a fifth of what the learning rate lets it, so that the gradient is
+/// small too. Joints in m.
+pub fn has_settled(config: &FitConfig, [before, now]: [f64; 2], [from, to]: [&[Vec3]; 2]) -> bool {
+    let rate = config.learning_rates.position.unwrap_or(config.learning_rate);
+    let most_m = SETTLED_M * (rate / SETTLED_RATE).min(1.0);
+    let flat = (now - before).abs() <= SETTLED_LOSS * before.abs();
+    let still = !from.is_empty() && from.len() == to.len();
+    flat && still && from.iter().zip(to).all(|(a, b)| norm(sub(*a, *b)) <= most_m)
 }
 
 fn bones_plausible(skeleton: &Skeleton, params: &Pppr) -> bool {

@@ -27,6 +27,14 @@ pub struct FitState {
     pub losses: SmallVec<[f64; LOOK_BACK + 2]>,
 }
 
+impl FitState {
+    /// Where a fit that begins at `params` stands before its first step.
+    pub fn at_start(params: Pppr) -> Self {
+        let adam = Adam::new(params.shape());
+        Self { iteration: 0, params, adam, motion: MotionState::default(), losses: SmallVec::new() }
+    }
+}
+
 /// Adam on the objective of one frame.
 pub struct Fitter {
     objective: Objective,
@@ -59,9 +67,7 @@ impl Fitter {
         let body = Articulation::new(&problem.skeleton);
         let objective = Objective::new(problem, config, precision, &initial)?;
         let evaluation = Evaluation::zeros(initial.shape());
-        let adam = Adam::new(initial.shape());
-        let state =
-            FitState { iteration: 0, params: initial, adam, motion: MotionState::default(), losses: SmallVec::new() };
+        let state = FitState::at_start(initial);
         let (next, next_evaluation) = (Arc::new(state.clone()), evaluation.clone());
         let mut fitter = Self {
             objective,
@@ -197,7 +203,8 @@ impl Fitter {
     /// Where the state's parameters have the wrong sizes or are not finite; the fitter then stays where it was.
     pub fn restore(&mut self, state: Arc<FitState>) -> Result<(), FitError> {
         self.objective.problem().check(&state.params)?;
-        if self.window.is_some() && state.motion.coordinates.is_empty() {
+        // Of a start nothing is known yet: neither its loss nor its place in a window.
+        if state.losses.is_empty() || self.window.is_some() && state.motion.coordinates.is_empty() {
             return self.set_state(FitState::clone(&state));
         }
         let Self { objective, window, evaluation, window_loss: [window_loss, _], .. } = self;

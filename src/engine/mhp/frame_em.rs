@@ -131,20 +131,41 @@ impl FrameEm {
     }
 
     /// L_EM alone, without its gradient.
-    pub(super) fn loss(&self, (radar, config): (&RadarConfig, &FitConfig), precision: Precision, params: &Pppr) -> f64 {
-        let (mut workspace, mut gaussians) = (Workspace::default(), WorldGaussians::default());
-        let skin = self.skin.clone().map(|mut skin| {
+    pub(super) fn loss(&self, of: (&RadarConfig, &FitConfig), precision: Precision, params: &Pppr) -> f64 {
+        self.loss_in(of, precision, params, &mut EmScratch::default())
+    }
+
+    /// The same, in room that was taken before: from the second time on nothing is allocated for cells.
+    pub(super) fn loss_in(
+        &self,
+        (radar, config): (&RadarConfig, &FitConfig),
+        precision: Precision,
+        params: &Pppr,
+        EmScratch { workspace, gaussians, skin }: &mut EmScratch,
+    ) -> f64 {
+        if skin.is_none() {
+            skin.clone_from(&self.skin);
+        }
+        let skin = skin.as_mut().filter(|_| self.skin.is_some()).map(|skin| {
             skin.fill(params);
-            skin
+            &*skin
         });
-        let seen = skin.as_ref().map_or(params, |skin| &skin.points);
+        let seen = skin.map_or(params, |skin| &skin.points);
         let config = &forward_config(config, skin.is_some());
         gaussians.fill(seen, precision);
         let losses = self.targets.iter().map(|target| {
             let model = ViewModel::new(radar, &target.cell_box.view, config);
-            workspace.project(&model, (seen, &gaussians), precision);
+            workspace.project(&model, (seen, &*gaussians), precision);
             workspace.compare(&model, target, (None, false), precision).loss
         });
         losses.sum::<f64>() / self.targets.len() as f64
     }
+}
+
+/// Room for evaluations of L_EM without gradient, of fits of one problem with one set of settings.
+#[derive(Default)]
+pub struct EmScratch {
+    workspace: Workspace,
+    gaussians: WorldGaussians,
+    skin: Option<Skin>,
 }

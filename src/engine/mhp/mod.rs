@@ -60,9 +60,11 @@ mod types;
 pub use adam::Adam;
 pub use articulation::Limb;
 pub use context::{Neighbour, Peak};
+pub use convergence::{SETTLED_OVER, has_settled};
 pub use fill::fill_missing;
 pub use fill::for_neighbours;
 pub use fitter::{FitState, Fitter};
+pub use frame_em::EmScratch;
 pub use init::{Initialisation, LimbMap, initialise, initialise_people, predict};
 #[cfg(feature = "train")]
 pub use init::{LimbLesson, learn_limbs};

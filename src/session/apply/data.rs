@@ -67,6 +67,7 @@ impl Session {
         if self.batch.is_running() {
             effects.push(Effect::CancelBatch);
         }
+        effects.extend(self.forget_explorations());
         self.results_from = None;
         effects.extend(self.clear_results());
         self.forget_frames();
@@ -92,6 +93,7 @@ impl Session {
         self.fits.clear();
         self.left.clear();
         self.summaries.change().clear();
+        self.best_basins.change().clear();
         self.pins = Pins::default();
         self.batch = Batch::default();
         self.evidence = EvidenceState::default();
@@ -258,6 +260,7 @@ impl Session {
             precision: self.precision,
             start,
             erased: self.fit.erased(),
+            around: self.fit.around(),
         })))]
     }
 }

@@ -188,8 +188,8 @@ impl Session {
         let (id, config, state) = (branch.id, branch.newest_config(), Arc::clone(state));
         self.config = FitConfig { iterations: self.config.iterations, ..config };
         self.summarise();
-        let erased = self.fit.erased();
-        vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: Box::new(self.config), erased })]
+        let (erased, around) = (self.fit.erased(), self.fit.around());
+        vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: Box::new(self.config), erased, around })]
     }
 
     /// Where an earlier iteration is looked at: starts a branch there with the current settings.
@@ -211,8 +211,14 @@ impl Session {
             let text = format!("branch {id} begins at iteration {kept} of branch {parent}: edited by hand");
             self.note(LogLevel::Info, text);
         }
-        let erased = self.fit.erased();
-        Some(vec![Effect::Send(WorkerCommand::Branch { branch: id, state, config: Box::new(self.config), erased })])
+        let (erased, around) = (self.fit.erased(), self.fit.around());
+        Some(vec![Effect::Send(WorkerCommand::Branch {
+            branch: id,
+            state,
+            config: Box::new(self.config),
+            erased,
+            around,
+        })])
     }
 
     pub(super) fn edit(&mut self, params: Pppr) -> Vec<Effect> {

@@ -93,8 +93,8 @@ impl Session {
         (self.fit.replay, self.fit.reason, self.fit.edited) = (None, None, true);
         let base = state.params.clone();
         self.moving = Some(Moving::Held(Box::new(Held { base, from: (parent, at), earlier, branch, moved })));
-        let erased = self.fit.erased();
-        Ok(vec![Effect::Send(WorkerCommand::Branch { branch, state, config: Box::new(self.config), erased })])
+        let (erased, around) = (self.fit.erased(), self.fit.around());
+        Ok(vec![Effect::Send(WorkerCommand::Branch { branch, state, config: Box::new(self.config), erased, around })])
     }
 
     /// The finger is lifted: what it did is one act.

@@ -8,6 +8,7 @@
 
 use crate::config::{FitConfig, ReadBy, difference};
 use crate::labels::CellRegion;
+use crate::mhp::FitState;
 use crate::session::acts::ActKind;
 use crate::session::effect::Effect;
 use crate::session::fit::FitStatus;
@@ -65,7 +66,7 @@ impl Session {
         }
         let before = std::mem::replace(&mut self.config, config);
         let from = self.fit.history.active_id();
-        self.drag.get_or_insert(Drag { before, from, live: None, erasing: None });
+        self.drag.get_or_insert(Drag { before, from, live: None, erasing: None, adopted: None });
         if !same_start(&config, &before) && self.fit.is_untouched() {
             return self.reset();
         }
@@ -98,7 +99,7 @@ impl Session {
             return Vec::new();
         }
         let (before, from) = (self.config, self.fit.history.active_id());
-        let drag = self.drag.get_or_insert(Drag { before, from, live: None, erasing: None });
+        let drag = self.drag.get_or_insert(Drag { before, from, live: None, erasing: None, adopted: None });
         if drag.erasing.as_ref().is_some_and(|(known, _)| *known == cells) {
             return Vec::new();
         }
@@ -113,9 +114,13 @@ impl Session {
         }
         let waits = self.drag.as_ref().is_some_and(|drag| drag.erasing.is_some() && drag.live.is_none());
         let effects = if waits { self.refit() } else { Vec::new() };
-        let Some(Drag { before, from, live, erasing }) = self.drag.take() else { return effects };
+        let Some(Drag { before, from, live, erasing, adopted }) = self.drag.take() else { return effects };
         let set = difference(&before, &self.config);
-        let name = erasing.as_ref().map_or(set, |(_, erased)| erased.clone());
+        let by_hand = erasing.as_ref().map(|(_, erased)| erased).or(adopted.as_ref()).cloned();
+        let name = match (by_hand, &adopted) {
+            (Some(begun), Some(_)) if !set.is_empty() => format!("{begun}, {set}"),
+            (by_hand, _) => by_hand.unwrap_or(set),
+        };
         let there = live.filter(|(branch, _)| self.fit.history.active_id() == *branch);
         if name.is_empty() {
             // Back where it was: so is the fit.
@@ -190,6 +195,9 @@ impl Session {
     /// Fits anew with the settings under the finger, on the branch that is its own.
     fn refit(&mut self) -> Vec<Effect> {
         let Some(drag) = self.drag.clone() else { return Vec::new() };
+        if drag.adopted.is_some() {
+            return Vec::new();
+        }
         let known = drag.live.filter(|(branch, _)| self.fit.history.branch(*branch).is_some());
         let (parent, at) = match (known, self.view.live_from) {
             (Some((branch, at)), _) => match self.fit.history.branch(branch).and_then(|branch| branch.parent) {
@@ -221,13 +229,18 @@ impl Session {
         if let Some(drag) = &mut self.drag {
             drag.live = Some((branch, at));
         }
+        self.run_anew(branch, (at, state))
+    }
+
+    /// The worker writes a branch anew from a state at an iteration.
+    pub(super) fn run_anew(&mut self, branch: u32, (at, state): (usize, Arc<FitState>)) -> Vec<Effect> {
         self.fit.cursor = None;
         self.fit.reason = None;
         self.fit.replay = None;
         self.fit.status = FitStatus::Running;
         self.fit.run = (self.fit.run.0 + 1, at);
         self.fit.refit_run = self.fit.run.0;
-        let (target, erased) = (self.config.iterations.max(at + 1), self.fit.erased());
+        let (target, erased, around) = (self.config.iterations.max(at + 1), self.fit.erased(), self.fit.around());
         vec![Effect::Send(WorkerCommand::Refit {
             branch,
             state,
@@ -235,6 +248,7 @@ impl Session {
             target,
             run: self.fit.run.0,
             erased,
+            around,
         })]
     }
 

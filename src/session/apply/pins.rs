@@ -9,7 +9,8 @@ use std::sync::Arc;
 impl Session {
     /// Keeps what is on screen: frame, iteration, settings. The first pin becomes the baseline.
     pub(super) fn pin_fit(&mut self) -> Vec<Effect> {
-        let (Some(shown), Some(initial), Some(frame)) = (&self.fit.shown, &self.fit.initial, &self.data.frame) else {
+        let (Some(shown), Some(initial), Some(frame)) = (&self.fit.shown, self.fit.region_pose(), &self.data.frame)
+        else {
             return Vec::new();
         };
         if self.pins.list.len() >= MOST_PINS {

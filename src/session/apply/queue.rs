@@ -120,6 +120,7 @@ impl Session {
             strata: self.strata.revision(),
             fits: reads.fit.then(|| self.summaries.revision()),
             labels: reads.labels().then(|| self.labels.revision()),
+            basins: reads.basins.then(|| self.best_basins.revision()),
             results: reads.results.then(|| (self.results.revision(), self.view.compared)),
             sort: self.view.sort,
             label_mode: self.view.label_mode,
@@ -155,6 +156,9 @@ impl Session {
             row.converged = summary.converged;
             row.reason = summary.reason.as_deref();
             row.majpe_mm = summary.majpe_mm;
+        }
+        if reads.basins {
+            row.best_basin = self.best_basins.get(&index).copied();
         }
         if reads.results {
             row.results = ResultSide::ALL.map(|side| self.results.value(side, index, self.view.compared));

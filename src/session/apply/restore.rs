@@ -37,6 +37,8 @@ impl Session {
             let summaries = self.summaries.change();
             *summaries = file.summaries;
             summaries.retain(|&frame, _| frame < dataset.len());
+            *self.best_basins.change() = file.best_basins;
+            self.best_basins.change().retain(|&frame, share| frame < dataset.len() && share.is_finite());
             for (side, set) in ResultSide::ALL.into_iter().zip(file.results) {
                 self.results.set(side, set);
             }

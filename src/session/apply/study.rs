@@ -13,12 +13,18 @@ use std::sync::Arc;
 impl Session {
     /// Begins a study of the listed frames, or of the selected ones. Where it was begun before it goes on.
     pub(super) fn run_study(&mut self, order: StudyOrder) -> Vec<Effect> {
+        let frames = self.batch_frames();
+        self.study_of(order, &frames)
+    }
+
+    /// The same of these frames.
+    pub(super) fn study_of(&mut self, order: StudyOrder, frames: &[u32]) -> Vec<Effect> {
         let Some(dataset) = self.data.dataset.clone() else { return Vec::new() };
         if self.study.work.is_running() {
             self.note(LogLevel::Warning, "a study is under way: let it end, or cancel it".into());
             return Vec::new();
         }
-        let frames = FrameRanges::of_frames(self.batch_frames().iter().map(|&frame| frame as usize));
+        let frames = FrameRanges::of_frames(frames.iter().map(|&frame| frame as usize));
         if frames.is_empty() {
             self.note(LogLevel::Warning, "no frame matches the filter: there is nothing to study".into());
             return Vec::new();
@@ -41,7 +47,7 @@ impl Session {
         self.study.work.begin(0);
         (self.study.begun, self.study.follow) = (Some(order.study), true);
         let complexity = self.strata.result().cloned();
-        vec![Effect::StartStudy(Box::new(StudyRequest { dataset, run, complexity }))]
+        vec![Effect::StartStudy(Box::new(StudyRequest { dataset, run, complexity, known: Vec::new() }))]
     }
 
     pub(super) fn pause_study(&mut self) -> Vec<Effect> {

@@ -72,7 +72,7 @@ pub fn syntax() -> String {
     format!(
         "Terms that must all hold, separated by spaces; - negates, | means either:\n\
         stratum:hard · tag:F1 · tag:F1|F2 · tag:none · tag:any · by:ada · note:word · scene:d5s1\n\
-        iou<0.5 · majpe>200 · hardness>=0.7 · peaks static saliency loss iterations index\n\
+        iou<0.5 · majpe>200 · basin<0.9 · hardness>=0.7 · peaks static saliency loss iterations index\n\
         a b diff: the two result sets that are compared, and B − A\n\
         {}: the terms of the loss\n\
         converged:no · fitted:yes · reason:diverged · verdict:detection-error · readable:no\n\

@@ -38,6 +38,8 @@ pub enum SortKey {
     Converged,
     /// MAJPE.
     Majpe,
+    /// Share of starts in the best basin.
+    BestBasin,
     /// Tags, in the order of their digits.
     Tags,
     /// Who labelled it.
@@ -62,6 +64,7 @@ impl SortKey {
                 Reads { strata: true, ..none }
             }
             Self::Iou | Self::Converged | Self::Majpe | Self::Term(_) => Reads { fit: true, ..none },
+            Self::BestBasin => Reads { basins: true, ..none },
             Self::ResultA | Self::ResultB | Self::Difference => Reads { results: true, ..none },
             Self::Tags => Reads { tags: true, ..none },
             Self::Annotator => Reads { annotators: true, ..none },
@@ -99,6 +102,7 @@ pub(super) struct ListedFrom {
     pub(super) strata: u64,
     pub(super) fits: Option<u64>,
     pub(super) labels: Option<u64>,
+    pub(super) basins: Option<u64>,
     pub(super) results: Option<(u64, ComparedNumber)>,
     pub(super) sort: Sort,
     pub(super) label_mode: LabelMode,
@@ -249,6 +253,7 @@ fn key(sort: Sort, row: &FrameRow<'_>) -> u64 {
         SortKey::Iou => row.iou.and_then(ordered),
         SortKey::Converged => row.converged.map(u64::from),
         SortKey::Majpe => row.majpe_mm.and_then(ordered),
+        SortKey::BestBasin => row.best_basin.and_then(ordered),
         SortKey::ResultA => row.results[0].and_then(ordered),
         SortKey::ResultB => row.results[1].and_then(ordered),
         SortKey::Difference => row.number(FrameNumber::Difference).and_then(ordered),

@@ -39,6 +39,8 @@ pub struct FrameRow<'a> {
     pub reason: Option<&'a str>,
     /// MAJPE, mm.
     pub majpe_mm: Option<f64>,
+    /// Share of its starts whose fits end in the best basin, where that was tried.
+    pub best_basin: Option<f64>,
     /// What result sets A and B say, by the number that they are compared by.
     pub results: [Option<f64>; 2],
     /// Tags that may be seen, by whomever.
@@ -72,6 +74,7 @@ impl Default for FrameRow<'_> {
             converged: None,
             reason: None,
             majpe_mm: None,
+            best_basin: None,
             results: [None; 2],
             tags: Tags::NONE,
             own_tags: Tags::NONE,
@@ -93,6 +96,8 @@ pub struct Reads {
     pub strata: bool,
     /// What is known of the fit.
     pub fit: bool,
+    /// Shares in the best basin.
+    pub basins: bool,
     /// Result sets A and B.
     pub results: bool,
     /// Tags.
@@ -110,6 +115,7 @@ impl Reads {
         scene: true,
         strata: true,
         fit: true,
+        basins: true,
         results: true,
         tags: true,
         said: true,
@@ -124,6 +130,7 @@ impl Reads {
             scene: self.scene || other.scene,
             strata: self.strata || other.strata,
             fit: self.fit || other.fit,
+            basins: self.basins || other.basins,
             results: self.results || other.results,
             tags: self.tags || other.tags,
             said: self.said || other.said,
@@ -158,6 +165,8 @@ pub enum FrameNumber {
     Iterations,
     /// MAJPE, mm.
     Majpe,
+    /// Share of starts in the best basin.
+    BestBasin,
     /// What result set A says.
     ResultA,
     /// What result set B says.
@@ -181,6 +190,7 @@ impl FrameNumber {
             Self::Loss,
             Self::Iterations,
             Self::Majpe,
+            Self::BestBasin,
             Self::ResultA,
             Self::ResultB,
             Self::Difference,
@@ -200,6 +210,7 @@ impl FrameNumber {
             Self::Loss => "loss",
             Self::Iterations => "iterations",
             Self::Majpe => "majpe",
+            Self::BestBasin => "basin",
             Self::ResultA => "a",
             Self::ResultB => "b",
             Self::Difference => "diff",
@@ -220,6 +231,7 @@ impl FrameNumber {
             Self::Hardness | Self::PeakDensity | Self::StaticDominance | Self::HumanSaliency => {
                 Reads { strata: true, ..none }
             }
+            Self::BestBasin => Reads { basins: true, ..none },
             Self::ResultA | Self::ResultB | Self::Difference => Reads { results: true, ..none },
             Self::Iou | Self::Loss | Self::Iterations | Self::Majpe | Self::Term(_) => Reads { fit: true, ..none },
         }
@@ -239,6 +251,7 @@ impl FrameRow<'_> {
             FrameNumber::Loss => self.loss,
             FrameNumber::Iterations => self.iterations.map(|n| n as f64),
             FrameNumber::Majpe => self.majpe_mm,
+            FrameNumber::BestBasin => self.best_basin,
             FrameNumber::ResultA => self.results[0],
             FrameNumber::ResultB => self.results[1],
             FrameNumber::Difference => self.results[1].zip(self.results[0]).map(|(b, a)| b - a),

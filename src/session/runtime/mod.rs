@@ -2,6 +2,7 @@
 
 mod batch;
 mod evidence;
+mod explore;
 mod labels;
 mod study;
 
@@ -53,6 +54,7 @@ pub struct Runtime {
     grading: Option<ComplexityJob>,
     batch: Option<batch::BatchRun>,
     study: Option<study::StudyThread>,
+    explorer: explore::Explorer,
     restored_window: Option<serde_json::Value>,
 }
 
@@ -71,6 +73,7 @@ impl Runtime {
             grading: None,
             batch: None,
             study: None,
+            explorer: explore::Explorer::default(),
             restored_window: None,
             wake,
             picker,
@@ -145,6 +148,9 @@ impl Runtime {
         if let Some(report) = self.batch_report().or_else(|| self.study_report()) {
             return Some(report);
         }
+        if let Some(report) = self.explorer.poll() {
+            return Some(report);
+        }
         let worker = self.worker.as_ref()?;
         // Rows and events first: a snapshot may be of a branch that an event announces.
         if let Some(message) = worker.poll() {
@@ -192,6 +198,8 @@ impl Runtime {
     }
 
     fn carry_out(&mut self, effects: Vec<Effect>) {
+        // Before the worker hears of a run: whoever explores makes way from its first step on.
+        self.explorer.make_way(self.session.needs_cores());
         for effect in effects {
             self.carry_out_one(effect);
         }
@@ -270,6 +278,8 @@ impl Runtime {
                     study.cancel();
                 }
             }
+            Effect::Explore(number, what) => self.explorer.start(number, *what, &self.wake),
+            Effect::StopExploring(kind) => self.explorer.stop(kind),
             Effect::FindKept(dataset) => self.on_thread("kept-fits", move || {
                 let (kept, faults) = batch::kept(&dataset);
                 Report::KeptFound { dataset, kept, faults }

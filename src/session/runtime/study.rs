@@ -7,7 +7,7 @@ use crate::session::report::Report;
 use crate::session::study::StudyRequest;
 use crate::study::StudyError;
 use crate::study::complexity::{ComplexityOptions, cache_folder, compute};
-use crate::study::run::{Run, RunError, RunFolder, RunPlan, execute_run};
+use crate::study::run::{Run, RunError, RunFolder, RunPlan, execute_run, seed_run};
 use crate::task::{Job, Progress};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -73,7 +73,7 @@ fn work(
 }
 
 fn study(
-    StudyRequest { dataset, run, complexity }: &StudyRequest,
+    StudyRequest { dataset, run, complexity, known }: &StudyRequest,
     progress: &Progress,
     newest: &Newest,
     wake: &Wake,
@@ -96,6 +96,9 @@ fn study(
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     // Beside the labels, in a folder of the program's own: no layout takes what lies there for data.
     let folder_of_run = RunFolder { path: folder.clone(), inputs: Inputs::default() };
+    if !known.is_empty() {
+        seed_run(&plan, &folder_of_run, known)?;
+    }
     let done = execute_run(dataset, &plan, &folder_of_run, threads, progress, Some(&watcher))?;
     Ok((folder, done))
 }

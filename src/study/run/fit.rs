@@ -118,18 +118,37 @@ impl<'a> LoadedFrame<'a> {
         start: &TimedStart,
         stops: &[usize],
     ) -> Vec<Result<Stop, String>> {
+        let mut fitter = Err(String::new());
+        self.fit_watched(config, precision, start, stops, &mut fitter, |_| true)
+    }
+
+    /// The same, watched from step to step: `go_on` sees the fit before each and says whether it is taken; no answer is given
+    /// for a stop that was not reached. The fit stays in `fitter`.
+    pub(super) fn fit_watched(
+        &self,
+        config: &FitConfig,
+        precision: Precision,
+        start: &TimedStart,
+        stops: &[usize],
+        fitter: &mut Result<Fitter, String>,
+        mut go_on: impl FnMut(&Fitter) -> bool,
+    ) -> Vec<Result<Stop, String>> {
         let began = Instant::now();
-        let fitter = Fitter::new(Arc::clone(&self.problem), *config, precision, start.params.clone());
-        let mut fitter = fitter.map_err(|error| self.told(&error));
+        let begun = Fitter::new(Arc::clone(&self.problem), *config, precision, start.params.clone());
+        *fitter = begun.map_err(|error| self.told(&error));
         let mut ended = false;
         let mut answers = Vec::with_capacity(stops.len());
         for &stop in stops {
-            if let Ok(running) = fitter.as_mut()
+            while let Ok(running) = fitter.as_mut()
                 && !ended
+                && running.iteration() < stop
             {
-                match running.run_to(stop, |_, _| {}) {
+                if !go_on(running) {
+                    return answers;
+                }
+                match running.run_to(running.iteration() + 1, |_, _| {}) {
                     Ok(reason) => ended = reason == StopReason::Converged,
-                    Err(why) => fitter = Err(self.told(&why)),
+                    Err(why) => *fitter = Err(self.told(&why)),
                 }
             }
             let fit_ms = milliseconds(began);

@@ -142,6 +142,26 @@ pub fn execute_run(
     Ok(Run::of(plan.spec.clone(), &rows, true))
 }
 
+/// Begins the folder of `plan` with rows that are done: those of its variants and frames. Where there is a run already nothing
+/// is changed, for what is done there counts.
+///
+/// # Errors
+/// As [`execute_run`], of the folder.
+pub fn seed_run(
+    plan: &RunPlan,
+    RunFolder { path: folder, inputs }: &RunFolder<'_>,
+    rows: &[RunRow],
+) -> Result<(), RunError> {
+    let _lock = claim(folder, inputs)?;
+    if is_run_folder(folder) || folder.join(JOURNAL_FILE).exists() {
+        return Ok(());
+    }
+    plan.spec.write(folder)?;
+    let of_plan = |row: &&RunRow| row.variant < plan.spec.variants.len() && plan.frames.contains(&row.frame);
+    let known = rows.iter().filter(of_plan).map(|row| ((row.variant, row.frame), row.clone())).collect();
+    rewrite(&folder.join(JOURNAL_FILE), &plan.spec, &known)
+}
+
 /// Refuses a folder for a run that lies in the data set, or whose files are inputs. It need not be there.
 ///
 /// # Errors

@@ -4,8 +4,8 @@
 //! killed run stopped; [`merge_runs`] makes one run of its shards; [`Run`] reads it back. From the inside out: `variant.rs` is one
 //! configuration, `plans.rs` the studies' rows, `grid.rs` and `switches.rs` two ways to make them, `kind.rs` their names,
 //! `paper.rs` the paper's figures beside them and `reach.rs` whether what they perturb can act; `spec.rs` is the file that says
-//! what a run is, `plan.rs` its units of work, `fit.rs` one frame, `counting.rs` the
-//! people of a frame, `row.rs` what is known of either, `journal.rs` what is done, `engine.rs` the threads, `table.rs` the sums,
+//! what a run is, `plan.rs` its units of work, `fit.rs` one frame, `single.rs` one fit of it by
+//! itself, `counting.rs` the people of a frame, `row.rs` what is known of either, `journal.rs` what is done, `engine.rs` the threads, `table.rs` the sums,
 //! `output.rs`, `markdown.rs` and `parquet_rows.rs` the files, `folder.rs` all of them together.
 //!
 //! A run folder: `run.toml` (the specification), `journal.jsonl` (rows as they were done), `rows.csv` and `rows.parquet` (the same,
@@ -42,19 +42,21 @@ mod plan;
 mod plans;
 mod reach;
 mod row;
+mod single;
 mod spec;
 mod switches;
 mod table;
 mod variant;
 
 pub use error::RunError;
-pub use folder::{Run, RunFolder, check_run_folder, execute_run, is_run_folder, merge_runs};
+pub use folder::{Run, RunFolder, check_run_folder, execute_run, is_run_folder, merge_runs, seed_run};
 pub use grid::GridAxis;
 pub use journal::JOURNAL_FILE;
 pub use kind::StudyKind;
 pub use output::TABLE_FILE;
-pub use plan::{RunPlan, RunRequest, points};
+pub use plan::{RunPlan, RunRequest, points, sweep};
 pub use row::{RunNumbers, RunRow};
+pub use single::{FrameSweep, SweptFit, failed_row};
 pub use spec::{RUN_FILE, RunSpec};
 pub use table::{CountShares, Spread, TableRow, mark, notes};
 pub use variant::{Method, PaperRow, StartFrom, Variant};

@@ -46,6 +46,14 @@ pub fn points(study: StudyKind, base: &FitConfig, grid: &[GridAxis], layout: &st
     Ok(plans::compared(study, base, grid, &[], layout)?.variants.len())
 }
 
+/// The variants of a sweep of these axes on top of `base`, in the order of its table: the last axis fastest.
+///
+/// # Errors
+/// Where the grid makes no sense.
+pub fn sweep(base: &FitConfig, grid: &[GridAxis]) -> Result<Vec<Variant>, RunError> {
+    Ok(plans::compared(StudyKind::Sweep, base, grid, &[], "")?.variants)
+}
+
 /// Work that is done in one piece by one thread.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Unit {

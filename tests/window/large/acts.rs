@@ -6,6 +6,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use mhp_inspector::app::{InspectorApp, Pane};
 use mhp_inspector::config::{FitConfig, Preset};
+use mhp_inspector::explore::ExplorationKind;
 use mhp_inspector::labels::Tag;
 use mhp_inspector::session::{Command, LabelStatus, Session, Sort, SortKey, StrataStatus, TimelineStrip};
 use std::fmt::Write as _;
@@ -49,6 +50,7 @@ pub(super) fn measure(tree: &Path, warm: bool) {
     window.bulk();
     window.panes();
     window.fit();
+    window.explore();
     window.batch(warm);
     window.results(tree);
     print_memory();
@@ -309,6 +311,22 @@ impl Window {
         meter.print();
         self.repeat("idle, curves of 100,000 iterations", 60, |_, _| {});
         self.apply(Command::SetFilter(String::new()));
+    }
+
+    /// Each exploration on screen while it fills.
+    fn explore(&mut self) {
+        self.apply(Command::GotoFrame(0));
+        self.until("frame 0", |s| s.data.loading.is_none() && s.fit.is_ready() && !s.fit.is_running());
+        self.apply(Command::SetConfig(Box::new(Preset::Baseline.config())));
+        self.until("its fit", |s| s.fit.is_ready() && !s.fit.is_running() && s.fit.shown.is_some());
+        for kind in ExplorationKind::ALL {
+            let pane = Pane::all().iter().find(|pane| pane.title().eq_ignore_ascii_case(kind.title())).unwrap();
+            self.0.state_mut().show_pane(pane);
+            let mut meter = Meter::new(&format!("a {} fills", kind.title()));
+            meter.pass_with(&mut self.0, |harness| harness.state_mut().apply(Command::Explore(kind)));
+            self.passes_until(&mut meter, |s| !s.explore.is_running(kind) && s.explore.is_current(kind));
+            meter.print();
+        }
     }
 
     /// Every frame fitted for one iteration: cancelled in the first window, gone on with in the second.

@@ -4,7 +4,7 @@ use crate::app::theme::{self, Tokens};
 use crate::app::widgets::iou_color;
 use crate::labels::Verdict;
 use crate::mhp::TermId;
-use crate::session::{ComparedNumber, FrameNumber, FrameRow, ResultSets, ResultSide, SortKey, ViewState};
+use crate::session::{ComparedNumber, FrameNumber, FrameRow, ResultSide, Session, SortKey, ViewState};
 use egui::{Align2, Color32, FontId, Painter, Rect, pos2};
 use std::sync::LazyLock;
 
@@ -51,10 +51,11 @@ impl Column {
         if self.is_of_term() { named(&view.shown_terms) } else { !named(&view.hidden_columns) }
     }
 
-    /// Whether there is something to say in it: the two result sets only where they are kept.
-    pub(super) fn has_any(&self, results: &ResultSets) -> bool {
-        let kept = |side| results.get(side).is_some();
+    /// Whether there is something to say in it: the two result sets only where they are kept, basins where they were sought.
+    pub(super) fn has_any(&self, session: &Session) -> bool {
+        let kept = |side| session.results.get(side).is_some();
         match self.sort {
+            SortKey::BestBasin => !session.best_basins.is_empty(),
             SortKey::ResultA => kept(ResultSide::A),
             SortKey::ResultB => kept(ResultSide::B),
             SortKey::Difference => kept(ResultSide::A) && kept(ResultSide::B),
@@ -188,6 +189,16 @@ const COLUMNS: &[Column] = &[
         right: true,
     },
     Column {
+        key: "basin",
+        title: "Basin",
+        name: "Best basin",
+        tip: "Share of starts whose fits end in the best basin, where a restart cloud was made of the frame: 100 % is a frame \
+              that every start finds alike.",
+        sort: SortKey::BestBasin,
+        width: 36.0,
+        right: true,
+    },
+    Column {
         key: "a",
         title: "A",
         name: "Results A",
@@ -259,6 +270,7 @@ fn text(column: &Column, row: &FrameRow<'_>, compared: ComparedNumber, tokens: &
         },
         "reason" => dim(row.reason.unwrap_or_default().to_owned()),
         "majpe" => (row.majpe_mm.map_or_else(String::new, |mm| format!("{mm:.0}")), tokens.text),
+        "basin" => (row.best_basin.map_or_else(String::new, |share| format!("{:.0} %", 100.0 * share)), tokens.text),
         "a" => (row.results[0].map_or_else(String::new, |x| compared.text(x)), tokens.text),
         "b" => (row.results[1].map_or_else(String::new, |x| compared.text(x)), tokens.text),
         "difference" => match row.number(FrameNumber::Difference) {

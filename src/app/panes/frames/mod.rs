@@ -73,9 +73,8 @@ fn blank(session: &Session) -> Option<Blank> {
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let session = shared.session;
     let tokens = Tokens::of(ui);
-    let columns: Vec<&Column> = columns::columns()
-        .filter(|column| column.is_shown(&session.view) && column.has_any(&session.results))
-        .collect();
+    let columns: Vec<&Column> =
+        columns::columns().filter(|column| column.is_shown(&session.view) && column.has_any(session)).collect();
     // As many digits as the last index has.
     let digits = session.data.len().saturating_sub(1).max(9).ilog10() as f32 + 1.0;
     let own = |column: &Column| if column.key == "index" { DIGIT * digits + 2.0 } else { column.width };

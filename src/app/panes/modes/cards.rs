@@ -29,6 +29,12 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
         for card in cards {
             one(ui, shared, card, tokens);
         }
+        if let Some(share) = session.best_basins.get(&session.data.frame_index) {
+            let text = format!("Restarts: {:.0} % of the starts end in the best basin", 100.0 * share);
+            let tip = "As the restart cloud found it: near 100 % every start finds the same. A small share is a frame that is \
+                       ambiguous, or a fit that does not find out of its start.";
+            ui.label(RichText::new(text).small()).on_hover_text(tip);
+        }
         return;
     }
     let text = match &session.fit.status {

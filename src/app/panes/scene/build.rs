@@ -2,7 +2,7 @@
 
 use crate::app::locate::seen_by;
 use crate::app::map_image::Orientation;
-use crate::app::panes::Shared;
+use crate::app::panes::{MovedBody, Shared};
 use crate::app::theme::Tokens;
 use crate::body::{Group, Pppr, Side, Skeleton};
 use crate::geometry::{self, rotation_from_quaternion};
@@ -21,6 +21,8 @@ const GRADIENT_M: f64 = 0.35;
 
 /// Share of the picture that a Gaussian may take before it fades.
 const LARGEST: f32 = 0.5;
+/// Basins of fewer starts have no ghost.
+const GHOST_SHARE: f64 = 0.03;
 /// A person's number stands this far above the highest joint, m.
 const ABOVE_HEAD_M: f64 = 0.12;
 
@@ -56,7 +58,7 @@ pub(super) fn scene(session: &Session, camera: &Camera, tokens: &Tokens, px: f32
         }
     }
     if look.show_initial
-        && let (Some(initial), Some(skeleton)) = (&session.fit.initial, skeleton)
+        && let (Some(initial), Some(skeleton)) = (session.fit.region_pose(), skeleton)
     {
         let stroke = Stroke { color: rgba(tokens.dim, 0.6), width_px: 1.0 * px };
         bones(&mut scene.lines, skeleton, initial.positions(), &|_, _| stroke);
@@ -75,6 +77,35 @@ pub(super) fn scene(session: &Session, camera: &Camera, tokens: &Tokens, px: f32
         bones(&mut scene.lines, &dataset.info().skeleton, pin.params.positions(), &|_, _| stroke);
     }
     (scene, labels)
+}
+
+/// The mean skeletons of the restart cloud's basins, that under the pointer in full; and the body where the pointer would
+/// move it.
+pub(super) fn explored(scene: &mut Scene, shared: &Shared<'_>, tokens: &Tokens, px: f32) {
+    let session = shared.session;
+    let (Some(problem), frame) = (&session.fit.problem, session.fit.frame) else { return };
+    let skeleton = &problem.skeleton;
+    if session.view.show_basins
+        && let Some(cloud) = session.explore.restarts(frame)
+    {
+        // Those of single starts would hide the others.
+        for (k, basin) in cloud.basins.iter().enumerate().filter(|(_, basin)| basin.share >= GHOST_SHARE) {
+            let pointed = shared.pointed.basin == Some(k);
+            let (alpha, width) = if pointed { (1.0, 3.0) } else { (0.25 + 0.5 * basin.share as f32, 1.5) };
+            let stroke =
+                Stroke { color: rgba(if k < 6 { tokens.person(k) } else { tokens.dim }, alpha), width_px: width * px };
+            bones(&mut scene.lines, skeleton, &basin.mean, &|_, _| stroke);
+        }
+    }
+    let moved = shared.pointed.moved.and_then(|moved| match moved {
+        MovedBody::Floor(at) => Some(session.explore.ambiguity(frame)?.on_floor(skeleton, at)),
+        MovedBody::Turned(at) => Some(session.explore.ambiguity(frame)?.turned(skeleton, at)),
+        MovedBody::Slice(at) => Some(session.explore.landscape(frame)?.params_at(skeleton, &at)),
+    });
+    if let Some(moved) = moved {
+        let stroke = Stroke { color: rgba(tokens.accent, 0.95), width_px: 2.0 * px };
+        bones(&mut scene.overlay, skeleton, moved.positions(), &|_, _| stroke);
+    }
 }
 
 /// The places that the cell under the pointer sees, whichever map it is of.
