@@ -42,6 +42,24 @@ pub(super) const BODY: &[Answer] = &[
     ),
 ];
 
+pub(super) const CLUTTER: &[Answer] = &[
+    answer("none", "none", "Noise alone, as strong in every cell."),
+    answer(
+        "modelled",
+        "by range",
+        "The median of what is lit beside the person at each range joins the noise: sidelobes and walls are arcs. In a window also what stands still over time, where the person walks.",
+    ),
+];
+
+pub(super) const STATIC_ECHO: &[Answer] = &[
+    answer("kept", "kept", "As bright as one that moves: the paper."),
+    answer(
+        "fitted",
+        "fitted",
+        "Radars take away the mean over a frame's chirps, and with it what stands still. How much is left of a joint at rest is fitted; opacities show it.",
+    ),
+];
+
 pub(super) const SUMMATION: &[Answer] = &[
     answer("coherent", "coherent", "H_sim = |Σ A K e^{iψ}|: joints interfere. The paper."),
     answer("incoherent", "incoherent", "H_sim = √Σ (A K)²: powers add."),

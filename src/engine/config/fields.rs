@@ -5,8 +5,9 @@
 use super::field::{Access, Answer, Field, FieldGroup, ReadBy, Unset, Value};
 use super::rows::{choice, count_at, flag_at, maybe_at, number, number_at, one_of_at, switch};
 use super::{
-    Background, BodyModel, Convergence, EM_REGION_FORM, EmLoss, EmRegion, FitConfig, FramesAround, GradientVelocity,
-    Height, Limbs, Parameterization, Scatterers, StartPlace, Still, Summation, WarmStart, Yaw, answers,
+    Background, BodyModel, Clutter, Convergence, EM_REGION_FORM, EmLoss, EmRegion, FitConfig, FramesAround,
+    GradientVelocity, Height, Limbs, Parameterization, Scatterers, StartPlace, StaticEcho, Still, Summation, WarmStart,
+    Yaw, answers,
 };
 use FieldGroup::{Limits, Model, Optimiser, Perturbation, Radar, Start as Starting, StepSizes, Weights};
 use ReadBy::{Run, Start, Steps, StepsAndStart};
@@ -70,6 +71,30 @@ pub const FIELDS: &[Field] = &[
             one_of_at!(body, [BodyModel::Joints, BodyModel::Skin]),
         )
         .row("body")
+    },
+    Field {
+        help: "What levels know of echoes that are not the person's.",
+        ..choice(
+            Model,
+            "clutter",
+            "Clutter",
+            StepsAndStart,
+            answers::CLUTTER,
+            one_of_at!(clutter, [Clutter::None, Clutter::Modelled]),
+        )
+        .row("clutter")
+    },
+    Field {
+        help: "How bright a joint is that stands still, where the parameterization is motion.",
+        ..choice(
+            Model,
+            "static_echo",
+            "Static echo",
+            StepsAndStart,
+            answers::STATIC_ECHO,
+            one_of_at!(static_echo, [StaticEcho::Kept, StaticEcho::Fitted]),
+        )
+        .row("static echo")
     },
     Field {
         help: "Share of the EM region's cells that a mask holds: B = [H > P_{100−τ}(H)]. At 100 % all but the smallest cell: no masking.",

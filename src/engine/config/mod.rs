@@ -66,6 +66,28 @@ pub enum BodyModel {
     Skin,
 }
 
+/// What is known of echoes that are not the person's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Clutter {
+    /// Noise, as strong in every cell: SPEC section 8.
+    #[default]
+    None,
+    /// What is lit beside the person at each range; in a window also what stands still where the person walks.
+    Modelled,
+}
+
+/// How bright a joint is that stands still.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StaticEcho {
+    /// As bright as one that moves: the paper.
+    #[default]
+    Kept,
+    /// As bright as the removal of static echoes leaves it, which is fitted.
+    Fitted,
+}
+
 /// Where the electromagnetic term is evaluated; SPEC section 4. A view's own `region` wins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum EmRegion {
@@ -147,6 +169,10 @@ pub struct FitConfig {
     pub objective: EmLoss,
     /// What returns an echo.
     pub body: BodyModel,
+    /// What levels know of echoes that are not the person's.
+    pub clutter: Clutter,
+    /// How bright a joint is that stands still.
+    pub static_echo: StaticEcho,
     /// Share of cells in a mask, percent.
     pub tau_pct: f64,
     /// Temperature T of the soft mask.
@@ -219,6 +245,8 @@ impl Default for FitConfig {
             w_kine: 0.5,
             objective: EmLoss::default(),
             body: BodyModel::default(),
+            clutter: Clutter::default(),
+            static_echo: StaticEcho::default(),
             tau_pct: 10.0,
             softness: 0.5,
             theta_max_deg: 170.0,

@@ -1,8 +1,8 @@
 //! Settings with a name.
 
 use super::{
-    Background, BodyModel, Convergence, EmLoss, EmRegion, FitConfig, FramesAround, GradientVelocity, Height,
-    InitConfig, LearningRates, Parameterization, Scatterers, StartPlace, Still, Summation, WarmStart, Yaw,
+    Background, BodyModel, Clutter, Convergence, EmLoss, EmRegion, FitConfig, FramesAround, GradientVelocity, Height,
+    InitConfig, LearningRates, Parameterization, Scatterers, StartPlace, StaticEcho, Still, Summation, WarmStart, Yaw,
 };
 
 /// A whole [`FitConfig`] with a name. Without a name, every command and the window take the recommended one; a FIT.toml begins at
@@ -64,7 +64,7 @@ impl Preset {
             Self::Baseline => "The paper's fit within 1.25 m of the person, from a start that leaves the room out",
             Self::Paper => "The paper to the letter: the whole map, the strongest cluster of peaks, one frame alone",
             Self::Recommended => {
-                "As many people as are counted, in windows of frames fitted at once: levels instead of masks, skin, and poses that real people have; who stands among reflectors stays where the start has them"
+                "As many people as are counted, in windows of frames fitted at once: levels instead of masks, skin, poses that real people have, and what lies beside a person; whom no body explains stays where the start has them"
             }
         }
     }
@@ -91,6 +91,8 @@ impl Preset {
             Self::Recommended => FitConfig {
                 objective: EmLoss::NccDb,
                 body: BodyModel::Skin,
+                clutter: Clutter::Modelled,
+                static_echo: StaticEcho::Fitted,
                 parameterization: Parameterization::Motion,
                 // What a body can do is what the prior says.
                 w_kine: 0.0,

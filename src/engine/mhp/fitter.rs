@@ -95,7 +95,10 @@ impl Fitter {
             // Where there is none, persons stay where they are.
             self.window = Window::new(&problem, &config, precision, &state.params)?.ok();
             if let Some(window) = &mut self.window {
-                let coordinates = window.coordinates_of(&state.params);
+                let mut coordinates = window.coordinates_of(&state.params);
+                let mut found = WindowLoss::default();
+                let how = (&*problem, &config);
+                window.choose_brightness(how, precision, (&mut coordinates, &state.params), &mut found);
                 let of = (coordinates.as_slice(), &state.params);
                 if window.explains((&problem, &config), precision, of, &mut self.window_loss[0]) {
                     window.place(&coordinates, &mut state.params);

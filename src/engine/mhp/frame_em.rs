@@ -3,7 +3,7 @@
 use super::cell_box::CellBox;
 use super::em::{EmTarget, Workspace};
 use super::gaussian::{WorldGaussianBars, WorldGaussians};
-use super::levels::Levels;
+use super::levels::{Levels, NOISE_PCT};
 use super::percentile::percentile;
 use super::region::Region;
 use super::skin::{Skin, radar_place};
@@ -11,8 +11,11 @@ use super::splat::ViewModel;
 use super::{Ious, Precision};
 use crate::body::{Pppr, Skeleton};
 use crate::config::{BodyModel, EmLoss, FitConfig, Summation};
-use crate::radar::{AxisKind, RadarConfig, View};
+use crate::radar::{AxisKind, RadarConfig, SpatialGrid, View};
 use smallvec::SmallVec;
+
+/// The median of powers of noise alone, of their percentile [`NOISE_PCT`]: speckle is exponential.
+const MEDIAN_OF_NOISE: f64 = 1.94;
 
 /// What is measured in a frame's EM regions, and the scratch of an evaluation.
 pub(super) struct FrameEm {
@@ -34,6 +37,28 @@ pub(super) struct Measured<'a> {
     pub radar: &'a RadarConfig,
     pub maps: SmallVec<[&'a [f64]; 4]>,
     pub background: Option<&'a [Vec<f64>]>,
+    /// The rings of each view, where clutter is modelled by range.
+    pub grids: SmallVec<[&'a SpatialGrid; 4]>,
+}
+
+impl Measured<'_> {
+    /// What joins the noise in a view with this region: a power a cell of the whole map, of the unit of the map's power, if
+    /// anything does. Sidelobes of a body, walls and leakage are arcs about the radar: of each range it is the median of the cells
+    /// beside the region, so far as it rises over the noise's, and at least what stands there over time.
+    fn clutter(&self, view: usize, region: &Region) -> Option<Vec<f64>> {
+        let standing = self.background.map(|maps| maps[view].as_slice());
+        let Some(grid) = self.grids.get(view) else { return standing.map(<[f64]>::to_vec) };
+        let power: Vec<f64> = self.maps[view].iter().map(|&h| self.views[view].quantity.power(h)).collect();
+        let mut inside = vec![false; power.len()];
+        region.indices(&self.views[view].shape()).into_iter().for_each(|cell| inside[cell] = true);
+        let mut clutter = grid.beside(&power, &inside);
+        let speckle = MEDIAN_OF_NOISE * percentile(&power, NOISE_PCT);
+        clutter.iter_mut().for_each(|beside| *beside = (*beside - speckle).max(0.0));
+        for (clutter, standing) in clutter.iter_mut().zip(standing.into_iter().flatten()) {
+            *clutter = clutter.max(*standing);
+        }
+        Some(clutter)
+    }
 }
 
 /// The settings of the forward model: points of skin lie where their echo comes from.
@@ -64,7 +89,7 @@ impl FrameEm {
             let ori: Vec<bool> = cells.iter().map(|&h| h > threshold).collect();
             let cell_box = CellBox::new(view, &region.bins, &ori, precision);
             let levels = (config.objective != EmLoss::Iou).then(|| {
-                let background = measured.background.map(|maps| inside(&maps[k]));
+                let background = measured.clutter(k, region).map(|power| inside(&power));
                 // Powers that add, without a spectrum along an axis.
                 let spectral = view.axes.iter().any(|axis| axis.kind == AxisKind::Doppler);
                 let in_rows = precision == Precision::F32 && config.summation == Summation::Incoherent && !spectral;

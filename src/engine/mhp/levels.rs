@@ -13,7 +13,7 @@ use crate::config::EmLoss;
 use crate::radar::Quantity;
 
 /// The share of a map's cells, percent, that lie at or below the noise.
-const NOISE_PCT: f64 = 30.0;
+pub(super) const NOISE_PCT: f64 = 30.0;
 /// The least noise and the least power of a cell, of the largest: zeros have no logarithm.
 pub(super) const LEAST_POWER: f64 = 1e-12;
 /// The least power above the noise, of all.
@@ -97,10 +97,7 @@ impl Levels {
         background: Option<&[f64]>,
         in_rows: bool,
     ) -> Self {
-        let power = |x: f64| match quantity {
-            Quantity::Amplitude => x * x,
-            Quantity::Power => x.max(0.0),
-        };
+        let power = |x: f64| quantity.power(x);
         let largest = cells.iter().copied().fold(0.0, f64::max);
         let unit = if largest > 0.0 { power(largest) } else { 1.0 };
         let everywhere: Vec<f64> = map.iter().map(|&x| power(x) / unit).collect();

@@ -57,7 +57,7 @@ impl Objective {
         problem.check(initial)?;
         let centres = region::centres(initial);
         let (regions, warnings) = region::regions(&problem.views, config.em_region, &centres)?;
-        let em = FrameEm::new(&problem.measured(), &regions, &config, precision);
+        let em = FrameEm::new(&problem.measured(&config), &regions, &config, precision);
         let mut objective = Self {
             problem,
             config,
@@ -88,10 +88,12 @@ impl Objective {
         {
             (self.regions, self.warnings) = (regions, warnings);
         }
-        let asked =
-            |config: &FitConfig| (config.em_region, config.tau_pct, config.objective, config.body, config.summation);
+        let asked = |config: &FitConfig| {
+            let compared = (config.objective, config.clutter, config.tau_pct);
+            (config.em_region, compared, config.body, config.summation)
+        };
         if asked(&config) != asked(&before) {
-            self.em = FrameEm::new(&self.problem.measured(), &self.regions, &config, self.precision);
+            self.em = FrameEm::new(&self.problem.measured(&config), &self.regions, &config, self.precision);
         }
         self.anchor();
     }

@@ -4,7 +4,7 @@ use super::context::{Contexts, Neighbour, Reading, TemporalContext, anchors};
 use super::frame_em::Measured;
 use super::{FitError, fill_missing};
 use crate::body::{Pppr, Skeleton};
-use crate::config::{FitConfig, FramesAround};
+use crate::config::{Clutter, EmLoss, FitConfig, FramesAround};
 use crate::geometry::Vec3;
 use crate::radar::{RadarConfig, View, ViewSet};
 
@@ -101,10 +101,12 @@ impl Problem {
         self.maps.get(view).map_or(&[], Vec::as_slice)
     }
 
-    /// What is measured in this frame.
-    pub(super) fn measured(&self) -> Measured<'_> {
+    /// What is measured in this frame, for these settings.
+    pub(super) fn measured(&self, config: &FitConfig) -> Measured<'_> {
         let maps = self.maps.iter().map(Vec::as_slice).collect();
-        Measured { views: &self.views, skeleton: &self.skeleton, radar: &self.radar, maps, background: None }
+        let by_range = config.clutter == Clutter::Modelled && config.objective != EmLoss::Iou;
+        let grids = self.views.grids().filter(|_| by_range).map(AsRef::as_ref).collect();
+        Measured { views: &self.views, skeleton: &self.skeleton, radar: &self.radar, maps, background: None, grids }
     }
 
     /// How many cells of a view's map were filled.

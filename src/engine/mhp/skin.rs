@@ -12,7 +12,7 @@
 //! ```
 //!
 //! each round, its amplitude the root of its area; `surface_offset_m` moves no point, for it lies on the skin. The joints' own opacities and scales, by those that their part of the body has
-//! at the start (`body::scatterer`), make the points between them brighter and larger, at most four times; their rotations say
+//! at the start (`body::scatterer`), make the points between them brighter and larger, at most four times (and dimmer as far as they are); their rotations say
 //! nothing. Velocities and Doppler features are those between the joints. The line of sight is that of the radar, the mean of the
 //! views' places.
 
@@ -52,8 +52,10 @@ const TRUNK_AREA_M2: f64 = 0.35 * 0.5 / 12.0 * 2.0;
 const HEAD_SCALE_M: f64 = 0.036;
 const HEAD_AREA_M2: f64 = 0.035;
 const LIMB_SCALE: f64 = 0.3;
-/// ln of how much brighter and larger than at the start a point may be.
+/// ln of how much brighter and larger than at the start a point may be, and how much smaller; it may be as dim as the removal of
+/// static echoes leaves it.
 const MOST_LN: f64 = 1.386_294_361_119_890_6;
+const LEAST_LN_ALPHA: f64 = -5.0;
 /// α and standard deviation, m, of a joint of which nothing is known.
 const PLAIN: [f64; 2] = [0.5, 0.08];
 
@@ -253,7 +255,8 @@ impl Skin {
                 let mut place = [0.0; 3];
                 of.shares.iter().for_each(|&(part, share)| add_scaled(&mut place, places[part], share));
                 let (at, seen) = of.seen(place, &places, &normal);
-                let [ln_alpha, ln_scale] = self.looks(first, of).map(|x| x.clamp(-MOST_LN, MOST_LN));
+                let [ln_alpha, ln_scale] = self.looks(first, of);
+                let (ln_alpha, ln_scale) = (ln_alpha.clamp(LEAST_LN_ALPHA, MOST_LN), ln_scale.clamp(-MOST_LN, MOST_LN));
                 let alpha = (of.ln_amplitude + 0.5 * seen.ln() + ln_alpha).exp().min(0.999);
                 self.points.set_vec3(Group::Position, joint, add(at, self.radar));
                 self.points.set_vec3(Group::LogScale, joint, [of.scale_m.ln() + ln_scale; 3]);
@@ -302,9 +305,10 @@ impl Skin {
                 let place_bar = of.pull_back(place, (&places, &normal), (bar, by_ln), &mut bars, &mut normal_bar);
                 of.shares.iter().for_each(|&(part, share)| add_scaled(&mut bars[part], place_bar, share));
                 let [ln_alpha, ln_scale] = self.looks(first, of);
-                let pass = |x: f64, bar: f64| if x.abs() < MOST_LN { bar } else { 0.0 };
+                let pass = |x: f64, least: f64, bar: f64| if x > least && x < MOST_LN { bar } else { 0.0 };
                 let scale_bar = self.gradient.vec3(Group::LogScale, joint).iter().sum();
-                let (alpha_bar, scale_bar) = (pass(ln_alpha, by_ln), pass(ln_scale, scale_bar));
+                let (alpha_bar, scale_bar) =
+                    (pass(ln_alpha, LEAST_LN_ALPHA, by_ln), pass(ln_scale, -MOST_LN, scale_bar));
                 let velocity_bar = self.gradient.vec3(Group::Velocity, joint);
                 let omega_bar = self.gradient.joint(Group::Omega, joint);
                 for &(own, share) in &of.joints {

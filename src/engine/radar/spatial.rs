@@ -30,7 +30,7 @@ pub(crate) struct SpatialGrid {
 }
 
 impl SpatialGrid {
-    pub(super) fn new(view: &View) -> Self {
+    pub(crate) fn new(view: &View) -> Self {
         let spatial = view.axes.iter().enumerate().filter(|(_, axis)| axis.kind != AxisKind::Doppler);
         let axes: Vec<(usize, Axis)> = spatial.map(|(k, axis)| (k, axis.clone())).collect();
         let shape: Vec<usize> = axes.iter().map(|(_, axis)| axis.bins).collect();
@@ -103,6 +103,43 @@ impl SpatialGrid {
         let ends = self.rings.get(place + 1).map_or(0..self.cells.len(), |&end| self.rings[place]..end);
         // Positive floats sort as their bits do, and integers are partitioned several times as fast.
         1.0 / median(&mut self.cells[ends].iter().map(|&cell| value[cell as usize].to_bits()).collect::<Vec<_>>())
+    }
+
+    /// The median of `power` over those cells of each cell's ring that are not `inside`, both a cell of the view in C order; 0 where
+    /// they are too few. A ring is one of each Doppler bin: what moves smears along its own.
+    pub(crate) fn beside(&self, power: &[f64], inside: &[bool]) -> Vec<f64> {
+        let shape = self.view.shape();
+        // The cells of a spatial cell: one a Doppler bin.
+        let strides: Vec<usize> = (0..shape.len()).map(|k| shape[k + 1..].iter().product()).collect();
+        let offsets = shape.iter().enumerate().fold(vec![0], |offsets: Vec<usize>, (k, &bins)| {
+            let own = if self.axes.iter().any(|(axis, _)| *axis == k) { 1 } else { bins };
+            offsets
+                .iter()
+                .flat_map(|&offset| (0..own).map(move |bin| (offset, bin)))
+                .map(|(o, bin)| o + bin * strides[k])
+                .collect()
+        });
+        let first = |spatial: usize| -> usize {
+            unravel(spatial, &self.shape).iter().zip(&self.axes).map(|(bin, (axis, _))| bin * strides[*axis]).sum()
+        };
+        let plain = self.axes.len() == shape.len();
+        let firsts: Vec<usize> = if plain { Vec::new() } else { (0..self.cells.len()).map(first).collect() };
+        let full = |spatial: u32| if plain { spatial as usize } else { firsts[spatial as usize] };
+        let mut levels = vec![0.0; power.len()];
+        let mut beside = Vec::new();
+        for ring in self.rings.windows(2) {
+            let cells = &self.cells[ring[0]..ring[1]];
+            for offset in &offsets {
+                beside.clear();
+                let outside = cells.iter().map(|&cell| full(cell) + offset).filter(|&cell| !inside[cell]);
+                beside.extend(outside.map(|cell| (power[cell] as f32).to_bits()));
+                if beside.len() >= SMALLEST_RING {
+                    let level = f64::from(median(&mut beside));
+                    cells.iter().for_each(|&cell| levels[full(cell) + offset] = level);
+                }
+            }
+        }
+        levels
     }
 
     /// H of each spatial cell in shares of `largest`, and the full cell each was taken from where that is another.
@@ -181,6 +218,22 @@ mod tests {
             let value = vec![1.0; grid.cells.len()];
             assert!((0..grid.rings.len()).all(|place| grid.background(&value, place).is_finite()), "{lo} to {hi}");
         }
+    }
+
+    /// An arc about the radar is known from the cells beside a box, and what is in the box says nothing of it.
+    #[test]
+    fn what_is_lit_beside_a_box_is_told_of_each_ring_and_doppler_bin() {
+        let axis = |kind, bins, lo, hi| Axis { kind, bins, lo, hi, spacing: Spacing::Linear };
+        let mut view = view([(AxisKind::Range, 4, 1.0, 5.0), (AxisKind::Azimuth, 20, -1.0, 1.0)]);
+        view.axes.insert(1, axis(AxisKind::Doppler, 3, -1.0, 1.0));
+        let grid = SpatialGrid::new(&view);
+        let of = |cell: usize| unravel(cell, &view.shape());
+        let inside: Vec<bool> = (0..view.cells()).map(|cell| (8..12).contains(&of(cell)[2])).collect();
+        let level = |cell: usize| (1 + of(cell)[0] * 10 + of(cell)[1]) as f64;
+        let power: Vec<f64> = (0..view.cells()).map(|cell| if inside[cell] { 1e6 } else { level(cell) }).collect();
+        let beside = grid.beside(&power, &inside);
+        assert!((0..view.cells()).all(|cell| beside[cell] == level(cell)));
+        assert!(grid.beside(&power, &vec![true; view.cells()]).iter().all(|&level| level == 0.0));
     }
 
     #[test]

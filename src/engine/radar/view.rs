@@ -17,6 +17,14 @@ pub enum Quantity {
 }
 
 impl Quantity {
+    /// The power of a stored number; what is stored as power and negative has none.
+    pub fn power(self, stored: f64) -> f64 {
+        match self {
+            Self::Amplitude => stored * stored,
+            Self::Power => stored.max(0.0),
+        }
+    }
+
     /// The factor before log₁₀ that makes decibels.
     pub fn db_factor(self) -> f64 {
         match self {

@@ -7,6 +7,8 @@ use crate::config::{EmLoss, FIELDS, Field, FitConfig, Limbs, Preset};
 const ORDER: &[&str] = &[
     "objective",
     "body",
+    "clutter",
+    "static echo",
     "motion",
     "bones turn",
     "scales and opacities by body part",

@@ -2,8 +2,8 @@
 //!
 //! Where static echoes were not removed, levels follow reflectors instead of the body. Over the frames around, the lower quartile
 //! of a cell's power is what stands there while a person who walks is elsewhere: it joins the noise under the person
-//! (`mhp/levels.rs`). Of somebody who stands it is the body itself, and nothing tells the two apart: such a body stays where it
-//! starts.
+//! (`mhp/levels.rs`). Of somebody who stands it is the body itself, and nothing tells the two apart: under such a body the noise is what
+//! lies beside it at each range alone (`mhp/frame_em.rs`).
 
 use crate::mhp::percentile;
 use crate::mhp::region::Region;
@@ -19,16 +19,12 @@ const CLUTTERED: f64 = 0.015;
 
 /// The power that stands in each cell of a view, of its `maps` over time, C order.
 pub(super) fn background(maps: &[Vec<f64>], quantity: Quantity) -> Vec<f64> {
-    let power = |x: f64| match quantity {
-        Quantity::Amplitude => x * x,
-        Quantity::Power => x.max(0.0),
-    };
     let cells = maps.first().map_or(0, Vec::len);
     let mut over_time = Vec::with_capacity(maps.len());
     (0..cells)
         .map(|cell| {
             over_time.clear();
-            over_time.extend(maps.iter().map(|map| power(map[cell])));
+            over_time.extend(maps.iter().map(|map| quantity.power(map[cell])));
             percentile(&over_time, QUARTILE_PCT)
         })
         .collect()

@@ -6,12 +6,13 @@
 //!
 //! ```text
 //! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior
-//! L_prior = (‖c‖² + ((s − s₀)/σ_s)²)/(K + 1) + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)²
+//! L_prior = (‖c‖² + ((s − s₀)/σ_s)² + ((q − q₀)/σ_q)²)/(K + 2) + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)²
 //! ```
 //!
 //! the last part of it that of the body's proportions (`proportions.rs`), the kinematic terms those of the frame that is fitted.
-//! PPPR stays the state that is shown, kept and exported: positions and velocities follow the coordinates, opacities, scales and
-//! the rest move by themselves and are the same in all frames of the window. The frame stands as near the window's middle as its
+//! q says how bright what stands still is (`static_echo.rs`). PPPR stays the state that is shown, kept and exported: positions and
+//! velocities follow the coordinates, and opacities do where the settings ask for it; scales and the rest move by themselves and
+//! are the same in all frames of the window. The frame stands as near the window's middle as its
 //! sequence lets it; without frames around the window is one frame. A start is searched from clusters of the prior and from
 //! several headings, coarse then fine ([`search`]).
 
@@ -19,6 +20,7 @@ mod clutter;
 mod proportions;
 mod search;
 mod space;
+mod static_echo;
 #[cfg(test)]
 mod tests;
 mod thinned;
@@ -31,10 +33,11 @@ use super::frame_em::FrameEm;
 use super::region;
 use super::{FitError, Precision, Problem};
 use crate::body::{Group, MotionPrior, Pppr};
-use crate::config::{EmLoss, FitConfig};
+use crate::config::{Clutter, EmLoss, FitConfig};
 use crate::geometry::{Vec3, add_scaled, mean, norm};
 use serde::{Deserialize, Serialize};
-use space::{LN_SIZE, MOST_JOINTS, PLACE, PoseSpace, YAW};
+use space::{BODY, LN_SIZE, MOST_JOINTS, PoseSpace, STILL, YAW};
+use static_echo::StaticEchoModel;
 use thinned::ThinnedViews;
 
 /// Frames of a window lie no farther from its middle, s: the prior reaches no farther.
@@ -43,21 +46,22 @@ const REACH_S: f64 = 0.201;
 const BETA_1: f64 = 0.9;
 const BETA_2: f64 = 0.99;
 const EPSILON: f64 = 1e-8;
-/// Steps of t, y, s and c at the default learning rate.
-const RATES: [f64; 4] = [0.01, 0.04, 0.006, 0.08];
+/// Steps of t, y, s, q and c at the default learning rate.
+const RATES: [f64; 5] = [0.01, 0.04, 0.006, 0.2, 0.08];
 const DEFAULT_RATE: f64 = 1e-3;
 /// From this share of the iterations on steps are shorter, by so much.
 const SLOW_FROM: f64 = 0.6;
 const SLOW: f64 = 0.3;
-/// Levels that correlate less than by one less this are of something else than the body.
-const MOST_UNLIKE: f64 = 0.2;
+/// Levels that correlate less than by one less this are of something else than the body: of who walks, whose reflectors are known,
+/// and of who stands.
+const MOST_UNLIKE: [f64; 2] = [0.2, 0.16];
 /// Slower than this nobody leaves the cells that it stands in while the frames around last, m/s.
 const WALKING_MPS: f64 = 0.35;
 
 /// The coordinates of a fit in a window, and Adam's moments of them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct MotionState {
-    /// A person after the other: t (3, m), heading y (rad), ln size s, c in standard deviations.
+    /// A person after the other: t (3, m), heading y (rad), ln size s, what is left of static echoes q, c in standard deviations.
     pub coordinates: Vec<f64>,
     /// Exponential mean of the gradient.
     pub first: Vec<f64>,
@@ -72,8 +76,6 @@ pub struct MotionState {
 pub(super) enum Held {
     /// The prior knows nothing of the skeleton.
     Skeleton,
-    /// Static echoes were not removed, and the person stands among them.
-    Clutter,
     /// No body of the prior explains the maps.
     Unlike,
 }
@@ -84,10 +86,7 @@ impl Held {
         match self {
             Self::Skeleton => "held at the start: an unknown skeleton; the prior of motion has nothing of it",
             Self::Unlike => {
-                "held at the start: no body explains the maps; their levels correlate by less than 0.8 with each of the prior"
-            }
-            Self::Clutter => {
-                "held at the start: nobody walks; static echoes were not removed, so body and reflectors cannot be told apart"
+                "held at the start: no body explains the maps; with each of the prior their levels correlate by less than 0.8 (0.84 of who stands)"
             }
         }
     }
@@ -96,11 +95,15 @@ impl Held {
 /// The frames that are fitted together.
 pub(super) struct Window {
     space: PoseSpace,
+    /// How bright joints are, where that is fitted.
+    echo: Option<StaticEchoModel>,
     /// The frame that is fitted, among them.
     own: usize,
     frames: Vec<WindowFrame>,
     /// Numbers of one person.
     stride: usize,
+    /// Whether all persons walk.
+    walk: bool,
 }
 
 struct WindowFrame {
@@ -121,9 +124,9 @@ pub(super) struct WindowLoss {
     pub(super) gradient: Vec<f64>,
 }
 
-/// Whether an L_EM is that of maps which the body does not explain.
-fn is_unlike(config: &FitConfig, em: f64) -> bool {
-    config.objective == EmLoss::NccDb && em > MOST_UNLIKE
+/// Whether an L_EM is that of maps which the bodies do not explain, where all of them walk or not.
+fn is_unlike(config: &FitConfig, em: f64, walk: bool) -> bool {
+    config.objective == EmLoss::NccDb && em > MOST_UNLIKE[usize::from(!walk)]
 }
 
 impl Window {
@@ -136,7 +139,7 @@ impl Window {
         loss: &mut WindowLoss,
     ) -> bool {
         self.evaluate((problem, config), precision, of, None, loss);
-        !is_unlike(config, loss.em)
+        !is_unlike(config, loss.em, self.walk)
     }
 
     /// Around the persons of `initial`, who move as their velocities say; or why they stay where they are.
@@ -160,7 +163,7 @@ impl Window {
         let Some(space) = PoseSpace::new(prior, &problem.skeleton, &times) else { return Ok(Err(Held::Skeleton)) };
         let (centres, ways) = (region::centres(initial), ways(initial));
         let mut frames = Vec::with_capacity(chosen.len());
-        let thinned = ThinnedViews::new(problem, initial);
+        let thinned = ThinnedViews::new(problem, config, initial);
         let views = &thinned.views;
         let (own_regions, _) = region::regions(views, config.em_region, &centres)?;
         let backgrounds: Vec<Vec<f64>> = (0..views.len())
@@ -171,12 +174,12 @@ impl Window {
             })
             .collect();
         let mut seen = views.iter().zip(&backgrounds).zip(&own_regions);
-        let cluttered = !problem.static_removed
+        let walks = !neighbours.is_empty() && ways.iter().all(|way| norm(*way) >= WALKING_MPS);
+        // What stands still over time is somebody who stands, too.
+        let standing = walks
+            && config.clutter == Clutter::Modelled
+            && !problem.static_removed
             && seen.any(|((view, background), region)| clutter::is_cluttered(background, &view.shape(), region));
-        let stands = neighbours.is_empty() || ways.iter().any(|way| norm(*way) < WALKING_MPS);
-        if cluttered && stands {
-            return Ok(Err(Held::Clutter));
-        }
         for &frame in &chosen {
             let t_s = frame.map_or(0.0, |k| offsets[k]);
             let moved: Vec<Vec3> = centres
@@ -189,13 +192,36 @@ impl Window {
                 })
                 .collect();
             let (regions, _) = region::regions(views, config.em_region, &moved)?;
-            let background = cluttered.then_some(backgrounds.as_slice());
+            let background = standing.then_some(backgrounds.as_slice());
             let em = thinned.compared(frame.map(|k| &neighbours[k]), &regions, (config, precision), background);
             frames.push(WindowFrame { em, params: initial.clone(), gradient: Pppr::zeros(initial.shape()) });
         }
         let own = chosen.iter().position(Option::is_none).unwrap_or(0);
         let stride = space.coordinates();
-        Ok(Ok(Self { space, own, frames, stride }))
+        let echo = StaticEchoModel::new(problem, config);
+        Ok(Ok(Self { space, echo, own, frames, stride, walk: walks }))
+    }
+
+    /// Gives all persons of `coordinates` the q at which the loss is lowest, where it is fitted.
+    pub(super) fn choose_brightness(
+        &mut self,
+        how: (&Problem, &FitConfig),
+        precision: Precision,
+        (coordinates, params): (&mut [f64], &Pppr),
+        loss: &mut WindowLoss,
+    ) {
+        if self.echo.is_none() {
+            return;
+        }
+        let mut best = (f64::INFINITY, static_echo::USUAL);
+        for q in static_echo::TRIED {
+            coordinates.chunks_exact_mut(self.stride).for_each(|of| of[STILL] = q);
+            self.evaluate_some(2, how, precision, (coordinates, params), None, loss);
+            if loss.em < best.0 {
+                best = (loss.em, q);
+            }
+        }
+        coordinates.chunks_exact_mut(self.stride).for_each(|of| of[STILL] = best.1);
     }
 
     /// The coordinates that come nearest to `params`, joints and velocities.
@@ -218,6 +244,15 @@ impl Window {
             let own = person * joints..(person + 1) * joints;
             self.space.pose(of, self.own, &mut positions[own.clone()]);
             self.space.velocity(of, self.own, &mut velocities[own]);
+        }
+        self.dim(coordinates, params);
+    }
+
+    /// Makes the persons of `params` as bright as static echoes leave them, where that is fitted.
+    fn dim(&self, coordinates: &[f64], params: &mut Pppr) {
+        let Some(echo) = &self.echo else { return };
+        for (person, of) in coordinates.chunks_exact(self.stride).enumerate() {
+            echo.dim(of[STILL], person, params);
         }
     }
 
@@ -244,7 +279,7 @@ impl Window {
         looks: Option<&mut Pppr>,
         loss: &mut WindowLoss,
     ) {
-        let Self { space, frames, stride, .. } = self;
+        let Self { space, echo, frames, stride, .. } = self;
         let joints = params.shape().joints;
         loss.gradient.clear();
         loss.gradient.resize(coordinates.len(), 0.0);
@@ -262,21 +297,37 @@ impl Window {
                 space.pose(own, frame, &mut positions[joints.clone()]);
                 space.velocity(own, frame, &mut velocities[joints]);
             }
+            if let Some(echo) = echo {
+                let each = coordinates.chunks_exact(*stride).enumerate();
+                each.for_each(|(person, own)| echo.dim(own[STILL], person, &mut of.params));
+            }
             of.gradient.reset(params.shape());
             let em = of.em.evaluate((&problem.radar, config), precision, &of.params, &mut of.gradient, None);
             loss.em += share * em;
             let each = coordinates.chunks_exact(*stride).zip(loss.gradient.chunks_exact_mut(*stride));
             for (person, (own, bars)) in each.enumerate() {
                 let of_person = person * joints..(person + 1) * joints;
-                let pose = &of.params.positions()[of_person.clone()];
-                let mut pose_bar = [[0.0; 3]; MOST_JOINTS];
-                for (bar, em) in pose_bar.iter_mut().zip(&of.gradient.positions()[of_person]) {
-                    *bar = em.map(|x| share * config.w_em * x);
+                let (pose, velocities) =
+                    (&of.params.positions()[of_person.clone()], &of.params.velocities()[of_person.clone()]);
+                let (mut pose_bar, mut velocity_bar) = ([[0.0; 3]; MOST_JOINTS], [[0.0; 3]; MOST_JOINTS]);
+                let em_gain = share * config.w_em;
+                for (bars, em) in
+                    [(&mut pose_bar, of.gradient.positions()), (&mut velocity_bar, of.gradient.velocities())]
+                {
+                    bars.iter_mut().zip(&em[of_person.clone()]).for_each(|(bar, em)| *bar = em.map(|x| em_gain * x));
+                }
+                if let Some(echo) = echo {
+                    let mut beta_bar = [0.0; MOST_JOINTS];
+                    let em = &of.gradient.group(Group::Beta)[of_person];
+                    beta_bar.iter_mut().zip(em).for_each(|(bar, em)| *bar = em_gain * em);
+                    let onto = (&mut pose_bar[..], &mut velocity_bar[..]);
+                    bars[STILL] += echo.pull_back(own[STILL], person, &of.params, &beta_bar, onto);
                 }
                 let gain = share * config.w_prior / persons;
                 let misfit = space.proportions.misfit(own, pose, gain, (&mut pose_bar, &mut *bars));
                 loss.prior += share * misfit / persons;
                 space.pull_back(own, frame, (pose, &pose_bar[..joints]), bars);
+                space.pull_back_velocity(own, frame, (velocities, &velocity_bar[..joints]), bars);
             }
             if let Some(looks) = kept.as_deref_mut() {
                 looks.add_scaled(share, &of.gradient);
@@ -319,8 +370,9 @@ impl MotionState {
                 0..YAW => RATES[0],
                 YAW => RATES[1],
                 LN_SIZE => RATES[2],
+                STILL => RATES[3],
                 _ if held => 0.0,
-                _ => RATES[3],
+                _ => RATES[4],
             };
             *m = BETA_1 * *m + (1.0 - BETA_1) * g;
             *v = BETA_2 * *v + (1.0 - BETA_2) * g * g;

@@ -3,7 +3,7 @@
 //! Every start is moved a little with its pose held; the few with the lowest loss are fitted with it. What wins is the start; the
 //! runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
 
-use super::{Held, LN_SIZE, MotionState, PLACE, Window, WindowLoss, YAW, ways};
+use super::{BODY, Held, LN_SIZE, MotionState, Window, WindowLoss, YAW, ways};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::geometry::{add, norm, sub};
@@ -139,6 +139,8 @@ pub(in crate::mhp) fn search(
         Err(held) => return Ok(Err(held)),
     };
     let mut coordinates = window.coordinates_of(params);
+    let mut found = WindowLoss::default();
+    window.choose_brightness((problem, config), Precision::F32, (&mut coordinates, params), &mut found);
     let (stride, joints) = (window.stride, params.shape().joints.max(1));
     let walks: Vec<bool> = ways(params).iter().map(|way| way[0].hypot(way[1]) > 0.5).collect();
     let floor = problem.radar.height_m;
@@ -165,7 +167,7 @@ pub(in crate::mhp) fn search(
             for turn in turns {
                 let mut of = coordinates.clone();
                 let mine = &mut of[own.clone()];
-                mine[PLACE..].copy_from_slice(c);
+                mine[BODY..].copy_from_slice(c);
                 mine[YAW] += turn;
                 mine[..3].copy_from_slice(&hips);
                 if let Some(height_m) = floor {
@@ -186,13 +188,21 @@ pub(in crate::mhp) fn search(
             tried.state = MotionState::at(tried.state.coordinates.clone());
             search.descend(tried, FINE, false);
         }
-        // A stride with the other leg in front looks much the same from afar.
+        // A stride with the other leg in front looks much the same from afar, and so does a back.
         if let Some(best) = all.iter().min_by(|a, b| a.loss.total_cmp(&b.loss)) {
-            let mut of = best.state.coordinates.clone();
-            search.window.space.mirror(&mut of[own.clone()]);
-            let mut mirrored = Tried { state: MotionState::at(of), loss: f64::INFINITY };
-            search.descend(&mut mirrored, FINE, false);
-            all.push(mirrored);
+            let found = best.state.coordinates.clone();
+            let mut others = vec![found.clone()];
+            search.window.space.mirror(&mut others[0][own.clone()]);
+            if !walks[person] {
+                let mut behind = found;
+                behind[own.start + YAW] += PI;
+                others.push(behind);
+            }
+            for of in others {
+                let mut tried = Tried { state: MotionState::at(of), loss: f64::INFINITY };
+                search.descend(&mut tried, FINE, false);
+                all.push(tried);
+            }
         }
         all.sort_by(|a, b| a.loss.total_cmp(&b.loss));
         let Some(best) = all.first() else { continue };
@@ -208,8 +218,9 @@ pub(in crate::mhp) fn search(
     search.every = 1;
     search.evaluate(&coordinates);
     let em = search.loss.em;
-    if super::is_unlike(config, em) {
-        if em < CLEARER * begun_em {
+    if super::is_unlike(config, em, window.walk) {
+        // Among reflectors that nothing is known of, another place may be theirs.
+        if window.walk && em < CLEARER * begun_em {
             move_there(problem, &window, &coordinates, params);
         }
         return Ok(Err(Held::Unlike));

@@ -5,9 +5,10 @@
 //! p_f    = e^s R_z(y) X_f(c) + t         world frame, m
 //! ```
 //!
-//! Coordinates of a person are t (3, m), y (rad), s (ln m) and c.
+//! Coordinates of a person are t (3, m), y (rad), s (ln m), q (how bright what stands still is, `static_echo.rs`) and c.
 
 use super::proportions::Proportions;
+use super::static_echo;
 use crate::body::{MotionPrior, Skeleton};
 use crate::geometry::Vec3;
 
@@ -15,11 +16,12 @@ use crate::geometry::Vec3;
 const MOST_COMPONENTS: usize = 24;
 /// Half the time over which a velocity is taken, s.
 const HALF_STEP_S: f64 = 0.05;
-/// t, y and s.
-pub(super) const PLACE: usize = 5;
-/// Where y and s stand.
+/// t, y, s and q: what a person has beside c.
+pub(super) const BODY: usize = 6;
+/// Where y, s and q stand.
 pub(super) const YAW: usize = 3;
 pub(super) const LN_SIZE: usize = 4;
+pub(super) const STILL: usize = 5;
 /// How far joints and what they travel in `HALF_STEP_S` may be from the prior's, sizes: those of a start are no measurements.
 const MISFIT: f64 = 0.05;
 
@@ -121,12 +123,12 @@ impl PoseSpace {
 
     /// The same body with left and right exchanged.
     pub(super) fn mirror(&self, coordinates: &mut [f64]) {
-        coordinates[PLACE..].iter_mut().zip(&self.signs).for_each(|(c, sign)| *c *= sign);
+        coordinates[BODY..].iter_mut().zip(&self.signs).for_each(|(c, sign)| *c *= sign);
     }
 
     /// Coordinates of a person.
     pub(super) fn coordinates(&self) -> usize {
-        PLACE + self.components
+        BODY + self.components
     }
 
     /// Σ_k of a row's mean and components times 1 and c.
@@ -144,7 +146,7 @@ impl PoseSpace {
 
     /// The joints of a person with these coordinates at time `frame`, world frame, m.
     pub(super) fn pose(&self, coordinates: &[f64], frame: usize, out: &mut [Vec3]) {
-        self.mixed(&self.poses[frame], &coordinates[PLACE..], out);
+        self.mixed(&self.poses[frame], &coordinates[BODY..], out);
         let (turn, place) = (Turn::of(coordinates), [coordinates[0], coordinates[1], coordinates[2]]);
         for p in out {
             let turned = turn.forwards(*p);
@@ -154,15 +156,14 @@ impl PoseSpace {
 
     /// Their velocities, m/s.
     pub(super) fn velocity(&self, coordinates: &[f64], frame: usize, out: &mut [Vec3]) {
-        self.mixed(&self.changes[frame], &coordinates[PLACE..], out);
+        self.mixed(&self.changes[frame], &coordinates[BODY..], out);
         let turn = Turn::of(coordinates);
         for v in out.iter_mut() {
             *v = turn.forwards(*v);
         }
     }
 
-    /// Adds to `bars` (a coordinate each) what the adjoints of a frame's joints and of their velocities imply; `pose` are the
-    /// joints. Velocities move with c, y and s, too.
+    /// Adds to `bars` (a coordinate each) what the adjoints of a frame's joints imply; `pose` are the joints.
     pub(super) fn pull_back(
         &self,
         coordinates: &[f64],
@@ -171,8 +172,7 @@ impl PoseSpace {
         bars: &mut [f64],
     ) {
         let turn = Turn::of(coordinates);
-        let row = &self.poses[frame];
-        let [mut x, mut y, mut z, mut yaw, mut ln_size] = [0.0; PLACE];
+        let [mut x, mut y, mut z, mut yaw, mut ln_size] = [0.0; 5];
         let place = [coordinates[0], coordinates[1], coordinates[2]];
         let mut own = [[0.0; 3]; MOST_JOINTS];
         for ((p, bar), own) in pose.iter().zip(pose_bar).zip(&mut own) {
@@ -187,24 +187,49 @@ impl PoseSpace {
         for (bar, sum) in bars.iter_mut().zip([x, y, z, yaw, ln_size]) {
             *bar += sum;
         }
-        for (k, bar) in bars[PLACE..].iter_mut().enumerate() {
+        self.mixed_back(&self.poses[frame], &own, bars);
+    }
+
+    /// Adds to `bars` what the adjoints of a frame's velocities imply.
+    pub(super) fn pull_back_velocity(
+        &self,
+        coordinates: &[f64],
+        frame: usize,
+        (velocities, velocity_bar): (&[Vec3], &[Vec3]),
+        bars: &mut [f64],
+    ) {
+        let turn = Turn::of(coordinates);
+        let mut own = [[0.0; 3]; MOST_JOINTS];
+        for ((v, bar), own) in velocities.iter().zip(velocity_bar).zip(&mut own) {
+            bars[YAW] += v[0] * bar[1] - v[1] * bar[0];
+            bars[LN_SIZE] += v[0] * bar[0] + v[1] * bar[1] + v[2] * bar[2];
+            *own = turn.backwards(*bar);
+        }
+        self.mixed_back(&self.changes[frame], &own, bars);
+    }
+
+    /// Adds to the bars of c what the adjoints of [`Self::mixed`] imply.
+    fn mixed_back(&self, row: &[Vec3], own: &[Vec3], bars: &mut [f64]) {
+        for (k, bar) in bars[BODY..].iter_mut().enumerate() {
             let of = &row[(k + 1) * self.joints..(k + 2) * self.joints];
             let mut sum = 0.0;
-            for (of, own) in of.iter().zip(&own) {
+            for (of, own) in of.iter().zip(own) {
                 sum += of[0] * own[0] + of[1] * own[1] + of[2] * own[2];
             }
             *bar += sum;
         }
     }
 
-    /// How unlikely the coordinates are: the mean square of c and of s, in standard deviations; adds `gain` times its gradient.
+    /// How unlikely the coordinates are: the mean square of c, s and q, in standard deviations; adds `gain` times its gradient.
     pub(super) fn unlikeliness(&self, coordinates: &[f64], gain: f64, bars: &mut [f64]) -> f64 {
-        let share = 1.0 / (self.components + 1) as f64;
+        let share = 1.0 / (self.components + 2) as f64;
         let [mean, deviation] = self.ln_size;
         let size = (coordinates[LN_SIZE] - mean) / deviation;
         bars[LN_SIZE] += 2.0 * gain * share * size / deviation;
-        let mut sum = size * size;
-        for (c, bar) in coordinates[PLACE..].iter().zip(&mut bars[PLACE..]) {
+        let (still, by_still) = static_echo::unlikeliness(coordinates[STILL]);
+        bars[STILL] += gain * share * by_still;
+        let mut sum = size * size + still;
+        for (c, bar) in coordinates[BODY..].iter().zip(&mut bars[BODY..]) {
             sum += c * c;
             *bar += 2.0 * gain * share * c;
         }
@@ -215,6 +240,7 @@ impl PoseSpace {
     pub(super) fn project(&self, frame: usize, joints: &[Vec3], velocities: &[Vec3]) -> Vec<f64> {
         let mut coordinates = vec![0.0; self.coordinates()];
         coordinates[LN_SIZE] = self.ln_size[0];
+        coordinates[STILL] = static_echo::USUAL;
         coordinates[YAW] = yaw_of(joints, &self.poses[frame][..self.joints]);
         // Place, size and pose in turn: each is linear where the others are known, and a few rounds settle.
         for _ in 0..ROUNDS {
@@ -228,7 +254,7 @@ impl PoseSpace {
     /// t, y and s that bring the pose of c onto `joints`.
     fn align(&self, frame: usize, joints: &[Vec3], coordinates: &mut [f64]) {
         let mut pose = vec![[0.0; 3]; self.joints];
-        self.mixed(&self.poses[frame], &coordinates[PLACE..], &mut pose);
+        self.mixed(&self.poses[frame], &coordinates[BODY..], &mut pose);
         let (a, b) = (crate::geometry::mean(&pose), crate::geometry::mean(joints));
         let (mut cosine, mut sine, mut square, mut height) = (0.0, 0.0, 0.0, 0.0);
         for (p, q) in pose.iter().zip(joints) {
@@ -281,7 +307,7 @@ impl PoseSpace {
                 normal[l * n + k] = normal[k * n + l];
             }
         }
-        coordinates[PLACE..].copy_from_slice(&solved(&mut normal, right));
+        coordinates[BODY..].copy_from_slice(&solved(&mut normal, right));
     }
 }
 

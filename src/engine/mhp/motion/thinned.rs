@@ -1,12 +1,12 @@
 //! Every second cell of a map where its point spread covers several: what is left says the same in a quarter of the time.
 
 use crate::body::Pppr;
-use crate::config::FitConfig;
+use crate::config::{Clutter, FitConfig};
 use crate::geometry::norm;
 use crate::mhp::frame_em::{FrameEm, Measured};
 use crate::mhp::region::{Region, centres};
 use crate::mhp::{Neighbour, Precision, Problem};
-use crate::radar::{Axis, AxisKind, PointSpread, View};
+use crate::radar::{Axis, AxisKind, PointSpread, SpatialGrid, View};
 
 /// Cells that a standard deviation of the point spread covers at least where every second one is enough.
 const CELLS: f64 = 1.5;
@@ -24,14 +24,18 @@ pub(super) struct ThinnedViews<'a> {
     problem: &'a Problem,
     thinned: Vec<Thinned>,
     pub(super) views: Vec<View>,
+    /// Their rings, where clutter is modelled.
+    grids: Vec<SpatialGrid>,
 }
 
 impl<'a> ThinnedViews<'a> {
     /// For persons who stand where those of `params` do.
-    pub(super) fn new(problem: &'a Problem, params: &Pppr) -> Self {
+    pub(super) fn new(problem: &'a Problem, config: &FitConfig, params: &Pppr) -> Self {
         let thinned: Vec<Thinned> = problem.views.iter().map(|view| Thinned::new(view, params)).collect();
-        let views = thinned.iter().map(|thinned| thinned.view.clone()).collect();
-        Self { problem, thinned, views }
+        let views: Vec<View> = thinned.iter().map(|thinned| thinned.view.clone()).collect();
+        let by_range = config.clutter == Clutter::Modelled;
+        let grids = views.iter().filter(|_| by_range).map(SpatialGrid::new).collect();
+        Self { problem, thinned, views, grids }
     }
 
     /// The kept cells of a view in a frame around, or in the one that is fitted; C order.
@@ -54,6 +58,7 @@ impl<'a> ThinnedViews<'a> {
             radar: &self.problem.radar,
             maps: maps.iter().map(Vec::as_slice).collect(),
             background,
+            grids: self.grids.iter().collect(),
         };
         FrameEm::new(&measured, regions, config, precision)
     }

@@ -43,7 +43,8 @@ pub(in crate::mhp) fn turn(problem: &Problem, config: &FitConfig, params: &mut P
         let (own, profiles) = profiles(problem, config, params, person)?;
         let losses = through(&profiles, own);
         let stayed = profiles.iter().map(|of| of[0]).sum::<f64>() / profiles.len() as f64;
-        let Some((angle, lowest)) = chosen(&losses, stayed).filter(|(_, lowest)| !is_unlike(config, *lowest)) else {
+        let Some((angle, lowest)) = chosen(&losses, stayed).filter(|(_, lowest)| !is_unlike(config, *lowest, true))
+        else {
             continue;
         };
         turn_person(problem, params, person, angle);
@@ -77,7 +78,7 @@ fn profiles(
     let all = problem.neighbours_in(config.frames_around);
     let neighbours: Vec<&Neighbour> = all.iter().filter(|neighbour| neighbour.offset_s.abs() <= NEAR_S).collect();
     let own = neighbours.partition_point(|neighbour| neighbour.offset_s < 0.0);
-    let thinned = ThinnedViews::new(problem, params);
+    let thinned = ThinnedViews::new(problem, config, params);
     let centre = region::centres(params)[person];
     let (regions, _) = region::regions(&thinned.views, em_region, &[centre])?;
     let turned: Vec<Pppr> = (0..HEADINGS)
