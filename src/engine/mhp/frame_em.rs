@@ -53,7 +53,9 @@ impl Measured<'_> {
         region.indices(&self.views[view].shape()).into_iter().for_each(|cell| inside[cell] = true);
         let mut clutter = grid.beside(&power, &inside);
         let speckle = MEDIAN_OF_NOISE * percentile(&power, NOISE_PCT);
-        clutter.iter_mut().for_each(|beside| *beside = (*beside - speckle).max(0.0));
+        for beside in &mut clutter {
+            *beside = (*beside - speckle).max(0.0);
+        }
         for (clutter, standing) in clutter.iter_mut().zip(standing.into_iter().flatten()) {
             *clutter = clutter.max(*standing);
         }

@@ -135,7 +135,9 @@ impl SpatialGrid {
                 beside.extend(outside.map(|cell| (power[cell] as f32).to_bits()));
                 if beside.len() >= SMALLEST_RING {
                     let level = f64::from(median(&mut beside));
-                    cells.iter().for_each(|&cell| levels[full(cell) + offset] = level);
+                    for &cell in cells {
+                        levels[full(cell) + offset] = level;
+                    }
                 }
             }
         }
