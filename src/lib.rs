@@ -42,8 +42,9 @@
 //! | [`cli`] | one file a subcommand |
 //! | [`session`] | the state behind the window and the only function that changes it |
 //! | [`worker`] | the thread that runs a fit, and its protocol |
+//! | [`condition`] | conditions in words: the language of filters, and the breakpoints of a run |
+//! | [`explore`] | what else a fit could have done, and what it rests on |
 //! | [`study`] | batch runs; studies, their tables and run folders; exports; which frames are hard; shards of all of them |
-//! | [`explore`] | what else a fit could have done: maps over settings, slices of the loss, restarts |
 //! | [`labels`] | tags, notes, verdicts, the journal that keeps them, agreement |
 //! | [`diagnose`] | metrics: MAJPE, PA-MAJPE; evidence for each failure mode |
 //! | [`start`] | where a frame's fit begins: the problem with the frames around it, and for how many people a start is asked |
@@ -62,6 +63,7 @@
 //! | [`geometry`] * | 3-vectors, 3×3 matrices, quaternions, poses |
 
 pub mod cli;
+pub mod condition;
 pub mod dataset;
 pub mod diagnose;
 mod digest;

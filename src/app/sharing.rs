@@ -99,6 +99,7 @@ fn suggestion(session: &Session, kind: SaveKind) -> PathBuf {
             format!("{dataset}-labels.{}", what.ending())
         }
         SaveKind::Export(Export::Strata) => format!("{dataset}-strata.csv"),
+        SaveKind::Export(Export::Erased) => of_frame("erased.json"),
         SaveKind::Export(what) => of_frame(what.ending()),
     };
     let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' };

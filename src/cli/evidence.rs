@@ -129,6 +129,7 @@ pub(super) fn run(args: &EvidenceArgs) -> anyhow::Result<ExitCode> {
         params_folder: None,
         ply: false,
         curves_folder: None,
+        ..BatchOptions::default()
     };
     let params = args.params.as_deref().map(|path| params(path, &dataset, &frames)).transpose()?;
     let judge = |frames: Range<usize>| -> Vec<FrameEvidence> {

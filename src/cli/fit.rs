@@ -9,12 +9,13 @@ use super::frames::{FrameRange, chosen};
 use super::merge::MergeArgs;
 use super::shards::{end, typed};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
+use crate::condition::{Breakpoint, syntax};
 use crate::config::{FitConfig, Preset, listing};
 use crate::dataset::Dataset;
-use crate::mhp::Precision;
+use crate::mhp::{ErasedCells, Precision};
 use crate::output::{FolderLock, Inputs, replace_file};
 use crate::study::shard::{FrameCommand, Shard, ShardFolder, ShardSpec, Whole};
-use crate::study::{BatchOptions, BatchRow, Means, Summary, columns, run_batch};
+use crate::study::{BatchOptions, BatchRow, Means, Summary, columns, read_erased, run_batch};
 use anyhow::Context as _;
 use clap::Args;
 use serde::{Deserialize, Serialize};
@@ -41,12 +42,16 @@ Examples:
       A minute of MMVR, each frame from the one before; writes results/summary.csv, fit.toml, pppr/*.npz.
   mhp-inspector fit data/walk --frames 7 --out results --ply --curves
       Also the Gaussians of the end as pppr/*.ply and every iteration as curves/*.csv.
+  mhp-inspector fit data/walk --frames 3 --break 'iou<0.4 iteration>10' --break 'em·kine<-0.9'
+      Stops where the masks part, or where the maps and the body want opposite things; the row says which.
+  mhp-inspector fit data/walk --frames 3 --erase reflector.json
+      As if nothing had been measured in those cells.
   mhp-inspector fit data/d1s1 --shard 2/8 --out shards/2
       The second of eight parts, for as many machines; `mhp-inspector merge shards/* --out results` makes the whole.";
 
 /// Shown under them by `fit --help`, and not by `fit -h`: also every setting.
 pub(super) fn long_help() -> String {
-    format!("{HELP}\n\n{}", listing())
+    format!("{HELP}\n\nConditions of --break. {}\n\n{}", syntax(), listing())
 }
 
 /// The settings in force, and the table.
@@ -97,6 +102,12 @@ pub struct FitArgs {
     /// Start each frame from the result of the one before in its sequence; one frame at a time then.
     #[arg(long)]
     warm_start: bool,
+    /// Stop a fit at the first iteration at which this holds; may be given several times.
+    #[arg(long = "break", value_name = "CONDITION")]
+    breakpoints: Vec<Breakpoint>,
+    /// Cells that no fit is to see, as the window's File > Export > erased cells writes them.
+    #[arg(long, value_name = "FILE")]
+    erase: Option<PathBuf>,
     /// One JSON object instead of a table: `frames` with the keys of the columns, and `mean`.
     #[arg(long)]
     json: bool,
@@ -116,7 +127,8 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
     let arrays: Vec<String> = dataset.info().views.iter().map(|view| view.array.clone()).collect();
-    let inputs = inputs(&dataset, &args.path, &[args.config.as_deref(), args.manifest.as_deref()]);
+    let inputs =
+        inputs(&dataset, &args.path, &[args.config.as_deref(), args.manifest.as_deref(), args.erase.as_deref()]);
     let options = BatchOptions {
         config,
         precision: args.precision.into(),
@@ -124,7 +136,19 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
         params_folder: args.out.as_ref().map(|out| out.join(PARAMS)),
         ply: args.ply,
         curves_folder: args.out.as_ref().filter(|_| args.curves).map(|out| out.join(CURVES)),
+        breakpoints: args.breakpoints.clone(),
+        erased: args
+            .erase
+            .as_deref()
+            .map(|file| read_erased(file, &dataset.info().views))
+            .transpose()?
+            .unwrap_or_default(),
     };
+    let names: Vec<&str> = arrays.iter().map(String::as_str).collect();
+    for breakpoint in &args.breakpoints {
+        let known = breakpoint.check(&dataset.info().skeleton, &names);
+        known.map_err(|why| anyhow::anyhow!("--break {breakpoint}: {why}"))?;
+    }
     if let (Some(shard), Some(out)) = (args.shard, &args.out) {
         return part(shard, out, &dataset, &frames, &options, &inputs);
     }
@@ -160,6 +184,8 @@ fn part(
         ply: options.ply,
         curves: options.curves_folder.is_some(),
         fit: options.config,
+        breakpoints: options.breakpoints.iter().map(ToString::to_string).collect(),
+        erased: options.erased.clone(),
     };
     let spec = ShardSpec::new(FrameCommand::Fit, dataset, frames, shard, &settings)?;
     let folder = ShardFolder::begin(out, shelves(settings.curves), spec, inputs)?;
@@ -210,6 +236,10 @@ struct Settings {
     ply: bool,
     curves: bool,
     fit: FitConfig,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    breakpoints: Vec<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    erased: Vec<ErasedCells>,
 }
 
 /// The folders below that of the results.

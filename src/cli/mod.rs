@@ -179,7 +179,7 @@ pub enum CliCommand {
     /// it in its sequence are read for what stays and what moves.
     #[command(after_help = evidence::HELP)]
     Evidence(evidence::EvidenceArgs),
-    /// Tell what else a fit could have done: under other settings, from other starts, elsewhere in the room.
+    /// Ask what a fit rests on, and what else it could have done: cells, radar, tau; settings, starts, places.
     #[command(subcommand, after_help = explore::HELP)]
     Explore(explore::ExploreCommand),
     /// Write what other programs read: parameters, simulated maps in the input's own files, point clouds.

@@ -1,4 +1,4 @@
-//! Explorations: what else could the fit have done? Many fits or evaluations around the one on screen, shown as they come.
+//! Explorations: what else could the fit have done, and what does it rest on? Many fits or evaluations around the one on screen, shown as they come.
 //!
 //! | exploration | question |
 //! |---|---|
@@ -6,6 +6,11 @@
 //! | [`LossSlice`] | what does the loss look like around this state, and between two? |
 //! | [`AmbiguityMap`] | where in the room, and how turned, would this body explain the echo as well? |
 //! | [`RestartCloud`] | is the frame ambiguous, or was the start unlucky? |
+//! | [`leave_one_out`] | who lit the maps: how much of their agreement is each joint's? |
+//! | [`Observability`] | what does the echo fix of the pose, and what only the prior? |
+//! | [`TauRibbon`] | which τ would one take? |
+//! | [`ClosureTest`] | could this pose have been recovered from this radar at all? |
+//! | [`WhatIf`] | what would another radar see? |
 //!
 //! **How they run.** Each is a plain function from a request to an answer, which knows neither window nor thread: the command
 //! line calls it, and the window lets it run beside itself ([`IdleCores`]), the newest request of a kind first, an older one
@@ -15,29 +20,42 @@
 //! To add one, write its file, and name it in the tables of this file.
 
 mod ambiguity;
+mod closure;
 mod coarse;
 mod cores;
+mod echo_radar;
+mod joints;
 mod landscape;
+mod modes;
 mod moves;
+mod observe;
 mod plane;
 mod restarts;
 mod state;
 mod task;
+mod tau;
 mod tuning;
+mod what_if;
 
 pub use ambiguity::{AMBIGUITY_CELLS, AmbiguityMap, AmbiguityRequest, AmbiguitySettings, EmPlane, RegionOf};
+pub use closure::{ClosureRequest, ClosureTest, closure_test};
 pub use cores::IdleCores;
+pub use joints::{LeaveOneOut, LeftOut, leave_one_out};
 pub use landscape::{
     Direction, LossSlice, SliceAlong, SliceRequest, SliceSettings, SliceValue, down_the_gradient, line,
 };
+pub use modes::PoseMode;
 pub use moves::{move_person, root_of, yaw_between};
+pub use observe::{Noise, Observability, UnseenDirection, observability};
 pub use plane::{Minimum, SampleAxis, minima};
 pub use restarts::{
     Basin, Restart, RestartCloud, RestartRequest, RestartSettings, StartFeature, StartOffset, Telling, heading,
 };
 pub use state::ExploredState;
 pub use task::{Halt, Showing};
+pub use tau::{TauClouds, TauRibbon, tau_clouds, tau_ribbon};
 pub use tuning::{AxisValues, TunedFrames, TunedQuantity, TuningAxis, TuningMap, TuningRequest, TuningSettings};
+pub use what_if::{RadarChange, Seen, WhatIf, preset_of, what_if};
 
 use crate::task::Progress;
 use serde::{Deserialize, Serialize};

@@ -3,8 +3,8 @@
 use super::Halt;
 use crate::body::Pppr;
 use crate::config::FitConfig;
-use crate::mhp::{Objective, Precision, Problem};
-use crate::worker::{ErasedCells, without};
+use crate::mhp::{ErasedCells, Objective, Precision, Problem, without};
+
 use std::sync::Arc;
 
 /// Parameters of a frame with all that its loss depends on.

@@ -37,7 +37,7 @@
 //! | `after` | the order of the record that this one replaces, milliseconds since 1970; left out where `time` is later than that |
 //! | `act` | the act in words, for people |
 //! | `program` | version of the program that wrote the line |
-//! | `judged` | the fit on screen: hash of its parameters and of its configuration, iteration, the machine's own scores in 0..1 and whether they were shown; each left out where unknown |
+//! | `judged` | the fit on screen: hash of its parameters and of its configuration, iteration, cells that it did not see (`erased`, regions as in `label.region`), the machine's own scores in 0..1 and whether they were shown; each left out where unknown |
 //!
 //! **Whose file speaks for whom.** `<slug of X>.labels.jsonl` speaks for X, in the data set's folder and in the user's.
 //! Records by X in any other file (a copy, files that were joined, another annotator's file) are read, told as such, and

@@ -168,6 +168,9 @@ pub struct Judged {
     /// The program's own evidence scores at that moment, 0..1 by failure mode, whether they were shown or not.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub machine: BTreeMap<Tag, f64>,
+    /// Cells that the fit did not see, the boxes around them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub erased: Vec<CellRegion>,
     /// True where those scores were on screen.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub machine_shown: bool,

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 /// The columns of the CSV, in the order in which they are written. On reading, any order will do; `frame` and the six
 /// tags must be there, other columns may lack, and unknown ones are passed over with a note.
-pub const COLUMNS: [&str; 25] = [
+pub const COLUMNS: [&str; 26] = [
     "frame",
     "index",
     "annotator",
@@ -35,6 +35,7 @@ pub const COLUMNS: [&str; 25] = [
     "judged_fit",
     "judged_config",
     "judged_iteration",
+    "judged_erased",
     "machine_F1",
     "machine_F2",
     "machine_F3",

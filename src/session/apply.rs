@@ -5,9 +5,11 @@
 //! `explore` tries what else a fit could have done, `reports` takes in what the worker says.
 
 mod batch;
+mod breakpoints;
 mod compared;
 mod data;
 mod diagnosis;
+mod erase;
 mod explore;
 mod export;
 mod fit;
@@ -22,6 +24,7 @@ mod restore;
 mod results;
 mod study;
 
+pub use erase::ErasedEffect;
 pub use export::OutputCheck;
 pub(super) use reports::mean_known;
 
@@ -130,8 +133,13 @@ impl Session {
             Command::SetConfig(config) => self.set_config(&config),
             Command::DragConfig(config) => self.drag_config(&config),
             Command::DragErase(region) => self.drag_erase(&region),
+            Command::DragEraseCells(view, cells) => self.drag_erase_cells(view, cells),
+            Command::EraseEcho(view, cell) => self.erase_echo(view, cell),
             Command::DragFit(fit) => self.drag_fit(*fit),
             Command::EndDrag => self.end_drag(),
+            Command::AddBreakpoint(text) => self.add_breakpoint(&text),
+            Command::RemoveBreakpoint(id) => self.remove_breakpoint(id),
+            Command::EnableBreakpoint(id, on) => self.enable_breakpoint(id, on),
             Command::ToggleReplay => self.toggle_replay(),
             Command::PlayOn(seconds) => self.play_on(seconds),
             Command::SetPrecision(precision) => {

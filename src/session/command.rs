@@ -129,10 +129,20 @@ pub enum Command {
     DragConfig(Box<FitConfig>),
     /// Cells under an eraser: the fit is done anew without them; until [`Command::EndDrag`] it is one act.
     DragErase(CellRegion),
+    /// Single cells (flat indices, C order) of a view under an eraser: as [`Command::DragErase`].
+    DragEraseCells(usize, Vec<usize>),
+    /// The whole connected echo that a cell of a view belongs to: erased, an act of its own.
+    EraseEcho(usize, usize),
     /// A fit of an exploration under a finger, beside the one on screen; until [`Command::EndDrag`] all are one act.
     DragFit(Box<AdoptedFit>),
     /// The finger is lifted.
     EndDrag,
+    /// Runs stop where this holds.
+    AddBreakpoint(String),
+    /// Forget a breakpoint.
+    RemoveBreakpoint(u32),
+    /// Switch a breakpoint on or off.
+    EnableBreakpoint(u32, bool),
     /// Play the iterations of the branch on screen, or stop playing them.
     ToggleReplay,
     /// So many seconds of the replay went by.
@@ -215,6 +225,8 @@ pub enum Export {
     LabelsJson,
     /// Complexity of every frame, CSV.
     Strata,
+    /// Cells that the fit does not see, JSON.
+    Erased,
 }
 
 impl Export {
@@ -226,6 +238,7 @@ impl Export {
             Self::Parameters => "parameters",
             Self::LabelsCsv | Self::LabelsJson => "labels",
             Self::Strata => "strata",
+            Self::Erased => "erased cells",
         }
     }
 
@@ -235,7 +248,7 @@ impl Export {
             Self::Curves | Self::LabelsCsv | Self::Strata => "csv",
             Self::Gaussians => "ply",
             Self::Parameters => "npz",
-            Self::LabelsJson => "json",
+            Self::LabelsJson | Self::Erased => "json",
         }
     }
 }

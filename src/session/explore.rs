@@ -4,7 +4,7 @@ use super::work::Work;
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::explore::{AmbiguityMap, Exploration, ExplorationKind, Explored, LossSlice, RestartCloud, TuningMap};
-use crate::worker::ErasedCells;
+use crate::mhp::ErasedCells;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -6,16 +6,17 @@
 //! to the session file, and told from others by its fingerprint. What only the window knows (camera, layout) is kept in
 //! `window` as the window gives it.
 
+use super::breakpoints::StopPoint;
 use super::compared::ResultSet;
 use super::pins::PinRow;
 use super::state::{FrameSummary, Session};
 use super::view::ViewState;
 use crate::body::Pppr;
+use crate::condition::Breakpoint;
 use crate::config::FitConfig;
 use crate::input::read_bytes;
-use crate::mhp::{FitState, Precision};
+use crate::mhp::{ErasedCells, FitState, Precision};
 use crate::output::replace_file;
-use crate::worker::ErasedCells;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -101,6 +102,9 @@ pub struct SessionFile {
     pub pins: Vec<SavedPin>,
     /// The pin that others are compared with, by its place in the list.
     pub baseline: Option<usize>,
+    /// Where runs stop.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub breakpoints: Vec<StopPoint>,
     /// Camera, layout and zoom, as the window gives them.
     pub window: serde_json::Value,
 }
@@ -147,6 +151,9 @@ pub struct SavedFit {
     /// Cells that the fit does not see.
     #[serde(default)]
     pub erased: Vec<ErasedCells>,
+    /// Iterations at which a breakpoint stopped it, and which one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stops: Vec<(usize, String)>,
 }
 
 /// A change of settings along the lineage.
@@ -224,6 +231,7 @@ impl SessionFile {
                 })
                 .collect(),
             baseline: pins.baseline().and_then(|base| pins.list().iter().position(|pin| pin.id == base.id)),
+            breakpoints: session.breakpoints.list().to_vec(),
             window,
         })
     }
@@ -257,6 +265,10 @@ impl SessionFile {
             return Err(wrong(format!("`version` is {}; this program reads {VERSION}", head.version)));
         }
         let file: Self = serde_json::from_slice(&text).map_err(|error| wrong(error.to_string()))?;
+        for point in &file.breakpoints {
+            let parsed = point.text.parse::<Breakpoint>();
+            parsed.map_err(|error| wrong(format!("`breakpoints`: {error}")))?;
+        }
         for config in file.configs() {
             FitConfig::parse(config, path).map_err(|error| wrong(format!("`config`: {error}")))?;
         }
@@ -311,6 +323,7 @@ fn saved_fit(session: &Session) -> Option<SavedFit> {
         changes: changes.collect(),
         edited: fit.edited,
         erased: branch.erased.to_vec(),
+        stops: fit.history.lineage_stops(),
     })
 }
 

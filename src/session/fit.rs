@@ -4,9 +4,9 @@ use super::history::{Branch, History, IterationRow};
 use super::state::FitHashes;
 use crate::body::Pppr;
 use crate::config::FitConfig;
-use crate::mhp::{Problem, SETTLED_OVER, has_settled};
+use crate::mhp::{ErasedCells, Problem, SETTLED_OVER, has_settled};
 use crate::start::FoundStart;
-use crate::worker::{ErasedCells, JobId, Snapshot};
+use crate::worker::{JobId, Snapshot};
 use std::sync::Arc;
 
 /// What the worker is doing for this frame.

@@ -2,8 +2,7 @@
 
 use crate::body::Pppr;
 use crate::config::{FitConfig, difference};
-use crate::mhp::{FitState, StepReport};
-use crate::worker::ErasedCells;
+use crate::mhp::{ErasedCells, FitState, StepReport};
 use std::sync::Arc;
 
 /// Bytes of states that one fit may keep; beyond it every second state is forgotten (its report stays).
@@ -55,6 +54,8 @@ pub struct Branch {
     pub edit: Option<String>,
     /// Cells that its fit does not see.
     pub erased: Arc<[ErasedCells]>,
+    /// Iterations at which a breakpoint stopped a run, and which one.
+    pub stops: Vec<(usize, String)>,
     /// The pose that its EM region is laid around, where that is not the start that was found first.
     pub around: Option<Arc<Pppr>>,
 }
@@ -123,11 +124,14 @@ impl History {
         rows: Vec<super::pins::PinRow>,
         states: Vec<FitState>,
         changes: Vec<(usize, FitConfig)>,
-        erased: Vec<ErasedCells>,
+        (erased, stops): (Vec<ErasedCells>, Vec<(usize, String)>),
     ) -> Self {
         let mut history = Self::new(*config);
         let erased: Arc<[ErasedCells]> = erased.into();
-        history.branches.iter_mut().for_each(|first| first.erased = Arc::clone(&erased));
+        for first in &mut history.branches {
+            first.erased = Arc::clone(&erased);
+            first.stops.clone_from(&stops);
+        }
         let mut states: Vec<Arc<FitState>> = states.into_iter().map(Arc::new).collect();
         for super::pins::PinRow { report, majpe_mm } in rows {
             let at = states.iter().position(|state| state.iteration == report.iteration);
@@ -155,6 +159,7 @@ impl History {
             flags: Vec::new(),
             edit: None,
             erased,
+            stops: Vec::new(),
             around,
         });
         self.activate(id);
@@ -206,6 +211,7 @@ impl History {
         let Some(branch) = self.branches.iter_mut().find(|b| b.id == branch) else { return };
         branch.rows.clear();
         branch.flags.clear();
+        branch.stops.clear();
         branch.config = config;
         self.revision += 1;
         self.recount();
@@ -274,8 +280,25 @@ impl History {
         Some((begin, changes))
     }
 
-    /// Where something was set, moved or erased on the way to the head of the active branch: the last iteration before, and what
-    /// in words.
+    /// A breakpoint stopped a run of a branch.
+    pub(super) fn stopped(&mut self, branch: u32, iteration: usize, breakpoint: String) {
+        if let Some(branch) = self.branches.iter_mut().find(|b| b.id == branch) {
+            branch.stops.push((iteration, breakpoint));
+            self.revision += 1;
+        }
+    }
+
+    /// Where breakpoints stopped runs on the way to the head of the active branch.
+    pub(super) fn lineage_stops(&self) -> Vec<(usize, String)> {
+        let of = |(branch, rows): (&Branch, &[IterationRow])| {
+            let end = rows.last().map_or(0, |row| row.report.iteration);
+            branch.stops.iter().filter(|(at, _)| *at <= end).cloned().collect::<Vec<_>>()
+        };
+        self.ancestry().into_iter().flat_map(of).collect()
+    }
+
+    /// Where something was set, moved or erased, or a breakpoint stopped, on the way to the head of the active branch: the last
+    /// iteration before, and what in words.
     pub fn flags(&self) -> Vec<(usize, String)> {
         let mut flags = Vec::new();
         for (branch, rows) in self.ancestry() {
@@ -284,7 +307,9 @@ impl History {
             let set = branch.flags.iter().filter(|flag| flag.iteration <= end);
             flags.extend(departure.into_iter().chain(set.map(|flag| (flag.iteration, flag.text.clone()))));
         }
+        flags.extend(self.lineage_stops().into_iter().map(|(at, text)| (at, format!("stopped: {text}"))));
         flags.retain(|(_, text)| !text.is_empty());
+        flags.sort_by_key(|(at, _)| *at);
         flags
     }
 
@@ -348,6 +373,7 @@ impl History {
             first.rows.truncate(1);
             first.config = first.flags.last().map_or(first.config, |flag| flag.config);
             first.flags.clear();
+            first.stops.clear();
             self.active = first.id;
         }
         self.revision += 1;

@@ -16,6 +16,7 @@ mod acts;
 mod apply;
 mod batch;
 mod body_move;
+mod breakpoints;
 mod command;
 mod compared;
 mod effect;
@@ -43,9 +44,10 @@ mod view;
 mod work;
 
 pub use acts::{ActKind, Asked, Changes, Done, LabelAct};
-pub use apply::OutputCheck;
+pub use apply::{ErasedEffect, OutputCheck};
 pub use batch::{Batch, BatchRequest};
 pub use body_move::{BodyMove, root_of};
+pub use breakpoints::{Breakpoints, StopPoint};
 pub use command::{Command, Export, PickKind, StartAt};
 pub use compared::{ComparedNumber, ResultSet, ResultSets, ResultSide, SetDifference};
 pub use effect::{BackgroundTask, Commit, Effect, PinRequest, Trash};
@@ -68,7 +70,7 @@ pub use strata::{Strata, StrataStatus};
 pub use study::{StudyOrder, StudyRequest, StudyView};
 pub use tracked::Tracked;
 pub use view::{
-    Against, ColorRange, Compare, CubeAxes, CubeView, CurvesShown, MapLimits, MapScale, Smoothing, SplatMode,
+    Against, ColorRange, Compare, CubeAxes, CubeView, CurvesShown, Isolate, MapLimits, MapScale, Smoothing, SplatMode,
     ThemeChoice, ThirdAxis, TimelineStrip, ViewState,
 };
 pub use work::{Work, WorkStatus};

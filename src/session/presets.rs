@@ -42,6 +42,7 @@ impl PresetFits {
                 params_folder: None,
                 ply: false,
                 curves_folder: None,
+                ..BatchOptions::default()
             };
             (preset, panic_as_error(|| fit_frame(dataset, frame.index, &options, None)))
         });

@@ -1,7 +1,7 @@
 //! Acts on settings and on the body: one from where a finger goes down until it is lifted, whatever it did in between.
 
 use crate::config::FitConfig;
-use crate::worker::ErasedCells;
+use crate::mhp::ErasedCells;
 use serde::{Deserialize, Serialize};
 
 /// Acts that can be undone.

@@ -2,6 +2,7 @@
 
 use super::batch::Batch;
 use super::body_move::Moving;
+use super::breakpoints::Breakpoints;
 use super::command::StartAt;
 use super::compared::ResultSets;
 use super::evidence::EvidenceState;
@@ -190,6 +191,8 @@ pub struct Session {
     pub best_basins: Tracked<BTreeMap<usize, f64>>,
     /// Fits that others are compared with.
     pub pins: Pins,
+    /// Where runs stop.
+    pub breakpoints: Breakpoints,
     /// The study on screen.
     pub study: StudyView,
     /// Settings.

@@ -126,6 +126,29 @@ pub enum CurvesShown {
     Quality,
 }
 
+/// Whose returns H_sim is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Isolate {
+    /// All joints'.
+    #[default]
+    All,
+    /// All but the selected joint's.
+    Without,
+    /// The selected joint's alone.
+    Only,
+}
+
+impl Isolate {
+    /// The next one, round.
+    pub fn next(self) -> Self {
+        match self {
+            Self::All => Self::Without,
+            Self::Without => Self::Only,
+            Self::Only => Self::All,
+        }
+    }
+}
+
 /// How much curves over the iterations are smoothed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Smoothing {
@@ -219,6 +242,8 @@ pub struct ViewState {
     pub compare: Compare,
     /// What flip, wipe and difference compare H_sim with.
     pub against: Against,
+    /// Whose returns the H_sim pane shows.
+    pub isolate: Isolate,
     /// Where the wipe's line is, 0..1 of the map's width.
     pub wipe: f32,
     /// Which axes of the maps are drawn, and in which coordinates.
@@ -295,6 +320,10 @@ pub struct ViewState {
     pub show_basins: bool,
     /// Scale of the whole interface.
     pub zoom: f32,
+    /// Draw the outlines of the masks at τ and its neighbours on the maps.
+    pub show_outlines: bool,
+    /// Draw the points that are kept at τ in 3-D.
+    pub show_clouds: bool,
     /// Begin to fit a frame as soon as it is shown.
     pub run_on_open: bool,
     /// Whether a change of settings fits anew at once.
@@ -318,6 +347,7 @@ impl Default for ViewState {
             colormap: "viridis".into(),
             compare: Compare::default(),
             against: Against::default(),
+            isolate: Isolate::default(),
             wipe: 0.5,
             cube: CubeView::default(),
             true_proportions: false,
@@ -358,6 +388,8 @@ impl Default for ViewState {
             show_baseline: true,
             show_basins: true,
             zoom: 1.0,
+            show_outlines: false,
+            show_clouds: false,
             run_on_open: false,
             live: Live::default(),
             live_from: LiveFrom::default(),

@@ -7,11 +7,12 @@
 use super::row::annotated;
 use super::{BatchRow, CurveRow, FitNumbers, FrameFit, StudyError, write_curves, write_ply};
 use crate::body::Pppr;
+use crate::condition::{Breakpoint, Watch};
 use crate::config::FitConfig;
 use crate::dataset::{Dataset, Truth, write_pppr};
 use crate::diagnose::{JointErrors, joint_errors};
 use crate::geometry::{Vec3, mean};
-use crate::mhp::{Fitter, Precision, StepReport, predict};
+use crate::mhp::{ErasedCells, Fitter, Precision, StepReport, predict, without};
 use crate::output::{FileNames, Inputs};
 use crate::people::Tracker;
 use crate::start::{find_start_in, problem_of};
@@ -24,7 +25,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// How a batch is run.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct BatchOptions {
     /// Settings of every fit.
     pub config: FitConfig,
@@ -38,6 +39,10 @@ pub struct BatchOptions {
     pub ply: bool,
     /// The folder that every iteration is written to, a CSV a frame; it must exist.
     pub curves_folder: Option<PathBuf>,
+    /// A fit stops at the first iteration at which one of these holds.
+    pub breakpoints: Vec<Breakpoint>,
+    /// Cells that no fit sees, neither in its frame nor in those around; a start that is sought sees them.
+    pub erased: Vec<ErasedCells>,
 }
 
 /// Fits one frame: from `start` where it is given, else from its own peaks.
@@ -74,17 +79,29 @@ fn fit_watched(
         (found.params, Some(milliseconds(began)))
     };
     let began = Instant::now();
+    let seen = without(&problem, &options.erased).map_err(|error| in_file(&error))?;
     let mut fitter =
-        Fitter::new(problem, options.config, options.precision, initial.clone()).map_err(|error| in_file(&error))?;
+        Fitter::new(seen, options.config, options.precision, initial.clone()).map_err(|error| in_file(&error))?;
     let errors = |params: &Pppr| errors(params, frame.truth.as_ref()?, info.skeleton.joints.len());
-    let watched = |report, params: &Pppr| watch(report, errors(params).map(|e| e.majpe_mm));
-    let reason = fitter.run_to(options.config.iterations, watched).map_err(|error| in_file(&error))?;
+    let (mut breaks, mut broke, mut first) = (Watch::new(options.breakpoints.clone()), None, true);
+    let stops = |fitter: &Fitter| {
+        let majpe_mm = errors(fitter.params()).map(|e| e.majpe_mm);
+        watch(fitter.report(), majpe_mm);
+        if std::mem::take(&mut first) {
+            breaks.begin(fitter, majpe_mm);
+            return false;
+        }
+        broke = breaks.step(fitter, majpe_mm);
+        broke.is_some()
+    };
+    let reason = fitter.run_until(options.config.iterations, stops).map_err(|error| in_file(&error))?;
+    let breakpoint = broke.and_then(|which| options.breakpoints.get(which)).map(ToString::to_string);
     let fit_ms = milliseconds(began);
     let (report, params) = (fitter.report(), fitter.params().clone());
     let errors = errors(&params);
     let (majpe_mm, pa_majpe_mm) = (errors.map(|e| e.majpe_mm), errors.map(|e| e.pa_majpe_mm));
     let (people, annotated) = (params.shape().persons, annotated(&frame));
-    let numbers = FitNumbers { report, reason, people, annotated, majpe_mm, pa_majpe_mm, init_ms, fit_ms };
+    let numbers = FitNumbers { report, reason, breakpoint, people, annotated, majpe_mm, pa_majpe_mm, init_ms, fit_ms };
     Ok(FrameFit { numbers, initial, params })
 }
 

@@ -9,6 +9,7 @@ mod batch;
 pub mod calibrate;
 pub mod complexity;
 pub mod count;
+mod erased;
 mod evidence;
 mod export;
 mod file_error;
@@ -22,6 +23,7 @@ pub mod shard;
 mod summary;
 
 pub use batch::{BatchOptions, fit_frame, run_batch};
+pub use erased::{read_erased, write_erased};
 pub use evidence::{FrameEvidence, frame_evidence, frames_before, state_evidence};
 pub use export::{
     CloudPoint, CurveRow, ExportError, ExportScale, HeatmapExport, curve_columns, curves_csv, ply, point_cloud,

@@ -17,6 +17,9 @@ pub struct FitNumbers {
     pub report: StepReport,
     /// Why the run ended.
     pub reason: StopReason,
+    /// Which breakpoint stopped it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub breakpoint: Option<String>,
     /// Persons fitted.
     pub people: usize,
     /// Persons annotated, where the data set says.
@@ -89,9 +92,10 @@ impl BatchRow {
         losses.chain(ious).chain(rest).map(|x| x.filter(|x| x.is_finite())).collect()
     }
 
-    /// Why the run ended: `iterations`, `converged`, or `error: …`.
+    /// Why the run ended: `iterations`, `converged`, `breakpoint: …`, or `error: …`.
     pub fn reason(&self) -> String {
         match &self.fit {
+            Ok(FitNumbers { breakpoint: Some(breakpoint), .. }) => format!("breakpoint: {breakpoint}"),
             Ok(fit) => fit.reason.word().to_owned(),
             Err(why) => format!("error: {why}"),
         }
@@ -234,6 +238,7 @@ mod tests {
         let fit = FitNumbers {
             report,
             reason: StopReason::Iterations,
+            breakpoint: None,
             people: 1,
             annotated: None,
             majpe_mm: None,

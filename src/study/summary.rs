@@ -44,6 +44,14 @@ pub enum StudyError {
         /// The file.
         path: PathBuf,
     },
+    /// A file of erased cells is not what it should be.
+    #[error("{path}: no erased cells: {reason}", path = path.display())]
+    Erased {
+        /// What is wrong with it, and what was expected.
+        reason: String,
+        /// The file.
+        path: PathBuf,
+    },
     /// The operating system gives no more threads.
     #[error("no thread to work on: {reason}")]
     Thread {

@@ -5,12 +5,10 @@
 //! [`HistoryRow`] (none may be lost), and rare [`WorkerEvent`]s. Every message carries the job it belongs to; the
 //! receiver drops stale ones. A panic inside a job becomes an event and the thread goes on.
 
-mod erased;
 mod handle;
 mod protocol;
 mod thread;
 
-pub use erased::{ErasedCells, leaves_any, without};
 pub use handle::Worker;
 pub use protocol::{
     HistoryRow, JobId, Kept, Prepare, PreparedFit, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,

@@ -1,11 +1,11 @@
 //! What the window and the worker say to each other.
 
-use super::erased::ErasedCells;
 use crate::body::Pppr;
+use crate::condition::Breakpoint;
 use crate::config::FitConfig;
 use crate::dataset::{Dataset, Frame};
 use crate::geometry::Vec3;
-use crate::mhp::{Evaluation, FitState, Masks, Precision, Problem, StepReport, StopReason};
+use crate::mhp::{ErasedCells, Evaluation, FitState, Masks, Precision, Problem, StepReport, StopReason};
 use crate::start::FoundStart;
 use std::sync::Arc;
 
@@ -84,6 +84,8 @@ pub enum WorkerCommand {
     /// Runs take at most so many iterations a second from now on, `None` as fast as they go; a fit that is done anew
     /// always does.
     Pace(Option<f64>),
+    /// Runs stop where one of these holds from now on, each with its number; a fit that is done anew does not.
+    Watch(Vec<(u32, Breakpoint)>),
     /// Stop after the current step; the job stays.
     Pause,
     /// Take effect at the next step.
@@ -221,6 +223,15 @@ pub enum WorkerEvent {
         branch: u32,
         /// The settings that it is fitted with.
         config: Box<FitConfig>,
+    },
+    /// A breakpoint holds: the run's end follows.
+    Broke {
+        /// The branch.
+        branch: u32,
+        /// Where it holds.
+        iteration: usize,
+        /// Its number.
+        breakpoint: u32,
     },
     /// A run ended.
     Finished {

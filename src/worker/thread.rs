@@ -1,14 +1,17 @@
 //! The worker's loop: drain every command, take one step, publish; block while nothing runs.
 
-use super::erased::{ErasedCells, without};
 use super::handle::Latest;
 use super::protocol::{
     HistoryRow, JobId, Kept, Prepare, PreparedFit, Snapshot, Start, WorkerCommand, WorkerEvent, WorkerMessage,
 };
 use crate::body::Pppr;
+use crate::condition::{Breakpoint, Watch};
 use crate::config::{FitConfig, Parameterization};
+use crate::dataset::Truth;
+use crate::diagnose::joint_errors;
 use crate::mhp::{
-    FitError, FitState, Fitter, Objective, Precision, Problem, StepReport, StopReason, masks, predict, simulate,
+    ErasedCells, FitError, FitState, Fitter, Objective, Precision, Problem, StepReport, StopReason, masks, predict,
+    simulate, without,
 };
 use crate::start::{find_start_in, problem_of};
 use crate::task::{catch_panic, milliseconds};
@@ -76,6 +79,11 @@ struct Job {
     next_step: Instant,
     /// A branch that is written anew, until its first rows are sent.
     refit: Option<Refit>,
+    /// Where runs stop, the numbers of what is watched for, and what held at the last step.
+    watch: Watch,
+    watched: Vec<u32>,
+    broke: Option<u32>,
+    truth: Option<Truth>,
 }
 
 /// A fit that is done anew, of which nothing was shown yet.
@@ -95,6 +103,8 @@ pub(super) struct Thread {
     current: JobId,
     /// Iterations a second that runs may take; `None` as fast as they go.
     pace: Option<f64>,
+    /// Where runs stop.
+    breakpoints: Vec<(u32, Breakpoint)>,
 }
 
 impl Thread {
@@ -104,7 +114,7 @@ impl Thread {
         snapshot: Arc<Latest>,
         wake: Box<dyn Fn() + Send>,
     ) -> Self {
-        Self { inbox, outbox, snapshot, wake, job: None, current: 0, pace: None }
+        Self { inbox, outbox, snapshot, wake, job: None, current: 0, pace: None, breakpoints: Vec::new() }
     }
 
     /// Until `Shutdown` or until the window is gone.
@@ -162,7 +172,12 @@ impl Thread {
             Ok(None) => {}
             Ok(Some(reason)) => {
                 let finished = job.finished(reason);
+                let (branch, iteration) = (job.branch, job.iteration());
+                let broke = job.broke.take();
                 self.publish();
+                if let Some(breakpoint) = broke {
+                    self.event(WorkerEvent::Broke { branch, iteration, breakpoint });
+                }
                 self.event(finished);
                 return;
             }
@@ -183,6 +198,10 @@ impl Thread {
             WorkerCommand::Pace(pace) => {
                 self.pace = pace;
                 self.job.iter_mut().for_each(|job| job.set_pace(pace));
+            }
+            WorkerCommand::Watch(breakpoints) => {
+                self.job.iter_mut().for_each(|job| job.watch_for(&breakpoints));
+                self.breakpoints = breakpoints;
             }
             WorkerCommand::Shutdown => return false,
             command => {
@@ -213,6 +232,7 @@ impl Thread {
         match Job::new(prepare) {
             Ok((mut job, prepared)) => {
                 job.set_pace(self.pace);
+                job.watch_for(&self.breakpoints);
                 self.job = Some(job);
                 self.event(WorkerEvent::Prepared(Box::new(prepared)));
             }
@@ -366,6 +386,10 @@ impl Job {
             anew: false,
             next_step: now,
             refit: None,
+            watch: Watch::default(),
+            watched: Vec::new(),
+            broke: None,
+            truth: frame.truth.clone(),
         };
         if !resumed {
             new.push_row(new.fitter.report());
@@ -432,6 +456,26 @@ impl Job {
         self.next_step = Instant::now();
     }
 
+    /// Runs stop where one of these holds.
+    fn watch_for(&mut self, breakpoints: &[(u32, Breakpoint)]) {
+        self.watched = breakpoints.iter().map(|(number, _)| *number).collect();
+        let majpe_mm = self.majpe_mm();
+        self.watch.replace(breakpoints.iter().map(|(_, of)| of.clone()).collect(), &self.fitter, majpe_mm);
+    }
+
+    /// What is watched begins anew where the fit stands.
+    fn begin_watch(&mut self) {
+        let majpe_mm = self.majpe_mm();
+        self.watch.begin(&self.fitter, majpe_mm);
+    }
+
+    /// Mean joint error, mm, where there is truth and somebody watches.
+    fn majpe_mm(&self) -> Option<f64> {
+        let truth = self.truth.as_ref().filter(|_| !self.watched.is_empty())?;
+        let joints = self.problem.skeleton.joints.len();
+        joint_errors(self.fitter.params().positions(), &truth.joints, joints).map(|errors| errors.majpe_mm)
+    }
+
     fn finished(&self, reason: StopReason) -> WorkerEvent {
         WorkerEvent::Finished {
             run: self.run,
@@ -475,6 +519,15 @@ impl Job {
         self.steps_in_run += 1;
         let (iteration, converged) = (report.iteration, report.converged);
         self.push_row(report);
+        // A fit under a finger goes to its end.
+        if !self.anew && !self.watch.is_empty() {
+            let majpe_mm = self.majpe_mm();
+            if let Some(which) = self.watch.step(&self.fitter, majpe_mm) {
+                self.broke = self.watched.get(which).copied();
+                self.target = 0;
+                return Ok(Some(StopReason::Breakpoint));
+            }
+        }
         if converged && self.fitter.config().stop_when_converged {
             self.target = 0;
             return Ok(Some(StopReason::Converged));
@@ -497,6 +550,7 @@ impl Job {
                 self.fitter.restore(state)?;
                 (self.branch, self.branch_start) = (branch, self.iteration());
                 self.push_row(self.fitter.report());
+                self.begin_watch();
                 self.begin_run(target, run);
                 self.anew = true;
                 self.refit = Some(Refit { began: self.run_began, config });
@@ -528,17 +582,23 @@ impl Job {
                 self.branch = branch;
                 self.branch_start = self.iteration();
                 self.push_row(self.fitter.report());
+                self.begin_watch();
             }
             WorkerCommand::Edit(params) => {
                 self.fitter.set_params(*params)?;
                 self.push_row(self.fitter.report());
+                self.begin_watch();
             }
             WorkerCommand::Inspect { branch, state, config } => {
                 return Ok(Reply::Show(Box::new(self.inspect(branch, &state, &config))));
             }
             #[expect(clippy::panic, reason = "the test hook that proves the window survives a panic")]
             WorkerCommand::PanicForTest => panic!("asked to panic"),
-            WorkerCommand::Prepare(_) | WorkerCommand::Discard | WorkerCommand::Pace(_) | WorkerCommand::Shutdown => {}
+            WorkerCommand::Prepare(_)
+            | WorkerCommand::Discard
+            | WorkerCommand::Pace(_)
+            | WorkerCommand::Watch(_)
+            | WorkerCommand::Shutdown => {}
         }
         Ok(Reply::Nothing)
     }

@@ -94,6 +94,7 @@ fn parameters_given_are_those_judged() {
         params_folder: None,
         ply: false,
         curves_folder: None,
+        ..BatchOptions::default()
     };
     let mut params = fit_frame(&dataset, 4, &options, None).unwrap().params;
     for joint in 0..17 {

@@ -437,6 +437,7 @@ fn an_error_of_the_sink_ends_the_batch() {
         params_folder: Some(pppr.clone()),
         ply: false,
         curves_folder: None,
+        ..BatchOptions::default()
     };
     let mut told = Vec::new();
     let full = || StudyError::Write { reason: std::io::Error::other("disk full"), path: "summary.csv".into() };

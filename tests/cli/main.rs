@@ -12,4 +12,5 @@ mod evidence;
 mod explore;
 mod fit;
 mod hostile_text;
+mod rests_on;
 mod score;

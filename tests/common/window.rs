@@ -237,10 +237,17 @@ impl Window {
         self.open_menu(menu);
         let names = self.names();
         let full = names.iter().find(|name| name.starts_with(item)).unwrap_or_else(|| panic!("{item}: {names:?}"));
+        self.reveal(full);
         self.node(full).click();
         self.harness.run_steps(2);
         self.harness.remove_cursor();
         self.harness.step();
+    }
+
+    /// Brings a pane to the front.
+    pub(crate) fn show(&mut self, title: &str) {
+        self.harness.state_mut().show_pane(mhp_inspector::app::Pane::called(title).unwrap());
+        self.harness.run_steps(3);
     }
 
     /// What a menu says, without choosing anything.

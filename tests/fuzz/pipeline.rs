@@ -38,8 +38,15 @@ pub(crate) fn whole(random: &mut StdRng, folder: &Path) {
         }
     };
     let config = config(random);
-    let options =
-        BatchOptions { config, precision, warm_start: false, params_folder: None, ply: false, curves_folder: None };
+    let options = BatchOptions {
+        config,
+        precision,
+        warm_start: false,
+        params_folder: None,
+        ply: false,
+        curves_folder: None,
+        ..BatchOptions::default()
+    };
     let frame = frames - 1;
     if let Ok(fit) = fit_frame(&dataset, frame, &options, None) {
         assert!(fit.params.is_finite(), "a fit that succeeds is finite");

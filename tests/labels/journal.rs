@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
 use crate::labels::{Case, commit, frame, name, tags};
-use mhp_inspector::labels::{Change, Journal, Judged, Label, LabelStore, Record, Tag, read_journal};
+use mhp_inspector::labels::{CellRegion, Change, Journal, Judged, Label, LabelStore, Record, Tag, read_journal};
 use rand::rngs::StdRng;
 use rand::{Rng as _, SeedableRng as _};
 use serde_json::{Value, json};
@@ -228,6 +228,7 @@ fn a_record_keeps_all_that_is_asked_of_it() {
         fit: Some("abc".into()),
         config: Some("def".into()),
         iteration: Some(40),
+        erased: vec![CellRegion { view: "hm".into(), lo: vec![1], hi: vec![4] }],
         machine,
         machine_shown: true,
     };

@@ -637,14 +637,14 @@ fn a_long_fit_that_is_done_anew_is_shown_on_the_way() {
     assert!(iterations(&rows).windows(2).all(|pair| pair[1] == pair[0] + 1), "no iteration is lost");
 }
 
-/// A fit that is not to see some cells is the fit of a frame in which they were not measured; told otherwise, it sees them.
+/// A fit that is not to see some cells is the fit of a frame in which they say nothing, whatever they hold; told otherwise, it
+/// sees them.
 #[test]
-fn erased_cells_are_as_if_they_had_not_been_measured() {
-    use mhp_inspector::mhp::{Fitter, Problem};
-    use mhp_inspector::worker::ErasedCells;
+fn erased_cells_take_no_part() {
+    use mhp_inspector::mhp::{ErasedCells, Fitter, Problem, erased_marks, masks, percentile};
     let mut rig = Rig::new();
     let (row, prepared) = rig.prepared();
-    let erased: Arc<[ErasedCells]> = [ErasedCells { view: 0, bins: vec![[10, 30], [8, 20]] }].into();
+    let erased: Arc<[ErasedCells]> = [ErasedCells { view: 0, bins: vec![[10, 30], [8, 20]], cells: Vec::new() }].into();
     let config = FitConfig { iterations: 5, ..FitConfig::default() };
     let (begin, told) = (Arc::clone(state(&row)), Box::new(config));
     let again = |erased: &Arc<[ErasedCells]>, run: u64| WorkerCommand::Refit {
@@ -666,20 +666,58 @@ fn erased_cells_are_as_if_they_had_not_been_measured() {
     let problem = &prepared.problem;
     let mut map = problem.map(0).to_vec();
     let width = problem.views[0].axes[1].bins;
-    (10..30).for_each(|row| map[row * width + 8..row * width + 20].fill(f64::NAN));
+    (10..30).for_each(|row| map[row * width + 8..row * width + 20].fill(1e6));
     let maps = [map.as_slice(), problem.map(1)];
     let (radar, skeleton) = (problem.radar.clone(), problem.skeleton.clone());
-    let mut holed = Problem::new(radar, skeleton, problem.views.clone(), &maps).unwrap();
-    for neighbour in problem.neighbours() {
-        let mut map = neighbour.map(0).to_vec();
-        (10..30).for_each(|row| map[row * width + 8..row * width + 20].fill(f64::NAN));
-        holed.add_neighbour(neighbour.offset_s, &[&map, neighbour.map(1)]).unwrap();
-    }
-    for (problem, rows) in [(Arc::new(holed), &without), (Arc::clone(problem), &with)] {
+    let loud = Problem::new(radar, skeleton, problem.views.clone(), &maps).unwrap();
+    let marks = erased_marks(&problem.views, &erased);
+    let left = Arc::new(loud.without(&marks).unwrap());
+    for (problem, rows) in [(Arc::clone(&left), &without), (Arc::clone(problem), &with)] {
         let mut fitter = Fitter::new(problem, config, Precision::F64, prepared.initial.clone()).unwrap();
         let mut losses = vec![fitter.report().loss];
         losses.extend((0..5).map(|_| fitter.step().unwrap().loss));
         assert_eq!(rows.iter().map(|row| row.report.loss).collect::<Vec<_>>(), losses);
     }
     assert_ne!(with[0].report.loss, without[0].report.loss);
+    // The percentile of H_ori is that of what is left of the region, and nothing erased is inside it; in single precision too.
+    for precision in [Precision::F64, Precision::F32] {
+        let fitter = Fitter::new(Arc::clone(&left), config, precision, prepared.initial.clone()).unwrap();
+        let h_sim = mhp_inspector::mhp::simulate(problem, &config, Precision::F32, fitter.params());
+        let seen = masks(fitter.objective(), 0, &h_sim[0]);
+        let inside: Vec<usize> = (0..map.len()).filter(|&cell| seen.inside[cell]).collect();
+        assert!(!inside.is_empty() && inside.iter().all(|&cell| !marks[0][cell]));
+        let values: Vec<f64> = inside.iter().map(|&cell| problem.map(0)[cell]).collect();
+        let threshold = percentile(&values, 100.0 - config.tau_pct);
+        assert!(inside.iter().all(|&cell| seen.ori[cell] == (problem.map(0)[cell] > threshold)));
+        let iou = fitter.report().iou[0].unwrap();
+        assert!((seen.iou().unwrap() - iou).abs() < 0.02, "{precision:?}: {iou}");
+        let told = fitter.report().loss;
+        assert!((told - without[0].report.loss).abs() < 1e-4 * told, "{precision:?}: {told}");
+    }
+}
+
+/// A breakpoint stops a run once where it holds, says which, and lets the run go on from there.
+#[test]
+fn a_run_stops_at_a_breakpoint_and_goes_on() {
+    let mut rig = Rig::new();
+    rig.prepared();
+    let watched = ["iteration>=3", "loss<0"].map(|text| text.parse().unwrap());
+    rig.send(WorkerCommand::Watch(watched.into_iter().enumerate().map(|(k, of)| (k as u32 + 40, of)).collect()));
+    rig.send(WorkerCommand::RunTo { target: 10, run: 1 });
+    let (rows, event) = rig.rows_until(1, |event| matches!(event, WorkerEvent::Broke { .. }));
+    assert!(matches!(event, WorkerEvent::Broke { branch: 0, iteration: 3, breakpoint: 40 }), "{event:?}");
+    assert_eq!(iterations(&rows), [1, 2, 3]);
+    assert_eq!(rig.finish().1, 3);
+    // It still holds: the run that goes on is not stopped again.
+    rig.send(WorkerCommand::RunTo { target: 10, run: 2 });
+    let (rows, iteration, reason) = rig.finish();
+    assert_eq!((rows.len(), iteration, reason), (7, 10, StopReason::Iterations));
+    // Another fit begins: it is armed again.
+    rig.prepare_with(2, &FitConfig::default(), Start::Initialise);
+    rig.rows_until(2, |event| matches!(event, WorkerEvent::Prepared(_)));
+    rig.send(WorkerCommand::RunTo { target: 10, run: 3 });
+    let (_, event) = rig.rows_until(2, |event| matches!(event, WorkerEvent::Broke { .. }));
+    assert!(matches!(event, WorkerEvent::Broke { iteration: 3, .. }), "{event:?}");
+    let (_, event) = rig.rows_until(2, |event| matches!(event, WorkerEvent::Finished { .. }));
+    assert!(matches!(event, WorkerEvent::Finished { reason: StopReason::Breakpoint, .. }), "{event:?}");
 }

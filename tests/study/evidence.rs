@@ -526,6 +526,7 @@ fn options(iterations: usize) -> BatchOptions {
         params_folder: None,
         ply: false,
         curves_folder: None,
+        ..BatchOptions::default()
     }
 }
 

@@ -5,6 +5,7 @@
 mod blob;
 #[path = "../journey/mod.rs"]
 mod journey;
+mod rests_on;
 #[path = "../common/scenes.rs"]
 mod scenes;
 #[path = "../common/tree.rs"]
@@ -12,13 +13,16 @@ mod tree;
 #[path = "../common/window.rs"]
 mod window;
 
+mod breakpoints;
 mod compare;
 mod erase;
 mod explore;
 mod hand;
 mod labels;
 mod large;
+mod lit;
 mod maps;
+mod pictures;
 mod radar;
 mod results;
 mod seen;

@@ -119,6 +119,15 @@ pub(super) const COMMANDS: &[CommandRow] = &[
         act: |_| save(Export::Parameters),
     },
     CommandRow {
+        label: "Export erased cells as JSON…",
+        title: None,
+        tooltip: "The cells that this fit does not see, as `fit --erase` takes them.",
+        menu: Menu::File,
+        keys: &[],
+        enabled: |s| !s.fit.erased().is_empty(),
+        act: |_| save(Export::Erased),
+    },
+    CommandRow {
         label: "Export Gaussians as PLY…",
         title: None,
         tooltip: "The Gaussians on screen, in the layout of 3-D Gaussian splatting.",

@@ -363,6 +363,7 @@ pub(super) const COMMANDS: &[CommandRow] = &[
         act: |_| UiAction::App(AppAct::ResetViews),
     },
     maps::ENLARGE,
+    maps::ISOLATE,
     CommandRow {
         label: "Bird's-eye",
         title: None,

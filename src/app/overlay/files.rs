@@ -54,6 +54,7 @@ fn what(kind: SaveKind) -> (&'static str, &'static str) {
             crate::session::Export::Parameters => ("Export parameters", "npz: PPPR of the iteration on screen."),
             crate::session::Export::LabelsCsv => ("Export labels", "CSV: a row a frame and annotator."),
             crate::session::Export::LabelsJson => ("Export labels", "JSON: everything that was recorded."),
+            crate::session::Export::Erased => ("Export erased cells", "JSON: what fit --erase takes."),
             crate::session::Export::Strata => ("Export strata", "CSV: hardness and its parts of every frame."),
         },
     }

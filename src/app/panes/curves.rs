@@ -129,6 +129,7 @@ fn branch_of(session: &Session) -> Cow<'_, Branch> {
         flags: Vec::new(),
         edit: None,
         erased: std::sync::Arc::default(),
+        stops: Vec::new(),
         around: None,
     };
     begun(session).map_or_else(|| Cow::Owned(none()), Cow::Borrowed)

@@ -1,6 +1,6 @@
 //! The fit: transport, the shown iteration's numbers, and every setting.
 
-use super::{Dock, Pane, PaneState, PaneStates, Shared};
+use super::{Dock, Pane, PaneState, PaneStates, Shared, ribbon};
 use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Mark, Named as _, chip, icon_button, iou_color, rows, settings, value_row};
@@ -36,9 +36,15 @@ pub(super) static PANE: Pane = Pane {
 struct State {
     /// What is looked for among the settings.
     search: String,
+    /// The agreement at every τ.
+    ribbon: ribbon::Ribbon,
 }
 
-impl PaneState for State {}
+impl PaneState for State {
+    fn is_working(&self) -> bool {
+        self.ribbon.is_working()
+    }
+}
 
 /// The setting beside the presets.
 const PEOPLE: &str = "people";
@@ -78,6 +84,9 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         let old = shared.session.config;
         let mut config = old;
         settings(ui, FieldGroup::Weights, &mut config);
+        if shared.session.fit.shown.is_some() {
+            ui.push_id("ribbon", |ui| ribbon::show(ui, shared, &mut state.ribbon, &mut config));
+        }
         ui.separator();
         ui.scope(|ui| numbers(ui, shared));
         ui.separator();

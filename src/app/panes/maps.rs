@@ -10,7 +10,7 @@ mod readout;
 mod region;
 mod toolbar;
 
-use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared, lit};
 use crate::app::commands::{CommandRow, Menu, NONE, SHIFT, UiAction, has_frame};
 use crate::app::figure;
 use crate::app::map_image::Orientation;
@@ -72,11 +72,26 @@ pub(in crate::app) const MARK_CELLS: CommandRow = CommandRow {
 pub(in crate::app) const ERASE_CELLS: CommandRow = CommandRow {
     label: "Erase cells",
     title: None,
-    tooltip: "Drag a box on a map: the fit is done anew as if nothing had been measured there, in this frame and in those around it, on a branch of its own. Live, the body follows the box.",
+    tooltip: "Drag a box on a map: the fit is done anew as if nothing had been measured there, in this frame and in those around it, on a branch of its own. Live, the body follows the box. Beside it: a brush, and whole echoes by one click.",
     menu: Menu::Fit,
     keys: &[(SHIFT, Key::G)],
     enabled: has_frame,
     act: |_| UiAction::panes(|states, _| states.of::<State>().draw_box(BoxOf::Eraser)),
+};
+
+/// H_sim of all joints, of all but the selected one, of the selected one alone; round.
+pub(in crate::app) const ISOLATE: CommandRow = CommandRow {
+    label: "Without or only this joint",
+    title: None,
+    tooltip: "H_sim without what the selected joint sends back; again: of that joint alone; again: of all.",
+    menu: Menu::View,
+    keys: &[(NONE, Key::I)],
+    enabled: |s| s.joint.is_some() && s.fit.shown.is_some(),
+    act: |s| {
+        let mut view = s.view.clone();
+        view.isolate = view.isolate.next();
+        UiAction::Session(crate::session::Command::SetView(Box::new(view)))
+    },
 };
 
 /// Points at cells of a view, first and last bin of each axis, and zooms its maps to them.
@@ -240,6 +255,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     state.windows.resize(views.len(), MapExtent::default());
     state.leave_highlight(Some(session.data.frame_index));
     state.pictures.update(session, views, frame);
+    isolate(ui, session, state, views);
     state.follow(session, views);
     // A toolbar that is wider than the pane must not push the maps out of it.
     let area = ui.available_rect_before_wrap().intersect(shared.pane);
@@ -269,6 +285,16 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     readout::show(ui, shared, state, readout);
 }
 
+/// Takes in the maps of what H_sim is made of, where that is not all joints.
+fn isolate(ui: &Ui, session: &Session, state: &mut State, views: &[View]) {
+    let kept = lit::isolated(session).zip(lit::lit(ui.ctx(), session));
+    for (index, view) in views.iter().enumerate() {
+        let map = kept.as_ref().and_then(|(kept, lit)| lit.map(ui.ctx(), index, *kept));
+        let o = Orientation::of(view, session.view.cube);
+        state.pictures.isolate(index, (view, o), map, (session.view.scale, session.view.range_of(&view.array)));
+    }
+}
+
 /// What a column shows now.
 fn content_of(column: MapColumn, state: &State, session: &Session) -> Content {
     let flipped = state.flipped == Some(column);
@@ -278,16 +304,24 @@ fn content_of(column: MapColumn, state: &State, session: &Session) -> Content {
         (MapColumn::Sim, true) => state.pictures.reference(),
         (MapColumn::Ori, true) => Content::Sim,
         (MapColumn::Sim, false) => match session.view.compare {
+            Compare::Flip | Compare::Wipe if lit::isolated(session).is_some() => Content::Isolated,
             Compare::Flip | Compare::Wipe => Content::Sim,
             Compare::Difference => Content::Difference,
         },
     }
 }
 
-fn name_of(content: Content, state: &State, view: &View) -> (String, &'static str) {
+/// `without` or `only`, where H_sim is not of all joints.
+fn isolated_word(session: &Session) -> Option<&'static str> {
+    lit::isolated(session).map(|kept| if matches!(kept, crate::mhp::KeptJoints::Only(_)) { "only" } else { "without" })
+}
+
+fn name_of(session: &Session, content: Content, state: &State, view: &View) -> (String, &'static str) {
     let what = match (content, state.pictures.reference()) {
         (Content::Difference, Content::Base) => "H_sim − baseline",
         (Content::Difference, _) => "H_sim − H_ori",
+        (Content::Isolated, _) if isolated_word(session) == Some("without") => "H_sim without the joint",
+        (Content::Isolated, _) => "H_sim of the joint alone",
         _ => content.name(),
     };
     (format!("{what} map of {}", view.array), what)
@@ -299,7 +333,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
     let Some(view) = session.data.dataset.as_ref().and_then(|d| d.info().views.get(index)) else { return };
     let orientation = Orientation::of(view, session.view.cube);
     let content = content_of(column, state, session);
-    let (name, what) = name_of(content, state, view);
+    let (name, what) = name_of(session, content, state, view);
     let unit = if content == Content::Masks { "masks" } else { state.pictures.unit(content) };
     let caption = figure::of(session, &format!("{what} {} · {unit}", view.array));
     let rect = figure::print(ui, rect, caption.as_deref());
@@ -320,6 +354,8 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
             shared.send(crate::session::Command::SetRegion(session.data.frame_index, Some(cells)));
         }
         Drawn::Erased(cells) => shared.send(crate::session::Command::DragErase(cells)),
+        Drawn::Painted(cells) => shared.send(crate::session::Command::DragEraseCells(index, cells)),
+        Drawn::Echo(cell) => shared.send(crate::session::Command::EraseEcho(index, cell)),
         Drawn::Begun | Drawn::Nothing => {}
     }
     if !drawing && !drag::joint(ui, shared, state, &response, plot, (index, view, orientation)) {
@@ -336,6 +372,12 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
     let region = state.pictures.region(index);
     overlay::draw(&painter, session, view, index, region, &to_screen);
     state.draw_regions(&painter, session, index, view, &to_screen, &tokens);
+    if session.view.show_outlines {
+        outlines(&painter, state, content, (index, view, orientation), &to_screen);
+    }
+    if let Some(joint) = shared.pointed.joint {
+        footprint(ui, &painter, session, joint, (index, view, orientation), &to_screen);
+    }
     overlay::title(&painter, plot, view, content, state.pictures.reference(), session);
     if row.axes {
         let first = column == MapColumn::Ori || state.solo.is_some();
@@ -350,7 +392,7 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
         }
         let joint = overlay::joint_near(session, view, orientation, &to_screen, pointer);
         shared.points.joint = joint.or(shared.points.joint);
-        if response.clicked() {
+        if response.clicked() && !drawing {
             super::joint::select(shared, joint);
         }
     }
@@ -361,6 +403,57 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
     drag::ring(&painter, shared, (view, orientation), &to_screen);
     if let Some((_, pixel)) = state.hovered.filter(|(hovered, _)| *hovered == index) {
         overlay::crosshair(&painter, &to_screen, view, orientation, pixel);
+    }
+}
+
+/// The outlines of a map's own mask at τ, and thinner at its neighbours; on the masks both.
+fn outlines(
+    painter: &egui::Painter,
+    state: &State,
+    content: Content,
+    (index, view, o): (usize, &View, Orientation),
+    to_screen: &dyn Fn([f64; 2]) -> egui::Pos2,
+) {
+    let Some(lines) = state.pictures.outlines(index) else { return };
+    let (ori, sim) = (content != Content::Sim, content != Content::Ori);
+    for (map, (wanted, color)) in lines.iter().zip([(ori, theme::MASK_ORI), (sim, theme::MASK_SIM)]) {
+        for (k, pieces) in map.iter().enumerate().filter(|_| wanted) {
+            let (width, strength) = if k == 1 { (1.6, 1.0) } else { (0.8, 0.75) };
+            let stroke = egui::Stroke::new(width, color.gamma_multiply(strength));
+            for piece in pieces {
+                painter.line_segment(piece.map(|at| to_screen(o.to_shown(view, at))), stroke);
+            }
+        }
+    }
+}
+
+/// Levels of a joint's footprint below its own largest cell, dB, and how its lines are drawn.
+const FOOTPRINT: [(f64, f32); 2] = [(-3.0, 2.0), (-10.0, 1.0)];
+
+/// Where the joint that is pointed at lights the map: lines 3 and 10 dB below its own largest cell.
+fn footprint(
+    ui: &Ui,
+    painter: &egui::Painter,
+    session: &Session,
+    joint: usize,
+    (index, view, o): (usize, &View, Orientation),
+    to_screen: &dyn Fn([f64; 2]) -> egui::Pos2,
+) {
+    let Some(lit) = lit::lit(ui.ctx(), session).filter(|lit| joint < lit.returns.joints()) else { return };
+    let Some(map) = lit.map(ui.ctx(), index, crate::mhp::KeptJoints::Only(joint)) else { return };
+    let picture = o.picture(view, &map);
+    let most = picture.iter().copied().fold(0.0, f64::max);
+    // What is nothing but H_sim's floor has no footprint.
+    if most <= 1e-29 {
+        return;
+    }
+    for (db, width) in FOOTPRINT {
+        let level = most * 10f64.powf(db / 20.0);
+        for piece in lit::contour(o.size(view), &picture, level) {
+            let ends = piece.map(|at| to_screen(o.to_shown(view, at)));
+            painter.line_segment(ends, egui::Stroke::new(width + 1.5, egui::Color32::from_black_alpha(110)));
+            painter.line_segment(ends, egui::Stroke::new(width, theme::DARK.selected));
+        }
     }
 }
 
@@ -412,7 +505,7 @@ fn beside(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, row: &GridRow
             unit: state.pictures.unit(content),
             row: (content != Content::Difference).then(|| BarRow {
                 array: &view.array,
-                name: name_of(content, state, view).0,
+                name: name_of(shared.session, content, state, view).0,
                 by_hand: set.is_some(),
                 locked: set.is_some_and(|set| set.locked),
             }),

@@ -10,28 +10,36 @@
 
 mod agreement;
 mod ambiguity;
+mod breakpoints;
 mod calibration;
+mod cell;
 mod chain;
+mod closure;
 mod compare;
 mod curves;
 #[cfg(test)]
 mod dummy;
 mod explore;
+mod extras;
 mod fit;
 pub(super) mod frames;
 mod image;
 mod joint;
+mod known;
 mod landscape;
+mod lit;
 mod log;
 pub(super) mod maps;
 pub(super) mod modes;
 mod pane;
 mod restarts;
+mod ribbon;
 pub(super) mod scene;
 mod signal;
 mod statistics;
 pub(super) mod study;
 mod tuning;
+mod what_if;
 
 pub use pane::Pane;
 pub(super) use pane::{Blank, Dock, PaneState, PaneStates};
@@ -48,15 +56,20 @@ static PANES: &[&Pane] = &[
     &chain::PANE,
     &calibration::PANE,
     &signal::PANE,
+    &what_if::PANE,
     &study::PANE,
     &statistics::PANE,
     &agreement::PANE,
     &curves::PANE,
+    &cell::PANE,
+    &known::PANE,
+    &closure::PANE,
     &compare::PANE,
     &tuning::PANE,
     &landscape::PANE,
     &ambiguity::PANE,
     &restarts::PANE,
+    &breakpoints::PANE,
     &log::PANE,
     &fit::PANE,
     &joint::PANE,

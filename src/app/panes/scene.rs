@@ -7,9 +7,10 @@ mod build;
 mod gizmo;
 mod hand;
 
-use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
+use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared, lit};
 use crate::app::commands::{CTRL, CommandRow, Menu, NONE, UiAction, always, has_frame};
 use crate::app::figure;
+use crate::app::map_image::Orientation;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Mark, Named as _, grounded};
 use crate::render::{Camera, Scene, SceneRenderer, Undrawable, Vec2, Vec3, pick, shapes};
@@ -227,7 +228,10 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         steer(ui, &response, rect, viewport, scale, &mut camera);
     }
     let sight = Sight { camera, ..sight };
-    let (mut scene, labels) = build::scene(shared.session, &camera, &tokens, scale);
+    let (mut scene, mut labels) = build::scene(shared.session, &camera, &tokens, scale);
+    for extras in super::extras::published(ui.ctx()) {
+        build::extras(&mut scene, &mut labels, &extras, (&camera, shared.session), scale);
+    }
     build::cell(&mut scene, shared, &tokens, scale);
     build::explored(&mut scene, shared, &tokens, scale);
     let gizmo = Gizmo::of(shared.session, &sight);
@@ -253,6 +257,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         }
     }
     captions(&painter, rect, shared.session, &tokens, state);
+    glow(ui, &painter, shared, &sight, &tokens);
     ring(&painter, shared, &sight, &tokens);
     if let Some(text) = readout {
         let font = theme::mono(theme::CAPTION);
@@ -323,6 +328,23 @@ fn pointed_cell(shared: &Shared<'_>) -> Option<String> {
     let (view, [column, row]) = shared.pointed.cell?;
     let array = &shared.session.data.dataset.as_ref()?.info().views.get(view)?.array;
     Some(format!("places of the cell of {array} at column {column}, row {row}"))
+}
+
+/// The joints that light the cell that is pointed at glow, as strongly as they do.
+fn glow(ui: &Ui, painter: &egui::Painter, shared: &Shared<'_>, sight: &Sight, tokens: &Tokens) {
+    let session = shared.session;
+    let (Some((index, pixel)), Some(dataset)) = (shared.pointed.cell, &session.data.dataset) else { return };
+    let (Some(lit), Some(view)) = (lit::lit(ui.ctx(), session), dataset.info().views.get(index)) else { return };
+    let map = session.fit.shown.as_ref().and_then(|shown| shown.h_sim.get(index)).map(Vec::as_slice);
+    let Some(cell) = lit::cell_at(view, Orientation::of(view, session.view.cube), pixel, map) else { return };
+    for of in lit.returns.at(index, cell).iter().filter(|of| of.amplitude_share > 0.02) {
+        let Some(p) = session.shown_positions().get(of.joint) else { continue };
+        let Some(at) = sight.on_screen(Vec3::from(p.map(|x| x as f32))) else { continue };
+        let share = of.amplitude_share.sqrt() as f32;
+        for (size, strength) in [(1.0, 0.18), (0.7, 0.22), (0.4, 0.35)] {
+            painter.circle_filled(at, size * (6.0 + 22.0 * share), tokens.warn.gamma_multiply(strength * share));
+        }
+    }
 }
 
 /// A ring around the joint that is pointed at, here or on a map.

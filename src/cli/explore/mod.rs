@@ -1,9 +1,15 @@
-//! `explore`: what else a fit could have done, headless and with the numbers of the window.
+//! `explore`: what else a fit could have done and what it rests on, headless and with the numbers of the window.
 
 mod ambiguity;
+mod cell;
+mod closure;
+mod frame;
+mod known;
 mod landscape;
+mod radar;
 mod restarts;
 mod target;
+mod tau;
 mod tuning;
 
 pub(super) use restarts::starts;
@@ -24,7 +30,17 @@ Examples:
   mhp-inspector explore ambiguity samples/f1 --frame 5 --preset baseline
       Where else in the room would this body explain the echo?
   mhp-inspector explore restarts samples/walk --frame 3 --preset baseline
-      200 fits from other starts: is the frame ambiguous, or was the start unlucky?";
+      200 fits from other starts: is the frame ambiguous, or was the start unlucky?
+  mhp-inspector explore cell data/walk --frame 3 --view hm_hori --at 3.1,0.4
+      Which joints light the cell at 3.1 m depth, 0.4 m to the left, and how much each joint is worth to the IoU.
+  mhp-inspector explore known data/walk --frames 0..8
+      What the echo fixes of each pose and what only the prior does: a condition number a frame, the least observable directions.
+  mhp-inspector explore tau data/walk --frame 3 --csv tau.csv
+      The IoU at every tau from 0.5 to 60 %, without a refit.
+  mhp-inspector explore closure data/walk --frame 3
+      The fitted pose through an independent FMCW synthesis, fitted again: could it have been recovered?
+  mhp-inspector explore radar data/walk --frame 3 --elements 86 --bandwidth 4e9 --save cascade
+      What another radar would know of the same pose; kept as a preset that manifests can name.";
 
 /// The explorations.
 #[derive(Debug, Subcommand)]
@@ -41,6 +57,16 @@ pub enum ExploreCommand {
     /// Fits from many starts, and the basins that they end in.
     #[command(after_help = restarts::HELP)]
     Restarts(restarts::RestartArgs),
+    /// Who lit a cell: the joints that send something back there, with their shares and phases; and what each joint is worth.
+    Cell(cell::CellArgs),
+    /// What the radar knows: what the echo fixes of a pose, and what only the prior does.
+    Known(known::KnownArgs),
+    /// The agreement of the masks at every tau.
+    Tau(tau::TauArgs),
+    /// The closure test: a pose before an independent radar, started and fitted as a new frame.
+    Closure(closure::ClosureArgs),
+    /// What another radar would see and know of the same pose.
+    Radar(radar::RadarArgs),
 }
 
 /// Runs `explore`.
@@ -53,5 +79,10 @@ pub(super) fn run(command: &ExploreCommand) -> anyhow::Result<ExitCode> {
         ExploreCommand::Landscape(args) => landscape::run(args),
         ExploreCommand::Ambiguity(args) => ambiguity::run(args),
         ExploreCommand::Restarts(args) => restarts::run(args),
+        ExploreCommand::Cell(args) => cell::run(args),
+        ExploreCommand::Known(args) => known::run(args),
+        ExploreCommand::Tau(args) => tau::run(args),
+        ExploreCommand::Closure(args) => closure::run(args),
+        ExploreCommand::Radar(args) => radar::run(args),
     }
 }

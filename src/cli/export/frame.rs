@@ -81,6 +81,7 @@ impl Job<'_> {
             params_folder: None,
             ply: false,
             curves_folder: None,
+            ..BatchOptions::default()
         };
         fit_frame(self.dataset, index, &options, None).map(|fit| fit.params)
     }

@@ -13,7 +13,7 @@ use std::process::ExitCode;
 /// Shown under the options of `labels export --help`.
 pub(super) const HELP: &str = "\
 Columns: frame index annotator time F1 F2 F3 F4 clean unsure verdict person region note judged_fit judged_config \
-judged_iteration machine_F1 machine_F2 machine_F3 machine_F4 machine_shown act dataset program. Tags are 1 or 0, what is \
+judged_iteration judged_erased machine_F1 machine_F2 machine_F3 machine_F4 machine_shown act dataset program. Tags are 1 or 0, what is \
 unknown is empty; region is view[first..=last, first..=last]. A row is what one annotator says of one frame now, by index, \
 name and annotator; labels that were taken back have none. Text is quoted as RFC 4180 asks; text that a spreadsheet would \
 compute has an apostrophe before it (--csv-plain leaves it out), which `labels import` and `labels agreement` take away \

@@ -36,6 +36,16 @@ pub(super) struct EmTarget {
     pub cell_box: CellBox,
     /// What is measured there, where levels are compared; `None` where masks are.
     pub levels: Option<Levels>,
+    /// Where cells are erased, what is left of them.
+    pub left: Option<Left>,
+}
+
+/// What is left of a region where cells are erased.
+pub(super) struct Left {
+    /// Whether each cell of the region is, C order.
+    pub cells: Vec<bool>,
+    /// Places of those that are, in the order of the sum.
+    pub places: Vec<usize>,
 }
 
 impl Workspace {
@@ -57,7 +67,7 @@ impl Workspace {
         moments.reset(splats.joints(), &model.view.axes);
         match precision {
             Precision::F64 => plain::<f64>(model, splats, target, factor, moments),
-            Precision::F32 if tiles::holds(model.config.softness) => {
+            Precision::F32 if tiles::holds(model.config.softness) && target.left.is_none() => {
                 let FitConfig { summation, tau_pct, softness, .. } = *model.config;
                 let query = EmQuery {
                     splats,
@@ -106,25 +116,53 @@ impl Workspace {
 fn plain<T: Real>(
     model: &ViewModel<'_>,
     splats: &Splats,
-    EmTarget { cell_box, levels, .. }: &EmTarget,
+    EmTarget { cell_box, levels, left, .. }: &EmTarget,
     scale: Option<f64>,
     moments: &mut Moments,
 ) -> ViewLoss {
     let mut kernel = Kernel::<T>::new(splats, &cell_box.bins, model.config.summation);
     let mut ln_s = vec![f64::NEG_INFINITY; cell_box.marked.len()];
     kernel.forward(&mut ln_s);
-    let mask = SoftMask::new(&ln_s, &cell_box.marked, model.config.tau_pct, model.config.softness);
+    let marked;
+    let (ln_s, marked) = match left {
+        None => (ln_s, cell_box.marked.as_slice()),
+        Some(left) => {
+            marked = left.of(&cell_box.marked);
+            (left.of(&ln_s), marked.as_slice())
+        }
+    };
+    let mask = SoftMask::new(&ln_s, marked, model.config.tau_pct, model.config.softness);
     let (loss, weight) = match levels {
-        None => (mask.loss(), scale.map(|scale| mask.weight(&ln_s, &cell_box.marked, scale))),
+        None => (mask.loss(), scale.map(|scale| mask.weight(&ln_s, marked, scale))),
         Some(levels) => {
             let power: Vec<f64> = ln_s.iter().map(|&x| floored(x).powi(2)).collect();
             levels.compare(&power, scale)
         }
     };
     if let Some(weight) = weight {
+        let weight = match left {
+            None => weight,
+            Some(left) => left.back(&weight, cell_box.marked.len()),
+        };
         kernel.backward(&weight, moments);
     }
     ViewLoss { loss, iou: mask.iou }
+}
+
+impl Left {
+    /// The values of what is left, of those of all cells in the order of the sum.
+    fn of<T: Copy>(&self, all: &[T]) -> Vec<T> {
+        self.places.iter().filter_map(|&place| all.get(place).copied()).collect()
+    }
+
+    /// The values of all cells, 0 where they are erased.
+    fn back(&self, values: &[f64], cells: usize) -> Vec<f64> {
+        let mut all = vec![0.0; cells];
+        for (&place, &value) in self.places.iter().zip(values) {
+            all[place] = value;
+        }
+        all
+    }
 }
 
 /// The soft mask of H_sim and what it has in common with the hard mask of H_ori.

@@ -123,11 +123,24 @@ impl Fitter {
     /// # Errors
     /// As [`Self::step`].
     pub fn run_to(&mut self, last: usize, mut watch: impl FnMut(StepReport, &Pppr)) -> Result<StopReason, FitError> {
-        watch(self.report(), self.params());
+        self.run_until(last, |fitter| {
+            watch(fitter.report(), fitter.params());
+            false
+        })
+    }
+
+    /// As [`Self::run_to`], and not beyond an iteration at which `stops` says so; it is asked at the first one too, where nothing
+    /// stops.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn run_until(&mut self, last: usize, mut stops: impl FnMut(&Self) -> bool) -> Result<StopReason, FitError> {
+        stops(self);
         while self.iteration() < last {
-            let report = self.step()?;
-            let converged = report.converged;
-            watch(report, self.params());
+            let converged = self.step()?.converged;
+            if stops(self) {
+                return Ok(StopReason::Breakpoint);
+            }
             if converged && self.config().stop_when_converged {
                 return Ok(StopReason::Converged);
             }

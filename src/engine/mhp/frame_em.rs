@@ -1,7 +1,7 @@
 //! L_EM of one frame: what its views measure, the body as they see it, and the way back; SPEC sections 3, 4 and 8.
 
 use super::cell_box::CellBox;
-use super::em::{EmTarget, Workspace};
+use super::em::{EmTarget, Left, Workspace};
 use super::gaussian::{WorldGaussianBars, WorldGaussians};
 use super::levels::{Levels, NOISE_PCT};
 use super::percentile::percentile;
@@ -29,8 +29,8 @@ pub(super) struct FrameEm {
     skin: Option<Skin>,
 }
 
-/// The maps of a frame with what is the same in all views: one map a view, C order, missing cells filled; a background power a
-/// cell, where one is known.
+/// The maps of a frame with what is the same in all views: one map a view, C order, missing cells filled and erased ones NaN; a
+/// background power a cell, where one is known.
 pub(super) struct Measured<'a> {
     pub views: &'a [View],
     pub skeleton: &'a Skeleton,
@@ -51,8 +51,11 @@ impl Measured<'_> {
         let power: Vec<f64> = self.maps[view].iter().map(|&h| self.views[view].quantity.power(h)).collect();
         let mut inside = vec![false; power.len()];
         region.indices(&self.views[view].shape()).into_iter().for_each(|cell| inside[cell] = true);
+        // Cells that were erased say nothing of what lies beside.
+        inside.iter_mut().zip(self.maps[view]).for_each(|(inside, h)| *inside |= h.is_nan());
         let mut clutter = grid.beside(&power, &inside);
-        let speckle = MEDIAN_OF_NOISE * percentile(&power, NOISE_PCT);
+        let there: Vec<f64> = power.iter().zip(self.maps[view]).filter(|(_, h)| !h.is_nan()).map(|(p, _)| *p).collect();
+        let speckle = MEDIAN_OF_NOISE * percentile(&there, NOISE_PCT);
         for beside in &mut clutter {
             *beside = (*beside - speckle).max(0.0);
         }
@@ -87,18 +90,31 @@ impl FrameEm {
             let indices = region.indices(&view.shape());
             let inside = |map: &[f64]| -> Vec<f64> { indices.iter().map(|&i| map[i]).collect() };
             let cells = inside(map);
-            let threshold = percentile(&cells, 100.0 - config.tau_pct);
+            let there: Vec<bool> = cells.iter().map(|h| !h.is_nan()).collect();
+            let erased = there.contains(&false);
+            let threshold = if erased {
+                let rest: Vec<f64> = cells.iter().copied().filter(|h| !h.is_nan()).collect();
+                percentile(&rest, 100.0 - config.tau_pct)
+            } else {
+                percentile(&cells, 100.0 - config.tau_pct)
+            };
             let ori: Vec<bool> = cells.iter().map(|&h| h > threshold).collect();
             let cell_box = CellBox::new(view, &region.bins, &ori, precision);
+            let left = erased.then(|| {
+                let marks: Vec<f64> = there.iter().map(|&there| f64::from(u8::from(there))).collect();
+                let marks = cell_box.in_order_of_sum(&marks);
+                Left { places: (0..marks.len()).filter(|&k| marks[k] > 0.0).collect(), cells: there }
+            });
             let levels = (config.objective != EmLoss::Iou).then(|| {
                 let background = measured.clutter(k, region).map(|power| inside(&power));
                 // Powers that add, without a spectrum along an axis.
                 let spectral = view.axes.iter().any(|axis| axis.kind == AxisKind::Doppler);
-                let in_rows = precision == Precision::F32 && config.summation == Summation::Incoherent && !spectral;
+                let in_rows =
+                    precision == Precision::F32 && config.summation == Summation::Incoherent && !spectral && !erased;
                 let measured = (cells.as_slice(), map);
                 Levels::new(config.objective, view.quantity, &cell_box, measured, background.as_deref(), in_rows)
             });
-            EmTarget { ori, cell_box, levels }
+            EmTarget { ori, cell_box, levels, left }
         };
         Self {
             targets: regions.iter().enumerate().map(of_view).collect(),
@@ -112,6 +128,11 @@ impl FrameEm {
     /// B_ori over a view's region, in C order.
     pub(super) fn ori(&self, view: usize) -> &[bool] {
         &self.targets[view].ori
+    }
+
+    /// Whether each cell of a view's region takes part, in C order; `None` where all do.
+    pub(super) fn left(&self, view: usize) -> Option<&[bool]> {
+        self.targets[view].left.as_ref().map(|left| left.cells.as_slice())
     }
 
     /// L_EM at `params`; adds its gradient to `gradient`, and tells the IoU of each view where asked.

@@ -88,7 +88,8 @@ impl LevelTotals {
 
 impl Levels {
     /// Of the cells of `cell_box`, whose measured numbers in C order of the view's own axes are `cells`; `map` is the whole map
-    /// and `background` a power to be added to the noise of each cell, of the same unit as the map's power, if there is one.
+    /// and `background` a power to be added to the noise of each cell, of the same unit as the map's power, if there is one. Cells
+    /// that are NaN are erased: the others alone are compared, and what is handed to [`Self::compare`] is theirs.
     pub(super) fn new(
         kind: EmLoss,
         quantity: Quantity,
@@ -100,13 +101,17 @@ impl Levels {
         let power = |x: f64| quantity.power(x);
         let largest = cells.iter().copied().fold(0.0, f64::max);
         let unit = if largest > 0.0 { power(largest) } else { 1.0 };
-        let everywhere: Vec<f64> = map.iter().map(|&x| power(x) / unit).collect();
+        let everywhere: Vec<f64> = map.iter().filter(|x| !x.is_nan()).map(|&x| power(x) / unit).collect();
         let noise = percentile(&everywhere, NOISE_PCT).max(LEAST_POWER);
-        let intensity: Vec<f64> = cell_box.in_order_of_sum(cells).iter().map(|&x| power(x) / unit).collect();
+        let ordered = cell_box.in_order_of_sum(cells);
+        let left = |(x, _): &(&f64, f64)| !x.is_nan();
         let noises: Vec<f64> = match background {
-            None => vec![noise; intensity.len()],
+            None => vec![noise; ordered.len()],
             Some(of) => cell_box.in_order_of_sum(of).iter().map(|&b| noise + b.max(0.0) / unit).collect(),
         };
+        let of_all = ordered.len();
+        let (intensity, noises): (Vec<f64>, Vec<f64>) =
+            ordered.iter().zip(noises).filter(left).map(|(&x, n)| (power(x) / unit, n)).unzip();
         let count = intensity.len().max(1) as f64;
         let (total, above) =
             intensity.iter().zip(&noises).fold((0.0, 0.0), |(total, above), (&i, &n)| (total + i, above + (i - n)));
@@ -146,7 +151,9 @@ impl Levels {
         };
         let values: [&[f64]; 3] = [&measured, &by_noise, &base];
         let rows = in_rows.then(|| LevelRows::new(&cell_box.bins, &cell_box.marked, values)).flatten();
-        let tiles = if rows.is_some() { LevelTiles::default() } else { LevelTiles::new(&cell_box.grid, values) };
+        // Tiles hold whole boxes.
+        let none = rows.is_some() || intensity.len() < of_all;
+        let tiles = if none { LevelTiles::default() } else { LevelTiles::new(&cell_box.grid, values) };
         Self { kind, measured, by_noise, base, totals, tiles, rows }
     }
 

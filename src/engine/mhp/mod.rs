@@ -12,7 +12,7 @@
 //! 2. a joint in a view: `triad.rs`, `gaussian.rs`, `splat.rs`, `adjoint.rs`; the skin between the joints, `skin.rs`
 //! 3. cells: `kernel.rs`, `tiles/mod.rs`, `cell_box.rs`; masks and levels over them, `levels.rs`, `em.rs`
 //! 4. what the maps of a frame and those around it show: `region.rs`, `template.rs`, `context/mod.rs`
-//! 5. a frame: `frame_em.rs`, `problem.rs`, `simulate.rs`, `signal.rs`
+//! 5. a frame: `frame_em.rs`, `problem.rs`, `erased.rs`, `simulate.rs`, `returns.rs`, `signal.rs`
 //! 6. the objective: `objective.rs`; a window of frames: `motion/mod.rs`
 //! 7. the fit: `convergence.rs`, `articulation.rs`, `adam.rs`, `fitter.rs`; and the start of one: `init/mod.rs`
 //!
@@ -31,6 +31,7 @@ mod cell_box;
 mod context;
 mod convergence;
 mod em;
+mod erased;
 mod fill;
 mod fitter;
 mod floors;
@@ -46,6 +47,7 @@ mod objective;
 mod percentile;
 mod problem;
 mod region;
+mod returns;
 mod scalar;
 mod signal;
 mod simulate;
@@ -61,6 +63,7 @@ pub use adam::Adam;
 pub use articulation::Limb;
 pub use context::{Neighbour, Peak};
 pub use convergence::{SETTLED_OVER, has_settled};
+pub use erased::{ErasedCells, connected_echo, erased_marks, leaves_any, without};
 pub use fill::fill_missing;
 pub use fill::for_neighbours;
 pub use fitter::{FitState, Fitter};
@@ -73,6 +76,7 @@ pub use objective::{Masks, Objective, masks};
 pub use percentile::{percentile, percentiles};
 pub use problem::Problem;
 pub use region::Region;
+pub use returns::{JointReturn, JointReturns, KeptJoints};
 pub use signal::{CellValue, simulate_signal};
 pub use simulate::simulate;
 pub use terms::{Hue, Scope, TERMS, Term, TermGroup, TermId, Terms, Weight, formula};

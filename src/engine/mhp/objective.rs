@@ -188,12 +188,16 @@ pub fn masks(objective: &Objective, view: usize, sim_map: &[f64]) -> Masks {
     };
     let cells = shape.iter().product();
     let indices = region.indices(&shape);
-    let simulated: Vec<f64> = indices.iter().filter_map(|&i| sim_map.get(i).copied()).collect();
+    let left = objective.em.left(view);
+    let is_left = |k: usize| left.is_none_or(|left| left.get(k) == Some(&true));
+    let indices_left = || indices.iter().enumerate().filter(|(k, _)| is_left(*k));
+    let simulated: Vec<f64> = indices_left().filter_map(|(_, &i)| sim_map.get(i).copied()).collect();
     let threshold = percentile(&simulated, 100.0 - objective.config.tau_pct);
     let mut masks = Masks { ori: vec![false; cells], sim: vec![false; cells], inside: vec![false; cells] };
-    for (&cell, &ori) in indices.iter().zip(objective.em.ori(view)) {
+    let ori = objective.em.ori(view);
+    for (k, &cell) in indices_left() {
         masks.inside[cell] = true;
-        masks.ori[cell] = ori;
+        masks.ori[cell] = ori.get(k) == Some(&true);
         masks.sim[cell] = sim_map.get(cell).is_some_and(|&h| h > threshold);
     }
     masks

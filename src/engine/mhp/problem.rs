@@ -7,6 +7,7 @@ use crate::body::{Pppr, Skeleton};
 use crate::config::{Clutter, EmLoss, FitConfig, FramesAround};
 use crate::geometry::Vec3;
 use crate::radar::{RadarConfig, View, ViewSet};
+use std::sync::Arc;
 
 /// Everything a fit needs besides its configuration and its start. Maps are cast to f64 and their missing cells filled
 /// (SPEC section 4).
@@ -24,6 +25,8 @@ pub struct Problem {
     filled: Vec<usize>,
     neighbours: Vec<Neighbour>,
     contexts: Contexts,
+    /// Where cells were erased, which are NaN in the maps here: the same problem with what borders on them in their place.
+    patched: Option<Arc<Self>>,
 }
 
 impl Problem {
@@ -47,7 +50,7 @@ impl Problem {
         views.iter().try_for_each(check_view)?;
         let (maps, filled) = fill(&views, maps)?;
         let (static_removed, neighbours, contexts) = (false, Vec::new(), Contexts::default());
-        Ok(Self { radar, skeleton, views, static_removed, maps, filled, neighbours, contexts })
+        Ok(Self { radar, skeleton, views, static_removed, maps, filled, neighbours, contexts, patched: None })
     }
 
     /// Adds the maps of a frame shortly before or after: (seconds after this frame, one map a view). The start reads
@@ -66,10 +69,52 @@ impl Problem {
         Ok(())
     }
 
+    /// The problem as if these cells had not been measured, neither in its frame nor in those around it: they take no part in L_EM,
+    /// and no percentile or level of H_ori is theirs. `erased` has a mark a cell of each view, C order. What looks for places in the
+    /// maps, as anchors do, finds what borders on the cells in their place.
+    ///
+    /// # Errors
+    /// Where `erased` has other sizes than the maps, or nothing of a map is left.
+    pub fn without(&self, erased: &[Vec<bool>]) -> Result<Self, FitError> {
+        let holed = |maps: &dyn Fn(usize) -> Vec<f64>| -> Result<Vec<Vec<f64>>, FitError> {
+            let of_view = |(k, view): (usize, &View)| {
+                let (mut map, array) = (maps(k), view.array.clone());
+                let marks = erased.get(k).map_or(&[][..], Vec::as_slice);
+                if marks.len() != map.len() {
+                    return Err(FitError::WrongShape { array, got: marks.len(), expected: map.len() });
+                }
+                map.iter_mut().zip(marks).filter(|(_, erased)| **erased).for_each(|(x, _)| *x = f64::NAN);
+                if map.iter().all(|x| x.is_nan()) { Err(FitError::NoFiniteCell { array }) } else { Ok(map) }
+            };
+            self.views.iter().enumerate().map(of_view).collect()
+        };
+        if erased.iter().flatten().all(|erased| !erased) {
+            return Ok(self.clone());
+        }
+        let maps = holed(&|k| self.maps[k].clone())?;
+        let slices = |maps: &[Vec<f64>]| -> Result<(Vec<Vec<f64>>, Vec<usize>), FitError> {
+            fill(&self.views, &maps.iter().map(Vec::as_slice).collect::<Vec<_>>())
+        };
+        let mut patched = Self { maps: slices(&maps)?.0, contexts: Contexts::default(), patched: None, ..self.clone() };
+        patched.neighbours.clear();
+        let mut left = Self { maps, contexts: Contexts::default(), patched: None, ..self.clone() };
+        left.neighbours.clear();
+        for neighbour in &self.neighbours {
+            let maps = holed(&|k| neighbour.map(k).to_vec())?;
+            patched.neighbours.push(Neighbour::new(neighbour.offset_s, slices(&maps)?.0));
+            left.neighbours.push(Neighbour::new(neighbour.offset_s, maps));
+        }
+        left.patched = Some(Arc::new(patched));
+        Ok(left)
+    }
+
     /// What the maps show to who reads them like this, worked out when first asked for; views must not be changed
     /// afterwards.
     pub(super) fn context(&self, reading: impl Into<Reading>) -> &TemporalContext {
         let reading = reading.into();
+        if let Some(patched) = &self.patched {
+            return patched.context(reading);
+        }
         self.contexts.of(&self.views, &self.maps, self.neighbours_in(reading.frames), reading)
     }
 
@@ -96,7 +141,7 @@ impl Problem {
         &self.neighbours
     }
 
-    /// H_ori of a view, missing cells filled, C order; empty where there is no such view.
+    /// H_ori of a view, missing cells filled, erased ones NaN, C order; empty where there is no such view.
     pub fn map(&self, view: usize) -> &[f64] {
         self.maps.get(view).map_or(&[], Vec::as_slice)
     }

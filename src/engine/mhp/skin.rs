@@ -240,6 +240,11 @@ impl Skin {
         })
     }
 
+    /// The skeleton's joints that each point of a person belongs to, with its shares.
+    pub(super) fn owners(&self) -> impl Iterator<Item = &[(usize, f64)]> {
+        self.body.iter().map(|point| point.joints.as_slice())
+    }
+
     /// Fills in the points of all persons of `params`.
     pub(super) fn fill(&mut self, params: &Pppr) {
         let shape = params.shape();

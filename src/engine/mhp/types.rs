@@ -89,6 +89,8 @@ pub enum StopReason {
     Converged,
     /// Somebody stopped it.
     Stopped,
+    /// A breakpoint held.
+    Breakpoint,
 }
 
 impl StopReason {
@@ -98,6 +100,7 @@ impl StopReason {
             Self::Iterations => "all iterations done",
             Self::Converged => "converged",
             Self::Stopped => "stopped",
+            Self::Breakpoint => "stopped at a breakpoint",
         }
     }
 
@@ -107,6 +110,7 @@ impl StopReason {
             Self::Iterations => "iterations",
             Self::Converged => "converged",
             Self::Stopped => "stopped",
+            Self::Breakpoint => "breakpoint",
         }
     }
 }

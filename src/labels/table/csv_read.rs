@@ -146,9 +146,17 @@ impl Cells<'_> {
             fit: hash("judged_fit")?,
             config: hash("judged_config")?,
             iteration: self.optional("judged_iteration", "a whole number")?,
+            erased: self.erased()?,
             machine,
             machine_shown: self.yes("machine_shown")?,
         })
+    }
+
+    fn erased(&self) -> Result<Vec<CellRegion>, TableError> {
+        let text = self.text("judged_erased")?;
+        let wrong =
+            |_| self.wrong("judged_erased", "is no JSON list of regions; expected [{\"view\", \"lo\", \"hi\"}]".into());
+        if text.trim().is_empty() { Ok(Vec::new()) } else { serde_json::from_str(text).map_err(wrong) }
     }
 
     /// What the cell says, without the sign that keeps spreadsheets from computing it; empty where the table lacks the

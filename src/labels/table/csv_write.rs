@@ -2,7 +2,7 @@
 
 use super::{COLUMNS, machine_column};
 use crate::escape::to_cell;
-use crate::labels::{Record, Tag};
+use crate::labels::{Judged, Record, Tag};
 use std::borrow::Cow;
 use std::io::Write;
 
@@ -35,6 +35,7 @@ fn cell<'r>(record: &'r Record, column: &str) -> Cow<'r, str> {
         "judged_fit" => to_cell(judged.fit.as_deref().unwrap_or_default()),
         "judged_config" => to_cell(judged.config.as_deref().unwrap_or_default()),
         "judged_iteration" => optional(judged.iteration).into(),
+        "judged_erased" => to_cell(&erased(judged)).into_owned().into(),
         "machine_shown" => yes(judged.machine_shown),
         "act" => to_cell(&record.act),
         "dataset" => to_cell(&record.dataset),
@@ -46,6 +47,12 @@ fn cell<'r>(record: &'r Record, column: &str) -> Cow<'r, str> {
 fn machine(record: &Record, column: &str) -> String {
     let mode = Tag::MODES.into_iter().find(|&mode| machine_column(mode) == column);
     optional(mode.and_then(|mode| record.judged.machine.get(&mode)))
+}
+
+/// The regions that the fit did not see, as JSON; empty where there is none.
+fn erased(judged: &Judged) -> String {
+    let known = (!judged.erased.is_empty()).then(|| serde_json::to_string(&judged.erased).ok()).flatten();
+    known.unwrap_or_default()
 }
 
 /// Empty where unknown.

@@ -8,7 +8,7 @@ use crate::session::command::Export;
 use crate::session::effect::{BackgroundTask, Effect};
 use crate::session::file::SessionFile;
 use crate::session::state::{LogLevel, Session};
-use crate::study::{CurveRow, complexity, write_curves, write_ply};
+use crate::study::{CurveRow, complexity, write_curves, write_erased, write_ply};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -21,6 +21,7 @@ impl Session {
             Export::LabelsCsv => self.labels_task(path, false),
             Export::LabelsJson => self.labels_task(path, true),
             Export::Strata => self.strata_task(path),
+            Export::Erased => self.erased_task(path),
         };
         if task.is_none() {
             self.note(LogLevel::Error, format!("{}: there is nothing to export yet", what.title()));
@@ -44,7 +45,13 @@ impl Session {
                     branch: branch.id,
                     report: &row.report,
                     majpe_mm: row.majpe_mm,
-                    flag: branch.flags.iter().find(|f| f.iteration == row.report.iteration).map(|f| f.text.as_str()),
+                    flag: branch
+                        .flags
+                        .iter()
+                        .map(|flag| (flag.iteration, &flag.text))
+                        .chain(branch.stops.iter().map(|(at, text)| (*at, text)))
+                        .find(|(at, _)| *at == row.report.iteration)
+                        .map(|(_, text)| text.as_str()),
                 })
             });
             write_curves(&path, &arrays, rows).map_err(|error| error.to_string())?;
@@ -92,6 +99,18 @@ impl Session {
                 .map_err(|reason| format!("{}: cannot be written: {reason}", path.display()))?;
             Ok(format!("{count} labels written to {}", path.display()))
         }))
+    }
+
+    fn erased_task(&self, path: PathBuf) -> Option<BackgroundTask> {
+        let (dataset, erased) = (Arc::clone(self.data.dataset.as_ref()?), self.fit.erased());
+        let check = self.output_check();
+        (!erased.is_empty()).then(|| {
+            BackgroundTask::new(move || {
+                check.file(&path)?;
+                write_erased(&path, &dataset.info().views, &erased).map_err(|error| error.to_string())?;
+                Ok(written(&path))
+            })
+        })
     }
 
     fn strata_task(&self, path: PathBuf) -> Option<BackgroundTask> {

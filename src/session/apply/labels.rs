@@ -1,6 +1,7 @@
 //! Acts of labelling: what a key or a field asks for becomes a commit; what the journal acknowledges becomes visible.
 
 use crate::labels::{CellRegion, Change, Judged, LabelPlace, Record, Tag, Verdict};
+use crate::mhp::ErasedCells;
 use crate::session::acts::{ActKind, Asked};
 use crate::session::effect::{Commit, Effect, Trash};
 use crate::session::labels::{LabelMode, LabelStatus, LabelTable};
@@ -134,7 +135,14 @@ impl Session {
         let machine: BTreeMap<Tag, f64> =
             machine.filter_map(|evidence| Some((evidence.mode, evidence.score?))).collect();
         let machine_shown = !machine.is_empty() && !self.evidence_hidden_of(frame);
-        Judged { machine, machine_shown, ..fit(shown) }
+        let views = self.data.dataset.as_ref().map(|dataset| &dataset.info().views[..]).unwrap_or_default();
+        let region = |cells: &ErasedCells| {
+            let ends = |end: fn(&[usize; 2]) -> usize| cells.bins.iter().map(end).collect();
+            let view = views.get(cells.view)?.array.clone();
+            Some(CellRegion { view, lo: ends(|b| b[0]), hi: ends(|b| b[1].saturating_sub(1)) })
+        };
+        let erased = self.fit.erased().iter().filter_map(region).collect();
+        Judged { machine, erased, machine_shown, ..fit(shown) }
     }
 
     /// True while the evidence of the frame on screen is hidden: in blind mode, until the annotator has tagged it. A verdict

@@ -7,7 +7,6 @@
 //! ```
 
 use crate::config::{FitConfig, ReadBy, difference};
-use crate::labels::CellRegion;
 use crate::mhp::FitState;
 use crate::session::acts::ActKind;
 use crate::session::effect::Effect;
@@ -15,7 +14,7 @@ use crate::session::fit::FitStatus;
 use crate::session::history::Branch;
 use crate::session::settings::{Drag, Live, LiveFrom, SettingsAct};
 use crate::session::state::{LogLevel, Session};
-use crate::worker::{ErasedCells, WorkerCommand, leaves_any};
+use crate::worker::WorkerCommand;
 use std::sync::Arc;
 
 impl Session {
@@ -75,36 +74,6 @@ impl Session {
         }
         // How long a run takes is no reason for another fit.
         if self.is_live() && !self.steers_only(&before) { self.refit() } else { self.configure(&before) }
-    }
-
-    /// Cells under the eraser: the fit is done anew without them, where that is live, else when the finger is lifted.
-    pub(super) fn drag_erase(&mut self, region: &CellRegion) -> Vec<Effect> {
-        let views = self.data.dataset.as_ref().map(|dataset| &dataset.info().views[..]).unwrap_or_default();
-        let Some(view) = views.iter().position(|view| view.array == region.view) else { return Vec::new() };
-        let bins: Vec<[usize; 2]> = region.lo.iter().zip(&region.hi).map(|(&lo, &hi)| [lo, hi + 1]).collect();
-        if bins.len() != views[view].axes.len() {
-            return Vec::new();
-        }
-        if !self.fit.is_ready() {
-            self.hint("there is no fit that could do without these cells".into());
-            return Vec::new();
-        }
-        let cells = ErasedCells { view, bins };
-        let all: Vec<ErasedCells> = self.fit.erased().iter().cloned().chain([cells.clone()]).collect();
-        if !leaves_any((view, &views[view]), &all) {
-            let text = format!("nothing of {} would be left: erase less of it", region.view);
-            if self.notice.as_ref().is_none_or(|notice| notice.text != text) {
-                self.hint(text);
-            }
-            return Vec::new();
-        }
-        let (before, from) = (self.config, self.fit.history.active_id());
-        let drag = self.drag.get_or_insert(Drag { before, from, live: None, erasing: None, adopted: None });
-        if drag.erasing.as_ref().is_some_and(|(known, _)| *known == cells) {
-            return Vec::new();
-        }
-        drag.erasing = Some((cells, format!("erased {region}")));
-        if self.is_live() { self.refit() } else { Vec::new() }
     }
 
     /// The finger is lifted: what it did is one act.
@@ -193,7 +162,7 @@ impl Session {
     }
 
     /// Fits anew with the settings under the finger, on the branch that is its own.
-    fn refit(&mut self) -> Vec<Effect> {
+    pub(super) fn refit(&mut self) -> Vec<Effect> {
         let Some(drag) = self.drag.clone() else { return Vec::new() };
         if drag.adopted.is_some() {
             return Vec::new();

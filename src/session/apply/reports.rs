@@ -95,6 +95,10 @@ impl Session {
                 self.fit.restart = Some((branch, config));
                 Vec::new()
             }
+            WorkerEvent::Broke { branch, iteration, breakpoint } => {
+                self.broke(branch, iteration, breakpoint);
+                Vec::new()
+            }
             WorkerEvent::Finished { run, branch, iteration, reason, run_ms } => {
                 if run == self.fit.run.0 && branch == self.fit.history.active_id() {
                     self.fit.status = FitStatus::Paused;
@@ -103,7 +107,9 @@ impl Session {
                     self.change_summary(|summary| summary.reason = Some(reason.text().to_owned()));
                     // A single step is seen on the screen; the log is for runs.
                     // What a finger asks for is told when it is lifted.
-                    if iteration > self.fit.run.1 + 1 && run != self.fit.refit_run {
+                    // What a breakpoint stops was told by it.
+                    let told = reason == StopReason::Breakpoint;
+                    if iteration > self.fit.run.1 + 1 && run != self.fit.refit_run && !told {
                         let why = match reason {
                             StopReason::Converged => "the convergence criterion holds",
                             other => other.text(),

@@ -70,6 +70,7 @@ impl Session {
             None => {}
         }
         let mut effects = vec![Effect::RestoreWindow(file.window)];
+        effects.extend(self.restore_breakpoints(file.breakpoints));
         for (k, saved) in file.pins.into_iter().enumerate() {
             let (Some(at), Some(config)) = (find(dataset, &saved.frame), config(&saved.config, &path)) else {
                 self.note(
@@ -127,8 +128,13 @@ fn resumed(saved: SavedFit, frame: usize, path: &Path) -> Option<Fit> {
         return None;
     }
     let changes = saved.changes.iter().filter_map(|change| Some((change.after, config(&change.config, path)?)));
-    let history =
-        History::restored(&config(&saved.config, path)?, saved.rows, saved.states, changes.collect(), saved.erased);
+    let history = History::restored(
+        &config(&saved.config, path)?,
+        saved.rows,
+        saved.states,
+        changes.collect(),
+        (saved.erased, saved.stops),
+    );
     Some(Fit {
         frame,
         status: FitStatus::Paused,

@@ -4,6 +4,7 @@
 //! A bare word is looked for in the frame's name. What a frame has no value for satisfies no comparison.
 
 use super::row::{FrameNumber, FrameRow, Reads};
+use crate::condition::{Comparison, comparison, split};
 use crate::labels::{Tag, Verdict};
 use crate::mhp::TERMS;
 use crate::study::complexity::Stratum;
@@ -30,15 +31,6 @@ enum Test {
     Tags { any_of: Vec<Tag>, any: bool, none: bool },
     /// A number compared with a limit.
     Compare(FrameNumber, Comparison, f64),
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Comparison {
-    Less,
-    LessOrEqual,
-    Equal,
-    GreaterOrEqual,
-    Greater,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -157,18 +149,6 @@ impl Word {
     }
 }
 
-impl Comparison {
-    fn holds(self, value: f64, limit: f64) -> bool {
-        match self {
-            Self::Less => value < limit,
-            Self::LessOrEqual => value <= limit,
-            Self::Equal => value == limit,
-            Self::GreaterOrEqual => value >= limit,
-            Self::Greater => value > limit,
-        }
-    }
-}
-
 /// True where `text` contains `part`, which is in lower case, whatever the case of `text`.
 fn contains(text: &str, part: &str) -> bool {
     if part.is_ascii() {
@@ -176,29 +156,6 @@ fn contains(text: &str, part: &str) -> bool {
         return part.is_empty() || text.windows(part.len()).any(|window| window.eq_ignore_ascii_case(part));
     }
     text.to_lowercase().contains(part)
-}
-
-/// Splits at spaces outside quotes.
-fn split(text: &str) -> Result<Vec<String>, String> {
-    let (mut parts, mut part, mut quoted) = (Vec::new(), String::new(), false);
-    for c in text.chars() {
-        match c {
-            '"' => quoted = !quoted,
-            c if c.is_whitespace() && !quoted => {
-                if !part.is_empty() {
-                    parts.push(std::mem::take(&mut part));
-                }
-            }
-            c => part.push(c),
-        }
-    }
-    if quoted {
-        return Err("a quote is not closed".into());
-    }
-    if !part.is_empty() {
-        parts.push(part);
-    }
-    Ok(parts)
 }
 
 fn term(part: &str) -> Result<Term, String> {
@@ -210,8 +167,16 @@ fn term(part: &str) -> Result<Term, String> {
 }
 
 fn test(text: &str) -> Result<Test, String> {
-    if let Some(at) = text.find(['<', '>', '=']).filter(|&at| at > 0 && !text[..at].contains(':')) {
-        return compare(&text[..at], &text[at..]);
+    if let Some(parts) = comparison(text) {
+        // Which number is meant is told before what is wrong with its limit.
+        let (key, comparison, limit) = match parts {
+            Ok(parts) => parts,
+            Err(why) => {
+                number(text.split(['<', '>', '=']).next().unwrap_or_default())?;
+                return Err(why);
+            }
+        };
+        return Ok(Test::Compare(number(key)?, comparison, limit));
     }
     let Some((key, value)) = text.split_once(':') else { return Ok(Test::Name(text.to_lowercase())) };
     let key = key.to_lowercase();
@@ -260,25 +225,11 @@ fn tags(values: &[String]) -> Result<Test, String> {
     Ok(Test::Tags { any_of, any, none })
 }
 
-fn compare(key: &str, rest: &str) -> Result<Test, String> {
-    let number = FrameNumber::of(&key.to_lowercase()).ok_or_else(|| {
+fn number(key: &str) -> Result<FrameNumber, String> {
+    FrameNumber::of(&key.to_lowercase()).ok_or_else(|| {
         let names: Vec<&str> = FrameNumber::all().map(FrameNumber::key).collect();
         format!("`{key}` is no number of a frame; expected {}", names.join(", "))
-    })?;
-    let (comparison, digits) = [
-        ("<=", Comparison::LessOrEqual),
-        (">=", Comparison::GreaterOrEqual),
-        ("==", Comparison::Equal),
-        ("<", Comparison::Less),
-        (">", Comparison::Greater),
-        ("=", Comparison::Equal),
-    ]
-    .into_iter()
-    .find_map(|(sign, comparison)| rest.strip_prefix(sign).map(|digits| (comparison, digits)))
-    .unwrap_or((Comparison::Equal, rest));
-    let limit: f64 =
-        digits.parse().map_err(|_| format!("`{key}{rest}`: `{digits}` is not a number; expected for example 0.5"))?;
-    Ok(Test::Compare(number, comparison, limit))
+    })
 }
 
 #[cfg(test)]

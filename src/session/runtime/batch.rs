@@ -106,6 +106,7 @@ fn work(request: &BatchRequest, waiting: &Waiting, progress: &Progress, wake: &W
         params_folder: None,
         ply: false,
         curves_folder: None,
+        ..BatchOptions::default()
     };
     let fitted = run_batch(dataset, &todo, &options, |row| {
         progress.wait_while_paused();

@@ -50,6 +50,7 @@ pub(super) fn measure(tree: &Path, warm: bool) {
     window.bulk();
     window.panes();
     window.fit();
+    window.explorations();
     window.explore();
     window.batch(warm);
     window.results(tree);
@@ -292,6 +293,35 @@ impl Window {
         meter.pass_with(&mut self.0, |harness| harness.drag_at(tab));
         meter.pass_with(&mut self.0, |harness| harness.drop_at(tab));
         (0..60).for_each(|_| meter.pass(&mut self.0));
+        meter.print();
+    }
+
+    /// What a fit rests on, while it is asked for and while a run goes on.
+    fn explorations(&mut self) {
+        self.apply(Command::AddBreakpoint("iou<-1".into()));
+        for pane in ["Who lit it", "Radar knows", "Closure test", "Radar what-if", "Breakpoints"] {
+            self.show(pane);
+            if pane == "Closure test" {
+                let button = self.rect("Test this pose").center();
+                let mut meter = Meter::new("the closure test is run");
+                meter.pass_with(&mut self.0, |harness| harness.hover_at(button));
+                meter.pass_with(&mut self.0, |harness| harness.drag_at(button));
+                meter.pass_with(&mut self.0, |harness| harness.drop_at(button));
+                (0..200).for_each(|_| meter.pass(&mut self.0));
+                meter.print();
+            }
+            let (mut meter, head) = (Meter::new(&format!("a run beside {pane}")), self.0.state().session().fit.head());
+            meter.pass_with(&mut self.0, |harness| harness.state_mut().apply(Command::StepFit(200)));
+            self.passes_until(&mut meter, |s| s.fit.head() >= head + 200 && !s.fit.is_running());
+            meter.print();
+        }
+        self.show("Maps");
+        let map = self.rect("H_sim map of hm_hori");
+        let mut meter = Meter::new("hovering cells with what lights them");
+        for k in 0..120 {
+            let at = map.min + map.size() * vec2((k % 12) as f32 / 12.0, (k / 12) as f32 / 10.0);
+            meter.pass_with(&mut self.0, |harness| harness.hover_at(at));
+        }
         meter.print();
     }
 

@@ -36,6 +36,13 @@ pub(super) fn title(
             let pin = session.pins.baseline();
             pin.map_or_else(String::new, |pin| format!("H_sim of {} ({})", pin.name, pin.frame_name))
         }
+        Content::Isolated => {
+            let skeleton = session.fit.problem.as_ref().map(|problem| &problem.skeleton);
+            let joint = session.joint.zip(skeleton).map_or_else(String::new, |(joint, skeleton)| {
+                skeleton.shown_name(joint % skeleton.joints.len().max(1))
+            });
+            format!("H_sim {} {joint}", super::isolated_word(session).unwrap_or("of"))
+        }
         _ => content.name().to_owned(),
     };
     let room = (plot.width() - 8.0).max(20.0);

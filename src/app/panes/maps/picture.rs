@@ -2,11 +2,14 @@
 
 use super::overlay::region_box;
 use crate::app::map_image::{Histogram, Orientation, Shown, colorize, floor, limits, shown};
+use crate::app::panes::lit::contour;
+use crate::app::panes::ribbon::NEIGHBOURS;
 use crate::app::theme;
 use crate::dataset::Frame;
+use crate::mhp::percentile;
 use crate::radar::View;
 use crate::render::Colormap;
-use crate::session::{Against, ColorRange, CubeView, MapLimits, MapScale, Session, ViewState};
+use crate::session::{Against, ColorRange, CubeView, MapLimits, MapScale, Session};
 use crate::worker::Snapshot;
 use egui::{Color32, ColorImage, Painter, Rect, TextureHandle, TextureOptions, Ui, vec2};
 use std::cell::RefCell;
@@ -20,6 +23,8 @@ pub(super) enum Content {
     Sim,
     /// H_sim of the baseline.
     Base,
+    /// H_sim without the selected joint, or of it alone.
+    Isolated,
     Difference,
     Masks,
 }
@@ -30,11 +35,15 @@ impl Content {
             Self::Ori => "H_ori",
             Self::Sim => "H_sim",
             Self::Base => "H_sim of the baseline",
+            Self::Isolated => "H_sim, isolated",
             Self::Difference => "Difference",
             Self::Masks => "Masks",
         }
     }
 }
+
+/// A map in H_sim's place, how it lies, how it is scaled, and as it is shown.
+type Isolated = (Arc<Vec<f64>>, Orientation, (MapScale, ColorRange), Shown);
 
 /// The maps of one view as shown.
 #[derive(Default)]
@@ -47,6 +56,10 @@ struct ViewPictures {
     sim_stored: Vec<f64>,
     sim: Option<Shown>,
     base: Option<Shown>,
+    /// What H_sim is made of instead of all joints, and how it is shown.
+    isolated: Option<Isolated>,
+    /// Outlines of the masks around τ, where they are asked for.
+    outlines: Option<Outlines>,
     masks: Option<[Vec<bool>; 3]>,
     /// Corners of the EM region, in the grid of cells.
     region: Option<[[f32; 2]; 2]>,
@@ -57,6 +70,9 @@ struct ViewPictures {
     sim_limits: (f64, f64),
     difference_limit: f64,
 }
+
+/// Lines of H_ori's mask and of H_sim's, each at τ's lower neighbour, τ, and its upper one.
+pub(super) type Outlines = [[Vec<[[f64; 2]; 2]>; 3]; 2];
 
 /// Every view's pictures and the textures made of them.
 #[derive(Default)]
@@ -82,10 +98,17 @@ struct Look {
     mask_opacity: f32,
     against: Against,
     cube: CubeView,
+    /// τ, where the masks are outlined, as its bits.
+    outlined: Option<Tau>,
 }
 
+/// A τ that is compared with itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Tau(f64);
+
 impl Look {
-    fn of(view: &ViewState) -> Self {
+    fn of(session: &Session) -> Self {
+        let view = &session.view;
         let colormap = Colormap::ALL.into_iter().find(|m| m.name().eq_ignore_ascii_case(&view.colormap));
         Self {
             scale: view.scale,
@@ -97,6 +120,7 @@ impl Look {
             mask_opacity: view.mask_opacity,
             against: view.against,
             cube: view.cube,
+            outlined: view.show_outlines.then_some(Tau(session.config.tau_pct)),
         }
     }
 }
@@ -112,7 +136,7 @@ fn same<T>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
 impl Pictures {
     /// Brings everything up to date with the session; does nothing where nothing changed.
     pub(super) fn update(&mut self, session: &Session, views: &[View], frame: &Arc<Frame>) {
-        let look = Look::of(&session.view);
+        let look = Look::of(session);
         let new_frame = !same(self.frame.as_ref(), Some(frame));
         let new_snapshot = !same(self.snapshot.as_ref(), session.fit.shown.as_ref());
         let new_look = self.look.as_ref() != Some(&look);
@@ -149,6 +173,14 @@ impl Pictures {
                 pictures.take_snapshot(session.fit.shown.as_deref(), i, view, &look);
             }
         }
+        let outlined = look.outlined.filter(|_| all || new_snapshot);
+        for pictures in &mut self.views {
+            match (look.outlined, outlined) {
+                (None, _) => pictures.outlines = None,
+                (_, Some(tau)) => pictures.outlines = pictures.outlined(tau.0),
+                _ => {}
+            }
+        }
         for ((_, content), (_, fresh)) in self.textures.get_mut() {
             *fresh &= !all && *content == Content::Ori;
         }
@@ -156,6 +188,41 @@ impl Pictures {
         self.snapshot.clone_from(&session.fit.shown);
         self.baseline = baseline;
         self.look = Some(look);
+    }
+
+    /// The outlines of the masks of a view around τ.
+    pub(super) fn outlines(&self, view: usize) -> Option<&Outlines> {
+        self.views.get(view)?.outlines.as_ref()
+    }
+
+    /// Takes in a map that is shown in H_sim's place, or none.
+    pub(super) fn isolate(
+        &mut self,
+        view: usize,
+        (of, o): (&View, Orientation),
+        map: Option<Arc<Vec<f64>>>,
+        look: (MapScale, ColorRange),
+    ) {
+        let Some(pictures) = self.views.get_mut(view) else { return };
+        let known = pictures.isolated.as_ref();
+        let same = match (known, &map) {
+            (Some((known, orientation, how, _)), Some(map)) => {
+                Arc::ptr_eq(known, map) && *orientation == o && *how == look
+            }
+            (None, Some(_)) => false,
+            // Until the next one is there the last one stays.
+            (_, None) => true,
+        };
+        if same {
+            return;
+        }
+        pictures.isolated = map.map(|map| {
+            let shown = shown(&o.picture(of, &map), look.0, look.1, of.quantity.db_factor());
+            (map, o, look, shown)
+        });
+        if let Some((_, fresh)) = self.textures.get_mut().get_mut(&(view, Content::Isolated)) {
+            *fresh = false;
+        }
     }
 
     /// Draws the part `uv` of a map into `rect`.
@@ -192,6 +259,7 @@ impl Pictures {
                 paint(&pictures.difference(self.reference())?, (-limit, limit), Colormap::Diverging)
             }
             Content::Base => paint(&pictures.base.as_ref()?.values, pictures.sim_limits, look.colormap),
+            Content::Isolated => paint(&pictures.isolated.as_ref()?.3.values, pictures.sim_limits, look.colormap),
             Content::Masks => pictures.mask_image(look.mask_opacity)?,
         })
     }
@@ -212,7 +280,7 @@ impl Pictures {
     pub(super) fn limits(&self, view: usize, content: Content) -> (f64, f64) {
         let Some(pictures) = self.views.get(view) else { return (0.0, 1.0) };
         match content {
-            Content::Sim | Content::Base => pictures.sim_limits,
+            Content::Sim | Content::Base | Content::Isolated => pictures.sim_limits,
             Content::Difference => (-pictures.difference_limit, pictures.difference_limit),
             _ => pictures.ori_limits,
         }
@@ -243,6 +311,10 @@ impl Pictures {
             Content::Ori | Content::Masks => pictures.ori_histogram.clone(),
             Content::Sim => Histogram::of(&of(&pictures.sim), limits),
             Content::Base => Histogram::of(&of(&pictures.base), limits),
+            Content::Isolated => {
+                let values = pictures.isolated.as_ref().map_or_else(Vec::new, |(.., shown)| shown.values.clone());
+                Histogram::of(&values, limits)
+            }
             Content::Difference => {
                 let mut values = pictures.difference(self.reference()).unwrap_or_default();
                 for value in &mut values {
@@ -318,6 +390,21 @@ impl ViewPictures {
             .get(index)
             .map(|masks| [&masks.ori, &masks.sim, &masks.inside].map(|mask| orientation.mask_picture(view, mask)));
         self.region = self.masks.as_ref().and_then(|[.., inside]| region_box(orientation.size(view), inside));
+    }
+
+    /// Outlines of both masks at τ and its neighbours, inside the EM region.
+    fn outlined(&self, tau: f64) -> Option<Outlines> {
+        let inside = &self.masks.as_ref()?[2];
+        let of = |map: &[f64]| {
+            let within: Vec<f64> = map.iter().zip(inside).filter(|(_, i)| **i).map(|(x, _)| *x).collect();
+            let shown: Vec<f64> = map.iter().zip(inside).map(|(x, i)| if *i { *x } else { 0.0 }).collect();
+            NEIGHBOURS.map(|by| {
+                let level = percentile(&within, 100.0 - (by * tau).clamp(0.1, 100.0));
+                // A mask of zeros has no outline.
+                if level > 0.0 { contour(self.size, &shown, level) } else { Vec::new() }
+            })
+        };
+        Some([of(&self.ori_stored), of(&self.sim_stored)])
     }
 
     /// H_sim less what it is compared with, both clipped to the lower limit, so that what is nothing does not hide the rest.

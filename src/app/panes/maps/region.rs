@@ -24,9 +24,34 @@ pub(super) struct Highlight {
 pub(super) enum BoxOf {
     /// The cells that a label is about.
     Label,
-    /// Cells that the fit is not to see.
+    /// Cells that the fit is not to see: a box of them,
     Eraser,
+    /// those under a brush,
+    Brush,
+    /// the whole connected echo that is clicked.
+    Echo,
 }
+
+impl BoxOf {
+    /// The ways to erase, and their names.
+    pub(super) const ERASERS: [(Self, &'static str, &'static str); 3] = [
+        (Self::Eraser, "Box", "Drag a box over the cells."),
+        (Self::Brush, "Brush", "Paint over the cells; the next stroke joins the ones before, until Esc."),
+        (
+            Self::Echo,
+            "Echo",
+            "Click an echo: all of it goes, as far as cells as strong as H_ori's mask reach from there. Until Esc.",
+        ),
+    ];
+
+    /// Whether it takes cells away from the fit.
+    pub(super) fn erases(self) -> bool {
+        self != Self::Label
+    }
+}
+
+/// Half the width of the brush, cells of the picture.
+const BRUSH: i64 = 2;
 
 /// Whether the mouse draws a box of cells.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -37,6 +62,8 @@ pub(super) struct Marking {
     from: Option<(DragStart, BoxOf)>,
     /// Where the pointer is.
     to: [f64; 2],
+    /// What was painted in this stroke: flat indices.
+    painted: std::collections::BTreeSet<usize>,
 }
 
 /// What a drag on a map comes to.
@@ -47,6 +74,10 @@ pub(super) enum Drawn {
     Begun,
     /// What the fit is not to see, so far.
     Erased(CellRegion),
+    /// The same, single cells.
+    Painted(Vec<usize>),
+    /// A cell whose echo it is not to see.
+    Echo(usize),
     /// What a label is about.
     Marked(CellRegion),
 }
@@ -105,12 +136,16 @@ impl State {
         tokens: &Tokens,
     ) {
         let o = Orientation::of(view, session.view.cube);
-        if let Some((begun, _)) = self.marking.from.filter(|(begun, _)| begun.view == index) {
+        let is_box = |(begun, what): &(DragStart, BoxOf)| begun.view == index && *what != BoxOf::Brush;
+        if let Some((begun, _)) = self.marking.from.filter(is_box) {
             let corners = [begun.at, self.marking.to].map(|at| o.to_grid(view, at).map(|x| x.clamp(0.0, 1.0)));
             let line = overlay::outline(view, o, overlay::grid_box(corners[0], corners[1]), to_screen);
             painter.line(line, Stroke::new(1.5, tokens.accent));
         }
         for cells in session.fit.erased().iter().filter(|cells| cells.view == index) {
+            if !cells.cells.is_empty() {
+                shade(painter, (view, o), &cells.cells, to_screen);
+            }
             let [lo, hi] = [|b: &[usize; 2]| b[0], |b: &[usize; 2]| b[1].saturating_sub(1)]
                 .map(|end: fn(&[usize; 2]) -> usize| cells.bins.iter().map(end).collect::<Vec<_>>());
             outline(painter, (view, o), &lo, &hi, to_screen, "erased", tokens);
@@ -137,11 +172,20 @@ impl State {
         let window = self.windows.get(index).copied().unwrap_or_default();
         let pointer = response.interact_pointer_pos();
         let what = self.marking.armed.or_else(|| ui.input(|i| i.modifiers.command).then_some(BoxOf::Label));
+        if what == Some(BoxOf::Echo) {
+            let at = response.clicked().then(|| response.interact_pointer_pos()).flatten();
+            let cell = at.and_then(|at| cell_at(view, o, unit_at(plot, window, at)));
+            if response.hovered() {
+                ui.ctx().set_cursor_icon(egui::CursorIcon::Crosshair);
+            }
+            return cell.map_or(Drawn::Begun, Drawn::Echo);
+        }
         if response.drag_started()
             && let (Some(what), Some(origin)) = (what, ui.input(|i| i.pointer.press_origin()))
         {
             let begun = DragStart { column: response.id, view: index, at: unit_at(plot, window, origin) };
             self.marking.from = Some((begun, what));
+            self.marking.painted.clear();
         }
         if self.marking.armed.is_some() && response.hovered() {
             ui.ctx().set_cursor_icon(egui::CursorIcon::Crosshair);
@@ -152,8 +196,21 @@ impl State {
             return Drawn::Nothing;
         };
         let to = pointer.map_or(from, |pointer| unit_at(plot, window, pointer));
-        self.marking.to = to;
+        let before = std::mem::replace(&mut self.marking.to, to);
         let dragged = response.dragged();
+        if what == BoxOf::Brush {
+            let fresh = if self.marking.painted.is_empty() { from } else { before };
+            let was = self.marking.painted.len();
+            paint(&mut self.marking.painted, (view, o), fresh, to);
+            if !dragged {
+                // The brush stays in the hand.
+                let armed = self.marking.armed;
+                self.marking = Marking { armed, ..Marking::default() };
+                return Drawn::Begun;
+            }
+            let more = self.marking.painted.len() > was;
+            return if more { Drawn::Painted(self.marking.painted.iter().copied().collect()) } else { Drawn::Begun };
+        }
         if !dragged {
             self.marking = Marking::default();
         }
@@ -163,6 +220,77 @@ impl State {
             (BoxOf::Label, Some(cells)) if !dragged => Drawn::Marked(cells),
             _ => Drawn::Begun,
         }
+    }
+}
+
+/// The cell of the map at a point of the picture, where the picture has one cell a pixel: of a cube the shown bin, or its middle.
+fn cell_at(view: &View, o: Orientation, at: [f64; 2]) -> Option<usize> {
+    let region = region(view, o, at, at)?;
+    let shape = view.shape();
+    let index = |k: usize| if region.lo[k] == region.hi[k] { region.lo[k] } else { third_bin(o, shape[k]) };
+    Some((0..shape.len()).fold(0, |flat, k| flat * shape[k] + index(k)))
+}
+
+fn third_bin(o: Orientation, bins: usize) -> usize {
+    match o.third {
+        crate::session::ThirdAxis::Bin(bin) => bin.min(bins.saturating_sub(1)),
+        _ => bins / 2,
+    }
+}
+
+/// Adds the cells under the brush on its way between two points of the picture: of a cube all bins of the axis that is not drawn.
+fn paint(
+    painted: &mut std::collections::BTreeSet<usize>,
+    (view, o): (&View, Orientation),
+    from: [f64; 2],
+    to: [f64; 2],
+) {
+    let ends = [from, to].map(|at| o.bins_from_unit(view, at));
+    let way: f64 = (0..2).map(|k| (ends[1][k] - ends[0][k]).abs()).fold(0.0, f64::max);
+    let steps = way.ceil().max(1.0);
+    let shape = view.shape();
+    for step in 0..=steps as usize {
+        let t = step as f64 / steps;
+        let at: [i64; 2] = std::array::from_fn(|k| (ends[0][k] + t * (ends[1][k] - ends[0][k])).round() as i64);
+        for (i, j) in (-BRUSH..=BRUSH).flat_map(|i| (-BRUSH..=BRUSH).map(move |j| (i, j))) {
+            if i * i + j * j > BRUSH * BRUSH + 1 {
+                continue;
+            }
+            let mut cells = vec![0];
+            for (axis, &bins) in shape.iter().enumerate() {
+                let place = [(o.horizontal, at[0] + i), (o.vertical, at[1] + j)].into_iter().find(|(k, _)| *k == axis);
+                cells = match place {
+                    Some((_, bin)) if (0..bins as i64).contains(&bin) => {
+                        cells.iter().map(|flat| flat * bins + bin as usize).collect()
+                    }
+                    Some(_) => Vec::new(),
+                    None => cells.iter().flat_map(|flat| (0..bins).map(move |bin| flat * bins + bin)).collect(),
+                };
+            }
+            painted.extend(cells);
+        }
+    }
+}
+
+/// Darkens single cells, row by row of the picture.
+fn shade(painter: &Painter, (view, o): (&View, Orientation), cells: &[usize], to_screen: &dyn Fn([f64; 2]) -> Pos2) {
+    let shape = view.shape();
+    let mut places: Vec<(usize, usize)> = cells
+        .iter()
+        .map(|&cell| {
+            let bins = crate::radar::unravel(cell, &shape);
+            (bins[o.vertical], bins[o.horizontal])
+        })
+        .collect();
+    places.sort_unstable();
+    places.dedup();
+    for run in places.chunk_by(|a, b| a.0 == b.0 && a.1 + 1 == b.1) {
+        let (Some(first), Some(last)) = (run.first(), run.last()) else { continue };
+        let corner = |row: f64, column: f64| o.grid_from_bins(view, [column, row]);
+        let row = first.0 as f64;
+        let cells = overlay::grid_box(corner(row - 0.5, first.1 as f64 - 0.5), corner(row + 0.5, last.1 as f64 + 0.5));
+        let line = overlay::outline(view, o, cells, to_screen);
+        painter.add(egui::Shape::convex_polygon(line, egui::Color32::from_black_alpha(150), Stroke::NONE));
     }
 }
 

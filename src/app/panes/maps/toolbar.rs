@@ -1,6 +1,7 @@
 //! The line above the maps: scale and colours, comparison, what is seen, the legend of the masks.
 
 use super::super::PaneState as _;
+use super::region::BoxOf;
 use super::{Shared, State};
 use crate::app::commands::{AppAct, UserCommand, command};
 use crate::app::map_image::Orientation;
@@ -12,7 +13,7 @@ use crate::session::{Against, ColorRange, Compare, CubeAxes, CubeView, MapScale,
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Color32, RichText, Sense, Ui, vec2};
 
-pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
+pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     egui::Frame::new().inner_margin(egui::Margin::symmetric(8, 2)).show(ui, |ui| {
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing = vec2(3.0, 2.0);
@@ -23,6 +24,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
             ui.separator();
             focus(ui, shared, state);
             eraser(ui, shared, state);
+            erased(ui, shared);
             cube(ui, shared);
             planes(ui, shared);
             // The legend goes where there is no room for it: its colours are told on the masks' read-out too.
@@ -42,12 +44,56 @@ fn focus(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
 }
 
 /// The eraser: what would the fit do without that echo?
-fn eraser(ui: &mut Ui, shared: &mut Shared<'_>, state: &State) {
-    let armed = state.marking.armed == Some(super::region::BoxOf::Eraser);
+fn eraser(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
+    let armed = state.marking.armed.is_some_and(BoxOf::erases);
     let tip = command("Erase cells").map(UserCommand::tip).unwrap_or_default();
     if ui.selectable_label(armed, "Erase").named(egui::Role::Button, "Erase cells").on_hover_text(tip).clicked() {
-        shared.invoke("Erase cells");
+        // Whatever way of erasing is in the hand is put down.
+        if armed {
+            state.marking.armed = None;
+        } else {
+            shared.invoke("Erase cells");
+        }
     }
+    if armed {
+        for (what, name, tip) in BoxOf::ERASERS {
+            let chosen = state.marking.armed == Some(what);
+            let button = ui
+                .selectable_label(chosen, name)
+                .named(egui::Role::Button, &format!("Erase by {}", name.to_lowercase()));
+            if button.on_hover_text(tip).clicked() {
+                state.marking.armed = Some(what);
+            }
+        }
+    }
+}
+
+/// What the erased cells change: how far the pose moved, and the numbers with and without them.
+fn erased(ui: &mut Ui, shared: &Shared<'_>) {
+    let Some(effect) = shared.session.erased_effect() else { return };
+    let number = |x: Option<f64>, digits: usize| x.map_or_else(|| "—".to_owned(), |x| format!("{x:.digits$}"));
+    let mut parts = vec![
+        format!("L_EM {:.4} → {:.4}", effect.em[0], effect.em[1]),
+        format!("IoU {} → {}", number(effect.iou[0], 3), number(effect.iou[1], 3)),
+    ];
+    if effect.majpe_mm.iter().any(Option::is_some) {
+        parts.push(format!("MAJPE {} → {} mm", number(effect.majpe_mm[0], 0), number(effect.majpe_mm[1], 0)));
+    }
+    let text = format!("moved {:.0} mm", effect.moved_mm[0]);
+    let tip = format!(
+        "Without {} cells: the joints moved {:.0} mm in the mean, {:.0} mm at most.\nWith → without: {}.",
+        effect.cells,
+        effect.moved_mm[0],
+        effect.moved_mm[1],
+        parts.join(", ")
+    );
+    let label = ui.label(RichText::new(text).small().color(Tokens::of(ui).warn));
+    label.widget_info(|| {
+        let mut info = egui::WidgetInfo::labeled(egui::Role::Group, true, "Without the erased cells");
+        info.current_text_value = Some(tip.clone());
+        info
+    });
+    label.on_hover_text(tip);
 }
 
 /// Which axes of maps with three are drawn, and how the third is taken; nothing where no map has three.

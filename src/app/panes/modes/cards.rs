@@ -4,7 +4,8 @@ use crate::app::panes::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::diagnose::{Evidence, Finding, FindingPlace};
-use crate::session::FitStatus;
+use crate::labels::{CellRegion, Tag};
+use crate::session::{Command, FitStatus};
 use egui::{RichText, Role, Sense, Ui, vec2};
 
 pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, tokens: &Tokens) {
@@ -152,6 +153,20 @@ fn line(ui: &mut Ui, shared: &mut Shared<'_>, card: &Evidence, finding: &Finding
         let name = format!("{word} where {} is seen: {}", card.mode, finding.text);
         if link.named(Role::Link, &name).on_hover_text(tip).clicked() {
             shared.show_place(place.clone());
+        }
+        // What a reflector did to the fit is seen without it.
+        if let (Tag::F1, FindingPlace::Cells { view, lo, hi }) = (card.mode, place)
+            && shared.session.fit.is_ready()
+        {
+            let link = ui.link(RichText::new("erase").small());
+            let name = format!("erase where {} is seen: {}", card.mode, finding.text);
+            let tip = "Fit without these cells, on a branch of its own; Ctrl+Z takes it back.";
+            let array =
+                shared.session.data.dataset.as_ref().and_then(|d| Some(d.info().views.get(*view)?.array.clone()));
+            if let (true, Some(array)) = (link.named(Role::Link, &name).on_hover_text(tip).clicked(), array) {
+                shared.send(Command::DragErase(CellRegion { view: array, lo: lo.clone(), hi: hi.clone() }));
+                shared.send(Command::EndDrag);
+            }
         }
     });
 }

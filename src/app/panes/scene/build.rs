@@ -2,6 +2,7 @@
 
 use crate::app::locate::seen_by;
 use crate::app::map_image::Orientation;
+use crate::app::panes::extras::Extras;
 use crate::app::panes::{MovedBody, Shared};
 use crate::app::theme::Tokens;
 use crate::body::{Group, Pppr, Side, Skeleton};
@@ -118,6 +119,40 @@ pub(super) fn cell(scene: &mut Scene, shared: &Shared<'_>, tokens: &Tokens, px: 
     let curve = |stroke: Stroke| stroke.polyline(points.iter().copied().map(vec3));
     scene.overlay.extend(curve(stroke(tokens.canvas, 0.7, 4.0)));
     scene.overlay.extend(curve(stroke(tokens.accent, 0.95, 2.0)));
+}
+
+/// What other panes draw here while they are in front.
+pub(super) fn extras(
+    scene: &mut Scene,
+    labels: &mut Vec<Label>,
+    extras: &Extras,
+    (camera, session): (&Camera, &Session),
+    px: f32,
+) {
+    for (line, color, width) in &extras.lines {
+        let stroke = Stroke { color: rgba(*color, 1.0), width_px: width * px };
+        scene.lines.extend(stroke.polyline(line.iter().copied().map(vec3)));
+    }
+    for ([from, to], color) in &extras.arrows {
+        if geometry::norm(geometry::sub(*to, *from)) > 0.01 {
+            let stroke = Stroke { color: rgba(*color, 1.0), width_px: 2.0 * px };
+            scene.overlay.extend(shapes::arrow(vec3(*from), vec3(*to), camera.eye(), stroke));
+        }
+    }
+    if let Some(dataset) = &session.data.dataset {
+        for (joints, color, width) in &extras.skeletons {
+            let stroke = Stroke { color: rgba(*color, 1.0), width_px: width * px };
+            bones(&mut scene.lines, &dataset.info().skeleton, joints, &|_, _| stroke);
+        }
+    }
+    for (at, size, color) in &extras.points {
+        let stroke = Stroke { color: rgba(*color, 0.9), width_px: 1.2 * px };
+        for axis in 0..3 {
+            let end = |sign: f64| vec3(std::array::from_fn(|k| at[k] + if k == axis { sign * size } else { 0.0 }));
+            scene.lines.push(stroke.line(end(-0.5), end(0.5)));
+        }
+    }
+    labels.extend(extras.labels.iter().map(|(at, text, color)| (vec3(*at), text.clone(), *color)));
 }
 
 /// Who is in the scene, and in which colour: of one person the sides, of several each of them.

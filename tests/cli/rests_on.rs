@@ -1,0 +1,145 @@
+//! `explore`, `fit --break` and `fit --erase` as they are run: exit codes, and that their numbers are those of the library.
+#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+
+use crate::blob;
+use mhp_inspector::config::FitConfig;
+use mhp_inspector::dataset::Dataset;
+use mhp_inspector::explore::{Noise, observability, tau_ribbon};
+use mhp_inspector::mhp::{ErasedCells, JointReturns, Objective, Precision, masks, simulate};
+use mhp_inspector::start::problem_of;
+use mhp_inspector::study::{BatchOptions, FrameFit, fit_frame, read_erased, write_erased};
+use mhp_inspector::task::Progress;
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::sync::Arc;
+
+fn run(args: &[&str], path: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_mhp-inspector")).args(args).arg(path).output().unwrap()
+}
+
+fn json(args: &[&str], path: &Path) -> Value {
+    let output = run(args, path);
+    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The blob's first frame as `--preset baseline --iterations 20` fits it.
+fn fitted(folder: &Path) -> (Dataset, FitConfig, FrameFit) {
+    let dataset = Dataset::open(folder, &Progress::new()).unwrap();
+    let config = FitConfig { iterations: 20, ..FitConfig::default() };
+    let options = BatchOptions { config, ..BatchOptions::default() };
+    let fit = fit_frame(&dataset, 0, &options, None).unwrap();
+    (dataset, config, fit)
+}
+
+const STATE: [&str; 4] = ["--preset", "baseline", "--iterations", "20"];
+
+#[test]
+fn a_fit_stops_at_a_breakpoint_and_says_which() {
+    let folder = tempfile::tempdir().unwrap();
+    blob::write_dataset(folder.path(), 2);
+    let found = json(&["fit", "--break", "iteration>=5", "--break", "loss<0", "--json"], folder.path());
+    for row in found["frames"].as_array().unwrap() {
+        assert_eq!((&row["iterations"], &row["reason"]), (&Value::from(5), &Value::from("breakpoint: iteration>=5")));
+    }
+    for (condition, expected) in [
+        ("iou<x", "`x` is not a number"),
+        ("joint tail leaves region", "`tail` is no joint"),
+        ("iou_x<1", "no such map"),
+    ] {
+        let output = run(&["fit", "--break", condition], folder.path());
+        assert_eq!(output.status.code(), Some(2));
+        assert!(said(&output).contains(expected), "{condition}: {}", said(&output));
+    }
+}
+
+#[test]
+fn a_fit_does_without_erased_cells() {
+    let (folder, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    blob::write_dataset(folder.path(), 1);
+    let (dataset, config, _) = fitted(folder.path());
+    let file = elsewhere.path().join("erased.json");
+    let boxed = ErasedCells { view: 0, bins: vec![[10, 30], [8, 20]], cells: Vec::new() };
+    let single = ErasedCells::of_cells((1, &dataset.info().views[1]), [700, 701, 702]).unwrap();
+    write_erased(&file, &dataset.info().views, &[boxed.clone(), single.clone()]).unwrap();
+    assert_eq!(read_erased(&file, &dataset.info().views).unwrap(), [boxed, single]);
+    let erase = file.to_str().unwrap();
+    let found = json(&["fit", "--erase", erase, "--json", "--preset", "baseline", "--iterations", "20"], folder.path());
+    let erased = read_erased(&file, &dataset.info().views).unwrap();
+    let options = BatchOptions { config, erased, ..BatchOptions::default() };
+    let fit = fit_frame(&dataset, 0, &options, None).unwrap();
+    assert_eq!(found["frames"][0]["loss"].as_f64().unwrap(), fit.numbers.report.loss);
+    let seen = json(&["fit", "--json", "--preset", "baseline", "--iterations", "20"], folder.path());
+    assert_ne!(seen["frames"][0]["loss"], found["frames"][0]["loss"]);
+    for (text, expected) in [
+        ("{}", "missing field `format`"),
+        (r#"{"format":"mhp-erased","version":2,"regions":[]}"#, "expected \"mhp-erased\" and 1"),
+        (r#"{"format":"mhp-erased","version":1,"regions":[{"view":"x","bins":[]}]}"#, "`regions[0].view`"),
+        (
+            r#"{"format":"mhp-erased","version":1,"regions":[{"view":"hori","bins":[[0,99],[0,1]]}]}"#,
+            "`regions[0].bins`",
+        ),
+        (
+            r#"{"format":"mhp-erased","version":1,"regions":[{"view":"hori","bins":[[0,9],[0,1]],"cells":[9999]}]}"#,
+            "`regions[0].cells`",
+        ),
+    ] {
+        std::fs::write(&file, text).unwrap();
+        let output = run(&["fit", "--erase", erase], folder.path());
+        assert_eq!(output.status.code(), Some(2));
+        assert!(said(&output).contains(expected) && said(&output).contains("erased.json"), "{text}: {}", said(&output));
+    }
+}
+
+#[test]
+fn explorations_tell_the_librarys_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    blob::write_dataset(folder.path(), 3);
+    let (dataset, config, fit) = fitted(folder.path());
+    let frame = dataset.load(0).unwrap();
+    let problem = Arc::new(problem_of(&dataset, &frame).unwrap());
+
+    let told = json(&[&["explore", "cell", "--cell", "24,16", "--json"], &STATE[..]].concat(), folder.path());
+    let returns = JointReturns::new(&problem, &config, &fit.params);
+    let first = returns.at(0, 24 * 32 + 16).remove(0);
+    assert_eq!(told["lit_by"][0]["share"].as_f64().unwrap(), first.share);
+    assert_eq!(told["lit_by"][0]["joint"], problem.skeleton.shown_name(first.joint).as_str());
+    assert_eq!(told["without"].as_array().unwrap().len(), 17);
+
+    let told = json(&[&["explore", "tau", "--json"], &STATE[..]].concat(), folder.path());
+    let objective = Objective::new(Arc::clone(&problem), config, Precision::F32, &fit.initial).unwrap();
+    let h_sim = simulate(&problem, &config, Precision::F32, &fit.params);
+    let seen: Vec<_> = h_sim.iter().enumerate().map(|(view, map)| masks(&objective, view, map)).collect();
+    let maps: Vec<(&[f64], &[f64])> =
+        h_sim.iter().enumerate().map(|(k, sim)| (problem.map(k), sim.as_slice())).collect();
+    let ribbon = tau_ribbon(&maps, &seen);
+    let ious: Vec<f64> = told["iou_at"].as_array().unwrap().iter().filter_map(Value::as_f64).collect();
+    assert_eq!(ious, ribbon.iou.iter().flatten().copied().collect::<Vec<_>>());
+    let at_tau = seen.iter().filter_map(mhp_inspector::mhp::Masks::iou).sum::<f64>() / 2.0;
+    assert!((told["iou"].as_f64().unwrap() - at_tau).abs() < 1e-12);
+
+    let told = json(&[&["explore", "known", "--frames", "0", "--json"], &STATE[..]].concat(), folder.path());
+    let known = observability(&problem, &config, (&fit.initial, &fit.params), Noise::Measured, &Progress::new());
+    let known = known.unwrap().unwrap();
+    assert_eq!(told["frames"][0]["refit_spread_mm"].as_f64().unwrap(), known.spread_mm[0]);
+    assert_eq!(told["frames"][0]["least_observable"][0]["name"], known.unseen[0].name.as_str());
+
+    let told = json(&[&["explore", "radar", "--elements", "128", "--json"], &STATE[..]].concat(), folder.path());
+    let width = |which: &str| told[which]["views"][0]["psf"]["azimuth_rad"].as_f64().unwrap();
+    assert!(width("other") < 0.6 * width("today"), "more elements see finer: {told}");
+    let output = run(&["explore", "radar", "--elements", "1"], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(said(&output).contains("elements 1: expected 2 to 1024"), "{}", said(&output));
+
+    let told = json(&[&["explore", "closure", "--truth", "--json"], &STATE[..]].concat(), folder.path());
+    assert!(
+        told["start_majpe_mm"].as_f64().unwrap() < 1500.0 && told["joints"].as_array().unwrap().len() == 17,
+        "{told}"
+    );
+    assert_eq!(told["radar_assumed"].as_array().unwrap().len(), 2);
+}

@@ -1,0 +1,115 @@
+//! Pictures of what a fit rests on, to be looked at: `MHP_PICTURES=FOLDER MHP_DATA=DATA cargo test --test window pictures -- --ignored`.
+#![expect(clippy::unwrap_used, reason = "a picture that cannot be made is no picture")]
+
+use crate::window::Window;
+use egui::pos2;
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use mhp_inspector::app::{InspectorApp, Pane};
+use mhp_inspector::session::{Command, Isolate, ThemeChoice};
+use std::path::{Path, PathBuf};
+
+/// The window with a graphics adapter.
+fn open(path: &Path, frame: usize) -> Window {
+    let paths: Vec<PathBuf> = vec![path.into()];
+    let harness: Harness<'static, InspectorApp> = Harness::builder()
+        .with_size([1440.0, 900.0])
+        .with_step_dt(1.0 / 60.0)
+        .with_max_steps(200)
+        .wgpu()
+        .build_eframe(|cc| InspectorApp::new(cc, &paths));
+    let mut window = Window { harness, folder: tempfile::tempdir().unwrap() };
+    window.ready(0);
+    if frame > 0 {
+        window.apply(Command::GotoFrame(frame));
+        window.ready(frame);
+    }
+    let iterations = window.session().config.iterations;
+    window.apply(Command::StepFit(iterations));
+    window.paused_at(iterations);
+    window.at_rest();
+    window
+}
+
+fn picture(window: &mut Window, folder: &Path, name: &str) {
+    for theme in [ThemeChoice::Dark, ThemeChoice::Light] {
+        let mut view = window.session().view.clone();
+        view.theme = theme;
+        window.apply(Command::SetView(Box::new(view)));
+        window.harness.run_steps(6);
+        let word = if theme == ThemeChoice::Dark { "dark" } else { "light" };
+        window.harness.render().unwrap().save(folder.join(format!("{name}-{word}.png"))).unwrap();
+    }
+}
+
+#[test]
+#[ignore = "writes pictures to be looked at"]
+fn pictures() {
+    let Some(folder) = std::env::var_os("MHP_PICTURES").map(PathBuf::from) else { return println!("no MHP_PICTURES") };
+    let data = std::env::var_os("MHP_DATA").map_or_else(|| "samples/walk".into(), PathBuf::from);
+    let frame = std::env::var("MHP_FRAME").ok().and_then(|text| text.parse().ok()).unwrap_or(0);
+    std::fs::create_dir_all(&folder).unwrap();
+    let mut window = open(&data, frame);
+    let view = window.session().data.dataset.as_ref().unwrap().info().views[0].array.clone();
+
+    window.show("Who lit it");
+    window.until("the joints left out", |w| w.says("its drop without a joint"));
+    let map = window.node(&format!("H_sim map of {view}")).rect();
+    window.harness.hover_at(pos2(map.left() + 0.46 * map.width(), map.top() + 0.5 * map.height()));
+    window.harness.run_steps(6);
+    picture(&mut window, &folder, "lit");
+    let joint = window.harness.query_all_by_label("Joint left knee").next().map(|node| node.rect().center());
+    window.harness.hover_at(joint.unwrap());
+    window.harness.run_steps(30);
+    picture(&mut window, &folder, "footprint");
+    window.harness.remove_cursor();
+    window.apply(Command::SelectJoint(Some(13)));
+    let mut shown = window.session().view.clone();
+    shown.isolate = Isolate::Without;
+    window.apply(Command::SetView(Box::new(shown.clone())));
+    window.harness.run_steps(30);
+    picture(&mut window, &folder, "without");
+    shown.isolate = Isolate::All;
+    window.apply(Command::SetView(Box::new(shown)));
+    window.apply(Command::SelectJoint(None));
+
+    window.show("Radar knows");
+    window.until("the matrix", |w| w.says("Least observable, widest first"));
+    picture(&mut window, &folder, "known");
+    window.show("Closure test");
+    window.click("Test this pose");
+    window.until("the test", |w| w.named("Closure test result"));
+    window.harness.run_steps(4);
+    picture(&mut window, &folder, "closure");
+    window.click("Mask outlines at τ");
+    window.click("Point clouds at τ");
+    window.until("the clouds", |w| w.says("PPPR "));
+    window.show("Curves");
+    picture(&mut window, &folder, "tau");
+    window.click("Mask outlines at τ");
+    window.click("Point clouds at τ");
+    window.show("Breakpoints");
+    window.apply(Command::AddBreakpoint("iteration=30".into()));
+    window.apply(Command::AddBreakpoint("em·kine<-0.9".into()));
+    window.apply(Command::Reset);
+    window.ready(frame);
+    window.key(egui::Key::Enter);
+    window.until("a stop", |w| w.session().breakpoints.list().iter().any(|point| point.hits > 0));
+    picture(&mut window, &folder, "breakpoints");
+    window.apply(Command::StepFit(70));
+    window.until("the end", |w| !w.fit().is_running());
+    window.harness.state_mut().show_pane(Pane::called("Radar what-if").unwrap());
+    window.until("both radars", |w| w.named(&format!("What-if map of {view}, other")));
+    let slider = window.node("Elements").rect();
+    let along = |share: f32| pos2(slider.left() + share * slider.width(), slider.center().y);
+    window.harness.hover_at(along(0.3));
+    window.harness.drag_at(along(0.3));
+    window.harness.run_steps(1);
+    window.harness.hover_at(along(0.5));
+    window.harness.run_steps(1);
+    window.harness.drop_at(along(0.5));
+    window.harness.run_steps(2);
+    window.harness.remove_cursor();
+    window.until("the other radar", |w| w.named("What-if numbers") && !w.harness.state().panes_are_working());
+    picture(&mut window, &folder, "what-if");
+}
