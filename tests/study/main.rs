@@ -12,6 +12,7 @@ mod scenes;
 mod array_jobs;
 mod clouds;
 mod evidence;
+mod explore;
 mod export;
 mod maps;
 mod radars;
