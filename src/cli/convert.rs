@@ -150,9 +150,9 @@ fn manifest_text(dataset: &Dataset, from: &Path) -> anyhow::Result<String> {
     let info = dataset.info();
     let view = |(k, view): (usize, &'_ View)| {
         let calibration = info.calibration(k);
-        // A configuration whose chirp is the data set's own says the widths; others are stated.
-        let own = calibration.fft.filter(|fft| calibration.derived && fft.radar == info.radar);
-        (own.is_none().then_some(view.psf), own.as_ref().map(FftText::of))
+        let fft = calibration.fft.as_ref().map(|fft| FftText::beside(fft, &info.radar, &view.axes));
+        // Widths that follow from the configuration are not stated beside it.
+        ((!calibration.derived || fft.is_none()).then_some(view.psf), fft)
     };
     let calibrated: Vec<_> = info.views.iter().enumerate().map(view).collect();
     let views = info.views.iter().zip(calibrated).map(|(view, (psf, fft))| WrittenView {

@@ -18,7 +18,7 @@ use crate::dataset::DatasetError;
 use crate::folders;
 use crate::input::{MOST_TEXT, read_text};
 use crate::output::replace_file;
-use crate::radar::{AxisKind, FftSetup, PointSpread, RadarConfig, Spacing, View, ViewFft, Window};
+use crate::radar::{Axis, AxisKind, FftSetup, PointSpread, RadarConfig, Spacing, View, ViewFft, Window};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -208,6 +208,43 @@ impl FftText {
             elevation: array.elevation.map(|count| (count, angle)),
         };
         Ok((ViewFft { setup, radar }, padding))
+    }
+
+    /// As text beside a `[radar]`, with what differs from it, and with its padding where the axes say it.
+    pub fn beside(fft: &ViewFft, radar: &RadarConfig, axes: &[Axis]) -> Self {
+        let own = &fft.radar;
+        let differs = |x: f64, of: f64| (x != of).then_some(x);
+        let sweep = SweepText {
+            start_hz: differs(own.start_hz, radar.start_hz),
+            bandwidth_hz: differs(own.bandwidth_hz, radar.bandwidth_hz),
+            chirp_s: differs(own.chirp_s, radar.chirp_s),
+            frame_s: differs(own.frame_s, radar.frame_s),
+        };
+        let mut text = Self::of(fft);
+        if let Some(array) = &mut text.array {
+            array.azimuth_m = array.azimuth.and_then(|_| differs(own.l_az_m, radar.l_az_m));
+            array.elevation_m = array.elevation.and_then(|_| differs(own.l_el_m, radar.l_el_m));
+        }
+        text.chirp = (sweep != SweepText::default()).then_some(sweep);
+        let mut padding = toml::Table::new();
+        for axis in axes {
+            let (name, angle) = match axis.kind {
+                AxisKind::Range => (AXES[0], false),
+                AxisKind::Doppler => (AXES[1], false),
+                kind if kind.is_angular() => (AXES[2], true),
+                _ => continue,
+            };
+            let on_grid = !angle || axis.spacing == Spacing::Sine;
+            if let Some(resolved) = fft.resolved(axis.kind).filter(|_| on_grid) {
+                let times = (resolved.natural / axis.step().abs()).round();
+                let exact = (axis.step().abs() * times / resolved.natural - 1.0).abs() < 1e-3;
+                if exact && (1.0..=MOST_PADDING as f64).contains(&times) {
+                    padding.insert(name.to_owned(), toml::Value::Integer(times as i64));
+                }
+            }
+        }
+        text.padding = (!padding.is_empty()).then_some(toml::Value::Table(padding));
+        text
     }
 
     /// As text, of a configuration whose chirp and spacings are those of a `[radar]`.

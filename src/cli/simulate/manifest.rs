@@ -2,8 +2,9 @@
 
 use super::Style;
 use crate::body::Skeleton;
+use crate::dataset::FftText;
 use crate::dataset::layout::{FrameWriter, MANTISSA_BITS};
-use crate::radar::{Axis, PointSpread, Quantity, RadarConfig};
+use crate::radar::{Axis, Quantity, RadarConfig, View, ViewFft};
 use crate::simulate::Recording;
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -28,7 +29,7 @@ struct Manifest {
 struct ManifestView {
     array: String,
     quantity: Quantity,
-    psf: PointSpread,
+    fft: FftText,
     axes: Vec<Axis>,
 }
 
@@ -41,10 +42,12 @@ fn name(recording: &Recording) -> String {
 
 /// The whole file.
 pub(super) fn text(recording: &Recording, writer: &dyn FrameWriter, style: Style<'_>) -> anyhow::Result<String> {
-    let view = |view: &crate::radar::View| ManifestView {
+    let (device, radar) = (recording.device(), recording.radar());
+    // Widths follow from the FFTs.
+    let view = |(view, fft): (&View, ViewFft)| ManifestView {
         array: view.array.clone(),
         quantity: view.quantity,
-        psf: view.psf,
+        fft: FftText::beside(&fft.for_axes(view.axes.iter().map(|axis| axis.kind)), &radar, &view.axes),
         axes: view.axes.clone(),
     };
     let manifest = Manifest {
@@ -54,8 +57,8 @@ pub(super) fn text(recording: &Recording, writer: &dyn FrameWriter, style: Style
         frame_rate_hz: recording.frame_rate_hz(),
         // Bones of a person of 1.70 m: the people of a recording differ in height.
         skeleton: (!writer.has_own_joints()).then(|| crate::body::Build::default().skeleton()),
-        radar: recording.radar(),
-        view: recording.device().views.iter().map(view).collect(),
+        view: device.views.iter().zip(device.ffts()).map(view).collect(),
+        radar: radar.clone(),
     };
     Ok(format!("{}\n{}", comment(recording, style.command), toml::to_string(&manifest)?))
 }

@@ -7,8 +7,8 @@ use super::cascade::{
 };
 use crate::geometry::Pose;
 use crate::radar::{
-    AdcCube, Axis, AxisKind, Chain, FftSetup, Fmcw, HUPR_SHAPE, MimoArray, PointSpread, Quantity, RadarConfig,
-    SPEED_OF_LIGHT, Spacing, View, Window, hupr_amplitudes, hupr_cube,
+    AdcCube, Axis, AxisKind, Chain, FftSetup, Fmcw, HUPR_SHAPE, MimoArray, Quantity, RadarConfig, SPEED_OF_LIGHT,
+    Spacing, View, ViewFft, Window, hupr_amplitudes, hupr_cube,
 };
 use num_complex::Complex64;
 
@@ -67,6 +67,17 @@ impl Device {
     /// Chirp and array as a manifest tells them.
     pub fn radar(&self) -> RadarConfig {
         self.radars.first().map_or_else(RadarConfig::default, |radar| radar.fmcw.radar.clone())
+    }
+
+    /// The FFT configuration of each view, from which its widths follow.
+    pub fn ffts(&self) -> Vec<ViewFft> {
+        let of_view = |(k, view): (usize, &View)| {
+            let radar = self.radars.get(k).or_else(|| self.radars.first())?;
+            let [horizontal, vertical] = ViewFft::angles(view.axes.iter().map(|axis| axis.kind));
+            let setup = setup(self.layout, radar, horizontal || vertical);
+            Some(ViewFft { setup, radar: radar.fmcw.radar.clone() })
+        };
+        self.views.iter().enumerate().filter_map(of_view).collect()
     }
 
     /// Times of the radar frames that a frame is made of, s after its own: one, or for HIBER three, of which two are subtracted from
@@ -156,19 +167,6 @@ impl Radar {
             }
         }
         map
-    }
-
-    /// The widths that follow from the FFT set-up, for a map with or without angle.
-    fn point_spread(&self, angle: bool) -> PointSpread {
-        let line = (self.fmcw.array.channels(), self.chain.angle_window);
-        let along = |name| (angle && self.name == name).then_some(line);
-        FftSetup {
-            range: (self.fmcw.samples, self.chain.range_window),
-            doppler: (self.fmcw.loops, self.chain.doppler_window),
-            azimuth: along("hori"),
-            elevation: along("vert"),
-        }
-        .point_spread(&self.fmcw.radar)
     }
 
     /// m/s between Doppler bins.
@@ -296,7 +294,29 @@ fn hupr() -> Vec<Radar> {
     vec![of("hori", array.clone()), of("vert", array.turned(&quarter))]
 }
 
+/// The FFTs behind a map of a radar, with or without angle.
+fn setup(layout: SimulatedLayout, radar: &Radar, angle: bool) -> FftSetup {
+    match layout {
+        SimulatedLayout::Hiber => return hiber_setup(radar),
+        SimulatedLayout::RtPose => return rt_pose_setup(radar),
+        _ => {}
+    }
+    let line = match layout {
+        // The line, without the raised transmitter.
+        SimulatedLayout::Hupr => (8, radar.chain.angle_window),
+        _ => (radar.fmcw.array.channels(), radar.chain.angle_window),
+    };
+    let along = |name| (angle && radar.name == name).then_some(line);
+    FftSetup {
+        range: (radar.fmcw.samples, radar.chain.range_window),
+        doppler: (radar.fmcw.loops, radar.chain.doppler_window),
+        azimuth: along("hori"),
+        elevation: along("vert"),
+    }
+}
+
 fn views(layout: SimulatedLayout, radars: &[Radar]) -> Vec<View> {
+    let psf = |radar: &Radar, angle: bool| setup(layout, radar, angle).point_spread(&radar.fmcw.radar);
     let view = |array: &str, psf, axes| View {
         array: array.into(),
         quantity: Quantity::Amplitude,
@@ -322,51 +342,48 @@ fn views(layout: SimulatedLayout, radars: &[Radar]) -> Vec<View> {
         (SimulatedLayout::Mmvr | SimulatedLayout::MmvrTree, [hori, vert]) => vec![
             view(
                 "hm_hori",
-                hori.point_spread(true),
+                psf(hori, true),
                 vec![cells(AxisKind::DepthH, 256, 8.0, 0.0), cells(AxisKind::Y, 128, left, right)],
             ),
             view(
                 "hm_vert",
-                vert.point_spread(true),
+                psf(vert, true),
                 vec![cells(AxisKind::DepthV, 256, 8.0, 0.0), cells(AxisKind::Z, 128, -2.0, 3.0)],
             ),
         ],
         (SimulatedLayout::Generic, [hori, vert]) => vec![
             view(
                 "range_cone_doppler",
-                hori.point_spread(true),
+                psf(hori, true),
                 vec![range(hori, GENERIC[0]), sine(AxisKind::Cone, GENERIC[1], -1.0, 1.0), doppler(hori, GENERIC[2])],
             ),
             view(
                 "range_elevation",
-                vert.point_spread(true),
+                psf(vert, true),
                 vec![range(vert, GENERIC[0]), sine(AxisKind::Elevation, GENERIC[1], -1.0, 1.0)],
             ),
         ],
         (SimulatedLayout::Xrf55, [radar]) => vec![
             view(
                 "range_cone",
-                radar.point_spread(true),
+                psf(radar, true),
                 vec![range(radar, XRF55[0]), sine(AxisKind::Cone, XRF55[1], -1.0, 1.0)],
             ),
-            view("range_doppler", radar.point_spread(false), vec![range(radar, XRF55[0]), doppler(radar, XRF55[2])]),
+            view("range_doppler", psf(radar, false), vec![range(radar, XRF55[0]), doppler(radar, XRF55[2])]),
         ],
         (SimulatedLayout::Xrf55Stack, [radar]) => {
             let axes = vec![range(radar, STACK[0]), sine(AxisKind::Cone, STACK[1], -1.0, 1.0)];
-            vec![view("array", radar.point_spread(true), axes)]
+            vec![view("array", psf(radar, true), axes)]
         }
         (SimulatedLayout::Hiber, [hori, vert]) => {
-            // One chirp a frame tells no speed.
-            let psf =
-                |radar: &Radar| PointSpread { doppler_mps: 0.0, ..hiber_setup(radar).point_spread(&radar.fmcw.radar) };
             vec![
-                view("horizontal", psf(hori), hiber_axes(AxisKind::DepthH, AxisKind::Y)),
-                view("vertical", psf(vert), hiber_axes(AxisKind::DepthV, AxisKind::Z)),
+                view("horizontal", psf(hori, true), hiber_axes(AxisKind::DepthH, AxisKind::Y)),
+                view("vertical", psf(vert, true), hiber_axes(AxisKind::DepthV, AxisKind::Z)),
             ]
         }
         (SimulatedLayout::RtPose, [radar]) => {
             let axes = RT_POSE_CUBE.map(|(kind, bins, lo, hi)| linear(kind, bins, lo, hi)).to_vec();
-            vec![view("cube", rt_pose_setup(radar).point_spread(&radar.fmcw.radar), axes)]
+            vec![view("cube", psf(radar, true), axes)]
         }
         (SimulatedLayout::Hupr, [hori, vert]) => {
             let axes = |radar: &Radar, kind| {
@@ -377,20 +394,30 @@ fn views(layout: SimulatedLayout, radars: &[Radar]) -> Vec<View> {
                     sine(kind, HUPR_SHAPE[2], 31.0 / 32.0, -33.0 / 32.0),
                 ]
             };
-            let psf = |radar: &Radar| {
-                let setup = FftSetup {
-                    range: (256, Window::Rectangular),
-                    doppler: (64, Window::Rectangular),
-                    azimuth: (radar.name == "hori").then_some((8, Window::Rectangular)),
-                    elevation: (radar.name == "vert").then_some((8, Window::Rectangular)),
-                };
-                setup.point_spread(&radar.fmcw.radar)
-            };
             vec![
-                view("hori", psf(hori), axes(hori, AxisKind::Cone)),
-                view("vert", psf(vert), axes(vert, AxisKind::Elevation)),
+                view("hori", psf(hori, true), axes(hori, AxisKind::Cone)),
+                view("vert", psf(vert, true), axes(vert, AxisKind::Elevation)),
             ]
         }
         _ => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a manifest says of the FFTs gives the widths that the views have.
+    #[test]
+    fn widths_follow_from_the_ffts_of_every_layout() {
+        for layout in SimulatedLayout::ALL {
+            let device = Device::new(layout);
+            let ffts = device.ffts();
+            assert_eq!(ffts.len(), device.views.len());
+            for (view, fft) in device.views.iter().zip(&ffts) {
+                let of_axes = fft.for_axes(view.axes.iter().map(|axis| axis.kind));
+                assert_eq!(of_axes.point_spread(), view.psf, "{layout:?}: {}", view.array);
+            }
+        }
     }
 }
