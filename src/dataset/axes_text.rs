@@ -16,7 +16,8 @@ pub fn axis_words(axis: &Axis, position: &str) -> String {
     let words = match axis.kind {
         AxisKind::Y if falling => format!("{} from left to right", span(first, last, "→")),
         AxisKind::Y => format!("{} from right to left", span(first, last, "→")),
-        AxisKind::Z if falling => format!("{} downward", span(first, last, "→")),
+        // Columns of a map run from left to right, whatever they measure.
+        AxisKind::Z if falling => end("bottom", "top"),
         AxisKind::Z => format!("{} up", span(first, last, "…")),
         AxisKind::Azimuth | AxisKind::Cone => end("right", "left"),
         AxisKind::Elevation => end("low", "high"),

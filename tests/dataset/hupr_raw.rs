@@ -69,6 +69,11 @@ fn captures_become_the_maps_of_the_published_cubes() {
         info.notes
     );
     assert_eq!(*info.views, *open(&raw.join("single_14")).info().views);
+    // Who was recorded is not published: a file beside the sequences says it.
+    assert_eq!(dataset.load(0).unwrap().global_id.as_deref(), Some("validation split"));
+    std::fs::write(raw.join("subjects.csv"), "sequence,subject\nsingle_14,anna\n").unwrap();
+    assert_eq!(open(&raw).load(0).unwrap().global_id.as_deref(), Some("subject anna, validation split"));
+    assert!(dataset.has_samples() && dataset.stages(1).unwrap().is_some_and(|stages| stages.limits.len() == 3));
     for frame in 0..2 {
         let (made, stored) = (dataset.load(frame).unwrap(), processed.load(frame).unwrap());
         for (made, stored) in made.maps.iter().zip(&stored.maps) {

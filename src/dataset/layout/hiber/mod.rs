@@ -7,6 +7,7 @@
 //! subtracted by the data set. Joints are in the frame of the room: truth needs the place of the radars ([`crate::dataset::RoomTransform`]).
 
 mod labels;
+mod splits;
 mod tree;
 mod write;
 
@@ -82,6 +83,7 @@ fn open(place: &DataFolder<'_>, named: Option<&str>, progress: &Progress) -> Res
         let expected = "HIBER's HORIZONTAL_HEATMAPS/EE_GG/FFFF.npy and VERTICAL_HEATMAPS in it or in a folder below";
         return Err(place.without_frames(expected.into()));
     }
+    let splits = splits::told(&found.segments);
     let folders = Folders::new(found.segments);
     let at = |named| (0..folders.count()).find(|&i| folders.find(i).is_some_and(|(_, stem)| stem == named));
     let named = named.map(|named| at(named).unwrap_or(0));
@@ -93,7 +95,7 @@ fn open(place: &DataFolder<'_>, named: Option<&str>, progress: &Progress) -> Res
         info.views.first().and_then(|view| read(&path, view).ok()).map(|(_, kind)| kind)
     });
     let kind = kind.unwrap_or_default();
-    info.notes = [found.notes, rooms.notes.clone(), places(&folders, &rooms)].concat();
+    info.notes = [found.notes, vec![splits], rooms.notes.clone(), places(&folders, &rooms)].concat();
     info.static_removed = true;
     info.assumptions.extend(assumptions(kind));
     if *info.views == *preset.views {
@@ -260,6 +262,7 @@ impl FrameSource for Frames {
         let person_count = joints.as_ref().map(Vec::len).or(labelled);
         let truth = joints.and_then(|joints| self.truth(segment, &joints, &mut notes));
         Ok(Frame {
+            global_id: splits::words(&segment.sequence),
             timestamp_s: info.frame_rate_hz.map(|rate| number as f64 / rate),
             maps: maps?,
             map_boxes,

@@ -3,11 +3,14 @@
 //! The file is a list of sequences, each a list of blocks, and does not name its sequences: they come in the order of the split in
 //! HuPR's configuration (`assets/hupr_splits.toml`). A list of another length is taken for the sequence folders that are there,
 //! in their order, where their number fits. Files are read when the first frame is: the largest has 50 MB.
+//!
+//! Who was recorded in which sequence HuPR does not publish; a `subjects.csv` beside the sequences, a line `7,anna` each (or
+//! `single_7,anna`), says it, and is told with the split of every frame.
 
 use crate::dataset::ImageAnnotations;
 use crate::dataset::layout::index::Segment;
 use crate::dataset::natural::natural;
-use crate::input::open_file;
+use crate::input::{MOST_TEXT, open_file, read_text};
 use serde::Deserialize;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -19,6 +22,8 @@ const JOINTS: usize = 14;
 /// Bytes of a file that are read: the largest that is published has 50 MB.
 const MOST_BYTES: u64 = 128 << 20;
 const SPLITS: [&str; 3] = ["train", "val", "test"];
+/// The file that says who was recorded.
+const SUBJECTS: &str = "subjects.csv";
 
 /// The label files of a data set.
 #[derive(Debug)]
@@ -27,6 +32,8 @@ pub(super) struct Annotations {
     files: Vec<(&'static str, PathBuf)>,
     /// Sequence folders, in order.
     folders: Vec<String>,
+    /// The number of a sequence to who was recorded in it.
+    subjects: HashMap<u32, String>,
     read: OnceLock<Labels>,
 }
 
@@ -48,7 +55,7 @@ struct Block {
     bbox: [f32; 4],
 }
 
-#[derive(Deserialize)]
+#[derive(Debug, Deserialize)]
 struct Splits {
     train: Vec<u32>,
     val: Vec<u32>,
@@ -65,14 +72,25 @@ impl Annotations {
             let name = format!("hrnet_annot_{split}.json");
             places.iter().map(|place| place.join(&name)).find(|path| path.is_file()).map(|path| (*split, path))
         };
+        let subjects = places.iter().map(|place| place.join(SUBJECTS)).find(|path| path.is_file());
+        let subjects = subjects.map_or_else(HashMap::new, |path| subjects_in(&path));
         let mut folders: Vec<String> = sequences.iter().map(|segment| segment.sequence.clone()).collect();
         folders.sort_by(|a, b| natural(a, b));
-        Self { files: SPLITS.iter().filter_map(found).collect(), folders, read: OnceLock::new() }
+        Self { files: SPLITS.iter().filter_map(found).collect(), folders, subjects, read: OnceLock::new() }
     }
 
     /// The label files.
     pub(super) fn paths(&self) -> impl Iterator<Item = &Path> {
         self.files.iter().map(|(_, path)| path.as_path())
+    }
+
+    /// The split of a sequence, and who was recorded in it where that is said.
+    pub(super) fn who(&self, sequence: &str) -> Option<String> {
+        let number = number(sequence)?;
+        let split = splits().and_then(|splits| splits.of(number)).map(|split| format!("{split} split"));
+        let subject = self.subjects.get(&number).map(|name| format!("subject {name}"));
+        let all: Vec<String> = subject.into_iter().chain(split).collect();
+        (!all.is_empty()).then(|| all.join(", "))
     }
 
     /// The labels of a frame; what is wrong with the files goes to `notes`.
@@ -133,15 +151,14 @@ impl Annotations {
 
     /// The numbers of the sequences that a list of `count` stands for.
     fn sequences_of(&self, split: &str, count: usize) -> Result<Vec<u32>, String> {
-        let splits: Splits =
-            toml::from_str(include_str!("../../../../assets/hupr_splits.toml")).map_err(|error| error.to_string())?;
+        let splits = splits().ok_or("HuPR's splits are not known")?;
         let ids = match split {
-            "train" => splits.train,
-            "val" => splits.val,
-            _ => splits.test,
+            "train" => &splits.train,
+            "val" => &splits.val,
+            _ => &splits.test,
         };
         if ids.len() == count {
-            return Ok(ids);
+            return Ok(ids.clone());
         }
         let folders: Vec<u32> = self.folders.iter().filter_map(|name| number(name)).collect();
         if self.files.len() == 1 && folders.len() == count {
@@ -154,9 +171,7 @@ impl Annotations {
 /// Which of these sequences are in which of HuPR's splits, in words.
 pub(super) fn splits_of(segments: &[Segment]) -> String {
     let numbers: Vec<u32> = segments.iter().filter_map(|segment| number(&segment.sequence)).collect();
-    let Ok(splits) = toml::from_str::<Splits>(include_str!("../../../../assets/hupr_splits.toml")) else {
-        return "splits are not known".into();
-    };
+    let Some(splits) = splits() else { return "splits are not known".into() };
     let count = |ids: &[u32]| numbers.iter().filter(|number| ids.contains(number)).count();
     let [train, val, test] = [&splits.train, &splits.val, &splits.test].map(|ids| count(ids));
     let none = segments.len() - (train + val + test).min(segments.len());
@@ -164,6 +179,30 @@ pub(super) fn splits_of(segments: &[Segment]) -> String {
         "splits: of {} sequences {train} are of HuPR's training, {val} of validation, {test} of test, {none} of none",
         segments.len()
     )
+}
+
+/// `None` never, for the file that the program was built with.
+fn splits() -> Option<&'static Splits> {
+    static SPLITS: OnceLock<Option<Splits>> = OnceLock::new();
+    SPLITS.get_or_init(|| toml::from_str(include_str!("../../../../assets/hupr_splits.toml")).ok()).as_ref()
+}
+
+impl Splits {
+    fn of(&self, number: u32) -> Option<&'static str> {
+        let all = [(&self.train, "training"), (&self.val, "validation"), (&self.test, "test")];
+        all.into_iter().find(|(ids, _)| ids.contains(&number)).map(|(_, name)| name)
+    }
+}
+
+/// Who was recorded, by the number of the sequence; lines that say something else are passed over.
+fn subjects_in(path: &Path) -> HashMap<u32, String> {
+    let text = read_text(path, "who was recorded (CSV)", MOST_TEXT).unwrap_or_default();
+    let one = |line: &str| {
+        let (sequence, name) = line.trim().split_once(',')?;
+        let name = name.trim();
+        (!name.is_empty()).then_some((number(sequence.trim())?, name.to_owned()))
+    };
+    text.lines().filter_map(one).collect()
 }
 
 /// `7` of `single_7`.

@@ -161,6 +161,7 @@ impl FrameSource for Frames {
         let number = stem.parse::<u32>().ok();
         let labelled = image.as_ref().map(|image| image.keypoints.len().max(image.boxes.len()));
         Ok(Frame {
+            global_id: self.labels.who(&segment.sequence),
             timestamp_s: known
                 .timestamp_s
                 .or_else(|| info.frame_rate_hz.and_then(|rate| number.map(|number| f64::from(number) / rate))),

@@ -3,13 +3,15 @@
 
 use super::annotations::{Annotations, splits_of};
 use super::{DataFolder, DatasetInfo, Folders, Opened, RADARS, Segment, assumptions, truth_path};
-use crate::dataset::adc::{AdcSettings, IqOrder, Payload, WordOrder, decode};
+use crate::dataset::adc::{AdcSettings, ChainStages, IqOrder, Payload, WordOrder, decode};
 use crate::dataset::layout::arrays::truth_beside;
 use crate::dataset::layout::{FrameSource, MapArray};
 use crate::dataset::natural::natural;
 use crate::dataset::walk::Walk;
 use crate::dataset::{DatasetError, Frame, Heatmap};
-use crate::radar::{ChirpSettings, FftSetup, HUPR_SHAPE, Spacing, View, Window, hupr_amplitudes, hupr_cube};
+use crate::radar::{
+    AdcCube, Board, Chain, ChirpSettings, FftSetup, HUPR_SHAPE, Spacing, View, Window, hupr_amplitudes, hupr_cube,
+};
 use crate::task::Progress;
 use std::collections::BTreeMap;
 use std::fmt::{self, Write};
@@ -161,18 +163,24 @@ struct RawFrames {
 }
 
 impl RawFrames {
-    fn maps_of(&self, i: usize, info: &DatasetInfo) -> Result<Vec<Heatmap>, DatasetError> {
+    /// The samples of a frame of the radar whose map `view` is.
+    fn samples(&self, i: usize, radar: &str, info: &DatasetInfo) -> Result<AdcCube, DatasetError> {
         let (segment, stem) = self.folders.at(i, info)?;
-        let number: u64 = stem.parse().unwrap_or(u64::MAX);
-        let bytes = self.settings.frame_bytes();
+        let (number, bytes) = (stem.parse().unwrap_or(u64::MAX), self.settings.frame_bytes());
+        let payload = Payload::open(&segment.path.join(radar).join(CAPTURE))?;
+        let samples = payload.read(number.saturating_mul(bytes), bytes as usize)?;
+        Ok(decode(&samples, &self.settings, IqOrder::IFirst))
+    }
+
+    fn maps_of(&self, i: usize, info: &DatasetInfo) -> Result<Vec<Heatmap>, DatasetError> {
+        let (segment, _) = self.folders.at(i, info)?;
         let read = |view: &View| {
-            let payload = Payload::open(&segment.path.join(&view.array).join(CAPTURE))?;
-            let samples = payload.read(number.saturating_mul(bytes), bytes as usize)?;
-            let cube = hupr_cube(&decode(&samples, &self.settings, IqOrder::IFirst));
+            let cube = hupr_cube(&self.samples(i, &view.array, info)?);
             let map = Heatmap { shape: view.shape(), data: hupr_amplitudes(&cube), dtype: "<i2".into() };
             if map.data.len() != view.cells() {
                 let message = format!("view `{}`: its axes are not those of HuPR's cubes, 16 × 64 × 64", view.array);
-                return Err(DatasetError::Frame { message, path: payload.path().to_owned() });
+                let path = segment.path.join(&view.array).join(CAPTURE);
+                return Err(DatasetError::Frame { message, path });
             }
             Ok(map)
         };
@@ -227,6 +235,7 @@ impl FrameSource for RawFrames {
         let known = truth_beside(&truth_path(segment, stem), info.skeleton.joints.len(), &mut notes);
         let labelled = image.as_ref().map(|image| image.keypoints.len().max(image.boxes.len()));
         Ok(Frame {
+            global_id: self.labels.who(&segment.sequence),
             timestamp_s: stem.parse::<u32>().ok().map(|number| f64::from(number) * self.settings.chirp.period_s),
             maps,
             map_boxes: vec![Vec::new(); info.views.len()],
@@ -236,5 +245,28 @@ impl FrameSource for RawFrames {
             notes,
             ..Frame::default()
         })
+    }
+
+    fn has_samples(&self) -> bool {
+        true
+    }
+
+    /// Those of the horizontal radar, without windows as HuPR has it, all that stands still kept.
+    fn stages(&self, i: usize, info: &DatasetInfo) -> Result<Option<ChainStages>, DatasetError> {
+        let samples = self.samples(i, RADARS[0], info)?;
+        let chirp = &self.settings.chirp;
+        let fmcw = chirp.fmcw(Board::Isk, info.radar.r_max_m);
+        let chain = Chain {
+            range_window: Window::Rectangular,
+            range_fft: chirp.samples,
+            doppler_window: Window::Rectangular,
+            doppler_fft: chirp.loops,
+            angle_window: Window::Rectangular,
+            angle_fft: HUPR_SHAPE[2],
+            still_share: 1.0,
+            max_range_m: info.radar.r_max_m.min(chirp.range_max_m()),
+        };
+        let line = fmcw.array.lines(1, fmcw.radar.l_az_m).into_iter().next().unwrap_or_default();
+        Ok(Some(ChainStages::of(&samples, &self.settings, (&fmcw, &chain), &line)))
     }
 }
