@@ -6,11 +6,18 @@ use super::counter::{Counted, NOBODY};
 use super::error::PeopleError;
 use super::network::CLASSES;
 use super::sight::{Role, Sight, baseline_m};
-use crate::geometry::{Vec3, flat_distance};
+use crate::geometry::{Vec3, flat_distance, norm, sub};
 use crate::radar::{View, unravel};
 
 /// Echoes of two views are one body's where their ranges differ by no more, m.
 const SAME_RANGE_M: f64 = 0.12;
+/// Of a view that tells heights too, echoes at one range, within this, m, but farther from each other than parts of a body, m, are an
+/// echo and its sidelobes where they are weaker by more than this, ln of amplitudes, or at the same cone angle, within this in the
+/// sine: arrays with few rows have them in every direction, 4 to 8 dB down.
+const GHOST_RANGE_M: f64 = 0.2;
+const GHOST_APART_M: f64 = 1.0;
+const GHOST_LN: f32 = 0.5;
+const GHOST_SINE: f64 = 0.08;
 /// No radar sees people farther away, m: what axes put there is no place, and its squares leave the range of numbers.
 const FARTHEST_M: f64 = 1e4;
 /// Frames before the present one that are looked at, two seconds of most radars: people stay as many, while one who hides
@@ -121,11 +128,12 @@ impl Scanner {
         let told = |role: Role| self.sights.iter().any(|(_, sight, _)| sight.role == role);
         let only_heights = !told(Role::Plan) && !told(Role::Whole);
         let heights = self.heights(detections);
-        let mut points = Vec::new();
+        let mut points: Vec<Point> = Vec::new();
         for (s, ((_, sight, _), found)) in self.sights.iter().zip(detections).enumerate() {
             if sight.role == Role::Height && !only_heights {
                 continue;
             }
+            let of_sight = points.len();
             for detection in found {
                 let reading = sight.reading(&unravel(detection.cell, &sight.view.shape()));
                 let seen = if sight.role == Role::Plan { self.seen(s, reading.range_m, &heights) } else { None };
@@ -141,6 +149,10 @@ impl Scanner {
                     range_m: reading.range_m,
                     age: 0,
                 });
+            }
+            if sight.role == Role::Whole {
+                let kept = without_ghosts(&points.split_off(of_sight), sight);
+                points.extend(kept);
             }
         }
         points
@@ -178,6 +190,25 @@ impl Scanner {
         }
         (weights > 0.0).then(|| (sum / weights, extent))
     }
+}
+
+/// The points of a view that tells heights without the sidelobes of stronger ones.
+fn without_ghosts(points: &[Point], sight: &Sight) -> Vec<Point> {
+    let sine = |point: &Point| sight.view.pose.view_from_world(point.position)[1] / point.range_m.max(1e-3);
+    let mut strongest: Vec<&Point> = points.iter().collect();
+    strongest.sort_by(|a, b| b.level.total_cmp(&a.level));
+    let mut kept: Vec<Point> = Vec::new();
+    for point in strongest {
+        let ghost = |other: &Point| {
+            (other.range_m - point.range_m).abs() <= GHOST_RANGE_M
+                && norm(sub(other.position, point.position)) > GHOST_APART_M
+                && (other.level - point.level > GHOST_LN || (sine(other) - sine(point)).abs() <= GHOST_SINE)
+        };
+        if !kept.iter().any(ghost) {
+            kept.push(*point);
+        }
+    }
+    kept
 }
 
 /// Leaves out what a stronger echo explains: others within its body, and its sidelobes at the same range. Strong is told by
