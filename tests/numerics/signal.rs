@@ -76,20 +76,50 @@ fn at(range: f64, degrees: f64) -> [f64; 3] {
     [range * cos, range * sin, 0.0]
 }
 
-/// Places of the strongest cell, refined by a parabola through the logarithms along each axis.
+/// Places of the strongest cell, refined along each axis by the parabola through the logarithms of three cells, which is exact for a
+/// Gaussian.
 fn peak(map: &[f64], shape: &[usize]) -> (Vec<f64>, f64) {
+    refined_peak(map, shape, |_, [l, m, h]| {
+        let [l, m, h] = [l, m, h].map(f64::ln);
+        0.5 * (l - h) / (l - 2.0 * m + h)
+    })
+}
+
+/// The same where each axis has the lobe of a window: the shift at which that lobe comes closest to the three cells (least squares,
+/// its height free). A parabola through three cells of a sinc is up to a quarter of a bin off its peak.
+fn lobe_peak(map: &[f64], view: &View, fft: &ViewFft, window: Window) -> (Vec<f64>, f64) {
+    refined_peak(map, &view.shape(), |k, cells| {
+        let resolved = fft.resolved(view.axes[k].kind).unwrap();
+        let bins = view.axes[k].step().abs() / resolved.natural;
+        let misfit = |shift: f64| {
+            let lobe: Vec<f64> =
+                [-1.0, 0.0, 1.0].map(|at| window.response(resolved.count, (at - shift) * bins)).to_vec();
+            let gain =
+                lobe.iter().zip(cells).map(|(a, b)| a * b).sum::<f64>() / lobe.iter().map(|a| a * a).sum::<f64>();
+            lobe.iter().zip(cells).map(|(a, b)| (gain * a - b).powi(2)).sum::<f64>()
+        };
+        let (mut lo, mut hi) = (-0.6, 0.6);
+        for _ in 0..40 {
+            let (a, b) = (lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0);
+            if misfit(a) < misfit(b) { hi = b } else { lo = a }
+        }
+        f64::midpoint(lo, hi)
+    })
+}
+
+/// The strongest cell, along each axis with the shift that `refine` sees in it and its neighbours.
+fn refined_peak(map: &[f64], shape: &[usize], refine: impl Fn(usize, [f64; 3]) -> f64) -> (Vec<f64>, f64) {
     let top = (0..map.len()).max_by(|&a, &b| map[a].total_cmp(&map[b])).unwrap();
     let mut places = Vec::new();
     let mut stride = map.len();
-    for &size in shape {
+    for (k, &size) in shape.iter().enumerate() {
         stride /= size;
         let bin = top / stride % size;
         let value = |k: i64| {
             let to = (bin as i64 + k).rem_euclid(size as i64) as usize;
-            map[top - bin * stride + to * stride].ln()
+            map[top - bin * stride + to * stride]
         };
-        let (l, m, h) = (value(-1), value(0), value(1));
-        places.push(bin as f64 + 0.5 * (l - h) / (l - 2.0 * m + h));
+        places.push(bin as f64 + refine(k, [-1, 0, 1].map(value)));
     }
     (places, map[top])
 }
@@ -102,6 +132,8 @@ struct Compared {
     half: f64,
     /// Root of the mean square over the whole lobe.
     rms: f64,
+    /// Level below the peak, dB, above which no cell of the lobe differs by more than 3 % of the peak; infinite where none does.
+    within: f64,
     /// Largest difference of the peak's place along an axis, bins.
     place: f64,
     /// Of the peaks' values.
@@ -115,7 +147,8 @@ fn compare(kinds: &[AxisKind], window: Window, padding: usize, params: &Pppr, ce
     let closed = &simulate(&problem, &config, Precision::F64, params)[0];
     let signal = &simulate_signal(&problem, &[Some(fft.clone())], &config, params, cells).unwrap()[0];
     let shape = view.shape();
-    let ((place, top), (wanted, level)) = (peak(signal, &shape), peak(closed, &shape));
+    let (place, top) = lobe_peak(signal, &view, &fft, window);
+    let (wanted, level) = peak(closed, &shape);
     let joint = view.bins_of_moving(params.position(0), params.velocity(0));
     // The lobe of the window, wider where the joint itself is wide.
     let reach: Vec<f64> = view
@@ -127,6 +160,7 @@ fn compare(kinds: &[AxisKind], window: Window, padding: usize, params: &Pppr, ce
         })
         .collect();
     let (mut whole, mut tenth, mut half, mut sum, mut count) = (0.0f64, 0.0f64, 0.0f64, 0.0, 0.0);
+    let mut within = f64::INFINITY;
     for (cell, (c, s)) in closed.iter().zip(signal).enumerate() {
         let mut stride = closed.len();
         let inside = shape.iter().enumerate().all(|(k, &size)| {
@@ -139,6 +173,9 @@ fn compare(kinds: &[AxisKind], window: Window, padding: usize, params: &Pppr, ce
             whole = whole.max(difference);
             sum += difference * difference;
             count += 1.0;
+            if difference > 0.03 {
+                within = within.min(-20.0 * (s / top).log10());
+            }
             if s / top > 0.1f64.sqrt() {
                 tenth = tenth.max(difference);
             }
@@ -148,52 +185,60 @@ fn compare(kinds: &[AxisKind], window: Window, padding: usize, params: &Pppr, ce
         }
     }
     let place = place.iter().zip(&wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    Compared { whole, tenth, half, rms: (sum / f64::max(count, 1.0)).sqrt(), place, peak: (level / top - 1.0).abs() }
+    let (rms, peak) = ((sum / f64::max(count, 1.0)).sqrt(), (level / top - 1.0).abs());
+    Compared { whole, tenth, half, rms, within, place, peak }
 }
 
-/// Windows with the largest difference that is accepted at padding 1 and from padding 2 on: to half power, down to −10 dB, and over
-/// the whole lobe to its first minimum, % of the peak. What the Gaussian of SPEC section 3 can do is measured here, not wished: its tail
-/// is higher than a window's near the minimum, most so for the rectangular one, and at padding 1 the closed form's I/12 widens it.
-const BOUNDS: [(Window, [f64; 3], [f64; 3]); 4] = [
-    (Window::Hann, [1.0, 5.0, 8.0], [3.0, 3.6, 5.8]),
-    (Window::Hamming, [3.0, 5.0, 8.0], [2.2, 2.6, 4.0]),
-    (Window::Blackman, [1.0, 3.5, 4.2], [1.9, 2.3, 2.8]),
-    (Window::Rectangular, [13.0, 15.0, 24.0], [5.2, 6.0, 15.0]),
+/// Windows with what is accepted at padding 1 and from padding 2 on: largest difference to half power, down to −10 dB, and over the
+/// whole lobe to its first minimum, % of the peak; and the level below the peak, dB, down to which 3 % hold. What the Gaussian of SPEC
+/// section 3 can do is measured here, not wished: its tail is higher than a window's near the minimum, most so for the rectangular
+/// one, and at padding 1 the closed form's I/12 widens it.
+const BOUNDS: [(Window, [f64; 4], [f64; 4]); 4] = [
+    (Window::Hann, [1.0, 4.5, 7.5, 9.5], [3.0, 3.6, 5.8, 3.2]),
+    (Window::Hamming, [2.5, 4.7, 7.5, 6.2], [2.2, 2.6, 4.0, 20.0]),
+    (Window::Blackman, [1.0, 3.4, 4.0, 9.5], [1.9, 2.3, 2.8, 60.0]),
+    // Unpadded, the peak itself is 8 % off.
+    (Window::Rectangular, [13.0, 15.0, 24.0, -1.0], [5.2, 6.0, 15.0, 0.5]),
 ];
 
 /// SPEC section 3's closed form against the path it stands for: point targets off the bins' centres, up to 50° off boresight.
 #[test]
 fn the_closed_form_has_the_main_lobe_of_the_signals() {
     println!("maps of range and angle, and of range and speed; point targets at −50 to 50°, off the bins' centres");
-    println!("window       padding  to half power  to -10 dB  whole lobe  rms of it  peak value  peak place, bins");
+    println!(
+        "window       padding  cells   to half power  to -10 dB  whole lobe  rms of it  3 % hold to, dB  peak value  peak place, bins"
+    );
     let places = [(2.013, 0.0), (3.377, 17.3), (2.741, -33.0), (4.158, 50.0), (3.02, -50.0)];
     for (window, first, other) in BOUNDS {
         for padding in 1..=4 {
-            let (mut most, mut place) = ([0.0f64; 5], 0.0f64);
-            for kinds in [[AxisKind::Range, AxisKind::Cone], [AxisKind::Range, AxisKind::Doppler]] {
-                for (range, degrees) in places {
-                    let target = at(range, degrees);
-                    let params = joints(&[target], target.map(|x| x / range * 0.83), 1e-4);
-                    let c = compare(&kinds, window, padding, &params, CellValue::Centre);
-                    for (most, x) in most.iter_mut().zip([c.half, c.tenth, c.whole, c.rms, c.peak]) {
-                        *most = most.max(100.0 * x);
+            for cells in [CellValue::Centre, CellValue::Mean] {
+                let (mut most, mut place, mut within) = ([0.0f64; 5], 0.0f64, f64::INFINITY);
+                for kinds in [[AxisKind::Range, AxisKind::Cone], [AxisKind::Range, AxisKind::Doppler]] {
+                    for (range, degrees) in places {
+                        let target = at(range, degrees);
+                        let params = joints(&[target], target.map(|x| x / range * 0.83), 1e-4);
+                        let c = compare(&kinds, window, padding, &params, cells);
+                        for (most, x) in most.iter_mut().zip([c.half, c.tenth, c.whole, c.rms, c.peak]) {
+                            *most = most.max(100.0 * x);
+                        }
+                        within = within.min(c.within);
+                        place = place.max(c.place);
                     }
-                    place = place.max(c.place);
+                }
+                let [half, tenth, whole, rms, peak] = most;
+                println!(
+                    "{:12} {padding:7}  {cells:6?}  {half:11.2} %  {tenth:7.2} %  {whole:8.2} %  {rms:7.2} %  {within:15.1}  \
+                     {peak:8.2} %  {place:16.3}",
+                    window.name()
+                );
+                // The estimator of a blurred lobe is not that of the lobe.
+                if cells == CellValue::Centre {
+                    let bounds = if padding == 1 { first } else { other };
+                    let holds = half < bounds[0] && tenth < bounds[1] && whole < bounds[2] && within > bounds[3];
+                    assert!(holds, "{window:?} x{padding}: {half} {tenth} {whole} {within}");
+                    assert!(place < 0.1, "{window:?} x{padding}: {place}");
                 }
             }
-            let [half, tenth, whole, rms, peak] = most;
-            println!(
-                "{:12} {padding:7}  {half:11.2} %  {tenth:7.2} %  {whole:8.2} %  {rms:7.2} %  {peak:8.2} %  {place:16.3}",
-                window.name()
-            );
-            let bounds = if padding == 1 { first } else { other };
-            assert!(
-                half < bounds[0] && tenth < bounds[1] && whole < bounds[2],
-                "{window:?} x{padding}: {half} {tenth} {whole}"
-            );
-            // A parabola through three bins of a sinc is not its peak.
-            let sharp = window == Window::Rectangular && padding == 1;
-            assert!(place < if sharp { 0.25 } else { 0.1 }, "{window:?} x{padding}: {place}");
         }
     }
 }

@@ -14,6 +14,21 @@
 //! gives the window's main lobe, and its peak has the closed form's value, whose weight A_j is that of its own narrowest Gaussian.
 //! Cartesian maps and even steps of angle are read from a fine map of range and sines, linearly, as a processing chain does.
 //!
+//! **How near the closed form comes** (`tests/numerics/signal.rs`: point targets off the bins' centres, up to 50° off boresight, maps
+//! of range with angle or speed). One Gaussian cannot be a window's lobe down to its first minimum: the closest one to a single axis' Hann
+//! lobe is 5 % off there, to a sinc 12 %. Largest difference, % of the peak, to half power, down to −10 dB and over the whole main lobe,
+//! and the level down to which 3 % hold:
+//!
+//! | window | padding 2 to 4 | 3 % hold to | padding 1 | 3 % hold to |
+//! |---|---|---|---|---|
+//! | Hann | 2.8 · 3.4 · 5.6 | −3.4 dB | 0.5 · 4.0 · 7.2 | −9.8 dB |
+//! | Hamming | 2.0 · 2.4 · 3.9 | −21 dB | 2.2 · 4.4 · 7.2 | −6.5 dB |
+//! | Blackman | 1.7 · 2.0 · 2.5 | all of it | 0.4 · 3.1 · 3.8 | −9.7 dB |
+//! | rectangular | 4.9 · 5.8 · 14.6 | nowhere near half power | 12 · 14 · 22 | the peak is 8 % off |
+//!
+//! The place of the peak agrees to 0.1 bin for all of them, the unpadded rectangular too, where the signal's peak is told by that
+//! window's own lobe.
+//!
 //! What stays an approximation: axes are linear about a joint over its own extent, and range, speed and angle do not couple over the
 //! length of a chirp or an array (the radar of [`crate::simulate`] has both).
 
