@@ -1,6 +1,8 @@
-//! What lies over the panes: palette, help sheet, about, go to, the question about a bare file's axes, notifications.
+//! What lies over the panes: palette, help sheet, about, go to, the questions about a bare file's axes and a
+//! capture's chirps, notifications.
 
 mod bare;
+mod capture;
 mod files;
 mod notices;
 mod palette;
@@ -44,6 +46,7 @@ pub(super) struct Overlay {
     presets: bool,
     notices: notices::Notices,
     bare: bare::BareQuestion,
+    capture: capture::CaptureQuestion,
     files: files::FileDialog,
 }
 
@@ -79,7 +82,7 @@ impl Overlay {
 
     /// True while keys belong to a sheet.
     pub(super) fn is_modal(&self) -> bool {
-        self.sheet != Sheet::None || self.bare.is_open() || self.presets
+        self.sheet != Sheet::None || self.bare.is_open() || self.capture.is_open() || self.presets
     }
 
     pub(super) fn notify(&mut self, level: LogLevel, text: String, now: f64) {
@@ -92,6 +95,7 @@ impl Overlay {
 
     pub(super) fn show(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) {
         self.bare.show(ui, shared);
+        self.capture.show(ui, shared);
         self.notices.show(ui, shared);
         self.presets = !matches!(shared.session.presets, PresetCard::Closed);
         if self.presets && self.sheet == Sheet::None && presets::show(ui, shared) {

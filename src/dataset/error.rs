@@ -87,6 +87,16 @@ pub enum DatasetError {
     /// A file of maps whose axes nobody has told yet: ask, then call `Dataset::open_bare`.
     #[error("{0}")]
     NeedsAxes(BareCatalog),
+    /// A capture of which nothing says the chirps: ask, then call `Dataset::open_capture`.
+    #[error(
+        "{path}: nothing beside it says what it is; expected its .cfg or .mmwave.json, or a dataset.toml with layout = \"capture\" and \
+         [capture.chirp] (`mhp-inspector chain --form` prints one to fill in; the window asks, and remembers)",
+        path = path.display()
+    )]
+    NeedsChirp {
+        /// The capture.
+        path: PathBuf,
+    },
     /// A choice of axes that does not fit the file.
     #[error("{path}: the chosen axes do not fit: {message}", path = path.display())]
     BadChoice {

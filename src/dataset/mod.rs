@@ -8,12 +8,13 @@
 //! **What each layout says and does not.** *MMVR* as it is published: Cartesian maps, row 0 far, NaN cells filled before the fit, key
 //! points and masks shown as what they are, image pixels; neither chirp nor point-spread function is published. *HuPR*:
 //! `single_<k>/{hori,vert}/*.npy` cubes; the map is the amplitude at the elevation bin where all twelve antennas sum, which side
-//! is left is assumed. *XRF55*: stacks of 17 maps, assumed to be range × azimuth, as the data set publishes no axes. The loaders of the
-//! last two are tested on files synthesised in the published form, no real file was at hand. *HIBER*: two Cartesian maps a frame with
+//! is left is assumed. *XRF55*: stacks of 17 maps, assumed to be range × azimuth, as the data set publishes no axes; raw clips, whose
+//! maps the chain makes. The loaders of the last two are tested on files synthesised in the published form, no real file was at hand. *HIBER*: two Cartesian maps a frame with
 //! what stands still subtracted, chirp and array published; its joints are in the room's frame, and where the radars stand in it is
-//! found by `calibrate-room`. *RT-Pose*: Cartesian cubes, Doppler bins summed, joints in the radar's frame; its chirp is assumed. No real
-//! file of these was at hand either. *Captures* of a DCA1000 or a cascade, and
-//! cubes of samples: the configuration beside them, or `[capture.chirp]`, says the chirp; which side is left and the antennas' places are assumed. *Generic*: a folder with
+//! found by `calibrate-room`. *RT-Pose*: Cartesian cubes, Doppler bins summed, or the part of them that a manifest asks for, or its raw
+//! cascades made into such cubes; joints in the radar's frame; the chirp of the published cubes is assumed. No real file of these was at
+//! hand either. *Captures* of a DCA1000 or a cascade, and
+//! cubes of samples: the configuration beside them, `[capture.chirp]`, or the form that the window shows, says the chirp; which side is left and the antennas' places are assumed. *Generic*: a folder with
 //! `dataset.toml` and one npz a frame; `samples/walk/dataset.toml` has every key. What is assumed is said on screen and by `info`.
 
 pub mod adc;
@@ -46,7 +47,7 @@ pub use calibration::{ArrayText, FftText, RadarPreset, SweepText, ViewCalibratio
 pub use error::DatasetError;
 pub use frame::{Frame, Heatmap, ImageAnnotations, Truth, map_cells};
 pub use job::OpenJob;
-pub use layout::{BareCatalog, BareChoice, LAYOUTS, Layout, MapArray, Remembered, Stored};
+pub use layout::{BareCatalog, BareChoice, CaptureForm, LAYOUTS, Layout, MapArray, Remembered, Stored};
 pub use loader::{Loaded, Loader};
 pub use manifest::Manifest;
 pub use maps::MapReader;

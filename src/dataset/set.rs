@@ -227,7 +227,7 @@ impl Dataset {
         if i >= self.len() {
             return Err(DatasetError::NoSuchFrame { index: i, count: self.len(), path: self.info.root.clone() });
         }
-        self.frames.stages(i)
+        self.frames.stages(i, &self.info)
     }
 }
 

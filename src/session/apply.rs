@@ -80,6 +80,16 @@ impl Session {
                 self.data.bare = None;
                 Vec::new()
             }
+            Command::OpenCapture(path, form) => {
+                self.data.capture = None;
+                self.data.opening = Some(data::opening(path.clone()));
+                vec![Effect::OpenCapture(path, form)]
+            }
+            Command::DismissCapture => {
+                self.restoring = None;
+                self.data.capture = None;
+                Vec::new()
+            }
             Command::CancelOpen => {
                 self.restoring = None;
                 self.data.opening = None;

@@ -6,7 +6,7 @@ use super::command::PickKind;
 use super::evidence::EvidenceRequest;
 use super::pins::Pin;
 use super::study::StudyRequest;
-use crate::dataset::{BareChoice, Dataset, Frame};
+use crate::dataset::{BareChoice, CaptureForm, Dataset, Frame};
 use crate::explore::{Exploration, ExplorationKind};
 use crate::labels::Judged;
 use crate::mhp::Precision;
@@ -86,6 +86,8 @@ pub enum Effect {
     Open(PathBuf),
     /// Open a bare file with these axes on a thread.
     OpenBare(PathBuf, BareChoice),
+    /// Open a capture whose chirps this says on a thread.
+    OpenCapture(PathBuf, Box<CaptureForm>),
     /// Stop opening.
     CancelOpen,
     /// Show a file dialog on a thread.

@@ -90,6 +90,8 @@ pub struct Data {
     pub opening: Option<Opening>,
     /// A bare file whose axes must be told.
     pub bare: Option<(PathBuf, BareCatalog)>,
+    /// A capture whose chirps must be told.
+    pub capture: Option<PathBuf>,
     /// The frame that was asked for.
     pub frame_index: usize,
     /// The frame on screen.

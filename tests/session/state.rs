@@ -4,7 +4,7 @@
 use crate::{SLOW_MS, dataset};
 use mhp_inspector::body::{Group, Pppr};
 use mhp_inspector::config::{FIELDS, Field, FieldKind, FitConfig, Number, ReadBy, Value};
-use mhp_inspector::dataset::{BareCatalog, BareChoice, Dataset, DatasetError};
+use mhp_inspector::dataset::{BareCatalog, BareChoice, CaptureForm, Dataset, DatasetError};
 use mhp_inspector::mhp::{Adam, Evaluation, FitState, StepReport, StopReason, Terms, initialise};
 use mhp_inspector::session::{
     Command, Effect, FitStatus, History, IterationRow, LogLevel, Notice, PickKind, Report, Session, ThemeChoice,
@@ -269,6 +269,25 @@ fn a_bare_file_asks_for_its_axes() {
     let effects = bench.apply(Command::OpenBare(path.clone(), choice.clone()));
     assert!(matches!(&effects[..], [Effect::OpenBare(p, c)] if *p == path && *c == choice));
     assert!(bench.session.data.bare.is_none() && bench.session.data.opening.is_some());
+}
+
+#[test]
+fn a_capture_without_a_configuration_asks_for_its_chirps() {
+    let (mut bench, path) = (Bench::new(), PathBuf::from("/data/adc_data.bin"));
+    let asks = |bench: &mut Bench| {
+        bench.apply(Command::Open(path.clone()));
+        bench.report(Report::Opened(path.clone(), Err(DatasetError::NeedsChirp { path: path.clone() })));
+    };
+    asks(&mut bench);
+    assert_eq!(bench.session.data.capture.as_ref(), Some(&path));
+    assert!(bench.errors().is_empty(), "a question is no error");
+    bench.apply(Command::DismissCapture);
+    assert_eq!(bench.session.data.capture, None);
+    asks(&mut bench);
+    let form = CaptureForm::usual().unwrap();
+    let effects = bench.apply(Command::OpenCapture(path.clone(), Box::new(form.clone())));
+    assert!(matches!(&effects[..], [Effect::OpenCapture(p, f)] if *p == path && **f == form));
+    assert!(bench.session.data.capture.is_none() && bench.session.data.opening.is_some());
 }
 
 #[test]

@@ -2,10 +2,14 @@
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
 use crate::window::Window;
+use mhp_inspector::dataset::Dataset;
+use mhp_inspector::folders::HOME_VARIABLE;
 use mhp_inspector::radar::{Board, ChirpSettings, Echo, Receiver};
+use mhp_inspector::task::Progress;
 use num_complex::Complex64;
 use rand::SeedableRng as _;
 use std::path::Path;
+use std::process::Command;
 
 /// A capture of a mover at 3 m and of a wall, with its `.cfg`, taken as `said` has it.
 fn write_capture(folder: &Path, said: &str) {
@@ -65,6 +69,59 @@ fn a_capture_shows_its_chain_and_what_is_wrong_with_it() {
     let mut maps = Window::open(1);
     maps.click("Radar chain");
     assert!(maps.says("No samples of a converter"), "{:?}", maps.names());
+}
+
+/// A capture that came alone: the window asks how it was recorded, tells what follows while it is typed, and remembers.
+#[test]
+fn a_capture_without_a_configuration_is_asked_for() {
+    // What is remembered must not go into the home of whoever runs the tests.
+    if std::env::var_os(HOME_VARIABLE).is_none() {
+        let home = tempfile::tempdir().unwrap();
+        let mut alone = Command::new(std::env::current_exe().unwrap());
+        alone.args(["--exact", "radar::a_capture_without_a_configuration_is_asked_for", "--nocapture"]);
+        let done = alone.env(HOME_VARIABLE, home.path()).output().unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        assert!(home.path().join("captures.toml").is_file());
+        return;
+    }
+    let mut shown = Window::open(1);
+    let folder = shown.folder.path().join("alone");
+    std::fs::create_dir(&folder).unwrap();
+    write_capture(&folder, "");
+    for file in ["chirps.cfg", "dataset.toml"] {
+        std::fs::remove_file(folder.join(file)).unwrap();
+    }
+    let capture = folder.join("adc_data.bin");
+    shown.drop_file(&capture);
+    shown.until("the question", |w| w.says("How was this recorded?"));
+    assert!(shown.says("256 samples at 5.00 Msps"), "{:?}", shown.names());
+    for (name, value) in [
+        ("Samples a chirp", "128"),
+        ("Sampling rate", "4000"),
+        ("Loops a frame", "16"),
+        ("End of the ramp", "60"),
+        ("Begin of sampling", "40"),
+    ] {
+        shown.type_value(name, value);
+    }
+    // 128 samples at 4 Msps after 40 µs of a ramp of 60.
+    assert!(
+        shown.says("128 samples at 4.00 Msps over 1.92 GHz") && shown.says("after the ramp"),
+        "{:?}",
+        shown.names()
+    );
+    shown.type_value("Begin of sampling", "5");
+    assert!(!shown.says("after the ramp"), "{:?}", shown.names());
+    shown.click("Open this capture");
+    shown.until("the capture", |w| {
+        w.session().data.dataset.as_ref().is_some_and(|dataset| dataset.info().layout.word() == "capture")
+    });
+    let dataset = shown.session().data.dataset.clone().unwrap();
+    assert_eq!((dataset.len(), dataset.info().views.len()), (3, 2));
+    // Remembered for this file, and for its folder.
+    let again = Dataset::open(&folder, &Progress::new()).unwrap();
+    assert_eq!(again.info().radar, dataset.info().radar);
+    assert!(!folder.join("dataset.toml").exists(), "nothing is written beside the capture");
 }
 
 #[test]

@@ -585,6 +585,12 @@ fn everything_that_can_be_used_has_a_name() {
     window.drop_file(&bare);
     window.until("the question", |w| w.says("What do these maps measure?"));
     look(&mut window, "the question");
+    window.key(Key::Escape);
+    let capture = window.folder.path().join("adc_data.bin");
+    std::fs::write(&capture, [0; 64]).unwrap();
+    window.drop_file(&capture);
+    window.until("the form", |w| w.says("How was this recorded?"));
+    look(&mut window, "the form");
     assert_eq!(unnamed, Vec::<String>::new());
 }
 

@@ -59,7 +59,7 @@ pub(super) const COMMANDS: &[CommandRow] = &[
     CommandRow {
         label: "Open file…",
         title: None,
-        tooltip: "Open one *_radar.npz, a dataset.toml, or a bare .npy or .npz of maps.",
+        tooltip: "Open one *_radar.npz, a dataset.toml, a capture (.bin, .pcap), or a bare .npy or .npz of maps.",
         menu: Menu::File,
         keys: &[(CTRL_SHIFT, Key::O)],
         enabled: always,

@@ -18,14 +18,14 @@ mod ti_cfg;
 use decode::number;
 pub use decode::{IqOrder, decode};
 pub use payload::{Gaps, Payload};
-pub use source::SampleSource;
+pub use source::{CubeOrder, SampleSource};
 pub(in crate::dataset) use source::{cascade_of, chip_of, is_npy};
 pub use stages::{ChainStages, StageLimit, limits};
 pub use studio::parse_studio;
 pub use ti_cfg::parse_cfg;
 
 use crate::radar::ChirpSettings;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// How the converter's words follow each other in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,7 +77,7 @@ fn transmitter(mask: u32) -> Result<usize, String> {
 }
 
 /// The table `[capture]` of a manifest: what no configuration file says, or says wrongly; all of it may be left out.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AdcText {
     /// The configuration, relative to the folder: a `.cfg` or a `.mmwave.json`; else the one beside the capture.
@@ -108,12 +108,12 @@ pub struct AdcText {
     pub padding: Option<toml::Value>,
     /// Ranges beyond this are dropped, m; 10 where nothing is said.
     pub max_range_m: Option<f64>,
-    /// What maps are made: `range_azimuth`, `range_elevation`, `range_doppler`, `cartesian`, `cube`.
+    /// What maps are made: `range_azimuth`, `range_elevation`, `range_doppler`, `cartesian`, `cube`, `cartesian_cube`.
     pub views: Option<Vec<String>>,
 }
 
 /// The chirps of a capture as a person writes them, in the units of configuration files.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChirpText {
     /// Frequency at which the ramp begins, GHz.

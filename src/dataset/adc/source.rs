@@ -2,7 +2,8 @@
 //!
 //! A cascade of four chips (MMWCAS) writes one file a chip, `master_0000_data.bin`, `slave1_…` to `slave3_…`: frame, loop, chirp,
 //! sample, its four receivers, I and Q. Cubes are (loops, channels, samples), or (frames, loops, channels, samples), channels
-//! (transmitter in the order of sending, receiver), complex; some were stored as if the words had been read without sign
+//! (transmitter in the order of sending, receiver), complex; or (frames, transmitters, samples, receivers, loops), as XRF55 publishes
+//! its segmented captures. Some were stored as if the words had been read without sign
 //! (`OpenRadar`'s own), which values above 32767 tell, and are wrapped.
 
 use super::{AdcSettings, IqOrder, Payload, decode, number};
@@ -28,7 +29,18 @@ pub enum SampleSource {
         cube: NpyCube,
         /// Whether numbers above 32767 are negative ones that lost their sign.
         wrapped: bool,
+        /// How its axes follow each other after that of the frames, if it has one.
+        order: CubeOrder,
     },
+}
+
+/// The axes of a frame in a cube of samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CubeOrder {
+    /// (loop, channel, sample).
+    Loops,
+    /// (transmitter, sample, receiver, loop).
+    Transmitters,
 }
 
 impl SampleSource {
@@ -41,21 +53,28 @@ impl SampleSource {
             [one] if is_npy(one) => {
                 let cube = NpyCube::open(one)?;
                 let chirp = &settings.chirp;
-                let expected = [chirp.loops, chirp.tx.len() * chirp.rx, chirp.samples];
                 let sizes = cube.shape();
-                let inner = if sizes.len() == 4 { &sizes[1..] } else { sizes };
-                if inner != expected || !cube.is_complex() {
+                let plain = [chirp.loops, chirp.tx.len() * chirp.rx, chirp.samples];
+                let segmented = [chirp.tx.len(), chirp.samples, chirp.rx, chirp.loops];
+                let order = match sizes {
+                    [_, rest @ ..] if sizes.len() == 5 && *rest == segmented => Some(CubeOrder::Transmitters),
+                    [_, rest @ ..] if sizes.len() == 4 && *rest == plain => Some(CubeOrder::Loops),
+                    all if *all == plain => Some(CubeOrder::Loops),
+                    _ => None,
+                };
+                let Some(order) = order.filter(|_| cube.is_complex()) else {
                     let message = format!(
-                        "an array {sizes:?} of {}; expected complex numbers, (loops, transmitters · receivers, samples) = {expected:?} \
-                         as its configuration says, or frames of them",
+                        "an array {sizes:?} of {}; expected complex numbers, (loops, transmitters · receivers, samples) = {plain:?} as \
+                         its configuration says, frames of them, or frames of (transmitters, samples, receivers, loops) = \
+                         {segmented:?}",
                         cube.dtype()
                     );
                     return Err(DatasetError::Frame { message, path: one.clone() });
-                }
-                let len = expected.iter().product();
-                let first = cube.read(0, len)?;
+                };
+                let empty = sizes.contains(&0);
+                let first = if empty { Vec::new() } else { cube.read(0, plain.iter().product())? };
                 let wrapped = first.iter().any(|x| x.re > 32_767.0 || x.im > 32_767.0);
-                Ok(Self::Numbers { cube, wrapped })
+                Ok(Self::Numbers { cube, wrapped, order })
             }
             [one] => Payload::open(one).map(Self::Words),
             several => several.iter().map(|path| Payload::open(path)).collect::<Result<_, _>>().map(Self::Cascade),
@@ -91,7 +110,7 @@ impl SampleSource {
                 let shortest = chips.iter().map(Payload::len).min().unwrap_or(0);
                 (shortest / bytes, chips.iter().map(|chip| chip.len() - shortest / bytes * bytes).max().unwrap_or(0))
             }
-            Self::Numbers { cube, .. } => (if cube.shape().len() == 4 { cube.shape()[0] as u64 } else { 1 }, 0),
+            Self::Numbers { cube, .. } => (if cube.shape().len() > 3 { cube.shape()[0] as u64 } else { 1 }, 0),
         }
     }
 
@@ -135,7 +154,7 @@ impl SampleSource {
                 let bytes = chips.iter().map(|chip| chip.read(frame * len, len as usize));
                 Ok(decode_cascade(&bytes.collect::<Result<Vec<_>, _>>()?, settings, iq))
             }
-            Self::Numbers { cube, wrapped } => {
+            Self::Numbers { cube, wrapped, order } => {
                 let len = chirp.loops * channels * chirp.samples;
                 let mut data = cube.read(frame * len as u64, len)?;
                 if *wrapped {
@@ -144,10 +163,27 @@ impl SampleSource {
                         *x = Complex64::new(signed(x.re), signed(x.im));
                     }
                 }
+                if *order == CubeOrder::Transmitters {
+                    data = by_loops(&data, [chirp.tx.len(), chirp.samples, chirp.rx, chirp.loops]);
+                }
                 Ok(AdcCube { loops: chirp.loops, channels, samples: chirp.samples, data })
             }
         }
     }
+}
+
+/// A frame of (transmitter, sample, receiver, loop) as one of (loop, channel, sample).
+fn by_loops(data: &[Complex64], [tx, samples, rx, loops]: [usize; 4]) -> Vec<Complex64> {
+    let mut out = Vec::with_capacity(data.len());
+    for turn in 0..loops {
+        for transmitter in 0..tx {
+            for receiver in 0..rx {
+                let at = |sample: usize| ((transmitter * samples + sample) * rx + receiver) * loops + turn;
+                out.extend((0..samples).map(|sample| data.get(at(sample)).copied().unwrap_or_default()));
+            }
+        }
+    }
+    out
 }
 
 /// The words of a cascade's chips: (loop, transmitter, sample, receiver, I and Q) each; what is missing at an end is 0.

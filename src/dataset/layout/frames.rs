@@ -86,7 +86,7 @@ pub trait FrameSource: Debug + Send + Sync {
     ///
     /// # Errors
     /// As [`Self::maps`].
-    fn stages(&self, _i: usize) -> Result<Option<ChainStages>, DatasetError> {
+    fn stages(&self, _i: usize, _info: &DatasetInfo) -> Result<Option<ChainStages>, DatasetError> {
         Ok(None)
     }
 }

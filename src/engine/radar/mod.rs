@@ -9,6 +9,7 @@ mod config;
 mod fft;
 mod fmcw;
 mod native;
+mod planar;
 mod psf;
 mod reflector;
 mod spatial;
@@ -26,6 +27,7 @@ pub use config::{RadarConfig, SPEED_OF_LIGHT};
 pub use fft::{Chain, PolarMap, RadarCube, RangeDoppler};
 pub use fmcw::{AdcCube, Echo, Fmcw, PointMotion, Receiver, add_leakage, path_gain};
 pub use native::{NativeAxes, interpolate, sine_deg};
+pub use planar::{PlanarMap, PlanarRows};
 pub use psf::{
     FftSetup, Resolved, ViewFft, doppler_sigma_mps, first_null_bins, main_lobe_sigma_bins, range_sigma_m, sine_sigma,
 };

@@ -15,12 +15,9 @@
 use super::Radar;
 use crate::geometry::Vec3;
 use crate::radar::{
-    AdcCube, Axis, AxisKind, Chain, FftSetup, Fmcw, MimoArray, RadarConfig, RangeDoppler, SPEED_OF_LIGHT, Spacing,
-    View, Window,
+    AdcCube, Axis, AxisKind, Chain, FftSetup, Fmcw, MimoArray, PlanarRows, RadarConfig, SPEED_OF_LIGHT, Spacing, View,
+    Window,
 };
-use num_complex::Complex64;
-use rustfft::FftPlanner;
-use std::f64::consts::PI;
 
 /// Seconds from one radar frame of HIBER to the next; two make a frame of its annotations.
 pub const HIBER_FRAME_S: f64 = 0.05;
@@ -50,12 +47,8 @@ const TX: [(f64, f64); 12] = [
 ];
 /// Elements of the line.
 const LINE: usize = 86;
-/// Heights of the rows of elements, half waves.
-const ROWS: [f64; 4] = [0.0, 1.0, 4.0, 6.0];
-/// Of these so many would make an even line as long.
+/// Of rows at heights of 0, 1, 4 and 6 half waves so many would make an even line as long.
 const ROW_SPAN: usize = 7;
-/// Bins of the sine along y, and along z, of a cube before it becomes Cartesian.
-const SINES: [usize; 2] = [128, 32];
 
 /// The array about the middle of its line; y grows along the board.
 fn array(spacing_m: f64) -> MimoArray {
@@ -181,7 +174,7 @@ pub(super) fn rt_pose() -> Vec<Radar> {
         doppler_window: Window::Hann,
         doppler_fft: loops,
         angle_window: Window::Rectangular,
-        angle_fft: SINES[0],
+        angle_fft: 128,
         still_share: 1.0,
         max_range_m: 11.6,
     };
@@ -198,89 +191,11 @@ pub(super) fn rt_pose_setup(radar: &Radar) -> FftSetup {
     }
 }
 
-/// Power by range, sine along z, sine along y.
-struct Polar {
-    ranges: usize,
-    range_step_m: f64,
-    power: Vec<f32>,
-}
-
 /// A cube of RT-Pose: amplitudes, z, y, x.
 pub(super) fn rt_pose_cube(radar: &Radar, view: &View, chain: &Chain, adc: &AdcCube) -> Vec<f64> {
     let [z, y, x] = &view.axes[..] else { return Vec::new() };
-    let polar = polar(&chain.range_doppler(&radar.fmcw, adc));
-    let mut cube = Vec::with_capacity(z.bins * y.bins * x.bins);
-    let centre = |axis: &Axis, bin: usize| axis.at(bin as f64);
-    for up in (0..z.bins).map(|bin| centre(z, bin)) {
-        for left in (0..y.bins).map(|bin| centre(y, bin)) {
-            for ahead in (0..x.bins).map(|bin| centre(x, bin)) {
-                let range = ahead.hypot(left).hypot(up);
-                cube.push(polar.at(range, left / range, up / range).sqrt());
-            }
-        }
-    }
-    cube
-}
-
-/// Both angle transforms of the rows of elements, powers summed over Doppler.
-fn polar(spectra: &RangeDoppler) -> Polar {
-    let [sines, heights] = SINES;
-    let rows: Vec<Vec<(usize, usize)>> = ROWS.iter().map(|&height| row(height)).collect();
-    let along = FftPlanner::new().plan_fft_inverse(sines);
-    // A scatterer above has a shorter way to a higher row: with it the phase falls, and is turned back.
-    let turns: Vec<Vec<Complex64>> = (0..heights)
-        .map(|k| {
-            let sine = 2.0 * (k as f64 - (heights / 2) as f64) / heights as f64;
-            ROWS.iter().map(|row| Complex64::cis(PI * row * sine)).collect()
-        })
-        .collect();
-    let mut power = vec![0.0_f32; spectra.ranges * heights * sines];
-    let mut lines = vec![vec![Complex64::ZERO; sines]; rows.len()];
-    for range in 0..spectra.ranges {
-        for doppler in 0..spectra.dopplers {
-            for (line, row) in lines.iter_mut().zip(&rows) {
-                line.fill(Complex64::ZERO);
-                let share = 1.0 / row.len() as f64;
-                for &(place, channel) in row {
-                    let at = (range * spectra.channels + channel) * spectra.dopplers + doppler;
-                    line[place] = spectra.data[at] * share;
-                }
-                along.process(line);
-            }
-            for (height, turns) in turns.iter().enumerate() {
-                let cells = &mut power[(range * heights + height) * sines..][..sines];
-                for (k, cell) in cells.iter_mut().enumerate() {
-                    let from = (k + sines / 2) % sines;
-                    let sum: Complex64 = lines.iter().zip(turns).map(|(line, turn)| line[from] * turn).sum();
-                    *cell += sum.norm_sqr() as f32;
-                }
-            }
-        }
-    }
-    Polar { ranges: spectra.ranges, range_step_m: spectra.range_step_m, power }
-}
-
-impl Polar {
-    /// Power at a range and the sines along y and z, linear between bins; 0 beyond the last range. Both sines are periodic.
-    fn at(&self, range_m: f64, left: f64, up: f64) -> f64 {
-        let [sines, heights] = SINES;
-        let r = range_m / self.range_step_m;
-        if !(r.is_finite() && left.is_finite() && up.is_finite()) || r + 1.0 >= self.ranges as f64 {
-            return 0.0;
-        }
-        let split = |x: f64| (x.floor(), x - x.floor());
-        let ((r0, r), (s0, s)) = (split(r), split((left / 2.0 + 0.5) * sines as f64));
-        let (h0, h) = split((up / 2.0 + 0.5) * heights as f64);
-        let cell = |range: f64, height: f64, sine: f64| {
-            let (range, height) = (range as usize, (height as i64).rem_euclid(heights as i64) as usize);
-            let sine = (sine as i64).rem_euclid(sines as i64) as usize;
-            f64::from(self.power[(range * heights + height) * sines + sine])
-        };
-        let mix = |share: f64, a: f64, b: f64| (1.0 - share) * a + share * b;
-        let line = |range: f64, height: f64| mix(s, cell(range, height, s0), cell(range, height, s0 + 1.0));
-        let plane = |range: f64| mix(h, line(range, h0), line(range, h0 + 1.0));
-        mix(r, plane(r0), plane(r0 + 1.0))
-    }
+    let rows = PlanarRows::of(&radar.fmcw.array, radar.spacing_m, radar.fmcw.radar.wavelength_m());
+    rows.map_or_else(Vec::new, |rows| rows.map(&chain.range_doppler(&radar.fmcw, adc)).cartesian([z, y, x]))
 }
 
 /// The bounds of HIBER's maps: outer edges along the rows, far first, and along the columns.
@@ -300,7 +215,7 @@ mod tests {
     fn nine_transmitters_make_a_whole_line_of_86() {
         let elements = row(0.0);
         assert_eq!(elements.iter().map(|(place, _)| *place).collect::<Vec<_>>(), (0..LINE).collect::<Vec<_>>());
-        assert!(ROWS[1..].iter().all(|&height| row(height).len() == 16));
+        assert!([1.0, 4.0, 6.0].iter().all(|&height| row(height).len() == 16));
         let spacing_m = 0.0019;
         let array = array(spacing_m);
         let places: Vec<f64> = line().into_iter().map(|c| array.tx[c / 16][1] + array.rx[c % 16][1]).collect();

@@ -25,7 +25,7 @@ const KEPT_FIT_BYTES: usize = 4 << 20;
 
 impl Session {
     pub(super) fn open(&mut self, path: PathBuf) -> Vec<Effect> {
-        self.data.bare = None;
+        (self.data.bare, self.data.capture) = (None, None);
         self.aim = StartAt::default();
         self.data.opening = Some(opening(path.clone()));
         vec![Effect::Open(path)]
@@ -37,6 +37,10 @@ impl Session {
             Ok(dataset) => dataset,
             Err(DatasetError::NeedsAxes(catalog)) => {
                 self.data.bare = Some((path, catalog));
+                return Vec::new();
+            }
+            Err(DatasetError::NeedsChirp { path: capture }) => {
+                self.data.capture = Some(capture);
                 return Vec::new();
             }
             Err(DatasetError::Cancelled) => {

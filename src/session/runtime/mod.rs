@@ -216,6 +216,10 @@ impl Runtime {
                 let result = Dataset::open_bare(&path, &choice).map(Arc::new);
                 Report::Opened(path, result)
             }),
+            Effect::OpenCapture(path, form) => self.on_thread("open-capture", move || {
+                let result = Dataset::open_capture(&path, &form).map(Arc::new);
+                Report::Opened(path, result)
+            }),
             Effect::CancelOpen => {
                 if let Some((_, job)) = self.opening.take() {
                     job.cancel();

@@ -10,11 +10,19 @@
 //! | `range_doppler` | range, radial speed | all antennas, powers summed |
 //! | `cartesian` | depth and y (upright: z), m | the first or second of these, cell by cell |
 //! | `cube` | range, sine, radial speed | the line, amplitudes |
+//! | `cartesian_cube` | z, y, x, m | all rows of antennas, where they lie above each other; powers summed over Doppler |
 //!
 //! Their point-spread widths follow from the chain.
 
+mod form;
 mod frames;
+mod maker;
 mod settings;
+
+pub use form::CaptureForm;
+pub(super) use frames::tell_iq;
+pub(super) use maker::Maker;
+pub(super) use settings::{config_in, processing_of, settings_from};
 
 use super::pattern::leads_out;
 use super::{DataFolder, Layout, Opened, manifest_beside};
@@ -24,8 +32,9 @@ use crate::dataset::axes_text::axes_badge;
 use crate::dataset::manifest::Manifest;
 use crate::dataset::set::parent;
 use crate::task::Progress;
+use form::Forms;
 use frames::Frames;
-use settings::{config_beside, processing_of, settings_of};
+use settings::{config_beside, settings_of};
 use std::path::{Path, PathBuf};
 
 /// The layout.
@@ -34,16 +43,26 @@ pub(super) struct Dca;
 
 /// A map that is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum ViewWish {
+pub(super) enum ViewWish {
     RangeAzimuth,
     RangeElevation,
     RangeDoppler,
     Cartesian,
     Cube,
+    CartesianCube,
 }
 
 impl ViewWish {
-    const NAMES: &str = "\"range_azimuth\", \"range_elevation\", \"range_doppler\", \"cartesian\", \"cube\"";
+    const NAMES: &str =
+        "\"range_azimuth\", \"range_elevation\", \"range_doppler\", \"cartesian\", \"cube\", \"cartesian_cube\"";
+    const ALL: [Self; 6] = [
+        Self::RangeAzimuth,
+        Self::RangeElevation,
+        Self::RangeDoppler,
+        Self::Cartesian,
+        Self::Cube,
+        Self::CartesianCube,
+    ];
 
     fn name(self) -> &'static str {
         match self {
@@ -52,12 +71,12 @@ impl ViewWish {
             Self::RangeDoppler => "range_doppler",
             Self::Cartesian => "cartesian",
             Self::Cube => "cube",
+            Self::CartesianCube => "cartesian_cube",
         }
     }
 
     fn named(name: &str) -> Option<Self> {
-        let all = [Self::RangeAzimuth, Self::RangeElevation, Self::RangeDoppler, Self::Cartesian, Self::Cube];
-        all.into_iter().find(|wish| wish.name() == name)
+        Self::ALL.into_iter().find(|wish| wish.name() == name)
     }
 }
 
@@ -94,7 +113,13 @@ impl Layout for Dca {
             None => files_in(place.root)?.into_iter().filter(|path| is_capture(path) && is_first(path)).collect(),
         };
         match &captures[..] {
-            [one] if said(place).chirp.is_some() || config_beside(one, place)?.is_some() => open_capture(one, place),
+            [one]
+                if said(place).chirp.is_some()
+                    || config_beside(one, place)?.is_some()
+                    || remembered(one, place)?.is_some() =>
+            {
+                open_capture(one, place)
+            }
             [] | [_] => Err(without()),
             several => {
                 let names = several.iter().map(|path| path.file_name().unwrap_or_default().to_string_lossy());
@@ -145,7 +170,22 @@ fn said(place: &DataFolder<'_>) -> AdcText {
     place.manifest.capture.clone().unwrap_or_default()
 }
 
+/// What a person said of a capture of which no file says anything.
+fn remembered(capture: &Path, place: &DataFolder<'_>) -> Result<Option<Manifest>, DatasetError> {
+    if said(place).chirp.is_some() || config_beside(capture, place)?.is_some() {
+        return Ok(None);
+    }
+    Ok(Forms::of_user().and_then(|forms| forms.recall(capture)))
+}
+
 fn open_capture(capture: &Path, place: &DataFolder<'_>) -> Result<Opened, DatasetError> {
+    if let Some(manifest) = remembered(capture, place)? {
+        return open_told(capture, &DataFolder { manifest: &manifest, ..*place });
+    }
+    open_told(capture, place)
+}
+
+fn open_told(capture: &Path, place: &DataFolder<'_>) -> Result<Opened, DatasetError> {
     let (settings, config) = settings_of(capture, place)?;
     let files = cascade_of(capture)?.unwrap_or_else(|| vec![capture.to_owned()]);
     if settings.chirp.rx % files.len() != 0 {
@@ -169,12 +209,12 @@ fn open_capture(capture: &Path, place: &DataFolder<'_>) -> Result<Opened, Datase
     }
     let name = capture.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let count = usize::try_from(count).unwrap_or(usize::MAX);
-    let frames = Frames::new(name, source, settings, &processing, count)?;
+    let frames = Frames::new(name, source, Maker::new(settings, &processing), count)?;
     let mut info = place.info(&place.manifest.layout.preset()?);
-    info.radar = frames.radar().clone();
-    (info.views, info.calibrations) = frames.views()?;
+    info.radar = frames.maker().radar().clone();
+    (info.views, info.calibrations) = frames.maker().views().map_err(|message| frames.fault(message))?;
     info.axes_badge = axes_badge(&info.views);
-    info.frame_rate_hz = info.frame_rate_hz.or(Some(1.0 / frames.chirp().period_s));
+    info.frame_rate_hz = info.frame_rate_hz.or(Some(1.0 / frames.maker().chirp().period_s));
     if place.manifest.name.is_none() {
         frames.name().clone_into(&mut info.name);
     }

@@ -22,7 +22,15 @@ pub(super) fn config_beside(capture: &Path, place: &DataFolder<'_>) -> Result<Op
     if let Some(name) = said(place).config {
         return Ok(Some(place.root.join(name)));
     }
-    let configs = files_in(parent(capture))?;
+    config_in(parent(capture), capture)
+}
+
+/// The only configuration in a folder; `capture` is for messages.
+///
+/// # Errors
+/// Where the folder cannot be read, or has two.
+pub(in crate::dataset::layout) fn config_in(folder: &Path, capture: &Path) -> Result<Option<PathBuf>, DatasetError> {
+    let configs = files_in(folder)?;
     let ends = |path: &Path, ending: &str| path.to_string_lossy().to_lowercase().ends_with(ending);
     for ending in [".mmwave.json", ".cfg"] {
         let found: Vec<&PathBuf> = configs.iter().filter(|path| ends(path, ending)).collect();
@@ -51,26 +59,52 @@ pub(super) fn settings_of(capture: &Path, place: &DataFolder<'_>) -> Result<(Adc
         (settings, place.manifest.path.clone())
     } else {
         let Some(path) = config_beside(capture, place)? else {
-            let message = "nothing beside it says what it is; expected its .cfg or .mmwave.json, or a dataset.toml with layout = \
-                           \"capture\" and [capture.chirp] (`mhp-inspector chain --form` prints one to fill in)";
-            return Err(DatasetError::Frame { message: message.into(), path: capture.to_owned() });
+            return Err(DatasetError::NeedsChirp { path: capture.to_owned() });
         };
-        let content = read_text(&path, "a radar's configuration", MOST_TEXT)
-            .map_err(|reason| DatasetError::Read { reason, path: path.clone() })?;
-        let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-        (if is_json { parse_studio(&content, &path) } else { parse_cfg(&content, &path) }?, path)
+        (settings_in(&path)?, path)
     };
+    let from = checked(&text, &mut settings, place, from)?;
+    Ok((settings, from))
+}
+
+/// What the file of a configuration says, with what the manifest says over it.
+///
+/// # Errors
+/// Where it cannot be read or makes no sense.
+pub(in crate::dataset::layout) fn settings_from(
+    config: &Path,
+    place: &DataFolder<'_>,
+) -> Result<AdcSettings, DatasetError> {
+    let mut settings = settings_in(config)?;
+    checked(&said(place), &mut settings, place, config.to_owned())?;
+    Ok(settings)
+}
+
+fn settings_in(config: &Path) -> Result<AdcSettings, DatasetError> {
+    let content = read_text(config, "a radar's configuration", MOST_TEXT)
+        .map_err(|reason| DatasetError::Read { reason, path: config.to_owned() })?;
+    let is_json = config.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+    if is_json { parse_studio(&content, config) } else { parse_cfg(&content, config) }
+}
+
+/// The settings with what the manifest says of words; `from` is where they are from.
+fn checked(
+    text: &AdcText,
+    settings: &mut AdcSettings,
+    place: &DataFolder<'_>,
+    from: PathBuf,
+) -> Result<PathBuf, DatasetError> {
     let fault = |message: String| DatasetError::Manifest { message, line: None, path: place.manifest.path.clone() };
     if let Some(message) = settings.chirp.fault() {
         return Err(fault(format!("[capture.chirp]: {message}")));
     }
-    say_words(&text, &mut settings.words).map_err(fault)?;
+    say_words(text, &mut settings.words).map_err(fault)?;
     if settings.frame_bytes() > MOST_FRAME {
         let message =
             format!("its chirps make {} bytes a frame; expected at most {MOST_FRAME}", settings.frame_bytes());
         return Err(DatasetError::Manifest { message, line: None, path: from });
     }
-    Ok((settings, from))
+    Ok(from)
 }
 
 /// What the manifest says of words, over what the configuration says.
@@ -95,7 +129,7 @@ fn say_words(text: &AdcText, words: &mut WordOrder) -> Result<(), String> {
 }
 
 /// What is done with the samples.
-pub(super) struct Processing {
+pub(in crate::dataset::layout) struct Processing {
     pub(super) board: Board,
     /// Whether the board stands on its side: its line of elements measures height.
     pub(super) upright: bool,
@@ -112,7 +146,7 @@ impl Processing {
     }
 }
 
-pub(super) fn processing_of(
+pub(in crate::dataset::layout) fn processing_of(
     settings: &AdcSettings,
     place: &DataFolder<'_>,
     chips: usize,

@@ -3,9 +3,12 @@
 //! `Train.json` and `Test.json`.
 //!
 //! A view has three axes at most: of Doppler bins the root of the summed power is taken, as everywhere in this program where Doppler is
-//! left out. They are read in pieces, so that no more than a cube is held.
+//! left out. They are read in pieces, so that no more than a cube is held. A view whose axes are a part of the published grid, such as
+//! the region of interest that the published training uses, takes that part of every cube. Raw captures of the cascade become the same
+//! cubes (`raw.rs`).
 
 mod labels;
+mod raw;
 mod write;
 
 use super::index::{Folders, Segment};
@@ -25,6 +28,12 @@ use std::path::{Path, PathBuf};
 
 /// The folders of cubes of a sequence; of several the first is taken.
 const CUBES: [&str; 4] = ["npy", "DZYX_npy_f16", "npy_DZYX_complex", "DZYX_npy_f16_complex"];
+/// Where messages say that the preset is.
+const PRESET_PATH: &str = "assets/rt_pose.toml";
+/// Cells of a published cube, z, y, x.
+const GRID: [usize; 3] = [32, 128, 256];
+/// Of a step so much may an axis be off the published grid.
+const OFF_GRID: f64 = 0.01;
 /// Folders inside each other that are looked into, those of the cubes included.
 const MAX_DEPTH: usize = 5;
 
@@ -38,7 +47,7 @@ impl Layout for RtPose {
     }
 
     fn preset_text(&self) -> Option<(&'static str, &'static str)> {
-        Some((include_str!("../../../../assets/rt_pose.toml"), "assets/rt_pose.toml"))
+        Some((include_str!("../../../../assets/rt_pose.toml"), PRESET_PATH))
     }
 
     fn signs(&self) -> Option<&'static str> {
@@ -79,10 +88,7 @@ fn cube_stem(name: &str) -> Option<&str> {
 fn open(place: &DataFolder<'_>, named: Option<&str>, progress: &Progress) -> Result<Opened, DatasetError> {
     progress.begin("listing folders", 0);
     let (segments, mut notes) = sequences(place.root, progress)?;
-    let Some(first) = segments.first() else {
-        let expected = "RT-Pose's <sequence>/npy/F.npy or DZYX_npy_f16/F.npy in it or in a folder below";
-        return Err(place.without_frames(expected.into()));
-    };
+    let Some(first) = segments.first() else { return raw::open(place, progress) };
     let (labels, calibration) = (Labels::near(&first.path), calibration(&first.path));
     let folders = Folders::new(segments);
     let at = |named| (0..folders.count()).find(|&i| folders.find(i).is_some_and(|(_, stem)| stem == named));
@@ -153,11 +159,13 @@ struct Form {
     /// 2 where real and imaginary part have an axis of their own.
     parts: usize,
     complex: bool,
+    /// The first cell of the part of the published grid that is taken, where it is not all of the file.
+    window: Option<[usize; 3]>,
 }
 
 impl Default for Form {
     fn default() -> Self {
-        Self { dopplers: 1, parts: 1, complex: false }
+        Self { dopplers: 1, parts: 1, complex: false, window: None }
     }
 }
 
@@ -167,7 +175,9 @@ impl Form {
         let mut file = NpzArchive::open(path)?;
         let (entry, cells) = (file.entry(NPY_KEY)?, view.shape());
         let complex = !entry.is_real && entry.dtype.contains('c');
-        let (dopplers, parts) = match entry.shape.strip_suffix(&cells[..]) {
+        let window = window_of(view).filter(|_| cells != GRID && entry.shape.ends_with(&GRID));
+        let of_file = if window.is_some() { &GRID[..] } else { &cells[..] };
+        let (dopplers, parts) = match entry.shape.strip_suffix(of_file) {
             Some([]) => (1, 1),
             Some([dopplers]) => (*dopplers, 1),
             Some([2, dopplers]) if !complex => (*dopplers, 2),
@@ -178,7 +188,7 @@ impl Form {
                 return Err(file.wrong_shape(NPY_KEY, &entry.shape, expected).into());
             }
         };
-        Ok(Self { dopplers, parts, complex })
+        Ok(Self { dopplers, parts, complex, window })
     }
 
     fn words(self) -> String {
@@ -187,11 +197,42 @@ impl Form {
             (false, 2) => "real and imaginary parts",
             _ => "real numbers, taken for amplitudes",
         };
+        let part = if self.window.is_some() { "; a part of the published grid is taken" } else { "" };
         if self.dopplers == 1 {
-            return format!("cubes: {numbers}, one a cell");
+            return format!("cubes: {numbers}, one a cell{part}");
         }
-        format!("cubes: {numbers} of {} Doppler bins a cell; the map is the root of their summed power", self.dopplers)
+        format!(
+            "cubes: {numbers} of {} Doppler bins a cell; the map is the root of their summed power{part}",
+            self.dopplers
+        )
     }
+}
+
+/// The first cell, on the published grid, of a view whose axes are a part of it.
+fn window_of(view: &View) -> Option<[usize; 3]> {
+    let preset = <dyn Layout>::preset(&RtPose).ok()?;
+    let grid = &preset.views.first()?.axes;
+    let mut first = [0; 3];
+    for ((axis, of), first) in view.axes.iter().zip(grid).zip(&mut first) {
+        let at = of.bin(axis.lo);
+        let same_step = (axis.step() / of.step() - 1.0).abs() * (axis.bins as f64) < OFF_GRID;
+        let inside = at > -OFF_GRID && at.round() as usize + axis.bins <= of.bins;
+        if axis.kind != of.kind || !same_step || !inside || (at - at.round()).abs() > OFF_GRID {
+            return None;
+        }
+        *first = at.round() as usize;
+    }
+    (view.axes.len() == 3).then_some(first)
+}
+
+/// The cells of `shape` from `first` on, of a cube of the published grid.
+fn part_of(cube: &[f64], first: [usize; 3], shape: &[usize]) -> Vec<f64> {
+    let &[z, y, x] = shape else { return Vec::new() };
+    let row = |z: usize, y: usize| {
+        let from = ((first[0] + z) * GRID[1] + first[1] + y) * GRID[2] + first[2];
+        cube.get(from..from + x).unwrap_or_default()
+    };
+    (0..z).flat_map(|z| (0..y).map(move |y| (z, y))).flat_map(|(z, y)| row(z, y).iter().copied()).collect()
 }
 
 /// The frames of sequences.
@@ -226,7 +267,9 @@ impl FrameSource for Frames {
 
     fn arrays(&self, _place: usize, info: &DatasetInfo) -> Vec<MapArray> {
         let stored = match self.form {
-            Form { dopplers: 1, parts: 1, complex: false } => Stored::Numbers,
+            // A part of the stored numbers is no map that could be put in their place.
+            Form { window: Some(_), .. } => return Vec::new(),
+            Form { dopplers: 1, parts: 1, complex: false, .. } => Stored::Numbers,
             Form { dopplers, parts, .. } => Stored::Folded { before: dopplers * parts, after: 1, over: 1 },
         };
         let array = |view: usize| MapArray { key: NPY_KEY.to_owned(), view, stored };
@@ -264,9 +307,15 @@ fn maps(segment: &Segment, stem: &str, info: &DatasetInfo) -> Result<Vec<Heatmap
     let path = segment.path.join(format!("{stem}.npy"));
     let read = |view: &View| {
         let form = Form::of(&path, view)?;
-        let fold = Fold { before: form.dopplers * form.parts, cells: view.cells(), after: 1, over: 1 };
+        let cells = form.window.map_or_else(|| view.cells(), |_| GRID.iter().product());
+        let fold = Fold { before: form.dopplers * form.parts, cells, after: 1, over: 1 };
         let folded = NpzArchive::open(&path)?.read_folded(NPY_KEY, fold)?;
-        Ok(Heatmap { shape: view.shape(), data: folded.data, dtype: folded.dtype })
+        let shape = view.shape();
+        let data = match form.window {
+            Some(first) => part_of(&folded.data, first, &shape),
+            None => folded.data,
+        };
+        Ok(Heatmap { shape, data, dtype: folded.dtype })
     };
     info.views.iter().map(read).collect()
 }

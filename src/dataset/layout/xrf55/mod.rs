@@ -1,8 +1,9 @@
 //! XRF55: `mmWave/XX_YY_ZZ.npy`, real stacks (17, 256, 128), with or without a leading axis of one.
 //!
 //! What the axes are is not published. A view of two axes takes each of the 17 as a frame, a view of three takes a file as one;
-//! the preset (`assets/xrf55.toml`) says which is assumed. XX_YY_ZZ are volunteer, action and repetition, however they are padded.
+//! the preset (`assets/xrf55.toml`) says which is assumed. Raw clips, complex and of five axes, are captures (`raw.rs`). XX_YY_ZZ are volunteer, action and repetition, however they are padded.
 
+mod raw;
 mod write;
 
 use super::arrays::truth_beside;
@@ -54,6 +55,9 @@ impl Layout for Xrf55 {
         let (files, notes) = stacks(place.root, progress)?;
         if files.is_empty() {
             return Err(place.without_frames("XRF55's XX_YY_ZZ.npy in it or in a folder below".into()));
+        }
+        if raw::is_raw(&place.root.join(&files[0])) {
+            return raw::open(place, &files, notes, progress);
         }
         let preset = place.manifest.layout.preset()?;
         let mut info = place.info(&preset);
