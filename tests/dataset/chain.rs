@@ -100,20 +100,7 @@ fn the_files_of_a_cascade_are_one_capture() {
     let mut adc = fmcw.synthesise(&fmcw.loop_of(&[]), &[echo]);
     adc.digitise(&Receiver { noise: 1e-4, full_scale: 1.0, bits: 14 }, &mut rand::rngs::StdRng::seed_from_u64(3));
     let home = tempfile::tempdir().unwrap();
-    for (chip, name) in ["master", "slave1", "slave2", "slave3"].into_iter().enumerate() {
-        let mut bytes = Vec::new();
-        for turn in 0..chirp.loops * 12 {
-            for sample in 0..64 {
-                for receiver in 0..4 {
-                    let x = adc.data[(turn * 16 + chip * 4 + receiver) * 64 + sample];
-                    bytes.extend((x.re as i16).to_le_bytes());
-                    bytes.extend((x.im as i16).to_le_bytes());
-                }
-            }
-        }
-        std::fs::write(home.path().join(format!("{name}_0000_data.bin")), bytes.repeat(2)).unwrap();
-        std::fs::write(home.path().join(format!("{name}_0000_idx.bin")), [0; 48]).unwrap();
-    }
+    cascade(home.path(), &adc, &chirp, 2);
     std::fs::write(home.path().join("cascade.mmwave.json"), studio(&chirp)).unwrap();
     let dataset = open(home.path()).unwrap();
     assert_eq!((dataset.len(), dataset.frame_name(1)), (2, "master_0000_data/000001"));
@@ -128,8 +115,28 @@ fn the_files_of_a_cascade_are_one_capture() {
     assert!(told.contains("slave2_0000_data.bin is not beside it"), "{told}");
 }
 
+/// Writes the four files of a cascade, the frame so many times; samples of at most 1 are scaled to whole numbers.
+pub(super) fn cascade(folder: &Path, adc: &AdcCube, chirp: &ChirpSettings, times: usize) {
+    let most = adc.data.iter().fold(0.0f64, |most, x| most.max(x.re.abs()).max(x.im.abs()));
+    let gain = if most <= 1.0 { 8000.0 / most.max(1e-12) } else { 1.0 };
+    for (chip, name) in ["master", "slave1", "slave2", "slave3"].into_iter().enumerate() {
+        let mut bytes = Vec::new();
+        for turn in 0..chirp.loops * chirp.tx.len() {
+            for sample in 0..adc.samples {
+                for receiver in 0..4 {
+                    let x = gain * adc.data[(turn * 16 + chip * 4 + receiver) * adc.samples + sample];
+                    bytes.extend((x.re as i16).to_le_bytes());
+                    bytes.extend((x.im as i16).to_le_bytes());
+                }
+            }
+        }
+        std::fs::write(folder.join(format!("{name}_0000_data.bin")), bytes.repeat(times)).unwrap();
+        std::fs::write(folder.join(format!("{name}_0000_idx.bin")), [0; 48]).unwrap();
+    }
+}
+
 /// What mmWave Studio writes of a cascade, as far as it is read.
-fn studio(chirp: &ChirpSettings) -> String {
+pub(super) fn studio(chirp: &ChirpSettings) -> String {
     let device = |chip: usize| {
         let chirps: Vec<serde_json::Value> = chirp
             .tx
@@ -161,7 +168,7 @@ fn studio(chirp: &ChirpSettings) -> String {
 }
 
 /// A `.npy` of complex numbers, C order.
-fn npy(path: &Path, shape: &[usize], data: &[Complex64]) {
+pub(super) fn npy(path: &Path, shape: &[usize], data: &[Complex64]) {
     let shape: Vec<String> = shape.iter().map(usize::to_string).collect();
     let mut header = format!("{{'descr': '<c16', 'fortran_order': False, 'shape': ({}), }}", shape.join(", "));
     while (header.len() + 11) % 64 != 0 {

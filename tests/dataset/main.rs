@@ -10,6 +10,7 @@ mod info;
 mod layouts;
 mod npz;
 mod open;
+mod raw_sets;
 mod rt_pose;
 mod simulate;
 mod threads;

@@ -75,6 +75,114 @@ pub(crate) fn npz(entries: &[(&str, Vec<u8>)], deflate: bool) -> Vec<u8> {
     archive.finish().unwrap().into_inner()
 }
 
+/// The configuration of small captures: two transmitters in turn, two loops, eight samples.
+const CHIRP: &str = r#"
+[capture.chirp]
+start_ghz = 77.0
+slope_mhz_per_us = 60.0
+idle_us = 7.0
+adc_start_us = 5.0
+ramp_us = 60.0
+samples = 8
+rate_ksps = 5000.0
+loops = 2
+tx = [0, 1]
+rx = 2
+period_ms = 100.0
+"#;
+
+/// A radar's file as `calibrate --save` keeps it.
+pub(crate) const RADAR: &str = r#"about = "a lab's radar"
+[radar]
+start_hz = 77e9
+bandwidth_hz = 2.5e9
+chirp_s = 60e-6
+frame_s = 0.0128
+r_max_m = 12.0
+l_az_m = 0.0019
+l_el_m = 0.0019
+doppler_features = 4
+[fft]
+samples = 64
+chirps = 16
+window = { range = "hann", doppler = "blackman", angle = "chebyshev-30" }
+padding = { range = 2, doppler = 1, angle = 4 }
+array = { azimuth = 8, elevation = 4, azimuth_m = 0.002 }
+chirp = { bandwidth_hz = 2.4e9 }
+[psf]
+range_m = 0.05
+azimuth_rad = 0.1
+elevation_rad = 0.2
+doppler_mps = 0.1
+"#;
+
+/// A cube of samples of two frames, (frames, loops, channels, samples) or as XRF55 has it, with a manifest that says its chirps.
+pub(crate) fn sample_cube(segmented: bool) -> Vec<File> {
+    let views =
+        r#"views = ["range_azimuth", "range_doppler", "cube", "cartesian", "range_elevation", "cartesian_cube"]"#;
+    let said =
+        format!("layout = \"capture\"\nskeleton = \"coco17\"\nframes = \"cube.npy\"\n[capture]\n{views}\n{CHIRP}");
+    let numbers = f4((0..2 * 64 * 2).map(|k| (k * 37 % 101) as f32));
+    let shape = if segmented { "(2, 2, 8, 2, 2)" } else { "(2, 2, 4, 8)" };
+    vec![("dataset.toml", said.into_bytes()), ("cube.npy", npy("<c8", shape, false, &numbers))]
+}
+
+/// Clips of samples as XRF55's raw variant has them.
+pub(crate) fn raw_clip() -> Vec<File> {
+    let numbers = f4((0..2 * 64 * 2).map(|k| (k * 37 % 101) as f32));
+    vec![
+        ("mmWave/01_02_03.npy", npy("<c8", "(2, 2, 8, 2, 2)", false, &numbers)),
+        ("mmWave/01_02_04.npy", npy("<c8", "(2, 2, 8, 2, 2)", false, &numbers)),
+    ]
+}
+
+/// The four files of a cascade with the JSON of its four chips, alone or where RT-Pose has them, with labels.
+pub(crate) fn cascade(of_rt_pose: bool) -> Vec<File> {
+    let device = |chip: usize| {
+        format!(
+            r#"{{"rfConfig":{{"rlChanCfg_t":{{"rxChannelEn":"0x3"}},"rlAdcOutCfg_t":{{"fmt":{{"b2AdcBits":2,"b2AdcOutFmt":1}}}},
+            "rlProfiles":[{{"rlProfileCfg_t":{{"profileId":0,"startFreqConst_GHz":77.0,"idleTimeConst_usec":7.0,
+            "adcStartTimeConst_usec":5.0,"rampEndTime_usec":60.0,"freqSlopeConst_MHz_usec":60.0,"numAdcSamples":8,
+            "digOutSampleRate":5000}}}}],"rlChirps":[{{"rlChirpCfg_t":{{"chirpStartIdx":0,"chirpEndIdx":0,"profileId":0,
+            "txEnable":"0x{}"}}}},{{"rlChirpCfg_t":{{"chirpStartIdx":1,"chirpEndIdx":1,"profileId":0,"txEnable":"0x{}"}}}}],
+            "rlFrameCfg_t":{{"chirpStartIdx":0,"chirpEndIdx":1,"numLoops":2,"framePeriodicity_msec":100.0}}}}}}"#,
+            u8::from(chip == 0),
+            u8::from(chip == 1)
+        )
+    };
+    let json = format!(r#"{{"mmWaveDevices":[{}]}}"#, (0..4).map(device).collect::<Vec<_>>().join(","));
+    let words: Vec<u8> = (0..2 * 2 * 2 * 8 * 2 * 2_u16).flat_map(|k| (k * 37 % 101).to_le_bytes()).collect();
+    if !of_rt_pose {
+        let said = "layout = \"capture\"\n[capture]\nviews = [\"cartesian_cube\", \"range_azimuth\"]\n";
+        return vec![
+            ("dataset.toml", said.into()),
+            ("a.mmwave.json", json.into_bytes()),
+            ("master_0000_data.bin", words.clone()),
+            ("slave1_0000_data.bin", words.clone()),
+            ("slave2_0000_data.bin", words.clone()),
+            ("slave3_0000_data.bin", words),
+        ];
+    }
+    let mut files = rt_pose();
+    files.retain(|(name, _)| !name.contains("npy"));
+    files.push(("2023_0001/radar/a.mmwave.json", json.into_bytes()));
+    for name in [
+        "2023_0001/radar/bin/master_0000_data.bin",
+        "2023_0001/radar/bin/slave1_0000_data.bin",
+        "2023_0001/radar/bin/slave2_0000_data.bin",
+        "2023_0001/radar/bin/slave3_0000_data.bin",
+    ] {
+        files.push((name, words.clone()));
+    }
+    files
+}
+
+/// HuPR's raw pair of captures: a frame of 786,432 bytes each.
+pub(crate) fn raw_pair() -> Vec<File> {
+    let words: Vec<u8> = (0..786_432_u32 / 2).flat_map(|k| ((k * 37 % 101) as u16).to_le_bytes()).collect();
+    vec![("single_1/hori/adc_data.bin", words.clone()), ("single_1/vert/adc_data.bin", words)]
+}
+
 /// A raw capture of two frames with its configuration: words alone, with packet headers, as a `.pcap`, or with a JSON.
 pub(crate) fn capture(which: usize) -> Vec<File> {
     let words: Vec<u8> = (0..2 * 2 * 2 * 2 * 8 * 2_u16).flat_map(|k| (k * 37 % 101).to_le_bytes()).collect();

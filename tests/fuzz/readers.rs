@@ -4,7 +4,7 @@ use crate::material::{self, File};
 use crate::mutate;
 use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::npz::{NPY_KEY, NpzArchive};
-use mhp_inspector::dataset::{Dataset, Manifest, OpenOptions, RoomTransforms, read_pppr};
+use mhp_inspector::dataset::{Dataset, Manifest, OpenOptions, RadarPreset, RoomTransforms, read_pppr};
 use mhp_inspector::labels::{LabelPlace, LabelStore, read_journal, read_table};
 use mhp_inspector::session::SessionFile;
 use mhp_inspector::study::read_summary;
@@ -12,6 +12,7 @@ use mhp_inspector::study::run::Run;
 use mhp_inspector::task::Progress;
 use rand::Rng as _;
 use rand::rngs::StdRng;
+use std::ops::Range;
 use std::path::Path;
 
 /// Whatever an archive holds, in every way that it can be asked.
@@ -113,6 +114,64 @@ fn changed(files: &[File], random: &mut StdRng, folder: &Path) {
 pub(crate) fn capture(random: &mut StdRng, folder: &Path) {
     changed(&material::capture(random.random_range(0..4)), random, folder);
     read_all(folder);
+}
+
+pub(crate) fn sample_cube(random: &mut StdRng, folder: &Path) {
+    let mut files = material::sample_cube(random.random());
+    hostile_array(&mut files, 1..2, random);
+    changed(&files, random, folder);
+    read_all(folder);
+    read_stages(folder);
+}
+
+pub(crate) fn cascade(random: &mut StdRng, folder: &Path) {
+    changed(&material::cascade(random.random()), random, folder);
+    read_all(folder);
+    read_stages(folder);
+}
+
+/// A radar's file, and the widths that follow from it.
+pub(crate) fn radar(random: &mut StdRng, _: &Path) {
+    let Ok(text) = String::from_utf8(mutate::text(material::RADAR, random)) else { return };
+    match RadarPreset::parse(&text, Path::new("lab.toml")) {
+        Ok(preset) => {
+            let _ = preset.view_fft().map(|fft| fft.map(|fft| fft.point_spread()));
+            assert!(RadarPreset::parse(&preset.to_toml(), Path::new("again")).is_ok(), "{}", preset.to_toml());
+        }
+        Err(error) => assert!(error.to_string().starts_with("lab.toml"), "{error}"),
+    }
+}
+
+pub(crate) fn raw_clip(random: &mut StdRng, folder: &Path) {
+    let mut files = material::raw_clip();
+    hostile_array(&mut files, 0..2, random);
+    changed(&files, random, folder);
+    read_all(folder);
+    read_stages(folder);
+}
+
+pub(crate) fn raw_pair(random: &mut StdRng, folder: &Path) {
+    changed(&material::raw_pair(), random, folder);
+    read_all(folder);
+    read_stages(folder);
+}
+
+/// Puts a hostile header before one of some arrays, now and then.
+fn hostile_array(files: &mut [File], range: Range<usize>, random: &mut StdRng) {
+    if random.random_bool(0.3) {
+        let chosen = random.random_range(range);
+        let mut entry = [("array", files[chosen].1.clone())];
+        material::hostile_entry(&mut entry, random);
+        files[chosen].1 = std::mem::take(&mut entry[0].1);
+    }
+}
+
+/// The stages of the first frames, as the window shows them.
+fn read_stages(folder: &Path) {
+    let Ok(dataset) = Dataset::open(folder, &Progress::new()) else { return };
+    for frame in 0..dataset.len().min(3) {
+        let _ = dataset.stages(frame);
+    }
 }
 
 pub(crate) fn generic(random: &mut StdRng, folder: &Path) {
@@ -304,6 +363,23 @@ fn what_the_mutations_begin_with_is_sound() {
         let frame = dataset.load(0).unwrap();
         assert!(frame.truth.is_some() && (name == "xrf55" || frame.notes.is_empty()), "{name}: {:?}", frame.notes);
     }
+    let captures = [
+        ("cube", material::sample_cube(false)),
+        ("segmented", material::sample_cube(true)),
+        ("clips", material::raw_clip()),
+        ("cascade", material::cascade(false)),
+        ("rt_pose raw", material::cascade(true)),
+        ("hupr raw", material::raw_pair()),
+    ];
+    for (name, files) in captures {
+        let folder = home.path().join(name);
+        let files: Vec<_> = files.into_iter().map(|(file, bytes)| (file.to_owned(), bytes)).collect();
+        material::lay_out(&folder, &files);
+        let dataset = Dataset::open(&folder, &Progress::new()).unwrap();
+        assert!(!dataset.is_empty(), "{name}");
+        assert!((0..dataset.len()).all(|frame| dataset.load(frame).is_ok() && dataset.stages(frame).is_ok()), "{name}");
+    }
+    RadarPreset::parse(material::RADAR, Path::new("lab.toml")).unwrap();
     let file = |name: &str, text: &str| {
         let path = home.path().join(name);
         std::fs::write(&path, text).unwrap();
