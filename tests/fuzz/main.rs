@@ -39,27 +39,27 @@ macro_rules! targets {
 
 targets! {
     archives: 1500, 158_000, crate::readers::archive;
-    manifests: 1500, 150_000, crate::readers::manifest;
+    manifests: 1500, 180_000, crate::readers::manifest;
     fit_configurations: 1000, 40_000, crate::readers::fit_configuration;
     parameters: 400, 60_000, crate::readers::parameters;
     captures: 200, 50_000, crate::readers::capture;
-    sample_cubes: 150, 30_000, crate::readers::sample_cube;
+    sample_cubes: 150, 10_000, crate::readers::sample_cube;
     cascades: 100, 20_000, crate::readers::cascade;
-    radars: 400, 40_000, crate::readers::radar;
-    raw_clips: 150, 20_000, crate::readers::raw_clip;
-    raw_pairs: 40, 2_000, crate::readers::raw_pair;
+    radars: 400, 61_000, crate::readers::radar;
+    raw_clips: 150, 5_000, crate::readers::raw_clip;
+    raw_pairs: 40, 1_000, crate::readers::raw_pair;
     generic_frames: 200, 50_000, crate::readers::generic;
-    mmvr_frames: 200, 40_000, crate::readers::mmvr;
+    mmvr_frames: 200, 12_000, crate::readers::mmvr;
     hupr_frames: 150, 40_000, crate::readers::hupr;
-    xrf55_frames: 150, 30_000, crate::readers::xrf55;
+    xrf55_frames: 150, 8_000, crate::readers::xrf55;
     hiber_frames: 150, 40_000, crate::readers::hiber;
-    rt_pose_frames: 150, 40_000, crate::readers::rt_pose;
-    room_transforms: 300, 20_000, crate::readers::rooms;
-    stacked_files: 200, 40_000, crate::readers::stacked;
-    label_journals: 200, 40_000, crate::readers::journal;
-    label_tables: 300, 40_000, crate::readers::label_table;
-    summaries: 300, 20_000, crate::readers::summary;
+    rt_pose_frames: 150, 15_000, crate::readers::rt_pose;
+    room_transforms: 300, 50_000, crate::readers::rooms;
+    stacked_files: 200, 30_000, crate::readers::stacked;
+    label_journals: 200, 60_000, crate::readers::journal;
+    label_tables: 300, 60_000, crate::readers::label_table;
+    summaries: 300, 30_000, crate::readers::summary;
     sessions: 200, 10_000, crate::readers::session;
-    run_folders: 200, 10_000, crate::readers::run_folder;
-    pipeline: 60, 10_000, crate::pipeline::whole;
+    run_folders: 200, 5_000, crate::readers::run_folder;
+    pipeline: 60, 5_000, crate::pipeline::whole;
 }

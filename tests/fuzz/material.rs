@@ -76,7 +76,7 @@ pub(crate) fn npz(entries: &[(&str, Vec<u8>)], deflate: bool) -> Vec<u8> {
 }
 
 /// The configuration of small captures: two transmitters in turn, two loops, eight samples.
-const CHIRP: &str = r#"
+const CHIRP: &str = r"
 [capture.chirp]
 start_ghz = 77.0
 slope_mhz_per_us = 60.0
@@ -89,7 +89,7 @@ loops = 2
 tx = [0, 1]
 rx = 2
 period_ms = 100.0
-"#;
+";
 
 /// A radar's file as `calibrate --save` keeps it.
 pub(crate) const RADAR: &str = r#"about = "a lab's radar"

@@ -5,6 +5,9 @@ use super::{Fmcw, MimoArray, RadarConfig, SPEED_OF_LIGHT};
 use crate::geometry::{Vec3, add, scale, sub};
 use std::collections::BTreeMap;
 
+/// Transmitters are numbered below this.
+const MOST_TRANSMITTER: usize = 128;
+
 /// The chirps of a capture: one profile, sent by one transmitter after the other (TDM-MIMO).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChirpSettings {
@@ -110,6 +113,9 @@ impl ChirpSettings {
             [("samples a chirp", self.samples, 1 << 16), ("loops", self.loops, 1 << 14), ("receivers", self.rx, 64)];
         if let Some((what, value, most)) = counts.iter().find(|(_, value, most)| *value == 0 || value > most) {
             return Some(format!("{what}: {value}; expected 1 to {most}"));
+        }
+        if let Some(tx) = self.tx.iter().find(|tx| **tx >= MOST_TRANSMITTER) {
+            return Some(format!("transmitter {tx}; expected 0 to {}", MOST_TRANSMITTER - 1));
         }
         let most = 64;
         (self.tx.is_empty() || self.tx.len() > most)
@@ -325,6 +331,8 @@ mod tests {
         assert!(said.contains("after the ramp") && said.contains("one chirp"), "{said}");
         let long = ChirpSettings { period_s: 0.1, ..real() };
         assert!(long.warnings().iter().any(|said| said.contains("frame period")));
+        let far = ChirpSettings { tx: vec![0, 1 << 26], ..real() };
+        assert!(far.fault().is_some_and(|said| said.contains("transmitter 67108864; expected 0 to 127")));
         assert!(ChirpSettings { loops: 0, ..real() }.fault().is_some_and(|said| said.contains("loops")));
         assert!(ChirpSettings { idle_s: f64::NAN, ..real() }.fault().is_some_and(|said| said.contains("idle")));
     }

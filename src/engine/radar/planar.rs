@@ -12,6 +12,8 @@ use rustfft::FftPlanner;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+/// Elements of a row that are accepted: a place far away is no antenna's of the same board.
+const MOST_ELEMENTS: usize = 1 << 12;
 /// Bins of the sine along y at least; and along z.
 const SINES: [usize; 2] = [128, 32];
 
@@ -38,7 +40,7 @@ pub struct PlanarMap {
 
 impl PlanarRows {
     /// Of an array whose elements are `spacing_m` apart along y and z; of several channels at one place the first. `None` where
-    /// they lie in one row.
+    /// they lie in one row, or farther apart than those of a board.
     pub fn of(array: &MimoArray, spacing_m: f64, wavelength_m: f64) -> Option<Self> {
         let place = |channel: usize, axis: usize| {
             let sum = array.tx[channel / array.rx.len()][axis] + array.rx[channel % array.rx.len()][axis];
@@ -55,7 +57,7 @@ impl PlanarRows {
         let longest = rows.values().filter_map(|row| row.keys().next_back()).max()? + 1;
         let rows: Vec<_> = rows.into_iter().map(|(up, row)| (up as f64, row.into_iter().collect())).collect();
         let sines = [longest.next_power_of_two().max(SINES[0]), SINES[1]];
-        (rows.len() > 1).then(|| Self { rows, sines, cycles: spacing_m / wavelength_m })
+        (rows.len() > 1 && longest <= MOST_ELEMENTS).then(|| Self { rows, sines, cycles: spacing_m / wavelength_m })
     }
 
     /// Elements of an even line as long as the longest row, and as high as the rows.
