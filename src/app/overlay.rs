@@ -2,7 +2,7 @@
 //! capture's chirps, notifications.
 
 mod bare;
-mod capture;
+mod chirps;
 mod files;
 mod notices;
 mod palette;
@@ -46,7 +46,7 @@ pub(super) struct Overlay {
     presets: bool,
     notices: notices::Notices,
     bare: bare::BareQuestion,
-    capture: capture::CaptureQuestion,
+    chirps: chirps::ChirpQuestion,
     files: files::FileDialog,
 }
 
@@ -82,7 +82,7 @@ impl Overlay {
 
     /// True while keys belong to a sheet.
     pub(super) fn is_modal(&self) -> bool {
-        self.sheet != Sheet::None || self.bare.is_open() || self.capture.is_open() || self.presets
+        self.sheet != Sheet::None || self.bare.is_open() || self.chirps.is_open() || self.presets
     }
 
     pub(super) fn notify(&mut self, level: LogLevel, text: String, now: f64) {
@@ -95,7 +95,7 @@ impl Overlay {
 
     pub(super) fn show(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) {
         self.bare.show(ui, shared);
-        self.capture.show(ui, shared);
+        self.chirps.show(ui, shared);
         self.notices.show(ui, shared);
         self.presets = !matches!(shared.session.presets, PresetCard::Closed);
         if self.presets && self.sheet == Sheet::None && presets::show(ui, shared) {

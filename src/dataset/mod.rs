@@ -47,7 +47,7 @@ pub use calibration::{ArrayText, FftText, RadarPreset, SweepText, ViewCalibratio
 pub use error::DatasetError;
 pub use frame::{Frame, Heatmap, ImageAnnotations, Truth, map_cells};
 pub use job::OpenJob;
-pub use layout::{BareCatalog, BareChoice, CaptureForm, LAYOUTS, Layout, MapArray, Remembered, Stored};
+pub use layout::{BareCatalog, BareChoice, ChirpForm, LAYOUTS, Layout, MapArray, Remembered, Stored};
 pub use loader::{Loaded, Loader};
 pub use manifest::Manifest;
 pub use maps::MapReader;

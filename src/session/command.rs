@@ -9,7 +9,7 @@ use super::study::StudyOrder;
 use super::view::ViewState;
 use crate::body::Pppr;
 use crate::config::FitConfig;
-use crate::dataset::{BareChoice, CaptureForm};
+use crate::dataset::{BareChoice, ChirpForm};
 use crate::explore::ExplorationKind;
 use crate::geometry::Vec3;
 use crate::labels::{CellRegion, Tag, Verdict};
@@ -50,7 +50,7 @@ pub enum Command {
     /// Close the question about a bare file's axes.
     DismissBare,
     /// Open a capture whose chirps this says.
-    OpenCapture(PathBuf, Box<CaptureForm>),
+    OpenCapture(PathBuf, Box<ChirpForm>),
     /// Close the question about a capture's chirps.
     DismissCapture,
     /// Give up opening.

@@ -6,7 +6,7 @@ use super::command::PickKind;
 use super::evidence::EvidenceRequest;
 use super::pins::Pin;
 use super::study::StudyRequest;
-use crate::dataset::{BareChoice, CaptureForm, Dataset, Frame};
+use crate::dataset::{BareChoice, ChirpForm, Dataset, Frame};
 use crate::explore::{Exploration, ExplorationKind};
 use crate::labels::Judged;
 use crate::mhp::Precision;
@@ -87,7 +87,7 @@ pub enum Effect {
     /// Open a bare file with these axes on a thread.
     OpenBare(PathBuf, BareChoice),
     /// Open a capture whose chirps this says on a thread.
-    OpenCapture(PathBuf, Box<CaptureForm>),
+    OpenCapture(PathBuf, Box<ChirpForm>),
     /// Stop opening.
     CancelOpen,
     /// Show a file dialog on a thread.

@@ -4,7 +4,7 @@
 use crate::{SLOW_MS, dataset};
 use mhp_inspector::body::{Group, Pppr};
 use mhp_inspector::config::{FIELDS, Field, FieldKind, FitConfig, Number, ReadBy, Value};
-use mhp_inspector::dataset::{BareCatalog, BareChoice, CaptureForm, Dataset, DatasetError};
+use mhp_inspector::dataset::{BareCatalog, BareChoice, ChirpForm, Dataset, DatasetError};
 use mhp_inspector::mhp::{Adam, Evaluation, FitState, StepReport, StopReason, Terms, initialise};
 use mhp_inspector::session::{
     Command, Effect, FitStatus, History, IterationRow, LogLevel, Notice, PickKind, Report, Session, ThemeChoice,
@@ -284,7 +284,7 @@ fn a_capture_without_a_configuration_asks_for_its_chirps() {
     bench.apply(Command::DismissCapture);
     assert_eq!(bench.session.data.capture, None);
     asks(&mut bench);
-    let form = CaptureForm::usual().unwrap();
+    let form = ChirpForm::usual().unwrap();
     let effects = bench.apply(Command::OpenCapture(path.clone(), Box::new(form.clone())));
     assert!(matches!(&effects[..], [Effect::OpenCapture(p, f)] if *p == path && **f == form));
     assert!(bench.session.data.capture.is_none() && bench.session.data.opening.is_some());

@@ -24,7 +24,7 @@ mod write;
 mod xrf55;
 
 pub use bare::{BareCatalog, BareChoice, Remembered};
-pub use dca::CaptureForm;
+pub use dca::ChirpForm;
 pub use frames::{FrameSource, MapArray, Stored};
 pub use write::{FrameWriter, MANTISSA_BITS, NewFrame, NewPlace};
 

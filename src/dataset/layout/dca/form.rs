@@ -1,6 +1,6 @@
 //! A capture without a configuration file: what a person says of it, as the manifest that it could have, and the memory of that.
 //!
-//! The window asks with a form ([`CaptureForm`]); the answer is kept for that file in the user's own folder (`captures.toml`), never
+//! The window asks with a form ([`ChirpForm`]); the answer is kept for that file in the user's own folder (`captures.toml`), never
 //! beside the capture, and every command takes it from there.
 
 use crate::dataset::DatasetError;
@@ -23,7 +23,7 @@ const MOST: usize = 1000;
 
 /// What a person says of a capture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CaptureForm {
+pub struct ChirpForm {
     layout: &'static str,
     /// Name of the skeleton to fit.
     pub skeleton: String,
@@ -31,7 +31,7 @@ pub struct CaptureForm {
     pub capture: AdcText,
 }
 
-impl CaptureForm {
+impl ChirpForm {
     /// The form as it is printed: a start to be edited.
     ///
     /// # Errors
@@ -97,7 +97,7 @@ impl Forms {
         Manifest::parse(&text, &self.file).ok().filter(|manifest| manifest.capture.is_some())
     }
 
-    fn remember(&self, capture: &Path, form: &CaptureForm) -> Result<(), DatasetError> {
+    fn remember(&self, capture: &Path, form: &ChirpForm) -> Result<(), DatasetError> {
         let failed = |reason| DatasetError::Write { reason, path: self.file.clone() };
         let mut all = self.all();
         while all.len() >= MOST {
@@ -122,7 +122,7 @@ impl Dataset {
     ///
     /// # Errors
     /// Where the form does not fit the capture. That it could not be remembered is logged, not an error.
-    pub fn open_capture(path: &Path, form: &CaptureForm) -> Result<Self, DatasetError> {
+    pub fn open_capture(path: &Path, form: &ChirpForm) -> Result<Self, DatasetError> {
         let forms = Forms::of_user();
         let file = forms.as_ref().map_or_else(|| PathBuf::from(NAME), |forms| forms.file.clone());
         let manifest = form.manifest(&file)?;
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn the_usual_form_is_sound_and_is_read_back() {
-        let mut form = CaptureForm::usual().unwrap();
+        let mut form = ChirpForm::usual().unwrap();
         assert!(form.told().unwrap().contains("256 samples"), "{:?}", form.told());
         let said = form.manifest(Path::new("form")).unwrap();
         assert_eq!(said.capture, Some(form.capture.clone()));

@@ -19,7 +19,7 @@ mod frames;
 mod maker;
 mod settings;
 
-pub use form::CaptureForm;
+pub use form::ChirpForm;
 pub(super) use frames::tell_iq;
 pub(super) use maker::Maker;
 pub(super) use settings::{config_in, processing_of, settings_from};

@@ -5,7 +5,7 @@ use crate::app::panes::Shared;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Named as _;
 use crate::body::Skeleton;
-use crate::dataset::CaptureForm;
+use crate::dataset::ChirpForm;
 use crate::dataset::adc::{AdcText, ChirpText};
 use crate::session::Command;
 use egui::{DragValue, RichText, Role, Ui};
@@ -26,13 +26,13 @@ const NAME_WIDTH: f32 = 96.0;
 
 /// The form that is being filled in.
 #[derive(Default)]
-pub(super) struct CaptureQuestion {
-    form: Option<(PathBuf, CaptureForm)>,
+pub(super) struct ChirpQuestion {
+    form: Option<(PathBuf, ChirpForm)>,
     /// The transmitters as they are typed.
     tx: String,
 }
 
-impl CaptureQuestion {
+impl ChirpQuestion {
     pub(super) fn is_open(&self) -> bool {
         self.form.is_some()
     }
@@ -43,14 +43,14 @@ impl CaptureQuestion {
             return;
         };
         if self.form.as_ref().is_none_or(|(known, _)| *known != path) {
-            let Ok(form) = CaptureForm::usual() else { return };
+            let Ok(form) = ChirpForm::usual() else { return };
             self.tx = form.capture.chirp.as_ref().map_or_else(String::new, |chirp| joined(&chirp.tx));
             self.form = Some((path.clone(), form));
         }
         let Some((_, form)) = &mut self.form else { return };
         let tx = &mut self.tx;
         let mut send = None;
-        let response = super::modal(ui, "capture").show(ui.ctx(), |ui| {
+        let response = super::modal(ui, "recording").show(ui.ctx(), |ui| {
             ui.set_width(super::width(ui, 620.0));
             let tokens = Tokens::of(ui);
             ui.label(RichText::new("How was this recorded?").font(theme::strong(16.0)));
@@ -156,7 +156,7 @@ fn chirp(ui: &mut Ui, of: &mut ChirpText, tx: &mut String) {
 fn choice(ui: &mut Ui, name: &str, value: &mut Option<String>, words: &[(Option<&str>, &str)]) {
     ui.add_sized([NAME_WIDTH, 18.0], egui::Label::new(name).halign(egui::Align::RIGHT));
     let shown = words.iter().find(|(word, _)| *word == value.as_deref()).map_or("", |(_, shown)| shown);
-    let combo = egui::ComboBox::from_id_salt(("capture", name)).width(150.0).selected_text(shown).show_ui(ui, |ui| {
+    let combo = egui::ComboBox::from_id_salt(("recording", name)).width(150.0).selected_text(shown).show_ui(ui, |ui| {
         for (word, shown) in words {
             ui.selectable_value(value, word.map(str::to_owned), *shown);
         }
