@@ -35,6 +35,7 @@ const SECTIONS: &[Section] = &[
     Section { key: "watched", heading: "What being watched costs", write: speed::watched },
     Section { key: "live", heading: "How a fit follows a finger", write: speed::live },
     Section { key: "large", heading: "A batch as large as MMVR", write: speed::large },
+    Section { key: "fuzz", heading: "Mutated inputs", write: speed::fuzz },
 ];
 
 const TITLE: &str = "\

@@ -115,3 +115,7 @@ pub(crate) fn large(_: &Bed) -> String {
     let size = [("MHP_LARGE_FRAMES", "355500"), ("MHP_LARGE_BATCH_ONLY", "1")];
     Bed::with_window("cargo test --locked --release --test window large -- --ignored --nocapture", &size)
 }
+
+pub(crate) fn fuzz(_: &Bed) -> String {
+    Bed::with_window("cargo test --locked --release --no-default-features --test fuzz -- --ignored --nocapture", &[])
+}
