@@ -67,6 +67,17 @@ fn within((share, [least, most]): (f32, [f32; 2]), of: f32) -> f32 {
 }
 
 impl Fitted {
+    /// The borders of a stored default layout; nothing where it is another one.
+    fn of(tree: &Tree<Leaf>) -> Option<Self> {
+        let linear = |tile: TileId| match tree.tiles.get(tile) {
+            Some(Tile::Container(Container::Linear(linear))) => Some(linear.children.clone()),
+            _ => None,
+        };
+        let columns = tree.root()?;
+        let [_, middle, _] = linear(columns)?[..] else { return None };
+        (linear(middle)?.len() == 2).then(|| Self { columns, middle, shares: [Vec::new(), Vec::new()] })
+    }
+
     /// Sets the borders for a window whose sides have these widths, points, 0 where one gave way; false where somebody moved one.
     fn set(&mut self, tiles: &mut Tiles<Leaf>, size: egui::Vec2, sides: [f32; 2], tall: bool) -> bool {
         let [left, right] = sides.map(|width| width / size.x.max(1.0));
@@ -111,10 +122,12 @@ fn docked(tiles: &mut Tiles<Leaf>, dock: Dock) -> TileId {
 }
 
 impl PaneLayout {
-    /// A stored tree; one without a single pane is replaced by the default.
-    pub(crate) fn restored(tree: Tree<Leaf>) -> Self {
+    /// A stored tree, and whether its borders went with the size of the window; one without a single pane is replaced by the
+    /// default.
+    pub(crate) fn restored(tree: Tree<Leaf>, fitted: bool) -> Self {
         if tree.root().is_some() && tree.tiles.iter().any(|(_, tile)| matches!(tile, Tile::Pane(_))) {
-            let mut restored = Self { tree, fitted: None, collapse: Collapse::default(), asked: None };
+            let fitted = if fitted { Fitted::of(&tree) } else { None };
+            let mut restored = Self { tree, fitted, collapse: Collapse::default(), asked: None };
             restored.complete();
             restored
         } else {
@@ -140,6 +153,11 @@ impl PaneLayout {
                 tabs.add_child(id);
             }
         }
+    }
+
+    /// Whether the borders go with the size of the window, to be stored.
+    pub(crate) fn is_fitted(&self) -> bool {
+        self.fitted.is_some()
     }
 
     /// The tree, to be stored.

@@ -41,6 +41,8 @@ const TOO_QUICK: std::time::Duration = std::time::Duration::from_millis(250);
 const VIEW_KEY: &str = "view";
 const RECENT_KEY: &str = "recent";
 const LAYOUT_KEY: &str = "layout";
+/// Whether the borders of the layout go with the size of the window.
+const FITTED_KEY: &str = "layout-fitted";
 const ANNOTATOR_KEY: &str = "annotator";
 
 /// What the window begins with.
@@ -109,7 +111,8 @@ impl InspectorApp {
             view = stored.unwrap_or_default();
             recent = eframe::get_value(storage, RECENT_KEY).unwrap_or_default();
             if let Some(stored) = eframe::get_value(storage, LAYOUT_KEY) {
-                layout = PaneLayout::restored(stored);
+                let fitted = eframe::get_value(storage, FITTED_KEY).unwrap_or(false);
+                layout = PaneLayout::restored(stored, fitted);
             }
         }
         let ctx = cc.egui_ctx.clone();
@@ -440,6 +443,7 @@ impl eframe::App for InspectorApp {
         eframe::set_value(storage, RECENT_KEY, &self.session().data.recent);
         eframe::set_value(storage, ANNOTATOR_KEY, &self.session().labels.annotator);
         eframe::set_value(storage, LAYOUT_KEY, self.layout.stored());
+        eframe::set_value(storage, FITTED_KEY, &self.layout.is_fitted());
     }
 }
 

@@ -16,6 +16,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 #[derive(Serialize, Deserialize)]
 struct WindowState {
     layout: egui_tiles::Tree<&'static Pane>,
+    /// Its borders go with the size of the window.
+    #[serde(default)]
+    fitted: bool,
     /// What the panes keep, each under its own name.
     panes: Map<String, Value>,
 }
@@ -129,7 +132,8 @@ impl InspectorApp {
             SaveKind::Export(what) => self.apply(Command::Export(what, path)),
             SaveKind::Session => {
                 let layout = self.layout.stored().clone();
-                let window = self.panes.stored().map(|panes| WindowState { layout, panes });
+                let fitted = self.layout.is_fitted();
+                let window = self.panes.stored().map(|panes| WindowState { layout, fitted, panes });
                 match window.and_then(serde_json::to_value) {
                     Ok(window) => self.apply(Command::SaveSession(path, window)),
                     Err(error) => {
@@ -183,10 +187,10 @@ impl InspectorApp {
         let Some(window) = self.runtime.take_restored_window() else { return };
         let restored = serde_json::from_value::<WindowState>(window).and_then(|state| {
             self.panes.restore(state.panes, self.runtime.session())?;
-            Ok(state.layout)
+            Ok((state.layout, state.fitted))
         });
         match restored {
-            Ok(layout) => self.layout = PaneLayout::restored(layout),
+            Ok((layout, fitted)) => self.layout = PaneLayout::restored(layout, fitted),
             Err(error) => {
                 let text = format!("camera and layout of the session could not be put back: {error}");
                 self.runtime.report(Report::Log(LogLevel::Warning, text));

@@ -863,6 +863,8 @@ fn a_run_is_replayed_as_slowly_as_chosen() {
 #[test]
 fn a_batch_is_held_by_its_buttons() {
     let mut window = Window::open(60);
+    // Long enough for a hand, on a busy machine too.
+    window.apply(Command::SetConfig(Box::new(FitConfig { iterations: 3000, ..window.session().config })));
     window.at_rest();
     window.click("Fit listed");
     window.until("how long it takes", |w| w.says(" of 60 · ") && w.says(" left"));

@@ -5,7 +5,7 @@ use crate::blob;
 use crate::window::Window;
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
-use mhp_inspector::app::{Begin, InspectorApp};
+use mhp_inspector::app::{Begin, InspectorApp, Pane};
 use mhp_inspector::config::Preset;
 use mhp_inspector::session::{FitStatus, RunSpeed, ThemeChoice};
 use std::collections::BTreeMap;
@@ -98,6 +98,26 @@ fn the_last_data_set_opens_again_and_one_that_is_gone_does_not() {
     let mut window = visit(&profile, &Begin::default());
     window.until("the bundled sample", |w| w.session().data.dataset.is_some());
     assert_eq!(window.session().data.dataset.as_ref().unwrap().info().name, "walk");
+}
+
+/// Borders that nobody moved go with the size of the window on the next visit too.
+#[test]
+fn the_layout_fits_another_window_on_the_next_visit() {
+    let data = tempfile::tempdir().unwrap();
+    blob::write_dataset(data.path(), 2);
+    let mut window = visit(&Profile::default(), &on(data.path()));
+    window.until("the frame", |w| w.session().data.frame.is_some());
+    window.harness.run_steps(3);
+    let profile = close(window);
+    let mut window = visit(&profile, &Begin::default());
+    window.ready(0);
+    let width = |w: &mut Window, size: [f32; 2]| {
+        w.harness.set_size(size.into());
+        w.harness.run_steps(4);
+        w.harness.state().pane_rect(Pane::called("Frames").unwrap()).unwrap().width()
+    };
+    let (small, large) = (width(&mut window, [1024.0, 640.0]), width(&mut window, [3840.0, 2160.0]));
+    assert!((212.0..=230.0).contains(&small) && (300.0..=340.0).contains(&large), "{small} {large}");
 }
 
 #[test]

@@ -73,7 +73,7 @@ fn a_layout_survives_json_and_ron_and_one_from_before_gets_the_pane() {
     let id = older.tiles.find_pane(&&PANE).unwrap();
     older.remove_recursively(id);
     assert_eq!(tabs_with(&older, &PANE), [""; 0]);
-    assert_eq!(tabs_with(PaneLayout::restored(older).stored(), &PANE), ["Fit", "Joint", "Dummy pane"]);
+    assert_eq!(tabs_with(PaneLayout::restored(older, false).stored(), &PANE), ["Fit", "Joint", "Dummy pane"]);
     let unknown: Result<Tree<&'static Pane>, _> = serde_json::from_str(&json.replace("Dummy", "Gone"));
     assert!(unknown.unwrap_err().to_string().contains("no pane has the key Gone"));
 }
