@@ -52,8 +52,8 @@ const DEFAULT_RATE: f64 = 1e-3;
 /// From this share of the iterations on steps are shorter, by so much.
 const SLOW_FROM: f64 = 0.6;
 const SLOW: f64 = 0.3;
-/// Levels that correlate less than by one less this are of something else than the body: of who walks, whose reflectors are known,
-/// and of who stands.
+/// Levels that correlate less than by one less this are of something else than the body: where the reflectors around are known, and
+/// where they are not.
 const MOST_UNLIKE: [f64; 2] = [0.2, 0.16];
 /// Slower than this nobody leaves the cells that it stands in while the frames around last, m/s.
 const WALKING_MPS: f64 = 0.35;
@@ -102,8 +102,8 @@ pub(super) struct Window {
     frames: Vec<WindowFrame>,
     /// Numbers of one person.
     stride: usize,
-    /// Whether all persons walk.
-    walk: bool,
+    /// Whether what stands around the persons is known: they walk, or static echoes were removed.
+    clear: bool,
 }
 
 struct WindowFrame {
@@ -124,9 +124,9 @@ pub(super) struct WindowLoss {
     pub(super) gradient: Vec<f64>,
 }
 
-/// Whether an L_EM is that of maps which the bodies do not explain, where all of them walk or not.
-fn is_unlike(config: &FitConfig, em: f64, walk: bool) -> bool {
-    config.objective == EmLoss::NccDb && em > MOST_UNLIKE[usize::from(!walk)]
+/// Whether an L_EM is that of maps which the bodies do not explain, where what stands around them is known or not.
+fn is_unlike(config: &FitConfig, em: f64, clear: bool) -> bool {
+    config.objective == EmLoss::NccDb && em > MOST_UNLIKE[usize::from(!clear)]
 }
 
 impl Window {
@@ -139,7 +139,7 @@ impl Window {
         loss: &mut WindowLoss,
     ) -> bool {
         self.evaluate((problem, config), precision, of, None, loss);
-        !is_unlike(config, loss.em, self.walk)
+        !is_unlike(config, loss.em, self.clear)
     }
 
     /// Around the persons of `initial`, who move as their velocities say; or why they stay where they are.
@@ -199,7 +199,7 @@ impl Window {
         let own = chosen.iter().position(Option::is_none).unwrap_or(0);
         let stride = space.coordinates();
         let echo = StaticEchoModel::new(problem, config);
-        Ok(Ok(Self { space, echo, own, frames, stride, walk: walks }))
+        Ok(Ok(Self { space, echo, own, frames, stride, clear: walks || problem.static_removed }))
     }
 
     /// Gives all persons of `coordinates` the q at which the loss is lowest, where it is fitted.

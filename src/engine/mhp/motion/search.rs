@@ -218,9 +218,9 @@ pub(in crate::mhp) fn search(
     search.every = 1;
     search.evaluate(&coordinates);
     let em = search.loss.em;
-    if super::is_unlike(config, em, window.walk) {
+    if super::is_unlike(config, em, window.clear) {
         // Among reflectors that nothing is known of, another place may be theirs.
-        if window.walk && em < CLEARER * begun_em {
+        if window.clear && em < CLEARER * begun_em {
             move_there(problem, &window, &coordinates, params);
         }
         return Ok(Err(Held::Unlike));
