@@ -5,7 +5,7 @@ use crate::config::{Convergence, FitConfig};
 use crate::geometry::{Vec3, dot, norm, sub};
 
 /// Iterations that a fit is looked at over to say that it has settled, and how little may change meanwhile: share of the
-/// loss, m of each joint at [`SETTLED_RATE`].
+/// loss, m of each joint at `SETTLED_RATE`.
 pub const SETTLED_OVER: usize = 10;
 const SETTLED_LOSS: f64 = 1e-3;
 const SETTLED_M: f64 = 2e-3;
