@@ -274,7 +274,8 @@ fn basins(ui: &mut Ui, shared: &mut Shared<'_>, cloud: &Arc<RestartCloud>, token
     if cloud.is_complete() {
         ui.add(egui::Label::new(RichText::new(cloud.verdict()).small()).wrap());
     } else {
-        ui.label(dim(&format!("{} of {} starts are fitted", cloud.done, cloud.restarts.len())));
+        let fitted = dim(&format!("{} of {} starts are fitted", cloud.done, cloud.restarts.len()));
+        ui.add(egui::Label::new(fitted).wrap());
     }
     let errors = cloud.basins.iter().any(|basin| basin.majpe_mm.is_some());
     let [looks, spread] = COLUMNS.map(|least| ui.available_width() >= least);

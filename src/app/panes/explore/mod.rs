@@ -13,6 +13,10 @@ use std::time::Duration;
 /// An exploration that takes longer is not begun unasked, ms.
 const UNASKED_MS: f64 = 4000.0;
 
+/// Width of a bar of progress, points, and of it with what stands beside it.
+const BAR_WIDTH: f32 = 140.0;
+const PROGRESS_WIDTH: f32 = 260.0;
+
 /// Asks for an exploration that a pane shows, once it is of something else than what is on screen: unasked where it takes
 /// `cost_ms` on one core and that is little; else a button asks for it. Shows how far it is.
 pub(super) fn keep_up(ui: &mut Ui, shared: &mut Shared<'_>, kind: ExplorationKind, cost_ms: Option<f64>) {
@@ -27,6 +31,10 @@ pub(super) fn keep_up(ui: &mut Ui, shared: &mut Shared<'_>, kind: ExplorationKin
     let failed = session.explore.state(kind).and_then(|state| state.fault.as_deref());
     if !current && at_rest && quick {
         shared.send(Command::Explore(kind));
+    }
+    // The bar is not squeezed into what is left of a line of the toolbar.
+    if running && ui.available_size_before_wrap().x < PROGRESS_WIDTH {
+        ui.end_row();
     }
     ui.horizontal(|ui| {
         if running {
@@ -54,7 +62,7 @@ fn progress(ui: &mut Ui, shared: &mut Shared<'_>, kind: ExplorationKind, tokens:
     }
     let share = if total > 0 { done as f32 / total as f32 } else { 0.0 };
     let text = if total > 0 { format!("{done} of {total}") } else { "beginning…".to_owned() };
-    let bar = egui::ProgressBar::new(share).desired_height(14.0).desired_width(140.0);
+    let bar = egui::ProgressBar::new(share).desired_height(14.0).desired_width(BAR_WIDTH);
     ui.add(bar.text(RichText::new(text).small()));
     let stop = ui.small_button("✕").on_hover_text("Stop; what was found stays.");
     if stop.named(Role::Button, &format!("Stop the {}", kind.title())).clicked() {
