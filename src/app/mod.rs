@@ -19,11 +19,12 @@ mod timeline;
 mod widgets;
 
 use crate::config::FitConfig;
+use crate::predictions::{Reading, looks_like_predictions};
 use crate::session::{Command, LogLevel, PickKind, Report, Runtime, Session, StartAt, ViewState, Wake};
 use commands::{AppAct, UiAction};
 use layout::PaneLayout;
 use overlay::Overlay;
-use panes::{PaneStates, Pointed, Shared, study};
+use panes::{PaneStates, Pointed, Shared, predictions, study};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -54,6 +55,8 @@ pub struct Begin {
     pub aim: StartAt,
     /// A table of results for the frame list.
     pub results: Option<PathBuf>,
+    /// Files of predictions, and what they are called.
+    pub predictions: Vec<(PathBuf, Option<String>)>,
     /// The run folder of a study.
     pub study: Option<PathBuf>,
     /// The settings, in force before anything is opened.
@@ -171,6 +174,10 @@ impl InspectorApp {
         if let Some(results) = &begin.results {
             app.apply(Command::LoadResults(results.clone()));
         }
+        for (path, name) in &begin.predictions {
+            let reading = Reading { name: name.clone(), ..Reading::default() };
+            app.apply(Command::OpenPredictions(path.clone(), Box::new(reading)));
+        }
         if let Some(run) = &begin.study {
             app.open_run(run.clone());
         }
@@ -251,6 +258,7 @@ impl InspectorApp {
             AppAct::ShowPane(pane) => self.layout.show_pane(pane),
             AppAct::LoadResults => self.overlay.load_results(),
             AppAct::OpenStudy => self.overlay.open_study(),
+            AppAct::OpenPredictions => self.overlay.open_predictions(),
             AppAct::CopyPath => self.copy_path(ctx),
             AppAct::FullScreen => {
                 let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
@@ -284,7 +292,7 @@ impl InspectorApp {
         self.apply(Command::OpenRun(folder));
     }
 
-    /// Files dropped on the window: a table is results, a run folder a study, anything else a data set.
+    /// Files dropped on the window: joints are predictions, a table is results, a run folder a study, anything else a data set.
     fn take_drops(&mut self, ctx: &egui::Context) {
         let dropped = ctx.input(|i| {
             i.raw
@@ -296,7 +304,10 @@ impl InspectorApp {
             && let Some(path) = dropped.clone()
         {
             let table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
-            if crate::study::run::is_run_folder(&path) {
+            if looks_like_predictions(&path) {
+                self.layout.show_pane(&predictions::PANE);
+                self.apply(Command::OpenPredictions(path, Box::default()));
+            } else if crate::study::run::is_run_folder(&path) {
                 self.open_run(path);
             } else {
                 self.apply(if table { Command::LoadResults(path) } else { Command::Open(path) });

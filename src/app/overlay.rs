@@ -6,6 +6,7 @@ mod chirps;
 mod files;
 mod notices;
 mod palette;
+mod predictions;
 mod presets;
 mod quit;
 
@@ -29,6 +30,7 @@ enum Sheet {
     Session,
     Results,
     Study,
+    Predictions,
     Save(SaveKind),
     Quit,
 }
@@ -47,6 +49,7 @@ pub(super) struct Overlay {
     notices: notices::Notices,
     bare: bare::BareQuestion,
     chirps: chirps::ChirpQuestion,
+    reading: predictions::ReadingQuestion,
     files: files::FileDialog,
 }
 
@@ -82,7 +85,11 @@ impl Overlay {
 
     /// True while keys belong to a sheet.
     pub(super) fn is_modal(&self) -> bool {
-        self.sheet != Sheet::None || self.bare.is_open() || self.chirps.is_open() || self.presets
+        self.sheet != Sheet::None
+            || self.bare.is_open()
+            || self.chirps.is_open()
+            || self.reading.is_open()
+            || self.presets
     }
 
     pub(super) fn notify(&mut self, level: LogLevel, text: String, now: f64) {
@@ -96,6 +103,7 @@ impl Overlay {
     pub(super) fn show(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) {
         self.bare.show(ui, shared);
         self.chirps.show(ui, shared);
+        self.reading.show(ui, shared);
         self.notices.show(ui, shared);
         self.presets = !matches!(shared.session.presets, PresetCard::Closed);
         if self.presets && self.sheet == Sheet::None && presets::show(ui, shared) {
@@ -111,6 +119,7 @@ impl Overlay {
             Sheet::Session => self.session_path(ui, shared),
             Sheet::Results => self.results_path(ui, shared),
             Sheet::Study => self.study_path(ui, shared),
+            Sheet::Predictions => self.predictions_path(ui, shared),
             Sheet::Save(kind) => self.save(ui, shared, kind),
             Sheet::Quit => self.quit(ui, shared),
         };
@@ -290,6 +299,12 @@ fn pick_session() -> Option<PathBuf> {
 /// Shows the desktop's dialog for a run folder; blocks like [`pick`].
 fn pick_run() -> Option<PathBuf> {
     rfd::FileDialog::new().set_title("Open study").pick_folder()
+}
+
+/// Shows the desktop's dialog for a file of predictions; blocks like [`pick`].
+fn pick_predictions() -> Option<PathBuf> {
+    let dialog = rfd::FileDialog::new().set_title("Open predictions");
+    dialog.add_filter("Joints", &crate::predictions::ENDINGS).add_filter("All files", &["*"]).pick_file()
 }
 
 /// Shows the desktop's dialog for a table of results; blocks like [`pick`].

@@ -138,6 +138,20 @@ impl Tokens {
         rgb(colors[identity % colors.len()])
     }
 
+    /// The colour of a source of predictions, by the order in which they were opened, then again from the first.
+    pub(crate) fn source(&self, hue: usize) -> Color32 {
+        const ON_DARK: [u32; 6] = [0xFF8FA3, 0x35D0BA, 0xD6B656, 0x7FB2FF, 0xE08BFF, 0xB5E06B];
+        const ON_LIGHT: [u32; 6] = [0xB3284A, 0x007F6E, 0x806000, 0x2456B8, 0x8E24AA, 0x4B7300];
+        let colors = if self.dark { ON_DARK } else { ON_LIGHT };
+        rgb(colors[hue % colors.len()])
+    }
+
+    /// The colour that a source names itself, or the one that it has by its order.
+    pub(crate) fn of_source(&self, source: &crate::session::Source) -> Color32 {
+        let own = source.predictions.colour.map(|colour| colour.0);
+        own.map_or_else(|| self.source(source.hue), |[r, g, b]| Color32::from_rgb(r, g, b))
+    }
+
     /// The one of two colours that is of this theme.
     fn pick(&self, on_dark: u32, on_light: u32) -> Color32 {
         rgb(if self.dark { on_dark } else { on_light })

@@ -8,6 +8,7 @@ use super::common::{
 use super::frames::{FrameRange, chosen};
 use super::merge::MergeArgs;
 use super::shards::{end, typed};
+use super::sources::{ReadingArgs, SourceFile};
 use super::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::condition::{Breakpoint, syntax};
 use crate::config::{FitConfig, Preset, listing};
@@ -23,6 +24,7 @@ use serde_json::{Value, json};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 use table::Table;
 
 /// Shown under the options of `fit --help`.
@@ -46,6 +48,8 @@ Examples:
       Stops where the masks part, or where the maps and the body want opposite things; the row says which.
   mhp-inspector fit data/walk --frames 3 --erase reflector.json
       As if nothing had been measured in those cells.
+  mhp-inspector fit data/walk --init retr.npz --out refined
+      Each frame begins at what a network predicted of it.
   mhp-inspector fit data/d1s1 --shard 2/8 --out shards/2
       The second of eight parts, for as many machines; `mhp-inspector merge shards/* --out results` makes the whole.";
 
@@ -105,6 +109,12 @@ pub struct FitArgs {
     /// Stop a fit at the first iteration at which this holds; may be given several times.
     #[arg(long = "break", value_name = "CONDITION")]
     breakpoints: Vec<Breakpoint>,
+    /// Start each frame where its people are predicted, instead of at its own peaks: "refine this prediction by the radar". A file of
+    /// joints (npz, npy, CSV, JSON, Parquet) or the PPPR of an earlier run; `predictions --help` tells more.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["warm_start", "shard"])]
+    init: Option<PathBuf>,
+    #[command(flatten)]
+    reading: ReadingArgs,
     /// Cells that no fit is to see, as the window's File > Export > erased cells writes them.
     #[arg(long, value_name = "FILE")]
     erase: Option<PathBuf>,
@@ -127,9 +137,18 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
     let dataset = open(&args.path, args.manifest.as_deref())?;
     let frames = chosen(args.frames, &args.path, &dataset)?;
     let arrays: Vec<String> = dataset.info().views.iter().map(|view| view.array.clone()).collect();
-    let inputs =
-        inputs(&dataset, &args.path, &[args.config.as_deref(), args.manifest.as_deref(), args.erase.as_deref()]);
+    let inputs = inputs(
+        &dataset,
+        &args.path,
+        &[args.config.as_deref(), args.manifest.as_deref(), args.erase.as_deref(), args.init.as_deref()],
+    );
+    let init = args.init.as_ref().map(|path| {
+        let source = args.reading.open(&SourceFile { name: None, path: path.clone() }, &dataset)?;
+        source.notes.iter().for_each(|note| complain(&format!("note: {}: {note}", path.display())));
+        anyhow::Ok(Arc::new(source))
+    });
     let options = BatchOptions {
+        init: init.transpose()?,
         config,
         precision: args.precision.into(),
         warm_start: args.warm_start,
@@ -275,7 +294,11 @@ fn write_settings(out: &Path, dataset: &Dataset, options: &BatchOptions, inputs:
         "# mhp-inspector {} fit of {}\n# precision {precision}, {}\n",
         env!("CARGO_PKG_VERSION"),
         dataset.info().root.display().to_string().escape_debug(),
-        if options.warm_start { "warm start" } else { "every frame from its own peaks" },
+        match &options.init {
+            Some(source) => format!("every frame from {}", source.path.display().to_string().escape_debug()),
+            None if options.warm_start => "warm start".into(),
+            None => "every frame from its own peaks".into(),
+        },
     );
     let text = head + &options.config.to_toml();
     let written = replace_file(&settings, |out| out.write_all(text.as_bytes()));

@@ -16,12 +16,16 @@ mod frames;
 mod info;
 mod labels;
 mod merge;
+mod pose;
+mod predict;
+mod predictions;
 mod radars;
 mod score;
 #[cfg(feature = "viewer")]
 mod screenshot;
 mod shards;
 pub mod simulate;
+mod sources;
 mod study;
 #[cfg(feature = "train")]
 mod train_counter;
@@ -31,6 +35,8 @@ mod train_evidence;
 mod train_limbs;
 #[cfg(feature = "train")]
 mod train_motion;
+#[cfg(feature = "train")]
+mod train_pose;
 mod transfer;
 
 pub use common::allow_outside;
@@ -93,6 +99,9 @@ pub struct WindowArgs {
     /// Take the results of a batch into the frame list: the `summary.csv` that `fit --out` wrote.
     #[arg(long, value_name = "FILE")]
     pub results: Option<PathBuf>,
+    /// Show predictions of others beside the fits: FILE or NAME=FILE; several times for several sources.
+    #[arg(long = "pred", value_name = "[NAME=]FILE")]
+    predictions: Vec<sources::SourceFile>,
     /// Show the run folder of a study, as `study NAME --out RUN` wrote it.
     #[arg(long, value_name = "RUN")]
     pub study: Option<PathBuf>,
@@ -109,7 +118,7 @@ pub struct WindowArgs {
     #[arg(long, value_name = "NAME", default_value = crate::config::Preset::default().name(), value_parser = common::presets())]
     pub preset: crate::config::Preset,
     /// Open a session file: the same frame, iteration, camera, pins and layout.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["paths", "frame", "iteration", "results", "study", "config", "preset"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["paths", "frame", "iteration", "results", "predictions", "study", "config", "preset"])]
     pub session: Option<PathBuf>,
 }
 
@@ -137,6 +146,7 @@ impl WindowArgs {
             paths: self.paths,
             aim,
             results: self.results,
+            predictions: self.predictions.into_iter().map(|source| (source.path, source.name)).collect(),
             study: self.study,
             config: Some(common::settings(self.config.as_deref(), self.preset, None)?),
             session: self.session,
@@ -202,6 +212,12 @@ pub enum CliCommand {
     /// Make one whole of the shards of `fit`, `complexity`, `count`, `evidence` or a study: what each did with --shard.
     #[command(after_help = merge::HELP)]
     Merge(merge::MergeArgs),
+    /// Say where the joints are by a network that `train-pose` taught: a file of predictions.
+    #[command(after_help = predict::HELP)]
+    Predict(predict::PredictArgs),
+    /// Compare joints that networks or other programs predict with truth and fit: a table, per joint, frames by disagreement.
+    #[command(after_help = predictions::HELP)]
+    Predictions(predictions::PredictionsArgs),
     /// List the radars that manifests can name, or print one.
     #[command(after_help = radars::HELP)]
     Radars(radars::RadarsArgs),
@@ -237,6 +253,10 @@ pub enum CliCommand {
     #[cfg(feature = "train")]
     #[command(after_help = train_motion::HELP)]
     TrainMotion(train_motion::TrainMotionArgs),
+    /// Teach a network MLP+PPPR on data with joints in metres
+    #[cfg(feature = "train")]
+    #[command(after_help = train_pose::HELP)]
+    TrainPose(train_pose::TrainPoseArgs),
 }
 
 /// Starts the program once more where a subcommand needs another environment than it has, and never returns then. For `main`
@@ -270,6 +290,8 @@ pub fn run(command: CliCommand) -> anyhow::Result<ExitCode> {
         CliCommand::Info(args) => info::run(&args),
         CliCommand::Labels(command) => labels::run(&command),
         CliCommand::Merge(args) => merge::run(&args),
+        CliCommand::Predict(args) => predict::run(&args),
+        CliCommand::Predictions(args) => predictions::run(&args),
         CliCommand::Radars(args) => radars::run(&args),
         CliCommand::Score(args) => score::run(&args),
         #[cfg(feature = "viewer")]
@@ -285,5 +307,7 @@ pub fn run(command: CliCommand) -> anyhow::Result<ExitCode> {
         CliCommand::TrainLimbs(args) => train_limbs::run(&args),
         #[cfg(feature = "train")]
         CliCommand::TrainMotion(args) => train_motion::run(&args),
+        #[cfg(feature = "train")]
+        CliCommand::TrainPose(args) => train_pose::run(&args),
     }
 }

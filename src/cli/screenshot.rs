@@ -1,6 +1,7 @@
 //! `screenshot`: the real window, drawn offscreen after a number of iterations.
 
 use super::common::{PeopleArg, outside_allowed, presets, settings};
+use super::sources::SourceFile;
 use crate::app::{Begin, InspectorApp, Pane};
 use crate::config::Preset;
 use crate::explore::ExplorationKind;
@@ -41,6 +42,9 @@ pub struct ScreenshotArgs {
     /// Show the run folder of a study in its pane.
     #[arg(long, value_name = "RUN")]
     study: Option<PathBuf>,
+    /// Show predictions of others beside the fit: FILE or NAME=FILE; several times for several sources.
+    #[arg(long = "pred", value_name = "[NAME=]FILE")]
+    predictions: Vec<SourceFile>,
     /// The frame, counted from 0.
     #[arg(long, value_name = "I", default_value_t = 0)]
     frame: usize,
@@ -131,6 +135,7 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
     let begin = Begin {
         paths: args.path.iter().cloned().collect(),
         study: args.study.clone(),
+        predictions: args.predictions.iter().map(|source| (source.path.clone(), source.name.clone())).collect(),
         config: Some(args.people.of(&settings(args.config.as_deref(), args.preset, None)?)),
         session: args.session.clone(),
         allow_outside: outside_allowed(),
@@ -194,7 +199,12 @@ fn set_up(harness: &mut Harness<'_, InspectorApp>, args: &ScreenshotArgs) -> any
         let graded = !matches!(session.strata.status, StrataStatus::Running { .. });
         let labelled = session.labels.status != LabelStatus::Opening;
         let settled = session.fit.is_ready() && !session.fit.is_running() && !session.evidence_is_stale();
-        let read = session.study.reading.is_none();
+        // A file that asks something is waited for by nobody.
+        let asked = args.predictions.len().min(crate::session::MOST_SOURCES);
+        let sources = session.sources.list();
+        let compared = session.sources.question.is_some()
+            || (sources.len() >= asked && sources.iter().all(|source| source.errors.is_some()));
+        let read = session.study.reading.is_none() && compared;
         let drawn = session.pins.list().iter().all(|pin| pin.snapshot.is_some());
         graded && labelled && settled && drawn && read
     })?;

@@ -4,7 +4,7 @@
 //! a symmetric 4×4 matrix, found by Jacobi rotations. It cannot reflect, so a mirrored skeleton stays wrong.
 
 use super::assign::assign;
-use crate::geometry::{Vec3, add, dot, mat_vec, mean, norm, rotation_from_quaternion, scale, sub};
+use crate::geometry::{Mat3, Vec3, add, dot, mat_vec, mean, norm, rotation_from_quaternion, scale, sub};
 
 const MM_PER_M: f64 = 1000.0;
 /// What a person who is missed or invented costs, and the most that one who is found does, mm.
@@ -68,20 +68,57 @@ fn ospa_mm(estimated: &[&[Vec3]], true_persons: &[&[Vec3]]) -> f64 {
     (paired + (most - least) as f64 * OSPA_CUTOFF_MM) / most.max(1) as f64
 }
 
+/// Mean distance of each joint over the pairs of persons that [`joint_errors`] makes, mm, in the order of the joints; none where it
+/// has no answer.
+pub fn paired_joint_distances_mm(estimate: &[Vec3], truth: &[Vec3], joints: usize) -> Vec<f64> {
+    if joint_errors(estimate, truth, joints).is_none() {
+        return Vec::new();
+    }
+    let estimated: Vec<&[Vec3]> = estimate.chunks_exact(joints).collect();
+    let true_persons: Vec<&[Vec3]> = truth.chunks_exact(joints).collect();
+    let pairs = assign(estimated.len(), true_persons.len(), |a, b| {
+        majpe_mm(estimated[a], true_persons[b]).unwrap_or(f64::INFINITY)
+    });
+    let distance = |joint: usize, &(a, b): &(usize, usize)| norm(sub(estimated[a][joint], true_persons[b][joint]));
+    let mean_of = |joint: usize| pairs.iter().map(|pair| distance(joint, pair)).sum::<f64>() / pairs.len() as f64;
+    (0..joints).map(|joint| MM_PER_M * mean_of(joint)).collect()
+}
+
 /// `estimate` after the similarity transform (no reflection) that brings it closest to `truth`.
 fn aligned(estimate: &[Vec3], truth: &[Vec3]) -> Option<Vec<Vec3>> {
-    if estimate.is_empty() || estimate.len() != truth.len() {
-        return None;
+    let onto = Similarity::between(estimate, truth)?;
+    Some(estimate.iter().map(|&p| onto.of(p)).collect())
+}
+
+/// A similarity transform: a turn, a scale and a shift; it cannot reflect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Similarity {
+    from: Vec3,
+    to: Vec3,
+    rotation: Mat3,
+    factor: f64,
+}
+
+impl Similarity {
+    /// The one that brings `from` closest to `to` in least squares; `None` where the lists are empty or differ in length.
+    pub fn between(from: &[Vec3], to: &[Vec3]) -> Option<Self> {
+        if from.is_empty() || from.len() != to.len() {
+            return None;
+        }
+        let (from_middle, to_middle) = (mean(from), mean(to));
+        let centred: Vec<Vec3> = from.iter().map(|&p| sub(p, from_middle)).collect();
+        let target: Vec<Vec3> = to.iter().map(|&p| sub(p, to_middle)).collect();
+        let rotation = rotation_from_quaternion(horn_quaternion(&centred, &target));
+        let size: f64 = centred.iter().map(|&p| dot(p, p)).sum();
+        let along: f64 = centred.iter().zip(&target).map(|(&a, &b)| dot(mat_vec(&rotation, a), b)).sum();
+        let factor = if size > 0.0 { along / size } else { 0.0 };
+        Some(Self { from: from_middle, to: to_middle, rotation, factor })
     }
-    let (from, to) = (mean(estimate), mean(truth));
-    let centred: Vec<Vec3> = estimate.iter().map(|&p| sub(p, from)).collect();
-    let target: Vec<Vec3> = truth.iter().map(|&p| sub(p, to)).collect();
-    let rotation = rotation_from_quaternion(horn_quaternion(&centred, &target));
-    let turned: Vec<Vec3> = centred.iter().map(|&p| mat_vec(&rotation, p)).collect();
-    let size: f64 = centred.iter().map(|&p| dot(p, p)).sum();
-    let along: f64 = turned.iter().zip(&target).map(|(&a, &b)| dot(a, b)).sum();
-    let factor = if size > 0.0 { along / size } else { 0.0 };
-    Some(turned.into_iter().map(|p| add(scale(p, factor), to)).collect())
+
+    /// Where it takes a point.
+    pub fn of(&self, p: Vec3) -> Vec3 {
+        add(scale(mat_vec(&self.rotation, sub(p, self.from)), self.factor), self.to)
+    }
 }
 
 /// The quaternion (w, x, y, z) of the rotation that turns `from` onto `to`, both centred.

@@ -11,5 +11,7 @@ pub use evidence::{
 };
 #[cfg(feature = "train")]
 pub use evidence::{EvidenceExample, Measured, chosen_examples, learn_curves};
-pub use metrics::{JointErrors, OSPA_CUTOFF_MM, joint_errors, majpe_mm, pa_majpe_mm};
+pub use metrics::{
+    JointErrors, OSPA_CUTOFF_MM, Similarity, joint_errors, majpe_mm, pa_majpe_mm, paired_joint_distances_mm,
+};
 pub use reprojection::{Reprojection, map_box_coverage, reprojection};

@@ -22,6 +22,7 @@ mod queue;
 mod reports;
 mod restore;
 mod results;
+mod sources;
 mod study;
 
 pub use erase::ErasedEffect;
@@ -184,6 +185,11 @@ impl Session {
             Command::KeepResults(side) => self.keep_results(side),
             Command::ForgetResults(side) => self.forget_results(side),
             Command::LoadResults(path) => self.load_results(path),
+            Command::OpenPredictions(path, reading) => self.open_predictions(path, *reading),
+            Command::DismissPredictions => self.dismiss_predictions(),
+            Command::ShowPredictions(slot, shown) => self.show_predictions(slot, shown),
+            Command::RemovePredictions(slot) => self.remove_predictions(slot),
+            Command::StartFromPredictions(slot) => self.start_from_predictions(slot),
             Command::ComparePresets => self.compare_presets(),
             Command::ClosePresets => {
                 self.presets = PresetCard::Closed;
@@ -248,6 +254,10 @@ impl Session {
             }
             Report::SessionRead(path, result) => self.session_read(path, result),
             Report::ResultsRead(path, result) => self.results_read(&path, result),
+            Report::PredictionsRead(path, reading, dataset, result) => {
+                self.predictions_read(path, *reading, &dataset, result)
+            }
+            Report::PredictionsCompared(of, errors) => self.predictions_compared(&of, errors),
             Report::BatchRows(dataset, rows, done) => self.batch_rows(&dataset, rows, done),
             Report::BatchDone(dataset, result) => self.batch_done(&dataset, result),
             Report::KeptFound { dataset, kept, faults } => self.kept_found(&dataset, kept, faults),

@@ -85,6 +85,7 @@ pub(super) fn summary(row: &BatchRow) -> FrameSummary {
         reason,
         hashes: None,
         batch: true,
+        joints: row.joints.clone(),
     }
 }
 

@@ -14,6 +14,7 @@ use crate::explore::ExplorationKind;
 use crate::geometry::Vec3;
 use crate::labels::{CellRegion, Tag, Verdict};
 use crate::mhp::Precision;
+use crate::predictions::Reading;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -184,6 +185,16 @@ pub enum Command {
     ForgetResults(ResultSide),
     /// Take the results of a batch, a table that `fit --out` wrote, into the frame list.
     LoadResults(PathBuf),
+    /// Show a file of predictions beside the fits; what it does not say of itself is told with it.
+    OpenPredictions(PathBuf, Box<Reading>),
+    /// Close the question about a file of predictions.
+    DismissPredictions,
+    /// Draw a source, or draw it no longer.
+    ShowPredictions(usize, bool),
+    /// Take a source out of the window.
+    RemovePredictions(usize),
+    /// Begin the fit on screen at what a source predicts.
+    StartFromPredictions(usize),
     /// Fit the frame on screen with the paper's and the recommended settings, and show both.
     ComparePresets,
     /// Close what shows them.

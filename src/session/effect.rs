@@ -10,6 +10,7 @@ use crate::dataset::{BareChoice, ChirpForm, Dataset, Frame};
 use crate::explore::{Exploration, ExplorationKind};
 use crate::labels::Judged;
 use crate::mhp::Precision;
+use crate::predictions::{Predictions, Reading};
 use crate::study::run::Run;
 use crate::worker::WorkerCommand;
 use std::collections::BTreeMap;
@@ -126,6 +127,10 @@ pub enum Effect {
     ReadSession(PathBuf),
     /// Read a table of results on a thread, and find its frames in this data set.
     ReadResults(PathBuf, Arc<Dataset>),
+    /// Read a file of predictions of this data set, on a thread.
+    ReadPredictions(PathBuf, Box<Reading>, Arc<Dataset>),
+    /// Compare a source with the truth of every frame, on a thread.
+    ComparePredictions(Arc<Predictions>, Arc<Dataset>),
     /// Fit these frames on all cores.
     StartBatch(Box<BatchRequest>),
     /// Let the batch wait, or go on.

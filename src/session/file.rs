@@ -17,6 +17,7 @@ use crate::config::FitConfig;
 use crate::input::read_bytes;
 use crate::mhp::{ErasedCells, FitState, Precision};
 use crate::output::replace_file;
+use crate::predictions::Reading;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -105,6 +106,9 @@ pub struct SessionFile {
     /// Where runs stop.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub breakpoints: Vec<StopPoint>,
+    /// Files of predictions, as they were read.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub predictions: Vec<SavedSource>,
     /// Camera, layout and zoom, as the window gives them.
     pub window: serde_json::Value,
 }
@@ -119,6 +123,16 @@ pub struct SavedDataset {
     pub relative: Option<PathBuf>,
     /// What it must be.
     pub fingerprint: String,
+}
+
+/// A file of predictions.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct SavedSource {
+    /// Where it was.
+    #[serde(with = "crate::folders::portable_path")]
+    pub path: PathBuf,
+    /// How it was read.
+    pub reading: Reading,
 }
 
 /// A frame.
@@ -184,6 +198,14 @@ pub struct SavedPin {
     pub rows: Vec<PinRow>,
 }
 
+impl SavedSource {
+    fn of(source: &super::sources::Source) -> Self {
+        let of = &source.predictions;
+        let path = std::path::absolute(&of.path).unwrap_or_else(|_| of.path.clone());
+        Self { path, reading: Reading { name: Some(of.name.clone()), ..of.reading.clone() } }
+    }
+}
+
 impl SessionFile {
     /// The session as it is now; `window` is what only the window knows. `None` without a data set.
     pub fn of(session: &Session, window: serde_json::Value) -> Option<Self> {
@@ -232,6 +254,7 @@ impl SessionFile {
                 .collect(),
             baseline: pins.baseline().and_then(|base| pins.list().iter().position(|pin| pin.id == base.id)),
             breakpoints: session.breakpoints.list().to_vec(),
+            predictions: session.sources.list().iter().map(SavedSource::of).collect(),
             window,
         })
     }

@@ -35,6 +35,7 @@ mod report;
 mod results;
 mod runtime;
 mod settings;
+mod sources;
 mod state;
 mod strata;
 mod study;
@@ -53,7 +54,7 @@ pub use compared::{ComparedNumber, ResultSet, ResultSets, ResultSide, SetDiffere
 pub use effect::{BackgroundTask, Commit, Effect, PinRequest, Trash};
 pub use evidence::EvidenceRequest;
 pub use explore::{AdoptedFit, ExplorationState, Explorations, ExploreNews};
-pub use file::{SavedChange, SavedDataset, SavedFit, SavedFrame, SavedPin, SessionFile, SessionFileError};
+pub use file::{SavedChange, SavedDataset, SavedFit, SavedFrame, SavedPin, SavedSource, SessionFile, SessionFileError};
 pub use fit::{Fit, FitStatus};
 pub use history::{Branch, Flag, History, IterationRow};
 pub use labels::{LabelMode, LabelStatus, LabelTable, Labels};
@@ -65,6 +66,9 @@ pub use report::{OpenedLabels, Report, Written};
 pub use results::FoundResults;
 pub use runtime::{Picker, Runtime, Wake};
 pub use settings::{Live, LiveFrom, RunSpeed};
+pub use sources::{
+    MOST_SOURCES, Source, SourceErrors, SourceNumber, SourceNumbers, SourceQuestion, Sources, frame_rows,
+};
 pub use state::{Data, FitHashes, FrameSummary, LogLevel, LogLine, Notice, Opening, Session};
 pub use strata::{Strata, StrataStatus};
 pub use study::{StudyOrder, StudyRequest, StudyView};

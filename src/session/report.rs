@@ -6,11 +6,13 @@ use super::file::SessionFile;
 use super::labels::LabelTable;
 use super::presets::PresetFits;
 use super::results::FoundResults;
+use super::sources::SourceErrors;
 use super::state::{FitHashes, LogLevel};
 use crate::dataset::{Dataset, DatasetError, Frame};
 use crate::diagnose::Evidence;
 use crate::explore::ExplorationKind;
 use crate::labels::LabelPlace;
+use crate::predictions::{PredictionError, Predictions, Reading};
 use crate::study::complexity::Complexity;
 use crate::study::run::Run;
 use crate::study::{BatchRow, KeptFits};
@@ -67,6 +69,10 @@ pub enum Report {
     SessionRead(PathBuf, Result<Box<SessionFile>, String>),
     /// A table of results was read and its frames were found in the data set, or not.
     ResultsRead(PathBuf, Result<Box<FoundResults>, String>),
+    /// A file of predictions was read as was told, or asks something, or cannot be used.
+    PredictionsRead(PathBuf, Box<Reading>, Arc<Dataset>, Result<Box<Predictions>, PredictionError>),
+    /// What a source says against the truth.
+    PredictionsCompared(Arc<Predictions>, Arc<SourceErrors>),
     /// Rows of a batch, and how many frames are done.
     BatchRows(Arc<Dataset>, Vec<BatchRow>, u64),
     /// A batch ended: with all frames, or cancelled; or it could not go on.

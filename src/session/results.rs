@@ -54,5 +54,6 @@ fn summary(row: SummaryRow) -> FrameSummary {
         reason: row.reason,
         hashes: None,
         batch: false,
+        joints: None,
     }
 }

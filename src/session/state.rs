@@ -15,6 +15,7 @@ use super::pins::Pins;
 use super::presets::PresetCard;
 use super::queue::{ListedFrom, Queue};
 use super::settings::{Drag, SettingsActs};
+use super::sources::Sources;
 use super::strata::Strata;
 use super::study::StudyView;
 use super::tracked::Tracked;
@@ -141,6 +142,9 @@ pub struct FrameSummary {
     /// Whether a batch of the window made it.
     #[serde(default)]
     pub batch: bool,
+    /// Its joints, m, where a fit of this session made it: predictions are compared with them.
+    #[serde(skip)]
+    pub joints: Option<Arc<[[f32; 3]]>>,
 }
 
 /// What identifies a fit: a label remembers it.
@@ -193,6 +197,8 @@ pub struct Session {
     pub best_basins: Tracked<BTreeMap<usize, f64>>,
     /// Fits that others are compared with.
     pub pins: Pins,
+    /// Predictions of others.
+    pub sources: Sources,
     /// Where runs stop.
     pub breakpoints: Breakpoints,
     /// The study on screen.

@@ -105,5 +105,6 @@ fn summary(row: &RunRow) -> FrameSummary {
         reason: Some(row.fit.as_ref().map_or_else(|why| format!("error: {why}"), |fit| fit.reason.clone())),
         hashes: None,
         batch: false,
+        joints: None,
     }
 }

@@ -112,6 +112,8 @@ pub enum TimelineStrip {
     Iou,
     /// Tags.
     Tags,
+    /// How far the predictions of others are from the fits.
+    Disagreement,
 }
 
 /// What the curves over the iterations show.

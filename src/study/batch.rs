@@ -15,6 +15,7 @@ use crate::geometry::{Vec3, mean};
 use crate::mhp::{ErasedCells, Fitter, Precision, StepReport, predict, without};
 use crate::output::{FileNames, Inputs};
 use crate::people::Tracker;
+use crate::predictions::{Predictions, start_of};
 use crate::start::{find_start_in, problem_of};
 use crate::task::{milliseconds, panic_as_error};
 use crossbeam_channel::Sender;
@@ -43,6 +44,8 @@ pub struct BatchOptions {
     pub breakpoints: Vec<Breakpoint>,
     /// Cells that no fit sees, neither in its frame nor in those around; a start that is sought sees them.
     pub erased: Vec<ErasedCells>,
+    /// Begin every frame at what is predicted of it; one of which nothing is predicted fails.
+    pub init: Option<Arc<Predictions>>,
 }
 
 /// Fits one frame: from `start` where it is given, else from its own peaks.
@@ -71,7 +74,13 @@ fn fit_watched(
     let info = dataset.info();
     let problem = Arc::new(problem_of(dataset, &frame).map_err(|error| in_file(&error))?);
     let began = Instant::now();
-    let (initial, init_ms) = if let Some(params) = start {
+    let predicted = |source: &Predictions| {
+        let found = start_of(source, dataset, index, &problem, &options.config);
+        found.ok_or_else(|| format!("{}: nothing is predicted of {}", source.path.display(), dataset.frame_name(index)))
+    };
+    let (initial, init_ms) = if let Some(source) = &options.init {
+        (predicted(source)?, None)
+    } else if let Some(params) = start {
         (predict(&problem, &options.config, &params), None)
     } else {
         let found =
@@ -225,11 +234,13 @@ impl Batch<'_> {
                 }
                 Ok(fit)
             });
+            let mut joints = None;
             let fit = fit.map(|fit| {
+                joints = Some(fit.params.positions().iter().map(|p| p.map(|x| x as f32)).collect());
                 before = Some((index, fit.params));
                 fit.numbers
             });
-            let row = BatchRow { index, frame: self.dataset.frame_name(index).to_owned(), fit };
+            let row = BatchRow { index, frame: self.dataset.frame_name(index).to_owned(), fit, joints };
             let several = kept.filter(|_| row.fit.is_ok());
             if outbox.send(Done { place, row, several }).is_err() {
                 return;

@@ -209,7 +209,7 @@ mod tests {
     use super::*;
 
     fn row(index: usize, why: &str) -> BatchRow {
-        BatchRow { index, frame: format!("f{index}"), fit: Err(why.into()) }
+        BatchRow { index, frame: format!("f{index}"), fit: Err(why.into()), joints: None }
     }
 
     #[test]

@@ -8,6 +8,7 @@ use crate::mhp::{StepReport, StopReason};
 use crate::study::shard::{FrameCommand, ShardRow};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use std::sync::Arc;
 
 /// The numbers of a fit that worked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -67,6 +68,9 @@ pub struct BatchRow {
     pub frame: String,
     /// The fit, or why there is none: one line that names the file.
     pub fit: Result<FitNumbers, String>,
+    /// Joints of all persons where the fit ended, m; not written, for tables have no use for them.
+    #[serde(skip)]
+    pub joints: Option<Arc<[[f32; 3]]>>,
 }
 
 impl ShardRow for BatchRow {
@@ -246,7 +250,7 @@ mod tests {
             init_ms: Some(2.0),
             fit_ms: 5.0,
         };
-        BatchRow { index: 0, frame: "a/0".into(), fit: Ok(fit) }
+        BatchRow { index: 0, frame: "a/0".into(), fit: Ok(fit), joints: None }
     }
 
     #[test]
@@ -255,7 +259,7 @@ mod tests {
         for row in [row(1.0, Some(0.4), true), row(3.0, None, false)] {
             means.add(&row);
         }
-        means.add(&BatchRow { index: 2, frame: "a/2".into(), fit: Err("x.npz: no".into()) });
+        means.add(&BatchRow { index: 2, frame: "a/2".into(), fit: Err("x.npz: no".into()), joints: None });
         let json = means.json(&super::super::columns(&["hm".to_owned()]));
         assert_eq!((means.frames, means.failed, means.converged_share()), (3, 1, Some(0.5)));
         assert_eq!(json["loss"], 2.0);
@@ -295,7 +299,7 @@ mod tests {
         let cell = |name: &str| cells[columns.iter().position(|column| column == name).unwrap()].as_str();
         assert_eq!(cell("iou_hm"), "", "an undefined IoU");
         assert_eq!(["majpe_mm", "pa_majpe_mm", "init_ms", "fit_ms"].map(cell), ["", "", "2", "5"]);
-        let failed = BatchRow { index: 0, frame: "b".into(), fit: Err("why".into()) };
+        let failed = BatchRow { index: 0, frame: "b".into(), fit: Err("why".into()), joints: None };
         assert_eq!(failed.cells(1)[1..7], ["", "", "error: why", "", "", ""]);
         assert_eq!(failed.json(&columns)["loss"], Value::Null);
     }

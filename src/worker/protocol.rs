@@ -19,6 +19,8 @@ pub enum Start {
     Initialise,
     /// From these parameters (the previous frame's).
     Warm(Pppr),
+    /// From these parameters, which are of this frame: what somebody predicts of it.
+    Given(Pppr),
     /// From a state of an earlier session with the same frame; `initial` fixes the EM region.
     Resume {
         /// The initial pose of that fit.

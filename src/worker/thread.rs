@@ -347,6 +347,7 @@ impl Job {
                 (Some(found), initial, None)
             }
             Start::Warm(params) => (None, predict(&problem, &config, &params), None),
+            Start::Given(params) => (None, params, None),
             Start::Resume { initial, state } => (None, initial, Some(state)),
         };
         let init_ms = milliseconds(began);

@@ -31,6 +31,11 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("render", &["geometry"]),
     ("start", &["geometry", "config", "radar", "body", "mhp", "people", "dataset"]),
     ("condition", &["geometry", "radar", "body", "mhp"]),
+    (
+        "predictions",
+        &["input", "geometry", "escape", "folders", "output", "config", "body", "mhp", "dataset", "diagnose"],
+    ),
+    ("network", &["digest", "input", "geometry", "output", "config", "body", "mhp", "dataset", "start"]),
     ("worker", &["task", "geometry", "config", "radar", "body", "mhp", "condition", "dataset", "start", "diagnose"]),
     // The synthetic source is used by the calibration of the evidence alone.
     (
@@ -53,6 +58,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "dataset",
             "start",
             "diagnose",
+            "predictions",
             "labels",
         ],
     ),
@@ -86,6 +92,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "labels",
             "study",
             "worker",
+            "predictions",
         ],
     ),
     (
@@ -110,6 +117,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "worker",
             "session",
             "render",
+            "predictions",
         ],
     ),
 ];
@@ -136,6 +144,8 @@ const WINDOWLESS: &[&str] = &[
     "start",
     "condition",
     "explore",
+    "network",
+    "predictions",
 ];
 
 fn files(folder: &Path) -> Vec<PathBuf> {

@@ -96,7 +96,7 @@ impl Bench {
         let problem = Arc::new(problem_alone(&dataset, &frame).unwrap());
         let (initial, resumed) = match start {
             Start::Initialise => (self.params.clone(), false),
-            Start::Warm(params) => (params, false),
+            Start::Warm(params) | Start::Given(params) => (params, false),
             Start::Resume { initial, .. } => (initial, true),
         };
         if !resumed {

@@ -23,6 +23,7 @@ mod large;
 mod lit;
 mod maps;
 mod pictures;
+mod predictions;
 mod radar;
 mod results;
 mod seen;

@@ -105,6 +105,8 @@ pub(crate) enum AppAct {
     LoadResults,
     /// Type the path of a run folder.
     OpenStudy,
+    /// Type the path of a file of predictions.
+    OpenPredictions,
     /// Put the frame's path on the clipboard.
     CopyPath,
 }

@@ -2,6 +2,7 @@
 
 use super::table::{CTRL, CTRL_SHIFT, NONE, SHIFT, always, has_frame, view};
 use super::{AppAct, CommandRow, Menu, SaveKind, UiAction};
+use crate::app::panes::predictions;
 use crate::session::{Against, Command, Export, Session};
 use egui::Key;
 
@@ -37,6 +38,8 @@ pub(super) const COMMANDS: &[CommandRow] = &[
         enabled: |s| s.data.dataset.is_some(),
         act: |_| UiAction::App(AppAct::LoadResults),
     },
+    predictions::OPEN,
+    predictions::START,
     CommandRow {
         label: "Open study…",
         title: None,

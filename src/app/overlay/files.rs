@@ -86,6 +86,31 @@ impl Overlay {
         self.files = FileDialog::default();
     }
 
+    /// Asks for a file of predictions.
+    pub(in crate::app) fn open_predictions(&mut self) {
+        self.toggle(super::Sheet::Predictions);
+        self.files = FileDialog::default();
+    }
+
+    pub(super) fn predictions_path(&mut self, ui: &mut Ui, shared: &mut Shared<'_>) -> bool {
+        let tokens = Tokens::of(ui);
+        let mut done = false;
+        let response = modal(ui, "predictions").show(ui.ctx(), |ui| {
+            ui.set_width(super::width(ui, 620.0));
+            ui.label(RichText::new("Open predictions").font(crate::app::theme::strong(16.0)));
+            let how = "Joints of a network or an earlier run: npz, npy, CSV, JSON (COCO, MMPose), Parquet, or the folder of \
+                       `fit --out`. What the file does not say of itself is asked for, and remembered.";
+            ui.label(RichText::new(how).small().color(tokens.dim));
+            let browse = |_: PathBuf| super::pick_predictions;
+            if let Some(path) = self.path_field(ui, "File of predictions", "Open", browse) {
+                shared.acts.push(UiAction::App(crate::app::commands::AppAct::ShowPane(&crate::app::panes::predictions::PANE)));
+                shared.send(Command::OpenPredictions(path, Box::default()));
+                done = true;
+            }
+        });
+        done || response.should_close()
+    }
+
     pub(super) fn save(&mut self, ui: &mut Ui, shared: &mut Shared<'_>, kind: SaveKind) -> bool {
         let tokens = Tokens::of(ui);
         let (title, how) = what(kind);

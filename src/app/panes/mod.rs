@@ -32,6 +32,7 @@ mod log;
 pub(super) mod maps;
 pub(super) mod modes;
 mod pane;
+pub(super) mod predictions;
 mod restarts;
 mod ribbon;
 pub(super) mod scene;
@@ -65,6 +66,7 @@ static PANES: &[&Pane] = &[
     &known::PANE,
     &closure::PANE,
     &compare::PANE,
+    &predictions::PANE,
     &tuning::PANE,
     &landscape::PANE,
     &ambiguity::PANE,

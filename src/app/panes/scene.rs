@@ -474,6 +474,8 @@ fn captions(painter: &egui::Painter, rect: Rect, session: &Session, tokens: &Tok
     let mut keys = build::who(session, tokens);
     keys.reverse();
     keys.extend(has_truth.then(|| ("truth".to_owned(), tokens.truth)));
+    let drawn = session.sources.list().iter().filter(|source| source.shown);
+    keys.extend(drawn.map(|source| (source.name().to_owned(), tokens.of_source(source))));
     keys.extend(baseline.map(|pin| (format!("baseline {}", pin.name), tokens.pin)));
     for (word, color) in keys {
         let at = pos2(x, rect.top() + 5.0);

@@ -58,7 +58,12 @@ fn caption(ui: &mut Ui, text: &str) {
 
 /// What the strip shows, in the place of its caption.
 fn choose_strip(ui: &mut Ui, shared: &mut Shared<'_>) {
-    let names = [(TimelineStrip::Stratum, "Stratum"), (TimelineStrip::Iou, "IoU"), (TimelineStrip::Tags, "Tags")];
+    let names = [
+        (TimelineStrip::Stratum, "Stratum"),
+        (TimelineStrip::Iou, "IoU"),
+        (TimelineStrip::Tags, "Tags"),
+        (TimelineStrip::Disagreement, "Disagree"),
+    ];
     let now = shared.session.view.strip;
     ui.allocate_ui_with_layout(vec2(CAPTION, 22.0), egui::Layout::left_to_right(egui::Align::Center), |ui| {
         ui.set_min_width(CAPTION);
@@ -71,7 +76,8 @@ fn choose_strip(ui: &mut Ui, shared: &mut Shared<'_>) {
                 }
             }
         });
-        let tip = "What the strip over all frames shows: bars for stratum or IoU, marks for tags.";
+        let tip = "What the strip over all frames shows: bars for stratum or IoU, marks for tags, or how far \
+                   the predictions of others are from the fits (the whole height is 300 mm).";
         button.response.named(egui::Role::Button, "Strip shows").on_hover_text(tip);
     });
 }

@@ -9,6 +9,9 @@ use crate::session::{LabelMode, Session, StrataStatus, TimelineStrip};
 use crate::study::complexity::Stratum;
 use egui::{Align2, Color32, Rect, Ui, pos2, vec2};
 
+/// The distance between predictions and fits that the height of the strip stands for, mm.
+const WHOLE_MM: f64 = 300.0;
+
 /// Frames and columns.
 type Size = (usize, usize);
 
@@ -63,6 +66,8 @@ pub(super) struct Strips {
     iou: Lane<(Size, u64), (f64, u32)>,
     /// Every tag that is seen.
     tags: Lane<(Size, u64, LabelMode), Tags>,
+    /// Sum of distances between predictions and fits, mm, and of how many.
+    apart: Lane<(Size, [u64; 2]), (f64, u32)>,
 }
 
 impl Strips {
@@ -81,6 +86,7 @@ impl Strips {
             match session.view.strip {
                 TimelineStrip::Stratum => strata(ui, column, self.strata.at(i), faded, tokens),
                 TimelineStrip::Iou => iou(ui, column, self.iou.at(i), faded, tokens),
+                TimelineStrip::Disagreement => apart(ui, column, self.apart.at(i), faded, tokens),
                 TimelineStrip::Tags => tags(ui, column, self.tags.at(i), faded, tokens),
             }
         }
@@ -101,6 +107,12 @@ impl Strips {
                 let known = session.summaries.iter().filter_map(|(&frame, summary)| Some((frame, summary.iou?)));
                 let key = (size, session.summaries.revision());
                 self.iou.update(size, key, known, |sum, iou| *sum = (sum.0 + iou, sum.1 + 1));
+            }
+            TimelineStrip::Disagreement => {
+                let known =
+                    session.summaries.keys().filter_map(|&frame| Some((frame, session.disagreement_mm(frame)?)));
+                let key = (size, [session.sources.revision(), session.summaries.revision()]);
+                self.apart.update(size, key, known, |sum, mm| *sum = (sum.0 + mm, sum.1 + 1));
             }
             TimelineStrip::Tags => {
                 let mode = session.view.label_mode;
@@ -142,6 +154,14 @@ fn iou(ui: &Ui, column: Rect, (sum, count): (f64, u32), faded: f32, tokens: &Tok
     if count > 0 {
         let mean = sum / f64::from(count);
         bar(ui, column, (mean as f32).clamp(0.08, 1.0), iou_color(tokens, mean).gamma_multiply(faded));
+    }
+}
+
+/// Mean distance between predictions and fits: height and colour say the same.
+fn apart(ui: &Ui, column: Rect, (sum, count): (f64, u32), faded: f32, tokens: &Tokens) {
+    if count > 0 {
+        let share = (sum / f64::from(count) / WHOLE_MM).clamp(0.0, 1.0);
+        bar(ui, column, (share as f32).max(0.06), iou_color(tokens, 1.0 - share).gamma_multiply(faded));
     }
 }
 

@@ -19,6 +19,7 @@ enum Elements<'a> {
     I64(&'a [i64]),
     Flags(&'a [bool]),
     Text(&'a str),
+    Texts(&'a [String]),
 }
 
 /// An array to be written, C order.
@@ -73,6 +74,11 @@ impl<'a> ArrayView<'a> {
         Self::new(&[], Elements::Text(text))
     }
 
+    /// A list of unicode strings.
+    pub fn texts(texts: &'a [String]) -> Self {
+        Self::new(&[texts.len()], Elements::Texts(texts))
+    }
+
     fn len(&self) -> usize {
         match self.elements {
             Elements::F64(data) => data.len(),
@@ -83,6 +89,7 @@ impl<'a> ArrayView<'a> {
             Elements::I64(data) => data.len(),
             Elements::Flags(data) => data.len(),
             Elements::Text(_) => 1,
+            Elements::Texts(texts) => texts.len(),
         }
     }
 
@@ -90,6 +97,16 @@ impl<'a> ArrayView<'a> {
         fn plain<T: npyz::AutoSerialize + Copy>(out: &mut dyn Write, shape: &[u64], data: &[T]) -> std::io::Result<()> {
             let mut writer = npyz::WriteOptions::new().default_dtype().shape(shape).writer(out).begin_nd()?;
             writer.extend(data)?;
+            writer.finish()
+        }
+        fn strings(out: &mut dyn Write, shape: &[u64], texts: &[&str]) -> std::io::Result<()> {
+            let longest = texts.iter().map(|text| text.chars().count()).max().unwrap_or(0).max(1);
+            let dtype = format!("<U{longest}").parse().map_err(std::io::Error::other)?;
+            let options = npyz::WriteOptions::<str>::new().dtype(npyz::DType::Plain(dtype)).shape(shape);
+            let mut writer = options.writer(out).begin_nd()?;
+            for text in texts {
+                writer.push(text)?;
+            }
             writer.finish()
         }
         if self.shape.iter().product::<u64>() != self.len() as u64 {
@@ -104,12 +121,10 @@ impl<'a> ArrayView<'a> {
             Elements::Complex64(data) => plain(out, &self.shape, data),
             Elements::I64(data) => plain(out, &self.shape, data),
             Elements::Flags(data) => plain(out, &self.shape, data),
-            Elements::Text(text) => {
-                let dtype = format!("<U{}", text.chars().count().max(1)).parse().map_err(std::io::Error::other)?;
-                let options = npyz::WriteOptions::<str>::new().dtype(npyz::DType::Plain(dtype)).shape(&self.shape);
-                let mut writer = options.writer(out).begin_nd()?;
-                writer.push(text)?;
-                writer.finish()
+            Elements::Text(text) => strings(out, &self.shape, &[text]),
+            Elements::Texts(texts) => {
+                let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
+                strings(out, &self.shape, &texts)
             }
         }
     }

@@ -88,6 +88,7 @@ impl Session {
         effects.extend(self.open_labels());
         effects.extend(self.begin_strata());
         effects.extend(self.load_waiting_results());
+        effects.extend(self.load_waiting_predictions());
         effects.push(Effect::FindKept(Arc::clone(&dataset)));
         effects
     }
@@ -99,6 +100,7 @@ impl Session {
         self.summaries.change().clear();
         self.best_basins.change().clear();
         self.pins = Pins::default();
+        self.forget_predictions();
         self.batch = Batch::default();
         self.evidence = EvidenceState::default();
         self.identities = Identities::default();
@@ -231,6 +233,11 @@ impl Session {
 
     /// Prepares the fit of the frame on screen: the one that was left there, a warm start, or a new one.
     pub(super) fn begin_fit(&mut self, index: usize, warm: Option<Pppr>) -> Vec<Effect> {
+        self.begin_fit_at(index, warm.map(Start::Warm))
+    }
+
+    /// As [`Self::begin_fit`], at `at` where no fit was left there.
+    pub(super) fn begin_fit_at(&mut self, index: usize, at: Option<Start>) -> Vec<Effect> {
         let resumed = self.fits.remove(&index).filter(|fit| fit.initial.is_some());
         let (Some(dataset), Some(frame)) = (&self.data.dataset, &self.data.frame) else { return Vec::new() };
         self.jobs += 1;
@@ -242,7 +249,7 @@ impl Session {
                     _ => (Fit::default(), Start::Initialise),
                 }
             }
-            None => (Fit::default(), warm.map_or(Start::Initialise, Start::Warm)),
+            None => (Fit::default(), at.unwrap_or(Start::Initialise)),
         };
         let resuming = matches!(start, Start::Resume { .. });
         self.fit = Fit { job: self.jobs, frame: index, status: FitStatus::Preparing, ..fit };

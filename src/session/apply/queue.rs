@@ -3,6 +3,7 @@
 use crate::session::compared::ResultSide;
 use crate::session::effect::Effect;
 use crate::session::queue::{FrameRow, ListedFrom, Reads, SavedView, Sort};
+use crate::session::sources::Source;
 use crate::session::state::{FrameSummary, LogLevel, Session};
 
 impl Session {
@@ -122,6 +123,7 @@ impl Session {
             labels: reads.labels().then(|| self.labels.revision()),
             basins: reads.basins.then(|| self.best_basins.revision()),
             results: reads.results.then(|| (self.results.revision(), self.view.compared)),
+            sources: reads.sources.then(|| (self.sources.revision(), reads.to_fits.then(|| self.summaries.revision()))),
             sort: self.view.sort,
             label_mode: self.view.label_mode,
         }
@@ -162,6 +164,12 @@ impl Session {
         }
         if reads.results {
             row.results = ResultSide::ALL.map(|side| self.results.value(side, index, self.view.compared));
+        }
+        if reads.sources {
+            let joints = dataset.info().skeleton.joints.len();
+            let fit = (reads.to_fits && !self.sources.is_empty()).then(|| self.fit_joints(index)).flatten();
+            let of = |source: &'a Source| (source.name(), source.numbers(index, fit.as_deref(), joints));
+            row.sources = self.sources.list().iter().map(of).collect();
         }
         if reads.tags {
             row.tags = self.labels.visible_tags(index, mode);

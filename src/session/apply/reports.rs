@@ -59,6 +59,10 @@ impl Session {
             converged: Some(row.report.converged),
             majpe_mm: row.majpe_mm,
             batch: false,
+            joints: row
+                .state
+                .as_ref()
+                .map(|state| state.params.positions().iter().map(|p| p.map(|x| x as f32)).collect()),
         };
         self.summaries.change().insert(self.fit.frame, summary);
     }

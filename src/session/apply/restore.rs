@@ -71,6 +71,8 @@ impl Session {
         }
         let mut effects = vec![Effect::RestoreWindow(file.window)];
         effects.extend(self.restore_breakpoints(file.breakpoints));
+        let sources = file.predictions.into_iter();
+        self.sources.waiting.extend(sources.map(|source| (source.path, source.reading)));
         for (k, saved) in file.pins.into_iter().enumerate() {
             let (Some(at), Some(config)) = (find(dataset, &saved.frame), config(&saved.config, &path)) else {
                 self.note(

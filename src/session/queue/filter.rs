@@ -7,6 +7,7 @@ use super::row::{FrameNumber, FrameRow, Reads};
 use crate::condition::{Comparison, comparison, split};
 use crate::labels::{Tag, Verdict};
 use crate::mhp::TERMS;
+use crate::session::sources::SourceNumber;
 use crate::study::complexity::Stratum;
 
 /// A parsed filter. The empty text matches every frame.
@@ -31,6 +32,8 @@ enum Test {
     Tags { any_of: Vec<Tag>, any: bool, none: bool },
     /// A number compared with a limit.
     Compare(FrameNumber, Comparison, f64),
+    /// A number of a source of predictions, by its name, compared with a limit.
+    Source(String, SourceNumber, Comparison, f64),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,6 +69,8 @@ pub fn syntax() -> String {
         stratum:hard · tag:F1 · tag:F1|F2 · tag:none · tag:any · by:ada · note:word · scene:d5s1\n\
         iou<0.5 · majpe>200 · basin<0.9 · hardness>=0.7 · peaks static saliency loss iterations index\n\
         a b diff: the two result sets that are compared, and B − A\n\
+        pred.NAME>100: MAJPE of a source of predictions, mm · pred.NAME.pa · pred.NAME.fit: how far it is from the fit\n\
+        disagree>100: the source that is farthest from the fit, mm\n\
         {}: the terms of the loss\n\
         converged:no · fitted:yes · reason:diverged · verdict:detection-error · readable:no\n\
         A bare word is looked for in the frame's name.",
@@ -105,6 +110,7 @@ impl Test {
             Self::Name(_) => Reads { name: true, ..none },
             Self::Tags { .. } => Reads { tags: true, ..none },
             Self::Compare(number, ..) => number.reads(),
+            Self::Source(_, number, ..) => number.reads(),
             Self::Word(word, _) => match word {
                 Word::Stratum | Word::Readable => Reads { strata: true, ..none },
                 Word::Scene => Reads { scene: true, ..none },
@@ -125,6 +131,9 @@ impl Test {
             }
             Self::Compare(number, comparison, limit) => {
                 row.number(*number).is_some_and(|value| comparison.holds(value, *limit))
+            }
+            Self::Source(name, number, comparison, limit) => {
+                row.of_source(name, *number).is_some_and(|value| comparison.holds(value, *limit))
             }
             Self::Word(word, values) => values.iter().any(|value| word.holds(row, value)),
         }
@@ -171,11 +180,16 @@ fn test(text: &str) -> Result<Test, String> {
         // Which number is meant is told before what is wrong with its limit.
         let (key, comparison, limit) = match parts {
             Ok(parts) => parts,
+            Err(why) if text.to_lowercase().starts_with(SOURCE) => return Err(why),
             Err(why) => {
                 number(text.split(['<', '>', '=']).next().unwrap_or_default())?;
                 return Err(why);
             }
         };
+        if let Some(source) = key.to_lowercase().strip_prefix(SOURCE) {
+            let (name, number) = source_number(source)?;
+            return Ok(Test::Source(name, number, comparison, limit));
+        }
         return Ok(Test::Compare(number(key)?, comparison, limit));
     }
     let Some((key, value)) = text.split_once(':') else { return Ok(Test::Name(text.to_lowercase())) };
@@ -225,6 +239,26 @@ fn tags(values: &[String]) -> Result<Test, String> {
     Ok(Test::Tags { any_of, any, none })
 }
 
+/// What begins a number of a source of predictions.
+const SOURCE: &str = "pred.";
+
+/// `retr`, `retr.pa`, `retr.fit`.
+fn source_number(text: &str) -> Result<(String, SourceNumber), String> {
+    let (name, number) = match text.rsplit_once('.') {
+        None => (text, SourceNumber::Error),
+        Some((name, "mm" | "majpe")) => (name, SourceNumber::Error),
+        Some((name, "pa")) => (name, SourceNumber::AlignedError),
+        Some((name, "fit")) => (name, SourceNumber::ToFit),
+        Some((_, other)) => {
+            return Err(format!("`pred.{text}`: `{other}`; expected pred.NAME, pred.NAME.pa or pred.NAME.fit"));
+        }
+    };
+    if name.is_empty() {
+        return Err("`pred.`: no name; expected for example pred.retr>100".into());
+    }
+    Ok((name.to_owned(), number))
+}
+
 fn number(key: &str) -> Result<FrameNumber, String> {
     FrameNumber::of(&key.to_lowercase()).ok_or_else(|| {
         let names: Vec<&str> = FrameNumber::all().map(FrameNumber::key).collect();
@@ -239,6 +273,7 @@ mod tests {
     use crate::labels::{Tags, Verdict};
     #[cfg(feature = "dummies")]
     use crate::mhp::Terms;
+    use crate::session::sources::SourceNumbers;
     use crate::study::complexity::Stratum;
 
     fn row() -> FrameRow<'static> {
@@ -286,6 +321,18 @@ mod tests {
     }
 
     #[test]
+    fn sources_are_asked_by_their_names() {
+        let numbers = SourceNumbers { majpe_mm: Some(120.0), pa_majpe_mm: Some(60.0), to_fit_mm: None };
+        let other = SourceNumbers { to_fit_mm: Some(90.0), ..SourceNumbers::default() };
+        let row = FrameRow { sources: vec![("retr", numbers), ("mmdiff", other)], ..row() };
+        let holds = |text: &str| FrameFilter::parse(text).unwrap().matches(&row);
+        assert!(holds("pred.retr>100 pred.RETR.pa<70 pred.mmdiff.fit>80 disagree>80"));
+        assert!(!holds("pred.retr.fit>0") && !holds("pred.none>0") && !holds("disagree>95"));
+        assert!(FrameFilter::parse("pred.retr>1").unwrap().reads().sources);
+        assert!(!FrameFilter::parse("pred.retr>1").unwrap().reads().to_fits);
+    }
+
+    #[test]
     fn what_is_wrong_is_told() {
         for (text, expected) in [
             ("iou:0.5", "iou is a number"),
@@ -295,6 +342,9 @@ mod tests {
             ("foo:1", "`foo:` is not known"),
             ("foo<1", "expected index"),
             ("tag:", "nothing after the colon"),
+            ("pred.>1", "no name"),
+            ("pred.retr.x>1", "`x`; expected pred.NAME"),
+            ("pred.retr>x", "not a number"),
             ("note:\"a", "quote"),
             ("-", "negates nothing"),
         ] {

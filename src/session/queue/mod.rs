@@ -8,6 +8,7 @@ mod row;
 
 use super::compared::ComparedNumber;
 use super::labels::LabelMode;
+use super::sources::SourceNumber;
 use super::tracked::Tracked;
 pub use filter::{FrameFilter, syntax};
 pub use row::{FrameNumber, FrameRow, Reads};
@@ -50,6 +51,10 @@ pub enum SortKey {
     ResultB,
     /// B − A.
     Difference,
+    /// The largest distance between a source of predictions and the fit.
+    Disagreement,
+    /// A number of the source of predictions at a place of their list.
+    Source(u8, SourceNumber),
     /// An unweighted term of the loss.
     Term(TermId),
 }
@@ -66,6 +71,8 @@ impl SortKey {
             Self::Iou | Self::Converged | Self::Majpe | Self::Term(_) => Reads { fit: true, ..none },
             Self::BestBasin => Reads { basins: true, ..none },
             Self::ResultA | Self::ResultB | Self::Difference => Reads { results: true, ..none },
+            Self::Disagreement => SourceNumber::ToFit.reads(),
+            Self::Source(_, number) => number.reads(),
             Self::Tags => Reads { tags: true, ..none },
             Self::Annotator => Reads { annotators: true, ..none },
         }
@@ -104,6 +111,8 @@ pub(super) struct ListedFrom {
     pub(super) labels: Option<u64>,
     pub(super) basins: Option<u64>,
     pub(super) results: Option<(u64, ComparedNumber)>,
+    /// Revisions of the sources, and of the fits that they are compared with.
+    pub(super) sources: Option<(u64, Option<u64>)>,
     pub(super) sort: Sort,
     pub(super) label_mode: LabelMode,
 }
@@ -257,6 +266,10 @@ fn key(sort: Sort, row: &FrameRow<'_>) -> u64 {
         SortKey::ResultA => row.results[0].and_then(ordered),
         SortKey::ResultB => row.results[1].and_then(ordered),
         SortKey::Difference => row.number(FrameNumber::Difference).and_then(ordered),
+        SortKey::Disagreement => row.disagreement_mm().and_then(ordered),
+        SortKey::Source(slot, number) => {
+            row.sources.get(usize::from(slot)).and_then(|(_, numbers)| numbers.get(number)).and_then(ordered)
+        }
         SortKey::Tags => Some(tag_rank(row.tags)).filter(|&rank| rank > 0),
         SortKey::Annotator => row.annotators.first().map(|name| letters(name)),
         SortKey::Term(term) => row.number(FrameNumber::Term(term)).and_then(ordered),

@@ -2,6 +2,7 @@
 
 use crate::labels::{Tags, Verdict};
 use crate::mhp::{TermId, Terms};
+use crate::session::sources::{SourceNumber, SourceNumbers};
 use crate::study::complexity::Stratum;
 
 /// One frame's row.
@@ -43,6 +44,8 @@ pub struct FrameRow<'a> {
     pub best_basin: Option<f64>,
     /// What result sets A and B say, by the number that they are compared by.
     pub results: [Option<f64>; 2],
+    /// What each source of predictions says, by its name.
+    pub sources: Vec<(&'a str, SourceNumbers)>,
     /// Tags that may be seen, by whomever.
     pub tags: Tags,
     /// Those that the annotator gave.
@@ -76,6 +79,7 @@ impl Default for FrameRow<'_> {
             majpe_mm: None,
             best_basin: None,
             results: [None; 2],
+            sources: Vec::new(),
             tags: Tags::NONE,
             own_tags: Tags::NONE,
             note: "",
@@ -100,6 +104,10 @@ pub struct Reads {
     pub basins: bool,
     /// Result sets A and B.
     pub results: bool,
+    /// What sources of predictions say against the truth.
+    pub sources: bool,
+    /// How far they are from the fits.
+    pub to_fits: bool,
     /// Tags.
     pub tags: bool,
     /// The annotator's note and verdict.
@@ -117,6 +125,8 @@ impl Reads {
         fit: true,
         basins: true,
         results: true,
+        sources: true,
+        to_fits: true,
         tags: true,
         said: true,
         annotators: true,
@@ -132,6 +142,8 @@ impl Reads {
             fit: self.fit || other.fit,
             basins: self.basins || other.basins,
             results: self.results || other.results,
+            sources: self.sources || other.sources,
+            to_fits: self.to_fits || other.to_fits,
             tags: self.tags || other.tags,
             said: self.said || other.said,
             annotators: self.annotators || other.annotators,
@@ -173,6 +185,8 @@ pub enum FrameNumber {
     ResultB,
     /// B − A.
     Difference,
+    /// The largest distance between a source of predictions and the fit, mm.
+    Disagreement,
     /// An unweighted term of the loss.
     Term(TermId),
 }
@@ -194,6 +208,7 @@ impl FrameNumber {
             Self::ResultA,
             Self::ResultB,
             Self::Difference,
+            Self::Disagreement,
         ];
         own.into_iter().chain(TermId::all().map(Self::Term))
     }
@@ -214,6 +229,7 @@ impl FrameNumber {
             Self::ResultA => "a",
             Self::ResultB => "b",
             Self::Difference => "diff",
+            Self::Disagreement => "disagree",
             Self::Term(term) => term.key,
         }
     }
@@ -233,12 +249,34 @@ impl FrameNumber {
             }
             Self::BestBasin => Reads { basins: true, ..none },
             Self::ResultA | Self::ResultB | Self::Difference => Reads { results: true, ..none },
+            Self::Disagreement => SourceNumber::ToFit.reads(),
             Self::Iou | Self::Loss | Self::Iterations | Self::Majpe | Self::Term(_) => Reads { fit: true, ..none },
         }
     }
 }
 
+impl SourceNumber {
+    /// What it is read from.
+    pub(super) fn reads(self) -> Reads {
+        let none = Reads::default();
+        match self {
+            Self::Error | Self::AlignedError => Reads { sources: true, ..none },
+            Self::ToFit => Reads { sources: true, to_fits: true, ..none },
+        }
+    }
+}
+
 impl FrameRow<'_> {
+    /// The largest distance between a source of predictions and the fit, mm.
+    pub fn disagreement_mm(&self) -> Option<f64> {
+        self.sources.iter().filter_map(|(_, numbers)| numbers.to_fit_mm).max_by(f64::total_cmp)
+    }
+
+    /// A number of the source called `name`.
+    pub fn of_source(&self, name: &str, number: SourceNumber) -> Option<f64> {
+        self.sources.iter().find(|(known, _)| *known == name).and_then(|(_, numbers)| numbers.get(number))
+    }
+
     /// A number of this frame.
     pub fn number(&self, number: FrameNumber) -> Option<f64> {
         match number {
@@ -255,6 +293,7 @@ impl FrameRow<'_> {
             FrameNumber::ResultA => self.results[0],
             FrameNumber::ResultB => self.results[1],
             FrameNumber::Difference => self.results[1].zip(self.results[0]).map(|(b, a)| b - a),
+            FrameNumber::Disagreement => self.disagreement_mm(),
             FrameNumber::Term(term) => self.terms.and_then(|terms| terms[term]),
         }
     }

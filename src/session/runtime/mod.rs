@@ -12,9 +12,11 @@ use super::file::SessionFile;
 use super::presets::PresetFits;
 use super::report::Report;
 use super::results::FoundResults;
+use super::sources::SourceErrors;
 use super::state::{LogLevel, Session};
 use super::strata::StrataStatus;
 use crate::dataset::{Dataset, Loader, OpenJob};
+use crate::predictions::{Predictions, RememberedReadings};
 use crate::study::StudyError;
 use crate::study::complexity::{ComplexityJob, ComplexityOptions, cache_folder, cached_share};
 use crate::worker::Worker;
@@ -256,6 +258,15 @@ impl Runtime {
             Effect::ReadResults(path, dataset) => self.on_thread("results", move || {
                 let read = FoundResults::read(&path, &dataset).map(Box::new);
                 Report::ResultsRead(path, read)
+            }),
+            Effect::ReadPredictions(path, reading, dataset) => self.on_thread("predictions", move || {
+                let memory = RememberedReadings::of_user();
+                let read = Predictions::open(&path, &dataset, &reading, memory.as_ref()).map(Box::new);
+                Report::PredictionsRead(path, reading, dataset, read)
+            }),
+            Effect::ComparePredictions(of, dataset) => self.on_thread("predictions-errors", move || {
+                let errors = Arc::new(SourceErrors::of(&of, &dataset));
+                Report::PredictionsCompared(of, errors)
             }),
             Effect::StartBatch(request) => self.batch = Some(batch::BatchRun::start(*request, &self.wake)),
             Effect::PauseBatch(wait) => {

@@ -4,8 +4,11 @@ use crate::app::theme::{self, Tokens};
 use crate::app::widgets::iou_color;
 use crate::labels::Verdict;
 use crate::mhp::TermId;
-use crate::session::{ComparedNumber, FrameNumber, FrameRow, ResultSide, Session, SortKey, ViewState};
+use crate::session::{
+    ComparedNumber, FrameNumber, FrameRow, MOST_SOURCES, ResultSide, Session, SortKey, SourceNumber, ViewState,
+};
 use egui::{Align2, Color32, FontId, Painter, Rect, pos2};
+use std::borrow::Cow;
 use std::sync::LazyLock;
 
 /// One column.
@@ -28,8 +31,10 @@ pub(super) struct Column {
 
 /// Every column, from left to right: at the end one for each term of the loss.
 pub(super) fn columns() -> impl Iterator<Item = &'static Column> {
+    static OF_SOURCES: LazyLock<Vec<Column>> =
+        LazyLock::new(|| (0..MOST_SOURCES as u8).flat_map(Column::of_source).collect());
     static OF_TERMS: LazyLock<Vec<Column>> = LazyLock::new(|| TermId::all().map(Column::of).collect());
-    COLUMNS.iter().chain(OF_TERMS.iter())
+    COLUMNS.iter().chain(OF_SOURCES.iter()).chain(OF_TERMS.iter())
 }
 
 impl Column {
@@ -42,6 +47,65 @@ impl Column {
             sort: SortKey::Term(term),
             width: 50.0,
             right: true,
+        }
+    }
+
+    /// The error of a source of predictions, and its distance from the fit.
+    fn of_source(slot: u8) -> [Self; 2] {
+        let of = |number, key: &str, name: &str, tip| {
+            let number_of = slot + 1;
+            Self {
+                key: format!("pred{number_of}{key}").leak(),
+                title: if key.is_empty() { "mm" } else { "Δ fit" },
+                name: format!("{name} of source {number_of}").leak(),
+                tip,
+                sort: SortKey::Source(slot, number),
+                width: 48.0,
+                right: true,
+            }
+        };
+        [
+            of(
+                SourceNumber::Error,
+                "",
+                "MAJPE",
+                "MAJPE of the source of predictions against the truth, mm, over the joints in common.",
+            ),
+            of(
+                SourceNumber::ToFit,
+                "_fit",
+                "Distance from the fit",
+                "Mean distance of the source's joints from the fit's, mm: where network and fit disagree.",
+            ),
+        ]
+    }
+
+    /// Over the column: of a source of predictions its name.
+    pub(super) fn title_in(&self, session: &Session) -> Cow<'static, str> {
+        match self.sort {
+            SortKey::Source(slot, number) => {
+                session.sources.get(slot.into()).map_or(Cow::Borrowed(self.title), |source| {
+                    Cow::Owned(if number == SourceNumber::ToFit {
+                        format!("Δ {}", source.name())
+                    } else {
+                        source.name().to_owned()
+                    })
+                })
+            }
+            _ => Cow::Borrowed(self.title),
+        }
+    }
+
+    /// In full: of a source of predictions with its name.
+    pub(super) fn name_in(&self, session: &Session) -> Cow<'static, str> {
+        match self.sort {
+            SortKey::Source(slot, number) => {
+                session.sources.get(slot.into()).map_or(Cow::Borrowed(self.name), |source| {
+                    let what = if number == SourceNumber::ToFit { "distance from the fit" } else { "MAJPE" };
+                    Cow::Owned(format!("{}, {what}", source.name()))
+                })
+            }
+            _ => Cow::Borrowed(self.name),
         }
     }
 
@@ -58,6 +122,11 @@ impl Column {
             SortKey::BestBasin => !session.best_basins.is_empty(),
             SortKey::ResultA => kept(ResultSide::A),
             SortKey::ResultB => kept(ResultSide::B),
+            SortKey::Source(slot, number) => session.sources.get(slot.into()).is_some_and(|source| match number {
+                SourceNumber::ToFit => true,
+                _ => source.errors.as_ref().is_some_and(|errors| !errors.frames.is_empty()),
+            }),
+            SortKey::Disagreement => session.sources.list().len() > 1,
             SortKey::Difference => kept(ResultSide::A) && kept(ResultSide::B),
             _ => true,
         }
@@ -226,6 +295,15 @@ const COLUMNS: &[Column] = &[
         right: true,
     },
     Column {
+        key: "disagree",
+        title: "Disagree",
+        name: "Disagreement",
+        tip: "The largest distance between a source of predictions and the fit, mm; a filter asks for disagree>100.",
+        sort: SortKey::Disagreement,
+        width: 52.0,
+        right: true,
+    },
+    Column {
         key: "by",
         title: "By",
         name: "Annotator",
@@ -249,7 +327,12 @@ fn text(column: &Column, row: &FrameRow<'_>, compared: ComparedNumber, tokens: &
         let value = row.number(FrameNumber::Term(term));
         return (value.map_or_else(String::new, |x| format!("{x:.4}")), tokens.text);
     }
+    if let SortKey::Source(slot, number) = column.sort {
+        let value = row.sources.get(usize::from(slot)).and_then(|(_, numbers)| numbers.get(number));
+        return (value.map_or_else(String::new, |mm| format!("{mm:.0}")), tokens.text);
+    }
     match column.key {
+        "disagree" => (row.disagreement_mm().map_or_else(String::new, |mm| format!("{mm:.0}")), tokens.text),
         "index" => dim(row.index.to_string()),
         "frame" => {
             let short = row.name.rsplit('/').next().unwrap_or(row.name);
@@ -365,6 +448,10 @@ pub(super) fn spoken(row: &FrameRow<'_>) -> String {
     parts.extend(row.stratum.map(|stratum| stratum.word().to_owned()));
     parts.extend(row.iou.map(|iou| format!("IoU {iou:.2}")));
     parts.extend(row.converged.map(|yes| if yes { "criterion holds" } else { "criterion open" }.to_owned()));
+    for (name, numbers) in &row.sources {
+        parts.extend(numbers.majpe_mm.map(|mm| format!("{name} {mm:.0} mm")));
+        parts.extend(numbers.to_fit_mm.map(|mm| format!("{name} {mm:.0} mm from the fit")));
+    }
     if !row.tags.is_empty() {
         parts.push(format!("tagged {}", row.tags));
     }

@@ -117,9 +117,12 @@ fn views(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
 
 fn column_menu(ui: &mut Ui, shared: &mut Shared<'_>) {
     let (button, _) = staying("Columns").ui(ui, |ui| {
-        for column in columns().filter(|column| column.key != "frame") {
+        let of_source = |column: &Column| matches!(column.sort, SortKey::Source(..));
+        let session = shared.session;
+        let offered = |column: &&Column| column.key != "frame" && (!of_source(column) || column.has_any(session));
+        for column in columns().filter(offered) {
             let mut on = column.is_shown(&shared.session.view);
-            if ui.checkbox(&mut on, column.name).on_hover_text(column.tip).changed() {
+            if ui.checkbox(&mut on, column.name_in(shared.session)).on_hover_text(column.tip).changed() {
                 shared.set_view(|view| column.show(view, on));
             }
         }
@@ -297,7 +300,7 @@ pub(super) fn titles(
         let active = sort.key == column.sort && (column.sort != SortKey::Index || column.key == "index");
         let id = ui.scope_id().with(("title", column.key));
         let response = ui.interact(at.expand2(vec2(GAP / 2.0, 0.0)), id, Sense::click());
-        let name = format!("Sort by {}", column.name);
+        let name = format!("Sort by {}", column.name_in(shared.session));
         response.widget_info(|| egui::WidgetInfo::selected(Role::Button, true, active, &name));
         let color = if active || response.hovered() { tokens.text } else { tokens.dim };
         let mark = if active && sort != Sort::default() { if sort.descending { "▾" } else { "▴" } } else { "" };
@@ -308,7 +311,7 @@ pub(super) fn titles(
         };
         let font = egui::FontId::proportional(theme::CAPTION);
         let painter = ui.painter().with_clip_rect(at.expand2(vec2(GAP, 0.0)).intersect(ui.clip_rect()));
-        painter.text(anchor, align, format!("{}{mark}", column.title), font, color);
+        painter.text(anchor, align, format!("{}{mark}", column.title_in(shared.session)), font, color);
         if response.on_hover_text(format!("{}\nClick to sort, again to turn the order round.", column.tip)).clicked() {
             let descending = if sort.key == column.sort { !sort.descending } else { false };
             shared.send(Command::SetSort(Sort { key: column.sort, descending }));

@@ -200,6 +200,23 @@ pub(super) fn draw(
         let at = moving_on(&truth.joints, truth.velocities.as_deref(), view, o, to_screen);
         bones(painter, &dataset.info().skeleton, &at, &|_, _| stroke);
     }
+    if look.show_truth
+        && let (Some(frame), Some(dataset)) = (&session.data.frame, &session.data.dataset)
+    {
+        let skeleton = &dataset.info().skeleton;
+        for source in session.sources.list().iter().filter(|source| source.shown) {
+            let stroke = Stroke::new(1.5, theme::DARK.of_source(source));
+            // Dark beneath: the brightest cells are as light as the lines.
+            let beneath = Stroke::new(3.5, Color32::from_black_alpha(120));
+            let joints = source.joints_on(frame.index, skeleton.joints.len());
+            let mut at = moving_on(&joints, None, view, o, to_screen);
+            for (at, p) in at.iter_mut().zip(&joints).filter(|(_, p)| !p[0].is_finite()) {
+                *at = pos2(p[0] as f32, f32::NAN);
+            }
+            bones(painter, skeleton, &at, &|_, _| beneath);
+            bones(painter, skeleton, &at, &|_, _| stroke);
+        }
+    }
     if look.show_skeleton
         && let Some(problem) = &session.fit.problem
     {
@@ -257,6 +274,9 @@ fn bones(painter: &Painter, skeleton: &Skeleton, joints: &[Pos2], stroke: &dyn F
     for (number, person) in joints.chunks_exact(skeleton.joints.len().max(1)).enumerate() {
         for &bone in &skeleton.bones {
             let (Some(&a), Some(&b)) = (person.get(bone[0]), person.get(bone[1])) else { continue };
+            if a.x.is_nan() || b.x.is_nan() {
+                continue;
+            }
             painter.line_segment([a, b], stroke(number, skeleton.bone_side(bone)));
         }
     }

@@ -71,6 +71,14 @@ pub(super) fn scene(session: &Session, camera: &Camera, tokens: &Tokens, px: f32
         let stroke = Stroke { color: rgba(tokens.truth, 0.85), width_px: 1.5 * px };
         bones(&mut scene.lines, &dataset.info().skeleton, &truth.joints, &|_, _| stroke);
     }
+    if let (Some(frame), Some(dataset)) = (&session.data.frame, &session.data.dataset) {
+        let skeleton = &dataset.info().skeleton;
+        for source in session.sources.list().iter().filter(|source| source.shown) {
+            let stroke = Stroke { color: rgba(tokens.of_source(source), 1.0), width_px: 2.0 * px };
+            let joints = source.joints_on(frame.index, skeleton.joints.len());
+            bones(&mut scene.lines, skeleton, &joints, &|_, _| stroke);
+        }
+    }
     if look.show_baseline
         && let (Some(pin), Some(dataset)) = (session.pins.baseline(), &session.data.dataset)
     {
@@ -257,7 +265,9 @@ fn bones(
 ) {
     for (number, person) in positions.chunks_exact(skeleton.joints.len().max(1)).enumerate() {
         for &bone in &skeleton.bones {
-            if let (Some(&a), Some(&b)) = (person.get(bone[0]), person.get(bone[1])) {
+            // Sources of predictions may not know every joint.
+            let known = |joint: usize| person.get(joint).filter(|p| p.iter().all(|x| x.is_finite()));
+            if let (Some(&a), Some(&b)) = (known(bone[0]), known(bone[1])) {
                 lines.push(stroke(number, skeleton.bone_side(bone)).line(vec3(a), vec3(b)));
             }
         }

@@ -22,6 +22,7 @@
 //! Nothing here reads a label.
 
 mod find;
+mod given;
 mod learned;
 mod notes;
 mod perturb;
@@ -31,6 +32,7 @@ mod scatterers;
 mod velocity;
 mod warm;
 
+pub use given::{standing_joints, start_at};
 pub use learned::LimbMap;
 #[cfg(feature = "train")]
 pub use learned::{LimbLesson, learn as learn_limbs};

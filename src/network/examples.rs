@@ -1,0 +1,158 @@
+//! Examples of a data set: what a network reads of each frame, and the joints that are there.
+
+use super::card::{Architecture, Features};
+use super::features::person_input;
+use crate::body::Pppr;
+use crate::dataset::{Dataset, Frame};
+use crate::geometry::{Vec3, mean, sub};
+use crate::start::problem_alone;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The parameters of each frame by index, where there is a fit.
+pub type ParamsOf = BTreeMap<usize, Arc<Pppr>>;
+
+/// One person of one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Example {
+    /// The frame.
+    pub frame: usize,
+    /// What is read.
+    pub input: Vec<f32>,
+    /// The joints, as the network is to answer them, m.
+    pub target: Vec<f32>,
+    /// Where the fitted body's middle is, where joints are about it, m.
+    pub middle: Vec3,
+}
+
+/// Examples of one sequence.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ExampleSet {
+    /// The data set and the sequence.
+    pub sequence: String,
+    /// In the order of the frames.
+    pub examples: Vec<Example>,
+}
+
+/// Examples of all frames with one person in truth and fit, by sequence; and how many frames were left out, by why.
+///
+/// # Errors
+/// Where no frame is left, in words.
+pub fn examples(
+    dataset: &Dataset,
+    params: &ParamsOf,
+    features: Features,
+    architecture: Architecture,
+) -> Result<(Vec<ExampleSet>, BTreeMap<&'static str, usize>), String> {
+    let made: Vec<Result<Example, &'static str>> = (0..dataset.len())
+        .into_par_iter()
+        .map(|index| {
+            let frame = dataset.load(index).map_err(|_| "cannot be read")?;
+            let truth = frame.truth.as_ref().ok_or("has no joints in metres")?;
+            if truth.persons != 1 {
+                return Err("shows not one person");
+            }
+            let mut inputs = inputs_of(dataset, &frame, params, features, architecture)?;
+            if inputs.len() != 1 {
+                return Err("is fitted with more than one person");
+            }
+            let (input, middle) = inputs.remove(0);
+            let target = truth.joints.iter().flat_map(|&p| sub(p, middle)).map(|x| x as f32).collect();
+            Ok(Example { frame: index, input, target, middle })
+        })
+        .collect();
+    let (mut sets, mut left_out) = (Vec::<ExampleSet>::new(), BTreeMap::new());
+    for (index, example) in made.into_iter().enumerate() {
+        match example {
+            Err(why) => *left_out.entry(why).or_default() += 1,
+            Ok(example) => {
+                let sequence = format!("{}/{}", dataset.info().name, dataset.sequence(index));
+                match sets.last_mut() {
+                    Some(set) if set.sequence == sequence => set.examples.push(example),
+                    _ => sets.push(ExampleSet { sequence, examples: vec![example] }),
+                }
+            }
+        }
+    }
+    if sets.is_empty() {
+        let why: Vec<String> = left_out.iter().map(|(why, n)| format!("{n} {why}")).collect();
+        return Err(format!("{}: no frame can teach anything: {}", dataset.info().root.display(), why.join(", ")));
+    }
+    Ok((sets, left_out))
+}
+
+/// What is read of each person of a frame, and where its middle is.
+///
+/// # Errors
+/// Why nothing can be read.
+pub fn prediction_inputs(
+    dataset: &Dataset,
+    index: usize,
+    params: &ParamsOf,
+    features: Features,
+    architecture: Architecture,
+) -> Result<Vec<(Vec<f32>, Vec3)>, &'static str> {
+    let frame = dataset.load(index).map_err(|_| "cannot be read")?;
+    inputs_of(dataset, &frame, params, features, architecture)
+}
+
+fn inputs_of(
+    dataset: &Dataset,
+    frame: &Frame,
+    params: &ParamsOf,
+    features: Features,
+    architecture: Architecture,
+) -> Result<Vec<(Vec<f32>, Vec3)>, &'static str> {
+    let own = params.get(&frame.index);
+    if features.needs_fit() && own.is_none() {
+        return Err("has no fit");
+    }
+    let centred = features.of_joints() && architecture != Architecture::Mlp;
+    let persons = if features.of_joints() { own.map_or(1, |own| own.shape().persons) } else { 1 };
+    let around = window(dataset, frame.index, architecture.reach());
+    let mut inputs = Vec::with_capacity(persons);
+    for person in 0..persons {
+        let mut input = Vec::new();
+        for &other in &around {
+            let beside = (other != frame.index).then(|| dataset.load(other).ok()).flatten();
+            let shown = beside.as_ref().unwrap_or(frame);
+            // A frame that shows other people tells nothing of this one: the frame itself stands for it.
+            let of = params.get(&shown.index).filter(|of| own.is_none_or(|own| own.shape() == of.shape())).or(own);
+            let problem = match features {
+                Features::PpprHeatmap => Some(problem_alone(dataset, shown).map_err(|_| "has no finite cell")?),
+                _ => None,
+            };
+            let read =
+                person_input(features, architecture, of.map(|of| (of.as_ref(), person)), &shown.maps, problem.as_ref());
+            input.extend(read.ok_or("has no fit")?);
+        }
+        let middle = own.filter(|_| centred).map_or([0.0; 3], |own| mean(own.person(person)));
+        inputs.push((input, middle));
+    }
+    Ok(inputs)
+}
+
+/// The frames that are read for one: at an end of its sequence the last one again.
+fn window(dataset: &Dataset, index: usize, reach: usize) -> Vec<usize> {
+    let sequence = dataset.sequence(index);
+    let inside = |other: isize| {
+        usize::try_from(other).ok().filter(|&other| other < dataset.len() && dataset.sequence(other) == sequence)
+    };
+    let mut nearest = index;
+    let mut before: Vec<usize> = (1..=reach as isize)
+        .map(|k| {
+            nearest = inside(index as isize - k).unwrap_or(nearest);
+            nearest
+        })
+        .collect();
+    before.reverse();
+    nearest = index;
+    let after: Vec<usize> = (1..=reach as isize)
+        .map(|k| {
+            nearest = inside(index as isize + k).unwrap_or(nearest);
+            nearest
+        })
+        .collect();
+    before.into_iter().chain([index]).chain(after).collect()
+}
