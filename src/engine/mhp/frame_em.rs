@@ -125,6 +125,16 @@ impl FrameEm {
         }
     }
 
+    /// What an evaluation at these persons costs at most: Gaussians times cells.
+    pub(super) fn work(&self, params: &Pppr) -> f64 {
+        let gaussians = self
+            .skin
+            .as_ref()
+            .map_or(params.shape().total_joints(), |skin| params.shape().persons * skin.owners().count());
+        let cells: usize = self.targets.iter().map(|target| target.cell_box.marked.len()).sum();
+        gaussians as f64 * cells as f64
+    }
+
     /// B_ori over a view's region, in C order.
     pub(super) fn ori(&self, view: usize) -> &[bool] {
         &self.targets[view].ori
@@ -168,7 +178,7 @@ impl FrameEm {
             }
         }
         let onto = skin.as_mut().map_or(&mut *gradient, |skin| &mut skin.gradient);
-        for (model, workspace) in models.iter().zip(&*workspaces) {
+        for (model, workspace) in models.iter().zip(&mut *workspaces) {
             workspace.pull_back(model, gaussians, (&mut *onto, &mut *bars), precision);
         }
         gaussians.pull_back(bars, onto, precision);

@@ -252,7 +252,8 @@ pub fn initialise_people(
         notes.push(format!("moved by {:.2} m to where a body explains the maps better", norm(way)));
     }
     notes.extend(told.as_ref().map(|told| told.as_ref().map_or_else(|held| (*held).to_owned(), String::clone)));
-    if matches!(told, Some(Err(_))) {
+    // Whom there are too many cells to search for there are too many to turn.
+    if told.as_ref().and_then(|told| told.as_ref().err()).is_some_and(|held| *held != motion::TOO_LARGE) {
         notes.extend(motion::turn(problem, config, &mut params)?);
     }
     let moved_m: Vec<f64> =

@@ -71,6 +71,10 @@ pub struct MotionState {
     pub steps: u32,
 }
 
+/// What is said of [`Held::Large`].
+pub(super) const TOO_LARGE: &str =
+    "held at the start: too many cells and persons to search among bodies; a smaller em_region can be";
+
 /// Why a fit in a window leaves the persons where they start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Held {
@@ -78,6 +82,8 @@ pub(super) enum Held {
     Skeleton,
     /// No body of the prior explains the maps.
     Unlike,
+    /// There are too many cells and persons to try bodies.
+    Large,
 }
 
 impl Held {
@@ -85,6 +91,7 @@ impl Held {
     pub(super) fn note(self) -> &'static str {
         match self {
             Self::Skeleton => "held at the start: an unknown skeleton; the prior of motion has nothing of it",
+            Self::Large => TOO_LARGE,
             Self::Unlike => {
                 "held at the start: no body explains the maps; with each of the prior their levels correlate by less than 0.8 (0.84 of who stands)"
             }

@@ -7,7 +7,7 @@ use super::{BODY, Held, LN_SIZE, MotionState, Window, WindowLoss, YAW, ways};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::geometry::{add, norm, sub};
-use crate::mhp::{FitError, Precision, Problem};
+use crate::mhp::{FitError, Precision, Problem, tiles};
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
@@ -19,6 +19,14 @@ const SIEVES: [Sieve; 3] = [
 ];
 /// Steps of what is left.
 const FINE: usize = 28;
+/// What a search may cost: Gaussians times cells, over all frames and evaluations. A map of 256 × 128 cells as a whole, five frames of
+/// two views, takes all the starts of the recommended settings.
+const MOST_WORK: f64 = 2e10;
+/// Where every cell is summed by itself each costs so many.
+const PLAIN: f64 = 10.0;
+/// Evaluations of a person's search beside those of the first sieve, and those of a start in it, in whole windows.
+const LATER: f64 = 250.0;
+const FIRST: f64 = 7.0 / 4.0;
 /// Starts whose joints have come nearer to each other than this, on average, have become one, m.
 const ONE_M: f64 = 0.03;
 /// A heading whose loss is larger by a smaller share than this is as good.
@@ -138,6 +146,7 @@ pub(in crate::mhp) fn search(
         Ok(window) => window,
         Err(held) => return Ok(Err(held)),
     };
+    let Some(most_starts) = affordable(&window, config, params) else { return Ok(Err(Held::Large)) };
     let mut coordinates = window.coordinates_of(params);
     let mut found = WindowLoss::default();
     window.choose_brightness((problem, config), Precision::F32, (&mut coordinates, params), &mut found);
@@ -163,7 +172,7 @@ pub(in crate::mhp) fn search(
         let begun_at = Tried { state: MotionState::at(coordinates.clone()), loss: f64::INFINITY };
         let mut all = vec![begun_at.clone()];
         let turns: &[f64] = if walks[person] { &[0.0, PI] } else { &[0.0, 0.5 * PI, PI, 1.5 * PI] };
-        for (c, hip_height) in starts.iter().take(config.starts.saturating_sub(1)) {
+        for (c, hip_height) in starts.iter().take(config.starts.min(most_starts).saturating_sub(1)) {
             for turn in turns {
                 let mut of = coordinates.clone();
                 let mine = &mut of[own.clone()];
@@ -227,6 +236,15 @@ pub(in crate::mhp) fn search(
     }
     window.place(&coordinates, params);
     Ok(Ok(Searched { losses: [begun, answer.0], runner_up: answer.1 }))
+}
+
+/// How many starts a search of these persons may have; `None` where one is too many: nothing that is asked for takes minutes.
+fn affordable(window: &Window, config: &FitConfig, params: &Pppr) -> Option<usize> {
+    let each = if tiles::holds(config.softness) { 1.0 } else { PLAIN };
+    let work: f64 = window.frames.iter().map(|frame| frame.em.work(params)).sum::<f64>() * each;
+    let evaluations = MOST_WORK / work.max(1.0) / params.shape().persons.max(1) as f64;
+    // Who stands is tried in four headings.
+    (evaluations >= LATER).then(|| ((evaluations - LATER) / (4.0 * FIRST)) as usize + 1)
 }
 
 /// Moves the persons as they are to where the search found them, by no more than [`MOST_MOVED_M`]: maps with few looks are explained
