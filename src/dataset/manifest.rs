@@ -282,6 +282,9 @@ impl Manifest {
                     (only(horizontal, psf.azimuth_rad), only(vertical, psf.elevation_rad));
                 view.psf = PointSpread { azimuth_rad, elevation_rad, ..psf };
             }
+            if let Some(fft) = &fft {
+                view.psf.lobes = fft.setup.lobes();
+            }
             if let Some(message) = psf_fault(&view) {
                 return Err(fault(format!("view `{}`: {message}", view.array), Some(span)));
             }
@@ -434,7 +437,7 @@ fn psf_fault(view: &View) -> Option<String> {
 
 /// What is wrong with widths, naming the key.
 pub(super) fn widths_fault(psf: &PointSpread) -> Option<String> {
-    let PointSpread { range_m, azimuth_rad, elevation_rad, doppler_mps } = *psf;
+    let PointSpread { range_m, azimuth_rad, elevation_rad, doppler_mps, .. } = *psf;
     let widths = [
         ("range_m", range_m, 100.0),
         ("azimuth_rad", azimuth_rad, TAU),

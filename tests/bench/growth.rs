@@ -31,7 +31,13 @@ impl Scene {
         View {
             array: format!("map{index}"),
             quantity: Quantity::default(),
-            psf: PointSpread { range_m: 0.05, azimuth_rad: 0.03, elevation_rad: 0.03, doppler_mps: 0.1 },
+            psf: PointSpread {
+                range_m: 0.05,
+                azimuth_rad: 0.03,
+                elevation_rad: 0.03,
+                doppler_mps: 0.1,
+                ..PointSpread::default()
+            },
             pose: Pose { rotation: rotation_from_quaternion([1.0, 0.0, 0.0, 0.0]), translation: [0.0; 3] },
             axes: vec![axis(kinds[0], 8.0, 0.0), axis(kinds[1], -5.0, 5.0)],
             region: None,

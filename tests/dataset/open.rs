@@ -264,7 +264,8 @@ fn a_generic_data_set_keeps_truth_pose_region_and_order() {
     assert!(info.assumptions[0].starts_with("radar: "), "an absent radar table is told");
     assert_eq!(info.views[0].region, Some(vec![[0, 1], [1, 3]]));
     assert_eq!(info.views[0].pose.view_from_world([1.0, 2.0, 3.0]), [2.5, -1.0, 2.0]);
-    let expected = PointSpread { range_m: 0.1, azimuth_rad: 0.1, elevation_rad: 0.0, doppler_mps: 0.2 };
+    let expected =
+        PointSpread { range_m: 0.1, azimuth_rad: 0.1, elevation_rad: 0.0, doppler_mps: 0.2, ..PointSpread::default() };
     assert_eq!(info.views[0].psf, expected);
     let frame = dataset.load(0).unwrap();
     assert_eq!((frame.timestamp_s, frame.person_count), (Some(2.0), Some(2)));

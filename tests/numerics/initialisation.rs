@@ -312,7 +312,13 @@ fn views() -> impl Strategy<Value = Vec<View>> {
     let view = (axes(), [width(), width(), width(), width()], any::<bool>()).prop_map(|(axes, psf, power)| View {
         array: "map".into(),
         quantity: if power { Quantity::Power } else { Quantity::Amplitude },
-        psf: PointSpread { range_m: psf[0], azimuth_rad: psf[1], elevation_rad: psf[2], doppler_mps: psf[3] },
+        psf: PointSpread {
+            range_m: psf[0],
+            azimuth_rad: psf[1],
+            elevation_rad: psf[2],
+            doppler_mps: psf[3],
+            ..PointSpread::default()
+        },
         pose: Pose::default(),
         axes,
         region: None,

@@ -55,7 +55,13 @@ fn view(index: usize, bins: &Range<usize>, rng: &mut StdRng) -> View {
     View {
         array: format!("map{index}"),
         quantity: Quantity::default(),
-        psf: PointSpread { range_m: 0.06, azimuth_rad: 0.04, elevation_rad: 0.05, doppler_mps: 0.15 },
+        psf: PointSpread {
+            range_m: 0.06,
+            azimuth_rad: 0.04,
+            elevation_rad: 0.05,
+            doppler_mps: 0.15,
+            ..PointSpread::default()
+        },
         pose: Pose { rotation: rotation_from_quaternion(q), translation: [0.0, 0.05, -0.1] },
         axes: axes.into_iter().map(|kind| axis(kind, bins.clone(), rng)).collect(),
         region: None,

@@ -12,7 +12,9 @@ use mhp_inspector::diagnose::{
 use mhp_inspector::geometry::Pose;
 use mhp_inspector::labels::Tag;
 use mhp_inspector::mhp::{Fitter, Masks, Objective, Precision, Problem, masks, simulate};
-use mhp_inspector::radar::{Axis, AxisKind, FftSetup, PointSpread, Quantity, RadarConfig, Spacing, View, Window};
+use mhp_inspector::radar::{
+    Axis, AxisKind, FftSetup, Lobes, PointSpread, Quantity, RadarConfig, Spacing, View, Window,
+};
 use mhp_inspector::simulate::{Options, Recording, ScenePreset, SimulatedLayout};
 use mhp_inspector::start::find_start;
 use mhp_inspector::study::{BatchOptions, fit_frame, frame_evidence, frames_before};
@@ -22,7 +24,13 @@ use rayon::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
 
-const PSF: PointSpread = PointSpread { range_m: 0.06, azimuth_rad: 0.03, elevation_rad: 0.03, doppler_mps: 0.05 };
+const PSF: PointSpread = PointSpread {
+    range_m: 0.06,
+    azimuth_rad: 0.03,
+    elevation_rad: 0.03,
+    doppler_mps: 0.05,
+    lobes: Lobes { range: None, azimuth: None, elevation: None, doppler: None },
+};
 
 fn axis(kind: AxisKind, bins: usize, lo: f64, hi: f64) -> Axis {
     Axis { kind, bins, lo, hi, spacing: Spacing::Linear }

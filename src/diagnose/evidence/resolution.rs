@@ -145,7 +145,13 @@ mod tests {
     use crate::radar::{PointSpread, Quantity, Spacing};
 
     fn view(axes: Vec<Axis>) -> View {
-        let psf = PointSpread { range_m: 0.1, azimuth_rad: 0.05, elevation_rad: 0.0, doppler_mps: 0.2 };
+        let psf = PointSpread {
+            range_m: 0.1,
+            azimuth_rad: 0.05,
+            elevation_rad: 0.0,
+            doppler_mps: 0.2,
+            ..PointSpread::default()
+        };
         View { array: "h".into(), quantity: Quantity::Amplitude, psf, pose: Pose::default(), axes, region: None }
     }
 

@@ -65,6 +65,15 @@ pub(super) const SUMMATION: &[Answer] = &[
     answer("incoherent", "incoherent", "H_sim = √Σ (A K)²: powers add."),
 ];
 
+pub(super) const LOBE: &[Answer] = &[
+    answer("gaussian", "Gaussian", "One Gaussian a joint, of the width of psf: SPEC 3."),
+    answer(
+        "window",
+        "the window's",
+        "Down to its first minimum: a difference of Gaussians an axis, four to eight times the work. Where the sum is coherent and the view's FFTs are known ([view.fft]); a Gaussian elsewhere.",
+    ),
+];
+
 pub(super) const PARAMETERIZATION: &[Answer] = &[
     answer("joints", "joints", "Every joint by itself: the paper."),
     answer("bones", "root and bones", "The root moves and turns, bones turn about their inner joint: lengths stay."),

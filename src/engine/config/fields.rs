@@ -6,8 +6,8 @@ use super::field::{Access, Answer, Field, FieldGroup, ReadBy, Unset, Value};
 use super::rows::{choice, count_at, flag_at, maybe_at, number, number_at, one_of_at, switch};
 use super::{
     Background, BodyModel, Clutter, Convergence, EM_REGION_FORM, EmLoss, EmRegion, FitConfig, FramesAround,
-    GradientVelocity, Height, Limbs, Parameterization, Scatterers, StartPlace, StaticEcho, Still, Summation, WarmStart,
-    Yaw, answers,
+    GradientVelocity, Height, Limbs, LobeShape, Parameterization, Scatterers, StartPlace, StaticEcho, Still, Summation,
+    WarmStart, Yaw, answers,
 };
 use FieldGroup::{Limits, Model, Optimiser, Perturbation, Radar, Start as Starting, StepSizes, Weights};
 use ReadBy::{Run, Start, Steps, StepsAndStart};
@@ -181,6 +181,18 @@ pub const FIELDS: &[Field] = &[
             one_of_at!(summation, [Summation::Coherent, Summation::Incoherent]),
         )
         .row("powers add")
+    },
+    Field {
+        help: "The main lobe of a joint: one Gaussian, 2 to 15 % of the peak off the window's own, or that itself.",
+        ..choice(
+            Radar,
+            "lobe",
+            "Lobe",
+            StepsAndStart,
+            answers::LOBE,
+            one_of_at!(lobe, [LobeShape::Gaussian, LobeShape::Window]),
+        )
+        .row("the window's lobe")
     },
     Field {
         help: "Where L_EM is computed: the whole map, or a box of this half width around the start pose.",

@@ -42,6 +42,17 @@ pub enum Summation {
     Incoherent,
 }
 
+/// The shape of the point spread.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LobeShape {
+    /// The Gaussian of SPEC section 3.
+    #[default]
+    Gaussian,
+    /// The main lobe of each FFT's window, down to its first minimum.
+    Window,
+}
+
 /// How L_EM compares the simulated map with the measured one; SPEC sections 4 and 8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -185,6 +196,8 @@ pub struct FitConfig {
     pub d_joint_m: f64,
     /// Coherent or incoherent sum.
     pub summation: Summation,
+    /// Gaussian or the window's own lobe; the latter where joints are summed coherently and the view's FFTs are known.
+    pub lobe: LobeShape,
     /// Where L_EM is evaluated.
     pub em_region: EmRegion,
     /// How far in front of the joint its echo comes from, m.
@@ -253,6 +266,7 @@ impl Default for FitConfig {
             d_sep_m: 0.5,
             d_joint_m: 0.1,
             summation: Summation::default(),
+            lobe: LobeShape::default(),
             em_region: EmRegion::default(),
             surface_offset_m: 0.0,
             scale_max_m: 0.43,

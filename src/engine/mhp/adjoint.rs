@@ -80,6 +80,21 @@ impl Moments {
         &mut self.r_by_bin[axis][bins]
     }
 
+    /// Those of `joints` joints from the `first` on, written over `into`.
+    pub(super) fn part(&self, first: usize, joints: usize, into: &mut Self) {
+        into.joints = joints;
+        into.numbers.reset(joints);
+        for joint in 0..joints {
+            let numbers: [f64; NUMBERS] = OneJoint(first + joint).load(&self.numbers);
+            OneJoint(joint).store(numbers, &mut into.numbers);
+        }
+        for (own, all) in into.r_by_bin.iter_mut().zip(&self.r_by_bin) {
+            let bins = all.len() / self.joints.max(1);
+            own.clear();
+            own.extend_from_slice(&all[first * bins..(first + joints) * bins]);
+        }
+    }
+
     fn of_bins(&self, joint: usize, axis: usize) -> &[f64] {
         &self.r_by_bin[axis][self.bins(joint, axis)]
     }
@@ -288,7 +303,7 @@ fn phases<T: Numeric>(geometry: &mut Geometry<T>, model: &ViewModel<'_>, in_view
 /// The point spread along e_az and e_el grows with distance; `bar` is ½ of what each wants times itself.
 #[inline(always)]
 fn blur<T: Numeric>(geometry: &mut Geometry<T>, model: &ViewModel<'_>, in_view: &JointInView<T>, bar: [T; 3]) {
-    let (triad, psf) = (&in_view.triad, &model.view.psf);
+    let (triad, psf) = (&in_view.triad, &model.psf);
     if model.blurs[1] {
         let bar = in_view.blur[1] * 2.0 * bar[1] / triad.cos_az_floored.value;
         geometry.rho += bar * psf.azimuth_rad;

@@ -24,6 +24,8 @@ const LEAST_SEARCHED: f64 = 1e-5;
 pub(super) struct Workspace {
     splats: Splats,
     moments: Moments,
+    /// Of one Gaussian of the lobes, where they are several.
+    lobe: (Splats, Moments),
     tiles: Tiles,
     rows: RowScratch,
 }
@@ -51,7 +53,8 @@ pub(super) struct Left {
 impl Workspace {
     /// Projects the joints of `params`, which have these Gaussians.
     pub(super) fn project(&mut self, model: &ViewModel<'_>, of: (&Pppr, &WorldGaussians), precision: Precision) {
-        model.splats(of, precision, &mut self.splats);
+        let Self { splats, lobe: (scratch, _), .. } = self;
+        model.splats_of(&model.lobes(), of, precision, (splats, scratch));
     }
 
     /// Evaluates L_view at `target`, of whose view `model` is, for the joints last projected, and where a gradient is wanted
@@ -63,7 +66,7 @@ impl Workspace {
         (factor, with_iou): (Option<f64>, bool),
         precision: Precision,
     ) -> ViewLoss {
-        let Self { splats, moments, tiles, rows } = self;
+        let Self { splats, moments, tiles, rows, .. } = self;
         moments.reset(splats.joints(), &model.view.axes);
         match precision {
             Precision::F64 => plain::<f64>(model, splats, target, factor, moments),
@@ -102,13 +105,21 @@ impl Workspace {
 
     /// Hands what the cells said to the joints' Gaussians and features.
     pub(super) fn pull_back(
-        &self,
+        &mut self,
         model: &ViewModel<'_>,
         gaussians: &WorldGaussians,
-        onto: (&mut Pppr, &mut WorldGaussianBars),
+        (gradient, bars): (&mut Pppr, &mut WorldGaussianBars),
         precision: Precision,
     ) {
-        pull_back(model, gaussians, &self.moments, onto, precision);
+        let (lobes, joints) = (model.lobes(), gaussians.joints());
+        if lobes.is_empty() {
+            return pull_back(model, gaussians, &self.moments, (gradient, bars), precision);
+        }
+        let Self { moments, lobe: (_, scratch), .. } = self;
+        for (k, lobe) in lobes.iter().enumerate() {
+            moments.part(k * joints, joints, scratch);
+            pull_back(lobe, gaussians, scratch, (&mut *gradient, &mut *bars), precision);
+        }
     }
 }
 

@@ -84,7 +84,8 @@ impl JointReturns {
         gaussians.fill(seen, Precision::F64);
         let views = problem.views.iter().map(|view| {
             let mut splats = Splats::default();
-            ViewModel::new(&problem.radar, view, config).splats((seen, &gaussians), Precision::F64, &mut splats);
+            let (model, scratch) = (ViewModel::new(&problem.radar, view, config), &mut Splats::default());
+            model.splats_of(&model.lobes(), (seen, &gaussians), Precision::F64, (&mut splats, scratch));
             (view.shape(), splats)
         });
         Self { joints, coherent: config.summation == Summation::Coherent, shares, views: views.collect() }
@@ -108,7 +109,7 @@ impl JointReturns {
         }
         let at = three(&unravel(cell, shape));
         let mut of = vec![Complex64::ZERO; self.joints];
-        for (splat, owners) in splats.iter().zip(&self.shares) {
+        for (splat, owners) in splats.iter().zip(self.shares.iter().cycle()) {
             let (ln, phase) = at_cell(&splat, at);
             for &(joint, share) in owners {
                 of[joint] += share * self.sent(ln, phase);
@@ -142,7 +143,7 @@ impl JointReturns {
         around[3 - bins.len()..].copy_from_slice(&bins);
         let size = around.map(|[lo, hi]| hi.saturating_sub(lo));
         let mut sum = vec![Complex64::ZERO; size.iter().product()];
-        for (splat, owners) in splats.iter().zip(&self.shares) {
+        for (splat, owners) in splats.iter().zip(self.shares.iter().cycle()) {
             let share =
                 |of: usize| owners.iter().filter(|(joint, _)| *joint == of).map(|(_, share)| share).sum::<f64>();
             let share = match kept {
@@ -238,7 +239,13 @@ mod tests {
         let view = |array: &str, axes| View {
             array: array.into(),
             quantity: Quantity::Amplitude,
-            psf: PointSpread { range_m: 0.05, azimuth_rad: 0.06, elevation_rad: 0.06, doppler_mps: 0.2 },
+            psf: PointSpread {
+                range_m: 0.05,
+                azimuth_rad: 0.06,
+                elevation_rad: 0.06,
+                doppler_mps: 0.2,
+                ..PointSpread::default()
+            },
             pose: crate::geometry::Pose::default(),
             axes,
             region: None,

@@ -24,11 +24,12 @@ pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, par
     let config = &forward_config(config, skin.is_some());
     let params = skin.as_ref().map_or(params, |skin| &skin.points);
     gaussians.fill(params, precision);
-    let mut splats = Splats::default();
+    let (mut splats, mut scratch) = (Splats::default(), Splats::default());
     let of_view = |view: &View| {
         let region = Region::whole(view);
         let cell_box = CellBox::new(view, &region.bins, &vec![false; region.cells()], precision);
-        ViewModel::new(&problem.radar, &cell_box.view, config).splats((params, &gaussians), precision, &mut splats);
+        let model = ViewModel::new(&problem.radar, &cell_box.view, config);
+        model.splats_of(&model.lobes(), (params, &gaussians), precision, (&mut splats, &mut scratch));
         let map = match precision {
             Precision::F64 => map::<f64>(&splats, &cell_box, config.summation),
             Precision::F32 => {

@@ -12,10 +12,11 @@ use super::batch::{Batch, Columns, JointTask, OneJoint, each_joint};
 use super::gaussian::{WorldGaussian, WorldGaussians, mean};
 use super::triad::{DISTANCE_FLOOR_M, Floored, SphericalTriad, splat_matrix};
 use crate::body::{Group, Pppr};
-use crate::config::FitConfig;
+use crate::config::{FitConfig, LobeShape, Summation};
 use crate::geometry::{Numeric, Vec3, dot, mat_t_vec, mat_vec, norm, scale};
-use crate::radar::{AxisKind, RadarConfig, SPEED_OF_LIGHT, View};
-use std::f64::consts::TAU;
+use crate::radar::{AxisKind, Lobe, PointSpread, RadarConfig, Resolves, SPEED_OF_LIGHT, View};
+use smallvec::SmallVec;
+use std::f64::consts::{PI, TAU};
 
 /// τ of an echo, s a metre.
 const PER_METRE_S: f64 = 2.0 / SPEED_OF_LIGHT;
@@ -93,6 +94,24 @@ impl Splats {
         self.joints
     }
 
+    fn clear(&mut self) {
+        self.joints = 0;
+        self.spectra.iter_mut().for_each(Vec::clear);
+    }
+
+    /// Adds those of `other`; of so many in the end.
+    fn append(&mut self, other: &Self, all: usize) {
+        self.numbers.hold(all);
+        for joint in 0..other.joints {
+            let numbers: [f64; NUMBERS] = OneJoint(joint).load(&other.numbers);
+            OneJoint(self.joints + joint).store(numbers, &mut self.numbers);
+        }
+        self.joints += other.joints;
+        for (spectra, others) in self.spectra.iter_mut().zip(&other.spectra) {
+            spectra.extend_from_slice(others);
+        }
+    }
+
     #[inline(always)]
     pub(super) fn of(&self, joint: usize) -> Splat<'_> {
         let [b0, b1, b2, w0, w1, w2, s0, s1, s2, ln_weight, phase, k0, k1, k2] = OneJoint(joint).load(&self.numbers);
@@ -148,6 +167,12 @@ pub(super) struct Widths<T> {
 pub(super) struct ViewModel<'a> {
     pub view: &'a View,
     pub config: &'a FitConfig,
+    /// The widths of the point spread.
+    pub psf: PointSpread,
+    /// What each axis adds to C beside them, bins².
+    cell: f64,
+    /// Of φ beside what joints have.
+    turned: f64,
     /// A bin of each axis in axis units, and bins a unit.
     pub step: [f64; 3],
     pub by_step: [f64; 3],
@@ -159,6 +184,7 @@ pub(super) struct ViewModel<'a> {
     pub blurs: [bool; 3],
     /// ln of what all joints' weights share.
     ln_share: f64,
+    radar: &'a RadarConfig,
 }
 
 /// Whether the operator behind an axis is on.
@@ -173,8 +199,7 @@ fn sees(config: &FitConfig, kind: AxisKind) -> bool {
 }
 
 /// The standard deviation of an axis whose width does not come through Σ', in axis units.
-fn own_width(config: &FitConfig, view: &View, kind: AxisKind) -> f64 {
-    let psf = &view.psf;
+fn own_width(config: &FitConfig, psf: &PointSpread, kind: AxisKind) -> f64 {
     match kind {
         AxisKind::Doppler => psf.doppler_mps,
         kind if sees(config, kind) => 0.0,
@@ -187,10 +212,16 @@ fn own_width(config: &FitConfig, view: &View, kind: AxisKind) -> f64 {
 
 impl<'a> ViewModel<'a> {
     pub(super) fn new(radar: &'a RadarConfig, view: &'a View, config: &'a FitConfig) -> Self {
+        let shaped = has_lobes(config, view);
+        Self::with(radar, view, config, (view.psf, if shaped { LOBE_CELL } else { 1.0 / 12.0 }))
+    }
+
+    /// With this point spread, and what each axis adds to C beside it.
+    fn with(radar: &'a RadarConfig, view: &'a View, config: &'a FitConfig, (psf, cell): (PointSpread, f64)) -> Self {
         let (mut step, mut by_step, mut own_variance) = ([1.0; 3], [1.0; 3], [0.0; 3]);
         for (k, axis) in view.axes.iter().take(3).enumerate() {
             (step[k], by_step[k]) = (axis.step(), 1.0 / axis.step());
-            own_variance[k] = (own_width(config, view, axis.kind) / step[k]).powi(2);
+            own_variance[k] = (own_width(config, &psf, axis.kind) / step[k]).powi(2);
         }
         let (on, per_metre) = (config.operators, TAU / radar.wavelength_m());
         let gate = |on: bool, x: f64| if on { x } else { 0.0 };
@@ -200,18 +231,64 @@ impl<'a> ViewModel<'a> {
             gate(on.angle, per_metre * radar.l_az_m),
             gate(on.angle, per_metre * radar.l_el_m),
         ];
-        let psf = &view.psf;
         let blurs = [psf.range_m, psf.azimuth_rad, psf.elevation_rad].map(|width| width != 0.0);
         let near = if on.attenuation { 4.0 * radar.r_max_m.ln() } else { 0.0 };
         let ln_share = near - 0.5 * view.axes.len().min(3) as f64 * LN_TAU;
-        Self { view, config, step, by_step, own_variance, phase, blurs, ln_share }
+        Self { view, config, psf, cell, turned: 0.0, step, by_step, own_variance, phase, blurs, ln_share, radar }
     }
+
+    /// The Gaussians that one joint's lobe is the sum of; none where it is one Gaussian. Along each axis the lobe is that of
+    /// [`Lobe`]; the difference over several axes is the sum over all their products. Each Gaussian is blurred by the joint's own
+    /// extent like any other, so that its gradient is theirs. The weights are those of peaks: a narrow Gaussian of unit area has a
+    /// higher one, by its widths.
+    pub(super) fn lobes(&self) -> SmallVec<[Self; 8]> {
+        if !has_lobes(self.config, self.view) {
+            return SmallVec::new();
+        }
+        let mut resolved: SmallVec<[Resolves; 3]> = SmallVec::new();
+        for axis in self.view.axes.iter().take(3) {
+            let of = Resolves::of(axis.kind);
+            if !resolved.contains(&of) {
+                resolved.push(of);
+            }
+        }
+        let one = |number: usize| {
+            let (mut psf, mut weight) = (self.psf, 1.0);
+            for (k, &of) in resolved.iter().enumerate() {
+                let which = number >> k & 1;
+                if let Some(lobe) = psf.lobe(of) {
+                    *psf.width_mut(of) *= lobe.ratios[which];
+                    weight *= Lobe::WEIGHTS[which] * lobe.ratios[which];
+                }
+            }
+            let mut model = Self::with(self.radar, self.view, self.config, (psf, self.cell));
+            model.ln_share += weight.abs().ln();
+            model.turned = if weight < 0.0 { PI } else { 0.0 };
+            model
+        };
+        (0..1 << resolved.len()).map(one).collect()
+    }
+}
+
+/// What keeps C regular beside the lobes of windows, bins²: a map's value is that at the middle of its cell.
+const LOBE_CELL: f64 = 1e-4;
+
+/// Whether a view's joints have the lobes of its windows.
+fn has_lobes(config: &FitConfig, view: &View) -> bool {
+    config.lobe == LobeShape::Window
+        && config.summation == Summation::Coherent
+        && view.axes.iter().all(|axis| view.psf.lobe(Resolves::of(axis.kind)).is_some())
 }
 
 impl ViewModel<'_> {
     /// The variance of axis `k` whose width does not come through Σ', bins².
     pub(super) fn own_variance(&self, k: usize) -> f64 {
         self.own_variance.get(k).copied().unwrap_or(0.0)
+    }
+
+    /// What each axis adds to C beside widths, bins².
+    pub(super) fn cell(&self) -> f64 {
+        self.cell
     }
 
     /// Number of axes, 1 to 3.
@@ -259,6 +336,25 @@ impl ViewModel<'_> {
         }
     }
 
+    /// The same of `lobes`, the Gaussians that each joint is the sum of, one after the other for all joints; of this one where
+    /// there are none.
+    pub(super) fn splats_of(
+        &self,
+        lobes: &[Self],
+        of: (&Pppr, &WorldGaussians),
+        precision: Precision,
+        (splats, scratch): (&mut Splats, &mut Splats),
+    ) {
+        if lobes.is_empty() {
+            return self.splats(of, precision, splats);
+        }
+        splats.clear();
+        for lobe in lobes {
+            lobe.splats(of, precision, scratch);
+            splats.append(scratch, of.1.joints() * lobes.len());
+        }
+    }
+
     /// Where the view sees joints with this Gaussian.
     #[inline(always)]
     pub(super) fn joint_in_view<T: Numeric>(&self, gaussian: &WorldGaussian<T>) -> JointInView<T> {
@@ -268,7 +364,7 @@ impl ViewModel<'_> {
         let unmoved = [x + pose.translation[0], y + pose.translation[1], z + pose.translation[2]];
         let moved = self.config.surface_offset_m != 0.0;
         let triad = SphericalTriad::new(if moved { scale(unmoved, self.surface_factor(unmoved).0) } else { unmoved });
-        let psf = &self.view.psf;
+        let psf = &self.psf;
         let mut blur = [x.splat(psf.range_m), x.splat(0.0), x.splat(0.0)];
         if self.blurs[1] {
             blur[1] = triad.rho.value * psf.azimuth_rad / triad.cos_az_floored.value;
@@ -332,7 +428,7 @@ impl ViewModel<'_> {
                     }
                 }
             }
-            covariance[k][k] = covariance[k][k] + (self.own_variance[k] + 1.0 / 12.0);
+            covariance[k][k] = covariance[k][k] + (self.own_variance[k] + self.cell);
         }
         Squares::new(&covariance)
     }
@@ -398,7 +494,7 @@ impl ViewModel<'_> {
     fn phase<T: Numeric>(&self, triad: &SphericalTriad<T>, radial_mps: T) -> T {
         let [by_tau_sq, by_radial, by_az, by_el] = self.phase;
         let tau = triad.d.value * PER_METRE_S;
-        tau * by_tau_sq * tau + radial_mps * by_radial + triad.sin_az * by_az + triad.sin_el * by_el
+        tau * by_tau_sq * tau + radial_mps * by_radial + triad.sin_az * by_az + triad.sin_el * by_el + self.turned
     }
 
     /// (∂φ/∂d, ∂φ/∂v_r, ∂φ/∂θ_az, ∂φ/∂θ_el).

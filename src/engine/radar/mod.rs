@@ -29,12 +29,13 @@ pub use fmcw::{AdcCube, Echo, Fmcw, PointMotion, Receiver, add_leakage, path_gai
 pub use native::{NativeAxes, interpolate, sine_deg};
 pub use planar::{PlanarMap, PlanarRows};
 pub use psf::{
-    FftSetup, Resolved, ViewFft, doppler_sigma_mps, first_null_bins, main_lobe_sigma_bins, range_sigma_m, sine_sigma,
+    FftSetup, Resolved, ViewFft, doppler_sigma_mps, first_null_bins, main_lobe_shape, main_lobe_sigma_bins,
+    range_sigma_m, sine_sigma,
 };
 pub use reflector::{LobeCut, Reflector, ReflectorMap, ReflectorPlace, refined_widths, width_of, with_width};
 pub(crate) use spatial::{NEAREST_M, SpatialGrid};
 pub use view::unravel;
-pub use view::{PointSpread, Quantity, View};
+pub use view::{Lobe, Lobes, PointSpread, Quantity, Resolves, View};
 pub use view_set::ViewSet;
 pub use vrdae::{HUPR_SHAPE, hupr_amplitudes, hupr_cube};
 pub use window::Window;

@@ -5,7 +5,7 @@
 //! minima, at evenly spaced frequencies. Zero padding interpolates the lobe and does not change its width, so that the width
 //! is stated in *natural* bins (cycles over the number of samples) and then in metres, radians and metres a second.
 
-use super::{AxisKind, PointSpread, RadarConfig, SPEED_OF_LIGHT, Window};
+use super::{AxisKind, Lobe, Lobes, PointSpread, RadarConfig, SPEED_OF_LIGHT, Window};
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 use std::f64::consts::PI;
@@ -14,6 +14,10 @@ use std::f64::consts::PI;
 const LOBE_POINTS: usize = 400;
 /// Zero padding of the spectrum that the lobe is read from: points a natural bin.
 const POINTS_A_BIN: usize = 128;
+
+/// The shape of a lobe is fitted to every so manyth of them, and its ratios to so many digits.
+const SHAPE_STEP: usize = 8;
+const SHAPE_DIGITS: f64 = 1e-5;
 
 /// Samples from which on a lobe in natural bins changes by less than 3e−4.
 const MOST_POINTS: usize = 4096;
@@ -57,8 +61,9 @@ pub fn first_null_bins(window: Window, n: usize) -> f64 {
     first_minimum(&spectrum(window, n))
 }
 
-/// Standard deviation, in natural bins, of the unit-peak Gaussian closest to the main lobe of `window` over `n` samples.
-pub fn main_lobe_sigma_bins(window: Window, n: usize) -> f64 {
+/// (place, amplitude) points of the main lobe of `window` over `n` samples, evenly from its peak to its first minimum, natural bins;
+/// and that minimum.
+fn main_lobe(window: Window, n: usize) -> (Vec<(f64, f64)>, f64) {
     let spectrum = spectrum(window, n);
     let null = first_minimum(&spectrum);
     // Between the points by the cubic through the four nearest; the amplitude is even.
@@ -70,11 +75,42 @@ pub fn main_lobe_sigma_bins(window: Window, n: usize) -> f64 {
         let (u, v, w) = (t + 1.0, t - 1.0, t - 2.0);
         (-a * t * v * w + 3.0 * b * u * v * w - 3.0 * c * u * t * w + d * u * t * v) / 6.0
     };
-    let lobe: Vec<(f64, f64)> = (0..LOBE_POINTS)
+    let lobe = (0..LOBE_POINTS)
         .map(|i| null * (i as f64 + 0.5) / LOBE_POINTS as f64)
         .map(|bins| (bins, amplitude(bins)))
         .collect();
+    (lobe, null)
+}
+
+/// Standard deviation, in natural bins, of the unit-peak Gaussian closest to the main lobe of `window` over `n` samples.
+pub fn main_lobe_sigma_bins(window: Window, n: usize) -> f64 {
+    let (lobe, null) = main_lobe(window, n);
     closest_sigma(&lobe, null)
+}
+
+/// The difference of Gaussians closest to the main lobe of `window` over `n` samples, least squares from the peak to the first
+/// minimum; `None` where two or fewer samples make no lobe, or the difference is no better than one Gaussian.
+pub fn main_lobe_shape(window: Window, n: usize) -> Option<Lobe> {
+    let (lobe, null) = main_lobe(window, n);
+    let sigma = closest_sigma(&lobe, null);
+    let [first, second] = Lobe::WEIGHTS;
+    let misfit = |ratios: [f64; 2]| -> f64 {
+        let falls = ratios.map(|ratio| -0.5 / (ratio * sigma * ratio * sigma));
+        let of = |(at, a): &(f64, f64)| {
+            let [p, q] = falls.map(|fall| (fall * at * at).exp());
+            (first * p + second * q - a).powi(2)
+        };
+        lobe.iter().step_by(SHAPE_STEP).map(of).sum()
+    };
+    let minimise = |f: &dyn Fn(f64) -> f64, (lo, hi): (f64, f64)| minimise_to(SHAPE_DIGITS, f, lo, hi);
+    // Along the second ratio the best first one; both sides of equal widths, where the difference is one Gaussian.
+    let best_of = |ratio: f64| minimise(&|first| misfit([first, ratio]), (0.3, 2.0));
+    let [narrow, wide] = [(0.3, 1.0), (1.0, 4.0)].map(|range| {
+        let second = minimise(&|ratio| misfit([best_of(ratio), ratio]), range);
+        [best_of(second), second]
+    });
+    let ratios = if misfit(narrow) < misfit(wide) { narrow } else { wide };
+    (n > 2 && misfit(ratios) < misfit([1.0, 1.0])).then_some(Lobe { ratios })
 }
 
 /// Standard deviation of the unit-peak Gaussian about 0 that is closest to (place, amplitude) points of a lobe which ends at
@@ -85,9 +121,14 @@ pub(super) fn closest_sigma(lobe: &[(f64, f64)], null: f64) -> f64 {
 }
 
 /// Golden-section search of the minimum of `f`, one minimum between `lo` and `hi`.
-fn minimise(f: impl Fn(f64) -> f64, mut lo: f64, mut hi: f64) -> f64 {
+fn minimise(f: impl Fn(f64) -> f64, lo: f64, hi: f64) -> f64 {
+    minimise_to(1e-10, f, lo, hi)
+}
+
+/// The same to so small a share of `hi`.
+fn minimise_to(least: f64, f: impl Fn(f64) -> f64, mut lo: f64, mut hi: f64) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
-    while hi - lo > 1e-10 * hi.abs().max(1.0) {
+    while hi - lo > least * hi.abs().max(1.0) {
         let (a, b) = (hi - GOLDEN * (hi - lo), lo + GOLDEN * (hi - lo));
         if f(a) < f(b) { hi = b } else { lo = a }
     }
@@ -126,6 +167,17 @@ pub struct FftSetup {
 }
 
 impl FftSetup {
+    /// The shape of each lobe.
+    pub fn lobes(&self) -> Lobes {
+        let shape = |(n, window): (usize, Window)| main_lobe_shape(window, n);
+        Lobes {
+            range: shape(self.range),
+            azimuth: self.azimuth.and_then(shape),
+            elevation: self.elevation.and_then(shape),
+            doppler: shape(self.doppler),
+        }
+    }
+
     /// The widths with the chirp and element spacings of `radar`; chirps follow each other evenly over `radar.frame_s`.
     pub fn point_spread(&self, radar: &RadarConfig) -> PointSpread {
         let wavelength = radar.wavelength_m();
@@ -138,6 +190,7 @@ impl FftSetup {
             azimuth_rad: sine(self.azimuth, radar.l_az_m),
             elevation_rad: sine(self.elevation, radar.l_el_m),
             doppler_mps: doppler_sigma_mps(taper, chirps, radar.frame_s / chirps as f64, wavelength),
+            lobes: self.lobes(),
         }
     }
 }
@@ -249,6 +302,29 @@ mod tests {
             assert!((null_here - null).abs() < 2e-4, "{window:?} {n}: null {null_here}");
             assert!((sigma_here - sigma).abs() < 2e-4 * sigma, "{window:?} {n}: sigma {sigma_here}");
         }
+    }
+
+    /// scipy's `least_squares` found the same ratios.
+    #[test]
+    fn a_difference_of_gaussians_has_the_whole_main_lobe() {
+        for (window, n, ratios) in [
+            (Window::Rectangular, 128, [1.477, 2.796]),
+            (Window::Hann, 128, [1.2445, 1.5725]),
+            (Window::Hamming, 12, [0.8926, 0.7877]),
+            (Window::Blackman, 12, [1.1403, 1.2974]),
+        ] {
+            let found = main_lobe_shape(window, n).map(|lobe| lobe.ratios).unwrap_or_default();
+            assert!((0..2).all(|k| (found[k] - ratios[k]).abs() < 0.02), "{window:?} {n}: {found:?}");
+            let sigma = main_lobe_sigma_bins(window, n);
+            let (lobe, _) = main_lobe(window, n);
+            let shape = |at: f64| -> f64 {
+                let of = |(w, f): (f64, f64)| w * (-0.5 * (at / (f * sigma)).powi(2)).exp();
+                Lobe::WEIGHTS.into_iter().zip(found).map(of).sum()
+            };
+            let worst = lobe.iter().map(|(at, a)| (shape(*at) - a).abs()).fold(0.0, f64::max);
+            assert!(worst < 0.0105, "{window:?} {n}: {worst}");
+        }
+        assert_eq!(main_lobe_shape(Window::Hann, 1), None);
     }
 
     #[test]

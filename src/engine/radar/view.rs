@@ -46,6 +46,83 @@ pub struct PointSpread {
     pub elevation_rad: f64,
     /// σ_dop, m/s.
     pub doppler_mps: f64,
+    /// What shape the lobes have besides, where the FFTs are known.
+    #[serde(skip)]
+    pub lobes: Lobes,
+}
+
+/// The main lobe of each quantity in its window's own shape; `None` where that is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Lobes {
+    /// Along range.
+    pub range: Option<Lobe>,
+    /// Along azimuth.
+    pub azimuth: Option<Lobe>,
+    /// Along elevation.
+    pub elevation: Option<Lobe>,
+    /// Along Doppler.
+    pub doppler: Option<Lobe>,
+}
+
+/// A window's main lobe as a difference of Gaussians, Σ_c w_c exp(−½ (x/(σ f_c))²) with w of [`Lobe::WEIGHTS`] and σ that of the
+/// one Gaussian closest to it. A Gaussian has no foot; the difference follows a lobe down to its first minimum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lobe {
+    /// f of each Gaussian.
+    pub ratios: [f64; 2],
+}
+
+impl Lobe {
+    /// w of each Gaussian: 1 at the peak.
+    pub const WEIGHTS: [f64; 2] = [2.0, -1.0];
+}
+
+/// What is resolved by an FFT of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Resolves {
+    /// Samples of a chirp.
+    Range,
+    /// Elements along y.
+    Azimuth,
+    /// Elements along z.
+    Elevation,
+    /// Chirps.
+    Doppler,
+}
+
+impl Resolves {
+    /// What the width along an axis comes from.
+    pub fn of(kind: AxisKind) -> Self {
+        match kind {
+            AxisKind::Range | AxisKind::X | AxisKind::DepthH | AxisKind::DepthV => Self::Range,
+            AxisKind::Azimuth | AxisKind::Cone | AxisKind::Y => Self::Azimuth,
+            AxisKind::Elevation | AxisKind::Z => Self::Elevation,
+            AxisKind::Doppler => Self::Doppler,
+        }
+    }
+}
+
+impl PointSpread {
+    /// The lobe of a quantity.
+    pub fn lobe(&self, of: Resolves) -> Option<Lobe> {
+        let Lobes { range, azimuth, elevation, doppler } = self.lobes;
+        match of {
+            Resolves::Range => range,
+            Resolves::Azimuth => azimuth,
+            Resolves::Elevation => elevation,
+            Resolves::Doppler => doppler,
+        }
+    }
+
+    /// The width of a quantity.
+    pub fn width_mut(&mut self, of: Resolves) -> &mut f64 {
+        match of {
+            Resolves::Range => &mut self.range_m,
+            Resolves::Azimuth => &mut self.azimuth_rad,
+            Resolves::Elevation => &mut self.elevation_rad,
+            Resolves::Doppler => &mut self.doppler_mps,
+        }
+    }
 }
 
 /// One map of a frame. The map is a C-ordered array whose shape is the axes' bins.

@@ -245,7 +245,13 @@ mod tests {
         View {
             array: array.into(),
             quantity: Quantity::Amplitude,
-            psf: PointSpread { range_m: 0.06, azimuth_rad: 0.03, elevation_rad: 0.03, doppler_mps: 0.1 },
+            psf: PointSpread {
+                range_m: 0.06,
+                azimuth_rad: 0.03,
+                elevation_rad: 0.03,
+                doppler_mps: 0.1,
+                ..PointSpread::default()
+            },
             pose: Pose::default(),
             axes: vec![axis(depth, 48, 6.0, 0.0), axis(across, 32, first, last)],
             region: None,

@@ -69,7 +69,13 @@ mod tests {
         View {
             array: "hm".into(),
             quantity: Quantity::Amplitude,
-            psf: PointSpread { range_m: 0.1, azimuth_rad: 0.1, elevation_rad: 0.1, doppler_mps: 0.1 },
+            psf: PointSpread {
+                range_m: 0.1,
+                azimuth_rad: 0.1,
+                elevation_rad: 0.1,
+                doppler_mps: 0.1,
+                ..PointSpread::default()
+            },
             pose: Pose::default(),
             axes: kinds.iter().map(axis).collect(),
             region: None,

@@ -141,7 +141,13 @@ fn guess_view(entry: &Entry, stacked: bool) -> View {
     let shape = if stacked { entry.shape.get(1..).unwrap_or_default() } else { &entry.shape };
     let size = |k: usize| shape.get(k).copied().unwrap_or(1);
     let vertical = entry.key.to_lowercase().contains("vert");
-    let mut psf = PointSpread { range_m: 0.06, azimuth_rad: 0.03, elevation_rad: 0.0, doppler_mps: 0.1 };
+    let mut psf = PointSpread {
+        range_m: 0.06,
+        azimuth_rad: 0.03,
+        elevation_rad: 0.0,
+        doppler_mps: 0.1,
+        ..PointSpread::default()
+    };
     let axes = match shape.len() {
         3 => {
             (psf.range_m, psf.azimuth_rad, psf.elevation_rad) = (0.1, 0.08, 0.12);

@@ -32,7 +32,13 @@ fn problem(rng: &mut StdRng) -> Problem {
         axes: vec![axis(depth, 40, 5.0, 1.0), axis(across, 30, 1.6, -1.6)],
         region: None,
     };
-    let psf = |azimuth_rad, elevation_rad| PointSpread { range_m: 0.05, azimuth_rad, elevation_rad, doppler_mps: 0.1 };
+    let psf = |azimuth_rad, elevation_rad| PointSpread {
+        range_m: 0.05,
+        azimuth_rad,
+        elevation_rad,
+        doppler_mps: 0.1,
+        ..PointSpread::default()
+    };
     let views = vec![
         view("h", AxisKind::DepthH, AxisKind::Y, psf(0.05, 0.0)),
         view("v", AxisKind::DepthV, AxisKind::Z, psf(0.0, 0.05)),
