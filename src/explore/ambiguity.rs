@@ -15,7 +15,7 @@ use super::task::Showing;
 use crate::body::Pppr;
 use crate::config::{EmRegion, FitConfig};
 use crate::geometry::mean;
-use crate::mhp::{EmScratch, Objective, Problem};
+use crate::mhp::{EmAround, EmScratch, FrameEmLoss};
 use crate::radar::{AxisKind, View};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -161,24 +161,21 @@ fn axis(name: &str, unit: &'static str, [from, to]: [f64; 2]) -> SampleAxis {
     SampleAxis { name: name.to_owned(), unit, from, to, cells: AMBIGUITY_CELLS, closed: false }
 }
 
-/// The objectives of regions that go along, by their place in the lattice; each is laid out once, by who comes first.
+/// The regions that go along, by their place in the lattice; each is laid out once, by who comes first.
 struct Regions<'a> {
-    seen: &'a Arc<Problem>,
-    state: &'a ExploredState,
-    config: FitConfig,
-    known: Mutex<BTreeMap<[usize; 2], Option<Arc<Objective>>>>,
+    frame: &'a FrameEmLoss<'a>,
+    known: Mutex<BTreeMap<[usize; 2], Option<Arc<EmAround<'a>>>>>,
 }
 
-impl Regions<'_> {
+impl<'a> Regions<'a> {
     /// Of a sample; `None` where no region can be laid there.
-    fn of(&self, [i, j]: [usize; 2], body: impl Fn([usize; 2]) -> Pppr) -> Option<Arc<Objective>> {
+    fn of(&self, [i, j]: [usize; 2], body: impl Fn([usize; 2]) -> Pppr) -> Option<Arc<EmAround<'a>>> {
         let block = [i / REGION_EVERY, j / REGION_EVERY];
         if let Some(known) = self.known.lock().unwrap_or_else(PoisonError::into_inner).get(&block) {
             return known.clone();
         }
         let middle = block.map(|k| (k * REGION_EVERY + REGION_EVERY / 2).min(AMBIGUITY_CELLS - 1));
-        let objective = Objective::new(Arc::clone(self.seen), self.config, self.state.precision, &body(middle));
-        let made = objective.ok().map(Arc::new);
+        let made = self.frame.around(&body(middle)).ok().map(Arc::new);
         self.known.lock().unwrap_or_else(PoisonError::into_inner).insert(block, made.clone());
         made
     }
@@ -200,10 +197,10 @@ pub(super) fn explore(
     }
     // Only L_EM counts: what other terms would look up is left out.
     let config = FitConfig { w_time: 0.0, ..state.config };
-    let fit = ExploredState { config, ..state.clone() };
-    let objective = Arc::new(fit.objective(&seen)?);
+    let frame = FrameEmLoss::new(&seen, config, state.precision, &state.params);
+    let of_fit = Arc::new(frame.around(&state.initial).map_err(|error| Halt::Failed(error.to_string()))?);
     let goes_along = *region == RegionOf::Body && config.em_region != EmRegion::Full;
-    let here_value = objective.em_loss(&state.params);
+    let here_value = of_fit.loss(&state.params, &mut EmScratch::default());
     let root = root_of(state.params.person(person), &seen.skeleton);
     let [sides, depths] = match (region, config.em_region) {
         (RegionOf::Fit, EmRegion::HalfWidth(half)) => {
@@ -226,7 +223,7 @@ pub(super) fn explore(
         region: *region,
         origin: Arc::new(state.params.clone()),
     };
-    let regions = Regions { seen: &seen, state: &fit, config, known: Mutex::default() };
+    let regions = Regions { frame: &frame, known: Mutex::default() };
     let (floor, turn) = (map.floor.clone(), map.turn.clone());
     let place = AmbiguityMap { floor: floor.clone(), turn: turn.clone(), ..map.clone() };
     let levels: Vec<Row> = rows([AMBIGUITY_CELLS; 2], PIECE);
@@ -250,9 +247,9 @@ pub(super) fn explore(
             let of = if on_floor && goes_along {
                 regions.of([i, *j], |cell| place.on_floor(&seen.skeleton, floor.at(cell)))?
             } else {
-                Arc::clone(&objective)
+                Arc::clone(&of_fit)
             };
-            Some(of.em_loss_in(params, scratch)).filter(|value| value.is_finite())
+            Some(of.loss(params, scratch)).filter(|value| value.is_finite())
         });
         Ok(values.collect())
     };

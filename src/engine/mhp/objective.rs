@@ -1,7 +1,7 @@
 //! L(Θ) and ∂L/∂Θ; SPEC section 4.
 
 use super::floors::hard_iou;
-use super::frame_em::{EmScratch, FrameEm};
+use super::frame_em::FrameEm;
 use super::percentile::percentile;
 use super::region::{self, Region};
 use super::terms::{self, Inputs};
@@ -170,11 +170,6 @@ impl Objective {
     /// L_EM alone, without its gradient.
     pub fn em_loss(&self, params: &Pppr) -> f64 {
         self.em.loss((&self.problem.radar, &self.config), self.precision, params)
-    }
-
-    /// The same, many times in the same room.
-    pub fn em_loss_in(&self, params: &Pppr, scratch: &mut EmScratch) -> f64 {
-        self.em.loss_in((&self.problem.radar, &self.config), self.precision, params, scratch)
     }
 }
 

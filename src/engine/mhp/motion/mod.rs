@@ -27,6 +27,7 @@ mod thinned;
 mod turn;
 
 pub(super) use search::search;
+pub(super) use thinned::ThinnedViews;
 pub(super) use turn::turn;
 
 use super::frame_em::FrameEm;
@@ -38,7 +39,6 @@ use crate::geometry::{Vec3, add_scaled, mean, norm};
 use serde::{Deserialize, Serialize};
 use space::{BODY, LN_SIZE, MOST_JOINTS, PoseSpace, STILL, YAW};
 use static_echo::StaticEchoModel;
-use thinned::ThinnedViews;
 
 /// Frames of a window lie no farther from its middle, s: the prior reaches no farther.
 const REACH_S: f64 = 0.201;

@@ -20,17 +20,17 @@ fn narrowed(psf: &PointSpread) -> PointSpread {
 }
 
 /// The views of a problem, thinned, and what its frames show in them.
-pub(super) struct ThinnedViews<'a> {
+pub(in crate::mhp) struct ThinnedViews<'a> {
     problem: &'a Problem,
     thinned: Vec<Thinned>,
-    pub(super) views: Vec<View>,
+    pub(in crate::mhp) views: Vec<View>,
     /// Their rings, where clutter is modelled.
     grids: Vec<SpatialGrid>,
 }
 
 impl<'a> ThinnedViews<'a> {
     /// For persons who stand where those of `params` do.
-    pub(super) fn new(problem: &'a Problem, config: &FitConfig, params: &Pppr) -> Self {
+    pub(in crate::mhp) fn new(problem: &'a Problem, config: &FitConfig, params: &Pppr) -> Self {
         let thinned: Vec<Thinned> = problem.views.iter().map(|view| Thinned::new(view, params)).collect();
         let views: Vec<View> = thinned.iter().map(|thinned| thinned.view.clone()).collect();
         let by_range = config.clutter == Clutter::Modelled;
@@ -44,7 +44,7 @@ impl<'a> ThinnedViews<'a> {
     }
 
     /// What compares the maps of a frame, over a background power a kept cell where one is known.
-    pub(super) fn compared(
+    pub(in crate::mhp) fn compared(
         &self,
         frame: Option<&Neighbour>,
         regions: &[Region],
