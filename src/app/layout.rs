@@ -23,6 +23,8 @@ pub(crate) struct PaneLayout {
     collapse: Collapse,
     /// A pane whose tab was right-clicked, and what was chosen.
     asked: Option<AppAct>,
+    /// A pane that is drawn without the others, and where.
+    alone: Option<(Leaf, egui::Rect)>,
 }
 
 impl Default for PaneLayout {
@@ -38,7 +40,7 @@ impl Default for PaneLayout {
         let root = linear(&mut tiles, LinearDir::Horizontal, &[(left, 1.0), (middle, 4.0), (right, 1.25)]);
         let fitted = Fitted { columns: root, middle, shares: [Vec::new(), Vec::new()] };
         let tree = Tree::new(egui::Id::unique("panes"), root, tiles);
-        Self { tree, fitted: Some(fitted), collapse: Collapse::default(), asked: None }
+        Self { tree, fitted: Some(fitted), collapse: Collapse::default(), asked: None, alone: None }
     }
 }
 
@@ -127,7 +129,7 @@ impl PaneLayout {
     pub(crate) fn restored(tree: Tree<Leaf>, fitted: bool) -> Self {
         if tree.root().is_some() && tree.tiles.iter().any(|(_, tile)| matches!(tile, Tile::Pane(_))) {
             let fitted = if fitted { Fitted::of(&tree) } else { None };
-            let mut restored = Self { tree, fitted, collapse: Collapse::default(), asked: None };
+            let mut restored = Self { tree, fitted, collapse: Collapse::default(), asked: None, alone: None };
             restored.complete();
             restored
         } else {
@@ -167,13 +169,21 @@ impl PaneLayout {
 
     /// Where a pane was drawn in the last pass, points; `None` where it is behind another tab.
     pub(crate) fn rect(&self, pane: Leaf) -> Option<egui::Rect> {
-        self.tree.tiles.rect(self.tree.tiles.find_pane(&pane)?)
+        match self.alone {
+            Some((alone, rect)) => (alone == pane).then_some(rect),
+            None => self.tree.tiles.rect(self.tree.tiles.find_pane(&pane)?),
+        }
     }
 
     /// Brings a pane to the front; one that was closed is not brought back.
     pub(crate) fn show_pane(&mut self, pane: Leaf) {
         self.collapse.open(&self.tree, pane);
         self.tree.make_active(|_, tile| matches!(tile, Tile::Pane(other) if *other == pane));
+    }
+
+    /// Draws a pane without the others from now on, over all of the window that they had.
+    pub(crate) fn show_alone(&mut self, pane: Leaf) {
+        self.alone = Some((pane, egui::Rect::NOTHING));
     }
 
     /// What was asked for on a tab.
@@ -185,6 +195,11 @@ impl PaneLayout {
     pub(crate) fn show(&mut self, ui: &mut egui::Ui, shared: &mut Shared<'_>, states: &mut PaneStates) {
         let tokens = Tokens::of(ui);
         egui::CentralPanel::default().frame(egui::Frame::new().fill(tokens.stroke)).show(ui, |ui| {
+            if let Some((pane, rect)) = &mut self.alone {
+                *rect = ui.max_rect();
+                pane.show(ui, tokens.panel, shared, states);
+                return;
+            }
             let whole = ui.available_size();
             let (left, right) = (within(LEFT, whole.x), within(RIGHT, whole.x));
             let sides = self.collapse.decide(&mut self.tree, whole, left, right);

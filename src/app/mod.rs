@@ -205,6 +205,11 @@ impl InspectorApp {
         self.layout.show_pane(pane);
     }
 
+    /// Draws a pane over all of the window's middle, without the others, as for a figure.
+    pub fn show_pane_alone(&mut self, pane: &'static Pane) {
+        self.layout.show_alone(pane);
+    }
+
     /// Whether panes wait for something that is computed for them alone.
     pub fn panes_are_working(&self) -> bool {
         self.panes.are_working()

@@ -71,7 +71,7 @@ pub struct ScreenshotArgs {
     /// Theme; without it that of the session file, or dark.
     #[arg(long, value_enum)]
     theme: Option<ThemeArg>,
-    /// Save this pane alone, called as on its tab, for example Maps.
+    /// Save this pane alone, called as on its tab, for example Maps; it takes all of the window between the bars.
     #[arg(long, value_name = "NAME")]
     pane: Option<String>,
     /// Print units, τ, iteration, seed and version small under every picture.
@@ -156,7 +156,7 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
         dataset.inputs().with_named(named).check_file(&args.out)?;
     }
     if let Some(pane) = pane {
-        harness.state_mut().show_pane(pane);
+        harness.state_mut().show_pane_alone(pane);
         // One of an exploration is drawn with it, however long it takes.
         if let Some(kind) =
             ExplorationKind::ALL.into_iter().find(|kind| pane.title().eq_ignore_ascii_case(kind.title()))

@@ -9,9 +9,10 @@ use crate::radar::{
 };
 use rayon::prelude::*;
 
-/// Samples and chirps of a radar that is only known by its widths, and the most elements that one is given.
+/// Samples and chirps of a radar that is only known by its widths, and the fewest and most elements that one is given.
 const SAMPLES: usize = 256;
 const CHIRPS: usize = 32;
+const FEWEST_ELEMENTS: usize = 3;
 const MOST_ELEMENTS: usize = 256;
 const USUAL_ELEMENTS: usize = 8;
 /// Points of the angle FFT for each element, at least, and of the range FFT for each sample.
@@ -40,8 +41,15 @@ pub(super) fn fft_of(view: &View, known: Option<&ViewFft>, radar: &RadarConfig) 
             if width <= 0.0 {
                 return (USUAL_ELEMENTS, Window::Hann);
             }
-            let off = |n: &usize| (sine_sigma(Window::Hann, *n, half_wave, 2.0 * half_wave) - width).abs();
-            let elements = (3..=MOST_ELEMENTS).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(8);
+            // A longer line is a narrower one: the first that is narrower, or the one before it.
+            let of = |elements: usize| sine_sigma(Window::Hann, elements, half_wave, 2.0 * half_wave);
+            let (mut wider, mut narrower) = (FEWEST_ELEMENTS, MOST_ELEMENTS);
+            while narrower - wider > 1 {
+                let middle = usize::midpoint(wider, narrower);
+                if of(middle) > width { wider = middle } else { narrower = middle }
+            }
+            let off = |elements: usize| (of(elements) - width).abs();
+            let elements = if off(wider) < off(narrower) { wider } else { narrower };
             (elements, Window::Hann)
         })
     };

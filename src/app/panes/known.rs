@@ -185,15 +185,18 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let left = (0.34 * area.width()).clamp(190.0, 300.0);
     let (numbers, list) = area.split_left_right_at_x(area.min.x + left);
     ui.scope_builder(egui::UiBuilder::new().max_rect(numbers.with_max_x(numbers.max.x - 8.0)), |ui| {
-        egui::ScrollArea::vertical().id_salt("known numbers").auto_shrink(false).show(ui, |ui| {
-            ui.spacing_mut().item_spacing.y = 1.0;
-            table(ui, known);
-        });
+        egui::ScrollArea::vertical().id_salt("known numbers").auto_shrink(false).min_scrolled_height(0.0).show(
+            ui,
+            |ui| {
+                ui.spacing_mut().item_spacing.y = 1.0;
+                table(ui, known);
+            },
+        );
     });
     let mut chosen = state.choice.direction;
     ui.scope_builder(egui::UiBuilder::new().max_rect(list), |ui| {
         ui.label(RichText::new("Least observable, widest first").small().color(tokens.dim));
-        egui::ScrollArea::vertical().id_salt("directions").auto_shrink(false).show(ui, |ui| {
+        egui::ScrollArea::vertical().id_salt("directions").auto_shrink(false).min_scrolled_height(0.0).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 1.0;
             for (k, of) in known.unseen.iter().enumerate() {
                 let on = k == chosen;

@@ -198,7 +198,12 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         let mut ui = ui.new_child(
             egui::UiBuilder::new().id_salt("column").max_rect(column).layout(egui::Layout::top_down(egui::Align::Min)),
         );
-        numbers::show(&mut ui, shared.session, &map, quantity, hovered, &tokens);
+        egui::ScrollArea::vertical().id_salt("numbers").auto_shrink(false).min_scrolled_height(0.0).show(
+            &mut ui,
+            |ui| {
+                numbers::show(ui, shared.session, &map, quantity, hovered, &tokens);
+            },
+        );
     }
 }
 
