@@ -83,20 +83,23 @@ pub struct EmPlane {
     pub here_value: f64,
     /// Every so many samples along each axis are done.
     pub stride: usize,
+    /// The minima, the lowest first; none before the plane is whole.
+    pub minima: Vec<Minimum>,
 }
 
 impl EmPlane {
+    /// Every so many samples are done now; of the whole plane the minima are looked for.
+    fn reach(&mut self, stride: usize) {
+        self.stride = stride;
+        if stride == 1 {
+            let axes = self.axes.each_ref();
+            self.minima = minima(&self.values, axes.map(|axis| axis.cells), axes.map(|axis| axis.closed));
+        }
+    }
+
     /// The value of a sample.
     pub fn value(&self, [i, j]: [usize; 2]) -> Option<f64> {
         self.values.get(j * self.axes[0].cells + i).copied().flatten()
-    }
-
-    /// The minima, the lowest first; none before the plane is whole.
-    pub fn minima(&self) -> Vec<Minimum> {
-        if self.stride > 1 {
-            return Vec::new();
-        }
-        minima(&self.values, self.axes.each_ref().map(|axis| axis.cells), self.axes.each_ref().map(|axis| axis.closed))
     }
 
     /// The axes' values at a sample.
@@ -154,7 +157,7 @@ fn floor_extent(views: &[View]) -> [[f64; 2]; 2] {
 /// A plane whose samples are all unknown.
 fn plane(axes: [SampleAxis; 2], here: [f64; 2], here_value: f64) -> EmPlane {
     let cells = axes[0].cells * axes[1].cells;
-    EmPlane { axes, values: vec![None; cells], here, here_value, stride: usize::MAX }
+    EmPlane { axes, values: vec![None; cells], here, here_value, stride: usize::MAX, minima: Vec::new() }
 }
 
 fn axis(name: &str, unit: &'static str, [from, to]: [f64; 2]) -> SampleAxis {
@@ -268,7 +271,8 @@ pub(super) fn explore(
             }
             let ended = super::coarse::ended(&mut left, *stride);
             if let Some(stride) = ended {
-                (map.floor.stride, map.turn.stride) = (stride, stride);
+                map.floor.reach(stride);
+                map.turn.reach(stride);
             }
             show.maybe(ended.is_some(), || map.clone());
         },

@@ -266,7 +266,7 @@ fn the_ambiguity_map_lists_places_and_a_branch_begins_at_one() {
     let map = Arc::clone(window.session().explore.ambiguity(0).unwrap());
     let shown = window.fit().shown_row().unwrap().report.terms.get("em").unwrap();
     assert!((map.floor.here_value - shown).abs() < 1e-6, "{} {shown}", map.floor.here_value);
-    let lowest = map.floor.minima()[0];
+    let lowest = map.floor.minima[0];
     assert!(lowest.value < map.floor.here_value + 0.05, "the body is near a minimum of its own echo");
     for name in ["L_EM over the floor", "L_EM over heading and height"] {
         let rect = window.harness.get_by_label(name).rect();

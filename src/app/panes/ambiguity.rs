@@ -153,7 +153,7 @@ fn picture(
     plane::axes(&painter, &area, [&axes[0], &axes[1]], tokens);
     plane::scale(ui, &area, map_colors, limits, "L_EM");
     let at = |value: [f64; 2]| area.at([of.axes[0].place(value[0]), of.axes[1].place(value[1])]);
-    for (k, minimum) in of.minima().iter().enumerate() {
+    for (k, minimum) in of.minima.iter().enumerate() {
         number(&painter, area.at(minimum.cell.map(|k| k as f64)), k + 1);
     }
     if side == Side::Floor
@@ -236,7 +236,7 @@ fn minima(
         ui.add_space(4.0);
         ui.label(RichText::new(title).small().color(tokens.dim));
         let of = of_side(map, side);
-        let found: Vec<Minimum> = of.minima();
+        let found: &[Minimum] = &of.minima;
         if found.is_empty() {
             ui.label(RichText::new("none yet").small().color(tokens.dim));
         }

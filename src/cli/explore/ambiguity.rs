@@ -78,12 +78,12 @@ pub(super) fn run(args: &AmbiguityArgs) -> anyhow::Result<ExitCode> {
         }
     }
     text.push_str("\nminima over the floor, lowest first\n");
-    for minimum in map.floor.minima() {
+    for minimum in &map.floor.minima {
         let [y, x] = map.floor.at(minimum.cell);
         let _ = writeln!(text, "  {:.4}  {:.4} deep  at x {x:.2} m, y {y:+.2} m", minimum.value, minimum.depth);
     }
     text.push_str("\nminima over heading and height\n");
-    for minimum in map.turn.minima() {
+    for minimum in &map.turn.minima {
         let [yaw, up] = map.turn.at(minimum.cell);
         let _ = writeln!(text, "  {:.4}  {:.4} deep  turned {yaw:+.0}°, {up:+.2} m up", minimum.value, minimum.depth);
     }
@@ -93,8 +93,8 @@ pub(super) fn run(args: &AmbiguityArgs) -> anyhow::Result<ExitCode> {
 
 fn plane(plane: &EmPlane) -> Value {
     let minima: Vec<Value> = plane
-        .minima()
-        .into_iter()
+        .minima
+        .iter()
         .map(|minimum| json!({"at": plane.at(minimum.cell), "em": minimum.value, "depth": minimum.depth}))
         .collect();
     json!({"axes": plane.axes, "values": plane.values, "here": plane.here, "minima": minima})

@@ -356,6 +356,7 @@ impl Window {
             meter.pass_with(&mut self.0, |harness| harness.state_mut().apply(Command::Explore(kind)));
             self.passes_until(&mut meter, |s| !s.explore.is_running(kind) && s.explore.is_current(kind));
             meter.print();
+            self.repeat(&format!("idle, a {} on screen", kind.title()), 60, |_, _| {});
         }
     }
 
