@@ -23,6 +23,7 @@ mod store;
 mod table;
 mod tags;
 mod tail;
+mod verdicts;
 
 pub use acts::{place_acts, read_acts, read_labels};
 pub use agreement::{
@@ -39,3 +40,4 @@ pub use statistics::{AnnotatorStatistics, LabelCounts, PAUSE_S, Pace, day, stati
 pub use store::{LabelStore, read_journal};
 pub use table::{COLUMNS, LabelRow, ReadTable, TableError, read_table, write_csv, write_json};
 pub use tags::{Tag, Tags, Verdict};
+pub use verdicts::{VerdictAgreement, verdict_agreement};

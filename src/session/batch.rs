@@ -85,6 +85,8 @@ pub(super) fn summary(row: &BatchRow) -> FrameSummary {
         reason,
         hashes: None,
         batch: true,
+        people: Some(fit.people),
+        annotated: fit.annotated,
         joints: row.joints.clone(),
     }
 }

@@ -54,6 +54,8 @@ fn summary(row: SummaryRow) -> FrameSummary {
         reason: row.reason,
         hashes: None,
         batch: false,
+        people: row.people,
+        annotated: row.annotated,
         joints: None,
     }
 }

@@ -142,6 +142,12 @@ pub struct FrameSummary {
     /// Whether a batch of the window made it.
     #[serde(default)]
     pub batch: bool,
+    /// Persons fitted, where that is known.
+    #[serde(default)]
+    pub people: Option<usize>,
+    /// Persons annotated, where that is known.
+    #[serde(default)]
+    pub annotated: Option<usize>,
     /// Its joints, m, where a fit of this session made it: predictions are compared with them.
     #[serde(skip)]
     pub joints: Option<Arc<[[f32; 3]]>>,

@@ -105,6 +105,8 @@ fn summary(row: &RunRow) -> FrameSummary {
         reason: Some(row.fit.as_ref().map_or_else(|why| format!("error: {why}"), |fit| fit.reason.clone())),
         hashes: None,
         batch: false,
+        people: fit.map(|fit| fit.persons),
+        annotated: fit.and_then(|fit| fit.annotated),
         joints: None,
     }
 }

@@ -10,7 +10,7 @@
 
 use mhp_inspector::labels::{
     Agreement, FrameId, Judged, Label, Record, Tag, TagAgreement, Tags, Verdict, against_machine, agreement, judged,
-    judged_in_acts, read_table,
+    judged_in_acts, read_table, verdict_agreement,
 };
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -158,6 +158,27 @@ fn a_verdict_alone_is_no_judgement_of_tags() {
     let pooled = &found.pooled;
     assert_eq!([pooled.both, pooled.only_a, pooled.only_b, pooled.neither], [4, 6, 6, 44]);
     assert!((pooled.kappa.unwrap() - 0.28).abs() < 1e-12, "{:?}", pooled.kappa);
+}
+
+/// Of ten frames, rows A's, columns B's: true negative 5 and 1 detection error, detection error 1 and 3. Σ r c = 6·6 + 4·4 = 52,
+/// κ = (10·8 − 52)/(100 − 52) = 0.5833.
+#[test]
+fn verdicts_have_a_kappa_of_their_own() {
+    let judged = |frame: usize, verdict: &str| {
+        record(&format!("{frame}"), Label { verdict: Some(verdict.parse().unwrap()), ..Label::default() })
+    };
+    let (tn, de) = ("true-negative", "detection-error");
+    let mut a: Vec<Record> = (0..10).map(|k| judged(k, if k < 6 { tn } else { de })).collect();
+    let mut b: Vec<Record> = (0..10).map(|k| judged(k, if k < 5 || k == 6 { tn } else { de })).collect();
+    // Alone, taken back, or only a tag: none of them counts.
+    a.extend([judged(11, tn), judged(12, tn), record("12", Label::default()), tagged("13", "F1")]);
+    b.extend([judged(12, tn), tagged("13", "F1")]);
+    let found = verdict_agreement(&a, &b);
+    assert_eq!((found.frames, found.raw), (10, Some(0.8)));
+    assert!((found.kappa.unwrap() - 28.0 / 48.0).abs() < 1e-12, "{:?}", found.kappa);
+    assert_eq!(found.table, [[0; 4], [0, 3, 0, 1], [0; 4], [0, 1, 0, 5]]);
+    let one = verdict_agreement(&a[..3], &b[..3]);
+    assert_eq!((one.frames, one.kappa), (3, None), "one answer by both everywhere tells nothing");
 }
 
 #[test]

@@ -4,8 +4,8 @@ use super::source::{acts, annotators, counted, listed, only};
 use crate::cli::common::{print, print_json};
 use crate::escape::one_line;
 use crate::labels::{
-    Agreement, MACHINE_THRESHOLD, MachineAgreement, Record, TagAgreement, against_machine, agreement as compare,
-    judged_in_acts,
+    Agreement, MACHINE_THRESHOLD, MachineAgreement, Record, TagAgreement, Verdict, VerdictAgreement, against_machine,
+    agreement as compare, judged_in_acts, verdict_agreement,
 };
 use anyhow::{Context as _, bail};
 use serde_json::{Map, Value, json};
@@ -24,6 +24,9 @@ clean unsure. kappa is Cohen's, null where undefined: no frame in common, or the
 is the share of equal decisions, null without a frame. pooled takes the decisions of all six tags as one table. Besides: \
 frames, prevalence_a, prevalence_b, unreliable (why kappa should not be trusted, or null), and with --disputes the frames \
 seen differently; in pooled also frames_only_in_a, frames_only_in_b.
+
+Verdicts on the count are compared apart from tags: with \"verdicts\" in JSON {\"frames\", \"kappa\", \"raw\", \"table\"}, where both \
+gave some; rows are A's, columns B's annotation-error, detection-error, both-incorrect, true-negative.
 
 With --machine B is the program: its scores of F1 to F4 at the moment of judging, yes from --threshold on; pooled then \
 counts machine_shown, the frames judged with the scores on screen, which are not blind, and unscored.
@@ -75,7 +78,9 @@ pub(super) fn run(args: &AgreementArgs) -> anyhow::Result<ExitCode> {
     if let Some(path) = &args.b {
         let b = of_one(path, args.annotator_b.as_deref(), "--annotator-b")?;
         let found = compare(judged_in_acts(&a), judged_in_acts(&b));
-        tell(args, || two_as_json(&found, args.disputes), || two_as_text(args, &found, &a, &b))?;
+        let verdicts = verdict_agreement(&a, &b);
+        let text = || two_as_text(args, &found, &a, &b) + &verdict_table(&verdicts);
+        tell(args, || two_as_json(&found, &verdicts, args.disputes), text)?;
     } else {
         let found = against_machine(judged_in_acts(&a), args.threshold);
         tell(args, || machine_as_json(&found, args.disputes), || machine_as_text(args, &found, &a))?;
@@ -106,24 +111,25 @@ fn of_one(path: &Path, annotator: Option<&str>, option: &str) -> anyhow::Result<
     Ok(acts)
 }
 
-fn two_as_json(found: &Agreement, disputes: bool) -> anyhow::Result<String> {
+fn two_as_json(found: &Agreement, verdicts: &VerdictAgreement, disputes: bool) -> anyhow::Result<String> {
     let more = json!({
         "frames": found.frames,
         "frames_only_in_a": found.only_in_a,
         "frames_only_in_b": found.only_in_b,
     });
-    as_json(found, more, disputes)
+    let verdicts = (verdicts.frames > 0).then(|| json!(verdicts));
+    as_json(found, more, verdicts, disputes)
 }
 
 fn machine_as_json(found: &MachineAgreement, disputes: bool) -> anyhow::Result<String> {
     let agreement = &found.agreement;
     let more = json!({ "frames": agreement.frames, "machine_shown": found.shown, "unscored": found.unscored });
-    as_json(agreement, more, disputes)
+    as_json(agreement, more, None, disputes)
 }
 
 /// An object a tag, and the pooled one, which also has the keys of `more`: whoever walks over the keys finds the same
 /// numbers under each.
-fn as_json(found: &Agreement, more: Value, disputes: bool) -> anyhow::Result<String> {
+fn as_json(found: &Agreement, more: Value, verdicts: Option<Value>, disputes: bool) -> anyhow::Result<String> {
     let mut object = Map::new();
     for (tag, table) in &found.tags {
         let mut value = json!(table);
@@ -143,6 +149,7 @@ fn as_json(found: &Agreement, more: Value, disputes: bool) -> anyhow::Result<Str
         pooled.extend(more);
     }
     object.insert("pooled".into(), pooled);
+    object.extend(verdicts.map(|verdicts| ("verdicts".to_owned(), verdicts)));
     Ok(serde_json::to_string_pretty(&Value::Object(object)).context("writing JSON")? + "\n")
 }
 
@@ -189,6 +196,27 @@ fn table(found: &Agreement, disputes: bool) -> String {
         let _ = writeln!(text, "{}  {} only by {who}", one_line(&dispute.frame), dispute.tag);
     }
     text
+}
+
+/// The verdicts on the count, where both gave some: κ, and a line a verdict of A with how often B gave which.
+fn verdict_table(found: &VerdictAgreement) -> String {
+    if found.frames == 0 {
+        return String::new();
+    }
+    let kappa = found.kappa.map_or_else(|| "-".to_owned(), |kappa| format!("{kappa:.3}"));
+    let raw = found.raw.map_or_else(|| "-".to_owned(), |raw| format!("{:.1} %", 100.0 * raw));
+    let frames = counted(found.frames, "frame");
+    let mut text = format!("\nverdicts on the count: {frames} of both, kappa {kappa}, raw {raw}\n{:<18}", "A \\ B");
+    for verdict in Verdict::ALL {
+        let _ = write!(text, " {:>16}", verdict.code());
+    }
+    for (verdict, row) in Verdict::ALL.iter().zip(&found.table) {
+        let _ = write!(text, "\n{:<18}", verdict.code());
+        for count in row {
+            let _ = write!(text, " {count:>16}");
+        }
+    }
+    text + "\n"
 }
 
 fn row(name: &str, table: &TagAgreement) -> [String; 9] {

@@ -157,6 +157,7 @@ impl Session {
             row.iterations = summary.iterations;
             row.converged = summary.converged;
             row.reason = summary.reason.as_deref();
+            row.mismatch = summary.people.zip(summary.annotated).map(|(people, annotated)| people != annotated);
             row.majpe_mm = summary.majpe_mm;
         }
         if reads.basins {

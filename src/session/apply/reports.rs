@@ -59,6 +59,12 @@ impl Session {
             converged: Some(row.report.converged),
             majpe_mm: row.majpe_mm,
             batch: false,
+            people: row.state.as_ref().map(|state| state.params.shape().persons),
+            annotated: self
+                .data
+                .frame
+                .as_ref()
+                .and_then(|frame| frame.person_count.or_else(|| frame.truth.as_ref().map(|truth| truth.persons))),
             joints: row
                 .state
                 .as_ref()

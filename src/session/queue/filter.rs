@@ -47,9 +47,10 @@ enum Word {
     Converged,
     Fitted,
     Readable,
+    Mismatch,
 }
 
-const WORDS: [(&str, Word); 9] = [
+const WORDS: [(&str, Word); 10] = [
     ("stratum", Word::Stratum),
     ("scene", Word::Scene),
     ("note", Word::Note),
@@ -59,6 +60,7 @@ const WORDS: [(&str, Word); 9] = [
     ("converged", Word::Converged),
     ("fitted", Word::Fitted),
     ("readable", Word::Readable),
+    ("mismatch", Word::Mismatch),
 ];
 
 /// What a filter may say, for the tooltip of its field.
@@ -73,6 +75,7 @@ pub fn syntax() -> String {
         disagree>100: the source that is farthest from the fit, mm\n\
         {}: the terms of the loss\n\
         converged:no · fitted:yes · reason:diverged · verdict:detection-error · readable:no\n\
+        mismatch:yes: another number of people fitted than annotated\n\
         A bare word is looked for in the frame's name.",
         of_loss.join(" ")
     )
@@ -116,7 +119,7 @@ impl Test {
                 Word::Scene => Reads { scene: true, ..none },
                 Word::Note | Word::Verdict => Reads { said: true, ..none },
                 Word::By => Reads { annotators: true, ..none },
-                Word::Reason | Word::Converged | Word::Fitted => Reads { fit: true, ..none },
+                Word::Reason | Word::Converged | Word::Fitted | Word::Mismatch => Reads { fit: true, ..none },
             },
         }
     }
@@ -154,6 +157,7 @@ impl Word {
             Self::Converged => row.converged == Some(yes),
             Self::Fitted => row.iterations.is_some() == yes,
             Self::Readable => row.readable == yes,
+            Self::Mismatch => row.mismatch == Some(yes),
         }
     }
 }
@@ -218,7 +222,7 @@ fn check(word: Word, values: &[String]) -> Result<(), String> {
     let allowed: &[&str] = match word {
         Word::Stratum => &["easy", "medium", "hard"],
         Word::Verdict => &["annotation-error", "detection-error", "both-incorrect", "true-negative"],
-        Word::Converged | Word::Fitted | Word::Readable => &["yes", "no", "true", "false", "1", "0"],
+        Word::Converged | Word::Fitted | Word::Readable | Word::Mismatch => &["yes", "no", "true", "false", "1", "0"],
         Word::Scene | Word::Note | Word::By | Word::Reason => return Ok(()),
     };
     match values.iter().find(|value| !allowed.contains(&value.as_str())) {
@@ -294,6 +298,15 @@ mod tests {
             annotators: vec!["ada"],
             ..FrameRow::default()
         }
+    }
+
+    #[test]
+    fn frames_whose_count_is_another_are_a_queue() {
+        let with = |mismatch| FrameRow { mismatch, ..row() };
+        let filter = FrameFilter::parse("mismatch:yes").unwrap();
+        assert!(filter.matches(&with(Some(true))) && filter.reads().fit);
+        assert!(!filter.matches(&with(Some(false))) && !filter.matches(&with(None)));
+        assert!(FrameFilter::parse("mismatch:no").unwrap().matches(&with(Some(false))));
     }
 
     fn holds(text: &str) -> bool {

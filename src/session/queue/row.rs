@@ -38,6 +38,8 @@ pub struct FrameRow<'a> {
     pub converged: Option<bool>,
     /// Why the run ended.
     pub reason: Option<&'a str>,
+    /// Whether another number of people was fitted than is annotated, where both are known.
+    pub mismatch: Option<bool>,
     /// MAJPE, mm.
     pub majpe_mm: Option<f64>,
     /// Share of its starts whose fits end in the best basin, where that was tried.
@@ -76,6 +78,7 @@ impl Default for FrameRow<'_> {
             iterations: None,
             converged: None,
             reason: None,
+            mismatch: None,
             majpe_mm: None,
             best_basin: None,
             results: [None; 2],
