@@ -14,7 +14,7 @@ const STAGES: &[(&str, &[&str])] = &[
     ("what maps and frames around show", &["region", "template", "context"]),
     ("a frame", &["frame_em", "problem", "erased", "simulate", "returns", "signal"]),
     ("the objective", &["objective"]),
-    ("a window of frames", &["motion"]),
+    ("a window of frames", &["motion", "em_around"]),
     ("the fit", &["convergence", "articulation", "adam", "fitter"]),
     ("the start", &["init"]),
 ];

@@ -3,7 +3,7 @@
 
 use crate::material;
 use crate::mutate::NUMBERS;
-use mhp_inspector::config::{FIELDS, FieldKind, FitConfig, Number, Preset, Value};
+use mhp_inspector::config::{FIELDS, FieldKind, FitConfig, Number, Parameterization, Preset, Value};
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::mhp::Precision;
 use mhp_inspector::study::complexity::{ComplexityOptions, compute};
@@ -66,6 +66,9 @@ pub(crate) fn whole(random: &mut StdRng, folder: &Path) {
 /// Cells of a map; a tenth of them in double precision. What takes long because it is large is no hang: the oracle takes every cell
 /// by every joint of up to eight people, and nothing is fast without optimisation.
 const MOST_CELLS: usize = if cfg!(debug_assertions) { 8_000 } else { 20_000 };
+
+/// People whose motion is searched, at most.
+const MOST_PEOPLE: usize = if cfg!(debug_assertions) { 2 } else { 4 };
 
 struct Axis {
     kind: &'static str,
@@ -180,5 +183,9 @@ fn config(random: &mut StdRng) -> FitConfig {
         }
     }
     config.iterations = random.random_range(0..=3);
+    // A search of the motion of eight people takes seconds without optimisation, as large maps do.
+    if config.parameterization == Parameterization::Motion {
+        config.people = config.people.min(MOST_PEOPLE);
+    }
     config.validated().unwrap_or_default()
 }
