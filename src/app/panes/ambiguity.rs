@@ -1,14 +1,14 @@
 //! The ambiguity map: L_EM of this body over the floor plan, and over heading and height, with its minima; a click on one, or
 //! anywhere, begins a branch there.
 
-use super::explore::{keep_up, needs_fit, plane, signed};
+use super::explore::{begin_branch, keep_up, needs_fit, plane, signed};
 use super::{Blank, Dock, MovedBody, Pane, PaneStates, Shared};
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Mark, Named as _};
 use crate::body::Pppr;
 use crate::explore::{AMBIGUITY_CELLS, AmbiguityMap, EmPlane, ExplorationKind, Minimum, RegionOf};
-use crate::session::{AdoptedFit, Command, Session};
+use crate::session::Session;
 use egui::{Color32, Rect, RichText, Role, Sense, Ui, pos2};
 use plane::{PlaneArea, PlaneAxis};
 use std::sync::Arc;
@@ -210,15 +210,8 @@ fn begin_at(shared: &mut Shared<'_>, map: &AmbiguityMap, side: Side, at: [f64; 2
     let session = shared.session;
     let Some(start) = moved(session, map, side, at).map(Arc::new) else { return };
     let goes_along = side == Side::Floor && map.region == RegionOf::Body;
-    let fit = AdoptedFit {
-        around: if goes_along { Some(Arc::clone(&start)) } else { session.fit.around() },
-        start,
-        erased: session.fit.erased(),
-        config: session.config,
-        words: format!("from {}", place(side, at)),
-    };
-    shared.send(Command::DragFit(Box::new(fit)));
-    shared.send(Command::EndDrag);
+    let around = if goes_along { Some(Arc::clone(&start)) } else { session.fit.around() };
+    begin_branch(shared, start, around, format!("from {}", place(side, at)));
 }
 
 /// The minima of both maps, and what is under the pointer.

@@ -2,6 +2,7 @@
 //! worth to the agreement of the maps. The cell stays when the pointer leaves the maps; joints that are pointed at here glow
 //! elsewhere.
 
+use super::answered::Answered;
 use super::lit::{cell_at, lit};
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::figure;
@@ -9,10 +10,9 @@ use crate::app::map_image::Orientation;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Mark;
 use crate::explore::{LeaveOneOut, leave_one_out};
-use crate::mhp::{FitError, JointReturn};
+use crate::mhp::JointReturn;
 use crate::session::{Command, Session};
-use crate::task::Job;
-use crate::worker::Snapshot;
+use crate::task::Progress;
 use egui::{Align2, Color32, FontId, Rect, RichText, Role, Sense, Stroke, Ui, pos2, vec2};
 use std::sync::Arc;
 
@@ -37,22 +37,17 @@ pub(super) static PANE: Pane = Pane {
     ui: |ui, shared, states| show(ui, shared, states.of()),
 };
 
-/// What is worked out of a state.
-type Asked = (Arc<Snapshot>, Job<Option<LeaveOneOut>, FitError>);
-/// The worth of the joints of a state.
-type Worth = (Arc<Snapshot>, Result<Option<LeaveOneOut>, String>);
-
 #[derive(Default)]
 struct State {
     /// View and pixel that were pointed at last.
     cell: Option<(usize, [usize; 2])>,
-    job: Option<Asked>,
-    worth: Option<Worth>,
+    /// The worth of the joints of a state.
+    worth: Answered<(), LeaveOneOut>,
 }
 
 impl PaneState for State {
     fn is_working(&self) -> bool {
-        self.job.is_some()
+        self.worth.is_working()
     }
 }
 
@@ -85,28 +80,12 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
 
 /// Asks for the worth of the joints of a state that rests.
 fn follow(ui: &Ui, session: &Session, state: &mut State) {
-    let (Some(shown), Some(problem), Some(initial)) =
-        (&session.fit.shown, &session.fit.problem, session.fit.region_pose())
-    else {
-        return;
-    };
-    if let Some((of, job)) = &mut state.job
-        && let Some(answer) = job.poll()
-    {
-        state.worth = Some((Arc::clone(of), answer.map_err(|error| error.to_string())));
-        state.job = None;
-    }
-    let known = state.worth.as_ref().is_some_and(|(of, _)| Arc::ptr_eq(of, shown));
-    let asked = state.job.as_ref().is_some_and(|(of, _)| Arc::ptr_eq(of, shown));
-    if known || asked || session.fit.is_running() || session.is_dragging() {
-        return;
-    }
-    let (problem, params, initial) = (Arc::clone(problem), shown.params.clone(), initial.clone());
-    let (config, ctx) = (shown.config, ui.ctx().clone());
-    let broken = |reason| FitError::WrongView { array: String::new(), reason };
-    let work = move |progress: &crate::task::Progress| leave_one_out(&problem, &config, (&initial, &params), progress);
-    // An older one is dropped, which cancels it.
-    state.job = Some((Arc::clone(shown), Job::start("leave-one-out", work, broken, move || ctx.request_repaint())));
+    state.worth.poll();
+    state.worth.ask((ui, session), (), "leave-one-out", |shown| {
+        let (problem, initial) = (Arc::clone(session.fit.problem.as_ref()?), session.fit.region_pose()?.clone());
+        let (config, params) = (shown.config, shown.params.clone());
+        Some(move |progress: &Progress| leave_one_out(&problem, &config, (&initial, &params), progress))
+    });
 }
 
 fn name(session: &Session, joint: usize) -> String {
@@ -286,23 +265,18 @@ fn arrow(painter: &egui::Painter, from: egui::Pos2, to: egui::Pos2, stroke: Stro
 }
 
 fn worths(ui: &mut Ui, shared: &mut Shared<'_>, state: &State, tokens: &Tokens) {
-    let worth = match &state.worth {
-        Some((_, Ok(Some(worth)))) => worth.clone(),
-        Some((_, Err(why))) => {
+    let worth = match state.worth.last() {
+        Some(Ok(worth)) => worth.clone(),
+        Some(Err(why)) => {
             ui.label(RichText::new(why).small().color(tokens.bad));
             return;
         }
-        _ => {
+        None => {
             ui.label(RichText::new("Leaving joints out …").small().color(tokens.dim));
             return;
         }
     };
-    let stale = shared
-        .session
-        .fit
-        .shown
-        .as_ref()
-        .is_some_and(|shown| state.worth.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, shown)));
+    let stale = shared.session.fit.shown.as_ref().is_some_and(|shown| state.worth.is_of_another(shown));
     let iou = worth.iou.map_or_else(|| "—".into(), |iou| format!("{iou:.3}"));
     let text = format!("IoU {iou}; its drop without a joint{}", if stale { " (of the last rest)" } else { "" });
     ui.label(RichText::new(text).small().color(tokens.dim)).on_hover_text(

@@ -1,6 +1,7 @@
 //! What the radar knows of the pose on screen, and what only the prior does: numbers and the least observable directions, with
 //! ellipsoids and arrows in 3-D while this pane is in front.
 
+use super::answered::Answered;
 use super::extras::{Extras, publish};
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::figure;
@@ -8,10 +9,8 @@ use crate::app::theme::Tokens;
 use crate::app::widgets::{Mark, Named as _, value_row};
 use crate::explore::{Noise, Observability, observability};
 use crate::geometry::add;
-use crate::mhp::FitError;
 use crate::session::Session;
-use crate::task::Job;
-use crate::worker::Snapshot;
+use crate::task::Progress;
 use egui::{RichText, Role, Sense, Ui};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -66,24 +65,14 @@ impl Default for Choice {
 #[derive(Default)]
 struct State {
     choice: Choice,
-    job: Option<(Asked, Job<Option<Observability>, FitError>)>,
-    known: Option<(Asked, Result<Observability, String>)>,
+    /// Asked with the noise.
+    known: Answered<Option<f64>, Observability>,
     drawn: Option<(Choice, bool, Arc<Extras>)>,
-}
-
-/// A state of the fit, and the noise.
-#[derive(Clone)]
-struct Asked(Arc<Snapshot>, Option<f64>);
-
-impl PartialEq for Asked {
-    fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.0, &other.0) && self.1 == other.1
-    }
 }
 
 impl PaneState for State {
     fn is_working(&self) -> bool {
-        self.job.is_some()
+        self.known.is_working()
     }
 
     fn stored_as(&self) -> Option<&'static str> {
@@ -127,7 +116,7 @@ fn toolbar(ui: &mut Ui, shared: &Shared<'_>, state: &mut State) {
         ui.add(drag).named(Role::SpinButton, "Magnification").on_hover_text(
             "How much larger than they are the ellipsoids of refits are drawn; those of the echo alone are to scale.",
         );
-        if state.job.is_some() {
+        if state.known.is_working() {
             ui.spinner();
             ui.label(RichText::new("differences of the gradient …").small().color(tokens.dim));
         } else if shared.session.fit.is_running() {
@@ -137,31 +126,16 @@ fn toolbar(ui: &mut Ui, shared: &Shared<'_>, state: &mut State) {
 }
 
 fn follow(ui: &Ui, session: &Session, state: &mut State) {
-    let (Some(shown), Some(problem), Some(initial)) =
-        (&session.fit.shown, &session.fit.problem, session.fit.region_pose())
-    else {
-        return;
-    };
-    if let Some((of, job)) = &mut state.job
-        && let Some(answer) = job.poll()
-    {
-        let answer = answer.map_err(|error| error.to_string()).and_then(|known| known.ok_or("cancelled".to_owned()));
-        state.known = Some((of.clone(), answer));
-        (state.job, state.drawn) = (None, None);
+    if state.known.poll() {
+        state.drawn = None;
     }
-    let asked = Asked(Arc::clone(shown), state.choice.snr_db);
-    let there = state.known.as_ref().is_some_and(|(of, _)| *of == asked);
-    let under_way = state.job.as_ref().is_some_and(|(of, _)| *of == asked);
-    if there || under_way || session.fit.is_running() || session.is_dragging() {
-        return;
-    }
-    let (problem, initial, params) = (Arc::clone(problem), initial.clone(), shown.params.clone());
-    let (config, ctx) = (shown.config, ui.ctx().clone());
-    let noise = state.choice.snr_db.map_or(Noise::Measured, Noise::SnrDb);
-    let work =
-        move |progress: &crate::task::Progress| observability(&problem, &config, (&initial, &params), noise, progress);
-    let broken = |reason| FitError::WrongView { array: String::new(), reason };
-    state.job = Some((asked, Job::start("observability", work, broken, move || ctx.request_repaint())));
+    let snr_db = state.choice.snr_db;
+    state.known.ask((ui, session), snr_db, "observability", |shown| {
+        let (problem, initial) = (Arc::clone(session.fit.problem.as_ref()?), session.fit.region_pose()?.clone());
+        let (config, params) = (shown.config, shown.params.clone());
+        let noise = snr_db.map_or(Noise::Measured, Noise::SnrDb);
+        Some(move |progress: &Progress| observability(&problem, &config, (&initial, &params), noise, progress))
+    });
 }
 
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
@@ -171,16 +145,16 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let area = figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref());
     ui.interact(area, ui.scope_id().with("known"), Sense::hover())
         .widget_info(|| figure::spoken("What the radar knows", caption.as_deref()));
-    let known = match &state.known {
+    let known = match state.known.last() {
         None => {
             ui.label(RichText::new("Differences of the gradient …").small().color(tokens.dim));
             return;
         }
-        Some((_, Err(why))) => {
+        Some(Err(why)) => {
             ui.label(RichText::new(why).small().color(tokens.bad));
             return;
         }
-        Some((_, Ok(known))) => known,
+        Some(Ok(known)) => known,
     };
     let left = (0.34 * area.width()).clamp(190.0, 300.0);
     let (numbers, list) = area.split_left_right_at_x(area.min.x + left);

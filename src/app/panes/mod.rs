@@ -10,6 +10,7 @@
 
 mod agreement;
 mod ambiguity;
+mod answered;
 mod breakpoints;
 mod calibration;
 mod cell;

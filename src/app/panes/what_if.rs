@@ -1,6 +1,7 @@
 //! Radar what-if: another radar before the pose on screen. Sliders at the left; what today's radar and the other would measure of
 //! this pose, and what they would know of it, side by side; both kinds of ellipsoids in 3-D while this pane is in front.
 
+use super::answered::Answered;
 use super::chain::colormap;
 use super::extras::{Extras, publish};
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
@@ -9,11 +10,9 @@ use crate::app::map_image::{Orientation, colorize};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Mark, Named as _};
 use crate::explore::{RadarChange, Seen, WhatIf, preset_of, what_if};
-use crate::mhp::FitError;
 use crate::radar::{View, ViewFft, Window};
 use crate::session::{BackgroundTask, Command, CubeView, Session};
-use crate::task::Job;
-use crate::worker::Snapshot;
+use crate::task::Progress;
 use egui::{
     Align2, Color32, FontId, Rect, RichText, Role, Sense, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,
 };
@@ -50,25 +49,15 @@ const WINDOWS: [Window; 4] =
 struct State {
     view: usize,
     changes: Vec<RadarChange>,
-    job: Option<(Asked, Job<Option<WhatIf>, FitError>)>,
-    known: Option<(Asked, Result<Arc<WhatIf>, String>)>,
+    known: Answered<Vec<RadarChange>, Arc<WhatIf>>,
     pictures: Vec<[TextureHandle; 2]>,
     drawn: Option<(bool, Arc<Extras>)>,
     name: String,
 }
 
-#[derive(Clone)]
-struct Asked(Arc<Snapshot>, Vec<RadarChange>);
-
-impl PartialEq for Asked {
-    fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.0, &other.0) && self.1 == other.1
-    }
-}
-
 impl PaneState for State {
     fn is_working(&self) -> bool {
-        self.job.is_some()
+        self.known.is_working()
     }
 
     fn stored_as(&self) -> Option<&'static str> {
@@ -200,47 +189,34 @@ fn slider(
 }
 
 fn follow(ui: &Ui, session: &Session, state: &mut State) {
-    let (Some(shown), Some(problem), Some(initial), Some(dataset)) =
-        (&session.fit.shown, &session.fit.problem, session.fit.region_pose(), &session.data.dataset)
-    else {
-        return;
-    };
-    if let Some((of, job)) = &mut state.job
-        && let Some(answer) = job.poll()
-    {
-        let answer = answer.map_err(|error| error.to_string()).and_then(|found| found.ok_or("cancelled".to_owned()));
-        state.known = Some((of.clone(), answer.map(Arc::new)));
+    if state.known.poll() {
         state.pictures.clear();
-        (state.job, state.drawn) = (None, None);
+        state.drawn = None;
     }
-    let asked = Asked(Arc::clone(shown), state.changes.clone());
-    let there = state.known.as_ref().is_some_and(|(of, _)| *of == asked);
-    let under_way = state.job.as_ref().is_some_and(|(of, _)| *of == asked);
-    if there || under_way || session.fit.is_running() || session.is_dragging() {
-        return;
-    }
-    let (info, problem, initial) = (dataset.info().clone(), Arc::clone(problem), initial.clone());
-    let (params, config, changes, ctx) = (shown.params.clone(), shown.config, state.changes.clone(), ui.ctx().clone());
-    let work = move |progress: &crate::task::Progress| {
-        what_if((&info, &problem), &config, (&initial, &params), &changes, progress)
-    };
-    let broken = |reason| FitError::WrongView { array: String::new(), reason };
-    // The one before is dropped, which cancels it: the newest wins.
-    state.job = Some((asked, Job::start("what-if", work, broken, move || ctx.request_repaint())));
+    let changes = state.changes.clone();
+    state.known.ask((ui, session), state.changes.clone(), "what-if", |shown| {
+        let (problem, initial) = (Arc::clone(session.fit.problem.as_ref()?), session.fit.region_pose()?.clone());
+        let info = session.data.dataset.as_ref()?.info().clone();
+        let (config, params) = (shown.config, shown.params.clone());
+        Some(move |progress: &Progress| {
+            let found = what_if((&info, &problem), &config, (&initial, &params), &changes, progress);
+            found.map(|found| found.map(Arc::new))
+        })
+    });
 }
 
 fn result(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Tokens) {
     let session = shared.session;
-    let found = match &state.known {
+    let found = match state.known.last() {
         None => {
             ui.label(RichText::new("Another radar looks …").small().color(tokens.dim));
             return;
         }
-        Some((_, Err(why))) => {
+        Some(Err(why)) => {
             ui.label(RichText::new(why).small().color(tokens.bad));
             return;
         }
-        Some((_, Ok(found))) => Arc::clone(found),
+        Some(Ok(found)) => Arc::clone(found),
     };
     let caption = figure::of(session, "H_sim with noise, dB re max: today's radar and the other");
     let area = figure::print(ui, ui.available_rect_before_wrap(), caption.as_deref());
@@ -291,7 +267,7 @@ fn result(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, tokens: &Toke
             }
         }
     }
-    if state.job.is_some() {
+    if state.known.is_working() {
         let spinner = Rect::from_center_size(area.right_top() + vec2(-12.0, 10.0), vec2(14.0, 14.0));
         ui.put(spinner, egui::Spinner::new());
     }

@@ -5,9 +5,11 @@ pub(super) mod plane;
 use super::Shared;
 use crate::app::theme::Tokens;
 use crate::app::widgets::Named as _;
+use crate::body::Pppr;
 use crate::explore::ExplorationKind;
-use crate::session::{Command, Session, WorkStatus};
+use crate::session::{AdoptedFit, Command, Session, WorkStatus};
 use egui::{RichText, Role, Ui};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// An exploration that takes longer is not begun unasked, ms.
@@ -89,4 +91,12 @@ pub(super) fn signed(text: impl AsRef<str>) -> String {
 /// Whether a pane of an exploration has something to explore.
 pub(super) fn needs_fit(session: &Session) -> bool {
     session.data.frame.is_none() || session.fit.problem.is_none()
+}
+
+/// A branch that begins with a body, its EM region around that of `around`; `words` say where it is from.
+pub(super) fn begin_branch(shared: &mut Shared<'_>, start: Arc<Pppr>, around: Option<Arc<Pppr>>, words: String) {
+    let session = shared.session;
+    let fit = AdoptedFit { start, around, erased: session.fit.erased(), config: session.config, words };
+    shared.send(Command::DragFit(Box::new(fit)));
+    shared.send(Command::EndDrag);
 }

@@ -4,14 +4,14 @@ mod choose;
 mod marks;
 mod picture;
 
-use super::explore::{keep_up, needs_fit};
+use super::explore::{begin_branch, keep_up, needs_fit};
 use super::{Blank, Dock, MovedBody, Pane, PaneStates, Shared};
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Mark, Named as _, value_row};
 use crate::explore::{ExplorationKind, LossSlice};
 use crate::mhp::TermId;
-use crate::session::{AdoptedFit, Command, Session};
+use crate::session::Session;
 use egui::{RichText, Role, Sense, Ui};
 use std::sync::Arc;
 
@@ -117,15 +117,8 @@ fn place(slice: &LossSlice, at: &[f64]) -> String {
 fn begin_at(shared: &mut Shared<'_>, slice: &LossSlice, at: &[f64]) {
     let session = shared.session;
     let Some(problem) = &session.fit.problem else { return };
-    let fit = AdoptedFit {
-        start: Arc::new(slice.params_at(&problem.skeleton, at)),
-        around: session.fit.around(),
-        erased: session.fit.erased(),
-        config: session.config,
-        words: format!("from {}", place(slice, at)),
-    };
-    shared.send(Command::DragFit(Box::new(fit)));
-    shared.send(Command::EndDrag);
+    let start = Arc::new(slice.params_at(&problem.skeleton, at));
+    begin_branch(shared, start, session.fit.around(), format!("from {}", place(slice, at)));
 }
 
 /// What is under the pointer, the minima, and what the marks are.
