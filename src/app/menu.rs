@@ -76,6 +76,7 @@ fn is_on(label: &str, session: &Session) -> bool {
     let view = &session.view;
     match label {
         "Warm start" => session.warm_start,
+        "Start along the sequence" => session.along,
         "Play frames" => session.data.playing,
         "Live fit" => session.is_live(),
         "Difference H_sim − H_ori" => view.compare == Compare::Difference,

@@ -32,7 +32,6 @@ mod train_counter;
 #[cfg(feature = "train")]
 mod train_evidence;
 #[cfg(feature = "train")]
-mod train_limbs;
 #[cfg(feature = "train")]
 mod train_motion;
 #[cfg(feature = "train")]
@@ -245,10 +244,6 @@ pub enum CliCommand {
     #[cfg(feature = "train")]
     #[command(after_help = train_evidence::HELP)]
     TrainEvidence(train_evidence::TrainEvidenceArgs),
-    /// Make the linear map of the limbs anew
-    #[cfg(feature = "train")]
-    #[command(after_help = train_limbs::HELP)]
-    TrainLimbs(train_limbs::TrainLimbsArgs),
     /// Make the prior of human motion anew
     #[cfg(feature = "train")]
     #[command(after_help = train_motion::HELP)]
@@ -303,8 +298,6 @@ pub fn run(command: CliCommand) -> anyhow::Result<ExitCode> {
         CliCommand::TrainCounter(args) => train_counter::run(&args),
         #[cfg(feature = "train")]
         CliCommand::TrainEvidence(args) => train_evidence::run(&args),
-        #[cfg(feature = "train")]
-        CliCommand::TrainLimbs(args) => train_limbs::run(&args),
         #[cfg(feature = "train")]
         CliCommand::TrainMotion(args) => train_motion::run(&args),
         #[cfg(feature = "train")]

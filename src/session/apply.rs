@@ -164,6 +164,13 @@ impl Session {
                 self.warm_start = on;
                 Vec::new()
             }
+            Command::SetAlong(on) => {
+                if self.along == on {
+                    return Vec::new();
+                }
+                self.along = on;
+                self.reset()
+            }
             Command::EditParams(params) => self.edit(*params),
             Command::DragBody(moved) => self.drag_body(moved),
             Command::NudgeBody(by) => self.nudge_body(by),

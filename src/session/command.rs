@@ -156,6 +156,8 @@ pub enum Command {
     SetPrecision(Precision),
     /// Start the next frame from this one's result.
     SetWarmStart(bool),
+    /// Let the frames around decide with each frame where it starts, or each frame by itself; starts the fit anew.
+    SetAlong(bool),
     /// Parameters edited by hand.
     EditParams(Box<Pppr>),
     /// The body under a finger: moved from where it was when the finger went down; until [`Command::EndDrag`] one act.

@@ -82,6 +82,9 @@ pub struct SessionFile {
     pub single_precision: bool,
     /// Start the next frame from the result of the one before.
     pub warm_start: bool,
+    /// Starts are decided by the frames around, too.
+    #[serde(default)]
+    pub along: bool,
     /// How things are shown.
     pub view: ViewState,
     /// The filter of the frame list.
@@ -226,6 +229,7 @@ impl SessionFile {
             config: session.config.to_toml(),
             single_precision: session.precision == Precision::F32,
             warm_start: session.warm_start,
+            along: session.along,
             view: session.view.clone(),
             filter: session.queue.text.clone(),
             joint: session.joint,

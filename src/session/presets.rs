@@ -1,6 +1,6 @@
 //! One frame fitted with two presets, to choose between them.
 
-use crate::config::Preset;
+use crate::config::{FitConfig, Preset};
 use crate::dataset::{Dataset, Frame};
 use crate::mhp::Precision;
 use crate::study::{BatchOptions, FrameFit, fit_frame};
@@ -36,7 +36,8 @@ impl PresetFits {
     pub(super) fn of(dataset: &Dataset, frame: &Arc<Frame>, precision: Precision) -> Self {
         let fits = COMPARED.map(|preset| {
             let options = BatchOptions {
-                config: preset.config(),
+                // As the window fits: each frame by itself.
+                config: FitConfig { decode_frames: 0, ..preset.config() },
                 precision,
                 warm_start: false,
                 params_folder: None,

@@ -217,6 +217,8 @@ pub struct Session {
     pub(super) identities: Identities,
     /// Start the next frame from this one's result.
     pub warm_start: bool,
+    /// The frames around decide with each frame where its fit starts.
+    pub along: bool,
     /// The selected joint (flat index).
     pub joint: Option<usize>,
     /// How things are shown.

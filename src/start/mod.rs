@@ -4,7 +4,9 @@
 mod people;
 mod problem;
 mod scans;
+mod sequence;
 
 pub use people::{FoundStart, find_start, find_start_in};
 pub use problem::{problem_alone, problem_of};
 pub use scans::{LEAD_IN, ScanWindow, count_people};
+pub use sequence::{find_start_along, start_key};

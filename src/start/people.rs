@@ -3,7 +3,8 @@
 use super::scans::count_people;
 use crate::config::{FitConfig, FramesAround, StartPlace};
 use crate::dataset::Dataset;
-use crate::mhp::{FitError, Initialisation, Neighbour, Problem, initialise_people};
+use crate::geometry::Vec3;
+use crate::mhp::{FitError, Hypotheses, Initialisation, Neighbour, Problem};
 use crate::people::{Count, Counter, Scan};
 use std::sync::Arc;
 
@@ -16,6 +17,27 @@ pub struct FoundStart {
     pub count: Option<Count>,
 }
 
+/// What the persons of a frame may be, before the frames around decide.
+#[derive(Debug, Clone)]
+pub(super) struct Sought {
+    hypotheses: Hypotheses,
+    /// The settings, with as many people as are looked for.
+    config: FitConfig,
+    count: Option<Count>,
+    /// What the count said.
+    note: Option<String>,
+}
+
+impl Sought {
+    /// The start, decided by the frames `around` with it, each with its time, s after this one.
+    pub(super) fn start(&self, problem: &Arc<Problem>, around: &[(f64, &Self)]) -> Result<FoundStart, FitError> {
+        let around: Vec<(f64, &Hypotheses)> = around.iter().map(|&(t_s, other)| (t_s, &other.hypotheses)).collect();
+        let mut initialisation = self.hypotheses.start(problem, &self.config, &around)?;
+        initialisation.notes.splice(0..0, self.note.clone());
+        Ok(FoundStart { initialisation, count: self.count.clone() })
+    }
+}
+
 /// A number of people is believed from this probability on, where the other is that there is nobody at all.
 const SURE: f64 = 0.9;
 
@@ -25,7 +47,7 @@ const SURE: f64 = 0.9;
 /// # Errors
 /// [`FitError::NoStart`] where nothing stands above the background, or surely nobody is there.
 pub fn find_start(problem: &Arc<Problem>, config: &FitConfig) -> Result<FoundStart, FitError> {
-    found(problem, config, || count(problem, config))
+    seek(problem, config, || count(problem, config))?.start(problem, &[])
 }
 
 /// As [`find_start`] for frame `frame` of a data set; people are counted with up to two seconds of frames before it
@@ -39,17 +61,27 @@ pub fn find_start_in(
     problem: &Arc<Problem>,
     config: &FitConfig,
 ) -> Result<FoundStart, FitError> {
-    if config.frames_around == FramesAround::None {
-        return find_start(problem, config);
-    }
-    found(problem, config, || count_people(dataset, frame).map_err(|reason| FitError::NoStart { reason }))
+    seek_in(dataset, frame, problem, config)?.start(problem, &[])
 }
 
-fn found(
+/// As [`find_start_in`], before one of the hypotheses is chosen.
+pub(super) fn seek_in(
+    dataset: &Dataset,
+    frame: usize,
+    problem: &Arc<Problem>,
+    config: &FitConfig,
+) -> Result<Sought, FitError> {
+    seek(problem, config, || match config.frames_around {
+        FramesAround::None => count(problem, config),
+        _ => count_people(dataset, frame).map_err(|reason| FitError::NoStart { reason }),
+    })
+}
+
+fn seek(
     problem: &Arc<Problem>,
     config: &FitConfig,
     count: impl FnOnce() -> Result<Count, FitError>,
-) -> Result<FoundStart, FitError> {
+) -> Result<Sought, FitError> {
     if config.people == 1 {
         // The paper looks for one person without a count, and so it goes where nothing can be counted, or nobody is.
         let asked = config.place == StartPlace::Counted && !problem.neighbours_in(config.frames_around).is_empty();
@@ -59,9 +91,7 @@ fn found(
     let count = match count() {
         Ok(count) => count,
         // Views that tell no place show one person, as the paper takes it.
-        Err(_) if config.people == 0 && Counter::new(&problem.views).is_err() => {
-            return one(problem, &FitConfig { people: 1, ..*config }, None);
-        }
+        Err(_) if config.people == 0 && Counter::new(&problem.views).is_err() => return one(problem, config, None),
         Err(error) => return Err(error),
     };
     let people = if config.people == 0 { count.people() } else { config.people };
@@ -70,25 +100,27 @@ fn found(
         if probability >= SURE {
             return Err(FitError::NoStart { reason: format!("nobody is counted (p = {probability:.2})") });
         }
-        let mut found = one(problem, &FitConfig { people: 1, ..*config }, None)?;
-        found.initialisation.notes.insert(0, format!("nobody is counted (p = {probability:.2}), 1 fitted"));
-        return Ok(FoundStart { count: Some(count), ..found });
+        let note = Some(format!("nobody is counted (p = {probability:.2}), 1 fitted"));
+        return Ok(Sought { count: Some(count), note, ..one(problem, config, None)? });
     }
-    let mut initialisation = if people == 1 && config.place == StartPlace::Counted {
-        one(problem, &FitConfig { people: 1, ..*config }, Some(&count))?.initialisation
+    let found = if people == 1 && config.place == StartPlace::Counted {
+        one(problem, config, Some(&count))?
     } else {
-        initialise_people(problem, config, &count.seeds(people))?
+        sought(problem, config, &count.seeds(people))?
     };
     let counted = count.people();
     let note = format!("{counted} counted (p = {:.2}), {people} fitted", count.probability(counted));
-    initialisation.notes.insert(0, note);
-    Ok(FoundStart { initialisation, count: Some(count) })
+    Ok(Sought { count: Some(count), note: Some(note), ..found })
 }
 
-/// A start of one person, near where people were counted.
-fn one(problem: &Arc<Problem>, config: &FitConfig, counted: Option<&Count>) -> Result<FoundStart, FitError> {
+/// One person, near where people were counted.
+fn one(problem: &Arc<Problem>, config: &FitConfig, counted: Option<&Count>) -> Result<Sought, FitError> {
     let seeds = counted.map_or_else(Vec::new, |count| [count.seeds(1), count.seeds(count.people())].concat());
-    Ok(FoundStart { initialisation: initialise_people(problem, config, &seeds)?, count: None })
+    sought(problem, &FitConfig { people: 1, ..*config }, &seeds)
+}
+
+fn sought(problem: &Arc<Problem>, config: &FitConfig, seeds: &[Vec3]) -> Result<Sought, FitError> {
+    Ok(Sought { hypotheses: Hypotheses::new(problem, config, seeds)?, config: *config, count: None, note: None })
 }
 
 /// Counts the people of a frame, with those of the frames around it that a start may look at: those after it tell as much as

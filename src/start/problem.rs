@@ -29,7 +29,7 @@ pub fn problem_alone(dataset: &Dataset, frame: &Frame) -> Result<Problem, FitErr
 /// As [`Problem::new`].
 pub fn problem_of(dataset: &Dataset, frame: &Frame) -> Result<Problem, FitError> {
     let mut problem = problem_alone(dataset, frame)?;
-    let rate_hz = dataset.info().frame_rate_hz.filter(|rate| *rate > 0.0).unwrap_or(USUAL_RATE_HZ);
+    let rate_hz = rate_hz(dataset);
     let sequence = dataset.sequence(frame.index);
     let around = frame.index.saturating_sub(REACH)..(frame.index + REACH + 1).min(dataset.len());
     for other in around.filter(|&other| other != frame.index && dataset.sequence(other) == sequence) {
@@ -40,4 +40,9 @@ pub fn problem_of(dataset: &Dataset, frame: &Frame) -> Result<Problem, FitError>
         }
     }
     Ok(problem)
+}
+
+/// Frames a second.
+pub(super) fn rate_hz(dataset: &Dataset) -> f64 {
+    dataset.info().frame_rate_hz.filter(|rate| *rate > 0.0).unwrap_or(USUAL_RATE_HZ)
 }

@@ -16,7 +16,7 @@ use crate::mhp::{ErasedCells, Fitter, Precision, StepReport, predict, without};
 use crate::output::{FileNames, Inputs};
 use crate::people::Tracker;
 use crate::predictions::{Predictions, start_of};
-use crate::start::{find_start_in, problem_of};
+use crate::start::{find_start_along, problem_of};
 use crate::task::{milliseconds, panic_as_error};
 use crossbeam_channel::Sender;
 use std::collections::BTreeMap;
@@ -83,8 +83,9 @@ fn fit_watched(
     } else if let Some(params) = start {
         (predict(&problem, &options.config, &params), None)
     } else {
-        let found =
-            find_start_in(dataset, index, &problem, &options.config).map_err(|error| in_file(&error))?.initialisation;
+        let found = find_start_along(dataset, index, &problem, &options.config)
+            .map_err(|error| in_file(&error))?
+            .initialisation;
         (found.params, Some(milliseconds(began)))
     };
     let began = Instant::now();

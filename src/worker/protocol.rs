@@ -17,6 +17,8 @@ pub type JobId = u64;
 pub enum Start {
     /// From the map's peaks.
     Initialise,
+    /// From the map's peaks, decided along the sequence.
+    Along,
     /// From these parameters (the previous frame's).
     Warm(Pppr),
     /// From these parameters, which are of this frame: what somebody predicts of it.

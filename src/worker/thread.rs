@@ -13,7 +13,7 @@ use crate::mhp::{
     ErasedCells, FitError, FitState, Fitter, Objective, Precision, Problem, StepReport, StopReason, masks, predict,
     simulate, without,
 };
-use crate::start::{find_start_in, problem_of};
+use crate::start::{find_start_along, find_start_in, problem_of};
 use crate::task::{catch_panic, milliseconds};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 use std::sync::Arc;
@@ -341,8 +341,9 @@ impl Job {
         let problem = Arc::new(problem_of(&dataset, &frame)?);
         let began = Instant::now();
         let (found_start, initial, state) = match start {
-            Start::Initialise => {
-                let found = find_start_in(&dataset, frame.index, &problem, &config)?;
+            Start::Initialise | Start::Along => {
+                let find = if matches!(start, Start::Along) { find_start_along } else { find_start_in };
+                let found = find(&dataset, frame.index, &problem, &config)?;
                 let initial = found.initialisation.params.clone();
                 (Some(found), initial, None)
             }

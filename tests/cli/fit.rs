@@ -10,7 +10,7 @@ use mhp_inspector::diagnose::joint_errors;
 use mhp_inspector::mhp::{Fitter, Precision, Problem, predict, simulate};
 use mhp_inspector::output::{FolderLock, Inputs};
 use mhp_inspector::radar::RadarConfig;
-use mhp_inspector::start::{find_start, problem_of};
+use mhp_inspector::start::{find_start_along, problem_of};
 use mhp_inspector::study::{BatchOptions, StudyError, run_batch};
 use mhp_inspector::task::Progress;
 use serde_json::Value;
@@ -167,7 +167,7 @@ fn by_hand(dataset: &Dataset, index: usize, config: &FitConfig, start: Option<Pp
     let problem = Arc::new(problem_of(dataset, &dataset.load(index).unwrap()).unwrap());
     let start = match start {
         Some(before) => predict(&problem, config, &before),
-        None => find_start(&problem, config).unwrap().initialisation.params,
+        None => find_start_along(dataset, index, &problem, config).unwrap().initialisation.params,
     };
     let mut fitter = Fitter::new(problem, *config, Precision::default(), start).unwrap();
     for _ in 0..config.iterations {

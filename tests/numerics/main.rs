@@ -10,7 +10,6 @@ mod reading;
 mod fitter;
 mod gradients;
 mod initialisation;
-mod limbs;
 mod mmvr;
 mod reference;
 mod signal;

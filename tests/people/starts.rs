@@ -3,7 +3,7 @@
 
 use mhp_inspector::config::{FitConfig, FramesAround, Preset};
 use mhp_inspector::dataset::Dataset;
-use mhp_inspector::start::{FoundStart, count_people, find_start_in, problem_of};
+use mhp_inspector::start::{FoundStart, count_people, find_start_along, find_start_in, problem_of};
 use mhp_inspector::study::count::count_frames;
 use mhp_inspector::task::Progress;
 use std::path::Path;
@@ -57,4 +57,30 @@ fn the_recommended_settings_fit_one_counted_person_as_one_that_is_asked_for() {
     let alone = FitConfig { frames_around: FramesAround::None, ..counted };
     let found = started(&dataset, 13, &alone);
     assert!(found.count.is_none_or(|count| count.alone));
+}
+
+#[test]
+fn a_start_along_a_sequence_is_the_same_in_every_order() {
+    // Each opening is another data set to whoever keeps what was searched.
+    let along = |dataset: &Dataset, frame: usize, config: &FitConfig| {
+        let problem = Arc::new(problem_of(dataset, &dataset.load(frame).unwrap()).unwrap());
+        find_start_along(dataset, frame, &problem, config).unwrap().initialisation
+    };
+    let config = FitConfig { decode_frames: 2, starts: 3, ..Preset::Recommended.config() };
+    let (onward, back) = (sample("walk"), sample("walk"));
+    let first: Vec<_> = [10, 11, 14].map(|frame| along(&onward, frame, &config)).into();
+    for (&frame, found) in [10, 11, 14].iter().zip(&first).rev() {
+        assert_eq!(along(&back, frame, &config), *found, "frame {frame}");
+    }
+    let along_note = |note: &Option<Result<String, &str>>| match note {
+        Some(Ok(note)) => note.split("along ").nth(1).map(str::to_owned),
+        _ => None,
+    };
+    assert_eq!(along_note(&first[0].motion).as_deref(), Some("5 frames"), "{:?}", first[0].motion);
+    // At the beginning of a sequence there are fewer, in the past alone too, and by itself a frame has none.
+    assert_eq!(along_note(&along(&onward, 0, &config).motion).as_deref(), Some("3 frames"));
+    let past = FitConfig { frames_around: FramesAround::Past, ..config };
+    assert_eq!(along_note(&along(&onward, 10, &past).motion).as_deref(), Some("3 frames"));
+    let alone = FitConfig { decode_frames: 0, ..config };
+    assert_eq!(along(&onward, 10, &alone), started(&onward, 10, &config).initialisation);
 }

@@ -95,7 +95,7 @@ impl Bench {
         let Prepare { job, branch, dataset, frame, start, .. } = prepare;
         let problem = Arc::new(problem_alone(&dataset, &frame).unwrap());
         let (initial, resumed) = match start {
-            Start::Initialise => (self.params.clone(), false),
+            Start::Initialise | Start::Along => (self.params.clone(), false),
             Start::Warm(params) | Start::Given(params) => (params, false),
             Start::Resume { initial, .. } => (initial, true),
         };
@@ -680,6 +680,20 @@ fn a_warm_start_takes_the_result_of_the_frame_before() {
     assert_eq!(bench.session.fit.initial.as_ref(), Some(&bench.state(6).params));
     // A fit that was left wins over a warm start.
     assert!(matches!(bench.goto(0).start, Start::Resume { .. }));
+}
+
+#[test]
+fn a_start_along_the_sequence_begins_the_frame_anew_and_goes_on_with_the_next() {
+    let mut bench = Bench::new();
+    bench.run_to(4);
+    let prepare = prepare_of(bench.apply(Command::SetAlong(true)));
+    assert!(matches!(prepare.start, Start::Along), "{:?}", prepare.start);
+    bench.answer(prepare);
+    assert_eq!(bench.session.fit.head(), 0);
+    assert!(bench.apply(Command::SetAlong(true)).is_empty(), "it is on");
+    assert!(matches!(bench.goto(1).start, Start::Along));
+    let prepare = prepare_of(bench.apply(Command::SetAlong(false)));
+    assert!(matches!(prepare.start, Start::Initialise), "{:?}", prepare.start);
 }
 
 #[test]

@@ -318,6 +318,15 @@ pub(super) const COMMANDS: &[CommandRow] = &[
         act: |s| UiAction::Session(Command::SetWarmStart(!s.warm_start)),
     },
     CommandRow {
+        label: "Start along the sequence",
+        title: None,
+        tooltip: "The frames around decide with each frame which body is fitted, as in runs over many frames.",
+        menu: Menu::Fit,
+        keys: &[],
+        enabled: always,
+        act: |s| UiAction::Session(Command::SetAlong(!s.along)),
+    },
+    CommandRow {
         label: "Difference H_sim − H_ori",
         title: None,
         tooltip: "Show the difference in the place of H_sim, colours diverging about zero; again for H_sim.",

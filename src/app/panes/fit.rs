@@ -420,6 +420,14 @@ fn ways(ui: &mut Ui, shared: &mut Shared<'_>) {
     {
         shared.send(Command::SetWarmStart(warm));
     }
+    let mut along = shared.session.along;
+    let reach = shared.session.config.decode_frames;
+    let tip = format!(
+        "The {reach} frames on each side (decode_frames) decide with this one which of the bodies found in it is fitted, as in runs over many frames. The first frame of a sequence takes some seconds, the next ones no longer than usual. Changing it resets the fit."
+    );
+    if ui.checkbox(&mut along, "Start along the sequence").on_hover_text(tip).changed() {
+        shared.send(Command::SetAlong(along));
+    }
     let mut precision = shared.session.precision;
     ui.horizontal(|ui| {
         ui.label("Kernel");

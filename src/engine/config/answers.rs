@@ -113,11 +113,6 @@ pub(super) const HEIGHT: &[Answer] = &[
     answer("floor", "floor and head", "Where the data set tells the radar's height (height_m)."),
 ];
 
-pub(super) const LIMBS: &[Answer] = &[
-    answer("posture", "of the posture", "The paper says nothing else."),
-    answer("learned", "learned", "Moved as what is lit around the person says; learned from simulated people."),
-];
-
 pub(super) const FRAMES_AROUND: &[Answer] = &[
     answer(
         "both",

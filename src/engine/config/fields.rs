@@ -6,7 +6,7 @@ use super::field::{Access, Answer, Field, FieldGroup, ReadBy, Unset, Value};
 use super::rows::{choice, count_at, flag_at, maybe_at, number, number_at, one_of_at, switch};
 use super::{
     Background, BodyModel, Clutter, Convergence, EM_REGION_FORM, EmLoss, EmRegion, FitConfig, FramesAround,
-    GradientVelocity, Height, Limbs, LobeShape, Parameterization, Scatterers, StartPlace, StaticEcho, Still, Summation,
+    GradientVelocity, Height, LobeShape, Parameterization, Scatterers, StartPlace, StaticEcho, Still, Summation,
     WarmStart, Yaw, answers,
 };
 use FieldGroup::{Limits, Model, Optimiser, Perturbation, Radar, Start as Starting, StepSizes, Weights};
@@ -115,6 +115,12 @@ pub const FIELDS: &[Field] = &[
     Field {
         help: "Frames that are fitted together where the parameterization is motion.",
         ..number(Model, "window", "Window", StepsAndStart, (1.0, 9.0), count_at!(window)).whole().row("motion")
+    },
+    Field {
+        help: "Frames on each side whose hypotheses decide with this frame's which of them is fitted (Viterbi); 0: a frame decides by itself.",
+        ..number(Starting, "decode_frames", "Decoded frames", Start, (0.0, 60.0), count_at!(decode_frames))
+            .whole()
+            .row("decoding along the sequence")
     },
     Field {
         help: "Temperature of the soft mask m = σ((ln H_sim − ln P)/T): small is sharp, large spreads the gradient.",
@@ -280,11 +286,6 @@ pub const FIELDS: &[Field] = &[
         help: "What tells how high a start stands.",
         ..choice(Model, "height", "Height", Start, answers::HEIGHT, one_of_at!(height, [Height::Echo, Height::Floor]))
             .row("height from the floor")
-    },
-    Field {
-        help: "What tells where the limbs of a start are.",
-        ..choice(Model, "limbs", "Limbs", Start, answers::LIMBS, one_of_at!(limbs, [Limbs::Posture, Limbs::Learned]))
-            .row("limbs as learned")
     },
     Field {
         help: "Weight of the temporal term: L_time = Σ ‖c − ĉ‖² (m²), c the mean of a person's joints, ĉ where a line through its places in this frame and those around says it is. Only where a frame has neighbours. Above 0 a start stands on that line too. 0 is the paper.",

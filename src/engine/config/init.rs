@@ -63,17 +63,6 @@ pub enum Height {
     Floor,
 }
 
-/// What tells where the limbs of a start are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Limbs {
-    /// The posture alone.
-    #[default]
-    Posture,
-    /// What is lit around the person besides: how far each limb then is from the posture's, simulated people have taught.
-    Learned,
-}
-
 /// Adam's step size a group; `None` takes `learning_rate`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

@@ -23,7 +23,7 @@ pub use difference::{difference, from_preset, listing};
 pub use error::ConfigError;
 pub use field::{Answer, Field, FieldGroup, FieldKind, Number, ReadBy, Unset, Value};
 pub use fields::FIELDS;
-pub use init::{Height, InitConfig, LearningRates, Limbs, Parameterization, Scatterers, StartPlace, Yaw};
+pub use init::{Height, InitConfig, LearningRates, Parameterization, Scatterers, StartPlace, Yaw};
 pub use preset::Preset;
 pub use reading::{Background, Convergence, FramesAround, GradientVelocity, Still, WarmStart};
 
@@ -236,13 +236,13 @@ pub struct FitConfig {
     pub w_prior: f64,
     /// Frames that are fitted together in a space of motion.
     pub window: usize,
+    /// Frames on each side whose hypotheses decide with this frame's which is fitted; 0: a frame decides by itself.
+    pub decode_frames: usize,
     /// Weight of a term that only tests know.
     #[cfg(any(test, feature = "dummies"))]
     pub w_dummy: f64,
     /// What tells how high a start stands.
     pub height: Height,
-    /// What tells where the limbs of a start are.
-    pub limbs: Limbs,
     /// The four operators.
     pub operators: Operators,
     /// Step sizes of single groups.
@@ -286,10 +286,10 @@ impl Default for FitConfig {
             w_time: 0.0,
             w_prior: 0.0,
             window: 5,
+            decode_frames: 0,
             #[cfg(any(test, feature = "dummies"))]
             w_dummy: 0.0,
             height: Height::default(),
-            limbs: Limbs::default(),
             operators: Operators::default(),
             learning_rates: LearningRates::default(),
             init: InitConfig::default(),

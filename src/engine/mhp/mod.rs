@@ -70,9 +70,7 @@ pub use fill::fill_missing;
 pub use fill::for_neighbours;
 pub use fitter::{FitState, Fitter};
 pub use frame_em::EmScratch;
-pub use init::{Initialisation, LimbMap, initialise, initialise_people, predict, standing_joints, start_at};
-#[cfg(feature = "train")]
-pub use init::{LimbLesson, learn_limbs};
+pub use init::{Hypotheses, Initialisation, initialise, initialise_people, predict, standing_joints, start_at};
 pub use motion::MotionState;
 pub use objective::{Masks, Objective, masks};
 pub use percentile::{percentile, percentiles};

@@ -14,6 +14,7 @@ const RELAXATIONS: usize = 400;
 const UPRIGHT_SHARE: f64 = 0.93;
 
 /// The body: x forward, y to its left, z up from the floor, m.
+#[derive(Debug)]
 pub(super) struct Template {
     /// One position a joint.
     pub joints: Vec<Vec3>,

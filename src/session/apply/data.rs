@@ -249,6 +249,7 @@ impl Session {
                     _ => (Fit::default(), Start::Initialise),
                 }
             }
+            None if self.along => (Fit::default(), at.unwrap_or(Start::Along)),
             None => (Fit::default(), at.unwrap_or(Start::Initialise)),
         };
         let resuming = matches!(start, Start::Resume { .. });

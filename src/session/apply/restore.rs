@@ -55,6 +55,7 @@ impl Session {
         self.config = config(&file.config, &path).unwrap_or(self.config);
         self.precision = precision(file.single_precision);
         self.warm_start = file.warm_start;
+        self.along = file.along;
         self.joint = file.joint;
         self.queue.set_text(file.filter);
         match file.fit.map(|fit| resumed(fit, frame, &path)) {

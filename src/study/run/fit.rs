@@ -1,28 +1,20 @@
 //! One frame under one or several variants: load once, start once, fit, measure.
 //!
-//! Variants that differ only in what no start depends on share their start ([`start_key`]); those that differ only in the
+//! Variants that differ only in what no start depends on share their start ([`crate::start::start_key`]); those that differ only in the
 //! number of iterations share the fit itself where k steps of a longer run are the shorter run ([`fit_key`]).
 
 use super::row::RunNumbers;
 use crate::body::Pppr;
-use crate::config::{FIELDS, FitConfig, Parameterization};
+use crate::config::{FitConfig, Parameterization};
 use crate::dataset::{Dataset, Frame};
 use crate::diagnose::{Reprojection, joint_errors, map_box_coverage, reprojection};
 use crate::geometry::Vec3;
 use crate::mhp::{Fitter, Precision, Problem, StopReason, predict};
-use crate::start::{find_start_in, problem_of};
+use crate::start::{find_start_along, problem_of};
 use crate::study::row::annotated;
 use crate::task::milliseconds;
 use std::sync::Arc;
 use std::time::Instant;
-
-/// A configuration with everything at its default that a start does not depend on: two variants with the same key start from
-/// the same pose. Where several postures are tried, the unweighted L_EM alone decides between them.
-pub(super) fn start_key(config: &FitConfig) -> FitConfig {
-    let (mut key, plain) = (*config, FitConfig::default());
-    FIELDS.iter().filter(|field| !field.read_by.by_cold_start()).for_each(|field| field.take(&mut key, &plain));
-    key
-}
 
 /// A configuration without its number of iterations: variants with the same key are one fit. The steps in a window of frames
 /// shorten towards the end of a run, and so a run's length stays in the key there.
@@ -74,7 +66,7 @@ impl<'a> LoadedFrame<'a> {
     /// Where nobody is seen.
     pub(super) fn cold(&self, config: &FitConfig) -> Result<TimedStart, String> {
         let began = Instant::now();
-        let found = find_start_in(self.dataset, self.frame.index, &self.problem, config)
+        let found = find_start_along(self.dataset, self.frame.index, &self.problem, config)
             .map_err(|error| self.told(&error))?
             .initialisation;
         Ok(TimedStart { params: found.params, unrefined: found.unrefined, init_ms: Some(milliseconds(began)) })
@@ -234,11 +226,11 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
     use super::*;
     use crate::body::{Group, PpprShape, Skeleton};
-    use crate::config::{Background, InitConfig, StartPlace};
+    use crate::config::{Background, FIELDS, InitConfig, StartPlace};
     use crate::geometry::Pose;
     use crate::mhp::simulate;
     use crate::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
-    use crate::start::find_start;
+    use crate::start::{find_start, start_key};
 
     fn view(array: &str, depth: AxisKind, across: AxisKind, [first, last]: [f64; 2]) -> View {
         let axis = |kind, bins, lo, hi| Axis { kind, bins, lo, hi, spacing: Spacing::Linear };

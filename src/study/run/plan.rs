@@ -3,7 +3,6 @@
 //! A unit is either one frame under all variants that share its start, or, for a warm start, a whole sequence under one
 //! variant. Shards take units, threads take units, a resumed run skips what is done: so the rows depend on none of the three.
 
-use super::fit::start_key;
 use super::grid::GridAxis;
 use super::spec::RunSpec;
 use super::variant::{Method, StartFrom, Variant};
@@ -11,6 +10,7 @@ use super::{RunError, StudyKind, counting, plans};
 use crate::config::FitConfig;
 use crate::dataset::Dataset;
 use crate::mhp::Precision;
+use crate::start::start_key;
 use crate::study::complexity::{Complexity, Stratum};
 use crate::study::shard::{DataSpec, FrameRanges, Shard, Subset};
 use std::collections::BTreeSet;

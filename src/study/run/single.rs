@@ -1,7 +1,7 @@
 //! One frame under the variants of a sweep, a fit at a time and in any order: the very rows that a run would make, for who
 //! shows a sweep while it grows.
 
-use super::fit::{LoadedFrame, TimedStart, start_key};
+use super::fit::{LoadedFrame, TimedStart};
 use super::row::RunRow;
 use super::variant::Variant;
 use crate::body::Pppr;
@@ -9,6 +9,7 @@ use crate::config::FitConfig;
 use crate::dataset::Dataset;
 use crate::geometry::Vec3;
 use crate::mhp::{Fitter, Precision, SETTLED_OVER, has_settled};
+use crate::start::start_key;
 use crate::task::panic_as_error;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};

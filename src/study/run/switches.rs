@@ -1,7 +1,7 @@
 //! The settings in which the presets differ, one place: the rows of the study `switches` are made from the table of settings.
 
 use super::variant::{StartFrom, Variant};
-use crate::config::{EmLoss, FIELDS, Field, FitConfig, Limbs, Preset};
+use crate::config::{EmLoss, FIELDS, Field, FitConfig, Preset};
 
 /// The order of the rows in the runs that exist; a row that is not named here follows in the order of the table of settings.
 const ORDER: &[&str] = &[
@@ -10,6 +10,7 @@ const ORDER: &[&str] = &[
     "clutter",
     "static echo",
     "motion",
+    "decoding along the sequence",
     "bones turn",
     "scales and opacities by body part",
     "skin in front of the joints",
@@ -19,7 +20,6 @@ const ORDER: &[&str] = &[
     "several starts",
     "temporal term",
     "height from the floor",
-    "limbs as learned",
     "convergence",
     "bone tolerance",
     "frames around",
@@ -63,10 +63,7 @@ fn switches() -> Vec<Switch> {
 type Change = fn(&mut FitConfig);
 
 /// What no preset has, but could help: a name and what it sets on top of `recommended`.
-const EXTRAS: &[(&str, Change)] = &[
-    ("the likelihood of speckle", |config| config.objective = EmLoss::Gamma),
-    ("limbs as learned", |config| config.limbs = Limbs::Learned),
-];
+const EXTRAS: &[(&str, Change)] = &[("the likelihood of speckle", |config| config.objective = EmLoss::Gamma)];
 
 /// What a configuration becomes with one part of another; `None` where both have it alike.
 fn with(base: &FitConfig, other: &FitConfig, switch: &Switch) -> Option<FitConfig> {

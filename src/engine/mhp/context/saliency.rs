@@ -227,11 +227,6 @@ impl SaliencyMap {
         })
     }
 
-    /// The largest salience of some cells, ln; 0 of none.
-    pub(in crate::mhp) fn brightest(&self, cells: &[usize]) -> f64 {
-        cells.iter().map(|&cell| self.salience(cell)).fold(0.0, f64::max)
-    }
-
     /// The largest salience at height `z_m` within `reach_m` before and behind `p_world`, ln.
     pub(super) fn salience_at_height(&self, p_world: Vec3, z_m: f64, reach_m: f64) -> f64 {
         let distance = p_world[0].hypot(p_world[1]).max(NEAREST_M);

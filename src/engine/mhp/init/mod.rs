@@ -15,15 +15,14 @@
 //!
 //! Switches beside the default setting refine the start: where counting finds the one person, behind the skin, on the
 //! line through the frames around, as high as floor and head say in all of them ([`context`]), in the posture that fits
-//! ([`pose`]), with the limbs where simulated people have them who look alike ([`learned`]). What it is without them is
-//! kept beside it. What the maps show is worked out once for a problem ([`context`]). A warm start goes where the persons of
+//! ([`pose`]). What it is without them is kept beside it. A search in the space of motion ends at several bodies; which of them
+//! a person is, the frames around may decide ([`Hypotheses`]). What the maps show is worked out once for a problem ([`context`]). A warm start goes where the persons of
 //! the frame before went ([`warm`]).
 //!
 //! Nothing here reads a label.
 
 mod find;
 mod given;
-mod learned;
 mod notes;
 mod perturb;
 mod place;
@@ -33,20 +32,17 @@ mod velocity;
 mod warm;
 
 pub use given::{standing_joints, start_at};
-pub use learned::LimbMap;
-#[cfg(feature = "train")]
-pub use learned::{LimbLesson, learn as learn_limbs};
 pub use warm::predict;
 
 use super::context::{
     self, Expectation, Peak, SaliencyMap, Sighting, Stature, Track, apart_m, behind_skin, bent_if_below, near,
 };
-use super::motion;
+use super::motion::{self, Decoded, Held, Hypothesis, Searched, Sight};
 use super::template::Template;
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
-use crate::config::{BodyModel, EmLoss, FitConfig, Height, Limbs, Parameterization, StartPlace, Summation, Yaw};
-use crate::geometry::{Vec3, add, flat_distance, mean, norm, sub};
+use crate::config::{BodyModel, EmLoss, FitConfig, Height, Parameterization, StartPlace, Summation, Yaw};
+use crate::geometry::{Vec3, add, flat_distance, norm};
 use find::{find_one, middle_of_views};
 use notes::notes_of;
 use pose::Posture;
@@ -62,8 +58,6 @@ const MOST_STEPS: usize = 12;
 const POSTURES: usize = 9;
 /// What counting finds farther from a place than this is another place, m.
 const ELSEWHERE_M: f64 = 1.0;
-/// Somebody nearer than this is lit where the limbs are looked for, m.
-const ALONE_M: f64 = 1.8;
 /// The L_EM of a posture other than standing, of that of standing, at which it is believed of somebody who does not walk.
 const CLEARLY_BETTER: f64 = 0.9;
 
@@ -85,14 +79,12 @@ pub struct Initialisation {
 }
 
 /// A person before it has parameters.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 struct Person {
     at: Vec3,
     expected: Option<Expectation>,
     track: Option<Track>,
     radial: Option<Radial>,
-    /// To the nearest other person, m.
-    apart_m: f64,
     posture: Posture,
     /// The template in that posture.
     body: Arc<Template>,
@@ -125,15 +117,8 @@ impl Person {
         walking.unwrap_or_else(|| towards_radar(self.at))
     }
 
-    /// Its joints, world frame, m.
+    /// Its joints in its posture, world frame, m.
     fn joints(&self, problem: &Problem, config: &FitConfig) -> Vec<Vec3> {
-        let posed = self.posed(problem, config);
-        let learned = config.limbs == Limbs::Learned && self.apart_m > ALONE_M;
-        learned.then(|| learned::moved(problem, config.into(), &posed)).flatten().unwrap_or(posed)
-    }
-
-    /// Its joints in its posture.
-    fn posed(&self, problem: &Problem, config: &FitConfig) -> Vec<Vec3> {
         let at = match &self.track {
             Some(track) if config.w_time > 0.0 || config.parameterization == Parameterization::Motion => {
                 [track.at[0], track.at[1], self.at[2]]
@@ -185,16 +170,141 @@ pub fn initialise_people(
     config: &FitConfig,
     seeds: &[Vec3],
 ) -> Result<Initialisation, FitError> {
-    let (maps, peaks) = shown(problem, config);
-    let maps = maps.as_ref();
+    Hypotheses::new(problem, config, seeds)?.start(problem, config, &[])
+}
+
+/// What the persons of a frame may be, before one of the bodies that a search ended at is chosen.
+#[derive(Debug, Clone)]
+pub struct Hypotheses {
+    /// The persons that the frame's own peaks show, and those that are fitted.
+    own: Vec<Person>,
+    persons: Vec<Person>,
+    /// What a search in the space of motion ended at, or why there is none; `None` where no setting asks for one.
+    searched: Option<Result<Searched, Held>>,
+    peaks: Vec<Peak>,
+    notes: Vec<String>,
+}
+
+impl Hypotheses {
+    /// Looks for persons as [`initialise_people`] does.
+    ///
+    /// # Errors
+    /// [`FitError::NoStart`] where no view shows anything above its background.
+    pub fn new(problem: &Arc<Problem>, config: &FitConfig, seeds: &[Vec3]) -> Result<Self, FitError> {
+        let (maps, peaks) = shown(problem, config);
+        let mut notes: Vec<String> = (0..problem.views.len())
+            .filter(|&k| problem.filled_cells(k) > 0)
+            .map(|k| format!("{}: {} missing cells filled", problem.views[k].array, problem.filled_cells(k)))
+            .collect();
+        let (own, persons) = persons(problem, config, (maps.as_ref(), &peaks), seeds, &mut notes)?;
+        // It begins at standing persons: its own starts are the postures.
+        let standing = || {
+            let model = ScattererModel::new(&problem.skeleton, config.scatterers);
+            motion::search(problem, config, &assemble(problem, config, &model, &persons))
+        };
+        let searched = (config.parameterization == Parameterization::Motion).then(standing).transpose()?;
+        Ok(Self { own, persons, searched, peaks, notes })
+    }
+
+    /// The start. Of what a search ended at it is the body on the cheapest path through what the frames `around` ended at, each
+    /// with its time, s after this one; of a frame alone the one with the lowest loss. Where bodies do not explain the maps of
+    /// all these frames, it is a posture.
+    ///
+    /// # Errors
+    /// Where a position is not finite.
+    pub fn start(
+        &self,
+        problem: &Arc<Problem>,
+        config: &FitConfig,
+        around: &[(f64, &Self)],
+    ) -> Result<Initialisation, FitError> {
+        let model = ScattererModel::new(&problem.skeleton, config.scatterers);
+        let mut notes = self.notes.clone();
+        let chosen = self.searched.as_ref().map(|searched| {
+            let searched = searched.as_ref().map_err(|held| *held)?;
+            chosen(searched, around).ok_or(Held::Unlike)
+        });
+        let (params, motion) = match chosen {
+            Some(Ok((bodies, note))) => {
+                let mut params = assemble(problem, config, &model, &self.persons);
+                bodies.iter().enumerate().for_each(|(person, body)| body.place(person, &mut params));
+                notes.push(note.clone());
+                (params, Some(Ok(note)))
+            }
+            Some(Err(held)) => (self.posture(problem, config, Some(held), &mut notes)?, Some(Err(held.note()))),
+            None => (self.posture(problem, config, None, &mut notes)?, None),
+        };
+        let (mut params, mut unrefined) = (params, assemble(problem, &unrefined(config), &model, &self.own));
+        for start in [&mut params, &mut unrefined] {
+            perturb::perturb(problem, &config.init, start);
+        }
+        notes.extend(self.persons.iter().flat_map(|person| notes_of(person, config)));
+        Ok(Initialisation { params, unrefined, peaks: self.peaks.clone(), notes, motion })
+    }
+
+    /// The persons in the postures that explain their masks best, where `held` they are turned and moved as levels say.
+    fn posture(
+        &self,
+        problem: &Arc<Problem>,
+        config: &FitConfig,
+        held: Option<Held>,
+        notes: &mut Vec<String>,
+    ) -> Result<Pppr, FitError> {
+        let mut persons = self.persons.clone();
+        if config.starts > 1 {
+            choose_postures(problem, config, &Template::new(&problem.skeleton), &mut persons)?;
+        }
+        let model = ScattererModel::new(&problem.skeleton, config.scatterers);
+        let mut params = assemble(problem, config, &model, &persons);
+        let joints = params.shape().joints;
+        let moved = self.searched.iter().flatten().flat_map(|searched| &searched.moved);
+        for (k, &way) in moved.enumerate().filter(|(_, way)| norm(**way) > 0.0) {
+            for joint in k * joints..(k + 1) * joints {
+                params.set_vec3(Group::Position, joint, add(params.position(joint), way));
+            }
+            notes.push(format!("moved by {:.2} m to where a body explains the maps better", norm(way)));
+        }
+        notes.extend(held.map(|held| held.note().to_owned()));
+        // Whom there are too many cells to search for there are too many to turn.
+        if held.is_some_and(|held| held != Held::Large) {
+            notes.extend(motion::turn(problem, config, &mut params)?);
+        }
+        Ok(params)
+    }
+
+    /// What other frames are told of this one, `t_s` after them.
+    fn sight(&self, t_s: f64) -> Option<Sight<'_>> {
+        let searched = self.searched.as_ref()?.as_ref().ok()?;
+        Some(Sight { t_s, persons: &searched.persons })
+    }
+}
+
+/// The body of each person on the cheapest path, and what is said of them; `None` where bodies do not explain the maps.
+fn chosen<'a>(searched: &'a Searched, around: &[(f64, &Hypotheses)]) -> Option<(Vec<&'a Hypothesis>, String)> {
+    let seen: Vec<Sight> = around.iter().filter_map(|&(t_s, other)| other.sight(t_s)).collect();
+    let decoded: Vec<Decoded> = searched.persons.iter().map(|own| motion::decode(own, &seen)).collect();
+    let unlikeness = decoded.iter().map(|person| person.unlikeness).sum::<f64>() / decoded.len().max(1) as f64;
+    if motion::is_unlike(unlikeness) {
+        return None;
+    }
+    let best = searched.persons.iter().zip(&decoded).filter_map(|(own, of)| own.get(motion::lowest(&of.costs)?));
+    let note = searched.note(decoded.last().map_or(&[], |last| &last.costs));
+    let along = if seen.is_empty() { String::new() } else { format!(", along {} frames", seen.len() + 1) };
+    Some((best.collect(), note + &along))
+}
+
+/// The persons that the frame's own peaks show, and those that are fitted.
+fn persons(
+    problem: &Arc<Problem>,
+    config: &FitConfig,
+    (maps, peaks): (&[SaliencyMap], &[Peak]),
+    seeds: &[Vec3],
+    notes: &mut Vec<String>,
+) -> Result<(Vec<Person>, Vec<Person>), FitError> {
     let template = Arc::new(Template::new(&problem.skeleton));
-    let mut notes: Vec<String> = (0..problem.views.len())
-        .filter(|&k| problem.filled_cells(k) > 0)
-        .map(|k| format!("{}: {} missing cells filled", problem.views[k].array, problem.filled_cells(k)))
-        .collect();
     let seen = |(at, expected): (Vec3, Expectation)| (at, Some(expected));
     let nearby = |k: usize| seen(near(&problem.views, maps, seeds, k));
-    let mut alone = || find_one(problem, config.place, maps, &template, &peaks, &mut notes).map(seen);
+    let mut alone = || find_one(problem, config.place, maps, &template, peaks, notes).map(seen);
     let one_counted = config.people == 1 && config.place == StartPlace::Counted && !seeds.is_empty();
     let found = match seeds {
         _ if !config.init.position => vec![(middle_of_views(problem), None)],
@@ -207,13 +317,13 @@ pub fn initialise_people(
         let here = Sighting { t_s: 0.0, at, lit_m: expected.and_then(|expected| expected.lit) };
         let track = followed(config).then(|| context::track(problem.context(config), here, apart_m)).flatten();
         let radial = velocity::radial(problem, config, at);
-        Person { at, expected, track, radial, apart_m, posture: Posture::Standing, body: Arc::clone(&template) }
+        Person { at, expected, track, radial, posture: Posture::Standing, body: Arc::clone(&template) }
     };
     let own: Vec<Person> =
         found.into_iter().enumerate().map(|(k, (at, expected))| person(at, expected, apart_m(&places, k))).collect();
     let counted_at = |place: Vec3| seeds.iter().any(|&seed| flat_distance(seed, place) <= ELSEWHERE_M);
     let elsewhere = (one_counted && config.init.position && !counted_at(places[0])).then(|| nearby(0));
-    let mut persons = match elsewhere {
+    let fitted = match elsewhere {
         Some((at, expected)) => {
             let [x, y, _] = own[0].at;
             notes.push(format!("the peaks alone show somebody at x {x:.2} m, y {y:.2} m; the frames around do not"));
@@ -221,49 +331,7 @@ pub fn initialise_people(
         }
         None => own.clone(),
     };
-    let model = ScattererModel::new(&problem.skeleton, config.scatterers);
-    // A search in a space of motion begins at standing persons: its own starts are the postures.
-    let (mut searched, mut told, mut moved_by) = (None, None, Vec::new());
-    if config.parameterization == Parameterization::Motion {
-        let mut standing = assemble(problem, config, &model, &persons);
-        let before = standing.clone();
-        match motion::search(problem, config, &mut standing)? {
-            Ok(found) => {
-                told = Some(Ok(found.note()));
-                searched = Some(standing);
-            }
-            Err(held) => {
-                // The pose stays that of the start; the place may be another.
-                let way = |k: usize| sub(mean(standing.person(k)), mean(before.person(k)));
-                moved_by = (0..persons.len()).map(way).collect();
-                told = Some(Err(held.note()));
-            }
-        }
-    }
-    if config.starts > 1 && searched.is_none() {
-        choose_postures(problem, config, &template, &mut persons)?;
-    }
-    let mut params = searched.unwrap_or_else(|| assemble(problem, config, &model, &persons));
-    let joints = params.shape().joints;
-    for (k, &way) in moved_by.iter().enumerate().filter(|(_, way)| norm(**way) > 0.0) {
-        for joint in k * joints..(k + 1) * joints {
-            params.set_vec3(Group::Position, joint, add(params.position(joint), way));
-        }
-        notes.push(format!("moved by {:.2} m to where a body explains the maps better", norm(way)));
-    }
-    notes.extend(told.as_ref().map(|told| told.as_ref().map_or_else(|held| (*held).to_owned(), String::clone)));
-    // Whom there are too many cells to search for there are too many to turn.
-    if told.as_ref().and_then(|told| told.as_ref().err()).is_some_and(|held| *held != motion::TOO_LARGE) {
-        notes.extend(motion::turn(problem, config, &mut params)?);
-    }
-    let moved_m: Vec<f64> =
-        persons.iter().enumerate().map(|(k, person)| mean_way_m(&params, k, &person.posed(problem, config))).collect();
-    let mut unrefined = assemble(problem, &unrefined(config), &model, &own);
-    for start in [&mut params, &mut unrefined] {
-        perturb::perturb(problem, &config.init, start);
-    }
-    notes.extend(persons.iter().zip(moved_m).flat_map(|(person, moved_m)| notes_of(person, config, moved_m)));
-    Ok(Initialisation { params, unrefined, peaks, notes, motion: told })
+    Ok((own, fitted))
 }
 
 /// Gives each person the posture whose L_EM is smallest where it stands best near its place; the place itself is left
@@ -276,8 +344,7 @@ fn choose_postures(
 ) -> Result<(), FitError> {
     // Masks tell postures apart also where levels are those of a room.
     let (objective, body) = (EmLoss::Iou, BodyModel::Joints);
-    let config =
-        FitConfig { objective, body, summation: Summation::Incoherent, w_time: 0.0, limbs: Limbs::Posture, ..*config };
+    let config = FitConfig { objective, body, summation: Summation::Incoherent, w_time: 0.0, ..*config };
     let model = ScattererModel::new(&problem.skeleton, config.scatterers);
     for k in 0..persons.len() {
         let walks = persons[k].walks();
@@ -360,7 +427,6 @@ fn unrefined(config: &FitConfig) -> FitConfig {
         place: StartPlace::Peaks,
         yaw: Yaw::Radar,
         height: Height::Echo,
-        limbs: Limbs::Posture,
         w_time: 0.0,
         surface_offset_m: 0.0,
         ..*config
@@ -381,10 +447,4 @@ fn assemble(problem: &Problem, config: &FitConfig, model: &ScattererModel, perso
     }
     model.apply(&mut params, &problem.skeleton);
     params
-}
-
-/// How far the joints of the `k`th person are from `posed`, on average, m.
-fn mean_way_m(params: &Pppr, k: usize, posed: &[Vec3]) -> f64 {
-    let way = |(joint, &p): (usize, &Vec3)| norm(sub(params.position(k * posed.len() + joint), p));
-    posed.iter().enumerate().map(way).sum::<f64>() / posed.len().max(1) as f64
 }

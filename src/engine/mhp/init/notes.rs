@@ -2,10 +2,10 @@
 
 use super::Person;
 use super::velocity::{Radial, Source};
-use crate::config::{FitConfig, GradientVelocity, Limbs, Yaw};
+use crate::config::{FitConfig, GradientVelocity, Yaw};
 
-/// What was found of a person, in words; `moved_m` is how far its joints are from its posture's.
-pub(super) fn notes_of(person: &Person, config: &FitConfig, moved_m: f64) -> Vec<String> {
+/// What was found of a person, in words.
+pub(super) fn notes_of(person: &Person, config: &FitConfig) -> Vec<String> {
     let at = person.at;
     let walking = person.track.as_ref().filter(|track| config.yaw == Yaw::Motion && track.heading.is_some());
     let mut notes = vec![match walking {
@@ -38,11 +38,5 @@ pub(super) fn notes_of(person: &Person, config: &FitConfig, moved_m: f64) -> Vec
         _ if walking.is_some() => "velocity from the frames around".to_owned(),
         _ => "velocity 0: no Doppler axis and no frame around".to_owned(),
     });
-    if config.limbs == Limbs::Learned {
-        notes.push(match moved_m {
-            0.0 => "limbs of the posture: nothing learned applies here".to_owned(),
-            moved_m => format!("joints {:.0} cm from the posture's, as learned of simulated people", 1e2 * moved_m),
-        });
-    }
     notes
 }

@@ -17,6 +17,7 @@
 //! several headings, coarse then fine ([`search`]).
 
 mod clutter;
+mod decode;
 mod proportions;
 mod search;
 mod space;
@@ -26,7 +27,8 @@ mod tests;
 mod thinned;
 mod turn;
 
-pub(super) use search::search;
+pub(super) use decode::{Decoded, Sight, decode, lowest};
+pub(super) use search::{Hypothesis, Searched, search};
 pub(super) use thinned::ThinnedViews;
 pub(super) use turn::turn;
 
@@ -52,9 +54,13 @@ const DEFAULT_RATE: f64 = 1e-3;
 /// From this share of the iterations on steps are shorter, by so much.
 const SLOW_FROM: f64 = 0.6;
 const SLOW: f64 = 0.3;
-/// Levels that correlate less than by one less this are of something else than the body: where the reflectors around are known, and
-/// where they are not.
-const MOST_UNLIKE: [f64; 2] = [0.2, 0.16];
+/// Maps whose [`unlikeness`] is larger are of something else than a body: of walkers, also among furniture, it is 0.15 at most, of
+/// somebody who stands in a bright room 0.3, of a crowd 0.45.
+const MOST_UNLIKE: f64 = 0.27;
+/// A fit goes on where the L_EM that it begins with is smaller: where what stands around the persons is known, and where it is not.
+const MOST_BEGUN: [f64; 2] = [0.2, 0.16];
+/// What a window's L_prior counts of its L_EM there: a pose that nobody takes explains maps, too.
+const OF_PRIOR: f64 = 0.1;
 /// Slower than this nobody leaves the cells that it stands in while the frames around last, m/s.
 const WALKING_MPS: f64 = 0.35;
 
@@ -93,7 +99,7 @@ impl Held {
             Self::Skeleton => "held at the start: an unknown skeleton; the prior of motion has nothing of it",
             Self::Large => TOO_LARGE,
             Self::Unlike => {
-                "held at the start: no body explains the maps; with each of the prior their levels correlate by less than 0.8 (0.84 of who stands)"
+                "held at the start: no body explains the maps; with each that people have their levels correlate by less than 0.74"
             }
         }
     }
@@ -131,9 +137,14 @@ pub(super) struct WindowLoss {
     pub(super) gradient: Vec<f64>,
 }
 
-/// Whether an L_EM is that of maps which the bodies do not explain, where what stands around them is known or not.
-fn is_unlike(config: &FitConfig, em: f64, clear: bool) -> bool {
-    config.objective == EmLoss::NccDb && em > MOST_UNLIKE[usize::from(!clear)]
+/// How little bodies explain maps whose levels they are compared with, or zero where masks are compared.
+fn unlikeness(config: &FitConfig, em: f64, prior: f64) -> f64 {
+    if config.objective == EmLoss::NccDb { em + OF_PRIOR * prior } else { 0.0 }
+}
+
+/// Whether maps with this [`unlikeness`], on average over frames, are of something else than bodies.
+pub(super) fn is_unlike(unlikeness: f64) -> bool {
+    unlikeness > MOST_UNLIKE
 }
 
 impl Window {
@@ -146,7 +157,7 @@ impl Window {
         loss: &mut WindowLoss,
     ) -> bool {
         self.evaluate((problem, config), precision, of, None, loss);
-        !is_unlike(config, loss.em, self.clear)
+        config.objective != EmLoss::NccDb || loss.em <= MOST_BEGUN[usize::from(!self.clear)]
     }
 
     /// Around the persons of `initial`, who move as their velocities say; or why they stay where they are.

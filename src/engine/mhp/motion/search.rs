@@ -3,10 +3,11 @@
 //! Every start is moved a little with its pose held; the few with the lowest loss are fitted with it. What wins is the start; the
 //! runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
 
+use super::decode::lowest;
 use super::{BODY, Held, LN_SIZE, MotionState, Window, WindowLoss, YAW, ways};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::{add, norm, sub};
+use crate::geometry::{Vec3, mean, norm, sub};
 use crate::mhp::{FitError, Precision, Problem, tiles};
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -15,7 +16,7 @@ use std::ops::Range;
 const SIEVES: [Sieve; 3] = [
     Sieve { steps: 6, every: 4, held: true, kept: 8 },
     Sieve { steps: 6, every: 2, held: false, kept: 4 },
-    Sieve { steps: 14, every: 1, held: false, kept: 2 },
+    Sieve { steps: 14, every: 1, held: false, kept: 4 },
 ];
 /// Steps of what is left.
 const FINE: usize = 28;
@@ -33,6 +34,9 @@ const ONE_M: f64 = 0.03;
 const AMBIGUOUS: f64 = 0.1;
 /// Headings farther apart than this are different ones.
 const ANOTHER_HEADING: f64 = PI / 3.0;
+/// What a metre between the middle of a body and that of the start counts of L_EM: echo shows where somebody is to a few
+/// centimetres, and a body that has to be elsewhere explains something else.
+const OF_WAY: f64 = 0.4;
 /// The share of the start's L_EM below which another place is believed even where the pose there is not, and how far it may be, m.
 const CLEARER: f64 = 0.85;
 const MOST_MOVED_M: f64 = 0.5;
@@ -47,12 +51,32 @@ struct Sieve {
     kept: usize,
 }
 
+/// A body that a search ended at, in the frame that is fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::mhp) struct Hypothesis {
+    /// w_EM L_EM + w_prior L_prior of the window with this body in it.
+    pub(in crate::mhp) loss: f64,
+    /// How little it explains the maps ([`super::unlikeness`]), and how far it is from the start.
+    pub(in crate::mhp) unlikeness: f64,
+    /// Where it looks, rad.
+    pub(in crate::mhp) yaw: f64,
+    /// Its joints, world frame, m.
+    pub(in crate::mhp) joints: Vec<Vec3>,
+    /// Their velocities, m/s.
+    pub(in crate::mhp) velocities: Vec<Vec3>,
+    /// How opaque they are: what static echoes leave.
+    pub(in crate::mhp) beta: Vec<f64>,
+}
+
 /// What a search found.
+#[derive(Debug, Clone, PartialEq)]
 pub(in crate::mhp) struct Searched {
-    /// The start's own loss, and that of what was found.
-    pub(in crate::mhp) losses: [f64; 2],
-    /// How far the best start that looks elsewhere is behind, share of its loss, and by how much it is turned, rad.
-    pub(in crate::mhp) runner_up: Option<(f64, f64)>,
+    /// The start's own loss.
+    pub(in crate::mhp) begun: f64,
+    /// What the search ended at, a list a person, the lowest loss first; none is empty.
+    pub(in crate::mhp) persons: Vec<Vec<Hypothesis>>,
+    /// How each person is to move, m, where the pose there is not believed.
+    pub(in crate::mhp) moved: Vec<Vec3>,
 }
 
 /// A start on its way.
@@ -60,6 +84,15 @@ pub(in crate::mhp) struct Searched {
 struct Tried {
     state: MotionState,
     loss: f64,
+    /// Its parts, unweighted.
+    em: f64,
+    prior: f64,
+}
+
+impl Tried {
+    fn at(coordinates: Vec<f64>) -> Self {
+        Self { state: MotionState::at(coordinates), loss: f64::INFINITY, em: 0.0, prior: 0.0 }
+    }
 }
 
 struct Search<'a> {
@@ -87,7 +120,7 @@ impl Search<'_> {
         for step in 0..=steps {
             let loss = self.evaluate(&state.coordinates);
             if loss.is_finite() && loss < tried.loss {
-                tried.loss = loss;
+                (tried.loss, tried.em, tried.prior) = (loss, self.loss.em, self.loss.prior);
                 best.clone_from(&state.coordinates);
             }
             if step < steps {
@@ -98,6 +131,23 @@ impl Search<'_> {
             }
         }
         tried.state = MotionState { coordinates: best, ..state };
+    }
+
+    /// Where a start ended.
+    fn hypothesis(&self, tried: &Tried, person: usize) -> Hypothesis {
+        let mut placed = self.params.clone();
+        self.window.place(&tried.state.coordinates, &mut placed);
+        let joints = placed.shape().joints;
+        let own = person * joints..(person + 1) * joints;
+        let way = sub(mean(placed.person(person)), mean(self.params.person(person)));
+        Hypothesis {
+            loss: tried.loss,
+            unlikeness: super::unlikeness(self.config, tried.em, tried.prior) + OF_WAY * norm(way),
+            yaw: tried.state.coordinates[person * self.window.stride + YAW],
+            joints: placed.positions()[own.clone()].to_vec(),
+            velocities: placed.velocities()[own.clone()].to_vec(),
+            beta: placed.group(Group::Beta)[own].to_vec(),
+        }
     }
 
     /// What a sieve leaves of `all`, the best first; of those that have become one, one.
@@ -133,14 +183,14 @@ impl Search<'_> {
     }
 }
 
-/// Searches around `params`, one person after the other, and puts them where it found them.
+/// Searches around `params`, one person after the other.
 ///
 /// # Errors
 /// Where a position is not finite.
 pub(in crate::mhp) fn search(
     problem: &Problem,
     config: &FitConfig,
-    params: &mut Pppr,
+    params: &Pppr,
 ) -> Result<Result<Searched, Held>, FitError> {
     let mut window = match Window::new(problem, config, Precision::F32, params)? {
         Ok(window) => window,
@@ -165,11 +215,11 @@ pub(in crate::mhp) fn search(
     };
     let begun = search.evaluate(&coordinates);
     let begun_em = search.loss.em;
-    let mut answer = (begun, None);
+    let mut persons: Vec<Vec<Hypothesis>> = Vec::with_capacity(params.shape().persons);
     for person in 0..params.shape().persons {
         let own = person * stride..(person + 1) * stride;
         let hips = hips_of(problem, params, person, joints);
-        let begun_at = Tried { state: MotionState::at(coordinates.clone()), loss: f64::INFINITY };
+        let begun_at = Tried::at(coordinates.clone());
         let mut all = vec![begun_at.clone()];
         let turns: &[f64] = if walks[person] { &[0.0, PI] } else { &[0.0, 0.5 * PI, PI, 1.5 * PI] };
         for (c, hip_height) in starts.iter().take(config.starts.min(most_starts).saturating_sub(1)) {
@@ -182,7 +232,7 @@ pub(in crate::mhp) fn search(
                 if let Some(height_m) = floor {
                     mine[2] = hip_height * mine[LN_SIZE].exp() - height_m;
                 }
-                all.push(Tried { state: MotionState::at(of), loss: f64::INFINITY });
+                all.push(Tried::at(of));
             }
         }
         for sieve in &SIEVES {
@@ -208,34 +258,24 @@ pub(in crate::mhp) fn search(
                 others.push(behind);
             }
             for of in others {
-                let mut tried = Tried { state: MotionState::at(of), loss: f64::INFINITY };
+                let mut tried = Tried::at(of);
                 search.descend(&mut tried, FINE, false);
                 all.push(tried);
             }
         }
         all.sort_by(|a, b| a.loss.total_cmp(&b.loss));
-        let Some(best) = all.first() else { continue };
-        let yaw = |tried: &Tried| tried.state.coordinates[own.start + YAW];
-        let turned = |tried: &Tried| {
-            let turn = (yaw(tried) - yaw(best)).rem_euclid(TAU);
-            turn.min(TAU - turn)
-        };
-        let runner_up = all.iter().find(|tried| turned(tried) > ANOTHER_HEADING);
-        answer = (best.loss, runner_up.map(|tried| (tried.loss / best.loss - 1.0, turned(tried))));
-        coordinates.clone_from(&best.state.coordinates);
+        if let Some(best) = all.first() {
+            coordinates.clone_from(&best.state.coordinates);
+        }
+        persons.push(all.iter().map(|tried| search.hypothesis(tried, person)).collect());
     }
     search.every = 1;
     search.evaluate(&coordinates);
     let em = search.loss.em;
-    if super::is_unlike(config, em, window.clear) {
-        // Among reflectors that nothing is known of, another place may be theirs.
-        if window.clear && em < CLEARER * begun_em {
-            move_there(problem, &window, &coordinates, params);
-        }
-        return Ok(Err(Held::Unlike));
-    }
-    window.place(&coordinates, params);
-    Ok(Ok(Searched { losses: [begun, answer.0], runner_up: answer.1 }))
+    // Among reflectors that nothing is known of, another place may be theirs.
+    let clearer = window.clear && em < CLEARER * begun_em;
+    let moved = (0..persons.len()).map(|k| if clearer { way(problem, params, k, &persons[k]) } else { [0.0; 3] });
+    Ok(Ok(Searched { begun, moved: moved.collect(), persons }))
 }
 
 /// How many starts a search of these persons may have; `None` where one is too many: nothing that is asked for takes minutes.
@@ -247,22 +287,15 @@ fn affordable(window: &Window, config: &FitConfig, params: &Pppr) -> Option<usiz
     (evaluations >= LATER).then(|| ((evaluations - LATER) / (4.0 * FIRST)) as usize + 1)
 }
 
-/// Moves the persons as they are to where the search found them, by no more than [`MOST_MOVED_M`]: maps with few looks are explained
-/// well by no pose, and still tell the place better than what is lit does.
-fn move_there(problem: &Problem, window: &Window, coordinates: &[f64], params: &mut Pppr) {
-    let mut found = params.clone();
-    window.place(coordinates, &mut found);
+/// The way from where a person is to where its best hypothesis is, where that is no farther than [`MOST_MOVED_M`]: maps with few
+/// looks are explained well by no pose, and still tell the place better than what is lit does.
+fn way(problem: &Problem, params: &Pppr, person: usize, found: &[Hypothesis]) -> Vec3 {
     let joints = params.shape().joints.max(1);
-    for person in 0..params.shape().persons {
-        let [from, to] = [&*params, &found].map(|of| hips_of(problem, of, person, joints));
-        let way = sub(to, from);
-        if norm(way) <= MOST_MOVED_M {
-            for joint in person * joints..(person + 1) * joints {
-                let moved = add(params.position(joint), way);
-                params.set_vec3(Group::Position, joint, moved);
-            }
-        }
-    }
+    let mut there = params.clone();
+    found.iter().take(1).for_each(|best| best.place(person, &mut there));
+    let [from, to] = [params, &there].map(|of| hips_of(problem, of, person, joints));
+    let way = sub(to, from);
+    if norm(way) <= MOST_MOVED_M { way } else { [0.0; 3] }
 }
 
 /// The middle of a person's hips, or of all its joints where it has none, world frame, m.
@@ -272,17 +305,39 @@ pub(super) fn hips_of(problem: &Problem, params: &Pppr, person: usize, joints: u
     if hips.is_empty() { crate::geometry::mean(params.person(person)) } else { crate::geometry::mean(&hips) }
 }
 
+impl Hypothesis {
+    /// Makes a person of `params` this body.
+    pub(in crate::mhp) fn place(&self, person: usize, params: &mut Pppr) {
+        let joints = params.shape().joints;
+        let own = person * joints..(person + 1) * joints;
+        let [positions, velocities] = params.motion_mut();
+        positions[own.clone()].copy_from_slice(&self.joints);
+        velocities[own.clone()].copy_from_slice(&self.velocities);
+        params.group_mut(Group::Beta)[own].copy_from_slice(&self.beta);
+    }
+
+    /// By how much it is turned against another, rad, at most π.
+    fn turned(&self, other: &Self) -> f64 {
+        let turn = (self.yaw - other.yaw).rem_euclid(TAU);
+        turn.min(TAU - turn)
+    }
+}
+
 impl Searched {
-    /// In words.
-    pub(in crate::mhp) fn note(&self) -> String {
-        let [from, to] = self.losses;
-        let other = match self.runner_up {
-            Some((behind, turned)) => {
+    /// In words, where `costs` of the last person's hypotheses decided.
+    pub(in crate::mhp) fn note(&self, costs: &[f64]) -> String {
+        let Some(last) = self.persons.last() else { return String::new() };
+        let Some(best) = lowest(costs).and_then(|k| last.get(k).map(|found| (k, found))) else { return String::new() };
+        let (k, found) = best;
+        let others = last.iter().zip(costs).filter(|(other, _)| other.turned(found) > ANOTHER_HEADING);
+        let other = match others.min_by(|a, b| a.1.total_cmp(b.1)) {
+            Some((other, cost)) => {
+                let behind = cost / costs[k] - 1.0;
                 let doubt = if behind < AMBIGUOUS { "; heading ambiguous: " } else { "; " };
-                format!("{doubt}turned by {:.0}° it is {:.1} % worse", turned.to_degrees(), 100.0 * behind)
+                format!("{doubt}turned by {:.0}° it is {:.1} % worse", other.turned(found).to_degrees(), 100.0 * behind)
             }
             None => String::new(),
         };
-        format!("motion: loss {from:.3} → {to:.3}{other}")
+        format!("motion: loss {:.3} → {:.3}{other}", self.begun, found.loss)
     }
 }

@@ -8,9 +8,9 @@
 
 use super::search::hips_of;
 use super::thinned::ThinnedViews;
-use super::{WALKING_MPS, is_unlike, ways};
+use super::{WALKING_MPS, ways};
 use crate::body::Pppr;
-use crate::config::{EmRegion, FitConfig};
+use crate::config::{EmLoss, EmRegion, FitConfig};
 use crate::geometry::{norm, turned_about};
 use crate::mhp::{FitError, Neighbour, Precision, Problem, region};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -28,6 +28,8 @@ const TURN: f64 = 0.004;
 /// by more than a right angle, below which it is turned farther.
 const CLEARER: f64 = 0.85;
 const BEHIND: f64 = 0.7;
+/// Levels that correlate less than by one less this are of something else than the body in any heading.
+const MOST_UNLIKE: f64 = 0.2;
 
 /// A number a heading.
 type Headings = [f64; HEADINGS];
@@ -43,7 +45,8 @@ pub(in crate::mhp) fn turn(problem: &Problem, config: &FitConfig, params: &mut P
         let (own, profiles) = profiles(problem, config, params, person)?;
         let losses = through(&profiles, own);
         let stayed = profiles.iter().map(|of| of[0]).sum::<f64>() / profiles.len() as f64;
-        let Some((angle, lowest)) = chosen(&losses, stayed).filter(|(_, lowest)| !is_unlike(config, *lowest, true))
+        let Some((angle, lowest)) =
+            chosen(&losses, stayed).filter(|(_, lowest)| *lowest <= MOST_UNLIKE || config.objective != EmLoss::NccDb)
         else {
             continue;
         };

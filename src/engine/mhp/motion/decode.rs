@@ -1,0 +1,166 @@
+//! Which of the bodies that a search ended at a person is: the one on the cheapest path through those of the frames around.
+//!
+//! Maps of a few tenths of a second tell front from back, or one leg from the other, by little, and now and then wrongly. But
+//! nobody turns about between two frames. A path takes one hypothesis of every frame and costs
+//!
+//! ```text
+//! Σ over frames of L/L_min + Σ over steps of min(apart/0.5 m, 0.9)
+//! ```
+//!
+//! with L_min the lowest loss of a frame and `apart` the mean distance between the joints of two hypotheses, each moved as its
+//! velocities say to the middle of the time between them. The cheapest paths come from dynamic programming (Viterbi 1967) from
+//! both ends to the frame that is fitted.
+
+use super::search::Hypothesis;
+use crate::geometry::{Vec3, flat_distance, mean, norm};
+use std::iter::zip;
+
+/// What a step costs a metre between the joints, and at most.
+const PER_M: f64 = 2.0;
+const MOST: f64 = 0.9;
+/// Nobody is farther from where the frame before has them, m, and for every second between the two, m/s.
+const LEASH_M: f64 = 0.4;
+const LEASH_MPS: f64 = 2.0;
+
+/// What the persons of a frame may be, and when that is, s after the frame that is fitted.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::mhp) struct Sight<'a> {
+    pub(in crate::mhp) t_s: f64,
+    /// A list a person.
+    pub(in crate::mhp) persons: &'a [Vec<Hypothesis>],
+}
+
+/// One person of a frame.
+#[derive(Clone, Copy)]
+struct Link<'a> {
+    t_s: f64,
+    of: &'a [Hypothesis],
+}
+
+/// What a sequence says of a person in one of its frames.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::mhp) struct Decoded {
+    /// What each hypothesis costs more than the best, in lowest losses of the frame, and one: where nothing is known of the frames
+    /// around, its loss by the lowest.
+    pub(in crate::mhp) costs: Vec<f64>,
+    /// How little bodies explain the maps, on average over the frames in which the person is followed.
+    pub(in crate::mhp) unlikeness: f64,
+}
+
+/// Decodes one person of a frame by what is seen in those around it, in any order.
+pub(in crate::mhp) fn decode(own: &[Hypothesis], around: &[Sight]) -> Decoded {
+    let own = Link { t_s: 0.0, of: own };
+    let sides = [-1.0, 1.0].map(|sign: f64| {
+        let mut side: Vec<&Sight> = around.iter().filter(|sight| sight.t_s * sign > 0.0).collect();
+        side.sort_by(|a, b| a.t_s.abs().total_cmp(&b.t_s.abs()));
+        followed(own, &side)
+    });
+    let [past, future] = sides.each_ref().map(|side| message(own, side));
+    let whole: Vec<f64> =
+        zip(shares(own.of), zip(past, future)).map(|(share, (past, future))| share + past + future).collect();
+    let lowest = whole.iter().copied().fold(f64::INFINITY, f64::min);
+    let best = std::iter::once(&own).chain(sides.iter().flatten()).filter_map(|link| link.of.first());
+    let unlike: Vec<f64> = best.map(|best| best.unlikeness).collect();
+    Decoded {
+        costs: whole.iter().map(|cost| cost - lowest + 1.0).collect(),
+        unlikeness: unlike.iter().sum::<f64>() / unlike.len().max(1) as f64,
+    }
+}
+
+/// The person of `own` in the frames on one side, the nearest first, as far as it can be followed.
+fn followed<'a>(own: Link, side: &[&Sight<'a>]) -> Vec<Link<'a>> {
+    let (mut at, mut from_s) = (place(own.of), own.t_s);
+    let mut links = Vec::with_capacity(side.len());
+    for sight in side.iter().filter(|sight| !sight.persons.is_empty()) {
+        let far = |of: &[Hypothesis]| place(of).zip(at).map_or(f64::INFINITY, |(p, q)| flat_distance(p, q));
+        let nearest = sight.persons.iter().min_by(|a, b| far(a).total_cmp(&far(b)));
+        let leash_m = LEASH_M + LEASH_MPS * (sight.t_s - from_s).abs();
+        let Some(of) = nearest.filter(|of| far(of) < leash_m) else { break };
+        (at, from_s) = (place(of), sight.t_s);
+        links.push(Link { t_s: sight.t_s, of });
+    }
+    links
+}
+
+/// Where the likeliest of some hypotheses is.
+fn place(of: &[Hypothesis]) -> Option<Vec3> {
+    of.first().map(|best| mean(&best.joints))
+}
+
+/// The cost of the cheapest path from each hypothesis of `own` to the end of `links`, its own share left out.
+fn message(own: Link, links: &[Link]) -> Vec<f64> {
+    let Some(last) = links.last() else { return vec![0.0; own.of.len()] };
+    let mut beyond = vec![0.0; last.of.len()];
+    for k in (0..links.len()).rev() {
+        let (to, from) = (links[k], if k == 0 { own } else { links[k - 1] });
+        let there: Vec<f64> = zip(shares(to.of), &beyond).map(|(share, beyond)| share + beyond).collect();
+        let cheapest = |a: &Hypothesis| {
+            let each = zip(to.of, &there).map(|(b, there)| there + step(a, b, to.t_s - from.t_s));
+            each.fold(f64::INFINITY, f64::min)
+        };
+        beyond = from.of.iter().map(cheapest).collect();
+    }
+    beyond
+}
+
+/// The losses by the lowest of them.
+fn shares(of: &[Hypothesis]) -> impl Iterator<Item = f64> + '_ {
+    let lowest = of.iter().map(|hypothesis| hypothesis.loss).fold(f64::INFINITY, f64::min);
+    of.iter().map(move |hypothesis| hypothesis.loss / lowest.max(f64::MIN_POSITIVE))
+}
+
+/// What it costs to be `a` and, `dt_s` later, `b`.
+fn step(a: &Hypothesis, b: &Hypothesis, dt_s: f64) -> f64 {
+    let moved = |(p, v): (&Vec3, &Vec3), dt_s: f64| [0, 1, 2].map(|k| p[k] + dt_s * v[k]);
+    let [here, there] = [(a, 0.5 * dt_s), (b, -0.5 * dt_s)]
+        .map(|(of, dt_s)| zip(&of.joints, &of.velocities).map(move |joint| moved(joint, dt_s)));
+    let apart_m: f64 = zip(here, there).map(|(p, q)| norm([0, 1, 2].map(|k| p[k] - q[k]))).sum();
+    (PER_M * apart_m / a.joints.len().max(1) as f64).min(MOST)
+}
+
+/// The place of the smallest number.
+pub(in crate::mhp) fn lowest(costs: &[f64]) -> Option<usize> {
+    (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Somebody at `x` who looks along `yaw`: one shoulder to each side.
+    fn body(x: f64, yaw: f64, loss: f64) -> Hypothesis {
+        let joints = [1.0, -1.0].map(|side| [x - 0.2 * side * yaw.sin(), 0.2 * side * yaw.cos(), 0.0]).to_vec();
+        Hypothesis { loss, unlikeness: loss, yaw, velocities: vec![[1.0, 0.0, 0.0]; 2], beta: vec![0.0; 2], joints }
+    }
+
+    #[test]
+    fn a_frame_alone_has_its_losses() {
+        let own = [body(3.0, 0.0, 0.2), body(3.0, 3.0, 0.25)];
+        let found = decode(&own, &[]);
+        assert_eq!((found.costs, found.unlikeness), (vec![1.0, 1.25], 0.2));
+    }
+
+    #[test]
+    fn the_frames_around_decide_against_one_frame_and_not_against_their_own() {
+        let back = std::f64::consts::PI;
+        // This frame takes the back for better by a tenth; those around the front, by three tenths each.
+        let own = [body(3.0, back, 0.2), body(3.0, 0.0, 0.22)];
+        let others: Vec<(f64, Vec<Vec<Hypothesis>>)> = [-2.0, -1.0, 1.0, 2.0]
+            .map(|k: f64| {
+                let x = 3.0 + 0.1 * k;
+                let elsewhere = vec![body(x + 3.0, back, 0.1)];
+                (0.1 * k, vec![elsewhere, vec![body(x, 0.0, 0.2), body(x, back, 0.26)]])
+            })
+            .to_vec();
+        let around: Vec<Sight> = others.iter().map(|(t_s, persons)| Sight { t_s: *t_s, persons }).collect();
+        let decoded = decode(&own, &around);
+        let found = &decoded.costs;
+        assert!((decoded.unlikeness - 0.2).abs() < 1e-12);
+        assert_eq!(lowest(found), Some(1), "{found:?}");
+        // Two steps to the front of both neighbours cost more than the tenth: as far as the joints are apart, 0.8 each.
+        assert!((found[0] - 1.0 - (4.0 * 0.3_f64).min(1.6) + 0.1).abs() < 1e-9, "{found:?}");
+        // Somebody else, farther than the leash, says nothing.
+        let far: Vec<Sight> = around.iter().map(|sight| Sight { persons: &sight.persons[..1], ..*sight }).collect();
+        assert_eq!(decode(&own, &far), decode(&own, &[]));
+    }
+}

@@ -1,0 +1,129 @@
+//! Starts that the frames of a sequence decide together.
+//!
+//! What the persons of each frame may be is searched in that frame's own window, once: the frames around it ask for it, too, and
+//! so does whoever fits them next. The decision of a frame hangs on a fixed number of frames on each side of it and not on which
+//! frames are fitted with it, in which order or by how many threads.
+
+use super::people::{FoundStart, Sought, find_start_in, seek_in};
+use super::problem::{problem_of, rate_hz};
+use crate::config::{FIELDS, FitConfig, FramesAround, Parameterization};
+use crate::dataset::Dataset;
+use crate::mhp::{FitError, Problem};
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Frames whose hypotheses are kept: those around one, under all variants of the largest study.
+const KEPT: usize = 1024;
+
+/// What a search looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Key {
+    dataset: u64,
+    frame: usize,
+    config: FitConfig,
+}
+
+/// What was found, or why nothing; `None` before anybody looked, and who looks holds the lock.
+struct Slot {
+    key: Key,
+    found: Mutex<Option<Result<Arc<Sought>, FitError>>>,
+}
+
+impl Slot {
+    /// Looks where nobody did.
+    fn filled(
+        found: &mut Option<Result<Arc<Sought>, FitError>>,
+        look: impl FnOnce() -> Result<Sought, FitError>,
+    ) -> &Result<Arc<Sought>, FitError> {
+        found.get_or_insert_with(|| look().map(Arc::new))
+    }
+}
+
+/// The slots that were asked for last, the latest first.
+static SLOTS: Mutex<VecDeque<Arc<Slot>>> = Mutex::new(VecDeque::new());
+
+/// A configuration with everything at its default that a start does not depend on: two with the same key start from the same
+/// pose. Where postures are tried, the unweighted L_EM alone decides between them; a search in a space of motion weighs it.
+pub fn start_key(config: &FitConfig) -> FitConfig {
+    let (mut key, plain) = (*config, FitConfig::default());
+    FIELDS.iter().filter(|field| !field.read_by.by_cold_start()).for_each(|field| field.take(&mut key, &plain));
+    if config.parameterization == Parameterization::Motion {
+        (key.w_em, key.w_prior) = (config.w_em, config.w_prior);
+    }
+    key
+}
+
+/// As [`find_start_in`], but the [`FitConfig::decode_frames`] frames on each side, as far as the settings look at frames around,
+/// decide with this one which body is fitted.
+///
+/// # Errors
+/// As [`find_start_in`]. What is wrong with another frame is said there; it decides nothing here.
+pub fn find_start_along(
+    dataset: &Dataset,
+    frame: usize,
+    problem: &Arc<Problem>,
+    config: &FitConfig,
+) -> Result<FoundStart, FitError> {
+    let reach = around(dataset, frame, config);
+    if reach.len() < 2 || config.parameterization != Parameterization::Motion {
+        return find_start_in(dataset, frame, problem, config);
+    }
+    let key = |frame: usize| Key { dataset: dataset.id(), frame, config: start_key(config) };
+    let slots: Vec<Arc<Slot>> = reach.clone().map(|other| slot(&key(other))).collect();
+    let look = |slot: &Slot| match slot.key.frame {
+        own if own == frame => seek_in(dataset, frame, problem, config),
+        other => seek(dataset, other, config),
+    };
+    // First what nobody looks at, then what others looked at meanwhile.
+    for slot in &slots {
+        if let Ok(mut found) = slot.found.try_lock() {
+            Slot::filled(&mut found, || look(slot));
+        }
+    }
+    let looked = |slot: &Arc<Slot>| {
+        let mut found = slot.found.lock().unwrap_or_else(PoisonError::into_inner);
+        Slot::filled(&mut found, || look(slot)).clone()
+    };
+    let mut own = None;
+    let mut others = Vec::with_capacity(slots.len());
+    for (slot, other) in slots.iter().zip(reach) {
+        match looked(slot) {
+            found if other == frame => own = Some(found),
+            Ok(found) => others.push(((other as f64 - frame as f64) / rate_hz(dataset), found)),
+            Err(_) => {}
+        }
+    }
+    let Some(own) = own else { return find_start_in(dataset, frame, problem, config) };
+    let sights: Vec<(f64, &Sought)> = others.iter().map(|(t_s, found)| (*t_s, found.as_ref())).collect();
+    own?.start(problem, &sights)
+}
+
+/// The frames of the sequence of `frame` that decide with it.
+fn around(dataset: &Dataset, frame: usize, config: &FitConfig) -> Range<usize> {
+    let most = config.decode_frames;
+    let [before, after] = match config.frames_around {
+        FramesAround::Both => [most, most],
+        FramesAround::Past => [most, 0],
+        FramesAround::None => [0, 0],
+    };
+    let sequence = dataset.sequence(frame);
+    let own = |other: &usize| dataset.sequence(*other) == sequence;
+    let first = (frame.saturating_sub(before)..frame).rev().take_while(own).last().unwrap_or(frame);
+    let last = (frame + 1..(frame + 1 + after).min(dataset.len())).take_while(own).last().unwrap_or(frame);
+    first..last + 1
+}
+
+fn slot(key: &Key) -> Arc<Slot> {
+    let mut slots = SLOTS.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = slots.iter().position(|slot| slot.key == *key).and_then(|k| slots.remove(k));
+    let slot = known.unwrap_or_else(|| Arc::new(Slot { key: *key, found: Mutex::default() }));
+    slots.push_front(Arc::clone(&slot));
+    slots.truncate(KEPT);
+    slot
+}
+
+fn seek(dataset: &Dataset, frame: usize, config: &FitConfig) -> Result<Sought, FitError> {
+    let read = dataset.load(frame).map_err(|error| FitError::NoStart { reason: error.to_string() })?;
+    seek_in(dataset, frame, &Arc::new(problem_of(dataset, &read)?), config)
+}
