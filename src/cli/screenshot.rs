@@ -10,6 +10,7 @@ use crate::session::{Command, FitStatus, LabelStatus, StrataStatus, ThemeChoice}
 use anyhow::{Context as _, bail};
 use clap::{Args, ValueEnum};
 use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -165,6 +166,11 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
         }
     }
     harness.run_steps(3);
+    // A test waits for somebody to ask for it.
+    if let Some(button) = pane.and_then(|_| harness.query_by_label("Test this pose")) {
+        button.click();
+        harness.run_steps(1);
+    }
     until(&mut harness, "the panes", |app| !app.panes_are_working() && !app.session().explore.any_running())?;
     harness.run_steps(1);
     let mut picture = harness.render().map_err(|e| anyhow::anyhow!("the window cannot be drawn: {e}"))?;

@@ -21,8 +21,6 @@ pub struct FoundStart {
 #[derive(Debug, Clone)]
 pub(super) struct Sought {
     hypotheses: Hypotheses,
-    /// The settings, with as many people as are looked for.
-    config: FitConfig,
     count: Option<Count>,
     /// What the count said.
     note: Option<String>,
@@ -30,9 +28,14 @@ pub(super) struct Sought {
 
 impl Sought {
     /// The start, decided by the frames `around` with it, each with its time, s after this one.
-    pub(super) fn start(&self, problem: &Arc<Problem>, around: &[(f64, &Self)]) -> Result<FoundStart, FitError> {
+    pub(super) fn start(
+        &self,
+        problem: &Arc<Problem>,
+        config: &FitConfig,
+        around: &[(f64, &Self)],
+    ) -> Result<FoundStart, FitError> {
         let around: Vec<(f64, &Hypotheses)> = around.iter().map(|&(t_s, other)| (t_s, &other.hypotheses)).collect();
-        let mut initialisation = self.hypotheses.start(problem, &self.config, &around)?;
+        let mut initialisation = self.hypotheses.start(problem, config, &around)?;
         initialisation.notes.splice(0..0, self.note.clone());
         Ok(FoundStart { initialisation, count: self.count.clone() })
     }
@@ -47,7 +50,7 @@ const SURE: f64 = 0.9;
 /// # Errors
 /// [`FitError::NoStart`] where nothing stands above the background, or surely nobody is there.
 pub fn find_start(problem: &Arc<Problem>, config: &FitConfig) -> Result<FoundStart, FitError> {
-    seek(problem, config, || count(problem, config))?.start(problem, &[])
+    seek(problem, config, || count(problem, config))?.start(problem, config, &[])
 }
 
 /// As [`find_start`] for frame `frame` of a data set; people are counted with up to two seconds of frames before it
@@ -61,7 +64,7 @@ pub fn find_start_in(
     problem: &Arc<Problem>,
     config: &FitConfig,
 ) -> Result<FoundStart, FitError> {
-    seek_in(dataset, frame, problem, config)?.start(problem, &[])
+    seek_in(dataset, frame, problem, config)?.start(problem, config, &[])
 }
 
 /// As [`find_start_in`], before one of the hypotheses is chosen.
@@ -120,7 +123,7 @@ fn one(problem: &Arc<Problem>, config: &FitConfig, counted: Option<&Count>) -> R
 }
 
 fn sought(problem: &Arc<Problem>, config: &FitConfig, seeds: &[Vec3]) -> Result<Sought, FitError> {
-    Ok(Sought { hypotheses: Hypotheses::new(problem, config, seeds)?, config: *config, count: None, note: None })
+    Ok(Sought { hypotheses: Hypotheses::new(problem, config, seeds)?, count: None, note: None })
 }
 
 /// Counts the people of a frame, with those of the frames around it that a start may look at: those after it tell as much as

@@ -6,7 +6,7 @@
 
 use super::people::{FoundStart, Sought, find_start_in, seek_in};
 use super::problem::{problem_of, rate_hz};
-use crate::config::{FIELDS, FitConfig, FramesAround, Parameterization};
+use crate::config::{EmLoss, FIELDS, FitConfig, FramesAround, Parameterization};
 use crate::dataset::Dataset;
 use crate::mhp::{FitError, Problem};
 use std::collections::VecDeque;
@@ -44,14 +44,20 @@ impl Slot {
 static SLOTS: Mutex<VecDeque<Arc<Slot>>> = Mutex::new(VecDeque::new());
 
 /// A configuration with everything at its default that a start does not depend on: two with the same key start from the same
-/// pose. Where postures are tried, the unweighted L_EM alone decides between them; a search in a space of motion weighs it.
+/// pose. Where postures are tried, the unweighted L_EM alone decides between them, and a search in a space of motion has weights of
+/// its own.
 pub fn start_key(config: &FitConfig) -> FitConfig {
     let (mut key, plain) = (*config, FitConfig::default());
     FIELDS.iter().filter(|field| !field.read_by.by_cold_start()).for_each(|field| field.take(&mut key, &plain));
-    if config.parameterization == Parameterization::Motion {
-        (key.w_em, key.w_prior) = (config.w_em, config.w_prior);
-    }
     key
+}
+
+/// As [`start_key`], of what a search in a space of motion depends on: neither who else decides nor, where levels are compared, how
+/// masks are made.
+fn search_key(config: &FitConfig) -> FitConfig {
+    let plain = FitConfig::default();
+    let tau_pct = if config.objective == EmLoss::Iou { config.tau_pct } else { plain.tau_pct };
+    FitConfig { decode_frames: plain.decode_frames, tau_pct, ..start_key(config) }
 }
 
 /// As [`find_start_in`], but the [`FitConfig::decode_frames`] frames on each side, as far as the settings look at frames around,
@@ -69,7 +75,8 @@ pub fn find_start_along(
     if reach.len() < 2 || config.parameterization != Parameterization::Motion {
         return find_start_in(dataset, frame, problem, config);
     }
-    let key = |frame: usize| Key { dataset: dataset.id(), frame, config: start_key(config) };
+    let searched = search_key(config);
+    let key = |frame: usize| Key { dataset: dataset.id(), frame, config: searched };
     let slots: Vec<Arc<Slot>> = reach.clone().map(|other| slot(&key(other))).collect();
     let look = |slot: &Slot| match slot.key.frame {
         own if own == frame => seek_in(dataset, frame, problem, config),
@@ -96,7 +103,7 @@ pub fn find_start_along(
     }
     let Some(own) = own else { return find_start_in(dataset, frame, problem, config) };
     let sights: Vec<(f64, &Sought)> = others.iter().map(|(t_s, found)| (*t_s, found.as_ref())).collect();
-    own?.start(problem, &sights)
+    own?.start(problem, config, &sights)
 }
 
 /// The frames of the sequence of `frame` that decide with it.

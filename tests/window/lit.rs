@@ -15,7 +15,7 @@ fn the_joints_that_light_a_cell_are_told() {
     window.show("Who lit it");
     window.key(Key::R);
     window.harness.run_steps(3);
-    assert!(window.says("Point at a cell of any map"));
+    assert!(window.says("The brightest cell of H_sim"));
     let map = window.node("H_sim map of hori").rect();
     let at = pos2(map.left() + 0.5 * map.width(), map.top() + 0.5 * map.height());
     window.harness.hover_at(at);

@@ -28,8 +28,9 @@ pub(super) static PANE: Pane = Pane {
     ui: |ui, shared, _| show(ui, shared),
 };
 
-/// Width of the list of minima, points.
+/// Width of the list of minima, points, and where there is much room.
 const LIST: f32 = 228.0;
+const WIDEST_LIST: f32 = 320.0;
 /// An evaluation takes about so much of a step, which has a gradient too.
 const OF_A_STEP: f64 = 0.6;
 
@@ -81,7 +82,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
     if rect.width() < 220.0 || rect.height() < 80.0 {
         return;
     }
-    let list = if rect.width() > 640.0 { LIST } else { 0.0 };
+    let list = if rect.width() > 640.0 { (0.2 * rect.width()).clamp(LIST, WIDEST_LIST) } else { 0.0 };
     let pictures = rect.with_max_x(rect.max.x - list);
     let floor_share = if pictures.width() > 380.0 { 0.5 } else { 1.0 };
     let middle = pictures.min.x + floor_share * pictures.width();

@@ -103,14 +103,18 @@ fn color(session: &Session, joint: usize, tokens: &Tokens) -> Color32 {
 fn lit_by(ui: &mut Ui, shared: &mut Shared<'_>, state: &State, tokens: &Tokens) {
     let session = shared.session;
     let (Some(lit), Some(dataset)) = (lit(ui.ctx(), session), &session.data.dataset) else { return };
+    let views = &dataset.info().views;
     let pointed = state.cell.and_then(|(index, pixel)| {
-        let view = dataset.info().views.get(index)?;
+        let view = views.get(index)?;
         let map = session.fit.shown.as_ref()?.h_sim.get(index).map(Vec::as_slice);
         let cell = cell_at(view, Orientation::of(view, session.view.cube), pixel, map)?;
         Some((index, view, cell))
     });
-    let Some((index, view, cell)) = pointed else {
-        ui.label(RichText::new("Point at a cell of any map.").small().color(tokens.dim));
+    if pointed.is_none() {
+        let hint = "The brightest cell of H_sim. Point at a cell of any map for another one.";
+        ui.label(RichText::new(hint).small().color(tokens.dim));
+    }
+    let Some((index, view, cell)) = pointed.or_else(|| Some((0, views.first()?, brightest(session, 0)?))) else {
         return;
     };
     let returns = lit.returns.at(index, cell);
@@ -150,6 +154,12 @@ fn lit_by(ui: &mut Ui, shared: &mut Shared<'_>, state: &State, tokens: &Tokens) 
     if side > 40.0 {
         phasors(ui, session, diagram, &returns, tokens);
     }
+}
+
+/// The flat index of the cell where H_sim of a view is largest.
+fn brightest(session: &Session, view: usize) -> Option<usize> {
+    let map = session.fit.shown.as_ref()?.h_sim.get(view)?;
+    (0..map.len()).max_by(|&a, &b| map[a].total_cmp(&map[b]))
 }
 
 /// A bar of a joint.

@@ -166,6 +166,10 @@ impl Session {
         let grid = axes.iter().map(crate::explore::TuningAxis::grid).collect::<Result<Vec<_>, _>>()?;
         // What the axes set is the same in every cell, whatever is set now.
         let mut base = self.config;
+        if !self.along {
+            // As the fit on screen begins: its frame by itself.
+            base.decode_frames = 0;
+        }
         for field in axes.iter().filter_map(|axis| axis.field().ok()) {
             field.set(&mut base, field.default());
         }

@@ -33,8 +33,9 @@ pub(super) static PANE: Pane = Pane {
     ui: |ui, shared, _| show(ui, shared),
 };
 
-/// Width of the numbers beside the picture, points.
+/// Width of the numbers beside the picture, points, and where there is much room.
 const NUMBERS: f32 = 200.0;
+const WIDEST_NUMBERS: f32 = 300.0;
 /// Evaluations of a slice along one direction, and over two.
 const EVALUATIONS: [f64; 2] = [241.0, 6561.0];
 
@@ -74,7 +75,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
     if rect.width() < 160.0 || rect.height() < 60.0 {
         return;
     }
-    let beside = if rect.width() > 460.0 { NUMBERS } else { 0.0 };
+    let beside = if rect.width() > 460.0 { (0.2 * rect.width()).clamp(NUMBERS, WIDEST_NUMBERS) } else { 0.0 };
     let picture = rect.with_max_x(rect.max.x - beside);
     let response = ui.interact(picture, ui.scope_id().with("landscape"), Sense::click());
     let marks = marks::of(session, &slice);

@@ -28,6 +28,8 @@ const PLAIN: f64 = 10.0;
 /// Evaluations of a person's search beside those of the first sieve, and those of a start in it, in whole windows.
 const LATER: f64 = 250.0;
 const FIRST: f64 = 7.0 / 4.0;
+/// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start.
+const WEIGHTS: [f64; 2] = [0.5, 8e-3];
 /// Starts whose joints have come nearer to each other than this, on average, have become one, m.
 const ONE_M: f64 = 0.03;
 /// A heading whose loss is larger by a smaller share than this is as good.
@@ -54,7 +56,7 @@ struct Sieve {
 /// A body that a search ended at, in the frame that is fitted.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::mhp) struct Hypothesis {
-    /// w_EM L_EM + w_prior L_prior of the window with this body in it.
+    /// L of the window, by the search's weights, with this body in it.
     pub(in crate::mhp) loss: f64,
     /// How little it explains the maps ([`super::unlikeness`]), and how far it is from the start.
     pub(in crate::mhp) unlikeness: f64,
@@ -192,6 +194,8 @@ pub(in crate::mhp) fn search(
     config: &FitConfig,
     params: &Pppr,
 ) -> Result<Result<Searched, Held>, FitError> {
+    let [w_em, w_prior] = WEIGHTS;
+    let config = &FitConfig { w_em, w_prior, ..*config };
     let mut window = match Window::new(problem, config, Precision::F32, params)? {
         Ok(window) => window,
         Err(held) => return Ok(Err(held)),
