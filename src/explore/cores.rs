@@ -6,7 +6,7 @@
 
 use crate::task::{Cancelled, Progress};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, LazyLock, Mutex, PoisonError};
 use std::time::Duration;
 
 /// Cores that a running fit and the window need.
@@ -65,7 +65,9 @@ impl IdleCores {
 }
 
 fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
+    // Asked between the steps of a fit: the system answers from files.
+    static CORES: LazyLock<usize> = LazyLock::new(|| std::thread::available_parallelism().map_or(1, usize::from));
+    *CORES
 }
 
 /// A thread at work: what a long piece asks between its steps.

@@ -8,6 +8,7 @@
 
 mod bed;
 mod fits;
+mod networks;
 mod people;
 mod reference;
 mod speed;
@@ -28,12 +29,14 @@ const SECTIONS: &[Section] = &[
     Section { key: "reference", heading: "Reference cases", write: reference::section },
     Section { key: "fits", heading: "Fits against truth", write: fits::section },
     Section { key: "people", heading: "Several people", write: people::several },
+    Section { key: "networks", heading: "Networks beside the fit", write: networks::section },
     Section { key: "counting", heading: "Counting", write: people::counting },
     Section { key: "studies", heading: "Studies of the bundled sample", write: studies::section },
     Section { key: "speed", heading: "Speed", write: speed::section },
     Section { key: "growth", heading: "How an iteration grows", write: speed::growth },
     Section { key: "watched", heading: "What being watched costs", write: speed::watched },
     Section { key: "live", heading: "How a fit follows a finger", write: speed::live },
+    Section { key: "explorations", heading: "Explorations", write: speed::explorations },
     Section { key: "large", heading: "A batch as large as MMVR", write: speed::large },
     Section { key: "fuzz", heading: "Mutated inputs", write: speed::fuzz },
 ];

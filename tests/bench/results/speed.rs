@@ -111,6 +111,32 @@ pub(crate) fn live(_: &Bed) -> String {
     Bed::with_window("cargo bench --locked --bench live", &[])
 }
 
+/// With `baseline` in the window, and with `recommended` on the command line, fit and search included.
+pub(crate) fn explorations(bed: &Bed) -> String {
+    let figures = Bed::with_window("cargo test --locked --release --test window figures -- --ignored --nocapture", &[]);
+    let mut data = vec![("`samples/walk`, frame 3", Bed::own("samples/walk"), "3")];
+    data.extend(Bed::shared("data/mmvr").map(|path| ("a real MMVR frame", path, "0")));
+    let mut rows = vec![row(&["`explore … --preset recommended`, s", "tuning", "ambiguity", "restarts"])];
+    for (name, path, frame) in data {
+        let path = path.to_str().unwrap();
+        let grid = ["--grid", "w_em=0.05..5:24log", "--grid", "tau_pct=2..40:24log"];
+        let tuning = ["explore", "tuning", path, "--frames", frame, "--preset", "recommended"];
+        let of = |kind: &'static str| vec!["explore", kind, path, "--frame", frame, "--preset", "recommended"];
+        let commands = [tuning.into_iter().chain(grid).collect(), of("ambiguity"), of("restarts")];
+        let seconds = commands.map(|words| {
+            let began = std::time::Instant::now();
+            bed.program(&words);
+            format!("{:.1}", began.elapsed().as_secs_f64())
+        });
+        rows.push(std::iter::once(name.to_owned()).chain(seconds).collect());
+    }
+    format!(
+        "{figures}\n\nA tuning map has 24 × 24 fits, an ambiguity map twice 128 × 128 evaluations, a restart cloud 200 fits. With \
+         `recommended`, the start and, along a sequence, those around it included:\n\n{}",
+        table(&rows)
+    )
+}
+
 pub(crate) fn large(_: &Bed) -> String {
     let size = [("MHP_LARGE_FRAMES", "355500"), ("MHP_LARGE_BATCH_ONLY", "1")];
     Bed::with_window("cargo test --locked --release --test window large -- --ignored --nocapture", &size)
