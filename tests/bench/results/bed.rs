@@ -48,12 +48,20 @@ impl Bed {
 
     /// Runs the program and answers what it printed.
     pub(crate) fn program(&self, arguments: &[&str]) -> String {
+        self.tried(arguments).unwrap_or_else(|said| panic!("{arguments:?}: {said}"))
+    }
+
+    /// Runs the program and answers what it printed, or what it complained of.
+    pub(crate) fn tried(&self, arguments: &[&str]) -> Result<String, String> {
         let program = std::env::var_os("MHP_PROGRAM").unwrap_or_else(|| env!("CARGO_BIN_EXE_mhp-inspector").into());
         let mut command = Command::new(program);
         let output = command.args(arguments).current_dir(self.folder.path()).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.code().is_some_and(|code| code < 2), "{arguments:?}: {said}");
-        String::from_utf8(output.stdout).unwrap()
+        let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
+        if output.status.code().is_some_and(|code| code < 2) {
+            Ok(text(output.stdout))
+        } else {
+            Err(text(output.stderr))
+        }
     }
 
     /// Simulates a data set, once.

@@ -1,7 +1,6 @@
 //! Networks that read fits beside those that read maps: the paper's A.6, and the same without its pooling.
 
 use super::bed::{Bed, row, table};
-use std::process::Command;
 
 /// What is learned from, and what is asked: no sequence of the one is in the other.
 const LESSONS: &str = "--preset easy,medium,hard --frames 2400 --sequence-length 12 --people 1 --seed 2301";
@@ -38,22 +37,20 @@ pub(crate) fn section(bed: &Bed) -> String {
     }
     for (k, (name, features, model)) in NETWORKS.into_iter().enumerate() {
         let out = format!("network-{k}");
-        let trained = run(
-            bed,
-            &[
-                "train-pose",
-                "lessons",
-                "--params",
-                "lessons-fits",
-                "--features",
-                features,
-                "--model",
-                model,
-                "--out",
-                &out,
-            ],
-        );
+        let trained = bed.tried(&[
+            "train-pose",
+            "lessons",
+            "--params",
+            "lessons-fits",
+            "--features",
+            features,
+            "--model",
+            model,
+            "--out",
+            &out,
+        ]);
         if let Err(why) = trained {
+            let why = why.lines().find(|line| line.starts_with("error")).unwrap_or_default();
             return format!(
                 "Not measured: {why}\n\nIt needs a program that was built with `--features train` (`MHP_PROGRAM`)."
             );
@@ -63,7 +60,7 @@ pub(crate) fn section(bed: &Bed) -> String {
         for set in ["unseen", "generic"] {
             let (file, fits) = (format!("{out}-{set}.npz"), format!("{set}-fits"));
             let model = format!("{out}/model.safetensors");
-            match run(bed, &["predict", &model, set, "--params", &fits, "--out", &file]) {
+            match bed.tried(&["predict", &model, set, "--params", &fits, "--out", &file]) {
                 Ok(said) => {
                     let number = |before: &str, after: &str| -> String {
                         let found = said.split(after).next().and_then(|text| text.rsplit(before).next());
@@ -104,15 +101,4 @@ fn told(bed: &Bed, name: &str, columns: [&str; 2]) -> String {
         if all.is_empty() { "–".to_owned() } else { format!("{:.1}", all.iter().sum::<f64>() / all.len() as f64) }
     };
     columns.map(mean).join(" / ")
-}
-
-/// Runs the program; what it printed, or the first line of what it complained of.
-fn run(bed: &Bed, arguments: &[&str]) -> Result<String, String> {
-    let program = std::env::var_os("MHP_PROGRAM").unwrap_or_else(|| env!("CARGO_BIN_EXE_mhp-inspector").into());
-    let output = Command::new(program).args(arguments).current_dir(bed.path("")).output().unwrap();
-    if output.status.code().is_some_and(|code| code < 2) {
-        return Ok(String::from_utf8(output.stdout).unwrap());
-    }
-    let said = String::from_utf8_lossy(&output.stderr);
-    Err(said.lines().find(|line| line.starts_with("error")).unwrap_or("it ended without a word").to_owned())
 }
