@@ -92,18 +92,15 @@ pub fn find_start_along(
         let mut found = slot.found.lock().unwrap_or_else(PoisonError::into_inner);
         Slot::filled(&mut found, || look(slot)).clone()
     };
-    let mut own = None;
-    let mut others = Vec::with_capacity(slots.len());
-    for (slot, other) in slots.iter().zip(reach) {
-        match looked(slot) {
-            found if other == frame => own = Some(found),
-            Ok(found) => others.push(((other as f64 - frame as f64) / rate_hz(dataset), found)),
-            Err(_) => {}
-        }
-    }
-    let Some(own) = own else { return find_start_in(dataset, frame, problem, config) };
-    let sights: Vec<(f64, &Sought)> = others.iter().map(|(t_s, found)| (*t_s, found.as_ref())).collect();
-    own?.start(problem, config, &sights)
+    let own = looked(&slots[frame - reach.start])?;
+    let t_s = |other: usize| (other as f64 - frame as f64) / rate_hz(dataset);
+    let others: Vec<(f64, Arc<Sought>)> = slots
+        .iter()
+        .filter(|slot| slot.key.frame != frame)
+        .filter_map(|slot| Some((t_s(slot.key.frame), looked(slot).ok()?)))
+        .collect();
+    let around: Vec<(f64, &Sought)> = others.iter().map(|(t_s, found)| (*t_s, found.as_ref())).collect();
+    own.start(problem, config, &around)
 }
 
 /// The frames of the sequence of `frame` that decide with it.
