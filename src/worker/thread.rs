@@ -340,7 +340,7 @@ impl Job {
         let Prepare { job, branch, dataset, frame, config, precision, start, erased, around } = prepare;
         let problem = Arc::new(problem_of(&dataset, &frame)?);
         let began = Instant::now();
-        let (found_start, initial, state) = match start {
+        let (mut found_start, initial, state) = match start {
             Start::Initialise | Start::Along => {
                 let find = if matches!(start, Start::Along) { find_start_along } else { find_start_in };
                 let found = find(&dataset, frame.index, &problem, &config)?;
@@ -355,6 +355,9 @@ impl Job {
         let seen = without(&problem, &erased)?;
         let region = around.as_deref().unwrap_or(&initial);
         let mut fitter = Fitter::new(Arc::clone(&seen), config, precision, region.clone())?;
+        if let Some(found) = found_start.as_mut().filter(|_| fitter.is_held()) {
+            found.initialisation.tell_held();
+        }
         let viewer = Objective::new(Arc::clone(&seen), config, precision, region)?;
         let warnings = viewer.warnings().to_vec();
         let resumed = state.is_some();

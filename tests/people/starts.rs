@@ -1,7 +1,7 @@
 //! Starts of as many as are counted: with the frames before that the counter was taught with, whatever was counted before.
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
-use mhp_inspector::config::{FitConfig, FramesAround, Preset};
+use mhp_inspector::config::{FitConfig, FramesAround, Parameterization, Preset};
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::start::{FoundStart, count_people, find_start_along, find_start_in, problem_of};
 use mhp_inspector::study::count::count_frames;
@@ -83,4 +83,15 @@ fn a_start_along_a_sequence_is_the_same_in_every_order() {
     assert_eq!(along_note(&along(&onward, 10, &past).motion).as_deref(), Some("3 frames"));
     let alone = FitConfig { decode_frames: 0, ..config };
     assert_eq!(along(&onward, 10, &alone), started(&onward, 10, &config).initialisation);
+}
+
+#[test]
+fn what_is_said_of_a_start_is_the_posture_that_it_has() {
+    let dataset = sample("walk");
+    let config = FitConfig { parameterization: Parameterization::Joints, starts: 9, ..Preset::Recommended.config() };
+    let walking = |frame: usize| {
+        let notes = started(&dataset, frame, &config).initialisation.notes;
+        notes.iter().any(|note| note.starts_with("walking at x"))
+    };
+    assert!([4, 10, 16, 22].into_iter().any(walking), "somebody who walks is started in a stride");
 }

@@ -203,6 +203,12 @@ impl Fitter {
         &self.state.params
     }
 
+    /// Whether a fit in a space of motion leaves the persons where they start: its prior knows nothing of the skeleton, or the
+    /// start explains the maps too little.
+    pub fn is_held(&self) -> bool {
+        self.config().parameterization == Parameterization::Motion && self.window.is_none()
+    }
+
     /// Adam steps taken.
     pub fn iteration(&self) -> usize {
         self.state.iteration

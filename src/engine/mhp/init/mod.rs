@@ -16,8 +16,8 @@
 //! Switches beside the default setting refine the start: where counting finds the one person, behind the skin, on the
 //! line through the frames around, as high as floor and head say in all of them ([`context`]), in the posture that fits
 //! ([`pose`]). What it is without them is kept beside it. A search in the space of motion ends at several bodies; which of them
-//! a person is, the frames around may decide ([`Hypotheses`]). What the maps show is worked out once for a problem ([`context`]). A warm start goes where the persons of
-//! the frame before went ([`warm`]).
+//! a person is, the frames around may decide ([`Hypotheses`]). What the maps show is worked out once for a problem
+//! ([`context`]). A warm start goes where the persons of the frame before went ([`warm`]).
 //!
 //! Nothing here reads a label.
 
@@ -37,7 +37,7 @@ pub use warm::predict;
 use super::context::{
     self, Expectation, Peak, SaliencyMap, Sighting, Stature, Track, apart_m, behind_skin, bent_if_below, near,
 };
-use super::motion::{self, Decoded, Held, Hypothesis, Searched, Sight};
+use super::motion::{self, Decoded, Held, Hypothesis, Searched, Stage};
 use super::template::Template;
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
@@ -76,6 +76,19 @@ pub struct Initialisation {
     /// What a search in the space of motion found, or why a fit in it leaves the persons where they start; both are among the
     /// notes.
     pub motion: Option<Result<String, &'static str>>,
+}
+
+impl Initialisation {
+    /// Tells of a fit that is held at the body which a search found ([`super::Fitter::is_held`]).
+    pub fn tell_held(&mut self) {
+        if let Some(Ok(note)) = &mut self.motion {
+            let line = self.notes.iter().position(|other| other == note);
+            note.push_str("; the fit leaves it there: its levels correlate by less than 0.8 (0.84 of who stands)");
+            if let Some(line) = line {
+                self.notes[line].clone_from(note);
+            }
+        }
+    }
 }
 
 /// A person before it has parameters.
@@ -219,43 +232,44 @@ impl Hypotheses {
         around: &[(f64, &Self)],
     ) -> Result<Initialisation, FitError> {
         let model = ScattererModel::new(&problem.skeleton, config.scatterers);
-        let mut notes = self.notes.clone();
+        let (mut persons, mut notes) = (self.persons.clone(), self.notes.clone());
         let chosen = self.searched.as_ref().map(|searched| {
             let searched = searched.as_ref().map_err(|held| *held)?;
             chosen(searched, around).ok_or(Held::Unlike)
         });
         let (params, motion) = match chosen {
             Some(Ok((bodies, note))) => {
-                let mut params = assemble(problem, config, &model, &self.persons);
+                let mut params = assemble(problem, config, &model, &persons);
                 bodies.iter().enumerate().for_each(|(person, body)| body.place(person, &mut params));
                 notes.push(note.clone());
                 (params, Some(Ok(note)))
             }
-            Some(Err(held)) => (self.posture(problem, config, Some(held), &mut notes)?, Some(Err(held.note()))),
-            None => (self.posture(problem, config, None, &mut notes)?, None),
+            Some(Err(held)) => {
+                (self.posture(problem, config, Some(held), (&mut persons, &mut notes))?, Some(Err(held.note())))
+            }
+            None => (self.posture(problem, config, None, (&mut persons, &mut notes))?, None),
         };
         let (mut params, mut unrefined) = (params, assemble(problem, &unrefined(config), &model, &self.own));
         for start in [&mut params, &mut unrefined] {
             perturb::perturb(problem, &config.init, start);
         }
-        notes.extend(self.persons.iter().flat_map(|person| notes_of(person, config)));
+        notes.extend(persons.iter().flat_map(|person| notes_of(person, config)));
         Ok(Initialisation { params, unrefined, peaks: self.peaks.clone(), notes, motion })
     }
 
-    /// The persons in the postures that explain their masks best, where `held` they are turned and moved as levels say.
+    /// The `persons` in the postures that explain their masks best; where `held` they are turned and moved as levels say.
     fn posture(
         &self,
         problem: &Arc<Problem>,
         config: &FitConfig,
         held: Option<Held>,
-        notes: &mut Vec<String>,
+        (persons, notes): (&mut [Person], &mut Vec<String>),
     ) -> Result<Pppr, FitError> {
-        let mut persons = self.persons.clone();
         if config.starts > 1 {
-            choose_postures(problem, config, &Template::new(&problem.skeleton), &mut persons)?;
+            choose_postures(problem, config, &Template::new(&problem.skeleton), persons)?;
         }
         let model = ScattererModel::new(&problem.skeleton, config.scatterers);
-        let mut params = assemble(problem, config, &model, &persons);
+        let mut params = assemble(problem, config, &model, persons);
         let joints = params.shape().joints;
         let moved = self.searched.iter().flatten().flat_map(|searched| &searched.moved);
         for (k, &way) in moved.enumerate().filter(|(_, way)| norm(**way) > 0.0) {
@@ -273,15 +287,15 @@ impl Hypotheses {
     }
 
     /// What other frames are told of this one, `t_s` after them.
-    fn sight(&self, t_s: f64) -> Option<Sight<'_>> {
+    fn stage(&self, t_s: f64) -> Option<Stage<'_>> {
         let searched = self.searched.as_ref()?.as_ref().ok()?;
-        Some(Sight { t_s, persons: &searched.persons })
+        Some(Stage { t_s, persons: &searched.persons })
     }
 }
 
 /// The body of each person on the cheapest path, and what is said of them; `None` where bodies do not explain the maps.
 fn chosen<'a>(searched: &'a Searched, around: &[(f64, &Hypotheses)]) -> Option<(Vec<&'a Hypothesis>, String)> {
-    let seen: Vec<Sight> = around.iter().filter_map(|&(t_s, other)| other.sight(t_s)).collect();
+    let seen: Vec<Stage> = around.iter().filter_map(|&(t_s, other)| other.stage(t_s)).collect();
     let decoded: Vec<Decoded> = searched.persons.iter().map(|own| motion::decode(own, &seen)).collect();
     let unlikeness = decoded.iter().map(|person| person.unlikeness).sum::<f64>() / decoded.len().max(1) as f64;
     if motion::is_unlike(unlikeness) {

@@ -22,9 +22,9 @@ const MOST: f64 = 0.9;
 const LEASH_M: f64 = 0.4;
 const LEASH_MPS: f64 = 2.0;
 
-/// What the persons of a frame may be, and when that is, s after the frame that is fitted.
+/// A stage of the trellis: what the persons of a frame may be, and when that is, s after the frame that is fitted.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::mhp) struct Sight<'a> {
+pub(in crate::mhp) struct Stage<'a> {
     pub(in crate::mhp) t_s: f64,
     /// A list a person.
     pub(in crate::mhp) persons: &'a [Vec<Hypothesis>],
@@ -48,10 +48,10 @@ pub(in crate::mhp) struct Decoded {
 }
 
 /// Decodes one person of a frame by what is seen in those around it, in any order.
-pub(in crate::mhp) fn decode(own: &[Hypothesis], around: &[Sight]) -> Decoded {
+pub(in crate::mhp) fn decode(own: &[Hypothesis], around: &[Stage]) -> Decoded {
     let own = Link { t_s: 0.0, of: own };
     let sides = [-1.0, 1.0].map(|sign: f64| {
-        let mut side: Vec<&Sight> = around.iter().filter(|sight| sight.t_s * sign > 0.0).collect();
+        let mut side: Vec<&Stage> = around.iter().filter(|stage| stage.t_s * sign > 0.0).collect();
         side.sort_by(|a, b| a.t_s.abs().total_cmp(&b.t_s.abs()));
         followed(own, &side)
     });
@@ -68,16 +68,16 @@ pub(in crate::mhp) fn decode(own: &[Hypothesis], around: &[Sight]) -> Decoded {
 }
 
 /// The person of `own` in the frames on one side, the nearest first, as far as it can be followed.
-fn followed<'a>(own: Link, side: &[&Sight<'a>]) -> Vec<Link<'a>> {
+fn followed<'a>(own: Link, side: &[&Stage<'a>]) -> Vec<Link<'a>> {
     let (mut at, mut from_s) = (place(own.of), own.t_s);
     let mut links = Vec::with_capacity(side.len());
-    for sight in side.iter().filter(|sight| !sight.persons.is_empty()) {
+    for stage in side.iter().filter(|stage| !stage.persons.is_empty()) {
         let far = |of: &[Hypothesis]| place(of).zip(at).map_or(f64::INFINITY, |(p, q)| flat_distance(p, q));
-        let nearest = sight.persons.iter().min_by(|a, b| far(a).total_cmp(&far(b)));
-        let leash_m = LEASH_M + LEASH_MPS * (sight.t_s - from_s).abs();
+        let nearest = stage.persons.iter().min_by(|a, b| far(a).total_cmp(&far(b)));
+        let leash_m = LEASH_M + LEASH_MPS * (stage.t_s - from_s).abs();
         let Some(of) = nearest.filter(|of| far(of) < leash_m) else { break };
-        (at, from_s) = (place(of), sight.t_s);
-        links.push(Link { t_s: sight.t_s, of });
+        (at, from_s) = (place(of), stage.t_s);
+        links.push(Link { t_s: stage.t_s, of });
     }
     links
 }
@@ -152,7 +152,7 @@ mod tests {
                 (0.1 * k, vec![elsewhere, vec![body(x, 0.0, 0.2), body(x, back, 0.26)]])
             })
             .to_vec();
-        let around: Vec<Sight> = others.iter().map(|(t_s, persons)| Sight { t_s: *t_s, persons }).collect();
+        let around: Vec<Stage> = others.iter().map(|(t_s, persons)| Stage { t_s: *t_s, persons }).collect();
         let decoded = decode(&own, &around);
         let found = &decoded.costs;
         assert!((decoded.unlikeness - 0.2).abs() < 1e-12);
@@ -160,7 +160,7 @@ mod tests {
         // Two steps to the front of both neighbours cost more than the tenth: as far as the joints are apart, 0.8 each.
         assert!((found[0] - 1.0 - (4.0 * 0.3_f64).min(1.6) + 0.1).abs() < 1e-9, "{found:?}");
         // Somebody else, farther than the leash, says nothing.
-        let far: Vec<Sight> = around.iter().map(|sight| Sight { persons: &sight.persons[..1], ..*sight }).collect();
+        let far: Vec<Stage> = around.iter().map(|stage| Stage { persons: &stage.persons[..1], ..*stage }).collect();
         assert_eq!(decode(&own, &far), decode(&own, &[]));
     }
 }

@@ -27,7 +27,7 @@ mod tests;
 mod thinned;
 mod turn;
 
-pub(super) use decode::{Decoded, Sight, decode, lowest};
+pub(super) use decode::{Decoded, Stage, decode, lowest};
 pub(super) use search::{Hypothesis, Searched, search};
 pub(super) use thinned::ThinnedViews;
 pub(super) use turn::turn;
@@ -99,7 +99,7 @@ impl Held {
             Self::Skeleton => "held at the start: an unknown skeleton; the prior of motion has nothing of it",
             Self::Large => TOO_LARGE,
             Self::Unlike => {
-                "held at the start: no body explains the maps; with each that people have their levels correlate by less than 0.74"
+                "held at the start: no body explains the maps; each leaves too much of their levels, takes a pose that nobody takes, or stands too far from the echo"
             }
         }
     }

@@ -26,7 +26,7 @@ const MOST_WORK: f64 = 2e10;
 /// Where every cell is summed by itself each costs so many.
 const PLAIN: f64 = 10.0;
 /// Evaluations of a person's search beside those of the first sieve, and those of a start in it, in whole windows.
-const LATER: f64 = 250.0;
+const LATER: f64 = 300.0;
 const FIRST: f64 = 7.0 / 4.0;
 /// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start.
 const WEIGHTS: [f64; 2] = [0.5, 8e-3];
