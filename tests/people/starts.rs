@@ -1,8 +1,10 @@
 //! Starts of as many as are counted: with the frames before that the counter was taught with, whatever was counted before.
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
-use mhp_inspector::config::{FitConfig, FramesAround, Parameterization, Preset};
+use mhp_inspector::body::{Group, Pppr};
+use mhp_inspector::config::{EmLoss, FitConfig, FramesAround, Parameterization, Preset};
 use mhp_inspector::dataset::Dataset;
+use mhp_inspector::mhp::{Fitter, Precision};
 use mhp_inspector::start::{FoundStart, count_people, find_start_along, find_start_in, problem_of};
 use mhp_inspector::study::count::count_frames;
 use mhp_inspector::task::Progress;
@@ -94,4 +96,24 @@ fn what_is_said_of_a_start_is_the_posture_that_it_has() {
         notes.iter().any(|note| note.starts_with("walking at x"))
     };
     assert!([4, 10, 16, 22].into_iter().any(walking), "somebody who walks is started in a stride");
+}
+
+#[test]
+fn a_fit_is_held_where_its_start_is_not_the_body_that_the_maps_show() {
+    let (dataset, config) = (sample("walk"), Preset::Recommended.config());
+    let problem = Arc::new(problem_of(&dataset, &dataset.load(12).unwrap()).unwrap());
+    let near = find_start_along(&dataset, 12, &problem, &config).unwrap().initialisation.params;
+    let mut far = near.clone();
+    for joint in 0..far.shape().total_joints() {
+        let [x, y, z] = far.position(joint);
+        far.set_vec3(Group::Position, joint, [x, y + 1.5, z]);
+    }
+    let held = |start: &Pppr, config: FitConfig| {
+        Fitter::new(Arc::clone(&problem), config, Precision::F64, start.clone()).unwrap().is_held()
+    };
+    assert!(!held(&near, config));
+    assert!(held(&far, config), "1.5 m beside the echo");
+    assert!(!held(&far, FitConfig { objective: EmLoss::Iou, ..config }), "masks hold nobody");
+    let joints = FitConfig { parameterization: Parameterization::Joints, ..config };
+    assert!(!held(&far, joints), "joints that move by themselves");
 }

@@ -168,19 +168,3 @@ fn a_mirrored_body_has_left_and_right_exchanged() {
     }
     assert!(norm(sub(plain[1][9], plain[1][10])) > 0.05, "it is no symmetric pose");
 }
-
-#[test]
-fn a_fit_is_held_where_levels_are_not_a_bodys_and_masks_hold_none() {
-    let rng = &mut StdRng::seed_from_u64(11);
-    let (problem, config) = (std::sync::Arc::new(problem(rng)), config());
-    let (_, initial) = person(rng, None);
-    let held = |config: FitConfig| {
-        crate::mhp::Fitter::new(std::sync::Arc::clone(&problem), config, Precision::F64, initial.clone())
-            .unwrap()
-            .is_held()
-    };
-    let motion = FitConfig { parameterization: crate::config::Parameterization::Motion, ..config };
-    assert!(held(motion), "maps of noise");
-    assert!(!held(FitConfig { objective: EmLoss::Iou, ..motion }));
-    assert!(!held(config), "joints that move by themselves");
-}
