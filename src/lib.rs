@@ -47,7 +47,8 @@
 //! | [`study`] | batch runs; studies, their tables and run folders; exports; which frames are hard; shards of all of them |
 //! | [`labels`] | tags, notes, verdicts, the journal that keeps them, agreement |
 //! | [`diagnose`] | metrics: MAJPE, PA-MAJPE; evidence for each failure mode |
-//! | [`network`] | MLP+PPPR: what it reads, its weights, its answers; training behind the feature `train` |
+//! | [`network`] | MLP+PPPR and models in ONNX: what they read, their weights, their answers; training behind the feature `train` |
+//! | [`representation`] | a fit as the input of a network: PPPR-Heatmap, PPPR-PC |
 //! | [`predictions`] | joints of networks, other programs and earlier runs: formats, units, axes, skeletons, errors, as starts |
 //! | [`start`] | where a frame's fit begins: the problem with the frames around it, and for how many people a start is asked |
 //! | [`mhp`] * | start poses, forward model, objective, Adam, convergence, the fitter's one `step` |
@@ -76,6 +77,7 @@ pub mod labels;
 pub mod network;
 pub mod output;
 pub mod predictions;
+pub mod representation;
 pub mod study;
 pub mod task;
 pub mod worker;

@@ -9,7 +9,8 @@ use crate::config::{FitConfig, Preset};
 use crate::dataset::Dataset;
 use crate::escape::one_line;
 use crate::output::{FileNames, FolderLock, Inputs};
-use crate::study::{ExportScale, HeatmapExport};
+use crate::representation::HeatmapScale;
+use crate::study::HeatmapExport;
 use anyhow::Context as _;
 use clap::{Args, ValueEnum};
 use frame::Exported;
@@ -129,10 +130,10 @@ impl ExportArgs {
         self.what.contains(&what)
     }
 
-    fn scale(&self) -> ExportScale {
+    fn scale(&self) -> HeatmapScale {
         match self.scale {
-            ScaleArg::Match => ExportScale::Match,
-            ScaleArg::None => ExportScale::None,
+            ScaleArg::Match => HeatmapScale::Match,
+            ScaleArg::None => HeatmapScale::None,
         }
     }
 

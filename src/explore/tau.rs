@@ -3,9 +3,7 @@
 use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::mhp::{Masks, Problem, percentile};
-use crate::people::{CfarOptions, detect};
-use crate::radar::View;
-use crate::study::{CloudPoint, point_cloud};
+use crate::representation::{CloudPoint, detected_cells, point_cloud};
 
 /// The least and the greatest τ, and the step between two, %.
 const TAU: [f64; 3] = [0.5, 60.0, 0.5];
@@ -129,14 +127,6 @@ pub fn tau_clouds(
     masks: &[Masks],
 ) -> TauClouds {
     let ori: Vec<Vec<f64>> = (0..problem.views.len()).map(|view| problem.map(view).to_vec()).collect();
-    let detected = |maps: &[Vec<f64>]| -> Vec<Vec<usize>> {
-        let of = |(view, map): (&View, &Vec<f64>)| {
-            let options = CfarOptions { spacing_m: 0.0, most: MOST_POINTS, ..CfarOptions::default() };
-            let found = detect(view, map, &options).unwrap_or_default();
-            found.into_iter().map(|detection| detection.cell).collect()
-        };
-        problem.views.iter().zip(maps).map(of).collect()
-    };
     let above = |(map, masks): (&Vec<f64>, &Masks)| -> Vec<usize> {
         let inside: Vec<f64> = map.iter().zip(&masks.inside).filter(|(_, inside)| **inside).map(|(x, _)| *x).collect();
         let threshold = percentile(&inside, 100.0 - config.tau_pct);
@@ -149,9 +139,9 @@ pub fn tau_clouds(
     let thresholded: Vec<Vec<usize>> = ori.iter().zip(masks).map(above).collect();
     let cloud = |maps: &[Vec<f64>], cells: &[Vec<usize>]| point_cloud(problem, config, params, maps, cells);
     TauClouds {
-        cfar: cloud(&ori, &detected(&ori)),
+        cfar: cloud(&ori, &detected_cells(problem, &ori, MOST_POINTS)),
         threshold: cloud(&ori, &thresholded),
-        pppr: cloud(h_sim, &detected(h_sim)),
+        pppr: cloud(h_sim, &detected_cells(problem, h_sim, MOST_POINTS)),
     }
 }
 

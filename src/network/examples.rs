@@ -110,11 +110,11 @@ fn inputs_of(
     }
     let centred = features.of_joints() && architecture != Architecture::Mlp;
     let persons = if features.of_joints() { own.map_or(1, |own| own.shape().persons) } else { 1 };
-    let around = window(dataset, frame.index, architecture.reach());
+    let reach = architecture.reach() as isize;
     let mut inputs = Vec::with_capacity(persons);
     for person in 0..persons {
         let mut input = Vec::new();
-        for &other in &around {
+        for other in (-reach..=reach).map(|step| beside(dataset, frame.index, step)) {
             let beside = (other != frame.index).then(|| dataset.load(other).ok()).flatten();
             let shown = beside.as_ref().unwrap_or(frame);
             // A frame that shows other people tells nothing of this one: the frame itself stands for it.
@@ -133,26 +133,10 @@ fn inputs_of(
     Ok(inputs)
 }
 
-/// The frames that are read for one: at an end of its sequence the last one again.
-fn window(dataset: &Dataset, index: usize, reach: usize) -> Vec<usize> {
+/// The frame `step` after one (before it where negative): at an end of its sequence the last one.
+pub(super) fn beside(dataset: &Dataset, index: usize, step: isize) -> usize {
     let sequence = dataset.sequence(index);
-    let inside = |other: isize| {
-        usize::try_from(other).ok().filter(|&other| other < dataset.len() && dataset.sequence(other) == sequence)
-    };
-    let mut nearest = index;
-    let mut before: Vec<usize> = (1..=reach as isize)
-        .map(|k| {
-            nearest = inside(index as isize - k).unwrap_or(nearest);
-            nearest
-        })
-        .collect();
-    before.reverse();
-    nearest = index;
-    let after: Vec<usize> = (1..=reach as isize)
-        .map(|k| {
-            nearest = inside(index as isize + k).unwrap_or(nearest);
-            nearest
-        })
-        .collect();
-    before.into_iter().chain([index]).chain(after).collect()
+    let inside = |other: &usize| *other < dataset.len() && dataset.sequence(*other) == sequence;
+    let wanted = |distance: usize| index.checked_add_signed(step.signum() * distance as isize);
+    (0..=step.unsigned_abs()).rev().find_map(|distance| wanted(distance).filter(inside)).unwrap_or(index)
 }

@@ -15,13 +15,17 @@
 mod card;
 mod examples;
 mod features;
+mod joint_model;
 mod model;
+mod onnx;
 #[cfg(feature = "train")]
 mod train;
 
 pub use card::{Architecture, Features, ModelCard};
 pub use examples::{Example, ExampleSet, ParamsOf, examples, prediction_inputs};
 pub use features::{input_width, person_input};
+pub use joint_model::{JointModel, ModelInput, open_model};
 pub use model::{DenseLayer, ModelError, PoseNetwork};
+pub use onnx::{About, InputDescription, InputKind, Normalisation, OnnxDescription, OnnxModel, OutputDescription};
 #[cfg(feature = "train")]
 pub use train::{TrainFault, TrainPoseOptions, TrainedEpoch, train_pose};

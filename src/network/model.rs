@@ -2,14 +2,14 @@
 
 use super::card::ModelCard;
 use crate::geometry::Vec3;
-use crate::input::read_bytes;
+use crate::input::{place, read_bytes};
 use crate::output::replace_file;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// Bytes of a model that are read.
-const MOST_BYTES: u64 = 512 << 20;
+pub(super) const MOST_BYTES: u64 = 512 << 20;
 /// The key of the card in the file's metadata.
 const CARD: &str = "card";
 
@@ -36,6 +36,35 @@ pub enum ModelError {
     #[error("{path}: no model of MLP+PPPR: {message}", path = path.display())]
     Content {
         /// What is wrong, and what was expected.
+        message: String,
+        /// The file.
+        path: PathBuf,
+    },
+    /// The description of a model in ONNX has a key that is none, or one without meaning.
+    #[error("{place}: {message}", place = place(path, *line))]
+    Description {
+        /// What is wrong, and what was expected.
+        message: String,
+        /// The line, counted from 1, where one is known.
+        line: Option<usize>,
+        /// The file.
+        path: PathBuf,
+    },
+    /// Nothing says what a model in ONNX reads.
+    #[error("{path}: nothing says what its tensors are; expected {beside}, or --description FILE (`predict --help` shows one). {has}",
+            path = path.display(), beside = beside.display())]
+    NotDescribed {
+        /// Its tensors, in words.
+        has: String,
+        /// Where the description was looked for.
+        beside: PathBuf,
+        /// The model.
+        path: PathBuf,
+    },
+    /// It is no model in ONNX, or none that can be run.
+    #[error("{path}: {message}", path = path.display())]
+    Onnx {
+        /// What is wrong.
         message: String,
         /// The file.
         path: PathBuf,

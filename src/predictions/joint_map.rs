@@ -19,6 +19,22 @@ pub enum JointSource {
     Between(Vec<usize>),
 }
 
+impl JointSource {
+    /// Where a joint called `wanted` is among joints called `names`.
+    pub fn find(names: &[String], wanted: &str) -> Option<Self> {
+        let canonical: Vec<String> = names.iter().map(|name| canonical_joint(name)).collect();
+        source(&canonical, &canonical_joint(wanted))
+    }
+
+    /// The place among those of all joints.
+    pub fn place(&self, joints: &[Vec3]) -> Vec3 {
+        match self {
+            Self::Same(k) => joints[*k],
+            Self::Between(of) => mean(&of.iter().map(|&k| joints[k]).collect::<Vec<_>>()),
+        }
+    }
+}
+
 /// Which joints of a data set's skeleton a list of joints tells, and how.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct JointMap {
@@ -69,11 +85,7 @@ impl JointMap {
 
     /// The known joints of a person, in the order of [`Self::known`].
     pub fn apply(&self, joints: &[Vec3]) -> Vec<Vec3> {
-        let place = |source: &JointSource| match source {
-            JointSource::Same(k) => joints[*k],
-            JointSource::Between(of) => mean(&of.iter().map(|&k| joints[k]).collect::<Vec<_>>()),
-        };
-        self.sources.iter().map(place).collect()
+        self.sources.iter().map(|source| source.place(joints)).collect()
     }
 }
 

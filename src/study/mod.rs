@@ -26,8 +26,8 @@ pub use batch::{BatchOptions, fit_frame, run_batch};
 pub use erased::{read_erased, write_erased};
 pub use evidence::{FrameEvidence, frame_evidence, frames_before, state_evidence};
 pub use export::{
-    CloudPoint, CurveRow, ExportError, ExportScale, HeatmapExport, curve_columns, curves_csv, ply, point_cloud,
-    scaled_maps, write_cloud_npz, write_cloud_pcd, write_cloud_ply, write_curves, write_ply,
+    CurveRow, ExportError, HeatmapExport, curve_columns, curves_csv, ply, write_cloud_npz, write_cloud_pcd,
+    write_cloud_ply, write_curves, write_ply,
 };
 pub use file_error::FileError;
 pub use kept::{FitsFile, FitsOf, FrameStamps, KeptFits, kept_fits};

@@ -4,6 +4,7 @@
 mod faults;
 mod formats;
 mod network;
+mod onnx;
 mod program;
 
 use mhp_inspector::dataset::{Dataset, bundled_sample};

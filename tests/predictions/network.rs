@@ -36,7 +36,18 @@ fn a_network_reads_fits_and_its_answers_are_predictions() {
     echo(&dataset.info().skeleton.joints, 0.25).write(&home.path().join("m.safetensors")).unwrap();
     let answer = program(
         home.path(),
-        &["predict", &at("m.safetensors"), data, "--frames", "0..3", "--params", &at("fits"), "--out", &at("p.npz")],
+        &[
+            "predict",
+            data,
+            "--model",
+            &at("m.safetensors"),
+            "--frames",
+            "0..3",
+            "--params",
+            &at("fits"),
+            "--out",
+            &at("p.npz"),
+        ],
     );
     assert!(answer.status.success(), "{}", text(&answer));
     assert!(text(&answer).contains("mlp on fit-joints, 2652 parameters") && text(&answer).contains("PA-MAJPE"));
@@ -52,7 +63,7 @@ fn a_network_reads_fits_and_its_answers_are_predictions() {
     }
     // A model of another skeleton is refused.
     echo(&dataset.info().skeleton.joints[..14], 0.0).write(&home.path().join("other.safetensors")).unwrap();
-    let refused = program(home.path(), &["predict", &at("other.safetensors"), data, "--out", &at("q.npz")]);
+    let refused = program(home.path(), &["predict", data, "--model", &at("other.safetensors"), "--out", &at("q.npz")]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(
         text(&refused).contains("the model does not fit the data: it reads fits of 14 joints"),

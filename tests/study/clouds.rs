@@ -7,7 +7,7 @@ use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::Dataset;
 use mhp_inspector::dataset::npz::{NpzArchive, read_array};
 use mhp_inspector::mhp::Problem;
-use mhp_inspector::study::{CloudPoint, point_cloud};
+use mhp_inspector::representation::{CloudPoint, point_cloud};
 use mhp_inspector::task::Progress;
 use std::path::Path;
 use std::process::Command;

@@ -7,8 +7,8 @@ use mhp_inspector::config::Preset;
 use mhp_inspector::dataset::npz::{NpzArchive, read_array};
 use mhp_inspector::dataset::{Dataset, read_pppr};
 use mhp_inspector::mhp::{Precision, simulate};
+use mhp_inspector::representation::{HeatmapScale, pppr_heatmap};
 use mhp_inspector::start::{problem_alone, problem_of};
-use mhp_inspector::study::{ExportScale, scaled_maps};
 use mhp_inspector::task::Progress;
 use std::collections::BTreeMap;
 use std::io::{Read as _, Write as _};
@@ -286,7 +286,7 @@ fn every_sample_is_exported_and_reads_back_as_a_data_set() {
             assert!(file("pc").is_file());
             let problem = Arc::new(problem_of(&before, &old).unwrap());
             let config = Preset::Baseline.config();
-            let wanted = scaled_maps(&problem, &config, Precision::F32, &params, ExportScale::Match).unwrap();
+            let wanted = pppr_heatmap(&problem, &config, Precision::F32, &params, HeatmapScale::Match).unwrap();
             for (map, wanted) in new.maps.iter().zip(&wanted) {
                 let most = wanted.iter().copied().fold(0.0, f64::max);
                 let tolerance = if map.dtype == "<f2" { 1e-3 } else { 1e-6 } * most;

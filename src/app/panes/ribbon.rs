@@ -115,7 +115,10 @@ impl Ribbon {
 }
 
 /// The clouds with their colours and the size of their points, m.
-fn clouds_of<'a>(clouds: &'a TauClouds, tokens: &Tokens) -> [(&'a [crate::study::CloudPoint], egui::Color32, f64); 3] {
+fn clouds_of<'a>(
+    clouds: &'a TauClouds,
+    tokens: &Tokens,
+) -> [(&'a [crate::representation::CloudPoint], egui::Color32, f64); 3] {
     [(&clouds.threshold, tokens.dim, 0.018), (&clouds.cfar, tokens.warn, 0.026), (&clouds.pppr, tokens.accent, 0.026)]
 }
 

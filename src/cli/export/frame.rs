@@ -4,16 +4,11 @@ use super::{CLOUDS, CloudFormat, Job, PARAMS, What};
 use crate::body::Pppr;
 use crate::dataset::{Dataset, read_pppr, write_pppr};
 use crate::mhp::{Precision, Problem};
-use crate::people::{CfarOptions, detect};
+use crate::representation::{CLOUD_POINTS, CloudPoint, detected_cells, point_cloud, pppr_heatmap};
 use crate::start::problem_of;
-use crate::study::{
-    BatchOptions, CloudPoint, fit_frame, point_cloud, scaled_maps, write_cloud_npz, write_cloud_pcd, write_cloud_ply,
-};
+use crate::study::{BatchOptions, fit_frame, write_cloud_npz, write_cloud_pcd, write_cloud_ply};
 use std::path::PathBuf;
 use std::sync::Arc;
-
-/// Points of a view at most, those highest above their threshold.
-const MOST_POINTS: usize = 2048;
 
 /// What is left to write of a frame: its maps go into files that frames may share.
 pub(super) struct Exported {
@@ -41,9 +36,10 @@ impl Job<'_> {
         let problem = problem(dataset, index)?;
         problem.check(&params).map_err(|error| in_file(&error))?;
         let maps =
-            scaled_maps(&problem, &self.config, precision, &params, args.scale()).map_err(|error| in_file(&error))?;
+            pppr_heatmap(&problem, &self.config, precision, &params, args.scale()).map_err(|error| in_file(&error))?;
         if args.wants(What::Pc) {
-            let points = point_cloud(&problem, &self.config, &params, &maps, &detections(&problem, &maps));
+            let points =
+                point_cloud(&problem, &self.config, &params, &maps, &detected_cells(&problem, &maps, CLOUD_POINTS));
             for format in &args.format {
                 self.write_cloud(*format, index, &points)?;
             }
@@ -85,14 +81,6 @@ impl Job<'_> {
         };
         fit_frame(self.dataset, index, &options, None).map(|fit| fit.params)
     }
-}
-
-/// The detector's cells in the map of each view; none where a view tells no place.
-fn detections(problem: &Problem, maps: &[Vec<f64>]) -> Vec<Vec<usize>> {
-    let of_view = problem.views.iter().zip(maps);
-    let options = CfarOptions { spacing_m: 0.0, most: MOST_POINTS, ..CfarOptions::default() };
-    let found = of_view.map(|(view, map)| detect(view, map, &options).unwrap_or_default());
-    found.map(|found| found.iter().map(|detection| detection.cell).collect()).collect()
 }
 
 fn problem(dataset: &Dataset, index: usize) -> Result<Arc<Problem>, String> {

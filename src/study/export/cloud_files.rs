@@ -1,9 +1,10 @@
 //! Point clouds as npz, PLY (binary little endian 1.0) and PCD (0.7, binary), with the same five numbers a point: `x y z` (m),
 //! `v_r` (m/s), `intensity`; and `view`, the map that it was found in.
 
-use super::{CloudPoint, ExportError};
+use super::ExportError;
 use crate::dataset::npz::{ArrayView, write};
 use crate::output::replace_file;
+use crate::representation::CloudPoint;
 use std::path::Path;
 
 const FIELDS: [&str; 5] = ["x", "y", "z", "v_r", "intensity"];

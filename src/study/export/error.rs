@@ -14,12 +14,6 @@ pub enum ExportError {
     /// A place that must not be written.
     #[error(transparent)]
     Output(#[from] OutputError),
-    /// The parameters do not fit the problem.
-    #[error("{reason}")]
-    Fit {
-        /// Why, in words.
-        reason: String,
-    },
     /// An array that no map can be written as.
     #[error("{path}: array `{key}` ({form}) cannot hold a map: {reason}", path = path.display())]
     Form {

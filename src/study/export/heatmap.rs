@@ -2,67 +2,17 @@
 //!
 //! A file keeps its place in the tree, its keys, each map's shape, dtype, byte and memory order; arrays that are no maps are copied,
 //! and so are labels beside it. Of complex cubes the amplitude that is the map becomes H_sim, and the phases stay; of several
-//! numbers a cell the ratios. H_sim is in units of its own: [`ExportScale::Match`] brings it to the input's. The manifest comes
+//! numbers a cell the ratios. H_sim is in units of its own: [`crate::representation::HeatmapScale::Match`] brings it to the input's. The manifest comes
 //! last: where it is missing the copy is not complete.
 
 use super::ExportError;
 use super::layout::{MapFile, STRANGERS_PATTERN, Tree};
-use crate::body::Pppr;
-use crate::config::FitConfig;
 use crate::dataset::npz::{Fold, Form, NpzArchive, copy_with, shape_text};
 use crate::dataset::{Dataset, MANIFEST_NAME, MapArray, Stored};
-use crate::mhp::{Objective, Precision, Problem, masks, simulate};
 use crate::output::{FolderGuard, Inputs, replace_file, resolved};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-
-/// What becomes of the values of H_sim.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ExportScale {
-    /// One factor a view: the mean of H_ori over its mask by that of H_sim over its own; then nothing below the smallest
-    /// value of H_ori, so that a logarithm of the map stays in the input's range.
-    Match,
-    /// As computed.
-    None,
-}
-
-/// H_sim of every view at `params`, C order, in the scale asked for.
-///
-/// # Errors
-/// Where `params` have the wrong sizes or are not finite.
-pub fn scaled_maps(
-    problem: &Arc<Problem>,
-    config: &FitConfig,
-    precision: Precision,
-    params: &Pppr,
-    scale: ExportScale,
-) -> Result<Vec<Vec<f64>>, ExportError> {
-    let mut maps = simulate(problem, config, precision, params);
-    if scale == ExportScale::None {
-        return Ok(maps);
-    }
-    let objective = Objective::new(Arc::clone(problem), *config, precision, params)
-        .map_err(|reason| ExportError::Fit { reason: reason.to_string() })?;
-    for (view, map) in maps.iter_mut().enumerate() {
-        let masks = masks(&objective, view, map);
-        let input = problem.map(view);
-        let factor = masked_mean(input, &masks.ori) / masked_mean(map, &masks.sim);
-        let factor = if factor.is_finite() && factor > 0.0 { factor } else { 1.0 };
-        let least = input.iter().copied().fold(f64::INFINITY, f64::min);
-        for cell in map.iter_mut() {
-            *cell = (*cell * factor).max(least);
-        }
-    }
-    Ok(maps)
-}
-
-fn masked_mean(map: &[f64], mask: &[bool]) -> f64 {
-    let (sum, count) =
-        map.iter().zip(mask).filter(|(_, inside)| **inside).fold((0.0, 0_usize), |(s, n), (x, _)| (s + x, n + 1));
-    sum / count as f64
-}
 
 /// Writes maps into a copy of a data set, frame by frame.
 ///

@@ -60,7 +60,7 @@ pub(crate) fn section(bed: &Bed) -> String {
         for set in ["unseen", "generic"] {
             let (file, fits) = (format!("{out}-{set}.npz"), format!("{set}-fits"));
             let model = format!("{out}/model.safetensors");
-            match bed.tried(&["predict", &model, set, "--params", &fits, "--out", &file]) {
+            match bed.tried(&["predict", set, "--model", &model, "--params", &fits, "--out", &file]) {
                 Ok(said) => {
                     let number = |before: &str, after: &str| -> String {
                         let found = said.split(after).next().and_then(|text| text.rsplit(before).next());

@@ -8,7 +8,11 @@ use crate::body::{Group, Pppr, PpprShape};
 use crate::config::{BodyModel, FitConfig};
 use crate::geometry::{Vec3, add, dot, norm, scale, sub};
 use crate::mhp::{Precision, Problem, simulate};
+use crate::people::{CfarOptions, detect};
 use crate::radar::{AxisKind, View, unravel};
+
+/// Points of a view of PPPR-PC at most.
+pub const CLOUD_POINTS: usize = 2048;
 
 /// One point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,6 +25,14 @@ pub struct CloudPoint {
     pub intensity: f64,
     /// The view that it was detected in.
     pub view: usize,
+}
+
+/// The detector's cells in the map of each view, at `most` those highest above their threshold; none where a view tells no place.
+pub fn detected_cells(problem: &Problem, maps: &[Vec<f64>], most: usize) -> Vec<Vec<usize>> {
+    let of_view = problem.views.iter().zip(maps);
+    let options = CfarOptions { spacing_m: 0.0, most, ..CfarOptions::default() };
+    let found = of_view.map(|(view, map)| detect(view, map, &options).unwrap_or_default());
+    found.map(|found| found.iter().map(|detection| detection.cell).collect()).collect()
 }
 
 /// The points of one frame, view by view in the order of `cells`: `cells[view]` are flat indices into `maps[view]`, where
