@@ -7,6 +7,7 @@ use crate::labels::{LabelPlace, LabelStore};
 use crate::radar::{PointSpread, View};
 use anyhow::Context as _;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -102,6 +103,7 @@ fn as_json(dataset: &Dataset, frame: &Frame, label_notes: &[String]) -> Value {
         "root": info.root.display().to_string(),
         "frames": dataset.len(),
         "sequences": dataset.sequences(),
+        "scenes": scenes(dataset),
         "frame_rate_hz": info.frame_rate_hz,
         "axes": info.axes_badge,
         "views": views,
@@ -116,6 +118,7 @@ fn as_json(dataset: &Dataset, frame: &Frame, label_notes: &[String]) -> Value {
         "frame": {
             "index": frame.index,
             "name": frame.name,
+            "origin": dataset.origin(frame.index),
             "global_id": frame.global_id,
             "timestamp_s": frame.timestamp_s,
             "people": frame.person_count,
@@ -128,6 +131,15 @@ fn as_json(dataset: &Dataset, frame: &Frame, label_notes: &[String]) -> Value {
         "notes": info.notes,
         "label_notes": label_notes,
     })
+}
+
+/// Frames of each scene.
+fn scenes(dataset: &Dataset) -> BTreeMap<String, usize> {
+    let mut scenes = BTreeMap::new();
+    for scene in (0..dataset.len()).filter_map(|frame| dataset.origin(frame).scene) {
+        *scenes.entry(scene).or_default() += 1;
+    }
+    scenes
 }
 
 fn view_json(view: &View, map: &Heatmap, calibration: &ViewCalibration) -> Value {
@@ -200,6 +212,16 @@ fn as_text(dataset: &Dataset, frame: &Frame, label_notes: &[String]) -> String {
     let sequences = counted(dataset.sequences(), "sequence", "sequences");
     let rate = info.frame_rate_hz.map(|rate| format!(", {rate} a second")).unwrap_or_default();
     line("frames", &format!("{} in {sequences}{rate}", dataset.len()));
+    let scenes = scenes(dataset);
+    if !scenes.is_empty() {
+        let told: Vec<String> =
+            scenes.iter().map(|(scene, frames)| format!("{} ({frames})", one_line(scene))).collect();
+        line("scenes", &told.join(", "));
+    }
+    let origin = dataset.origin(frame.index);
+    if !origin.is_unknown() {
+        line("this frame", &one_line(&origin.to_string()));
+    }
     line("axes", &info.axes_badge);
     let skeleton = info.skeleton.preset_name().unwrap_or("its own");
     let (joints, bones) = (info.skeleton.joints.len(), info.skeleton.bones.len());

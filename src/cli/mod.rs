@@ -32,7 +32,6 @@ mod train_counter;
 #[cfg(feature = "train")]
 mod train_evidence;
 #[cfg(feature = "train")]
-#[cfg(feature = "train")]
 mod train_motion;
 #[cfg(feature = "train")]
 mod train_pose;

@@ -53,9 +53,19 @@ pub struct TrainPoseArgs {
     /// Fit configuration instead of the preset.
     #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
     config: Option<PathBuf>,
+    #[command(flatten)]
+    learning: LearningArgs,
+    /// Every how many sequences one is kept for validation.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]
+    validation_every: usize,
+}
+
+/// How a network is taught.
+#[derive(Debug, Args)]
+pub(super) struct LearningArgs {
     /// Passes over the examples at most.
     #[arg(long, default_value_t = TrainPoseOptions::default().epochs, value_parser = at_least_one)]
-    epochs: usize,
+    pub(super) epochs: usize,
     /// Passes without a better validation error after which it ends.
     #[arg(long, default_value_t = TrainPoseOptions::default().patience, value_parser = at_least_one)]
     patience: usize,
@@ -70,10 +80,26 @@ pub struct TrainPoseArgs {
     hidden: Vec<usize>,
     /// Seed of weights, order, dropout and of which sequences are kept for validation.
     #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Every how many sequences one is kept for validation.
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]
-    validation_every: usize,
+    pub(super) seed: u64,
+}
+
+impl LearningArgs {
+    /// # Errors
+    /// Where a layer has no width.
+    pub(super) fn options(&self) -> anyhow::Result<TrainPoseOptions> {
+        if self.hidden.contains(&0) {
+            bail!("--hidden: a layer of 0; expected widths of 1 or more");
+        }
+        Ok(TrainPoseOptions {
+            epochs: self.epochs,
+            patience: self.patience,
+            batch: self.batch,
+            learning_rate: self.learning_rate,
+            hidden: self.hidden.clone(),
+            seed: self.seed,
+            ..TrainPoseOptions::default()
+        })
+    }
 }
 
 /// Runs `train-pose`.
@@ -88,9 +114,7 @@ pub(super) fn run(args: &TrainPoseArgs) -> anyhow::Result<ExitCode> {
             args.data.len()
         );
     }
-    if args.hidden.contains(&0) {
-        bail!("--hidden: a layer of 0; expected widths of 1 or more");
-    }
+    let options = args.learning.options()?;
     std::fs::create_dir_all(&args.out).with_context(|| format!("{}: cannot be made", args.out.display()))?;
     let (mut sets, mut card, mut told) = (Vec::<ExampleSet>::new(), None::<ModelCard>, Vec::new());
     for (k, path) in args.data.iter().enumerate() {
@@ -112,18 +136,9 @@ pub(super) fn run(args: &TrainPoseArgs) -> anyhow::Result<ExitCode> {
         sets.extend(found);
     }
     let card = card.context("no data set")?;
-    let (train, validation) = split(&sets, args.seed, args.validation_every)?;
-    let options = TrainPoseOptions {
-        epochs: args.epochs,
-        patience: args.patience,
-        batch: args.batch,
-        learning_rate: args.learning_rate,
-        hidden: args.hidden.clone(),
-        seed: args.seed,
-        ..TrainPoseOptions::default()
-    };
+    let (train, validation) = split(&sets, args.learning.seed, args.validation_every)?;
     complain(&format!("note: {} examples to learn from, {} to validate with", train.len(), validation.len()));
-    let bar = ProgressBar::new(args.epochs as u64);
+    let bar = ProgressBar::new(options.epochs as u64);
     let checkpoint = args.out.join("checkpoint.safetensors");
     let (mut network, curves) = train_pose(&card, &train, &validation, &options, Some(&checkpoint), |curve| {
         bar.set_position(curve.epoch as u64);
@@ -199,7 +214,8 @@ fn notes(
     curves: &[TrainedEpoch],
 ) -> Vec<String> {
     let best = curves.iter().min_by(|a, b| a.validation_mm.total_cmp(&b.validation_mm));
-    let mut notes = vec![format!("mhp-inspector {} train-pose, seed {}", env!("CARGO_PKG_VERSION"), args.seed)];
+    let mut notes =
+        vec![format!("mhp-inspector {} train-pose, seed {}", env!("CARGO_PKG_VERSION"), args.learning.seed)];
     notes.extend(data.iter().cloned());
     notes.push(format!("{train} examples learned from, {validation} of other sequences to validate with"));
     if let Some(best) = best {

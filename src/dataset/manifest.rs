@@ -7,6 +7,7 @@ use super::adc::AdcText;
 use super::calibration::{FftText, RadarPreset, ViewCalibration, fft_fault};
 use super::layout::{LAYOUTS, Layout};
 use super::npz::MAX_ELEMENTS;
+use super::origin::OriginRule;
 use super::set::MANIFEST_NAME;
 use crate::body::Skeleton;
 use crate::geometry::{IDENTITY, Mat3, Pose, Vec3, dot};
@@ -51,6 +52,8 @@ pub struct Manifest {
     pub calibrations: Vec<ViewCalibration>,
     /// What is said of a raw capture.
     pub capture: Option<AdcText>,
+    /// Where frames come from; the first that says something of one holds.
+    pub origins: Vec<OriginRule>,
 }
 
 #[derive(Deserialize)]
@@ -66,6 +69,8 @@ struct ManifestText {
     #[serde(default)]
     view: Vec<Spanned<ViewText>>,
     capture: Option<AdcText>,
+    #[serde(default)]
+    origin: Vec<OriginRule>,
 }
 
 /// A view as written; also the form in which chosen axes are remembered.
@@ -313,6 +318,7 @@ impl Manifest {
             views,
             calibrations,
             capture: parsed.capture,
+            origins: parsed.origin,
         })
     }
 
@@ -340,6 +346,7 @@ impl Manifest {
             views: Vec::new(),
             calibrations: Vec::new(),
             capture: None,
+            origins: Vec::new(),
         }
     }
 }

@@ -32,6 +32,7 @@ mod maps;
 mod names;
 mod natural;
 pub mod npz;
+mod origin;
 mod pppr_io;
 mod room;
 mod sample;
@@ -51,7 +52,9 @@ pub use layout::{BareCatalog, BareChoice, ChirpForm, LAYOUTS, Layout, MapArray, 
 pub use loader::{Loaded, Loader};
 pub use manifest::Manifest;
 pub use maps::MapReader;
+pub(crate) use natural::natural;
 pub use npz::NpzError;
+pub use origin::{Origin, OriginRule};
 pub use pppr_io::{read_pppr, write_pppr};
 pub use room::{ROOMS_NAME, RoomJoints, RoomTransform, RoomTransforms, remember_room, write_stated_rooms};
 pub use sample::bundled_sample;

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 
 /// Numbers inside names by value, the rest by character: `d9s1` before `d10s1`.
-pub(super) fn natural(a: &str, b: &str) -> Ordering {
+pub(crate) fn natural(a: &str, b: &str) -> Ordering {
     let (mut left, mut right) = (a.as_bytes(), b.as_bytes());
     while let (Some((&x, rest_x)), Some((&y, rest_y))) = (left.split_first(), right.split_first()) {
         let order = if x.is_ascii_digit() && y.is_ascii_digit() {

@@ -5,6 +5,7 @@ use super::cache::Cache;
 use super::layout::{DataFolder, FrameSource, LAYOUTS, Layout, Opened, open_unknown};
 use super::manifest::Manifest;
 use super::names::Names;
+use super::origin::{Origin, OriginRule};
 use super::room::RoomJoints;
 use super::{DatasetError, Frame, Heatmap, ViewCalibration};
 use crate::body::Skeleton;
@@ -49,6 +50,8 @@ pub struct DatasetInfo {
     pub axes_badge: String,
     /// What was assumed because the data set does not publish it.
     pub assumptions: Vec<String>,
+    /// Where frames come from, as the manifest says.
+    pub origins: Vec<OriginRule>,
     /// What was found on opening that somebody should know: folders that could not be read.
     pub notes: Vec<String>,
 }
@@ -193,6 +196,13 @@ impl Dataset {
     /// What frame `i` follows the one before in: MMVR's session and segment, a folder, or the data set.
     pub fn sequence(&self, i: usize) -> &str {
         self.frames.sequence(i, self.frame_name(i)).unwrap_or(&self.info.name)
+    }
+
+    /// Where frame `i` comes from, as far as the manifest or the layout's names say.
+    pub fn origin(&self, i: usize) -> Origin {
+        let (sequence, name) = (self.sequence(i), self.frame_name(i));
+        let said = self.info.origins.iter().fold(Origin::default(), |known, rule| known.or(rule.of(sequence, name)));
+        said.or(self.frames.origin(i))
     }
 
     /// The file that frame `i` is read from, the main one where there are several; the root past the end.

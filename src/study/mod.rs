@@ -9,6 +9,8 @@ mod batch;
 pub mod calibrate;
 pub mod complexity;
 pub mod count;
+#[cfg(feature = "train")]
+pub mod cross;
 mod erased;
 mod evidence;
 mod export;

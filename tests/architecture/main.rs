@@ -78,6 +78,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "diagnose",
             "predictions",
             "representation",
+            // Studies across scenes and data sets teach networks.
+            "network",
             "labels",
         ],
     ),

@@ -507,3 +507,38 @@ fn a_data_set_in_a_folder_that_is_no_text_is_studied() {
         String::from_utf8(refused.stderr).is_ok_and(|told| told.starts_with("error: ") && told.lines().count() == 1)
     );
 }
+
+#[test]
+fn every_table_is_told_by_scene_where_frames_come_from_several() {
+    let case = Case::new();
+    case.done(&["weights", "--iterations", "2", "--preset", "baseline"], "plain");
+    let table = |run: &str| -> Value {
+        serde_json::from_slice(&std::fs::read(case.run(run).join(TABLE_FILE)).unwrap()).unwrap()
+    };
+    assert!(table("plain").get("scenes").is_none());
+    let manifest = case.data().join("dataset.toml");
+    let said = "\n[[origin]]\nframes = \"*hard*\"\nscene = \"hall\"\nsubject = \"b\"\n[[origin]]\nscene = \"lab\"\n";
+    std::fs::write(&manifest, std::fs::read_to_string(&manifest).unwrap() + said).unwrap();
+    let told = case.done(&["weights", "--iterations", "2", "--preset", "baseline"], "scenes");
+    assert!(told.contains("## Scene hall") && told.contains("## Scene lab"), "{told}");
+    let (plain, scenes) = (table("plain"), table("scenes"));
+    assert_eq!(plain["rows"], scenes["rows"]);
+    let parts = scenes["scenes"].as_array().unwrap();
+    assert_eq!(parts.iter().map(|part| part["scene"].as_str().unwrap()).collect::<Vec<_>>(), ["hall", "lab"]);
+    for (row, all) in plain["rows"].as_array().unwrap().iter().enumerate() {
+        let of = |key: &str, part: &Value| part["rows"][row][key]["mean"].as_f64().unwrap();
+        let mean = parts.iter().map(|part| of("majpe_mm", part) / 2.0).sum::<f64>();
+        assert!((mean - all["majpe_mm"]["mean"].as_f64().unwrap()).abs() < 1e-9);
+    }
+    let mut rows = csv::Reader::from_path(case.run("scenes").join("rows.csv")).unwrap();
+    let heads = rows.headers().unwrap().clone();
+    let at = |name: &str| heads.iter().position(|head| head == name).unwrap();
+    for row in rows.records().map(Result::unwrap) {
+        let hard = row[at("sequence")].contains("hard");
+        assert_eq!((&row[at("scene")], &row[at("subject")]), if hard { ("hall", "b") } else { ("lab", "") });
+    }
+    // A key that is none is told with its line.
+    std::fs::write(&manifest, std::fs::read_to_string(&manifest).unwrap() + "[[origin]]\nroom = \"x\"\n").unwrap();
+    let refused = text(&case.study(&["weights"], "refused").stderr);
+    assert!(refused.contains("dataset.toml:") && refused.contains("room"), "{refused}");
+}

@@ -71,6 +71,10 @@ pub struct SimulateArgs {
     /// More (or less) thermal noise than the preset has, dB.
     #[arg(long, value_name = "DB", default_value_t = 0.0, allow_negative_numbers = true)]
     pub noise_db: f64,
+    /// One room for all sequences of a preset, drawn from this seed: a scene, which the manifest names. Without it each sequence has
+    /// a room of its own.
+    #[arg(long, value_name = "S")]
+    pub room_seed: Option<u64>,
     /// Height of the radar above the floor, m, which the manifest tells; `any` draws one for each sequence, untold.
     #[arg(long, value_name = "M", default_value = "1", value_parser = radar_height)]
     pub radar_height: RadarHeight,
@@ -207,6 +211,7 @@ impl SimulateArgs {
             still_share: self.still_share,
             multipath: self.multipath,
             noise_db: self.noise_db,
+            room_seed: self.room_seed,
             radar_height_m: self.radar_height.0,
         };
         options.check().context("simulate")?;
@@ -238,6 +243,9 @@ impl SimulateArgs {
         }
         if self.noise_db != 0.0 {
             let _ = write!(text, " --noise-db {}", self.noise_db);
+        }
+        if let Some(seed) = self.room_seed {
+            let _ = write!(text, " --room-seed {seed}");
         }
         match self.radar_height.0 {
             None => text.push_str(" --radar-height any"),

@@ -23,6 +23,14 @@ struct Manifest {
     skeleton: Option<Skeleton>,
     radar: RadarConfig,
     view: Vec<ManifestView>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    origin: Vec<Scene>,
+}
+
+/// The scene of all frames.
+#[derive(Serialize)]
+struct Scene {
+    scene: String,
 }
 
 #[derive(Serialize)]
@@ -59,6 +67,7 @@ pub(super) fn text(recording: &Recording, writer: &dyn FrameWriter, style: Style
         skeleton: (!writer.has_own_joints()).then(|| crate::body::Build::default().skeleton()),
         view: device.views.iter().zip(device.ffts()).map(view).collect(),
         radar: radar.clone(),
+        origin: recording.options().room_seed.map(|seed| Scene { scene: format!("room {seed}") }).into_iter().collect(),
     };
     Ok(format!("{}\n{}", comment(recording, style.command), toml::to_string(&manifest)?))
 }

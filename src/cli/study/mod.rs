@@ -1,5 +1,7 @@
 //! `study`: variants of a configuration over many frames, as a run folder with its table.
 
+#[cfg(feature = "train")]
+mod cross;
 mod run;
 
 use crate::study::run::merge_runs;
@@ -62,6 +64,12 @@ pub enum StudyCommand {
     /// Any grid over the configuration: numbers, switches and choices.
     #[command(after_long_help = crate::config::listing())]
     Sweep(run::SweepArgs),
+    /// Networks taught on one scene and asked on the others (paper 5.2.2), by what they read: heatmaps, PPPR, PPPR-Heatmap.
+    #[cfg(feature = "train")]
+    CrossScene(cross::CrossArgs),
+    /// The same across data sets, of other radars for example (paper 5.2.3).
+    #[cfg(feature = "train")]
+    CrossDataset(cross::CrossArgs),
 }
 
 /// Runs `study`.
@@ -82,6 +90,10 @@ pub(super) fn run(command: &StudyCommand) -> anyhow::Result<ExitCode> {
         StudyCommand::Counting(args) => run::run(Kind::Counting, args, None, &[]),
         StudyCommand::Truth(args) => run::run(Kind::Truth, args, None, &[]),
         StudyCommand::Sweep(args) => run::run(Kind::Sweep, &args.run, None, &args.grid),
+        #[cfg(feature = "train")]
+        StudyCommand::CrossScene(args) => cross::run(crate::study::cross::CrossKind::Scene, args),
+        #[cfg(feature = "train")]
+        StudyCommand::CrossDataset(args) => cross::run(crate::study::cross::CrossKind::Dataset, args),
     }
 }
 

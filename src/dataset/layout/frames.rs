@@ -1,5 +1,6 @@
 //! The frames of an open data set, as its layout gives them.
 
+use crate::dataset::Origin;
 use crate::dataset::adc::ChainStages;
 use crate::dataset::room::RoomJoints;
 use crate::dataset::{DatasetError, DatasetInfo, Frame, Heatmap};
@@ -24,6 +25,11 @@ pub trait FrameSource: Debug + Send + Sync {
 
     /// What frame `i`, called `name`, follows the one before in; `None` for the data set itself.
     fn sequence<'a>(&'a self, i: usize, name: &'a str) -> Option<&'a str>;
+
+    /// Where frame `i` comes from, as far as the names of files and folders say.
+    fn origin(&self, _i: usize) -> Origin {
+        Origin::default()
+    }
 
     /// The files that the maps of frame `i` are made of, the main one first: one, or one a view.
     fn files(&self, i: usize, info: &DatasetInfo) -> Vec<PathBuf>;

@@ -174,6 +174,7 @@ impl DataFolder<'_> {
             calibrations,
             static_removed: false,
             assumptions,
+            origins: manifest.origins.clone(),
             notes: Vec::new(),
         }
     }

@@ -141,6 +141,8 @@ pub struct Options {
     pub multipath: Option<bool>,
     /// More thermal noise than the preset has, dB.
     pub noise_db: f64,
+    /// One room for all sequences of a preset, drawn from this; without it each sequence has a room of its own.
+    pub room_seed: Option<u64>,
     /// Height of the radar above the floor, m; `None` draws one for each sequence, 0.9 to 1.1.
     pub radar_height_m: Option<f64>,
 }
@@ -160,6 +162,7 @@ impl Default for Options {
             still_share: None,
             multipath: None,
             noise_db: 0.0,
+            room_seed: None,
             radar_height_m: None,
         }
     }

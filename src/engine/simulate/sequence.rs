@@ -98,7 +98,9 @@ impl Sequence {
             Some(true) if recipe.multipath == 0.0 => Recipe { multipath: 0.12, ..recipe },
             _ => recipe,
         };
-        let room = Room::new(&recipe, multipath, stage.lateral_m, stage.floor_z_m, centre, &mut rng(Purpose::Room));
+        let one_room = |seed: u64| generator(seed, 0, Purpose::Room as u64);
+        let mut draw_room = options.room_seed.map_or_else(|| rng(Purpose::Room), one_room);
+        let room = Room::new(&recipe, multipath, stage.lateral_m, stage.floor_z_m, centre, &mut draw_room);
         let mut skin = rng(Purpose::Skin);
         let people: Vec<(Performer, BodySurface)> = performers
             .into_iter()

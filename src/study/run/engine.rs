@@ -270,6 +270,7 @@ impl Engine<'_> {
             frame,
             name: self.dataset.frame_name(frame).to_owned(),
             sequence: self.dataset.sequence(frame).to_owned(),
+            origin: self.dataset.origin(frame),
             stratum: self.plan.strata.get(frame).copied().flatten(),
             passing: !self.studied.contains(&frame),
             fit,

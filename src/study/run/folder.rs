@@ -9,7 +9,7 @@ use super::output::{self, TABLE_FILE, json_text};
 use super::plan::RunPlan;
 use super::row::RunRow;
 use super::spec::{RUN_FILE, RunSpec};
-use super::table::{TableRow, table};
+use super::table::{SceneTable, TableRow, by_scene, table};
 use crate::dataset::Dataset;
 use crate::output::{FolderLock, Inputs};
 use crate::study::shard::{Part as _, gather};
@@ -32,12 +32,14 @@ pub struct Run {
     pub complete: bool,
     /// The table of these rows.
     pub table: Vec<TableRow>,
+    /// The same for each scene, where there are several.
+    pub scenes: Vec<SceneTable>,
 }
 
 impl Run {
     fn of(spec: RunSpec, rows: &Rows, complete: bool) -> Self {
-        let table = table(&spec, rows);
-        Self { spec, rows: rows.values().cloned().collect(), complete, table }
+        let (table, scenes) = (table(&spec, rows), by_scene(&spec, rows));
+        Self { spec, rows: rows.values().cloned().collect(), complete, table, scenes }
     }
 
     /// Reads a run folder.
@@ -52,12 +54,12 @@ impl Run {
 
     /// The table as Markdown.
     pub fn markdown(&self) -> String {
-        markdown::text(&self.spec, &self.table)
+        markdown::text(&self.spec, &self.table, &self.scenes)
     }
 
     /// The table as JSON.
     pub fn json(&self) -> String {
-        json_text(&self.spec, &self.table)
+        json_text(&self.spec, &self.table, &self.scenes)
     }
 
     /// The rows of a row of the table, by frame.

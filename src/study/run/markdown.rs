@@ -3,7 +3,7 @@
 use super::StudyKind;
 use super::journal::Rows;
 use super::spec::RunSpec;
-use super::table::{self, Spread, TableRow};
+use super::table::{self, SceneTable, Spread, TableRow};
 use crate::escape::one_line;
 use crate::mhp::Precision;
 use crate::people::CLASSES;
@@ -22,7 +22,7 @@ struct Column<'a> {
 }
 
 /// Head, table, notes. Nothing in it depends on the time or the machine.
-pub(super) fn text(spec: &RunSpec, rows: &[TableRow]) -> String {
+pub(super) fn text(spec: &RunSpec, rows: &[TableRow], scenes: &[SceneTable]) -> String {
     let data = &spec.data;
     let mut text = format!("# {}\n\n", spec.study.title());
     let plural = if data.frames == 1 { "" } else { "s" };
@@ -40,7 +40,11 @@ pub(super) fn text(spec: &RunSpec, rows: &[TableRow]) -> String {
         spec.version,
         spec.shard.map(|shard| format!(" Shard {shard}: not the whole.")).unwrap_or_default(),
     );
-    text + &grid(&columns(spec, rows), rows) + &notes(spec, rows)
+    text += &(grid(&columns(spec, rows), rows) + &notes(spec, rows));
+    for SceneTable { scene, rows } in scenes {
+        let _ = write!(text, "\n## Scene {}\n\n{}", escaped(scene), grid(&columns(spec, rows), rows));
+    }
+    text
 }
 
 fn columns<'a>(spec: &'a RunSpec, rows: &[TableRow]) -> Vec<Column<'a>> {

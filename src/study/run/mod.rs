@@ -58,5 +58,5 @@ pub use plan::{RunPlan, RunRequest, points, sweep};
 pub use row::{RunNumbers, RunRow};
 pub use single::{FrameSweep, SweptFit, failed_row};
 pub use spec::{RUN_FILE, RunSpec};
-pub use table::{CountShares, Spread, TableRow, mark, notes};
+pub use table::{CountShares, SceneTable, Spread, TableRow, mark, notes};
 pub use variant::{Method, PaperRow, StartFrom, Variant};

@@ -5,7 +5,7 @@ use super::error::RunError;
 use super::journal::Rows;
 use super::row::{Cell, RunRow, cells};
 use super::spec::RunSpec;
-use super::table::{TableRow, table};
+use super::table::{SceneTable, TableRow, by_scene, table};
 use super::{markdown, parquet_rows};
 use crate::escape::to_cell;
 use crate::output::replace_file;
@@ -24,17 +24,17 @@ pub(super) const FILES: [&str; 6] = ["rows.csv", "rows.parquet", "table.md", "ti
 /// # Errors
 /// Where a file cannot be written.
 pub(super) fn write(folder: &Path, spec: &RunSpec, rows: &Rows) -> Result<(), RunError> {
-    let table = table(spec, rows);
+    let (table, scenes) = (table(spec, rows), by_scene(spec, rows));
     let studied: Vec<&RunRow> = rows.values().filter(|row| !row.passing).collect();
     write_rows(folder, spec, &studied)?;
-    write_text(&folder.join("table.md"), &markdown::text(spec, &table))?;
+    write_text(&folder.join("table.md"), &markdown::text(spec, &table, &scenes))?;
     write_times(folder, spec, &studied)?;
     write_text(&folder.join("timing.md"), &markdown::timing(spec, rows))?;
-    write_text(&folder.join(TABLE_FILE), &json_text(spec, &table))
+    write_text(&folder.join(TABLE_FILE), &json_text(spec, &table, &scenes))
 }
 
 /// The table as JSON: the study, the label columns, the data, a row each.
-pub(super) fn json_text(spec: &RunSpec, table: &[TableRow]) -> String {
+pub(super) fn json_text(spec: &RunSpec, table: &[TableRow], scenes: &[SceneTable]) -> String {
     let data = &spec.data;
     let mut object = json!({
         "study": spec.study,
@@ -53,6 +53,9 @@ pub(super) fn json_text(spec: &RunSpec, table: &[TableRow]) -> String {
     });
     if let Some(listed) = &data.listed {
         object["data"]["listed"] = json!(listed);
+    }
+    if !scenes.is_empty() {
+        object["scenes"] = json!(scenes);
     }
     serde_json::to_string_pretty(&object).unwrap_or_default() + "\n"
 }

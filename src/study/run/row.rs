@@ -1,6 +1,7 @@
 //! One row of a run: one frame under one variant.
 
 use super::spec::RunSpec;
+use crate::dataset::Origin;
 use crate::escape::to_cell;
 use crate::mhp::{TermId, Terms};
 use crate::study::complexity::Stratum;
@@ -74,6 +75,9 @@ pub struct RunRow {
     pub name: String,
     /// The sequence it is of.
     pub sequence: String,
+    /// Where it comes from, as far as that is known.
+    #[serde(default, skip_serializing_if = "Origin::is_unknown")]
+    pub origin: Origin,
     /// Its stratum, where the study asks for it.
     #[serde(default, skip_serializing_if = "Option::is_none", with = "stratum_word")]
     pub stratum: Option<Stratum>,
@@ -148,6 +152,9 @@ pub(super) fn cells(spec: &RunSpec, row: &RunRow) -> Vec<(String, Cell)> {
     add("index", count(Some(row.frame)));
     add("frame", text(&row.name));
     add("sequence", text(&row.sequence));
+    for (name, part) in Origin::PARTS.iter().zip(row.origin.parts()) {
+        add(name, Cell::Text(part.map(ToOwned::to_owned)));
+    }
     add("stratum", Cell::Text(row.stratum.map(|stratum| stratum.word().to_owned())));
     let reason = row.fit.as_ref().map_or_else(|why| format!("error: {why}"), |fit| fit.reason.clone());
     if spec.study == super::StudyKind::Counting {
@@ -206,6 +213,7 @@ mod tests {
             frame: 0,
             name: "a/0".into(),
             sequence: "a".into(),
+            origin: Origin::default(),
             stratum: None,
             passing: false,
             fit: Ok(fit),

@@ -106,6 +106,7 @@ pub fn failed_row(dataset: &Dataset, (variant, frame): (usize, usize), why: Stri
         frame,
         name: dataset.frame_name(frame).to_owned(),
         sequence: dataset.sequence(frame).to_owned(),
+        origin: dataset.origin(frame),
         stratum: None,
         passing: false,
         fit: Err(why),

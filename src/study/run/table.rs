@@ -10,6 +10,7 @@ use super::paper::{self, PaperSet};
 use super::row::{RunNumbers, RunRow};
 use super::spec::RunSpec;
 use super::variant::{Method, PaperRow, StartFrom};
+use crate::dataset::natural;
 use crate::people::{CLASSES, Confusion};
 use crate::study::complexity::Stratum;
 use serde::Serialize;
@@ -120,6 +121,15 @@ pub struct TableRow {
     pub note: Option<String>,
 }
 
+/// The rows of one scene.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SceneTable {
+    /// What it is called.
+    pub scene: String,
+    /// As in the table of all frames.
+    pub rows: Vec<TableRow>,
+}
+
 /// The different notes of a table, in the order of the rows that bear them: a row's mark is the place of its own, from 1.
 pub fn notes(rows: &[TableRow]) -> Vec<&str> {
     let mut notes: Vec<&str> = Vec::new();
@@ -167,6 +177,23 @@ pub(super) fn table(spec: &RunSpec, all_rows: &Rows) -> Vec<TableRow> {
         }
     });
     of_stratum.collect()
+}
+
+/// The table of each scene by itself, where frames come from several; without the paper's figures, which are of all of them.
+pub(super) fn by_scene(spec: &RunSpec, all_rows: &Rows) -> Vec<SceneTable> {
+    let mut scenes: Vec<&str> = all_rows.values().filter_map(|row| row.origin.scene.as_deref()).collect();
+    scenes.sort_by(|a, b| natural(a, b));
+    scenes.dedup();
+    if scenes.len() < 2 {
+        return Vec::new();
+    }
+    let of = |scene: &str| {
+        let inside = |row: &&RunRow| row.origin.scene.as_deref() == Some(scene);
+        let rows: Rows = all_rows.iter().filter(|(_, row)| inside(row)).map(|(key, row)| (*key, row.clone())).collect();
+        let rows = table(spec, &rows).into_iter().map(|row| TableRow { paper: None, ..row }).collect();
+        SceneTable { scene: scene.to_owned(), rows }
+    };
+    scenes.into_iter().map(of).collect()
 }
 
 /// The row with its median, and with how often its loss ends lower than the one from the truth does.
@@ -267,6 +294,7 @@ fn counted_right(labels: Vec<String>, variant: usize, rows: &[&RunRow]) -> Table
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
     use super::*;
+    use crate::dataset::Origin;
 
     fn row(frame: usize, majpe_mm: f64, fitted: usize) -> RunRow {
         let fit = RunNumbers {
@@ -283,6 +311,7 @@ mod tests {
             frame,
             name: format!("f{frame}"),
             sequence: "s".into(),
+            origin: Origin::default(),
             stratum: None,
             passing: false,
             fit: Ok(fit),

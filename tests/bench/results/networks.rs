@@ -5,9 +5,19 @@ use super::bed::{Bed, row, table};
 /// What is learned from, and what is asked: no sequence of the one is in the other.
 const LESSONS: &str = "--preset easy,medium,hard --frames 2400 --sequence-length 12 --people 1 --seed 2301";
 const UNSEEN: &str = "--preset easy,medium,hard --frames 600 --people 1 --seed 600";
-/// Another radar than the one that is learned from, and unseen people before it.
-const OTHERS: [(&str, &str); 1] =
-    [("generic", "--layout generic --preset easy,medium,hard --frames 180 --people 1 --seed 811")];
+/// Other radars than the one that is learned from, and unseen people before them.
+const OTHERS: [(&str, &str); 3] = [
+    ("generic", "--layout generic --preset easy,medium,hard --frames 180 --people 1 --seed 811"),
+    ("hupr", "--layout hupr --preset easy,medium,hard --frames 180 --people 1 --seed 812 --narrow"),
+    ("xrf55", "--layout xrf55 --preset easy,medium,hard --frames 180 --people 1 --seed 813"),
+];
+/// A scene that is learned, and three others of the same radar.
+const SCENES: [(&str, &str); 4] = [
+    ("scene-1", "--preset medium --frames 1200 --sequence-length 12 --people 1 --seed 2401 --room-seed 1"),
+    ("scene-2", "--preset medium --frames 180 --sequence-length 12 --people 1 --seed 2402 --room-seed 2"),
+    ("scene-3", "--preset medium --frames 180 --sequence-length 12 --people 1 --seed 2403 --room-seed 3"),
+    ("scene-4", "--preset medium --frames 180 --sequence-length 12 --people 1 --seed 2404 --room-seed 4"),
+];
 /// Name, features and architecture.
 const NETWORKS: [(&str, &str, &str); 4] = [
     ("MLP+PPPR (A.6, pooled)", "pppr", "mlp"),
@@ -17,12 +27,12 @@ const NETWORKS: [(&str, &str, &str); 4] = [
 ];
 
 pub(crate) fn section(bed: &Bed) -> String {
-    let data = [("lessons", LESSONS), ("unseen", UNSEEN)].into_iter().chain(OTHERS);
+    let data = [("lessons", LESSONS), ("unseen", UNSEEN)].into_iter().chain(OTHERS).chain(SCENES);
     let mut errors: Vec<Vec<String>> = vec![Vec::new(); 2];
     for (name, options) in data {
         bed.simulated(name, options);
         bed.program(&["fit", name, "--out", &format!("{name}-fits")]);
-        if name != "lessons" {
+        if name != "lessons" && !name.starts_with("scene") {
             for (row, column) in
                 errors.iter_mut().zip([["init_majpe_mm", "init_pa_majpe_mm"], ["majpe_mm", "pa_majpe_mm"]])
             {
@@ -30,7 +40,7 @@ pub(crate) fn section(bed: &Bed) -> String {
             }
         }
     }
-    let heads = ["mm", "unseen", "generic", "parameters", "MB", "ms a frame"];
+    let heads = ["mm", "unseen", "generic", "hupr", "xrf55", "parameters", "MB", "ms a frame"];
     let mut rows = vec![row(&heads)];
     for (name, cells) in ["start", "fit"].into_iter().zip(errors) {
         rows.push([vec![name.to_owned()], cells, row(&["–", "–", "–"])].concat());
@@ -57,7 +67,7 @@ pub(crate) fn section(bed: &Bed) -> String {
         }
         let mut cells = vec![name.to_owned()];
         let mut size = row(&["–", "–", "–"]);
-        for set in ["unseen", "generic"] {
+        for set in ["unseen"].into_iter().chain(OTHERS.map(|(name, _)| name)) {
             let (file, fits) = (format!("{out}-{set}.npz"), format!("{set}-fits"));
             let model = format!("{out}/model.safetensors");
             match bed.tried(&["predict", set, "--model", &model, "--params", &fits, "--out", &file]) {
@@ -76,11 +86,26 @@ pub(crate) fn section(bed: &Bed) -> String {
         }
         rows.push([cells, size].concat());
     }
+    let across = |study: &str, sets: &[&str]| {
+        let fits: Vec<String> = sets.iter().map(|set| format!("{set}-fits")).collect();
+        let mut words = vec!["study", study];
+        words.extend(sets);
+        fits.iter().for_each(|fits| words.extend(["--params", fits.as_str()]));
+        words.extend(["--out", study]);
+        let said = bed.program(&words);
+        said.split_once("\n\n").map_or(said.clone(), |(_, rest)| rest.trim().to_owned())
+    };
+    let scenes = across("cross-scene", &SCENES.map(|(name, _)| name));
+    let radars = across("cross-dataset", &["lessons", "generic", "hupr", "xrf55"]);
+    let told: Vec<String> = SCENES.iter().map(|(name, options)| format!("{name}: `simulate {options}`")).collect();
     format!(
         "`train-pose DATA --params FITS --features F --model M` on `simulate {LESSONS}` and its fits, with the paper's schedule; then `predict` on `simulate {UNSEEN}` \
-         (unseen) and before another radar ({}). MAJPE / PA-MAJPE over all frames; – where a network cannot read such data. Latency is the network's alone, after the fit.\n\n{}",
+         (unseen) and before other radars ({}). MAJPE / PA-MAJPE over all frames; – where a network cannot read such data. Latency is the network's alone, after the fit.\n\n{}\n\n\
+         ### Across scenes\n\n`study cross-scene` on {}, and their fits.\n\n{scenes}\n\n\
+         ### Across radars\n\n`study cross-dataset` on the data above and their fits: one layout a radar, by calibration alone.\n\n{radars}",
         OTHERS.map(|(name, options)| format!("{name}: `{options}`")).join("; "),
-        table(&rows)
+        table(&rows),
+        told.join("; "),
     )
 }
 

@@ -100,6 +100,7 @@ fn open_chosen(catalog: &BareCatalog, choice: &BareChoice) -> Result<Opened, Dat
         assumptions: assumptions(&choice.views),
         views: choice.views.clone().into(),
         calibrations: Vec::new(),
+        origins: Vec::new(),
         notes: Vec::new(),
     };
     opened(info, count, choice.first_axis_is_frame)

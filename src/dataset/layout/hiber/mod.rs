@@ -14,6 +14,7 @@ mod write;
 use super::arrays::lift_zeros;
 use super::index::{Folders, Segment};
 use super::{DataFolder, FrameSource, FrameWriter, Layout, MapArray, Opened, Stored, manifest_beside, no_single_file};
+use crate::dataset::Origin;
 use crate::dataset::manifest::Manifest;
 use crate::dataset::npz::{Fold, NPY_KEY, NpzArchive, shape_text};
 use crate::dataset::room::{RoomJoints, RoomTransforms};
@@ -206,6 +207,14 @@ impl FrameSource for Frames {
 
     fn sequence<'a>(&'a self, i: usize, _name: &'a str) -> Option<&'a str> {
         self.folders.sequence(i)
+    }
+
+    /// The environment is the scene, the category what is done.
+    fn origin(&self, i: usize) -> Origin {
+        let Some((segment, _)) = self.folders.find(i) else { return Origin::default() };
+        let action = segment.sequence.split_once('/').map(|(category, _)| category.to_owned());
+        let session = segment.sequence.rsplit('/').next().map(ToOwned::to_owned);
+        Origin { scene: environment(segment).map(ToOwned::to_owned), session, action, ..Origin::default() }
     }
 
     fn files(&self, i: usize, info: &DatasetInfo) -> Vec<PathBuf> {

@@ -8,6 +8,7 @@
 //! `single_7,anna`), says it, and is told with the split of every frame.
 
 use crate::dataset::ImageAnnotations;
+use crate::dataset::Origin;
 use crate::dataset::layout::index::Segment;
 use crate::dataset::natural::natural;
 use crate::input::{MOST_TEXT, open_file, read_text};
@@ -91,6 +92,13 @@ impl Annotations {
         let subject = self.subjects.get(&number).map(|name| format!("subject {name}"));
         let all: Vec<String> = subject.into_iter().chain(split).collect();
         (!all.is_empty()).then(|| all.join(", "))
+    }
+
+    /// The recording of a sequence, and who is in it where that is said.
+    pub(super) fn origin(&self, sequence: &str) -> Origin {
+        let number = number(sequence);
+        let subject = number.and_then(|number| self.subjects.get(&number).cloned());
+        Origin { subject, session: number.map(|number| number.to_string()), ..Origin::default() }
     }
 
     /// The labels of a frame; what is wrong with the files goes to `notes`.

@@ -14,6 +14,7 @@ mod write;
 use super::arrays::truth_beside;
 use super::index::{Folders, Segment};
 use super::{DataFolder, FrameSource, FrameWriter, Layout, MapArray, Opened, Stored};
+use crate::dataset::Origin;
 use crate::dataset::natural::natural;
 use crate::dataset::npz::{NPY_KEY, NpzArchive, shape_text};
 use crate::dataset::set::DatasetInfo;
@@ -127,6 +128,10 @@ impl FrameSource for Frames {
 
     fn sequence<'a>(&'a self, i: usize, _name: &'a str) -> Option<&'a str> {
         self.folders.sequence(i)
+    }
+
+    fn origin(&self, i: usize) -> Origin {
+        self.folders.sequence(i).map_or_else(Origin::default, |sequence| self.labels.origin(sequence))
     }
 
     fn files(&self, i: usize, info: &DatasetInfo) -> Vec<PathBuf> {

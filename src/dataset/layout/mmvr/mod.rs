@@ -9,6 +9,7 @@ mod write;
 use super::arrays::{read_map, truth_beside};
 use super::index::{Folders, Segment};
 use super::{DataFolder, FrameSource, FrameWriter, Layout, Opened, manifest_beside, no_single_file};
+use crate::dataset::Origin;
 use crate::dataset::manifest::Manifest;
 use crate::dataset::npz::{NpzArchive, shape_text};
 use crate::dataset::set::{DatasetInfo, MANIFEST_NAME, parent};
@@ -144,6 +145,15 @@ fn is_session(name: &str) -> bool {
         .is_some_and(|(day, session)| digits(day) && digits(session))
 }
 
+/// The session of `d5s1/000`, and its scene: days 1 to 4 are the open room of P1, days 5 to 9 one of the five furnished rooms of P2
+/// each. That a day is a room is concluded from their numbers, and published nowhere.
+fn origin_of(sequence: &str) -> Origin {
+    let session = sequence.split('/').next().filter(|part| is_session(part));
+    let day = session.and_then(|session| session[1..].split('s').next()?.parse::<u32>().ok());
+    let scene = day.filter(|day| (1..=9).contains(day)).map(|day| day.saturating_sub(3).max(1).to_string());
+    Origin { scene, session: session.map(ToOwned::to_owned), ..Origin::default() }
+}
+
 /// The frames of a tree.
 #[derive(Debug)]
 struct Frames(Folders);
@@ -163,6 +173,10 @@ impl FrameSource for Frames {
 
     fn sequence<'a>(&'a self, i: usize, _name: &'a str) -> Option<&'a str> {
         self.0.sequence(i)
+    }
+
+    fn origin(&self, i: usize) -> Origin {
+        self.0.sequence(i).map_or_else(Origin::default, origin_of)
     }
 
     fn files(&self, i: usize, _info: &DatasetInfo) -> Vec<PathBuf> {
@@ -239,5 +253,13 @@ mod tests {
         assert_eq!(sequence_of(Path::new("/data/MMVR/P1/d1s1/000")), "d1s1/000");
         assert_eq!(sequence_of(Path::new("/data/mmvr")), "mmvr");
         assert_eq!(sequence_of(Path::new("/data/dxs1/007")), "007");
+    }
+
+    #[test]
+    fn a_day_is_a_scene() {
+        assert_eq!(origin_of("d3s2/004").to_string(), "scene 1, session d3s2");
+        assert_eq!(origin_of("d5s1/000").to_string(), "scene 2, session d5s1");
+        assert_eq!(origin_of("d9s6/010").to_string(), "scene 6, session d9s6");
+        assert!(origin_of("mmvr").is_unknown());
     }
 }

@@ -9,6 +9,7 @@ mod write;
 use super::arrays::truth_beside;
 use super::index::{folder_of, folders_of};
 use super::{DataFolder, FrameSource, FrameWriter, Layout, Opened};
+use crate::dataset::Origin;
 use crate::dataset::natural::natural;
 use crate::dataset::npz::{NPY_KEY, NpzArchive, shape_text};
 use crate::dataset::set::DatasetInfo;
@@ -126,6 +127,13 @@ fn told(files: &[PathBuf]) -> String {
     format!("{} clips: volunteers {}, actions {}, repetitions {}{scenes}", files.len(), number(0), number(1), number(2))
 }
 
+/// What the name of a clip and its folder say.
+fn origin_of(file: &Path) -> Origin {
+    let [subject, action, session] = numbers(file).map_or([None; 3], |numbers| numbers.map(Some));
+    let text = |number: Option<u32>| number.map(|number| number.to_string());
+    Origin { scene: scene(file), subject: text(subject), session: text(session), action: text(action) }
+}
+
 /// What a clip is, as its name and folder say; repetitions up to 14 are the published training split.
 fn clip_words(file: &Path) -> Option<String> {
     let [volunteer, action, repetition] = numbers(file)?;
@@ -179,6 +187,10 @@ impl FrameSource for Frames {
             return name.rsplit_once('/').map(|(clip, _)| clip);
         }
         self.files.get(i).and_then(|file| folder_of(file))
+    }
+
+    fn origin(&self, i: usize) -> Origin {
+        self.files.get(i / self.steps.max(1)).map_or_else(Origin::default, |file| origin_of(file))
     }
 
     fn files(&self, i: usize, info: &DatasetInfo) -> Vec<PathBuf> {
@@ -263,6 +275,8 @@ mod tests {
             words("Scene2/mmWave/03_07_15.npy").as_deref(),
             Some("volunteer 3, action 7, repetition 15 (test), Scene2")
         );
+        let origin = origin_of(Path::new("Scene2/mmWave/03_07_15.npy"));
+        assert_eq!(origin.to_string(), "scene Scene2, subject 3, session 15, action 7");
         let files = ["Scene1/1_2_3.npy", "Scene2/01_05_03.npy"].map(PathBuf::from);
         assert_eq!(told(&files), "2 clips: volunteers 1, actions 2, repetitions 1, in Scene1, Scene2");
     }
