@@ -300,7 +300,7 @@ pub struct ViewState {
     pub sort: Sort,
     /// Columns of the frame list that are not shown, by their keys.
     pub hidden_columns: Vec<String>,
-    /// Terms of the loss that have a column in the frame list, by their keys.
+    /// Columns of the frame list that are shown on request, terms of the loss for example, by their keys.
     pub shown_terms: Vec<String>,
     /// By which number results A and B are compared.
     pub compared: ComparedNumber,

@@ -23,6 +23,7 @@ mod row;
 pub mod run;
 pub mod shard;
 mod summary;
+pub mod verification;
 
 pub use batch::{BatchOptions, fit_frame, run_batch};
 pub use erased::{read_erased, write_erased};

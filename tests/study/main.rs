@@ -18,3 +18,4 @@ mod maps;
 mod radars;
 mod runs;
 mod shards;
+mod verification;

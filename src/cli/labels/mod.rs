@@ -8,7 +8,9 @@ mod show;
 mod source;
 mod stats;
 mod tag;
+mod verification;
 
+pub(super) use source::acts_of;
 use std::process::ExitCode;
 
 /// Shown under the options of `labels --help`.
@@ -44,6 +46,9 @@ pub enum LabelsCommand {
     /// Count labels: by tag, by scene, stratum or day; and the time that one took.
     #[command(after_help = stats::HELP)]
     Stats(stats::StatsArgs),
+    /// Tell which frames the count-matched protocol keeps, and what reviewers said of the others.
+    #[command(after_help = verification::HELP)]
+    Verification(verification::VerificationArgs),
 }
 
 /// Runs a subcommand of `labels`.
@@ -58,5 +63,6 @@ pub(super) fn run(command: &LabelsCommand) -> anyhow::Result<ExitCode> {
         LabelsCommand::Export(args) => export::run(args),
         LabelsCommand::Import(args) => import::run(args),
         LabelsCommand::Stats(args) => stats::run(args),
+        LabelsCommand::Verification(args) => verification::run(args),
     }
 }

@@ -33,7 +33,7 @@ pub(super) fn is_table(path: &Path) -> bool {
 ///
 /// # Errors
 /// Where the journals cannot be read.
-pub(super) fn acts_of(dataset: &Dataset) -> anyhow::Result<Vec<Record>> {
+pub(in crate::cli) fn acts_of(dataset: &Dataset) -> anyhow::Result<Vec<Record>> {
     let (acts, warnings) = place_acts(&LabelPlace::to_read(&dataset.info().root, dataset.fingerprint()))?;
     for warning in warnings {
         tracing::warn!("{warning}");

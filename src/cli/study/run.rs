@@ -3,13 +3,15 @@
 use crate::cli::common::{CsvArgs, PrecisionArg, complain, inputs, open, presets, print, print_json};
 use crate::cli::complexity::compute;
 use crate::cli::frames::{FrameRange, chosen_set};
+use crate::cli::labels::acts_of;
 use crate::cli::shards::typed;
 use crate::cli::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::config::{FitConfig, Preset};
 use crate::dataset::Dataset;
 use crate::study::complexity::{ComplexityOptions, cache_folder};
 use crate::study::run::{GridAxis, Run, RunFolder, RunPlan, RunRequest, StudyKind, check_run_folder, execute_run};
-use crate::study::shard::{Shard, Subset};
+use crate::study::shard::{FrameRanges, Shard, Subset};
+use crate::study::verification::taken_out;
 use crate::task::Progress;
 use clap::Args;
 use crossbeam_channel::{RecvTimeoutError, bounded};
@@ -35,6 +37,9 @@ pub struct RunArgs {
     /// commas between: 0..5,7,9..12. Default: all.
     #[arg(long, value_name = "A..B,…", value_delimiter = ',')]
     frames: Vec<FrameRange>,
+    /// Leave out the frames of which a reviewer says that annotation, count or both are wrong (paper A.3: N_verified).
+    #[arg(long)]
+    verified: bool,
     /// The settings that the study varies.
     #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = presets())]
     preset: Preset,
@@ -103,7 +108,7 @@ pub(super) fn run(kind: StudyKind, args: &RunArgs, all: Option<bool>, grid: &[Gr
         base,
         base_name,
         precision: args.precision.into(),
-        frames: chosen_set(&args.frames, &args.path, &dataset)?,
+        frames: frames(args, &dataset)?,
         subset: if all == Some(false) { Subset::Hard } else { Subset::All },
         grid: grid.to_vec(),
         iterations: args.iterations,
@@ -114,6 +119,19 @@ pub(super) fn run(kind: StudyKind, args: &RunArgs, all: Option<bool>, grid: &[Gr
         .transpose()?;
     let plan = RunPlan::new(&dataset, &request, complexity.as_ref())?;
     tell(&execute(&dataset, plan, args)?, args.json)
+}
+
+/// The frames that are asked for, without those that a verdict takes out where that is asked for, too.
+fn frames(args: &RunArgs, dataset: &Dataset) -> anyhow::Result<FrameRanges> {
+    let asked = chosen_set(&args.frames, &args.path, dataset)?;
+    if !args.verified {
+        return Ok(asked);
+    }
+    let acts = acts_of(dataset)?;
+    let out = taken_out(&acts);
+    let kept = FrameRanges::of_frames(asked.iter().filter(|&frame| !out.contains(dataset.frame_name(frame))));
+    complain(&format!("note: {} frames are left out by a verdict", asked.len() - kept.len()));
+    Ok(kept)
 }
 
 /// The settings that the study varies, and their name.

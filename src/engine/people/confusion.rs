@@ -34,6 +34,15 @@ impl Confusion {
         PREVALENCE.iter().map(|&(people, share)| self.accuracy(people).map(|accuracy| share * accuracy)).sum()
     }
 
+    /// Share of all frames whose count is off by no more than one person; 4 and more are one number.
+    pub fn within_one(&self) -> Option<f64> {
+        let all: usize = (0..CLASSES).map(|class| self.of(class)).sum();
+        let near = |(truth, row): (usize, &[usize; CLASSES])| -> usize {
+            row.iter().enumerate().filter(|(predicted, _)| truth.abs_diff(*predicted) <= 1).map(|(_, n)| n).sum()
+        };
+        (all > 0).then(|| self.frames.iter().enumerate().map(near).sum::<usize>() as f64 / all as f64)
+    }
+
     /// Share of all frames counted right.
     pub fn overall(&self) -> Option<f64> {
         let all: usize = (0..CLASSES).map(|class| self.of(class)).sum();
@@ -57,5 +66,8 @@ mod tests {
         assert_eq!(confusion.accuracy(4), Some(1.0), "4 and more are one class");
         assert!(confusion.weighted().is_some_and(|w| (w - (0.91 + 0.04 + 0.01)).abs() < 1e-12));
         assert_eq!(confusion.overall(), Some(5.0 / 6.0));
+        assert_eq!(confusion.within_one(), Some(1.0));
+        confusion.add(0, 3);
+        assert_eq!(confusion.within_one(), Some(6.0 / 7.0));
     }
 }

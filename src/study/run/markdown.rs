@@ -73,7 +73,8 @@ fn columns<'a>(spec: &'a RunSpec, rows: &[TableRow]) -> Vec<Column<'a>> {
             add(&format!("{people}{more} right"), true, Box::new(cell));
         }
         add("weighted 91/8/1", false, Box::new(|row| percent2(row.counts?.weighted)));
-        add("all", false, Box::new(|row| percent2(row.counts?.overall)));
+        add("exact", false, Box::new(|row| percent2(row.counts?.overall)));
+        add("within one", false, Box::new(|row| percent2(row.counts?.within_one)));
         add("paper weighted", true, Box::new(|row| percent(row.paper?.count_accuracy)));
         columns.retain(|column| !column.optional || rows.iter().any(|row| (column.cell)(row).is_some()));
         return columns;

@@ -58,6 +58,8 @@ pub struct CountShares {
     pub weighted: Option<f64>,
     /// Of all frames.
     pub overall: Option<f64>,
+    /// Frames that are off by no more than one person.
+    pub within_one: Option<f64>,
 }
 
 /// One row of the table. `None` where nothing is known.
@@ -285,6 +287,7 @@ fn counted_right(labels: Vec<String>, variant: usize, rows: &[&RunRow]) -> Table
         frames: std::array::from_fn(|people| confusion.of(people)),
         weighted: confusion.weighted(),
         overall: confusion.overall(),
+        within_one: confusion.within_one(),
     };
     let failed = rows.iter().filter(|row| row.fit.is_err()).count();
     TableRow { frames: rows.len(), failed, counts: Some(counts), ..summed(labels, variant, &[]) }

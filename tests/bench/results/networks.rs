@@ -90,7 +90,7 @@ pub(crate) fn section(bed: &Bed) -> String {
         let fits: Vec<String> = sets.iter().map(|set| format!("{set}-fits")).collect();
         let mut words = vec!["study", study];
         words.extend(sets);
-        fits.iter().for_each(|fits| words.extend(["--params", fits.as_str()]));
+        words.extend(fits.iter().flat_map(|fits| ["--params", fits.as_str()]));
         words.extend(["--out", study]);
         let said = bed.program(&words);
         said.split_once("\n\n").map_or(said.clone(), |(_, rest)| rest.trim().to_owned())

@@ -50,13 +50,13 @@ impl Column {
         }
     }
 
-    /// The error of a source of predictions, and its distance from the fit.
-    fn of_source(slot: u8) -> [Self; 2] {
+    /// The errors of a source of predictions, and its distance from the fit.
+    fn of_source(slot: u8) -> [Self; 3] {
         let of = |number, key: &str, name: &str, tip| {
             let number_of = slot + 1;
             Self {
                 key: format!("pred{number_of}{key}").leak(),
-                title: if key.is_empty() { "mm" } else { "Δ fit" },
+                title: if number == SourceNumber::ToFit { "Δ fit" } else { "mm" },
                 name: format!("{name} of source {number_of}").leak(),
                 tip,
                 sort: SortKey::Source(slot, number),
@@ -72,6 +72,12 @@ impl Column {
                 "MAJPE of the source of predictions against the truth, mm, over the joints in common.",
             ),
             of(
+                SourceNumber::AlignedError,
+                "_pa",
+                "PA-MAJPE",
+                "PA-MAJPE of the source of predictions, mm: after rotation, translation and scale of each person.",
+            ),
+            of(
                 SourceNumber::ToFit,
                 "_fit",
                 "Distance from the fit",
@@ -85,10 +91,10 @@ impl Column {
         match self.sort {
             SortKey::Source(slot, number) => {
                 session.sources.get(slot.into()).map_or(Cow::Borrowed(self.title), |source| {
-                    Cow::Owned(if number == SourceNumber::ToFit {
-                        format!("Δ {}", source.name())
-                    } else {
-                        source.name().to_owned()
+                    Cow::Owned(match number {
+                        SourceNumber::ToFit => format!("Δ {}", source.name()),
+                        SourceNumber::AlignedError => format!("PA {}", source.name()),
+                        SourceNumber::Error => source.name().to_owned(),
                     })
                 })
             }
@@ -101,7 +107,11 @@ impl Column {
         match self.sort {
             SortKey::Source(slot, number) => {
                 session.sources.get(slot.into()).map_or(Cow::Borrowed(self.name), |source| {
-                    let what = if number == SourceNumber::ToFit { "distance from the fit" } else { "MAJPE" };
+                    let what = match number {
+                        SourceNumber::ToFit => "distance from the fit",
+                        SourceNumber::AlignedError => "PA-MAJPE",
+                        SourceNumber::Error => "MAJPE",
+                    };
                     Cow::Owned(format!("{}, {what}", source.name()))
                 })
             }
@@ -109,10 +119,10 @@ impl Column {
         }
     }
 
-    /// Whether it is in the list: a term of the loss where it is asked for, the others unless they are not wanted.
+    /// Whether it is in the list: what is one of many where it is asked for, the others unless they are not wanted.
     pub(super) fn is_shown(&self, view: &ViewState) -> bool {
         let named = |keys: &[String]| keys.iter().any(|key| key == self.key);
-        if self.is_of_term() { named(&view.shown_terms) } else { !named(&view.hidden_columns) }
+        if self.is_on_request() { named(&view.shown_terms) } else { !named(&view.hidden_columns) }
     }
 
     /// Whether there is something to say in it: the two result sets only where they are kept, basins where they were sought.
@@ -134,16 +144,17 @@ impl Column {
 
     /// Takes it into the list, or out of it.
     pub(super) fn show(&self, view: &mut ViewState, on: bool) {
-        let of_term = self.is_of_term();
-        let keys = if of_term { &mut view.shown_terms } else { &mut view.hidden_columns };
+        let on_request = self.is_on_request();
+        let keys = if on_request { &mut view.shown_terms } else { &mut view.hidden_columns };
         keys.retain(|key| key != self.key);
-        if on == of_term {
+        if on == on_request {
             keys.push(self.key.to_owned());
         }
     }
 
-    fn is_of_term(&self) -> bool {
-        matches!(self.sort, SortKey::Term(_))
+    /// Terms of the loss, and the aligned errors of sources.
+    fn is_on_request(&self) -> bool {
+        matches!(self.sort, SortKey::Term(_) | SortKey::Source(_, SourceNumber::AlignedError))
     }
 }
 

@@ -10,7 +10,7 @@ use egui::{Align, Layout, RichText, Role, Ui};
 type Cell = fn(&TableRow) -> Option<String>;
 
 /// Head, what it means, and its text.
-const COLUMNS: [(&str, &str, Cell); 22] = [
+const COLUMNS: [(&str, &str, Cell); 23] = [
     ("frames", "Frames studied.", |row| Some(row.frames.to_string())),
     ("failed", "Frames that could not be fitted.", |row| count(row.failed)),
     ("mismatch", "Frames left out: another number of persons was fitted than is annotated.", |row| {
@@ -28,7 +28,8 @@ const COLUMNS: [(&str, &str, Cell); 22] = [
     ("2 right", "Share of frames with two people that were counted right.", |row| percent(row.counts?.by_people[2])),
     ("3 right", "Share of frames with three people that were counted right.", |row| percent(row.counts?.by_people[3])),
     ("weighted", "One, two and three people weighted by 91, 8 and 1 %.", |row| percent(row.counts?.weighted)),
-    ("all", "Share of all frames that were counted right.", |row| percent(row.counts?.overall)),
+    ("exact", "Share of all frames that were counted right.", |row| percent(row.counts?.overall)),
+    ("within 1", "Share of all frames that are off by no more than one person.", |row| percent(row.counts?.within_one)),
     ("paper weighted", "The paper's weighted accuracy on cleaned MMVR.", |row| percent(row.paper?.count_accuracy)),
     ("px", "Joints projected into the camera against key points, px: the calibration is uncertain.", |row| {
         mean(row.reprojection_px, 1)
