@@ -4,6 +4,7 @@ use super::source::acts_of;
 use crate::cli::common::{open, print, print_json, progress_bar};
 use crate::escape::one_line;
 use crate::labels::Verdict;
+use crate::study::run::PaperVerification;
 use crate::study::verification::{Verification, verify};
 use anyhow::Context as _;
 use std::fmt::Write as _;
@@ -35,13 +36,6 @@ pub struct VerificationArgs {
     json: bool,
 }
 
-/// The paper's figures of each verdict, %: MMVR, XRF55.
-const PAPER: [[u32; 2]; 4] = [[11, 7], [3, 1], [3, 1], [83, 91]];
-/// Its retention of frames with several people, %.
-const PAPER_RETENTION: [f64; 2] = [93.2, 94.8];
-/// The layouts that they are of.
-const PAPER_SETS: [&str; 2] = ["mmvr", "xrf55"];
-
 /// Counts, compares, prints.
 ///
 /// # Errors
@@ -67,7 +61,6 @@ pub(super) fn run(args: &VerificationArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn text(all: &[Verification]) -> String {
-    let paper = |layout: &str| PAPER_SETS.iter().position(|set| *set == layout);
     let percent = |share: Option<f64>| share.map_or("–".to_owned(), |share| format!("{:.1} %", 100.0 * share));
     let name = |of: &Verification| one_line(&of.data).into_owned();
     let width = all.iter().map(|of| name(of).chars().count()).max().unwrap_or(0).max(20);
@@ -77,8 +70,8 @@ fn text(all: &[Verification]) -> String {
         let [share, several] = of.retention().map(percent);
         let _ =
             write!(text, "{:<width$}  {:>8}  {share:>10}  {:>15}  {several:>9}", name(of), of.frames[0], of.frames[1]);
-        if let Some(set) = paper(of.layout) {
-            let _ = write!(text, "  (paper {:.1} %)", PAPER_RETENTION[set]);
+        if let Some(paper) = PaperVerification::beside(of.layout) {
+            let _ = write!(text, "  (paper {:.1} %)", paper.retention_pct);
         }
         text.push('\n');
     }
@@ -99,11 +92,8 @@ fn text(all: &[Verification]) -> String {
             cells.push(format!("combined {}", share(sum(|of, k| of.verdicts[k]), sum(|of, _| of.reviewed()))));
         }
         let cells: Vec<String> = cells.iter().map(|cell| format!("{cell:>16}")).collect();
-        let papers: Vec<String> = all
-            .iter()
-            .filter_map(|of| paper(of.layout))
-            .map(|set| format!("{} {} %", ["MMVR", "XRF55"][set], PAPER[k][set]))
-            .collect();
+        let papers = all.iter().filter_map(|of| PaperVerification::beside(of.layout));
+        let papers: Vec<String> = papers.map(|paper| format!("{} {} %", paper.name, paper.verdicts[k])).collect();
         let papers = if papers.is_empty() { String::new() } else { format!("  (paper {})", papers.join(", ")) };
         let _ = writeln!(text, "{:<width$}  {}{papers}", verdict.code().replace('-', " "), cells.join("  "));
     }

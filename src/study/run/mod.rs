@@ -54,6 +54,7 @@ pub use grid::GridAxis;
 pub use journal::JOURNAL_FILE;
 pub use kind::StudyKind;
 pub use output::TABLE_FILE;
+pub use paper::PaperVerification;
 pub use plan::{RunPlan, RunRequest, points, sweep};
 pub use row::{RunNumbers, RunRow};
 pub use single::{FrameSweep, SweptFit, failed_row};

@@ -90,6 +90,30 @@ pub(super) fn stratum(stratum: Option<Stratum>) -> PaperRow {
     PaperRow { majpe_mm: Some(majpe), iou: Some(iou), converged_share: Some(converged), ..PaperRow::default() }
 }
 
+/// What the paper says of a data set's mismatched frames (table 18) and of what its protocol keeps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PaperVerification {
+    /// The data set.
+    pub name: &'static str,
+    /// Frames of 100 with each verdict, in the order of [`crate::labels::Verdict::ALL`].
+    pub verdicts: [u32; 4],
+    /// Share of the frames with several people that are kept, %.
+    pub retention_pct: f64,
+}
+
+impl PaperVerification {
+    /// That of data with this layout.
+    pub fn beside(layout: &str) -> Option<Self> {
+        let set = PaperSet::ALL.into_iter().find(|set| set.layout() == layout)?;
+        let (verdicts, retention_pct) = match set {
+            PaperSet::Mmvr => ([11, 3, 3, 83], 93.2),
+            PaperSet::Xrf55 => ([7, 1, 1, 91], 94.8),
+            PaperSet::Hupr => return None,
+        };
+        Some(Self { name: set.name(), verdicts, retention_pct })
+    }
+}
+
 /// MAJPE and PA-MAJPE at thresholds of 5, 10, 30, 70 and 100 %, mm.
 pub(super) fn threshold(set: PaperSet) -> [[f64; 2]; 5] {
     match set {
