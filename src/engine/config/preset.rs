@@ -107,7 +107,9 @@ impl Preset {
                 surface_offset_m: 0.04,
                 starts: 17,
                 people: 0,
-                iterations: 60,
+                // A search has been there before: more and shorter steps come to the same pose.
+                iterations: 30,
+                learning_rate: 2e-3,
                 // How bright and how wide each part is differs from person to person; points of skin have areas.
                 learning_rates: LearningRates {
                     beta: Some(0.0),
