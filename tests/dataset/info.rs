@@ -65,8 +65,8 @@ fn json_has_stable_keys_and_exact_values() {
     assert_eq!(code, 0);
     let json: serde_json::Value = serde_json::from_str(&out).unwrap();
     let keys: Vec<&str> = json.as_object().unwrap().keys().map(String::as_str).collect();
-    let wanted =
-        "assumptions axes frame frame_rate_hz frames label_notes layout name notes radar root sequences skeleton views";
+    let wanted = "assumptions axes frame frame_rate_hz frames label_notes layout name notes radar root scenes sequences \
+                  skeleton views";
     let mut sorted = keys.clone();
     sorted.sort_unstable();
     assert_eq!(sorted, wanted.split(' ').collect::<Vec<_>>());

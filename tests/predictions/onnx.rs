@@ -217,6 +217,11 @@ fn what_is_wrong_with_a_model_is_told() {
         ("is = \"map\"", "is = \"map\"\ntensor = \"x\"", "no [[input]] has tensor = \"maps\""),
         ("unit = \"m\"", "unit = \"m\"\ntensor = \"y\"", "it gives no `y`"),
         ("is = \"map\"", "is = \"map\"\nshape = [1, 4, 32, 32]", "the model's is [?, 2, 64, 32]"),
+        (
+            "is = \"map\"",
+            "is = \"map\"\nshape = [9000000000000000000, 2, 64, 32]",
+            "is [9000000000000000000, 2, 64, 32]; the data give",
+        ),
         ("\"coco17\"", "\"hupr14\"", "it answers [1, 17, 3]; expected a multiple of 14 x 3"),
     ] {
         let described = home.path().join("d.toml");

@@ -250,6 +250,9 @@ impl OnnxDescription {
             if input.frames.is_empty() {
                 return Some(format!("frames{of} = []; expected at least one, 0 for the frame that is asked"));
             }
+            if input.frames.len() > MOST_FRAMES {
+                return Some(format!("frames{of}: {}; expected no more than {MOST_FRAMES}", input.frames.len()));
+            }
             if input.frames.iter().any(|frame| frame.unsigned_abs() > MOST_FRAMES) {
                 return Some(format!("frames{of}: expected none beyond {MOST_FRAMES} from the one that is asked"));
             }

@@ -316,7 +316,7 @@ fn shape(model: &InferenceModel, k: usize, told: Option<&[usize]>, reader: &Read
             if let Some(first) = known.first_mut().filter(|first| first.is_none()) {
                 *first = Some(1);
             }
-            let product: usize = known.iter().flatten().product();
+            let product = cells(known.iter().flatten()).unwrap_or(0);
             let open: Vec<usize> = (0..known.len()).filter(|&axis| known[axis].is_none()).collect();
             match open[..] {
                 [] => {}
@@ -333,10 +333,15 @@ fn shape(model: &InferenceModel, k: usize, told: Option<&[usize]>, reader: &Read
             known.into_iter().flatten().collect()
         }
     };
-    if shape.iter().product::<usize>() != reader.numbers {
+    if cells(&shape) != Some(reader.numbers) {
         return Err(format!("`{name}` is {shape:?}; the data give {} numbers ({})", reader.numbers, reader.form));
     }
     Ok(shape)
+}
+
+/// Numbers of a tensor; `None` where there are more than can be counted.
+fn cells<'a>(shape: impl IntoIterator<Item = &'a usize>) -> Option<usize> {
+    shape.into_iter().try_fold(1usize, |product, dim| product.checked_mul(*dim))
 }
 
 fn shown(shape: &[Option<usize>]) -> String {
