@@ -8,7 +8,7 @@ const UNSEEN: &str = "--preset easy,medium,hard --frames 600 --people 1 --seed 6
 /// Other radars than the one that is learned from, and unseen people before them.
 const OTHERS: [(&str, &str); 3] = [
     ("generic", "--layout generic --preset easy,medium,hard --frames 180 --people 1 --seed 811"),
-    ("hupr", "--layout hupr --preset easy,medium,hard --frames 180 --people 1 --seed 812 --narrow"),
+    ("hupr", "--layout hupr --preset easy,medium,hard --frames 40 --people 1 --seed 812 --narrow"),
     ("xrf55", "--layout xrf55 --preset easy,medium,hard --frames 180 --people 1 --seed 813"),
 ];
 /// A scene that is learned, and three others of the same radar.
