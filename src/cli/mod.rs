@@ -210,7 +210,7 @@ pub enum CliCommand {
     /// Make one whole of the shards of `fit`, `complexity`, `count`, `evidence` or a study: what each did with --shard.
     #[command(after_help = merge::HELP)]
     Merge(merge::MergeArgs),
-    /// Say where the joints are by a network that `train-pose` taught: a file of predictions.
+    /// Say where the joints are by a network, one of `train-pose` or one in ONNX: a file of predictions.
     #[command(after_help = predict::HELP)]
     Predict(predict::PredictArgs),
     /// Compare joints that networks or other programs predict with truth and fit: a table, per joint, frames by disagreement.
