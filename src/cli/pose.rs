@@ -1,18 +1,38 @@
 //! What `train-pose` and `predict` share: parameters of frames, kept or fitted.
 
-use super::common::progress_bar;
-use crate::config::FitConfig;
+use super::common::{config, presets, progress_bar};
+use crate::config::{FitConfig, Preset};
 use crate::dataset::{Dataset, read_pppr};
 use crate::mhp::Precision;
 use crate::network::ParamsOf;
 use crate::study::{BatchOptions, fit_frame};
 use anyhow::bail;
+use clap::Args;
 use rayon::prelude::*;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The folder of parameters inside one of results.
 const PARAMS: &str = "pppr";
+
+/// With which settings frames are fitted that a network reads.
+#[derive(Debug, Args)]
+pub(super) struct FitsArgs {
+    /// Settings of the fits.
+    #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = presets())]
+    preset: Preset,
+    /// Fit configuration instead of the preset.
+    #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
+    config: Option<PathBuf>,
+}
+
+impl FitsArgs {
+    /// # Errors
+    /// Where the configuration cannot be used.
+    pub(super) fn settings(&self) -> anyhow::Result<FitConfig> {
+        if self.config.is_some() { config(self.config.as_deref()) } else { Ok(self.preset.config()) }
+    }
+}
 
 /// The parameters of `frames`: those of a folder of `fit --out`, or fitted here and now. Frames without are left out.
 ///

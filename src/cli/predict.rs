@@ -1,9 +1,8 @@
 //! `predict`: joints of a network, as a file of predictions.
 
-use super::common::{complain, config, inputs, open, presets, print};
+use super::common::{complain, inputs, open, print};
 use super::frames::{FrameRange, chosen};
-use super::pose::params_of;
-use crate::config::Preset;
+use super::pose::{FitsArgs, params_of};
 use crate::dataset::Dataset;
 use crate::geometry::Vec3;
 use crate::network::{ParamsOf, open_model};
@@ -69,12 +68,8 @@ pub struct PredictArgs {
     /// Fits to read: the folder of `fit --out`. Without it each frame is fitted.
     #[arg(long, value_name = "DIR")]
     params: Option<PathBuf>,
-    /// Settings of the fits.
-    #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = presets())]
-    preset: Preset,
-    /// Fit configuration instead of the preset.
-    #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
-    config: Option<PathBuf>,
+    #[command(flatten)]
+    fits: FitsArgs,
     /// Frames, counted from 0: 5..12, 5.., ..12 or 7. Default: all.
     #[arg(long, value_name = "A..B")]
     frames: Option<FrameRange>,
@@ -89,7 +84,7 @@ pub struct PredictArgs {
 /// Where the model or the data set cannot be used, or the file not be written.
 pub(super) fn run(args: &PredictArgs) -> anyhow::Result<ExitCode> {
     let dataset = open(&args.path, args.manifest.as_deref())?;
-    let settings = if args.config.is_some() { config(args.config.as_deref())? } else { args.preset.config() };
+    let settings = args.fits.settings()?;
     let model = open_model(&args.model, args.description.as_deref(), &dataset, &settings)?;
     let format = WriteFormat::of(&args.out).with_context(|| {
         format!("{}: expected a name that ends in .npz, .csv, .json or .parquet", args.out.display())

@@ -1,8 +1,7 @@
 //! `train-pose`: teaches MLP+PPPR on data with truth.
 
-use super::common::{at_least_one, complain, config, open, presets, print};
-use super::pose::params_of;
-use crate::config::Preset;
+use super::common::{at_least_one, complain, open, print};
+use super::pose::{FitsArgs, params_of};
 use crate::network::{
     Architecture, Example, ExampleSet, Features, ModelCard, ParamsOf, TrainPoseOptions, TrainedEpoch, examples,
     train_pose,
@@ -47,12 +46,8 @@ pub struct TrainPoseArgs {
     /// Folder for model.safetensors, card.md, curves.csv and the checkpoint.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Settings of the fits.
-    #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = presets())]
-    preset: Preset,
-    /// Fit configuration instead of the preset.
-    #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
-    config: Option<PathBuf>,
+    #[command(flatten)]
+    fits: FitsArgs,
     #[command(flatten)]
     learning: LearningArgs,
     /// Every how many sequences one is kept for validation.
@@ -162,27 +157,13 @@ fn data_of(
     params: Option<&Path>,
 ) -> anyhow::Result<(Vec<ExampleSet>, ModelCard, String)> {
     let dataset = open(path, None)?;
-    let settings = if args.config.is_some() { config(args.config.as_deref())? } else { args.preset.config() };
+    let settings = args.fits.settings()?;
     let all: Vec<usize> = (0..dataset.len()).collect();
     let params =
         if args.features.needs_fit() { params_of(&dataset, &all, params, &settings)? } else { ParamsOf::new() };
     let (sets, left_out) = examples(&dataset, &params, args.features, args.model).map_err(anyhow::Error::msg)?;
     let info = dataset.info();
-    let maps = if args.features.of_joints() {
-        Vec::new()
-    } else {
-        info.views.iter().map(|view| (view.array.clone(), view.shape())).collect()
-    };
-    let card = ModelCard {
-        features: args.features,
-        architecture: args.model,
-        joints: info.skeleton.joints.clone(),
-        doppler_features: info.radar.doppler_features,
-        maps,
-        centred: args.features.of_joints() && args.model != Architecture::Mlp,
-        parameters: 0,
-        notes: Vec::new(),
-    };
+    let card = ModelCard::of_data(info, args.features, args.model);
     let frames: usize = sets.iter().map(|set| set.examples.len()).sum();
     let why: Vec<String> = left_out.iter().map(|(why, n)| format!("{n} frames left out: {why}")).collect();
     let rest = if why.is_empty() { String::new() } else { format!(" ({})", why.join(", ")) };

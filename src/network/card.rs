@@ -1,5 +1,6 @@
 //! What a model is: what it reads, how it is built, what it was taught with. The metadata of its file.
 
+use crate::dataset::DatasetInfo;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -118,4 +119,21 @@ pub struct ModelCard {
     pub parameters: usize,
     /// The command that made it, the program's version, the data, the figures: one line each.
     pub notes: Vec<String>,
+}
+
+impl ModelCard {
+    /// That of a network that is to be taught on a data set: no weights yet, and no notes.
+    pub fn of_data(info: &DatasetInfo, features: Features, architecture: Architecture) -> Self {
+        let views = if features.of_joints() { &[] } else { &info.views[..] };
+        Self {
+            features,
+            architecture,
+            joints: info.skeleton.joints.clone(),
+            doppler_features: info.radar.doppler_features,
+            maps: views.iter().map(|view| (view.array.clone(), view.shape())).collect(),
+            centred: features.of_joints() && architecture != Architecture::Mlp,
+            parameters: 0,
+            notes: Vec::new(),
+        }
+    }
 }

@@ -13,7 +13,7 @@ const SIDE: usize = 32;
 const BRIGHT: f64 = 0.99;
 
 /// Numbers of one joint: the six groups, opacity, radial velocity.
-fn joint_width(doppler_features: usize) -> usize {
+pub(super) fn joint_width(doppler_features: usize) -> usize {
     16 + doppler_features
 }
 
@@ -70,7 +70,7 @@ pub fn person_input(
 }
 
 /// The numbers of a joint, its position about `middle`.
-fn joint(params: &Pppr, joint: usize, middle: Vec3, out: &mut Vec<f64>) {
+pub(super) fn joint_numbers(params: &Pppr, joint: usize, middle: Vec3, out: &mut Vec<f64>) {
     let p = params.position(joint);
     out.extend(sub(p, middle));
     for group in &Group::ALL[1..] {
@@ -88,7 +88,7 @@ fn pooled(params: &Pppr, person: usize) -> Vec<f32> {
     let mut numbers = Vec::with_capacity(width);
     for k in person * joints..(person + 1) * joints {
         numbers.clear();
-        joint(params, k, [0.0; 3], &mut numbers);
+        joint_numbers(params, k, [0.0; 3], &mut numbers);
         sum.iter_mut().zip(&numbers).for_each(|(sum, x)| *sum += x / joints as f64);
     }
     sum.into_iter().map(|x| x as f32).collect()
@@ -100,7 +100,7 @@ fn each_joint(params: &Pppr, person: usize) -> Vec<f32> {
     let middle = mean(params.person(person));
     let mut numbers: Vec<f64> = middle.to_vec();
     for k in person * joints..(person + 1) * joints {
-        joint(params, k, middle, &mut numbers);
+        joint_numbers(params, k, middle, &mut numbers);
     }
     numbers.into_iter().map(|x| x as f32).collect()
 }

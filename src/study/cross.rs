@@ -181,7 +181,8 @@ pub fn cross(
         let within: Vec<ExampleSet> = sets.iter().skip(1).step_by(KEPT).cloned().collect();
         let inside = folder.join("networks").join(format!("{}-{}", number + 1, input.features));
         std::fs::create_dir_all(&inside).map_err(FileError::writing(&inside))?;
-        let card = card(first, input);
+        let mut card = ModelCard::of_data(first.dataset.info(), input.features, input.architecture);
+        card.notes = vec![format!("mhp-inspector {}, learned on {}", env!("CARGO_PKG_VERSION"), first.name)];
         let (network, _) =
             train_pose(&card, &train, &validation, options, Some(&inside.join("checkpoint.safetensors")), |epoch| {
                 told(input, epoch);
@@ -217,25 +218,6 @@ fn sets_of(part: &CrossPart<'_>, input: &CrossInput) -> Result<Vec<ExampleSet>, 
         sets.retain(|set| !set.examples.is_empty());
     }
     Ok(sets)
-}
-
-fn card(part: &CrossPart<'_>, input: &CrossInput) -> ModelCard {
-    let info = part.dataset.info();
-    let maps = if input.features.of_joints() {
-        Vec::new()
-    } else {
-        info.views.iter().map(|view| (view.array.clone(), view.shape())).collect()
-    };
-    ModelCard {
-        features: input.features,
-        architecture: input.architecture,
-        joints: info.skeleton.joints.clone(),
-        doppler_features: info.radar.doppler_features,
-        maps,
-        centred: input.features.of_joints() && input.architecture != Architecture::Mlp,
-        parameters: 0,
-        notes: vec![format!("mhp-inspector {}, learned on {}", env!("CARGO_PKG_VERSION"), part.name)],
-    }
 }
 
 /// Whether a network can read a part at all.

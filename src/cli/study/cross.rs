@@ -1,9 +1,8 @@
 //! `study cross-scene` and `study cross-dataset`: networks taught on one part and asked on the others.
 
-use crate::cli::common::{config, open, presets, print};
-use crate::cli::pose::params_of;
+use crate::cli::common::{open, print};
+use crate::cli::pose::{FitsArgs, params_of};
 use crate::cli::train_pose::LearningArgs;
-use crate::config::Preset;
 use crate::dataset::Dataset;
 use crate::network::ParamsOf;
 use crate::study::cross::{CrossKind, cross, cross_parts, markdown};
@@ -28,12 +27,8 @@ pub struct CrossArgs {
     /// The run folder: networks with their checkpoints, table.md, table.json.
     #[arg(long, value_name = "RUN")]
     out: PathBuf,
-    /// Settings of the fits.
-    #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = presets())]
-    preset: Preset,
-    /// Fit configuration instead of the preset.
-    #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
-    config: Option<PathBuf>,
+    #[command(flatten)]
+    fits: FitsArgs,
     #[command(flatten)]
     learning: LearningArgs,
 }
@@ -48,7 +43,7 @@ pub(super) fn run(kind: CrossKind, args: &CrossArgs) -> anyhow::Result<ExitCode>
         bail!("--params: {folders} folders for {sets} data sets; expected one each, in their order");
     }
     let options = args.learning.options()?;
-    let settings = if args.config.is_some() { config(args.config.as_deref())? } else { args.preset.config() };
+    let settings = args.fits.settings()?;
     let mut sets: Vec<(Dataset, ParamsOf)> = Vec::with_capacity(args.data.len());
     for (k, path) in args.data.iter().enumerate() {
         let dataset = open(path, None)?;

@@ -1,13 +1,14 @@
 //! The numbers of a tensor: maps, points or joints of a frame and of those beside it.
 
 use super::describe::{About, InputDescription, InputKind, Normalisation, joints_of};
-use crate::body::{Group, Pppr, Skeleton};
+use crate::body::{Pppr, Skeleton};
 use crate::config::FitConfig;
 use crate::dataset::{Dataset, Frame};
-use crate::geometry::{Vec3, dot, mean, norm, scale, sub};
+use crate::geometry::{Vec3, mean, scale, sub};
 use crate::mhp::Precision;
 use crate::network::ParamsOf;
 use crate::network::examples::beside;
+use crate::network::features::{joint_numbers, joint_width};
 use crate::predictions::{Axes, JointSource, Unit};
 use crate::radar::View;
 use crate::representation::{CLOUD_POINTS, HeatmapScale, detected_cells, point_cloud, pppr_heatmap};
@@ -65,7 +66,7 @@ impl Reader {
             }
             InputKind::PpprPc => (told.points * POINT, format!("points {} x {POINT}", told.points)),
             InputKind::Pppr => {
-                let width = parameters(info.radar.doppler_features);
+                let width = joint_width(info.radar.doppler_features);
                 (info.skeleton.joints.len() * width, format!("joints {} x {width}", info.skeleton.joints.len()))
             }
             InputKind::FitJoints => {
@@ -220,22 +221,12 @@ fn sources(told: &InputDescription, skeleton: &Skeleton) -> Result<Vec<JointSour
     wanted.iter().map(find).collect()
 }
 
-/// Numbers of a joint of PPPR.
-fn parameters(doppler_features: usize) -> usize {
-    16 + doppler_features
-}
-
 /// The parameters of each joint, positions about `point`.
 fn each_joint(of: &Pppr, person: usize, point: Vec3) -> Vec<f64> {
     let joints = of.shape().joints;
-    let mut numbers = Vec::with_capacity(joints * parameters(of.shape().doppler_features));
+    let mut numbers = Vec::with_capacity(joints * joint_width(of.shape().doppler_features));
     for joint in person * joints..(person + 1) * joints {
-        let p = of.position(joint);
-        numbers.extend(sub(p, point));
-        for group in &Group::ALL[1..] {
-            numbers.extend_from_slice(of.joint(*group, joint));
-        }
-        numbers.extend([of.opacity(joint), dot(of.velocity(joint), scale(p, 1.0 / norm(p).max(1e-6)))]);
+        joint_numbers(of, joint, point, &mut numbers);
     }
     numbers
 }
