@@ -49,9 +49,9 @@ pub struct ScreenshotArgs {
     /// The frame, counted from 0.
     #[arg(long, value_name = "I", default_value_t = 0)]
     frame: usize,
-    /// Adam steps to take first.
-    #[arg(long, value_name = "K", default_value_t = 60)]
-    iterations: usize,
+    /// Adam steps to take first, instead of the settings' own.
+    #[arg(long, value_name = "K")]
+    iterations: Option<usize>,
     /// Settings with a name.
     #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = presets())]
     preset: Preset,
@@ -239,8 +239,9 @@ fn fit(harness: &mut Harness<'_, InspectorApp>, args: &ScreenshotArgs) -> anyhow
         let fit = &app.session().fit;
         fit.frame == args.frame && fit.is_ready() && fit.shown.is_some()
     })?;
-    if args.iterations > 0 {
-        harness.state_mut().apply(Command::StepFit(args.iterations));
+    let iterations = args.iterations.unwrap_or(harness.state().session().config.iterations);
+    if iterations > 0 {
+        harness.state_mut().apply(Command::StepFit(iterations));
         until(harness, "the iterations", |app| {
             let fit = &app.session().fit;
             fit.status == FitStatus::Paused && fit.shown.as_ref().is_some_and(|s| s.iteration == fit.head())
