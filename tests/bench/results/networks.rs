@@ -13,10 +13,10 @@ const OTHERS: [(&str, &str); 3] = [
 ];
 /// A scene that is learned, and three others of the same radar.
 const SCENES: [(&str, &str); 4] = [
-    ("scene-1", "--preset medium --frames 1200 --sequence-length 12 --people 1 --seed 2401 --room-seed 1"),
-    ("scene-2", "--preset medium --frames 180 --sequence-length 12 --people 1 --seed 2402 --room-seed 2"),
-    ("scene-3", "--preset medium --frames 180 --sequence-length 12 --people 1 --seed 2403 --room-seed 3"),
-    ("scene-4", "--preset medium --frames 180 --sequence-length 12 --people 1 --seed 2404 --room-seed 4"),
+    ("scene-1", "--preset medium --frames 900 --sequence-length 12 --people 1 --seed 2401 --room-seed 1"),
+    ("scene-2", "--preset medium --frames 120 --sequence-length 12 --people 1 --seed 2402 --room-seed 2"),
+    ("scene-3", "--preset medium --frames 120 --sequence-length 12 --people 1 --seed 2403 --room-seed 3"),
+    ("scene-4", "--preset medium --frames 120 --sequence-length 12 --people 1 --seed 2404 --room-seed 4"),
 ];
 /// Name, features and architecture.
 const NETWORKS: [(&str, &str, &str); 4] = [
