@@ -321,7 +321,9 @@ pub fn markdown(kind: CrossKind, rows: &[CrossRow]) -> String {
         let cells: Vec<String> = CROSS_INPUTS.iter().map(cell).collect();
         let _ = writeln!(text, "| mean of the others | | {} |", cells.join(" | "));
     }
-    text.push('\n');
+    if rows.iter().any(|row| row.why.is_some()) {
+        text.push('\n');
+    }
     for row in rows.iter().filter(|row| row.why.is_some()) {
         let why = row.why.as_deref().unwrap_or_default();
         let _ = writeln!(text, "{} on {}: {}.", row.input, escaped(&row.tested_on), escaped(why));
