@@ -9,6 +9,8 @@
 //! 16 + N_d. The mean over the joints throws the pose away: `mlp` is the paper's network, `mlp-joints` the same on every joint's
 //! numbers, `mlp-window` on those of five frames. Both of the latter read and answer joints about the middle of the fitted body.
 //!
+//! Models of others come in ONNX, with a description of their tensors ([`OnnxDescription`]); [`open_model`] opens either.
+//!
 //! Weights are a safetensors file whose metadata is the model's card ([`ModelCard`]). Reading and answering ([`PoseNetwork`]) need
 //! nothing of what training needs, which is candle behind the feature `train`.
 

@@ -50,7 +50,7 @@ pub struct Verification {
     pub mismatched: usize,
     /// Of the mismatched ones, frames with each verdict, in the order of [`Verdict::ALL`].
     pub verdicts: [usize; Verdict::ALL.len()],
-    /// Frames of whose verdict the reviewers are not of one mind; they count nowhere.
+    /// Frames of whose verdict the reviewers are not of one mind; they are not kept.
     pub disputed: usize,
     /// Frames where N_pred = N_GT that a verdict takes out.
     pub overruled: usize,

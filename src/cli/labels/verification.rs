@@ -14,7 +14,7 @@ use std::process::ExitCode;
 /// Shown under the options of `labels verification --help`.
 pub(super) const HELP: &str = "\
 A frame is kept where the counter's number is the annotated one and no reviewer says that annotation, count or both are wrong; a \
-frame whose reviewers are not of one mind counts nowhere. Retention is the share that is kept. Of mismatched frames the verdicts \
+frame whose reviewers are not of one mind is not kept. Retention is the share that is kept. Of mismatched frames the verdicts \
 are told as the paper's table 18 does. Annotations in metres that are no bodies are listed: a limb under 2 cm, or, where one person \
 is in a sequence, a bone more than 5 cm from its median. `study … --verified` leaves reviewed frames out in the same way; in the \
 window the filter mismatch:yes shows what there is to review.
@@ -23,7 +23,7 @@ Examples:
   mhp-inspector labels verification data/mmvr
       Retention, verdicts, implausible annotations.
   mhp-inspector labels verification data/mmvr data/xrf55 --json
-      Two data sets, and both together, for a program.";
+      Two data sets, for a program.";
 
 /// What `labels verification` is told.
 #[derive(Debug, clap::Args)]

@@ -29,7 +29,8 @@ pub struct OnnxModel {
     /// The description of each of the model's inputs, in the model's order.
     order: Vec<usize>,
     shapes: Vec<Vec<usize>>,
-    outputs: [Option<usize>; 2],
+    /// Which output the joints are, and which their scores.
+    outputs: (usize, Option<usize>),
     plan: Arc<TypedSimplePlan>,
     /// Its name, its opset and its weights, in words.
     summary: String,
@@ -87,8 +88,8 @@ impl OnnxModel {
         Ok(Self { described, joints, config, readers, order, shapes, outputs, plan, summary })
     }
 
-    /// What the tensors answer, each as numbers with its shape; the joints first, then the scores where there are some.
-    fn run(&self, tensors: &[Vec<f32>]) -> Result<Vec<Answered>, String> {
+    /// The joints that it answers, and the scores where there are some.
+    fn run(&self, tensors: &[Vec<f32>]) -> Result<(Answered, Option<Answered>), String> {
         let mut inputs = TVec::new();
         for (k, (&told, shape)) in self.order.iter().zip(&self.shapes).enumerate() {
             let numbers = tensors.get(told).ok_or("a tensor is missing")?;
@@ -97,13 +98,14 @@ impl OnnxModel {
             inputs.push(tensor.cast_to_dt(dtype).map_err(said)?.into_owned().into_tvalue());
         }
         let answered = panic_as_error(|| self.plan.run(inputs).map_err(said))?;
-        let read = |k: usize| {
+        let read = |k: usize| -> Result<Answered, String> {
             let tensor = answered.get(k).ok_or("an output is missing")?;
             let numbers = tensor.cast_to::<f32>().map_err(said)?;
             let numbers = numbers.to_plain_array_view::<f32>().map_err(said)?.iter().copied().collect();
             Ok((tensor.shape().to_vec(), numbers))
         };
-        self.outputs.iter().flatten().map(|&k| read(k)).collect()
+        let (joints, scores) = self.outputs;
+        Ok((read(joints)?, scores.map(read).transpose()?))
     }
 }
 
@@ -137,8 +139,7 @@ impl JointModel for OnnxModel {
     }
 
     fn answer(&self, input: &ModelInput) -> Result<Vec<Vec<Vec3>>, String> {
-        let answered = self.run(&input.tensors)?;
-        let (shape, numbers) = answered.first().ok_or("an output is missing")?;
+        let ((shape, numbers), scores) = self.run(&input.tensors)?;
         let (told, width) = (&self.described.output, 3 * self.joints.len());
         let rows: Vec<&[f32]> = numbers.chunks_exact(width).collect();
         if rows.is_empty() || numbers.len() != rows.len() * width {
@@ -151,11 +152,11 @@ impl JointModel for OnnxModel {
                 vec![*rows.get(take).ok_or_else(|| format!("take = {take}; it answers {n} rows"))?]
             }
         };
-        let scores = answered.get(1).map(|(_, scores)| scores);
-        if let Some(scores) = scores.filter(|scores| scores.len() != rows.len()) {
+        let scores = scores.map(|(_, scores)| scores);
+        if let Some(scores) = scores.as_ref().filter(|scores| scores.len() != rows.len()) {
             return Err(format!("it answers {} scores for {} persons", scores.len(), rows.len()));
         }
-        let there = |k: &usize| scores.is_none_or(|scores| f64::from(scores[*k]) >= told.least_score);
+        let there = |k: &usize| scores.as_ref().is_none_or(|scores| f64::from(scores[*k]) >= told.least_score);
         let mut persons = Vec::new();
         for row in (0..rows.len()).filter(there).map(|k| rows[k]) {
             if row.iter().any(|x| !x.is_finite()) {
@@ -276,7 +277,7 @@ fn order(model: &InferenceModel, described: &OnnxDescription) -> Result<Vec<usiz
 }
 
 /// Which outputs are the joints and the scores.
-fn outputs(model: &InferenceModel, described: &OnnxDescription) -> Result<[Option<usize>; 2], String> {
+fn outputs(model: &InferenceModel, described: &OnnxDescription) -> Result<(usize, Option<usize>), String> {
     let names = output_names(model);
     let find = |wanted: &String| {
         let at = names.iter().position(|name| name == wanted);
@@ -288,7 +289,7 @@ fn outputs(model: &InferenceModel, described: &OnnxDescription) -> Result<[Optio
         None if names.len() == 1 => 0,
         None => return Err(format!("[output] has no tensor = ..., and the model gives several. {}", tensors(model))),
     };
-    Ok([Some(joints), told.scores.as_ref().map(find).transpose()?])
+    Ok((joints, told.scores.as_ref().map(find).transpose()?))
 }
 
 /// The shape of an input: as told, else as the model has it, where an open first axis is a batch of one and one more open axis is what
