@@ -7,13 +7,17 @@
 
 use super::Precision;
 use super::tiles::{TileGrid, blocks_of};
-use crate::radar::View;
+use crate::radar::{AxisKind, View};
 use smallvec::SmallVec;
 
 /// Axes change places where that leaves at most one of so many blocks,
 const MIN_SAVING: usize = 4;
 /// of at least so many: fewer cost nothing.
 const MIN_BLOCKS: usize = 64;
+/// Where a Doppler axis stays outermost, one of so many is enough.
+const MIN_SAVING_APART: usize = 2;
+/// What a block costs where a Doppler axis runs through its tiles, beside one where none does.
+const DOPPLER_COST: usize = 8;
 
 /// A box of cells as it is summed.
 pub(super) struct CellBox {
@@ -35,7 +39,7 @@ impl CellBox {
     pub(super) fn new(view: &View, bins: &[[usize; 2]], marked: &[bool], precision: Precision) -> Self {
         let order = match precision {
             Precision::F64 => (0..bins.len()).collect(),
-            Precision::F32 => order_of(bins),
+            Precision::F32 => order_of(bins, |k| view.axes.get(k).is_some_and(|axis| axis.kind == AxisKind::Doppler)),
         };
         let axes = order.iter().filter_map(|&k| view.axes.get(k).cloned()).collect();
         let bins_in_order: Vec<[usize; 2]> = order.iter().map(|&k| bins[k]).collect();
@@ -63,15 +67,27 @@ impl CellBox {
     }
 }
 
-/// The order of the axes of a box: their own, or the one with the fewest blocks where that saves most of them.
-fn order_of(bins: &[[usize; 2]]) -> SmallVec<[usize; 3]> {
+/// The order of the axes of a box: their own, or the one that costs least where that saves most of the blocks. Three axes with a
+/// Doppler axis among them may leave that one outermost: a tile that it runs through needs an exponential a cell.
+fn order_of(bins: &[[usize; 2]], is_doppler: impl Fn(usize) -> bool) -> SmallVec<[usize; 3]> {
     let own: SmallVec<[usize; 3]> = (0..bins.len()).collect();
     let size = |k: usize| bins[k][1].saturating_sub(bins[k][0]);
-    let mut sorted = own.clone();
+    let cost = |order: &[usize]| {
+        let within = order.iter().skip(bins.len().saturating_sub(2)).any(|&k| is_doppler(k));
+        blocks_of(order.iter().map(|&k| size(k))) * if within { DOPPLER_COST } else { 1 }
+    };
+    let (mut sorted, mut doppler_first) = (own.clone(), own.clone());
     sorted.sort_by_key(|&k| size(k));
-    let blocks = |order: &[usize]| blocks_of(order.iter().map(|&k| size(k)));
-    let (now, least) = (blocks(&own), blocks(&sorted));
-    if now >= MIN_BLOCKS && least <= now / MIN_SAVING { sorted } else { own }
+    doppler_first.sort_by_key(|&k| (!is_doppler(k), size(k)));
+    let now = cost(&own);
+    let worth = |order: &SmallVec<[usize; 3]>, saving: usize| now >= MIN_BLOCKS && cost(order) <= now / saving;
+    if cost(&doppler_first) < cost(&sorted) && worth(&doppler_first, MIN_SAVING_APART) {
+        doppler_first
+    } else if worth(&sorted, MIN_SAVING) {
+        sorted
+    } else {
+        own
+    }
 }
 
 /// `values` of a box (C order) in C order of its axes `order`.
@@ -93,7 +109,8 @@ mod tests {
 
     #[test]
     fn only_a_grid_that_tiles_do_not_fit_is_turned() {
-        let order = |sizes: &[usize]| order_of(&sizes.iter().map(|&n| [3, 3 + n]).collect::<Vec<_>>()).to_vec();
+        let order =
+            |sizes: &[usize]| order_of(&sizes.iter().map(|&n| [3, 3 + n]).collect::<Vec<_>>(), |_| false).to_vec();
         for fits in
             [&[256, 128][..], &[80, 64], &[128, 40], &[1, 100_000], &[1, 1], &[3, 2], &[64, 64, 32], &[1, 1, 50_000]]
         {
@@ -103,6 +120,15 @@ mod tests {
         assert_eq!(order(&[100_000, 3]), [1, 0]);
         assert_eq!(order(&[50_000, 1, 1]), [1, 2, 0]);
         assert_eq!(order(&[900, 1, 700]), [1, 2, 0]);
+    }
+
+    #[test]
+    fn a_doppler_axis_stays_out_of_the_tiles_where_that_saves_as_much() {
+        let order = |sizes: [usize; 3], doppler: usize| order_of(&sizes.map(|n| [0, n]), |k| k == doppler).to_vec();
+        assert_eq!(order([16, 64, 12], 0), [0, 2, 1]);
+        assert_eq!(order([16, 47, 10], 0), [0, 2, 1]);
+        assert_eq!(order([16, 47, 10], 3), [2, 0, 1]);
+        assert_eq!(order([50_000, 1, 1], 0), [1, 2, 0], "a tile a bin would be worse");
     }
 
     #[test]

@@ -89,9 +89,11 @@ impl Tiles {
                     let wanted = wanted::<S, COHERENT>(simd, returned, &sums[tile], part);
                     let x = splat(simd, first_x + (tile * TILE_ALONG_BINS) as f32 + beside_x);
                     of.add(wanted, [one, x, x * x]);
-                    let mut cells = PerCell::ZERO;
-                    store(&mut cells, part, wanted[0]);
-                    by_bin(grid, block, tile, &cells, strip.joint as usize, moments);
+                    if joint.by_bin() {
+                        let mut cells = PerCell::ZERO;
+                        store(&mut cells, part, wanted[0]);
+                        by_bin(grid, block, tile, &cells, strip.joint as usize, moments);
+                    }
                 }
                 cell.add(simd, &of, tile_row.delta + beside_y);
             }

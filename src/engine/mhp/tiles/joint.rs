@@ -249,8 +249,13 @@ impl Joint {
             }
             self.rows.push(rows & low_bits(grid.rows - index % blocks * BLOCK_TILES));
         }
-        let gaussian = self.along.cells.is_empty() && self.across.cells.is_empty();
-        self.bounded = gaussian && self.top + f64::from(self.outer) - scale < f64::from(MAX_RETURN_LOG2);
+        self.bounded = !self.by_bin() && self.top + f64::from(self.outer) - scale < f64::from(MAX_RETURN_LOG2);
+    }
+
+    /// Whether an axis within a tile is a Doppler axis, where what the cells want is told by bins as well.
+    #[inline(always)]
+    pub(super) fn by_bin(&self) -> bool {
+        !(self.along.cells.is_empty() && self.across.cells.is_empty())
     }
 
     /// Whether the joint reaches a block's row.
