@@ -54,7 +54,7 @@ pub use manifest::Manifest;
 pub use maps::MapReader;
 pub(crate) use natural::natural;
 pub use npz::NpzError;
-pub use origin::{Origin, OriginRule};
+pub use origin::{Origin, OriginPart, OriginRule};
 pub use pppr_io::{read_pppr, write_pppr};
 pub use room::{ROOMS_NAME, RoomJoints, RoomTransform, RoomTransforms, remember_room, write_stated_rooms};
 pub use sample::bundled_sample;

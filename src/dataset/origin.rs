@@ -22,7 +22,36 @@ pub struct Origin {
     pub action: Option<String>,
 }
 
+/// A part of an origin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OriginPart {
+    /// The room, or its arrangement.
+    Scene,
+    /// Who is in it.
+    Subject,
+    /// The recording.
+    Session,
+    /// What is done.
+    Action,
+}
+
+impl OriginPart {
+    /// All of them, in the order of [`Origin::PARTS`].
+    pub const ALL: [Self; 4] = [Self::Scene, Self::Subject, Self::Session, Self::Action];
+
+    /// As columns and filters have it.
+    pub fn key(self) -> &'static str {
+        Origin::PARTS[self as usize]
+    }
+}
+
 impl Origin {
+    /// What is known of a part.
+    pub fn part(&self, part: OriginPart) -> Option<&str> {
+        self.parts()[part as usize]
+    }
+
     /// The names of [`Self::parts`], as columns of tables have them.
     pub const PARTS: [&'static str; 4] = ["scene", "subject", "session", "action"];
 

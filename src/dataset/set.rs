@@ -5,7 +5,7 @@ use super::cache::Cache;
 use super::layout::{DataFolder, FrameSource, LAYOUTS, Layout, Opened, open_unknown};
 use super::manifest::Manifest;
 use super::names::Names;
-use super::origin::{Origin, OriginRule};
+use super::origin::{Origin, OriginPart, OriginRule};
 use super::room::RoomJoints;
 use super::{DatasetError, Frame, Heatmap, ViewCalibration};
 use crate::body::Skeleton;
@@ -21,6 +21,8 @@ use std::sync::{Mutex, OnceLock};
 pub const MANIFEST_NAME: &str = "dataset.toml";
 /// Maps of frames around others that are kept, bytes.
 const RECENT_BYTES: usize = 64 << 20;
+/// Frames that are asked where they come from, to learn which parts of it are known at all.
+const ASKED_ORIGINS: usize = 64;
 
 /// Data sets that were opened.
 static OPENED: AtomicU64 = AtomicU64::new(0);
@@ -86,6 +88,7 @@ pub struct Dataset {
     named: Option<usize>,
     names: Names,
     fingerprint: OnceLock<String>,
+    origin_parts: OnceLock<[bool; OriginPart::ALL.len()]>,
     /// Maps that were asked for last beside others.
     pub(super) recent: Mutex<Cache<Vec<Heatmap>>>,
 }
@@ -125,9 +128,10 @@ impl Dataset {
     /// Names the frames of what was opened.
     pub(super) fn of(Opened { info, frames, named }: Opened) -> Result<Self, DatasetError> {
         let names = Names::of(&*frames, &info).ok_or_else(|| DatasetError::too_long_names(&info.root))?;
-        let (fingerprint, recent) = (OnceLock::new(), Mutex::new(Cache::new(RECENT_BYTES)));
+        let (fingerprint, origin_parts) = (OnceLock::new(), OnceLock::new());
+        let recent = Mutex::new(Cache::new(RECENT_BYTES));
         let id = OPENED.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { id, info, frames, named, names, fingerprint, recent })
+        Ok(Self { id, info, frames, named, names, fingerprint, origin_parts, recent })
     }
 
     /// A number that no other data set opened by this process has: what was worked out of one is not taken for another's.
@@ -203,6 +207,16 @@ impl Dataset {
         let (sequence, name) = (self.sequence(i), self.frame_name(i));
         let said = self.info.origins.iter().fold(Origin::default(), |known, rule| known.or(rule.of(sequence, name)));
         said.or(self.frames.origin(i))
+    }
+
+    /// Whether such a part is known of some of the frames: a few throughout them are asked.
+    pub fn tells(&self, part: OriginPart) -> bool {
+        let known = self.origin_parts.get_or_init(|| {
+            let step = self.len().div_ceil(ASKED_ORIGINS).max(1);
+            let asked: Vec<Origin> = (0..self.len()).step_by(step).map(|i| self.origin(i)).collect();
+            OriginPart::ALL.map(|part| asked.iter().any(|origin| origin.part(part).is_some()))
+        });
+        known[part as usize]
     }
 
     /// The file that frame `i` is read from, the main one where there are several; the root past the end.

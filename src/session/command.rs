@@ -210,7 +210,12 @@ pub enum Command {
     /// Show the run of a study.
     OpenRun(PathBuf),
     /// Put the frames of a row of the study's table into the list, with what the study says of them.
-    ShowStudyRow(usize),
+    ShowStudyRow {
+        /// Its place in the table.
+        row: usize,
+        /// Only the frames of this scene.
+        scene: Option<String>,
+    },
     /// Explore what is on screen, as is chosen; an older exploration of the kind is given up.
     Explore(ExplorationKind),
     /// Give it up.

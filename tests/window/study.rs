@@ -3,6 +3,7 @@
 
 use crate::blob;
 use crate::window::Window;
+use egui::Key;
 use mhp_inspector::app::Pane;
 use mhp_inspector::config::{FitConfig, Parameterization, Preset, Summation};
 use mhp_inspector::dataset::Dataset;
@@ -118,6 +119,38 @@ fn a_row_puts_its_frames_into_the_list() {
     // The other row's frames replace them.
     window.click("Study row full (P + V)");
     window.until("the other row", |w| w.session().study.row == Some(0) && w.session().summaries.len() == 4);
+}
+
+#[test]
+fn each_scene_has_its_table_and_its_frames() {
+    let folder = tempfile::tempdir().unwrap();
+    blob::write_dataset(folder.path(), 4);
+    let said = "\n[[origin]]\nframes = \"*000\"\nscene = \"hall\"\nsubject = \"b\"\n[[origin]]\nscene = \"lab\"\n";
+    std::fs::write(folder.path().join("dataset.toml"), blob::MANIFEST.to_owned() + said).unwrap();
+    let mut window = Window::on(folder);
+    let folder = run(&window, StudyKind::Init, &[]);
+    window.apply(Command::OpenRun(folder));
+    window.harness.state_mut().show_pane(Pane::called("Study").unwrap());
+    shown(&mut window, StudyKind::Init);
+    assert!(window.named("All scenes") && window.named("Scene hall") && window.named("Scene lab"));
+    window.click("Scene lab");
+    window.click("Study row without position (P)");
+    window.until("its frames in the lab", |w| w.session().queue.rows() == [1, 2, 3]);
+    window.click("Scene hall");
+    window.click("Study row full (P + V)");
+    window.until("the frame in the hall", |w| w.session().queue.rows() == [0]);
+    window.click("All scenes");
+    window.click("Study row without velocity (V)");
+    window.until("all of them", |w| w.session().queue.rows().len() == 4);
+    // The list says where frames come from, for who asks.
+    assert!(window.session().frame_row(0).origin.subject.as_deref() == Some("b"));
+    window.click("Columns");
+    window.click("Scene");
+    window.key(Key::Escape);
+    window.harness.run_steps(2);
+    window.click("Sort by Scene");
+    window.harness.run_steps(2);
+    assert_eq!(window.session().queue.rows(), [0, 1, 2, 3], "the hall before the lab");
 }
 
 #[test]

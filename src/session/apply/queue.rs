@@ -142,8 +142,11 @@ impl Session {
         if reads.name {
             row.name = dataset.frame_name(index);
         }
-        if reads.scene {
-            row.scene = dataset.sequence(index);
+        if reads.sequence {
+            row.sequence = dataset.sequence(index);
+        }
+        if reads.origin {
+            row.origin = dataset.origin(index);
         }
         if reads.strata {
             self.add_strata(&mut row);

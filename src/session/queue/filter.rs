@@ -5,6 +5,7 @@
 
 use super::row::{FrameNumber, FrameRow, Reads};
 use crate::condition::{Comparison, comparison, split};
+use crate::dataset::OriginPart;
 use crate::labels::{Tag, Verdict};
 use crate::mhp::TERMS;
 use crate::session::sources::SourceNumber;
@@ -39,7 +40,9 @@ enum Test {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Word {
     Stratum,
+    Sequence,
     Scene,
+    Origin(OriginPart),
     Note,
     By,
     Verdict,
@@ -50,9 +53,13 @@ enum Word {
     Mismatch,
 }
 
-const WORDS: [(&str, Word); 10] = [
+const WORDS: [(&str, Word); 14] = [
     ("stratum", Word::Stratum),
+    ("sequence", Word::Sequence),
     ("scene", Word::Scene),
+    ("subject", Word::Origin(OriginPart::Subject)),
+    ("session", Word::Origin(OriginPart::Session)),
+    ("action", Word::Origin(OriginPart::Action)),
     ("note", Word::Note),
     ("by", Word::By),
     ("verdict", Word::Verdict),
@@ -68,7 +75,8 @@ pub fn syntax() -> String {
     let of_loss: Vec<&str> = TERMS.iter().map(|term| term.key).collect();
     format!(
         "Terms that must all hold, separated by spaces; - negates, | means either:\n\
-        stratum:hard · tag:F1 · tag:F1|F2 · tag:none · tag:any · by:ada · note:word · scene:d5s1\n\
+        stratum:hard · tag:F1 · tag:F1|F2 · tag:none · tag:any · by:ada · note:word\n\
+        scene:lab · subject:07 · session:2 · action:walk, as far as the data set tells them · sequence:d5s1\n\
         iou<0.5 · majpe>200 · basin<0.9 · hardness>=0.7 · peaks static saliency loss iterations index\n\
         a b diff: the two result sets that are compared, and B − A\n\
         pred.NAME>100: MAJPE of a source of predictions, mm · pred.NAME.pa · pred.NAME.fit: how far it is from the fit\n\
@@ -116,7 +124,9 @@ impl Test {
             Self::Source(_, number, ..) => number.reads(),
             Self::Word(word, _) => match word {
                 Word::Stratum | Word::Readable => Reads { strata: true, ..none },
-                Word::Scene => Reads { scene: true, ..none },
+                Word::Sequence => Reads { sequence: true, ..none },
+                Word::Scene => Reads { sequence: true, origin: true, ..none },
+                Word::Origin(_) => Reads { origin: true, ..none },
                 Word::Note | Word::Verdict => Reads { said: true, ..none },
                 Word::By => Reads { annotators: true, ..none },
                 Word::Reason | Word::Converged | Word::Fitted | Word::Mismatch => Reads { fit: true, ..none },
@@ -147,9 +157,13 @@ impl Word {
     fn holds(self, row: &FrameRow<'_>, value: &str) -> bool {
         let is = |text: Option<&str>| text.is_some_and(|text| text.eq_ignore_ascii_case(value));
         let yes = matches!(value, "yes" | "true" | "1");
+        let has = |part| row.origin.part(part).is_some_and(|known| contains(known, value));
         match self {
             Self::Stratum => is(row.stratum.map(Stratum::word)),
-            Self::Scene => contains(row.scene, value),
+            Self::Sequence => contains(row.sequence, value),
+            // What is told of no scene by itself may be in the name of the sequence.
+            Self::Scene => has(OriginPart::Scene) || contains(row.sequence, value),
+            Self::Origin(part) => has(part),
             Self::Note => contains(row.note, value),
             Self::By => row.annotators.iter().any(|name| contains(name, value)),
             Self::Verdict => is(row.verdict.map(Verdict::code)),
@@ -223,7 +237,7 @@ fn check(word: Word, values: &[String]) -> Result<(), String> {
         Word::Stratum => &["easy", "medium", "hard"],
         Word::Verdict => &["annotation-error", "detection-error", "both-incorrect", "true-negative"],
         Word::Converged | Word::Fitted | Word::Readable | Word::Mismatch => &["yes", "no", "true", "false", "1", "0"],
-        Word::Scene | Word::Note | Word::By | Word::Reason => return Ok(()),
+        Word::Sequence | Word::Scene | Word::Origin(_) | Word::Note | Word::By | Word::Reason => return Ok(()),
     };
     match values.iter().find(|value| !allowed.contains(&value.as_str())) {
         Some(wrong) => Err(format!("`{wrong}`: expected {}", allowed.join(", "))),
@@ -274,6 +288,7 @@ fn number(key: &str) -> Result<FrameNumber, String> {
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests")]
     use super::*;
+    use crate::dataset::Origin;
     use crate::labels::{Tags, Verdict};
     #[cfg(feature = "dummies")]
     use crate::mhp::Terms;
@@ -284,7 +299,8 @@ mod tests {
         FrameRow {
             index: 12,
             name: "d5s1/003/00012",
-            scene: "d5s1/003",
+            sequence: "d5s1/003",
+            origin: Origin { scene: Some("Lab".into()), subject: Some("07".into()), ..Origin::default() },
             readable: true,
             stratum: Some(Stratum::Hard),
             hardness: Some(0.9),
@@ -321,6 +337,9 @@ mod tests {
         assert!(holds("STRATUM:Hard|easy tag:f1|F2 hardness>=0.9 index=12"));
         assert!(holds("d5S1 00012 -d6"));
         assert!(holds("note:\"near the wall\" by:AD verdict:both-incorrect scene:/003"));
+        assert!(holds("scene:lab subject:07 sequence:d5s1 -subject:08 -action:walk"));
+        assert!(!holds("sequence:lab") && !holds("session:d5s1"));
+        assert!(FrameFilter::parse("action:walk").unwrap().reads().origin);
         assert!(holds("converged:no fitted:yes tag:any -tag:none reason:iter"));
         assert!(!holds("converged:yes") && !holds("readable:no"));
     }

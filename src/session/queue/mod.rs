@@ -13,6 +13,7 @@ use super::tracked::Tracked;
 pub use filter::{FrameFilter, syntax};
 pub use row::{FrameNumber, FrameRow, Reads};
 
+use crate::dataset::OriginPart;
 use crate::labels::Tags;
 use crate::mhp::TermId;
 use serde::{Deserialize, Serialize};
@@ -55,6 +56,8 @@ pub enum SortKey {
     Disagreement,
     /// A number of the source of predictions at a place of their list.
     Source(u8, SourceNumber),
+    /// Where it comes from.
+    Origin(OriginPart),
     /// An unweighted term of the loss.
     Term(TermId),
 }
@@ -74,6 +77,7 @@ impl SortKey {
             Self::Disagreement => SourceNumber::ToFit.reads(),
             Self::Source(_, number) => number.reads(),
             Self::Tags => Reads { tags: true, ..none },
+            Self::Origin(_) => Reads { origin: true, ..none },
             Self::Annotator => Reads { annotators: true, ..none },
         }
     }
@@ -271,6 +275,7 @@ fn key(sort: Sort, row: &FrameRow<'_>) -> u64 {
             row.sources.get(usize::from(slot)).and_then(|(_, numbers)| numbers.get(number)).and_then(ordered)
         }
         SortKey::Tags => Some(tag_rank(row.tags)).filter(|&rank| rank > 0),
+        SortKey::Origin(part) => row.origin.part(part).map(letters),
         SortKey::Annotator => row.annotators.first().map(|name| letters(name)),
         SortKey::Term(term) => row.number(FrameNumber::Term(term)).and_then(ordered),
     };

@@ -1,5 +1,6 @@
 //! What the frame list knows of one frame, gathered for filtering and sorting.
 
+use crate::dataset::Origin;
 use crate::labels::{Tags, Verdict};
 use crate::mhp::{TermId, Terms};
 use crate::session::sources::{SourceNumber, SourceNumbers};
@@ -13,7 +14,9 @@ pub struct FrameRow<'a> {
     /// Name.
     pub name: &'a str,
     /// The sequence that it belongs to.
-    pub scene: &'a str,
+    pub sequence: &'a str,
+    /// Scene, subject, session and action, as far as they are known.
+    pub origin: Origin,
     /// False where its file could not be read.
     pub readable: bool,
     /// Easy, medium or hard.
@@ -65,7 +68,8 @@ impl Default for FrameRow<'_> {
         Self {
             index: 0,
             name: "",
-            scene: "",
+            sequence: "",
+            origin: Origin::default(),
             readable: true,
             stratum: None,
             hardness: None,
@@ -98,7 +102,9 @@ pub struct Reads {
     /// The name.
     pub name: bool,
     /// The sequence.
-    pub scene: bool,
+    pub sequence: bool,
+    /// Where it comes from.
+    pub origin: bool,
     /// Stratum, hardness and its parts, readable.
     pub strata: bool,
     /// What is known of the fit.
@@ -123,7 +129,8 @@ impl Reads {
     /// Everything.
     pub const ALL: Self = Self {
         name: true,
-        scene: true,
+        sequence: true,
+        origin: true,
         strata: true,
         fit: true,
         basins: true,
@@ -140,7 +147,8 @@ impl Reads {
     pub fn or(self, other: Self) -> Self {
         Self {
             name: self.name || other.name,
-            scene: self.scene || other.scene,
+            sequence: self.sequence || other.sequence,
+            origin: self.origin || other.origin,
             strata: self.strata || other.strata,
             fit: self.fit || other.fit,
             basins: self.basins || other.basins,

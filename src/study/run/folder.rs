@@ -42,6 +42,14 @@ impl Run {
         Self { spec, rows: rows.values().cloned().collect(), complete, table, scenes }
     }
 
+    /// What of it is of one scene; `None` where it has no such scene, or no other.
+    #[must_use]
+    pub fn of_scene(&self, scene: &str) -> Option<Self> {
+        let table = self.scenes.iter().find(|table| table.scene == scene)?.rows.clone();
+        let rows = self.rows.iter().filter(|row| row.origin.scene.as_deref() == Some(scene)).cloned().collect();
+        Some(Self { spec: self.spec.clone(), rows, complete: self.complete, table, scenes: Vec::new() })
+    }
+
     /// Reads a run folder.
     ///
     /// # Errors

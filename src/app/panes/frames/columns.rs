@@ -2,6 +2,7 @@
 
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::iou_color;
+use crate::dataset::OriginPart;
 use crate::labels::Verdict;
 use crate::mhp::TermId;
 use crate::session::{
@@ -34,7 +35,8 @@ pub(super) fn columns() -> impl Iterator<Item = &'static Column> {
     static OF_SOURCES: LazyLock<Vec<Column>> =
         LazyLock::new(|| (0..MOST_SOURCES as u8).flat_map(Column::of_source).collect());
     static OF_TERMS: LazyLock<Vec<Column>> = LazyLock::new(|| TermId::all().map(Column::of).collect());
-    COLUMNS.iter().chain(OF_SOURCES.iter()).chain(OF_TERMS.iter())
+    static OF_ORIGINS: LazyLock<Vec<Column>> = LazyLock::new(|| OriginPart::ALL.map(Column::of_origin).into());
+    COLUMNS.iter().chain(OF_ORIGINS.iter()).chain(OF_SOURCES.iter()).chain(OF_TERMS.iter())
 }
 
 impl Column {
@@ -48,6 +50,16 @@ impl Column {
             width: 50.0,
             right: true,
         }
+    }
+
+    fn of_origin(part: OriginPart) -> Self {
+        let (title, width, tip) = match part {
+            OriginPart::Scene => ("Scene", 56.0, "The room, or its arrangement; a filter asks for scene:lab."),
+            OriginPart::Subject => ("Subject", 52.0, "Who is in it; a filter asks for subject:07."),
+            OriginPart::Session => ("Session", 52.0, "The recording; a filter asks for session:2."),
+            OriginPart::Action => ("Action", 72.0, "What is done; a filter asks for action:walk."),
+        };
+        Self { key: part.key(), title, name: title, tip, sort: SortKey::Origin(part), width, right: false }
     }
 
     /// The errors of a source of predictions, and its distance from the fit.
@@ -136,6 +148,7 @@ impl Column {
                 SourceNumber::ToFit => true,
                 _ => source.errors.as_ref().is_some_and(|errors| !errors.frames.is_empty()),
             }),
+            SortKey::Origin(part) => session.data.dataset.as_ref().is_some_and(|dataset| dataset.tells(part)),
             SortKey::Disagreement => session.sources.list().len() > 1,
             SortKey::Difference => kept(ResultSide::A) && kept(ResultSide::B),
             _ => true,
@@ -152,9 +165,9 @@ impl Column {
         }
     }
 
-    /// Terms of the loss, and the aligned errors of sources.
+    /// Terms of the loss, the aligned errors of sources, and where frames come from.
     fn is_on_request(&self) -> bool {
-        matches!(self.sort, SortKey::Term(_) | SortKey::Source(_, SourceNumber::AlignedError))
+        matches!(self.sort, SortKey::Term(_) | SortKey::Origin(_) | SortKey::Source(_, SourceNumber::AlignedError))
     }
 }
 
@@ -341,6 +354,9 @@ fn text(column: &Column, row: &FrameRow<'_>, compared: ComparedNumber, tokens: &
     if let SortKey::Source(slot, number) = column.sort {
         let value = row.sources.get(usize::from(slot)).and_then(|(_, numbers)| numbers.get(number));
         return (value.map_or_else(String::new, |mm| format!("{mm:.0}")), tokens.text);
+    }
+    if let SortKey::Origin(part) = column.sort {
+        return dim(row.origin.part(part).unwrap_or_default().to_owned());
     }
     match column.key {
         "disagree" => (row.disagreement_mm().map_or_else(String::new, |mm| format!("{mm:.0}")), tokens.text),

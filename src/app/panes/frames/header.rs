@@ -117,9 +117,9 @@ fn views(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
 
 fn column_menu(ui: &mut Ui, shared: &mut Shared<'_>) {
     let (button, _) = staying("Columns").ui(ui, |ui| {
-        let of_source = |column: &Column| matches!(column.sort, SortKey::Source(..));
+        let may_lack = |column: &Column| matches!(column.sort, SortKey::Source(..) | SortKey::Origin(_));
         let session = shared.session;
-        let offered = |column: &&Column| column.key != "frame" && (!of_source(column) || column.has_any(session));
+        let offered = |column: &&Column| column.key != "frame" && (!may_lack(column) || column.has_any(session));
         for column in columns().filter(offered) {
             let mut on = column.is_shown(&shared.session.view);
             if ui.checkbox(&mut on, column.name_in(shared.session)).on_hover_text(column.tip).changed() {

@@ -201,7 +201,10 @@ fn row(
 
 fn tooltip(ui: &mut Ui, session: &Session, index: usize) {
     let row = session.frame_row(index);
-    ui.label(format!("{} · {}", row.scene, row.name));
+    ui.label(format!("{} · {}", row.sequence, row.name));
+    if !row.origin.is_unknown() {
+        ui.label(row.origin.to_string());
+    }
     let number = |value: Option<f64>| value.map_or_else(|| "undefined".into(), |x| format!("{x:.3}"));
     if let Some(hardness) = row.hardness {
         let word = row.stratum.map_or("ungraded", |stratum| stratum.word());

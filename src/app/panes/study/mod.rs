@@ -17,6 +17,7 @@ use crate::study::run::{Run, StudyKind};
 use crate::study::shard::Subset;
 use egui::{Key, RichText, Role, Ui};
 use measure::{PlottedQuantity, Values};
+use std::sync::Arc;
 
 /// A pane of less than this width, points, has a list of quantities instead of a button for each.
 const NARROW: f32 = 460.0;
@@ -75,7 +76,26 @@ fn order<'a>(states: &'a mut PaneStates, session: &Session) -> &'a mut order::Or
 struct State {
     measure: PlottedQuantity,
     order: Option<order::Order>,
-    values: Option<(u64, Vec<(PlottedQuantity, Values)>)>,
+    /// The scene whose frames are looked at; all of them where none is chosen.
+    scene: Option<String>,
+    shown: Option<Shown>,
+}
+
+/// What was made of a revision of the run: the run or what of it is of the chosen scene, and the values that can be plotted.
+struct Shown {
+    revision: u64,
+    scene: Option<String>,
+    run: Arc<Run>,
+    values: Vec<(PlottedQuantity, Values)>,
+}
+
+impl Shown {
+    fn new(revision: u64, run: &Arc<Run>, scene: Option<&str>) -> Self {
+        let of_scene = scene.and_then(|scene| run.of_scene(scene).map(Arc::new));
+        let scene = scene.filter(|_| of_scene.is_some()).map(str::to_owned);
+        let run = of_scene.unwrap_or_else(|| Arc::clone(run));
+        Self { revision, scene, values: measure::of_run(&run), run }
+    }
 }
 
 impl PaneState for State {}
@@ -112,10 +132,13 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let tokens = Tokens::of(ui);
     let Some((_, run)) = study.run.clone() else { return none_yet(ui, study.work.is_running(), &tokens) };
     let revision = study.run.revision();
-    if state.values.as_ref().is_none_or(|(known, _)| *known != revision) {
-        state.values = Some((revision, measure::of_run(&run)));
+    if state.shown.as_ref().is_none_or(|shown| shown.revision != revision || shown.scene != state.scene) {
+        let shown = Shown::new(revision, &run, state.scene.as_deref());
+        state.scene.clone_from(&shown.scene);
+        state.shown = Some(shown);
     }
-    let Some((_, values)) = &state.values else { return };
+    scenes(ui, &run, &mut state.scene, &tokens);
+    let Some(Shown { run, values, .. }) = &state.shown else { return };
     if !values.iter().any(|(measure, _)| *measure == state.measure) {
         state.measure = values.first().map(|(measure, _)| *measure).unwrap_or_default();
     }
@@ -127,11 +150,11 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     // A picture is seen whole; the table below it is scrolled to.
     let height = (ui.available_height() - 8.0).clamp(150.0, 280.0);
     egui::ScrollArea::both().id_salt("study").auto_shrink(false).show(ui, |ui| {
-        let plot = |ui: &mut Ui| match picture(&run) {
-            Picture::Bars => bars::show(ui, &run, *measure, shown, row, &tokens),
-            Picture::Lines => lines::show(ui, &run, *measure, shown, height, &tokens),
-            Picture::Contour => contour::show(ui, &run, *measure, shown, shared.session, height, &tokens),
-            Picture::Parallel => parallel::show(ui, &run, *measure, shown, row, shared.session, height, &tokens),
+        let plot = |ui: &mut Ui| match picture(run) {
+            Picture::Bars => bars::show(ui, run, *measure, shown, row, &tokens),
+            Picture::Lines => lines::show(ui, run, *measure, shown, height, &tokens),
+            Picture::Contour => contour::show(ui, run, *measure, shown, shared.session, height, &tokens),
+            Picture::Parallel => parallel::show(ui, run, *measure, shown, row, shared.session, height, &tokens),
         };
         if wide {
             ui.horizontal_top(|ui| {
@@ -139,17 +162,17 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
                 let size = egui::vec2(width, ui.available_height());
                 let of_plot = ui.allocate_ui(size, |ui| ui.vertical(plot).inner).inner;
                 ui.add_space(12.0);
-                let of_table = ui.vertical(|ui| table::show(ui, &run, row, &tokens)).inner;
+                let of_table = ui.vertical(|ui| table::show(ui, run, row, &tokens)).inner;
                 asked = of_plot.map(RowAsked::Frames).or(of_table);
             });
         } else {
             let of_plot = plot(ui);
             ui.add_space(8.0);
-            asked = of_plot.map(RowAsked::Frames).or(table::show(ui, &run, row, &tokens));
+            asked = of_plot.map(RowAsked::Frames).or(table::show(ui, run, row, &tokens));
         }
     });
     match asked {
-        Some(RowAsked::Frames(row)) => shared.send(Command::ShowStudyRow(row)),
+        Some(RowAsked::Frames(row)) => shared.send(Command::ShowStudyRow { row, scene: state.scene.clone() }),
         Some(RowAsked::Settings(row)) => {
             let variant = run.table.get(row).and_then(|row| run.spec.variants.get(row.variant));
             if let Some(variant) = variant {
@@ -158,6 +181,29 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         }
         None => {}
     }
+}
+
+/// Which scene's frames are looked at, where there are several.
+fn scenes(ui: &mut Ui, run: &Run, chosen: &mut Option<String>, tokens: &Tokens) {
+    if run.scenes.is_empty() {
+        return;
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.label(RichText::new("Scene").small().color(tokens.dim));
+        let all = ui.selectable_label(chosen.is_none(), RichText::new("all").small());
+        if all.named(Role::Button, "All scenes").clicked() {
+            *chosen = None;
+        }
+        for scene in run.scenes.iter().map(|table| &table.scene) {
+            let one = ui.selectable_label(chosen.as_ref() == Some(scene), RichText::new(scene).small());
+            let tip = "The frames of this scene alone; the paper's figures are of all.";
+            if one.named(Role::Button, &format!("Scene {scene}")).on_hover_text(tip).clicked() {
+                *chosen = Some(scene.clone());
+            }
+        }
+    });
+    ui.add_space(4.0);
 }
 
 /// What the pane is for, while nothing is on screen.
