@@ -111,7 +111,7 @@ pub struct FitArgs {
     breakpoints: Vec<Breakpoint>,
     /// Start each frame where its people are predicted, instead of at its own peaks: "refine this prediction by the radar". A file of
     /// joints (npz, npy, CSV, JSON, Parquet) or the PPPR of an earlier run; `predictions --help` tells more.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["warm_start", "shard"])]
+    #[arg(long, value_name = "FILE", conflicts_with = "warm_start")]
     init: Option<PathBuf>,
     #[command(flatten)]
     reading: ReadingArgs,
@@ -205,6 +205,7 @@ fn part(
         fit: options.config,
         breakpoints: options.breakpoints.iter().map(ToString::to_string).collect(),
         erased: options.erased.clone(),
+        init: options.init.as_ref().map(|source| source.digest()),
     };
     let spec = ShardSpec::new(FrameCommand::Fit, dataset, frames, shard, &settings)?;
     let folder = ShardFolder::begin(out, shelves(settings.curves), spec, inputs)?;
@@ -259,6 +260,9 @@ struct Settings {
     breakpoints: Vec<String>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     erased: Vec<ErasedCells>,
+    /// Tells the predictions that frames start from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    init: Option<String>,
 }
 
 /// The folders below that of the results.

@@ -152,7 +152,7 @@ fn tables_of_shards_are_those_of_one_run() {
 fn fits_of_shards_are_those_of_one_run() {
     let case = Case::new();
     let fit: &[&str] = &["fit", "@data", "--iterations", "3"];
-    let all: &[&[&str]] = &[&["--ply", "--curves"], &["--warm-start", "--people", "0"]];
+    let all: &[&[&str]] = &[&["--ply", "--curves"], &["--warm-start", "--people", "0"], &["--init", "@one0/pppr"]];
     for (k, more) in all.iter().enumerate() {
         let words = [fit, more].concat();
         let (one, out) = (format!("@one{k}"), format!("@whole{k}"));
