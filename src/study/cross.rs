@@ -419,4 +419,40 @@ mod tests {
         );
         assert!(few.unwrap_err().to_string().contains("hall: 1 sequences to learn from; expected 5 or more"));
     }
+
+    #[test]
+    fn another_radar_is_asked_what_it_can_be_asked() {
+        let home = tempfile::tempdir().unwrap();
+        let [one, other] = ["one", "other"].map(|name| home.path().join(name));
+        let mut sets = vec![walk(&one), walk(&other)];
+        // The other has one map.
+        let text = std::fs::read_to_string(other.join(MANIFEST_NAME)).unwrap();
+        let (views, origins) = (text.match_indices("[[view]]").nth(1).unwrap().0, text.find("\n[[origin]]").unwrap());
+        let text = format!("{}{}", &text[..views], &text[origins..]).replace("name = \"walk\"", "name = \"other\"");
+        std::fs::write(other.join(MANIFEST_NAME), text).unwrap();
+        sets[1].0 = Dataset::open(&other, &Progress::new()).unwrap();
+        let parts = cross_parts(CrossKind::Dataset, &sets);
+        assert_eq!(parts.iter().map(|part| part.name.as_str()).collect::<Vec<_>>(), ["walk", "other"]);
+        let options = TrainPoseOptions { epochs: 6, hidden: vec![24], ..TrainPoseOptions::default() };
+        let run = home.path().join("run");
+        let rows = cross(CrossKind::Dataset, &parts, &options, &run, |_, _| {}).unwrap();
+        for input in CROSS_INPUTS {
+            let on = |part: &str| rows.iter().find(|row| row.input == input.name && row.tested_on == part).unwrap();
+            let (within, there) = (on("walk (within)"), on("other"));
+            assert_eq!((within.frames, within.sequences), (4, 1), "every fifth of six sequences, from the second on");
+            if input.features.of_joints() {
+                assert_eq!((there.frames, there.sequences, there.joints), (24, 6, 17), "{}", input.name);
+                assert!(there.majpe_mm.is_some() && there.why.is_none());
+            } else {
+                assert_eq!((there.frames, there.majpe_mm), (0, None));
+                assert_eq!(there.why.as_deref(), Some("it reads 2 maps, not 1"));
+            }
+        }
+        let text = std::fs::read_to_string(run.join("table.md")).unwrap();
+        assert!(
+            text.starts_with("# cross-dataset\n") && text.contains("Heatmap on other: it reads 2 maps, not 1."),
+            "{text}"
+        );
+        assert!(text.contains("218.7 / 201.3"), "{text}");
+    }
 }
