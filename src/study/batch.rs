@@ -58,7 +58,7 @@ pub fn fit_frame(
     options: &BatchOptions,
     start: Option<Pppr>,
 ) -> Result<FrameFit, String> {
-    fit_watched(dataset, index, options, start, |_, _| {})
+    fit_watched(dataset, index, options, start, None)
 }
 
 /// As [`fit_frame`]; `watch` sees every iteration, the start included, with its mean joint error in mm where there is truth.
@@ -67,7 +67,7 @@ fn fit_watched(
     index: usize,
     options: &BatchOptions,
     start: Option<Pppr>,
-    mut watch: impl FnMut(StepReport, Option<f64>),
+    mut watch: Option<&mut dyn FnMut(StepReport, Option<f64>)>,
 ) -> Result<FrameFit, String> {
     let in_file = |error: &dyn std::fmt::Display| format!("{}: {error}", dataset.frame_path(index).display());
     let frame = dataset.load(index).map_err(|error| error.to_string())?;
@@ -94,9 +94,12 @@ fn fit_watched(
         Fitter::new(seen, options.config, options.precision, initial.clone()).map_err(|error| in_file(&error))?;
     let errors = |params: &Pppr| errors(params, frame.truth.as_ref()?, info.skeleton.joints.len());
     let (mut breaks, mut broke, mut first) = (Watch::new(options.breakpoints.clone()), None, true);
+    let unwatched = watch.is_none() && options.breakpoints.is_empty();
     let stops = |fitter: &Fitter| {
         let majpe_mm = errors(fitter.params()).map(|e| e.majpe_mm);
-        watch(fitter.report(), majpe_mm);
+        if let Some(watch) = watch.as_mut() {
+            watch(fitter.report(), majpe_mm);
+        }
         if std::mem::take(&mut first) {
             breaks.begin(fitter, majpe_mm);
             return false;
@@ -104,7 +107,9 @@ fn fit_watched(
         broke = breaks.step(fitter, majpe_mm);
         broke.is_some()
     };
-    let reason = fitter.run_until(options.config.iterations, stops).map_err(|error| in_file(&error))?;
+    let last = options.config.iterations;
+    let run = if unwatched { fitter.run_unseen(last) } else { fitter.run_until(last, stops) };
+    let reason = run.map_err(|error| in_file(&error))?;
     let breakpoint = broke.and_then(|which| options.breakpoints.get(which)).map(ToString::to_string);
     let fit_ms = milliseconds(began);
     let (report, params) = (fitter.report(), fitter.params().clone());
@@ -257,11 +262,9 @@ impl Batch<'_> {
     fn fit(&self, index: usize, start: Option<Pppr>) -> Result<FrameFit, String> {
         let (dataset, options) = (self.dataset, self.options);
         let mut rows = Vec::new();
-        let fit = fit_watched(dataset, index, options, start, |report, majpe_mm| {
-            if options.curves_folder.is_some() {
-                rows.push((report, majpe_mm));
-            }
-        })?;
+        let mut keep = |report, majpe_mm| rows.push((report, majpe_mm));
+        let watch = options.curves_folder.is_some().then_some(&mut keep as &mut dyn FnMut(StepReport, Option<f64>));
+        let fit = fit_watched(dataset, index, options, start, watch)?;
         if let Some(folder) = &options.curves_folder {
             let arrays: Vec<String> = dataset.info().views.iter().map(|view| view.array.clone()).collect();
             let rows =

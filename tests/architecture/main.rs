@@ -33,7 +33,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("condition", &["geometry", "radar", "body", "mhp"]),
     (
         "predictions",
-        &["input", "geometry", "escape", "folders", "output", "config", "body", "mhp", "dataset", "diagnose"],
+        &["digest", "input", "geometry", "escape", "folders", "output", "config", "body", "mhp", "dataset", "diagnose"],
     ),
     ("representation", &["geometry", "config", "radar", "body", "mhp", "people"]),
     (

@@ -18,6 +18,11 @@ pub enum FramesAround {
     None,
 }
 
+impl FramesAround {
+    /// How many choices there are.
+    pub const COUNT: usize = 3;
+}
+
 /// What becomes of echoes that do not change over the frames around.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

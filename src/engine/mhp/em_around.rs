@@ -37,7 +37,7 @@ impl<'a> FrameEmLoss<'a> {
     pub fn around(&self, params: &Pppr) -> Result<EmAround<'_>, FitError> {
         let Self { problem, config, precision, thinned } = self;
         problem.check(params)?;
-        let views = thinned.as_ref().map_or(&problem.views[..], |thinned| &thinned.views);
+        let views = thinned.as_ref().map_or(&problem.views[..], ThinnedViews::views);
         let (regions, _) = region::regions(views, config.em_region, &region::centres(params))?;
         let em = match thinned {
             Some(thinned) => thinned.compared(None, &regions, (config, *precision), None),

@@ -51,6 +51,8 @@ pub struct Fitter {
     window: Option<Window>,
     /// What the window says of the current parameters, and room for what it says of the next.
     window_loss: [WindowLoss; 2],
+    /// Whether the current evaluation lacks what a window's step does not need.
+    unseen: bool,
 }
 
 impl Fitter {
@@ -79,6 +81,7 @@ impl Fitter {
             turns: Vec::new(),
             window: None,
             window_loss: Default::default(),
+            unseen: false,
         };
         fitter.begin()?;
         Ok(fitter)
@@ -111,7 +114,8 @@ impl Fitter {
         let shape = state.params.shape();
         self.evaluation = Evaluation::zeros(shape);
         let Self { objective, window, evaluation, window_loss: [window_loss, _], .. } = self;
-        evaluate_state(objective, window.as_mut(), &state, (evaluation, window_loss))?;
+        evaluate_state(objective, window.as_mut(), &state, true, (evaluation, window_loss))?;
+        self.unseen = false;
         state.losses = smallvec![self.evaluation.loss];
         self.state = Arc::new(state);
         Ok(())
@@ -153,7 +157,46 @@ impl Fitter {
     /// # Errors
     /// [`FitError::Diverged`] where the new parameters or their loss are not finite; the fitter then stays where it was.
     pub fn step(&mut self) -> Result<StepReport, FitError> {
-        let Self { objective, body, state, evaluation, next, next_evaluation, turns, window, window_loss } = self;
+        self.advance(true)?;
+        Ok(self.report())
+    }
+
+    /// As [`Self::step`], but what a window's step does not need is not worked out: the IoU and the gradient of the frame that is
+    /// fitted, which are shown. [`Self::look`] does that where somebody wants to see them. Answers whether the loss has converged.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_unseen(&mut self) -> Result<bool, FitError> {
+        self.advance(false)?;
+        Ok(self.has_converged())
+    }
+
+    /// Works out what was left out of the evaluation of the current parameters.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn look(&mut self) -> Result<(), FitError> {
+        if self.unseen { self.evaluate_now() } else { Ok(()) }
+    }
+
+    /// As [`Self::run_to`], where nobody watches; looks at the end.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn run_unseen(&mut self, last: usize) -> Result<StopReason, FitError> {
+        let mut reason = StopReason::Iterations;
+        while self.iteration() < last && reason == StopReason::Iterations {
+            if self.step_unseen()? && self.config().stop_when_converged {
+                reason = StopReason::Converged;
+            }
+        }
+        self.look()?;
+        Ok(reason)
+    }
+
+    fn advance(&mut self, seen: bool) -> Result<(), FitError> {
+        let Self { objective, body, state, evaluation, next, next_evaluation, turns, window, window_loss, unseen } =
+            self;
         // What somebody keeps stays as it is.
         if Arc::get_mut(next).is_none() {
             *next = Arc::new(FitState::clone(state));
@@ -171,26 +214,31 @@ impl Fitter {
             state.motion.advance(window, &loss_now.gradient, at, &mut next_state.motion);
             window.place(&next_state.motion.coordinates, &mut next_state.params);
         }
-        evaluate_state(objective, window.as_mut(), next_state, (next_evaluation, loss_next))?;
+        evaluate_state(objective, window.as_mut(), next_state, seen, (next_evaluation, loss_next))?;
+        *unseen = !seen && window.is_some();
         next_state.losses.push(next_evaluation.loss);
         let surplus = next_state.losses.len().saturating_sub(LOOK_BACK + 1);
         next_state.losses.drain(..surplus);
         std::mem::swap(state, next);
         std::mem::swap(evaluation, next_evaluation);
         window_loss.swap(0, 1);
-        Ok(self.report())
+        Ok(())
     }
 
     /// What is known of the current parameters; also at iteration 0.
     pub fn report(&self) -> StepReport {
-        let (skeleton, criterion) = (&self.objective.problem().skeleton, self.objective.config().convergence);
         StepReport {
             iteration: self.state.iteration,
             loss: self.evaluation.loss,
             terms: self.evaluation.terms,
             iou: self.evaluation.iou.clone(),
-            converged: converged(criterion, skeleton, &self.state.params, &self.state.losses),
+            converged: self.has_converged(),
         }
+    }
+
+    fn has_converged(&self) -> bool {
+        let (skeleton, criterion) = (&self.objective.problem().skeleton, self.objective.config().convergence);
+        converged(criterion, skeleton, &self.state.params, &self.state.losses)
     }
 
     /// Loss and gradients of the current parameters.
@@ -230,7 +278,8 @@ impl Fitter {
             return self.set_state(FitState::clone(&state));
         }
         let Self { objective, window, evaluation, window_loss: [window_loss, _], .. } = self;
-        evaluate_state(objective, window.as_mut(), &state, (evaluation, window_loss))?;
+        evaluate_state(objective, window.as_mut(), &state, true, (evaluation, window_loss))?;
+        self.unseen = false;
         self.state = state;
         Ok(())
     }
@@ -242,7 +291,8 @@ impl Fitter {
         if let Err(error) = self.begin() {
             self.state = before;
             let Self { objective, window, evaluation, window_loss: [window_loss, _], state, .. } = self;
-            evaluate_state(objective, window.as_mut(), state, (evaluation, window_loss))?;
+            evaluate_state(objective, window.as_mut(), state, true, (evaluation, window_loss))?;
+            self.unseen = false;
             return Err(error);
         }
         if losses.len() > 1 {
@@ -304,8 +354,9 @@ impl Fitter {
 
     /// Evaluates the current parameters.
     fn evaluate_now(&mut self) -> Result<(), FitError> {
-        let Self { objective, window, evaluation, window_loss: [window_loss, _], state, .. } = self;
-        evaluate_state(objective, window.as_mut(), state, (evaluation, window_loss))
+        let Self { objective, window, evaluation, window_loss: [window_loss, _], state, unseen, .. } = self;
+        *unseen = false;
+        evaluate_state(objective, window.as_mut(), state, true, (evaluation, window_loss))
     }
 
     /// Takes parameters edited by hand at the current iteration; Adam's moments start anew.
@@ -345,14 +396,16 @@ fn hold_scales(before: &Pppr, after: &mut Pppr, scale_max_m: f64) {
     }
 }
 
-/// Evaluates a state, in its window where there is one, and refuses what is not finite.
+/// Evaluates a state, in its window where there is one, and refuses what is not finite. What only shows the frame that is fitted is
+/// left out where it is not `seen` and a window needs it not.
 fn evaluate_state(
     objective: &mut Objective,
     window: Option<&mut Window>,
     state: &FitState,
+    seen: bool,
     (evaluation, loss): (&mut Evaluation, &mut WindowLoss),
 ) -> Result<(), FitError> {
-    evaluate_into(objective, &state.params, state.iteration, evaluation)?;
+    evaluate_into(objective, &state.params, state.iteration, seen || window.is_none(), evaluation)?;
     let Some(window) = window else { return Ok(()) };
     let (config, precision) = (*objective.config(), objective.precision());
     // How the persons look is what all frames say of it; where they are is the window's affair.
@@ -388,13 +441,18 @@ fn evaluate_into(
     objective: &mut Objective,
     params: &Pppr,
     iteration: usize,
+    with_maps: bool,
     evaluation: &mut Evaluation,
 ) -> Result<(), FitError> {
     let names = |joint: usize| joint_name(objective, params, joint);
     if let Some((joint, group)) = first_non_finite(params) {
         return Err(FitError::Diverged { iteration, joint: names(joint), term: group.key().to_owned() });
     }
-    objective.evaluate_into(params, evaluation);
+    if with_maps {
+        objective.evaluate_into(params, evaluation);
+    } else {
+        objective.evaluate_without_maps(params, evaluation);
+    }
     if let Some((joint, group)) = first_non_finite(&evaluation.gradient) {
         let term = format!("the gradient of {}", group.key());
         return Err(FitError::Diverged { iteration, joint: joint_name(objective, params, joint), term });

@@ -3,7 +3,7 @@
 use super::cell_box::CellBox;
 use super::em::{EmTarget, Left, Workspace};
 use super::gaussian::{WorldGaussianBars, WorldGaussians};
-use super::levels::{Levels, NOISE_PCT};
+use super::levels::Levels;
 use super::percentile::percentile;
 use super::region::Region;
 use super::skin::{Skin, radar_place};
@@ -14,7 +14,7 @@ use crate::config::{BodyModel, EmLoss, FitConfig, Summation};
 use crate::radar::{AxisKind, RadarConfig, SpatialGrid, View};
 use smallvec::SmallVec;
 
-/// The median of powers of noise alone, of their percentile [`NOISE_PCT`]: speckle is exponential.
+/// The median of powers of noise alone, of the percentile of them that is told as noise: speckle is exponential.
 const MEDIAN_OF_NOISE: f64 = 1.94;
 
 /// What is measured in a frame's EM regions, and the scratch of an evaluation.
@@ -39,13 +39,15 @@ pub(super) struct Measured<'a> {
     pub background: Option<&'a [Vec<f64>]>,
     /// The rings of each view, where clutter is modelled by range.
     pub grids: SmallVec<[&'a SpatialGrid; 4]>,
+    /// The power of a view's noise.
+    pub noise: Box<dyn Fn(usize) -> f64 + 'a>,
 }
 
 impl Measured<'_> {
     /// What joins the noise in a view with this region: a power a cell of the whole map, of the unit of the map's power, if
     /// anything does. Sidelobes of a body, walls and leakage are arcs about the radar: of each range it is the median of the cells
     /// beside the region, so far as it rises over the noise's, and at least what stands there over time.
-    fn clutter(&self, view: usize, region: &Region) -> Option<Vec<f64>> {
+    fn clutter(&self, view: usize, region: &Region, noise: f64) -> Option<Vec<f64>> {
         let standing = self.background.map(|maps| maps[view].as_slice());
         let Some(grid) = self.grids.get(view) else { return standing.map(<[f64]>::to_vec) };
         let power: Vec<f64> = self.maps[view].iter().map(|&h| self.views[view].quantity.power(h)).collect();
@@ -54,8 +56,7 @@ impl Measured<'_> {
         // Cells that were erased say nothing of what lies beside.
         inside.iter_mut().zip(self.maps[view]).for_each(|(inside, h)| *inside |= h.is_nan());
         let mut clutter = grid.beside(&power, &inside);
-        let there: Vec<f64> = power.iter().zip(self.maps[view]).filter(|(_, h)| !h.is_nan()).map(|(p, _)| *p).collect();
-        let speckle = MEDIAN_OF_NOISE * percentile(&there, NOISE_PCT);
+        let speckle = MEDIAN_OF_NOISE * noise;
         for beside in &mut clutter {
             *beside = (*beside - speckle).max(0.0);
         }
@@ -85,6 +86,17 @@ pub(super) fn skin_of(
 impl FrameEm {
     /// Of what is measured in `regions`, one a view.
     pub(super) fn new(measured: &Measured<'_>, regions: &[Region], config: &FitConfig, precision: Precision) -> Self {
+        let skin = skin_of(config, (measured.views, measured.skeleton, measured.radar));
+        Self::with_skin(measured, regions, (config, precision), skin)
+    }
+
+    /// The same with a skin that was made before.
+    pub(super) fn with_skin(
+        measured: &Measured<'_>,
+        regions: &[Region],
+        (config, precision): (&FitConfig, Precision),
+        skin: Option<Skin>,
+    ) -> Self {
         let of_view = |(k, region): (usize, &Region)| {
             let (view, map) = (&measured.views[k], measured.maps[k]);
             let indices = region.indices(&view.shape());
@@ -106,13 +118,14 @@ impl FrameEm {
                 Left { places: (0..marks.len()).filter(|&k| marks[k] > 0.0).collect(), cells: there }
             });
             let levels = (config.objective != EmLoss::Iou).then(|| {
-                let background = measured.clutter(k, region).map(|power| inside(&power));
+                let noise = (measured.noise)(k);
+                let background = measured.clutter(k, region, noise).map(|power| inside(&power));
                 // Powers that add, without a spectrum along an axis.
                 let spectral = view.axes.iter().any(|axis| axis.kind == AxisKind::Doppler);
                 let in_rows =
                     precision == Precision::F32 && config.summation == Summation::Incoherent && !spectral && !erased;
-                let measured = (cells.as_slice(), map);
-                Levels::new(config.objective, view.quantity, &cell_box, measured, background.as_deref(), in_rows)
+                let of = (cells.as_slice(), noise);
+                Levels::new(config.objective, view.quantity, &cell_box, of, background.as_deref(), in_rows)
             });
             EmTarget { ori, cell_box, levels, left }
         };
@@ -121,7 +134,7 @@ impl FrameEm {
             workspaces: regions.iter().map(|_| Workspace::default()).collect(),
             gaussians: WorldGaussians::default(),
             bars: WorldGaussianBars::default(),
-            skin: skin_of(config, (measured.views, measured.skeleton, measured.radar)),
+            skin,
         }
     }
 

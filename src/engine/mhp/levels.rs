@@ -7,7 +7,6 @@
 
 use super::cell_box::CellBox;
 use super::level_rows::LevelRows;
-use super::percentile::percentile;
 use super::tiles::LevelTiles;
 use crate::config::EmLoss;
 use crate::radar::Quantity;
@@ -87,22 +86,21 @@ impl LevelTotals {
 }
 
 impl Levels {
-    /// Of the cells of `cell_box`, whose measured numbers in C order of the view's own axes are `cells`; `map` is the whole map
-    /// and `background` a power to be added to the noise of each cell, of the same unit as the map's power, if there is one. Cells
+    /// Of the cells of `cell_box`, whose measured numbers in C order of the view's own axes are `cells`; `noise` is the power of the
+    /// whole map's noise and `background` a power to be added to the noise of each cell, of the same unit as the map's power, if there is one. Cells
     /// that are NaN are erased: the others alone are compared, and what is handed to [`Self::compare`] is theirs.
     pub(super) fn new(
         kind: EmLoss,
         quantity: Quantity,
         cell_box: &CellBox,
-        (cells, map): (&[f64], &[f64]),
+        (cells, noise): (&[f64], f64),
         background: Option<&[f64]>,
         in_rows: bool,
     ) -> Self {
         let power = |x: f64| quantity.power(x);
         let largest = cells.iter().copied().fold(0.0, f64::max);
         let unit = if largest > 0.0 { power(largest) } else { 1.0 };
-        let everywhere: Vec<f64> = map.iter().filter(|x| !x.is_nan()).map(|&x| power(x) / unit).collect();
-        let noise = percentile(&everywhere, NOISE_PCT).max(LEAST_POWER);
+        let noise = (noise / unit).max(LEAST_POWER);
         let ordered = cell_box.in_order_of_sum(cells);
         let left = |(x, _): &(&f64, f64)| !x.is_nan();
         let noises: Vec<f64> = match background {

@@ -12,7 +12,7 @@
 //! 2. a joint in a view: `triad.rs`, `gaussian.rs`, `splat.rs`, `adjoint.rs`; the skin between the joints, `skin.rs`
 //! 3. cells: `kernel.rs`, `tiles/mod.rs`, `cell_box.rs`; masks and levels over them, `levels.rs`, `em.rs`
 //! 4. what the maps of a frame and those around it show: `region.rs`, `template.rs`, `context/mod.rs`
-//! 5. a frame: `frame_em.rs`, `problem.rs`, `erased.rs`, `simulate.rs`, `returns.rs`, `signal.rs`
+//! 5. a frame: `frame_em.rs`, `problem.rs`, `thinned.rs`, `erased.rs`, `simulate.rs`, `returns.rs`, `signal.rs`
 //! 6. the objective: `objective.rs`; a window of frames: `motion/mod.rs`
 //! 7. the fit: `convergence.rs`, `articulation.rs`, `adam.rs`, `fitter.rs`; and the start of one: `init/mod.rs`
 //!
@@ -56,6 +56,7 @@ mod skin;
 mod splat;
 mod template;
 mod terms;
+mod thinned;
 mod tiles;
 mod triad;
 mod types;

@@ -134,14 +134,19 @@ impl Objective {
     /// As [`Self::evaluate`], into an evaluation of before: in single precision nothing is allocated from the second
     /// time on where there are no more than four views.
     pub fn evaluate_into(&mut self, params: &Pppr, evaluation: &mut Evaluation) {
-        self.evaluate_gained(params, &terms::WHOLE, evaluation);
+        self.evaluate_gained(params, &terms::WHOLE, true, evaluation);
+    }
+
+    /// As [`Self::evaluate_into`], without what the maps say: of L_EM neither value nor gradient, and no IoU.
+    pub(super) fn evaluate_without_maps(&mut self, params: &Pppr, evaluation: &mut Evaluation) {
+        self.evaluate_gained(params, &terms::WHOLE, false, evaluation);
     }
 
     /// ∂L_t/∂Θ of a term alone, unweighted; 0 for one that is not evaluated, because its weight is 0.
     pub fn term_gradient(&mut self, term: TermId, params: &Pppr) -> Pppr {
         let mut evaluation = Evaluation::zeros(params.shape());
         if term.is_of_maps() {
-            self.evaluate_gained(params, &term.alone(), &mut evaluation);
+            self.evaluate_gained(params, &term.alone(), true, &mut evaluation);
         } else {
             let Self { problem, config, anchors, .. } = &*self;
             let inputs = Inputs { skeleton: &problem.skeleton, config, params, anchors };
@@ -150,8 +155,14 @@ impl Objective {
         evaluation.gradients[term.weight as usize].clone()
     }
 
-    /// As [`Self::evaluate_into`], each term's gradient times its gain.
-    fn evaluate_gained(&mut self, params: &Pppr, gains: &[f64; TERMS.len()], evaluation: &mut Evaluation) {
+    /// As [`Self::evaluate_into`], each term's gradient times its gain; with what the maps say or without.
+    fn evaluate_gained(
+        &mut self,
+        params: &Pppr,
+        gains: &[f64; TERMS.len()],
+        with_maps: bool,
+        evaluation: &mut Evaluation,
+    ) {
         let Evaluation { loss, terms, iou, gradient, gradients } = evaluation;
         for gradient in gradients.iter_mut() {
             gradient.reset(params.shape());
@@ -160,7 +171,8 @@ impl Objective {
         iou.clear();
         let Self { problem, config, precision, em, anchors, .. } = self;
         let config = &*config;
-        let em = em.evaluate((&problem.radar, config), *precision, params, em_gradient, Some(iou));
+        let mut of_maps = || em.evaluate((&problem.radar, config), *precision, params, em_gradient, Some(iou));
+        let em = if with_maps { of_maps() } else { 0.0 };
         let inputs = Inputs { skeleton: &problem.skeleton, config, params, anchors };
         *terms = terms::evaluate(&inputs, em, gains, gradients);
         *loss = terms.loss(config);

@@ -10,10 +10,10 @@ pub(super) fn place(last: usize, q_pct: f64) -> (usize, f64) {
 /// The two order statistics around a percentile and the weight of the upper one.
 fn neighbours(values: &[f64], q_pct: f64) -> Option<(f64, f64, f64)> {
     let (lower_index, weight) = place(values.len().checked_sub(1)?, q_pct);
-    let mut scratch = values.to_vec();
-    let (_, &mut lower, above) = scratch.select_nth_unstable_by(lower_index, f64::total_cmp);
-    let upper = above.iter().copied().min_by(f64::total_cmp).unwrap_or(lower);
-    Some((lower, upper, weight))
+    let mut scratch: Vec<i64> = values.iter().map(|&x| ordered(x)).collect();
+    let (_, &mut lower, above) = scratch.select_nth_unstable(lower_index);
+    let upper = above.iter().copied().min().unwrap_or(lower);
+    Some((unordered(lower), unordered(upper), weight))
 }
 
 /// numpy's lerp, with its second branch at t ≥ ½.

@@ -2,6 +2,7 @@
 
 use super::context::{Contexts, Neighbour, Reading, TemporalContext, anchors};
 use super::frame_em::Measured;
+use super::thinned::{Strides, ThinnedCache, ThinnedMaps};
 use super::{FitError, fill_missing};
 use crate::body::{Pppr, Skeleton};
 use crate::config::{Clutter, EmLoss, FitConfig, FramesAround};
@@ -25,6 +26,7 @@ pub struct Problem {
     filled: Vec<usize>,
     neighbours: Vec<Neighbour>,
     contexts: Contexts,
+    thinned: ThinnedCache,
     /// Where cells were erased, which are NaN in the maps here: the same problem with what borders on them in their place.
     patched: Option<Arc<Self>>,
 }
@@ -49,8 +51,18 @@ impl Problem {
         check_skeleton(&skeleton)?;
         views.iter().try_for_each(check_view)?;
         let (maps, filled) = fill(&views, maps)?;
-        let (static_removed, neighbours, contexts) = (false, Vec::new(), Contexts::default());
-        Ok(Self { radar, skeleton, views, static_removed, maps, filled, neighbours, contexts, patched: None })
+        Ok(Self {
+            radar,
+            skeleton,
+            views,
+            static_removed: false,
+            maps,
+            filled,
+            neighbours: Vec::new(),
+            contexts: Contexts::default(),
+            thinned: ThinnedCache::default(),
+            patched: None,
+        })
     }
 
     /// Adds the maps of a frame shortly before or after: (seconds after this frame, one map a view). The start reads
@@ -64,7 +76,7 @@ impl Problem {
         }
         let (maps, _) = fill(&self.views, maps)?;
         self.neighbours.push(Neighbour::new(offset_s, maps));
-        self.contexts = Contexts::default();
+        (self.contexts, self.thinned) = (Contexts::default(), ThinnedCache::default());
         self.neighbours.sort_by(|a, b| a.offset_s.total_cmp(&b.offset_s));
         Ok(())
     }
@@ -118,6 +130,11 @@ impl Problem {
         self.contexts.of(&self.views, &self.maps, self.neighbours_in(reading.frames), reading)
     }
 
+    /// Its maps in every so manyth cell, worked out when first asked for; views must not be changed afterwards.
+    pub(super) fn thinned(&self, strides: Strides) -> Arc<ThinnedMaps> {
+        self.thinned.of(self, strides)
+    }
+
     /// Where the frames around say that the mean of each person's joints is, world frame, m; empty without frames around.
     pub(super) fn anchors(&self, config: &FitConfig, params: &Pppr) -> Vec<Vec3> {
         if self.neighbours_in(config.frames_around).is_empty() {
@@ -151,7 +168,15 @@ impl Problem {
         let maps = self.maps.iter().map(Vec::as_slice).collect();
         let by_range = config.clutter == Clutter::Modelled && config.objective != EmLoss::Iou;
         let grids = self.views.grids().filter(|_| by_range).map(AsRef::as_ref).collect();
-        Measured { views: &self.views, skeleton: &self.skeleton, radar: &self.radar, maps, background: None, grids }
+        Measured {
+            views: &self.views,
+            skeleton: &self.skeleton,
+            radar: &self.radar,
+            maps,
+            background: None,
+            grids,
+            noise: Box::new(|view| self.thinned.noise(self, view)),
+        }
     }
 
     /// How many cells of a view's map were filled.

@@ -106,7 +106,8 @@ impl SpatialGrid {
     }
 
     /// The median of `power` over those cells of each cell's ring that are not `inside`, both a cell of the view in C order; 0 where
-    /// they are too few. A ring is one of each Doppler bin: what moves smears along its own.
+    /// they are too few, and where the ring has nothing inside, of which nobody asks. A ring is one of each Doppler bin: what moves
+    /// smears along its own.
     pub(crate) fn beside(&self, power: &[f64], inside: &[bool]) -> Vec<f64> {
         let shape = self.view.shape();
         // The cells of a spatial cell: one a Doppler bin.
@@ -133,7 +134,7 @@ impl SpatialGrid {
                 beside.clear();
                 let outside = cells.iter().map(|&cell| full(cell) + offset).filter(|&cell| !inside[cell]);
                 beside.extend(outside.map(|cell| (power[cell] as f32).to_bits()));
-                if beside.len() >= SMALLEST_RING {
+                if beside.len() >= SMALLEST_RING && beside.len() < cells.len() {
                     let level = f64::from(median(&mut beside));
                     for &cell in cells {
                         levels[full(cell) + offset] = level;

@@ -195,11 +195,14 @@ pub(super) fn explore(
             if !hand.go_on() {
                 return Err(Halt::Cancelled);
             }
-            match fitter.step() {
-                Ok(report) if report.converged && state.config.stop_when_converged => break,
+            match fitter.step_unseen() {
+                Ok(true) if state.config.stop_when_converged => break,
                 Ok(_) => {}
                 Err(_) => return Ok(None),
             }
+        }
+        if fitter.look().is_err() {
+            return Ok(None);
         }
         let (report, end) = (fitter.report(), fitter.params().clone());
         let known: Vec<f64> = report.iou.iter().flatten().copied().collect();

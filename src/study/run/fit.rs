@@ -138,10 +138,13 @@ impl<'a> LoadedFrame<'a> {
                 if !go_on(running) {
                     return answers;
                 }
-                match running.run_to(running.iteration() + 1, |_, _| {}) {
-                    Ok(reason) => ended = reason == StopReason::Converged,
+                match running.step_unseen() {
+                    Ok(converged) => ended = converged && config.stop_when_converged,
                     Err(why) => *fitter = Err(self.told(&why)),
                 }
+            }
+            if let Ok(Err(why)) = fitter.as_mut().map(Fitter::look) {
+                *fitter = Err(self.told(&why));
             }
             let fit_ms = milliseconds(began);
             answers.push(fitter.as_ref().map_err(Clone::clone).map(|fitter| Stop {

@@ -39,6 +39,9 @@ pub struct MotionPrior {
     components: Vec<Vec<f64>>,
     /// From where a search may start, the most frequent first.
     starts: Vec<MotionStart>,
+    /// What becomes of each component where left and right are exchanged, when first asked for.
+    #[serde(skip)]
+    signs: OnceLock<Vec<f64>>,
 }
 
 /// The middle of a cluster of windows.
@@ -91,6 +94,28 @@ impl MotionPrior {
             ))
         };
         text().map_err(|error| error.to_string())
+    }
+
+    /// 1 or −1 for each component: what becomes of it where left and right are exchanged.
+    pub fn mirror_signs(&self) -> &[f64] {
+        self.signs.get_or_init(|| self.components.iter().map(|component| self.mirror_sign(component)).collect())
+    }
+
+    fn mirror_sign(&self, component: &[f64]) -> f64 {
+        let other = |name: &str| match (name.strip_prefix("left_"), name.strip_prefix("right_")) {
+            (Some(rest), _) => self.joint(&format!("right_{rest}")),
+            (_, Some(rest)) => self.joint(&format!("left_{rest}")),
+            _ => None,
+        };
+        let there: Vec<usize> = self.joints.iter().enumerate().map(|(own, name)| other(name).unwrap_or(own)).collect();
+        let mut sum = 0.0;
+        for window in component.chunks_exact(3 * there.len()) {
+            for (own, &there) in there.iter().enumerate() {
+                let (a, b) = (&window[3 * own..3 * own + 3], &window[3 * there..3 * there + 3]);
+                sum += a[0] * b[0] - a[1] * b[1] + a[2] * b[2];
+            }
+        }
+        if sum < 0.0 { -1.0 } else { 1.0 }
     }
 
     /// What does not fit; `None` if all does.

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::geometry::{Vec3, norm, sub};
+use std::sync::OnceLock;
 
 fn tiny() -> MotionPrior {
     MotionPrior {
@@ -12,6 +13,7 @@ fn tiny() -> MotionPrior {
         mean: vec![0.1, 0.2, 0.3, 0.1, 0.25, 0.3],
         components: vec![vec![0.0, 1.0, 0.0, 0.0, 1.0, 0.0], vec![0.5, 0.0, 0.0, -0.5, 0.0, 0.0]],
         starts: vec![MotionStart { share: 0.75, hip_height: 0.8, coefficients: vec![1.0, -2.0] }],
+        signs: OnceLock::new(),
     }
 }
 

@@ -6,6 +6,7 @@ use crate::body::skeletons::COCO_JOINTS;
 use crate::geometry::{Vec3, add, norm, scale, sub};
 use nalgebra::{DMatrix, SymmetricEigen};
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 /// The joints of a recording: COCO's, then the middle of the hips, the base of the neck, the top of the head.
 pub const MOTION_JOINTS: [&str; JOINTS] = {
@@ -175,6 +176,7 @@ pub fn learn_motion(clips: &[MotionClip]) -> Option<MotionPrior> {
         mean,
         components,
         starts: starts(&windows, &weights, &coefficients, &members),
+        signs: OnceLock::new(),
     };
     let of_starts = prior
         .starts

@@ -38,6 +38,7 @@ use super::{FitError, Precision, Problem};
 use crate::body::{Group, MotionPrior, Pppr};
 use crate::config::{Clutter, EmLoss, FitConfig};
 use crate::geometry::{Vec3, add_scaled, mean, norm};
+use crate::radar::View;
 use serde::{Deserialize, Serialize};
 use space::{BODY, LN_SIZE, MOST_JOINTS, PoseSpace, STILL, YAW};
 use static_echo::StaticEchoModel;
@@ -182,22 +183,17 @@ impl Window {
         let (centres, ways) = (region::centres(initial), ways(initial));
         let mut frames = Vec::with_capacity(chosen.len());
         let thinned = ThinnedViews::new(problem, config, initial);
-        let views = &thinned.views;
+        let views = thinned.views();
         let (own_regions, _) = region::regions(views, config.em_region, &centres)?;
-        let backgrounds: Vec<Vec<f64>> = (0..views.len())
-            .map(|view| {
-                let frames = std::iter::once(None).chain(neighbours.iter().map(Some));
-                let maps: Vec<Vec<f64>> = frames.map(|frame| thinned.cells(view, frame)).collect();
-                clutter::background(&maps, views[view].quantity)
-            })
-            .collect();
-        let mut seen = views.iter().zip(&backgrounds).zip(&own_regions);
         let walks = !neighbours.is_empty() && ways.iter().all(|way| norm(*way) >= WALKING_MPS);
         // What stands still over time is somebody who stands, too.
-        let standing = walks
-            && config.clutter == Clutter::Modelled
-            && !problem.static_removed
-            && seen.any(|((view, background), region)| clutter::is_cluttered(background, &view.shape(), region));
+        let asked = walks && config.clutter == Clutter::Modelled && !problem.static_removed;
+        let of_view = |view: &View, maps| clutter::background(maps, view.quantity);
+        let background =
+            asked.then(|| thinned.maps.backgrounds(problem, config.frames_around, of_view)).filter(|backgrounds| {
+                let mut seen = views.iter().zip(*backgrounds).zip(&own_regions);
+                seen.any(|((view, background), region)| clutter::is_cluttered(background, &view.shape(), region))
+            });
         for &frame in &chosen {
             let t_s = frame.map_or(0.0, |k| offsets[k]);
             let moved: Vec<Vec3> = centres
@@ -210,8 +206,7 @@ impl Window {
                 })
                 .collect();
             let (regions, _) = region::regions(views, config.em_region, &moved)?;
-            let background = standing.then_some(backgrounds.as_slice());
-            let em = thinned.compared(frame.map(|k| &neighbours[k]), &regions, (config, precision), background);
+            let em = thinned.compared(frame, &regions, (config, precision), background);
             frames.push(WindowFrame { em, params: initial.clone(), gradient: Pppr::zeros(initial.shape()) });
         }
         let own = chosen.iter().position(Option::is_none).unwrap_or(0);

@@ -115,7 +115,7 @@ impl PoseSpace {
             poses: times_s.iter().map(|&t_s| at(t_s)).collect(),
             changes: times_s.iter().map(change).collect(),
             ln_size: prior.ln_size(),
-            signs: prior.components()[..components].iter().map(|of| symmetry(prior, of)).collect(),
+            signs: prior.mirror_signs()[..components].to_vec(),
             proportions: Proportions::of(skeleton),
             starts: starts.collect(),
         })
@@ -309,25 +309,6 @@ impl PoseSpace {
         }
         coordinates[BODY..].copy_from_slice(&solved(&mut normal, right));
     }
-}
-
-/// 1 or −1: what becomes of a component where left and right are exchanged.
-fn symmetry(prior: &MotionPrior, component: &[f64]) -> f64 {
-    let other = |name: &str| match (name.strip_prefix("left_"), name.strip_prefix("right_")) {
-        (Some(rest), _) => prior.joint(&format!("right_{rest}")),
-        (_, Some(rest)) => prior.joint(&format!("left_{rest}")),
-        _ => None,
-    };
-    let joints = prior.joints();
-    let mut sum = 0.0;
-    for window in component.chunks_exact(3 * joints.len()) {
-        for (own, name) in joints.iter().enumerate() {
-            let there = other(name).unwrap_or(own);
-            let (a, b) = (&window[3 * own..3 * own + 3], &window[3 * there..3 * there + 3]);
-            sum += a[0] * b[0] - a[1] * b[1] + a[2] * b[2];
-        }
-    }
-    if sum < 0.0 { -1.0 } else { 1.0 }
 }
 
 /// Joints of a skeleton at most: those of larger ones are not moved by a prior.

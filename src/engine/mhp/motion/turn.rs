@@ -12,7 +12,7 @@ use super::{WALKING_MPS, ways};
 use crate::body::Pppr;
 use crate::config::{EmLoss, EmRegion, FitConfig};
 use crate::geometry::{norm, turned_about};
-use crate::mhp::{FitError, Neighbour, Precision, Problem, region};
+use crate::mhp::{FitError, Precision, Problem, region};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Headings that are tried.
@@ -79,11 +79,11 @@ fn profiles(
         EmRegion::HalfWidth(half_m) => EmRegion::HalfWidth(half_m.min(AROUND_M)),
     };
     let all = problem.neighbours_in(config.frames_around);
-    let neighbours: Vec<&Neighbour> = all.iter().filter(|neighbour| neighbour.offset_s.abs() <= NEAR_S).collect();
-    let own = neighbours.partition_point(|neighbour| neighbour.offset_s < 0.0);
+    let near: Vec<usize> = (0..all.len()).filter(|&k| all[k].offset_s.abs() <= NEAR_S).collect();
+    let own = near.partition_point(|&k| all[k].offset_s < 0.0);
     let thinned = ThinnedViews::new(problem, config, params);
     let centre = region::centres(params)[person];
-    let (regions, _) = region::regions(&thinned.views, em_region, &[centre])?;
+    let (regions, _) = region::regions(thinned.views(), em_region, &[centre])?;
     let turned: Vec<Pppr> = (0..HEADINGS)
         .map(|k| {
             let mut turned = params.clone();
@@ -92,10 +92,10 @@ fn profiles(
         })
         .collect();
     let profile = |frame: Option<usize>| -> Headings {
-        let em = thinned.compared(frame.map(|k| neighbours[k]), &regions, (config, Precision::F32), None);
+        let em = thinned.compared(frame, &regions, (config, Precision::F32), None);
         std::array::from_fn(|k| em.loss((&problem.radar, config), Precision::F32, &turned[k]))
     };
-    let mut frames: Vec<Option<usize>> = (0..neighbours.len()).map(Some).collect();
+    let mut frames: Vec<Option<usize>> = near.into_iter().map(Some).collect();
     frames.insert(own, None);
     Ok((own, frames.into_iter().map(profile).collect()))
 }
