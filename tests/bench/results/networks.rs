@@ -7,9 +7,9 @@ const LESSONS: &str = "--preset easy,medium,hard --frames 2400 --sequence-length
 const UNSEEN: &str = "--preset easy,medium,hard --frames 600 --people 1 --seed 600";
 /// Other radars than the one that is learned from, and unseen people before them.
 const OTHERS: [(&str, &str); 3] = [
-    ("generic", "--layout generic --preset easy,medium,hard --frames 180 --people 1 --seed 811"),
+    ("generic", "--layout generic --preset easy,medium,hard --frames 120 --people 1 --seed 811"),
     ("hupr", "--layout hupr --preset easy,medium,hard --frames 40 --people 1 --seed 812 --narrow"),
-    ("xrf55", "--layout xrf55 --preset easy,medium,hard --frames 180 --people 1 --seed 813"),
+    ("xrf55", "--layout xrf55 --preset easy,medium,hard --frames 120 --people 1 --seed 813"),
 ];
 /// A scene that is learned, and three others of the same radar.
 const SCENES: [(&str, &str); 4] = [
