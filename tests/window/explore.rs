@@ -363,30 +363,32 @@ fn figures() {
             folder: tempfile::tempdir().unwrap(),
         };
         window.until("the data set", |w| w.session().data.dataset.is_some() && w.fit().is_ready());
-        window.apply(Command::SetConfig(Box::new(Preset::Baseline.config())));
-        window.apply(Command::GotoFrame(frame));
-        window.ready(frame);
-        window.apply(Command::Reset);
-        window.ready(frame);
-        window.apply(Command::StepFit(100));
-        window.paused_at(100);
-        view(&mut window, |view| {
-            view.explore.landscape.and = Some(SliceAlong::BodyY);
-        });
-        println!("{} frame {frame}, baseline, {} cores", path.display(), std::thread::available_parallelism().unwrap());
-        for kind in ExplorationKind::ALL {
-            let request = window.session().exploration(kind).unwrap();
-            let (began, first) = (Instant::now(), Mutex::new(None));
-            let look = |_| {
-                first.lock().unwrap().get_or_insert_with(|| began.elapsed());
-            };
-            request.explore(&IdleCores::all(), &Progress::new(), &look).unwrap();
-            println!(
-                "  {:<16} first {:>5.0?}  all {:>6.0?}",
-                kind.title(),
-                first.lock().unwrap().unwrap_or_default(),
-                began.elapsed()
-            );
+        for preset in [Preset::Recommended, Preset::Baseline] {
+            let config = preset.config();
+            let steps = config.iterations.min(100);
+            window.apply(Command::SetConfig(Box::new(config)));
+            window.apply(Command::GotoFrame(frame));
+            window.ready(frame);
+            window.apply(Command::Reset);
+            window.ready(frame);
+            window.apply(Command::StepFit(steps));
+            window.paused_at(steps);
+            view(&mut window, |view| {
+                view.explore.landscape.and = Some(SliceAlong::BodyY);
+            });
+            let cores = std::thread::available_parallelism().unwrap();
+            println!("{} frame {frame}, {}, {cores} cores", path.display(), preset.name());
+            for kind in ExplorationKind::ALL {
+                let request = window.session().exploration(kind).unwrap();
+                let (began, first) = (Instant::now(), Mutex::new(None));
+                let look = |_| {
+                    first.lock().unwrap().get_or_insert_with(|| began.elapsed());
+                };
+                request.explore(&IdleCores::all(), &Progress::new(), &look).unwrap();
+                let seconds = |of: std::time::Duration| format!("{:.2} s", of.as_secs_f64());
+                let first = first.lock().unwrap().unwrap_or_default();
+                println!("  {:<16} first {:>7}  all {:>7}", kind.title(), seconds(first), seconds(began.elapsed()));
+            }
         }
         let mut took = [Vec::new(), Vec::new()];
         for k in 0..10 {

@@ -40,10 +40,10 @@ pub(crate) fn section(bed: &Bed) -> String {
             }
         }
     }
-    let heads = ["mm", "unseen", "generic", "hupr", "xrf55", "parameters", "MB", "ms a frame"];
+    let heads = ["mm", "unseen", "generic", "hupr", "xrf55", "parameters", "MB", "ms a frame", "FPS"];
     let mut rows = vec![row(&heads)];
     for (name, cells) in ["start", "fit"].into_iter().zip(errors) {
-        rows.push([vec![name.to_owned()], cells, row(&["–", "–", "–"])].concat());
+        rows.push([vec![name.to_owned()], cells, row(&["–", "–", "–", "–"])].concat());
     }
     for (k, (name, features, model)) in NETWORKS.into_iter().enumerate() {
         let out = format!("network-{k}");
@@ -66,7 +66,7 @@ pub(crate) fn section(bed: &Bed) -> String {
             );
         }
         let mut cells = vec![name.to_owned()];
-        let mut size = row(&["–", "–", "–"]);
+        let mut size = row(&["–", "–", "–", "–"]);
         for set in ["unseen"].into_iter().chain(OTHERS.map(|(name, _)| name)) {
             let (file, fits) = (format!("{out}-{set}.npz"), format!("{set}-fits"));
             let model = format!("{out}/model.safetensors");
@@ -78,7 +78,9 @@ pub(crate) fn section(bed: &Bed) -> String {
                     };
                     cells.push(format!("{} / {}", number("\nMAJPE ", " mm, PA"), number("PA-MAJPE ", " mm over")));
                     if set == "unseen" {
-                        size = vec![number(", ", " parameters"), number(", ", " MB;"), number("; ", " ms a frame")];
+                        let ms = number("; ", " ms a frame");
+                        let fps = ms.parse().map_or("–".to_owned(), |ms: f64| format!("{:.0}", 1e3 / ms));
+                        size = vec![number(", ", " parameters"), number(", ", " MB;"), ms, fps];
                     }
                 }
                 Err(_) => cells.push("–".to_owned()),
