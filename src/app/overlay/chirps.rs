@@ -21,8 +21,8 @@ const VIEWS: [(&str, &str); 6] = [
     ("cube", "range, azimuth and speed"),
     ("cartesian_cube", "Cartesian cube"),
 ];
-/// Width of a name before its number, points.
-const NAME_WIDTH: f32 = 96.0;
+/// Width of the names before the numbers at least, points: those of both grids lie below each other.
+const NAME_WIDTH: f32 = 84.0;
 
 /// The form that is being filled in.
 #[derive(Default)]
@@ -58,8 +58,8 @@ impl ChirpQuestion {
             ui.label(RichText::new(text).small().color(tokens.dim));
             ui.label(RichText::new(path.display().to_string()).font(theme::mono(theme::CAPTION)).color(tokens.dim));
             ui.separator();
-            let height = (ui.ctx().content_rect().height() - 300.0).clamp(160.0, 330.0);
-            egui::ScrollArea::vertical().max_height(height).show(ui, |ui| {
+            let height = (ui.ctx().content_rect().height() - 300.0).clamp(160.0, 480.0);
+            egui::ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
                 let skeleton = &mut form.skeleton;
                 if let Some(of) = &mut form.capture.chirp {
                     chirp(ui, of, tx);
@@ -111,14 +111,15 @@ fn number<T: egui::emath::Numeric>(
     value: &mut T,
     (range, speed, suffix): (RangeInclusive<T>, f64, &str),
 ) {
-    ui.add_sized([NAME_WIDTH, 18.0], egui::Label::new(name).halign(egui::Align::RIGHT));
-    let drag = DragValue::new(value).range(range).speed(speed).max_decimals(4).suffix(suffix.to_owned());
+    ui.label(name);
+    let decimals = if T::INTEGRAL { 0 } else { 4 };
+    let drag = DragValue::new(value).range(range).speed(speed).max_decimals(decimals).suffix(suffix.to_owned());
     ui.add_sized([110.0, 18.0], drag).on_hover_text(tip).named(Role::SpinButton, spoken);
 }
 
 fn chirp(ui: &mut Ui, of: &mut ChirpText, tx: &mut String) {
     ui.label(RichText::new("Chirp").font(theme::strong(theme::BODY)));
-    egui::Grid::new("capture chirp").num_columns(4).spacing([10.0, 4.0]).show(ui, |ui| {
+    egui::Grid::new("capture chirp").num_columns(4).min_col_width(NAME_WIDTH).spacing([10.0, 4.0]).show(ui, |ui| {
         let start = ("Start", "Start frequency", "Where the ramp begins: 77 for xWR14xx to 18xx, 60 for xWR68xx.");
         number(ui, start, &mut of.start_ghz, (1.0..=300.0, 0.01, " GHz"));
         let slope = ("Slope", "Slope of the ramp", "profileCfg, field 8.");
@@ -137,7 +138,7 @@ fn chirp(ui: &mut Ui, of: &mut ChirpText, tx: &mut String) {
         let loops = ("Loops", "Loops a frame", "Times that every transmitter sends in a frame.");
         number(ui, loops, &mut of.loops, (1..=1 << 14, 1.0, ""));
         ui.end_row();
-        ui.add_sized([NAME_WIDTH, 18.0], egui::Label::new("Transmitters").halign(egui::Align::RIGHT));
+        ui.label("Transmitters");
         let tip = "Counted from 0, in the order in which they send: 0, 2, 1 where the raised one is last.";
         let field = ui.add_sized([110.0, 18.0], egui::TextEdit::singleline(tx));
         if field.on_hover_text(tip).named(Role::TextInput, "Transmitters").changed() {
@@ -154,7 +155,7 @@ fn chirp(ui: &mut Ui, of: &mut ChirpText, tx: &mut String) {
 
 /// One of several words; the first is meant where nothing is said.
 fn choice(ui: &mut Ui, name: &str, value: &mut Option<String>, words: &[(Option<&str>, &str)]) {
-    ui.add_sized([NAME_WIDTH, 18.0], egui::Label::new(name).halign(egui::Align::RIGHT));
+    ui.label(name);
     let shown = words.iter().find(|(word, _)| *word == value.as_deref()).map_or("", |(_, shown)| shown);
     let combo = egui::ComboBox::from_id_salt(("recording", name)).width(150.0).selected_text(shown).show_ui(ui, |ui| {
         for (word, shown) in words {
@@ -166,7 +167,7 @@ fn choice(ui: &mut Ui, name: &str, value: &mut Option<String>, words: &[(Option<
 
 fn samples(ui: &mut Ui, of: &mut AdcText) {
     ui.label(RichText::new("Samples").font(theme::strong(theme::BODY)));
-    egui::Grid::new("capture samples").num_columns(4).spacing([10.0, 4.0]).show(ui, |ui| {
+    egui::Grid::new("capture samples").num_columns(4).min_col_width(NAME_WIDTH).spacing([10.0, 4.0]).show(ui, |ui| {
         let iq = [
             (None, "the first frame tells"),
             (Some("i_first"), "I first (Studio)"),
@@ -183,7 +184,7 @@ fn samples(ui: &mut Ui, of: &mut AdcText) {
         ui.end_row();
         let mount = [(None, "flat"), (Some("upright"), "upright: its line is height")];
         choice(ui, "Mount", &mut of.mount, &mount);
-        ui.add_sized([NAME_WIDTH, 18.0], egui::Label::new("Converter").halign(egui::Align::RIGHT));
+        ui.label("Converter");
         ui.horizontal(|ui| {
             for bits in [12, 14, 16] {
                 let on = of.bits.unwrap_or(16) == bits;
@@ -193,7 +194,7 @@ fn samples(ui: &mut Ui, of: &mut AdcText) {
             }
         });
         ui.end_row();
-        ui.add_sized([NAME_WIDTH, 18.0], egui::Label::new("LVDS lanes").halign(egui::Align::RIGHT));
+        ui.label("LVDS lanes");
         ui.horizontal(|ui| {
             for lanes in [2, 4] {
                 let on = of.lanes.unwrap_or(2) == lanes;
