@@ -132,6 +132,16 @@ pub(super) fn progress_bar(frames: usize) -> ProgressBar {
     bar
 }
 
+/// A bar of a training on standard error: epochs, what its message says, and when the last of them would be done.
+#[cfg(feature = "train")]
+pub(super) fn epochs_bar(epochs: usize) -> ProgressBar {
+    if !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} epochs, {elapsed} gone, {eta} to go  {msg}");
+    ProgressBar::new(epochs as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
 /// Writes text to standard output, what a terminal would obey as it is spelt. Parts that come from data are in one line
 /// each before they are here. That nobody reads on (`info … | head`) is no error.
 ///

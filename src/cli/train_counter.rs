@@ -1,7 +1,9 @@
 //! `train-counter`: makes the weights of the person counter anew, from synthetic recordings.
 
-use super::common::{at_least_one, print, progress_bar};
-use crate::people::train::{CounterExample, CounterLesson, TrainOptions, examples, pooled, recordings, train};
+use super::common::{at_least_one, epochs_bar, print, progress_bar};
+use crate::people::train::{
+    CounterExample, CounterLesson, MapLesson, TrainOptions, examples, pooled, recordings, train, train_on_maps,
+};
 use crate::people::{CLASSES, COMPARED, Confusion, Counter, CounterOptions, FEATURES, HISTORY, Network};
 use crate::simulate::{Recording, ScenePreset};
 use anyhow::Context as _;
@@ -13,12 +15,15 @@ use std::process::ExitCode;
 /// Shown under the options of `train-counter --help`.
 pub(super) const HELP: &str = "\
 Simulates MMVR-like sequences with 0 to 4 people 0.6 to 2 m apart (easy, medium and hard in turn), looks at them as `count`
-does, trains the network on the true counts, and tests it on sequences of another seed. The same is done with the network
-alone, on statistics of the maps, for comparison. The same options give the same weights.
+does, trains the network on the true counts, and tests it on sequences of another seed. The same is done with what it is
+compared with: the network alone, on statistics of the maps, and a convolutional network on the maps themselves. The same
+options give the same weights.
 
 Examples:
   mhp-inspector train-counter --out assets
-      Writes counter.json and counter-alone.json, and prints what they reach.
+      Writes counter.json, counter-alone.json and counter-maps.json, and prints what they reach.
+  mhp-inspector train-counter --out assets --only maps --epochs 12
+      The convolutional network alone.
   mhp-inspector train-counter --out /tmp --sequences 4 --test-sequences 2 --epochs 5
       A quick look at whether it works.";
 
@@ -31,7 +36,7 @@ const TESTS: usize = HISTORY + 5;
 /// What `train-counter` is told.
 #[derive(Debug, Args)]
 pub struct TrainCounterArgs {
-    /// Folder for `counter.json` and `counter-alone.json`.
+    /// Folder for `counter.json`, `counter-alone.json` and `counter-maps.json`.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Sequences with one person to learn from, five frames each; half as many with two, a quarter with three, an eighth
@@ -50,6 +55,45 @@ pub struct TrainCounterArgs {
     /// Passes over the lessons.
     #[arg(long, default_value_t = TrainOptions::default().epochs, value_parser = at_least_one)]
     epochs: usize,
+    /// Only this network: `counter`, `alone` or `maps`.
+    #[arg(long, value_name = "NETWORK")]
+    only: Option<Taught>,
+}
+
+/// A network that counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Taught {
+    /// On clusters: the counter.
+    Counter,
+    /// On statistics of the maps.
+    Alone,
+    /// On the maps themselves.
+    Maps,
+}
+
+impl Taught {
+    const ALL: [Self; 3] = [Self::Counter, Self::Alone, Self::Maps];
+
+    fn file(self) -> &'static str {
+        match self {
+            Self::Counter => "counter.json",
+            Self::Alone => "counter-alone.json",
+            Self::Maps => "counter-maps.json",
+        }
+    }
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Counter => "counter",
+            Self::Alone => "alone",
+            Self::Maps => "maps",
+        }
+    }
+
+    /// Whether the frames of a sequence agree on a number; else each is counted by itself.
+    fn agrees(self) -> bool {
+        self == Self::Counter
+    }
 }
 
 /// Runs `train-counter`.
@@ -61,29 +105,35 @@ pub(super) fn run(args: &TrainCounterArgs) -> anyhow::Result<ExitCode> {
     let lessons = simulate(args.seed, args.sequences, LESSONS)?;
     let tests = simulate(args.test_seed, args.test_sequences, TESTS)?;
     let mut report = String::new();
-    for (name, pick) in [("counter", pick_counted as Pick), ("counter-alone", pick_alone as Pick)] {
+    for taught in Taught::ALL.into_iter().filter(|taught| args.only.is_none_or(|only| only == *taught)) {
         let options = TrainOptions { epochs: args.epochs, seed: args.seed, ..TrainOptions::default() };
-        let chosen: Vec<CounterLesson> = lessons.iter().map(|example| pick(example).clone()).collect();
-        let bar = progress_bar(args.epochs);
-        let mut network = train(&chosen, &options, |_, _| bar.inc(1))?;
+        let bar = epochs_bar(args.epochs);
+        let told = |_, _| bar.inc(1);
+        let of = |answer: &dyn Fn(&CounterExample) -> Probabilities| header(args, taught, &lessons, &tests, answer);
+        let header = if taught == Taught::Maps {
+            let chosen: Vec<&MapLesson> = lessons.iter().map(|example| &example.maps).collect();
+            let mut network = train_on_maps(&chosen, &options, told)?;
+            network.header = of(&|example| network.probabilities(&example.maps.image));
+            write(&args.out.join(taught.file()), &network)?;
+            network.header
+        } else {
+            let pick = |example: &CounterExample| {
+                if taught == Taught::Counter { example.counted.clone() } else { example.alone.clone() }
+            };
+            let mut network = train(&lessons.iter().map(pick).collect::<Vec<CounterLesson>>(), &options, told)?;
+            network.header = of(&|example| pick(example).answer(&network));
+            write(&args.out.join(taught.file()), &network)?;
+            network.header
+        };
         bar.finish_and_clear();
-        network.header = header(args, &network, &lessons, &tests, pick);
-        let _ = writeln!(report, "{name}.json\n  {}\n", network.header.join("\n  "));
-        write(&args.out.join(format!("{name}.json")), &network)?;
+        let _ = writeln!(report, "{}\n  {}\n", taught.file(), header.join("\n  "));
     }
     print(&report)?;
     Ok(ExitCode::SUCCESS)
 }
 
-type Pick = fn(&CounterExample) -> &CounterLesson;
-
-fn pick_counted(example: &CounterExample) -> &CounterLesson {
-    &example.counted
-}
-
-fn pick_alone(example: &CounterExample) -> &CounterLesson {
-    &example.alone
-}
+/// Of 0, 1, 2, 3, and 4 or more people.
+type Probabilities = [f64; CLASSES];
 
 fn simulate(seed: u64, sequences: usize, frames: usize) -> anyhow::Result<Vec<CounterExample>> {
     let recordings = recordings(seed, sequences)?;
@@ -99,13 +149,13 @@ fn simulate(seed: u64, sequences: usize, frames: usize) -> anyhow::Result<Vec<Co
 /// How the weights came about and what they reach, for people.
 fn header(
     args: &TrainCounterArgs,
-    network: &Network,
+    taught: Taught,
     lessons: &[CounterExample],
     tests: &[CounterExample],
-    pick: Pick,
+    answer: &dyn Fn(&CounterExample) -> Probabilities,
 ) -> Vec<String> {
     let TrainCounterArgs { sequences, test_sequences, seed, test_seed, epochs, .. } = args;
-    let (learnt, answers) = (answers(lessons, network, pick), answers(tests, network, pick));
+    let (learnt, answers) = (answers(lessons, taught, answer), answers(tests, taught, answer));
     let confusion = |of: &[Answer], taken: &dyn Fn(&Answer) -> bool| {
         let mut confusion = Confusion::default();
         of.iter().filter(|answer| taken(answer)).for_each(|answer| confusion.add(answer.people, answer.said));
@@ -115,7 +165,8 @@ fn header(
     let mut lines = vec![
         format!(
             "cargo run --release --no-default-features --features train -- train-counter --out assets --sequences \
-             {sequences} --test-sequences {test_sequences} --seed {seed} --test-seed {test_seed} --epochs {epochs}"
+             {sequences} --test-sequences {test_sequences} --seed {seed} --test-seed {test_seed} --epochs {epochs}{}",
+            if args.only.is_some() { format!(" --only {}", taught.word()) } else { String::new() }
         ),
         format!("learnt from {} frames, tested on {} frames of another seed", lessons.len(), tests.len()),
     ];
@@ -141,22 +192,25 @@ struct Answer {
     preset: ScenePreset,
 }
 
-/// What is said of every frame: of the counter's lessons what the frames agree on, of the classifier alone each by itself.
-fn answers(examples: &[CounterExample], network: &Network, pick: Pick) -> Vec<Answer> {
-    let mut said: Vec<[f64; CLASSES]> = Vec::new();
+/// What is said of every frame: by the counter what the frames agree on, by the others each by itself.
+fn answers(
+    examples: &[CounterExample],
+    taught: Taught,
+    answer: &dyn Fn(&CounterExample) -> Probabilities,
+) -> Vec<Answer> {
+    let mut said: Vec<Probabilities> = Vec::new();
     let of = |example: &CounterExample| {
-        let lesson = pick(example);
-        if example.history == 0 || !lesson.placed {
+        if example.history == 0 || !taught.agrees() {
             said.clear();
         }
-        said.push(lesson.answer(network));
+        said.push(answer(example));
         let CounterExample { history, preset, .. } = *example;
-        Answer { people: lesson.people, said: most_probable(&pooled(&said)), history, preset }
+        Answer { people: example.maps.people, said: most_probable(&pooled(&said)), history, preset }
     };
     examples.iter().map(of).collect()
 }
 
-fn most_probable(p: &[f64; CLASSES]) -> usize {
+fn most_probable(p: &Probabilities) -> usize {
     (0..CLASSES).fold(0, |best, n| if p[n] > p[best] { n } else { best })
 }
 
@@ -169,7 +223,7 @@ fn told(what: &str, confusion: &Confusion) -> Vec<String> {
     ]
 }
 
-fn write(path: &Path, network: &Network) -> anyhow::Result<()> {
+fn write(path: &Path, network: &impl serde::Serialize) -> anyhow::Result<()> {
     let text = serde_json::to_string(network)?.replace("],[", "],\n[").replace("\",\"", "\",\n\"") + "\n";
     std::fs::write(path, text).with_context(|| format!("{}: cannot be written", path.display()))
 }

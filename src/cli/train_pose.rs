@@ -1,6 +1,6 @@
 //! `train-pose`: teaches MLP+PPPR on data with truth.
 
-use super::common::{at_least_one, complain, open, print};
+use super::common::{at_least_one, complain, epochs_bar, open, print};
 use super::pose::{FitsArgs, params_of};
 use crate::network::{
     Architecture, Example, ExampleSet, Features, ModelCard, ParamsOf, TrainPoseOptions, TrainedEpoch, examples,
@@ -9,7 +9,6 @@ use crate::network::{
 use crate::output::replace_file;
 use anyhow::{Context as _, bail};
 use clap::Args;
-use indicatif::ProgressBar;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -133,7 +132,7 @@ pub(super) fn run(args: &TrainPoseArgs) -> anyhow::Result<ExitCode> {
     let card = card.context("no data set")?;
     let (train, validation) = split(&sets, args.learning.seed, args.validation_every)?;
     complain(&format!("note: {} examples to learn from, {} to validate with", train.len(), validation.len()));
-    let bar = ProgressBar::new(options.epochs as u64);
+    let bar = epochs_bar(options.epochs);
     let checkpoint = args.out.join("checkpoint.safetensors");
     let (mut network, curves) = train_pose(&card, &train, &validation, &options, Some(&checkpoint), |curve| {
         bar.set_position(curve.epoch as u64);

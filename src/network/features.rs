@@ -6,6 +6,7 @@ use crate::config::Preset;
 use crate::dataset::Heatmap;
 use crate::geometry::{Vec3, dot, mean, norm, scale, sub};
 use crate::mhp::{Precision, Problem, simulate};
+use crate::radar::coarse;
 
 /// Cells a side that a map is brought to.
 const SIDE: usize = 32;
@@ -105,18 +106,9 @@ fn each_joint(params: &Pppr, person: usize) -> Vec<f32> {
     numbers.into_iter().map(|x| x as f32).collect()
 }
 
-/// A map as 32 × 32 means of its amplitudes, roots of them about the brightest; axes beyond two are summed.
+/// A map as 32 × 32 means of its amplitudes, roots of them about the brightest; axes before the last two are averaged over.
 fn reduced(shape: &[usize], cells: &[f64]) -> Vec<f32> {
-    let rows = shape.first().copied().unwrap_or(1).max(1);
-    let columns = shape.get(1).copied().unwrap_or(1).max(1);
-    let behind: usize = shape.get(2..).unwrap_or_default().iter().product::<usize>().max(1);
-    let mut sums = vec![(0.0, 0u32); SIDE * SIDE];
-    for (k, cell) in cells.iter().enumerate().filter(|(_, cell)| cell.is_finite()) {
-        let (row, column) = (k / behind / columns, k / behind % columns);
-        let at = (row * SIDE / rows).min(SIDE - 1) * SIDE + (column * SIDE / columns).min(SIDE - 1);
-        sums[at] = (sums[at].0 + cell.abs(), sums[at].1 + 1);
-    }
-    let means: Vec<f64> = sums.iter().map(|(sum, n)| if *n > 0 { sum / f64::from(*n) } else { 0.0 }).collect();
+    let means = coarse(shape, cells, [SIDE; 2]);
     let mut sorted = means.clone();
     sorted.sort_by(f64::total_cmp);
     let bright = sorted[((SIDE * SIDE - 1) as f64 * BRIGHT) as usize].max(1e-12);

@@ -1,6 +1,6 @@
 //! `study cross-scene` and `study cross-dataset`: networks taught on one part and asked on the others.
 
-use crate::cli::common::{open, print};
+use crate::cli::common::{epochs_bar, open, print};
 use crate::cli::pose::{FitsArgs, params_of};
 use crate::cli::train_pose::LearningArgs;
 use crate::dataset::Dataset;
@@ -8,7 +8,6 @@ use crate::network::ParamsOf;
 use crate::study::cross::{CrossKind, cross, cross_parts, markdown};
 use anyhow::{Context as _, bail};
 use clap::Args;
-use indicatif::ProgressBar;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -60,7 +59,7 @@ pub(super) fn run(kind: CrossKind, args: &CrossArgs) -> anyhow::Result<ExitCode>
         parts[..=at].rotate_right(1);
     }
     std::fs::create_dir_all(&args.out).with_context(|| format!("{}: cannot be made", args.out.display()))?;
-    let bar = ProgressBar::new(options.epochs as u64);
+    let bar = epochs_bar(options.epochs);
     let rows = cross(kind, &parts, &options, &args.out, |input, epoch| {
         bar.set_position(epoch.epoch as u64);
         bar.set_message(format!("{}: {:.1} mm", input.name, epoch.best_mm));

@@ -14,14 +14,16 @@
 //!
 //! A [`Counter`] is made once for the views of a data set; [`Counter::scan`] looks at a frame, [`Counter::count`] at a scanned
 //! frame and those before it. All of it is pure. `train/` (feature `train`) makes the weights in `assets/counter.json`;
-//! `map_statistics.rs` is what the classifier that the counter is compared with sees.
+//! `map_statistics.rs` is what the classifier alone sees and `map_network.rs` a convolutional network on the maps: what the counter is
+//! compared with.
 //!
 //! The counter is trained on synthetic maps alone. It needs two seconds of frames before the one that is counted; without them
 //! people who stand closer than their echoes are wide count as one, and an arm or a body that falls sometimes as another person.
 //! Two people of whom one hides the other all the while are counted as one. The first frame of a sequence is counted with the
 //! three after it; a frame that stands alone and is uncertain says so (`uncertain`): without frames around it furniture looks like
 //! people. `train-counter` prints what it reaches on seeds that nothing was tuned on: of 1005 frames with nineteen before them 100,
-//! 100, 96.0, 90.4 and 70.8 % right for 0, 1, 2, 3 and 4 or more people.
+//! 100, 96.0, 90.4 and 70.8 % right for 0, 1, 2, 3 and 4 or more people; the convolutional network has 92.6, 98.5, 56.9, 37.7 and 16.0 %
+//! of the 4824 frames each by itself.
 
 mod cfar;
 mod change;
@@ -31,6 +33,7 @@ mod counter;
 mod error;
 mod features;
 mod identity;
+mod map_network;
 mod map_statistics;
 mod network;
 mod scan;
@@ -47,6 +50,7 @@ pub use counter::{Count, Counted, Counter, CounterOptions};
 pub use error::PeopleError;
 pub use features::FEATURES;
 pub use identity::{Track, Tracker, TrackerOptions, match_people};
+pub use map_network::{CHANNELS, FilterLayer, IMAGE, MapNetwork, map_image};
 pub use map_statistics::{STATISTICS, map_statistics};
 pub use network::{CLASSES, LAYERS, Layer, Network};
 pub use scan::{COMPARED, HISTORY, Point, Scan};

@@ -110,7 +110,7 @@ pub(super) fn widths(inputs: usize) -> impl Iterator<Item = (usize, usize)> {
     std::iter::once(inputs).chain(LAYERS).zip(LAYERS)
 }
 
-fn softmax(logits: &[f32]) -> [f64; CLASSES] {
+pub(super) fn softmax(logits: &[f32]) -> [f64; CLASSES] {
     let top = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     let mut p: [f64; CLASSES] = std::array::from_fn(|k| logits.get(k).map_or(0.0, |x| f64::from(x - top).exp()));
     let sum: f64 = p.iter().sum();

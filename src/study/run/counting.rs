@@ -4,7 +4,7 @@ use super::row::RunNumbers;
 use super::variant::Method;
 use crate::dataset::{Dataset, Heatmap, map_cells};
 use crate::mhp::fill_missing;
-use crate::people::{CLASSES, Counter, Network, map_statistics};
+use crate::people::{CLASSES, Counter, MapNetwork, Network, map_image, map_statistics};
 use crate::start::{LEAD_IN, ScanWindow};
 use crate::study::row::annotated;
 use crate::task::milliseconds;
@@ -22,6 +22,7 @@ pub(super) fn count(dataset: &Dataset, method: Method, frames: &[usize]) -> Vec<
     let Some(&first) = frames.first() else { return Vec::new() };
     let made = match method {
         Method::Counter => Counter::new(&dataset.info().views).map(|counter| Tool::Counter(Arc::new(counter))),
+        Method::Maps => MapNetwork::bundled().map(Tool::Maps),
         Method::Alone | Method::Fit => Network::alone().map(Tool::Alone),
     };
     let tool = match made {
@@ -29,7 +30,17 @@ pub(super) fn count(dataset: &Dataset, method: Method, frames: &[usize]) -> Vec<
         Err(error) => return frames.iter().map(|_| (Err(error.to_string()), None)).collect(),
     };
     match &tool {
-        Tool::Alone(network) => frames.iter().map(|&frame| alone(dataset, network, frame)).collect(),
+        Tool::Alone(network) => {
+            let answer = |maps: &[Heatmap]| network.probabilities(&map_statistics(&map_cells(maps)));
+            frames.iter().map(|&frame| by_itself(dataset, &answer, frame)).collect()
+        }
+        Tool::Maps(network) => {
+            let shaped = |maps: &[Heatmap]| {
+                map_image(&maps.iter().map(|map| (&map.shape[..], &map.data[..])).collect::<Vec<_>>())
+            };
+            let answer = |maps: &[Heatmap]| network.probabilities(&shaped(maps));
+            frames.iter().map(|&frame| by_itself(dataset, &answer, frame)).collect()
+        }
         Tool::Counter(counter) => {
             let mut window = ScanWindow::new(counter);
             let sequence = dataset.sequence(first);
@@ -47,6 +58,7 @@ pub(super) fn count(dataset: &Dataset, method: Method, frames: &[usize]) -> Vec<
 enum Tool {
     Counter(Arc<Counter>),
     Alone(Network),
+    Maps(MapNetwork),
 }
 
 fn with_counter(dataset: &Dataset, window: &mut ScanWindow, frame: usize) -> CountOutcome {
@@ -63,7 +75,8 @@ fn with_counter(dataset: &Dataset, window: &mut ScanWindow, frame: usize) -> Cou
     (numbers.map_err(|why| super::fit::portable(dataset, &why)), ms)
 }
 
-fn alone(dataset: &Dataset, network: &Network, frame: usize) -> CountOutcome {
+/// By what a classifier answers of a frame's maps alone.
+fn by_itself(dataset: &Dataset, answer: &dyn Fn(&[Heatmap]) -> [f64; CLASSES], frame: usize) -> CountOutcome {
     let (mut maps, annotated) = match maps(dataset, frame) {
         Ok(found) => found,
         Err(why) => return (Err(super::fit::portable(dataset, &why)), None),
@@ -72,7 +85,7 @@ fn alone(dataset: &Dataset, network: &Network, frame: usize) -> CountOutcome {
     for map in &mut maps {
         let _ = fill_missing(&mut map.data, &map.shape);
     }
-    let probabilities = network.probabilities(&map_statistics(&map_cells(&maps)));
+    let probabilities = answer(&maps);
     let people = (0..CLASSES).fold(0, |best, n| if probabilities[n] > probabilities[best] { n } else { best });
     (Ok(numbers(people, annotated)), Some(milliseconds(began)))
 }

@@ -148,7 +148,11 @@ fn counting(base: &FitConfig, set: Option<PaperSet>) -> Vec<Variant> {
         let paper = set.map(|_| PaperRow { count_accuracy: Some(accuracy), ..PaperRow::default() });
         Variant::cold([name], base).counting(method).beside(paper)
     };
-    vec![row("CFAR + DBSCAN + MLP", Method::Counter, 0.994), row("MLP alone", Method::Alone, 0.946)]
+    vec![
+        row("CFAR + DBSCAN + MLP", Method::Counter, 0.994),
+        row("MLP alone", Method::Alone, 0.946),
+        row("CNN", Method::Maps, 0.975),
+    ]
 }
 
 /// Every row from the truth follows the one from the program's own start that it is compared with ([`super::table`]).

@@ -27,6 +27,8 @@ pub enum Method {
     Counter,
     /// Its people are counted by a classifier of the map's statistics alone.
     Alone,
+    /// Its people are counted by a convolutional network on the maps themselves.
+    Maps,
 }
 
 impl Method {

@@ -1,7 +1,8 @@
 //! Lessons from the synthetic source: frames with known counts as the counter sees them.
 
-use super::CounterLesson;
-use crate::people::{Counter, HISTORY, PeopleError, Scan, map_statistics};
+use super::{CounterLesson, MapLesson};
+use crate::people::{Counter, HISTORY, IMAGE, PeopleError, Scan, map_image, map_statistics};
+use crate::radar::{AxisKind, View};
 use crate::simulate::{Options, Recording, ScenePreset, SimulateError};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -23,6 +24,8 @@ pub struct CounterExample {
     pub counted: CounterLesson,
     /// Statistics of its maps.
     pub alone: CounterLesson,
+    /// Its maps themselves.
+    pub maps: MapLesson,
     /// Frames before it in its sequence.
     pub history: usize,
     /// Easy, medium, hard.
@@ -81,6 +84,8 @@ fn sequence(
 ) -> Result<Vec<CounterExample>, PeopleError> {
     let sequence = recording.sequence(number);
     let (mut scans, mut found): (Vec<Scan>, Vec<CounterExample>) = (Vec::new(), Vec::new());
+    let views = recording.views();
+    let shapes: Vec<Vec<usize>> = views.iter().map(View::shape).collect();
     for (history, k) in shown.enumerate() {
         let frame = sequence.frame(k);
         let maps: Vec<Vec<f64>> = frame.maps.iter().map(|map| map.iter().map(|&x| f64::from(x)).collect()).collect();
@@ -91,6 +96,7 @@ fn sequence(
         found.push(CounterExample {
             counted: CounterLesson::of(counter, &now, &before, people),
             alone: CounterLesson { rows: vec![map_statistics(&maps).to_vec()], people, placed: false },
+            maps: lesson_of_maps(&views, &shapes, &maps, people),
             history,
             preset: sequence.preset(),
         });
@@ -98,4 +104,16 @@ fn sequence(
         done();
     }
     Ok(found)
+}
+
+fn lesson_of_maps(views: &[View], shapes: &[Vec<usize>], maps: &[&[f64]], people: usize) -> MapLesson {
+    let shaped: Vec<(&[usize], &[f64])> = shapes.iter().map(Vec::as_slice).zip(maps.iter().copied()).collect();
+    let lateral = |view: &View| view.axes.last().is_some_and(|axis| axis.kind == AxisKind::Y);
+    let image = map_image(&shaped);
+    let mirrored = views.iter().zip(image.chunks_exact(IMAGE[0] * IMAGE[1])).flat_map(|(view, plane)| {
+        let rows = plane.chunks_exact(IMAGE[1]);
+        rows.flat_map(|row| if lateral(view) { row.iter().rev().copied().collect() } else { row.to_vec() })
+            .collect::<Vec<f32>>()
+    });
+    MapLesson { mirrored: mirrored.collect(), image, people }
 }

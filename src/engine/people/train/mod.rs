@@ -5,8 +5,10 @@
 //! gradient goes through that sum.
 
 mod examples;
+mod maps;
 
 pub use examples::{CounterExample, examples, recordings};
+pub use maps::{MapLesson, train_on_maps};
 
 use super::counter::{Counter, MOST_CLUSTERS, NOBODY, agreed, convolve};
 use super::network::{CLASSES, Layer, Network, widths};
@@ -103,41 +105,71 @@ impl Default for TrainOptions {
     }
 }
 
+impl TrainOptions {
+    /// Adam's step in an epoch, counted from 0.
+    fn step_of(&self, epoch: usize) -> f64 {
+        let done = epoch as f64 / self.epochs as f64;
+        0.5 * self.learning_rate * (1.0 + (std::f64::consts::PI * done).cos())
+    }
+}
+
 /// Trains a network; `told` hears epoch and mean loss.
 ///
 /// # Errors
 /// candle's, which would be a mistake in here.
-pub fn train(lessons: &[CounterLesson], options: &TrainOptions, mut told: impl FnMut(usize, f32)) -> Result<Network> {
+pub fn train(lessons: &[CounterLesson], options: &TrainOptions, told: impl FnMut(usize, f32)) -> Result<Network> {
     let mut rng = StdRng::seed_from_u64(options.seed);
     let lessons: Vec<CounterLesson> = lessons.iter().flat_map(|lesson| [lesson.clone(), lesson.mirrored()]).collect();
     let (mean, scale) = moments(&lessons);
-    let options = TrainOptions { weights: shared(&lessons, options.weights), ..*options };
+    let people: Vec<usize> = lessons.iter().map(|lesson| lesson.people).collect();
+    let weights = shared(&people, options.weights);
+    let options = TrainOptions { weights, ..*options };
     let model = Model::new(mean.len(), &mut rng)?;
-    let parameters =
-        ParamsAdamW { lr: options.learning_rate, weight_decay: options.weight_decay, ..ParamsAdamW::default() };
-    let mut adam = AdamW::new(model.vars(), parameters)?;
-    let mut order: Vec<usize> = (0..lessons.len()).collect();
-    for epoch in 0..options.epochs {
-        order.shuffle(&mut rng);
-        let done = epoch as f64 / options.epochs as f64;
-        adam.set_learning_rate(0.5 * options.learning_rate * (1.0 + (std::f64::consts::PI * done).cos()));
-        let mut sum = 0.0;
-        for chosen in order.chunks(options.batch.max(1)) {
-            let batch: Vec<&CounterLesson> = chosen.iter().filter_map(|&i| lessons.get(i)).collect();
-            let loss = model.loss(&batch, (&mean, &scale), &options, &mut rng)?;
-            adam.backward_step(&loss)?;
-            sum += loss.to_scalar::<f32>()? * batch.len() as f32;
-        }
-        told(epoch + 1, sum / lessons.len().max(1) as f32);
-    }
+    let loss = |chosen: &[usize], rng: &mut StdRng| {
+        let batch: Vec<&CounterLesson> = chosen.iter().filter_map(|&i| lessons.get(i)).collect();
+        model.loss(&batch, (&mean, &scale), &options, rng)
+    };
+    descend((model.vars(), lessons.len()), &options, &mut rng, loss, told)?;
     Ok(Network { header: Vec::new(), mean, scale, layers: model.layers()? })
 }
 
+/// Goes down the loss of batches of so many lessons, told by their places, with AdamW; `told` hears epoch and mean loss.
+fn descend(
+    (vars, lessons): (Vec<Var>, usize),
+    options: &TrainOptions,
+    rng: &mut StdRng,
+    loss: impl Fn(&[usize], &mut StdRng) -> Result<Tensor>,
+    mut told: impl FnMut(usize, f32),
+) -> Result<()> {
+    let parameters =
+        ParamsAdamW { lr: options.learning_rate, weight_decay: options.weight_decay, ..ParamsAdamW::default() };
+    let mut adam = AdamW::new(vars, parameters)?;
+    let mut order: Vec<usize> = (0..lessons).collect();
+    for epoch in 0..options.epochs {
+        order.shuffle(rng);
+        adam.set_learning_rate(options.step_of(epoch));
+        let mut sum = 0.0;
+        for chosen in order.chunks(options.batch.max(1)) {
+            let loss = loss(chosen, rng)?;
+            adam.backward_step(&loss)?;
+            sum += loss.to_scalar::<f32>()? * chosen.len() as f32;
+        }
+        told(epoch + 1, sum / lessons.max(1) as f32);
+    }
+    Ok(())
+}
+
 /// What one lesson of each number of people counts, so that together they count as asked for; 1 on average.
-fn shared(lessons: &[CounterLesson], weights: [f32; CLASSES]) -> [f32; CLASSES] {
+fn shared(people: &[usize], weights: [f32; CLASSES]) -> [f32; CLASSES] {
     let all: f32 = weights.iter().sum();
-    let of = |k: usize| lessons.iter().filter(|lesson| lesson.people.min(CLASSES - 1) == k).count().max(1);
-    std::array::from_fn(|k| weights[k] / all * lessons.len() as f32 / of(k) as f32)
+    let of = |k: usize| people.iter().filter(|people| (**people).min(CLASSES - 1) == k).count().max(1);
+    std::array::from_fn(|k| weights[k] / all * people.len() as f32 / of(k) as f32)
+}
+
+/// What the outputs of a layer are multiplied by where some are dropped: 0, or what makes up for those.
+fn dropped(elements: usize, dropout: f64, rng: &mut StdRng) -> Vec<f32> {
+    let kept = (1.0 / (1.0 - dropout)) as f32;
+    (0..elements).map(|_| if rng.random_bool(dropout) { 0.0 } else { kept }).collect()
 }
 
 /// Mean and standard deviation of each feature.
@@ -233,9 +265,8 @@ impl Model {
                 x = x.relu()?;
             }
             if k == 0 && dropout > 0.0 {
-                let kept = (1.0 / (1.0 - dropout)) as f32;
-                let mask = (0..x.elem_count()).map(|_| if rng.random_bool(dropout) { 0.0 } else { kept });
-                x = x.mul(&Tensor::from_vec(mask.collect::<Vec<f32>>(), x.shape().clone(), &Device::Cpu)?)?;
+                let mask = dropped(x.elem_count(), dropout, rng);
+                x = x.mul(&Tensor::from_vec(mask, x.shape().clone(), &Device::Cpu)?)?;
             }
         }
         Ok(x)
