@@ -188,7 +188,7 @@ mod tests {
             (StudyKind::Weights, 5, 5),
             (StudyKind::Init, 3, 3),
             (StudyKind::Budget, 16, 0),
-            (StudyKind::Counting, 2, 2),
+            (StudyKind::Counting, 3, 3),
             (StudyKind::Truth, 2, 0),
         ];
         for (kind, all, of_paper) in counts {
