@@ -143,3 +143,49 @@ fn explorations_tell_the_librarys_numbers() {
     );
     assert_eq!(told["radar_assumed"].as_array().unwrap().len(), 2);
 }
+
+/// What a radar would be is kept under a name, listed, and is the radar of a data set whose manifest names it.
+#[test]
+fn a_radar_that_is_saved_can_be_named_by_a_manifest() {
+    let home = tempfile::tempdir().unwrap();
+    let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/walk");
+    let data = home.path().join("data");
+    std::fs::create_dir_all(data.join("frames")).unwrap();
+    std::fs::copy(sample.join("frames/000003.npz"), data.join("frames/000003.npz")).unwrap();
+    let manifest = std::fs::read_to_string(sample.join("dataset.toml")).unwrap();
+    std::fs::write(data.join("dataset.toml"), &manifest).unwrap();
+    let program = |args: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_mhp-inspector"));
+        let output = command.args(args).env("MHP_INSPECTOR_HOME", home.path()).output().unwrap();
+        assert!(output.status.success(), "{args:?}: {}", said(&output));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let path = data.to_str().unwrap();
+    let range = |text: &str| text.lines().find(|line| line.starts_with("  widths")).unwrap().to_owned();
+    let today = range(&program(&["info", path]));
+    program(&[
+        "explore",
+        "radar",
+        path,
+        "--preset",
+        "baseline",
+        "--iterations",
+        "2",
+        "--bandwidth",
+        "4e9",
+        "--save",
+        "wide",
+    ]);
+    assert!(home.path().join("radars/wide.toml").is_file() && program(&["radars"]).contains("what-if of walk"));
+    // The same maps, by a manifest that names the radar and states no widths.
+    let mut named: toml::Table = toml::from_str(&manifest).unwrap();
+    named.insert("radar".into(), "wide".into());
+    for view in named["view"].as_array_mut().unwrap() {
+        let view = view.as_table_mut().unwrap();
+        view.remove("psf");
+        view.remove("fft");
+    }
+    std::fs::write(data.join("dataset.toml"), toml::to_string(&named).unwrap()).unwrap();
+    let other = range(&program(&["info", path]));
+    assert!(today.contains("range 4.124 cm") && other.contains("range 3.093 cm"), "{today}\n{other}");
+}

@@ -80,7 +80,11 @@ fn what_reviewers_object_to_is_left_out_and_told_as_in_the_paper() {
     let words =
         ["study", "complexity", path, "--verified", "--iterations", "1", "--preset", "baseline", "--json", "--out"];
     let study = program(home.path(), &[&words[..], &[run.to_str().unwrap()]].concat());
-    assert!(study.status.success() && said(&study).contains("2 frames are left out by a verdict"), "{}", said(&study));
+    assert!(
+        study.status.success() && said(&study).contains("2 of 10 frames are left out by a verdict: retention 80.0 %"),
+        "{}",
+        said(&study)
+    );
     let table: Value = serde_json::from_slice(&study.stdout).unwrap();
     assert_eq!(table["data"]["frames"], 8);
 }

@@ -130,7 +130,12 @@ fn frames(args: &RunArgs, dataset: &Dataset) -> anyhow::Result<FrameRanges> {
     let acts = acts_of(dataset)?;
     let out = taken_out(&acts);
     let kept = FrameRanges::of_frames(asked.iter().filter(|&frame| !out.contains(dataset.frame_name(frame))));
-    complain(&format!("note: {} frames are left out by a verdict", asked.len() - kept.len()));
+    let retention = 100.0 * kept.len() as f64 / asked.len().max(1) as f64;
+    let left_out = asked.len() - kept.len();
+    complain(&format!(
+        "note: {left_out} of {} frames are left out by a verdict: retention {retention:.1} %",
+        asked.len()
+    ));
     Ok(kept)
 }
 
