@@ -144,15 +144,10 @@ pub fn closure_test(request: &ClosureRequest, progress: &Progress) -> Result<Opt
         return Ok(None);
     }
     let mut fitter = Fitter::new(problem, config, *precision, start.clone()).map_err(told)?;
-    while fitter.iteration() < config.iterations {
-        if let Err(Cancelled) = progress.check() {
-            return Ok(None);
-        }
-        if fitter.step_unseen().map_err(told)? && config.stop_when_converged {
-            break;
-        }
+    fitter.run_unseen(config.iterations, |_| progress.is_cancelled()).map_err(told)?;
+    if let Err(Cancelled) = progress.check() {
+        return Ok(None);
     }
-    fitter.look().map_err(told)?;
     let (truth, fitted) = (pose.positions().to_vec(), fitter.params().clone());
     let joints = info.skeleton.joints.len();
     let errors = |params: &Pppr| {

@@ -108,7 +108,7 @@ fn fit_watched(
         broke.is_some()
     };
     let last = options.config.iterations;
-    let run = if unwatched { fitter.run_unseen(last) } else { fitter.run_until(last, stops) };
+    let run = if unwatched { fitter.run_unseen(last, |_| false) } else { fitter.run_until(last, stops) };
     let reason = run.map_err(|error| in_file(&error))?;
     let breakpoint = broke.and_then(|which| options.breakpoints.get(which)).map(ToString::to_string);
     let fit_ms = milliseconds(began);

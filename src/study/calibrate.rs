@@ -148,7 +148,7 @@ fn problem(recording: &Recording, skeleton: Skeleton, frames: &[Vec<Vec<f64>>]) 
 fn measured(problem: &Arc<Problem>, frames: &[Vec<Vec<f64>>], config: &FitConfig) -> Result<Measured, FitError> {
     let initial = find_start(problem, config)?.initialisation.params;
     let mut fitter = Fitter::new(Arc::clone(problem), *config, Precision::F32, initial.clone())?;
-    fitter.run_unseen(config.iterations)?;
+    fitter.run_unseen(config.iterations, |_| false)?;
     let masks = masks_around(problem, &initial, fitter.params(), config, Precision::F32)?;
     let before = frames.iter().take(frames.len().saturating_sub(1)).enumerate();
     let before: Vec<EarlierFrame<'_>> =

@@ -135,7 +135,7 @@ impl ThreeRadars {
         let initial = find_start(&problem, &self.config)?.initialisation.params;
         let start = joint_errors(initial.positions(), &truth, joints);
         let mut fitter = Fitter::new(problem, self.config, Precision::F32, initial)?;
-        fitter.run_unseen(self.config.iterations)?;
+        fitter.run_unseen(self.config.iterations, |_| false)?;
         let end = joint_errors(fitter.params().positions(), &truth, joints);
         let ious: Vec<f64> = fitter.report().iou.iter().flatten().copied().collect();
         let iou = ious.iter().sum::<f64>() / ious.len().max(1) as f64;

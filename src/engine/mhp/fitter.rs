@@ -161,36 +161,26 @@ impl Fitter {
         Ok(self.report())
     }
 
-    /// As [`Self::step`], but what a window's step does not need is not worked out: the IoU and the gradient of the frame that is
-    /// fitted, which are shown. [`Self::look`] does that where somebody wants to see them. Answers whether the loss has converged.
+    /// Steps as [`Self::run_to`], where nobody watches: what a window's step does not need, the IoU and the gradient of the frame that
+    /// is fitted, is worked out at the end alone. `stops` is asked before each step, where the loss and the parameters are known.
     ///
     /// # Errors
     /// As [`Self::step`].
-    pub fn step_unseen(&mut self) -> Result<bool, FitError> {
-        self.advance(false)?;
-        Ok(self.has_converged())
-    }
-
-    /// Works out what was left out of the evaluation of the current parameters.
-    ///
-    /// # Errors
-    /// As [`Self::step`].
-    pub fn look(&mut self) -> Result<(), FitError> {
-        if self.unseen { self.evaluate_now() } else { Ok(()) }
-    }
-
-    /// As [`Self::run_to`], where nobody watches; looks at the end.
-    ///
-    /// # Errors
-    /// As [`Self::step`].
-    pub fn run_unseen(&mut self, last: usize) -> Result<StopReason, FitError> {
+    pub fn run_unseen(&mut self, last: usize, mut stops: impl FnMut(&Self) -> bool) -> Result<StopReason, FitError> {
         let mut reason = StopReason::Iterations;
         while self.iteration() < last && reason == StopReason::Iterations {
-            if self.step_unseen()? && self.config().stop_when_converged {
+            if stops(self) {
+                reason = StopReason::Breakpoint;
+                continue;
+            }
+            self.advance(false)?;
+            if self.has_converged() && self.config().stop_when_converged {
                 reason = StopReason::Converged;
             }
         }
-        self.look()?;
+        if self.unseen {
+            self.evaluate_now()?;
+        }
         Ok(reason)
     }
 
@@ -290,9 +280,7 @@ impl Fitter {
         let losses = self.state.losses.clone();
         if let Err(error) = self.begin() {
             self.state = before;
-            let Self { objective, window, evaluation, window_loss: [window_loss, _], state, .. } = self;
-            evaluate_state(objective, window.as_mut(), state, true, (evaluation, window_loss))?;
-            self.unseen = false;
+            self.evaluate_now()?;
             return Err(error);
         }
         if losses.len() > 1 {

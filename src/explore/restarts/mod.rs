@@ -19,7 +19,7 @@ use super::task::Showing;
 use crate::body::Pppr;
 use crate::diagnose::joint_errors;
 use crate::geometry::Vec3;
-use crate::mhp::{FitState, Fitter, Terms};
+use crate::mhp::{FitState, Fitter, StopReason, Terms};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -191,18 +191,10 @@ pub(super) fn explore(
         if fitter.restore(Arc::new(FitState::at_start(start.clone()))).is_err() {
             return Ok(None);
         }
-        while fitter.iteration() < state.config.iterations {
-            if !hand.go_on() {
-                return Err(Halt::Cancelled);
-            }
-            match fitter.step_unseen() {
-                Ok(true) if state.config.stop_when_converged => break,
-                Ok(_) => {}
-                Err(_) => return Ok(None),
-            }
-        }
-        if fitter.look().is_err() {
-            return Ok(None);
+        match fitter.run_unseen(state.config.iterations, |_| !hand.go_on()) {
+            Ok(StopReason::Breakpoint) => return Err(Halt::Cancelled),
+            Ok(_) => {}
+            Err(_) => return Ok(None),
         }
         let (report, end) = (fitter.report(), fitter.params().clone());
         let known: Vec<f64> = report.iou.iter().flatten().copied().collect();

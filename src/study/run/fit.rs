@@ -131,20 +131,14 @@ impl<'a> LoadedFrame<'a> {
         let mut ended = false;
         let mut answers = Vec::with_capacity(stops.len());
         for &stop in stops {
-            while let Ok(running) = fitter.as_mut()
+            if let Ok(running) = fitter.as_mut()
                 && !ended
-                && running.iteration() < stop
             {
-                if !go_on(running) {
-                    return answers;
-                }
-                match running.step_unseen() {
-                    Ok(converged) => ended = converged && config.stop_when_converged,
+                match running.run_unseen(stop, |fitter| !go_on(fitter)) {
+                    Ok(StopReason::Breakpoint) => return answers,
+                    Ok(reason) => ended = reason == StopReason::Converged,
                     Err(why) => *fitter = Err(self.told(&why)),
                 }
-            }
-            if let Ok(Err(why)) = fitter.as_mut().map(Fitter::look) {
-                *fitter = Err(self.told(&why));
             }
             let fit_ms = milliseconds(began);
             answers.push(fitter.as_ref().map_err(Clone::clone).map(|fitter| Stop {
