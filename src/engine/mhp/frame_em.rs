@@ -39,8 +39,8 @@ pub(super) struct Measured<'a> {
     pub background: Option<&'a [Vec<f64>]>,
     /// The rings of each view, where clutter is modelled by range.
     pub grids: SmallVec<[&'a SpatialGrid; 4]>,
-    /// The power of a view's noise.
-    pub noise: Box<dyn Fn(usize) -> f64 + 'a>,
+    /// The power of each view's noise, of the unit of the map's power; none where masks are compared.
+    pub noises: SmallVec<[f64; 4]>,
 }
 
 impl Measured<'_> {
@@ -118,7 +118,7 @@ impl FrameEm {
                 Left { places: (0..marks.len()).filter(|&k| marks[k] > 0.0).collect(), cells: there }
             });
             let levels = (config.objective != EmLoss::Iou).then(|| {
-                let noise = (measured.noise)(k);
+                let noise = measured.noises[k];
                 let background = measured.clutter(k, region, noise).map(|power| inside(&power));
                 // Powers that add, without a spectrum along an axis.
                 let spectral = view.axes.iter().any(|axis| axis.kind == AxisKind::Doppler);

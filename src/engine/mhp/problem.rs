@@ -166,16 +166,16 @@ impl Problem {
     /// What is measured in this frame, for these settings.
     pub(super) fn measured(&self, config: &FitConfig) -> Measured<'_> {
         let maps = self.maps.iter().map(Vec::as_slice).collect();
-        let by_range = config.clutter == Clutter::Modelled && config.objective != EmLoss::Iou;
-        let grids = self.views.grids().filter(|_| by_range).map(AsRef::as_ref).collect();
+        let levels = config.objective != EmLoss::Iou;
+        let by_range = config.clutter == Clutter::Modelled && levels;
         Measured {
             views: &self.views,
             skeleton: &self.skeleton,
             radar: &self.radar,
             maps,
             background: None,
-            grids,
-            noise: Box::new(|view| self.thinned.noise(self, view)),
+            grids: self.views.grids().filter(|_| by_range).map(AsRef::as_ref).collect(),
+            noises: (0..self.views.len()).filter(|_| levels).map(|view| self.thinned.noise(self, view)).collect(),
         }
     }
 

@@ -90,7 +90,7 @@ fn moving(maps: &[Vec<f64>], around: &[Neighbour], plain: &[SaliencyMap]) -> Opt
 }
 
 /// Ways of reading maps.
-const READINGS: usize = 3 * 2 * 2;
+const READINGS: usize = FramesAround::COUNT * 2 * 2;
 
 /// A frame's context for each way of reading it, worked out when first asked for. Equal to any other: they follow from the
 /// maps.

@@ -1,7 +1,7 @@
 //! Which cells of a problem's maps a window looks at, and a frame's comparison in them.
 
 use crate::body::Pppr;
-use crate::config::{Clutter, FitConfig};
+use crate::config::{Clutter, EmLoss, FitConfig};
 use crate::geometry::norm;
 use crate::mhp::frame_em::{FrameEm, Measured, skin_of};
 use crate::mhp::region::{Region, centres};
@@ -47,7 +47,7 @@ impl<'a> ThinnedViews<'a> {
         background: Option<&[Vec<f64>]>,
     ) -> FrameEm {
         let Self { problem, maps, by_range, skin } = self;
-        let views = 0..maps.views.len();
+        let (views, levels) = (0..maps.views.len(), config.objective != EmLoss::Iou);
         let measured = Measured {
             views: &maps.views,
             skeleton: &problem.skeleton,
@@ -55,7 +55,7 @@ impl<'a> ThinnedViews<'a> {
             maps: views.clone().map(|view| maps.map(problem, frame, view).cells.as_slice()).collect(),
             background,
             grids: views.clone().filter(|_| *by_range).map(|view| maps.grid(view)).collect(),
-            noise: Box::new(move |view| maps.noise(problem, frame, view)),
+            noises: views.filter(|_| levels).map(|view| maps.noise(problem, frame, view)).collect(),
         };
         FrameEm::with_skin(&measured, regions, (config, precision), skin.clone())
     }
