@@ -206,7 +206,7 @@ impl Session {
             Command::PauseStudy => self.pause_study(),
             Command::CancelStudy => self.cancel_study(),
             Command::OpenRun(folder) => self.open_run(&folder),
-            Command::ShowStudyRow { row, scene } => self.show_study_row(row, scene.as_deref()),
+            Command::ShowStudyRow { row, scene } => self.show_study_row(row, scene),
             Command::Explore(kind) => self.explore(kind),
             Command::StopExploring(kind) => self.stop_exploring(kind),
             Command::KeepTuning => self.keep_tuning(),

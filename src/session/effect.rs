@@ -150,7 +150,18 @@ pub enum Effect {
     /// Read a run folder on a thread.
     ReadRun(PathBuf),
     /// Find the frames of a row of a run's table in this data set, on a thread.
-    FindStudyRow(PathBuf, Arc<Run>, usize, Arc<Dataset>),
+    FindStudyRow {
+        /// Where the run lies.
+        folder: PathBuf,
+        /// The run.
+        run: Arc<Run>,
+        /// The row's place in its table.
+        row: usize,
+        /// Only the frames of this scene.
+        scene: Option<String>,
+        /// Where the frames are sought.
+        dataset: Arc<Dataset>,
+    },
     /// Explore this on idle cores, under this number; an older one of its kind is given up.
     Explore(u64, Box<Exploration>),
     /// Give it up.

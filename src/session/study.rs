@@ -78,11 +78,12 @@ impl StudyView {
 /// The filter that shows the frames of a row: all that have a result, also those that could not be fitted.
 pub(super) const ROW_FILTER: &str = "reason:iterations|converged|counted|error";
 
-/// Finds the frames of row `row` of the table in a data set, by their names.
-pub(super) fn frames_of_row(run: &Run, row: usize, dataset: &Arc<Dataset>) -> FoundResults {
+/// Finds the frames of row `row` of the table, of `scene` or of all, in a data set, by their names.
+pub(super) fn frames_of_row(run: &Run, row: usize, scene: Option<&str>, dataset: &Arc<Dataset>) -> FoundResults {
     let names: HashMap<&str, usize> = (0..dataset.len()).map(|index| (dataset.frame_name(index), index)).collect();
     let (mut summaries, mut unknown, mut first_unknown) = (BTreeMap::new(), 0, None);
-    for of in run.table.get(row).into_iter().flat_map(|of| run.rows_of(of)) {
+    let of_row = run.table.get(row).into_iter().flat_map(|of| run.rows_of(of));
+    for of in of_row.filter(|of| scene.is_none() || of.origin.scene.as_deref() == scene) {
         if let Some(&index) = names.get(of.name.as_str()) {
             summaries.insert(index, summary(of));
         } else {

@@ -125,20 +125,21 @@ fn a_row_puts_its_frames_into_the_list() {
 fn each_scene_has_its_table_and_its_frames() {
     let folder = tempfile::tempdir().unwrap();
     blob::write_dataset(folder.path(), 4);
-    let said = "\n[[origin]]\nframes = \"*000\"\nscene = \"hall\"\nsubject = \"b\"\n[[origin]]\nscene = \"lab\"\n";
+    let said =
+        "\n[[origin]]\nframes = \"*000\"\nscene = \"room 1\"\nsubject = \"b\"\n[[origin]]\nscene = \"room 10\"\n";
     std::fs::write(folder.path().join("dataset.toml"), blob::MANIFEST.to_owned() + said).unwrap();
     let mut window = Window::on(folder);
     let folder = run(&window, StudyKind::Init, &[]);
     window.apply(Command::OpenRun(folder));
     window.harness.state_mut().show_pane(Pane::called("Study").unwrap());
     shown(&mut window, StudyKind::Init);
-    assert!(window.named("All scenes") && window.named("Scene hall") && window.named("Scene lab"));
-    window.click("Scene lab");
+    assert!(window.named("All scenes") && window.named("Scene room 1") && window.named("Scene room 10"));
+    window.click("Scene room 10");
     window.click("Study row without position (P)");
-    window.until("its frames in the lab", |w| w.session().queue.rows() == [1, 2, 3]);
-    window.click("Scene hall");
+    window.until("its frames in room 10", |w| w.session().queue.rows() == [1, 2, 3]);
+    window.click("Scene room 1");
     window.click("Study row full (P + V)");
-    window.until("the frame in the hall", |w| w.session().queue.rows() == [0]);
+    window.until("the frame in room 1", |w| w.session().queue.rows() == [0]);
     window.click("All scenes");
     window.click("Study row without velocity (V)");
     window.until("all of them", |w| w.session().queue.rows().len() == 4);
@@ -150,7 +151,7 @@ fn each_scene_has_its_table_and_its_frames() {
     window.harness.run_steps(2);
     window.click("Sort by Scene");
     window.harness.run_steps(2);
-    assert_eq!(window.session().queue.rows(), [0, 1, 2, 3], "the hall before the lab");
+    assert_eq!(window.session().queue.rows(), [0, 1, 2, 3], "room 1 before room 10");
 }
 
 #[test]

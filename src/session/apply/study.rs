@@ -126,7 +126,7 @@ impl Session {
     }
 
     /// Puts the frames of a row into the list, of one scene or of all.
-    pub(super) fn show_study_row(&mut self, row: usize, scene: Option<&str>) -> Vec<Effect> {
+    pub(super) fn show_study_row(&mut self, row: usize, scene: Option<String>) -> Vec<Effect> {
         let Some((folder, run)) = self.study.run.clone().filter(|(_, run)| row < run.table.len()) else {
             return Vec::new();
         };
@@ -135,9 +135,8 @@ impl Session {
             return Vec::new();
         };
         self.study.row = Some(row);
-        let of_scene = scene.map(|scene| format!(" scene:\"{scene}\"")).unwrap_or_default();
-        let mut effects = self.set_filter(format!("{ROW_FILTER}{of_scene}"));
-        effects.push(Effect::FindStudyRow(folder, run, row, dataset));
+        let mut effects = self.set_filter(ROW_FILTER.to_owned());
+        effects.push(Effect::FindStudyRow { folder, run, row, scene, dataset });
         effects
     }
 }

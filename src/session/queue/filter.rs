@@ -157,13 +157,13 @@ impl Word {
     fn holds(self, row: &FrameRow<'_>, value: &str) -> bool {
         let is = |text: Option<&str>| text.is_some_and(|text| text.eq_ignore_ascii_case(value));
         let yes = matches!(value, "yes" | "true" | "1");
-        let has = |part| row.origin.part(part).is_some_and(|known| contains(known, value));
+        let is_of = |part| row.origin.part(part).map(|known| known.to_lowercase() == value);
         match self {
             Self::Stratum => is(row.stratum.map(Stratum::word)),
             Self::Sequence => contains(row.sequence, value),
-            // What is told of no scene by itself may be in the name of the sequence.
-            Self::Scene => has(OriginPart::Scene) || contains(row.sequence, value),
-            Self::Origin(part) => has(part),
+            // What no scene is told of may have it in the name of the sequence.
+            Self::Scene => is_of(OriginPart::Scene).unwrap_or_else(|| contains(row.sequence, value)),
+            Self::Origin(part) => is_of(part) == Some(true),
             Self::Note => contains(row.note, value),
             Self::By => row.annotators.iter().any(|name| contains(name, value)),
             Self::Verdict => is(row.verdict.map(Verdict::code)),
@@ -300,7 +300,6 @@ mod tests {
             index: 12,
             name: "d5s1/003/00012",
             sequence: "d5s1/003",
-            origin: Origin { scene: Some("Lab".into()), subject: Some("07".into()), ..Origin::default() },
             readable: true,
             stratum: Some(Stratum::Hard),
             hardness: Some(0.9),
@@ -337,9 +336,6 @@ mod tests {
         assert!(holds("STRATUM:Hard|easy tag:f1|F2 hardness>=0.9 index=12"));
         assert!(holds("d5S1 00012 -d6"));
         assert!(holds("note:\"near the wall\" by:AD verdict:both-incorrect scene:/003"));
-        assert!(holds("scene:lab subject:07 sequence:d5s1 -subject:08 -action:walk"));
-        assert!(!holds("sequence:lab") && !holds("session:d5s1"));
-        assert!(FrameFilter::parse("action:walk").unwrap().reads().origin);
         assert!(holds("converged:no fitted:yes tag:any -tag:none reason:iter"));
         assert!(!holds("converged:yes") && !holds("readable:no"));
     }
@@ -350,6 +346,17 @@ mod tests {
         assert!(holds("-majpe>0"));
         let bare = FrameRow { name: "x", ..FrameRow::default() };
         assert!(!FrameFilter::parse("converged:no").unwrap().matches(&bare), "not fitted is not unconverged");
+    }
+
+    #[test]
+    fn frames_are_of_the_scene_that_is_told_and_of_no_other() {
+        let origin = Origin { scene: Some("Lab".into()), subject: Some("07".into()), ..Origin::default() };
+        let row = FrameRow { origin, ..row() };
+        let holds = |text: &str| FrameFilter::parse(text).unwrap().matches(&row);
+        assert!(holds("scene:lab subject:07 sequence:d5s1 -subject:08 -action:walk"));
+        assert!(!holds("scene:la") && !holds("scene:d5s1") && !holds("subject:7"), "words in full");
+        assert!(!holds("sequence:lab") && !holds("session:d5s1"));
+        assert!(FrameFilter::parse("action:walk").unwrap().reads().origin);
     }
 
     #[test]

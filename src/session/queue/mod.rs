@@ -275,7 +275,8 @@ fn key(sort: Sort, row: &FrameRow<'_>) -> u64 {
             row.sources.get(usize::from(slot)).and_then(|(_, numbers)| numbers.get(number)).and_then(ordered)
         }
         SortKey::Tags => Some(tag_rank(row.tags)).filter(|&rank| rank > 0),
-        SortKey::Origin(part) => row.origin.part(part).map(letters),
+        // Subject 2 comes before subject 10, and numbers before names.
+        SortKey::Origin(part) => row.origin.part(part).map(|name| name.parse::<u32>().map_or(letters(name), u64::from)),
         SortKey::Annotator => row.annotators.first().map(|name| letters(name)),
         SortKey::Term(term) => row.number(FrameNumber::Term(term)).and_then(ordered),
     };
@@ -306,6 +307,7 @@ mod tests {
     #![cfg_attr(feature = "dummies", expect(clippy::unwrap_used, reason = "tests fail by panicking"))]
 
     use super::*;
+    use crate::dataset::Origin;
     #[cfg(feature = "dummies")]
     use crate::mhp::Terms;
 
@@ -327,6 +329,18 @@ mod tests {
         assert_eq!(queue.rows(), [1, 2, 0]);
         let text = serde_json::to_string(&sort).unwrap();
         assert_eq!((text.contains("\"dummy\""), serde_json::from_str(&text).unwrap()), (true, sort));
+    }
+
+    #[test]
+    fn numbers_of_subjects_are_ordered_as_numbers() {
+        let sort = Sort { key: SortKey::Origin(OriginPart::Subject), descending: false };
+        let subjects = ["10", "anna", "2", ""];
+        let mut queue = Queue::default();
+        queue.fill(subjects.len(), sort, |index| {
+            let subject = Some(subjects[index].to_owned()).filter(|name| !name.is_empty());
+            FrameRow { index, origin: Origin { subject, ..Origin::default() }, ..FrameRow::default() }
+        });
+        assert_eq!(queue.rows(), [2, 0, 1, 3]);
     }
 
     const IOU: [Option<f64>; 6] = [Some(0.5), None, Some(0.1), Some(0.5), None, Some(0.3)];

@@ -303,8 +303,8 @@ impl Runtime {
                 let read = crate::study::run::Run::read(&folder).map(Arc::new).map_err(|error| error.to_string());
                 Report::RunRead(folder, read)
             }),
-            Effect::FindStudyRow(folder, run, row, dataset) => self.on_thread("results", move || {
-                let found = super::study::frames_of_row(&run, row, &dataset);
+            Effect::FindStudyRow { folder, run, row, scene, dataset } => self.on_thread("results", move || {
+                let found = super::study::frames_of_row(&run, row, scene.as_deref(), &dataset);
                 Report::ResultsRead(folder, Ok(Box::new(found)))
             }),
             Effect::Send(command) => {
