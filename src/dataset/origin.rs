@@ -85,12 +85,12 @@ impl fmt::Display for Origin {
 }
 
 /// A manifest's `[[origin]]`: what holds for the frames whose names, or whose sequences, are like a pattern.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OriginRule {
     /// Names of frames or sequences, with `*` and `?`.
-    #[serde(default = "every_frame")]
-    frames: String,
+    #[serde(default)]
+    frames: Like,
     /// The scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     scene: Option<String>,
@@ -105,15 +105,33 @@ pub struct OriginRule {
     action: Option<String>,
 }
 
-fn every_frame() -> String {
-    "*".to_owned()
+/// A pattern, ready to be compared: every frame of a list is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(from = "String", into = "String")]
+struct Like(WildMatch);
+
+impl Default for Like {
+    fn default() -> Self {
+        Self(WildMatch::new("*"))
+    }
+}
+
+impl From<String> for Like {
+    fn from(pattern: String) -> Self {
+        Self(WildMatch::new(&pattern))
+    }
+}
+
+impl From<Like> for String {
+    fn from(like: Like) -> Self {
+        like.0.to_string()
+    }
 }
 
 impl OriginRule {
     /// What it says of a frame.
     pub(super) fn of(&self, sequence: &str, name: &str) -> Origin {
-        let like = WildMatch::new(&self.frames);
-        if !like.matches(name) && !like.matches(sequence) {
+        if !self.frames.0.matches(name) && !self.frames.0.matches(sequence) {
             return Origin::default();
         }
         let Self { scene, subject, session, action, .. } = self.clone();
@@ -128,7 +146,7 @@ mod tests {
     #[test]
     fn the_first_rule_that_says_something_holds() {
         let rule = |frames: &str, scene: Option<&str>, subject: Option<&str>| OriginRule {
-            frames: frames.into(),
+            frames: frames.to_owned().into(),
             scene: scene.map(Into::into),
             subject: subject.map(Into::into),
             session: None,
