@@ -7,7 +7,7 @@ use crate::people::train::{
 use crate::people::{CLASSES, COMPARED, Confusion, Counter, CounterOptions, FEATURES, HISTORY, Network};
 use crate::simulate::{Recording, ScenePreset};
 use anyhow::Context as _;
-use clap::Args;
+use clap::{Args, ValueEnum as _};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -82,12 +82,14 @@ impl Taught {
         }
     }
 
-    fn word(self) -> &'static str {
-        match self {
-            Self::Counter => "counter",
-            Self::Alone => "alone",
-            Self::Maps => "maps",
-        }
+    /// As `--only` has it.
+    fn word(self) -> String {
+        self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+    }
+
+    /// What it learns of a frame; of the maps themselves that is [`CounterExample::maps`].
+    fn lesson(self, example: &CounterExample) -> &CounterLesson {
+        if self == Self::Counter { &example.counted } else { &example.alone }
     }
 
     /// Whether the frames of a sequence agree on a number; else each is counted by itself.
@@ -117,11 +119,9 @@ pub(super) fn run(args: &TrainCounterArgs) -> anyhow::Result<ExitCode> {
             write(&args.out.join(taught.file()), &network)?;
             network.header
         } else {
-            let pick = |example: &CounterExample| {
-                if taught == Taught::Counter { example.counted.clone() } else { example.alone.clone() }
-            };
-            let mut network = train(&lessons.iter().map(pick).collect::<Vec<CounterLesson>>(), &options, told)?;
-            network.header = of(&|example| pick(example).answer(&network));
+            let chosen: Vec<CounterLesson> = lessons.iter().map(|example| taught.lesson(example).clone()).collect();
+            let mut network = train(&chosen, &options, told)?;
+            network.header = of(&|example| taught.lesson(example).answer(&network));
             write(&args.out.join(taught.file()), &network)?;
             network.header
         };
