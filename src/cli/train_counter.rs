@@ -22,8 +22,8 @@ options give the same weights.
 Examples:
   mhp-inspector train-counter --out assets
       Writes counter.json, counter-alone.json and counter-maps.json, and prints what they reach.
-  mhp-inspector train-counter --out assets --only maps --epochs 12
-      The convolutional network alone.
+  mhp-inspector train-counter --out assets --only maps --sequences 800 --epochs 20
+      The convolutional network alone, as it is committed.
   mhp-inspector train-counter --out /tmp --sequences 4 --test-sequences 2 --epochs 5
       A quick look at whether it works.";
 
