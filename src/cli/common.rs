@@ -3,15 +3,16 @@
 use crate::config::{FitConfig, Preset};
 use crate::dataset::{Dataset, Manifest, OpenOptions};
 use crate::escape;
-use crate::mhp::Precision;
+use crate::mhp::{ErasedCells, Precision};
 use crate::output::Inputs;
+use crate::study::read_erased;
 use crate::task::Progress;
 use anyhow::Context as _;
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{ErrorKind, IsTerminal as _, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The two precisions as typed.
@@ -100,6 +101,29 @@ impl PeopleArg {
     /// The configuration with that number, where one is given.
     pub(super) fn of(self, config: &FitConfig) -> FitConfig {
         FitConfig { people: self.people.map_or(config.people, usize::from), ..*config }
+    }
+}
+
+/// What a fit is not to see.
+#[derive(Debug, Clone, clap::Args)]
+pub(super) struct EraseArg {
+    /// Cells that no fit is to see, as the window's File > Export > erased cells writes them.
+    #[arg(long, value_name = "FILE.json")]
+    erase: Option<PathBuf>,
+}
+
+impl EraseArg {
+    /// The file, if one is named.
+    pub(super) fn file(&self) -> Option<&Path> {
+        self.erase.as_deref()
+    }
+
+    /// The cells, of the views of a data set; none without a file.
+    ///
+    /// # Errors
+    /// As [`read_erased`].
+    pub(super) fn read(&self, dataset: &Dataset) -> anyhow::Result<Vec<ErasedCells>> {
+        Ok(self.file().map(|file| read_erased(file, &dataset.info().views)).transpose()?.unwrap_or_default())
     }
 }
 

@@ -3,7 +3,8 @@
 mod table;
 
 use super::common::{
-    CsvArgs, PeopleArg, PrecisionArg, complain, inputs, open, presets, print, print_json, progress_bar, settings,
+    CsvArgs, EraseArg, PeopleArg, PrecisionArg, complain, inputs, open, presets, print, print_json, progress_bar,
+    settings,
 };
 use super::frames::{FrameRange, chosen};
 use super::merge::MergeArgs;
@@ -16,7 +17,7 @@ use crate::dataset::Dataset;
 use crate::mhp::{ErasedCells, Precision};
 use crate::output::{FolderLock, Inputs, replace_file};
 use crate::study::shard::{FrameCommand, Shard, ShardFolder, ShardSpec, Whole};
-use crate::study::{BatchOptions, BatchRow, Means, Summary, columns, read_erased, run_batch};
+use crate::study::{BatchOptions, BatchRow, Means, Summary, columns, run_batch};
 use anyhow::Context as _;
 use clap::Args;
 use serde::{Deserialize, Serialize};
@@ -115,9 +116,8 @@ pub struct FitArgs {
     init: Option<PathBuf>,
     #[command(flatten)]
     reading: ReadingArgs,
-    /// Cells that no fit is to see, as the window's File > Export > erased cells writes them.
-    #[arg(long, value_name = "FILE")]
-    erase: Option<PathBuf>,
+    #[command(flatten)]
+    erase: EraseArg,
     /// One JSON object instead of a table: `frames` with the keys of the columns, and `mean`.
     #[arg(long)]
     json: bool,
@@ -140,7 +140,7 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
     let inputs = inputs(
         &dataset,
         &args.path,
-        &[args.config.as_deref(), args.manifest.as_deref(), args.erase.as_deref(), args.init.as_deref()],
+        &[args.config.as_deref(), args.manifest.as_deref(), args.erase.file(), args.init.as_deref()],
     );
     let init = args.init.as_ref().map(|path| {
         let source = args.reading.open(&SourceFile { name: None, path: path.clone() }, &dataset)?;
@@ -156,12 +156,7 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
         ply: args.ply,
         curves_folder: args.out.as_ref().filter(|_| args.curves).map(|out| out.join(CURVES)),
         breakpoints: args.breakpoints.clone(),
-        erased: args
-            .erase
-            .as_deref()
-            .map(|file| read_erased(file, &dataset.info().views))
-            .transpose()?
-            .unwrap_or_default(),
+        erased: args.erase.read(&dataset)?,
     };
     let names: Vec<&str> = arrays.iter().map(String::as_str).collect();
     for breakpoint in &args.breakpoints {

@@ -3,20 +3,22 @@
 //!
 //! The synthesis owes nothing to the forward model: a body of hundreds of skin points with speckle of their own, each an echo with
 //! its delay to every antenna, FFTs, noise of the receiver. There is no room: what fails here, fails without reflectors. The body
-//! moves on evenly with the mean of its joints' velocities in the frames around, and with each joint's own within a frame.
+//! moves on evenly with the mean of its joints' velocities in the frames around, and with each joint's own within a frame. No cell of
+//! it is erased: what a person takes away of the measured maps is not in these.
 
+use super::Halt;
+use super::cores::{Hand, IdleCores, each};
 use super::echo_radar::{EchoRadar, fft_of};
 use crate::body::{BodyPose, BodySurface, Build, Parts, Pppr, SegmentFrame, Skeleton};
 use crate::config::FitConfig;
 use crate::dataset::DatasetInfo;
 use crate::diagnose::{JointErrors, joint_errors};
 use crate::geometry::{Mat3, Vec3, add, add_scaled, cross, dot, mat_vec, mean, norm, scale, sub, transpose};
-use crate::mhp::{FitError, Fitter, Precision, Problem};
+use crate::mhp::{Fitter, Precision, Problem};
 use crate::radar::{Echo, PointMotion, Receiver, View};
 use crate::start::find_start;
-use crate::task::{Cancelled, Progress};
+use crate::task::Progress;
 use rand::{SeedableRng, rngs::StdRng};
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Skin points a person, as the synthetic source has them.
@@ -85,80 +87,77 @@ pub struct ClosureTest {
 /// Runs the test. It takes a second or two.
 ///
 /// # Errors
-/// In words: where the views are of no line of antennas, or nothing can be started or fitted; `Ok(None)` where it was cancelled.
-pub fn closure_test(request: &ClosureRequest, progress: &Progress) -> Result<Option<ClosureTest>, String> {
+/// Where the views are of no line of antennas, nothing can be started or fitted, or it was cancelled.
+pub fn closure_test(request: &ClosureRequest, (cores, progress): (&IdleCores, &Progress)) -> Result<ClosureTest, Halt> {
     let ClosureRequest { info, pose, config, precision, noise, seed } = request;
     let (ffts, mut assumed) = (info.ffts(), Vec::new());
     let mut radars = Vec::new();
     for (k, view) in info.views.iter().enumerate() {
         let (fft, known) = fft_of(view, ffts.get(k).and_then(Option::as_ref), &info.radar);
-        radars.push(EchoRadar::new(view, &fft, info.static_removed)?);
+        radars.push(EchoRadar::new(view, &fft, info.static_removed).map_err(Halt::failed)?);
         if !known {
             assumed.push(view.array.clone());
         }
     }
-    let bodies = Bodies::new(&info.skeleton, pose, *seed)?;
+    let bodies = Bodies::new(&info.skeleton, pose, *seed).map_err(Halt::failed)?;
     let rate_hz = info.frame_rate_hz.filter(|rate| *rate > 0.0).unwrap_or(USUAL_RATE_HZ);
     let frames: Vec<isize> = (-REACH..=REACH).collect();
     progress.begin("synthesis", frames.len() as u64);
-    let synthesised: Vec<Option<Vec<Vec<f64>>>> = frames
-        .par_iter()
-        .map(|&frame| {
-            progress.check().ok()?;
-            let of = |(k, radar): (usize, &EchoRadar)| {
-                let view = &info.views[k];
-                let echoes = bodies.echoes(view, frame as f64 / rate_hz, 0.5 * radar.fmcw.radar.frame_s);
-                let none = vec![num_complex::Complex64::ZERO; radar.fmcw.array.channels() * radar.fmcw.samples];
-                let mut adc = radar.fmcw.synthesise(&none, &echoes);
-                let loudest = adc.data.iter().map(|x| x.re.abs().max(x.im.abs())).fold(0.0, f64::max);
-                let receiver = Receiver { noise: *noise, full_scale: loudest + 6.0 * noise, bits: BITS };
-                let number = (frame + REACH) as u64 * 16 + k as u64;
-                adc.digitise(
-                    &receiver,
-                    &mut StdRng::seed_from_u64(seed.wrapping_add(number.wrapping_mul(0x9E37_79B9_7F4A_7C15))),
-                );
-                radar.map(view, &adc)
-            };
-            let maps = radars.iter().enumerate().map(of).collect();
-            progress.advance(1);
-            Some(maps)
-        })
-        .collect();
-    let Some(mut synthesised) = synthesised.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
+    let synthesise = |(): &mut (), piece: usize, hand: &Hand<'_>| -> Result<Vec<Vec<f64>>, Halt> {
+        let frame = frames[piece];
+        let of = |(k, radar): (usize, &EchoRadar)| {
+            if !hand.go_on() {
+                return Err(Halt::Cancelled);
+            }
+            let view = &info.views[k];
+            let echoes = bodies.echoes(view, frame as f64 / rate_hz, 0.5 * radar.fmcw.radar.frame_s);
+            let none = vec![num_complex::Complex64::ZERO; radar.fmcw.array.channels() * radar.fmcw.samples];
+            let mut adc = radar.fmcw.synthesise(&none, &echoes);
+            let loudest = adc.data.iter().map(|x| x.re.abs().max(x.im.abs())).fold(0.0, f64::max);
+            let receiver = Receiver { noise: *noise, full_scale: loudest + 6.0 * noise, bits: BITS };
+            let number = (frame + REACH) as u64 * 16 + k as u64;
+            adc.digitise(
+                &receiver,
+                &mut StdRng::seed_from_u64(seed.wrapping_add(number.wrapping_mul(0x9E37_79B9_7F4A_7C15))),
+            );
+            Ok(radar.map(view, &adc))
+        };
+        let maps = radars.iter().enumerate().map(of).collect::<Result<Vec<_>, _>>()?;
+        progress.advance(1);
+        Ok(maps)
+    };
+    let mut synthesised: Vec<Vec<Vec<f64>>> = vec![Vec::new(); frames.len()];
+    each((cores, progress), frames.len(), || (), synthesise, |piece, maps| synthesised[piece] = maps)?;
     progress.begin("start and fit", 0);
-    let told = |error: FitError| error.to_string();
     let slices = |maps: &[Vec<f64>]| -> Vec<Vec<f64>> { maps.to_vec() };
     let own = slices(&synthesised[REACH as usize]);
     let of: Vec<&[f64]> = own.iter().map(Vec::as_slice).collect();
-    let mut problem = Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &of).map_err(told)?;
+    let mut problem =
+        Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &of).map_err(Halt::failed)?;
     problem.static_removed = info.static_removed;
     for (frame, maps) in frames.iter().zip(&synthesised).filter(|(frame, _)| **frame != 0) {
         let of: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
-        problem.add_neighbour(*frame as f64 / rate_hz, &of).map_err(told)?;
+        problem.add_neighbour(*frame as f64 / rate_hz, &of).map_err(Halt::failed)?;
     }
     let problem = Arc::new(problem);
     let people = pose.shape().persons;
     let config = FitConfig { people: if config.people == 0 { people } else { config.people }, ..*config };
-    let start = find_start(&problem, &config).map_err(told)?.initialisation.params;
-    if let Err(Cancelled) = progress.check() {
-        return Ok(None);
-    }
-    let mut fitter = Fitter::new(problem, config, *precision, start.clone()).map_err(told)?;
-    fitter.run_unseen(config.iterations, |_| progress.is_cancelled()).map_err(told)?;
-    if let Err(Cancelled) = progress.check() {
-        return Ok(None);
-    }
+    let start = find_start(&problem, &config).map_err(Halt::failed)?.initialisation.params;
+    cores.make_way(0, progress)?;
+    let mut fitter = Fitter::new(problem, config, *precision, start.clone()).map_err(Halt::failed)?;
+    fitter.run_unseen(config.iterations, |_| cores.make_way(0, progress).is_err()).map_err(Halt::failed)?;
+    cores.make_way(0, progress)?;
     let (truth, fitted) = (pose.positions().to_vec(), fitter.params().clone());
     let joints = info.skeleton.joints.len();
     let errors = |params: &Pppr| {
         joint_errors(params.positions(), &truth, joints)
-            .ok_or_else(|| "start and pose have no joints in common".to_owned())
+            .ok_or_else(|| Halt::failed("start and pose have no joints in common"))
     };
     let off = |params: &Pppr| 1000.0 * norm(sub(mean(params.positions()), mean(&truth)));
     let ious: Vec<f64> = fitter.report().iou.iter().flatten().copied().collect();
     let one = people == 1 && fitted.shape().persons == 1;
     let each = || fitted.positions().iter().zip(&truth).map(|(a, b)| 1000.0 * norm(sub(*a, *b)));
-    Ok(Some(ClosureTest {
+    Ok(ClosureTest {
         maps: synthesised.swap_remove(REACH as usize),
         errors: [errors(&start)?, errors(&fitted)?],
         joints_mm: if one { each().collect() } else { Vec::new() },
@@ -169,7 +168,7 @@ pub fn closure_test(request: &ClosureRequest, progress: &Progress) -> Result<Opt
         start,
         fitted,
         assumed,
-    }))
+    })
 }
 
 /// The bodies of a pose, and their skin.

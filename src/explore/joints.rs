@@ -1,10 +1,9 @@
 //! What each joint is worth to the agreement of the maps: the drop of IoU where it sends nothing back.
 
-use crate::body::Pppr;
-use crate::config::FitConfig;
-use crate::mhp::{FitError, JointReturns, KeptJoints, Objective, Precision, Problem, masks};
-use crate::task::{Cancelled, Progress};
-use std::sync::Arc;
+use super::cores::{Hand, IdleCores, each};
+use super::{ExploredState, Halt};
+use crate::mhp::{JointReturns, KeptJoints, masks};
+use crate::task::Progress;
 
 /// A joint that is left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,18 +25,14 @@ pub struct LeaveOneOut {
     pub joints: Vec<LeftOut>,
 }
 
-/// Leaves every joint out of H_sim in turn; the EM region is that around `initial`. Nothing is fitted anew.
+/// Leaves every joint out of H_sim in turn; the EM region is that of the fit. Nothing is fitted anew.
 ///
 /// # Errors
-/// As [`Objective::new`]; `Ok(None)` where it was cancelled.
-pub fn leave_one_out(
-    problem: &Arc<Problem>,
-    config: &FitConfig,
-    (initial, params): (&Pppr, &Pppr),
-    progress: &Progress,
-) -> Result<Option<LeaveOneOut>, FitError> {
-    let objective = Objective::new(Arc::clone(problem), *config, Precision::F64, initial)?;
-    let returns = JointReturns::new(problem, config, params);
+/// As [`Objective::new`](crate::mhp::Objective::new), or where it was cancelled.
+pub fn leave_one_out(state: &ExploredState, (cores, progress): (&IdleCores, &Progress)) -> Result<LeaveOneOut, Halt> {
+    let seen = state.seen()?;
+    let objective = state.objective(&seen)?;
+    let returns = JointReturns::new(&seen, &state.config, &state.params);
     let iou = |kept: KeptJoints| {
         let of_view = |(view, of): (usize, &crate::radar::View)| {
             let region = &objective.regions()[view];
@@ -48,21 +43,18 @@ pub fn leave_one_out(
             }
             masks(&objective, view, &whole).iou()
         };
-        let known: Vec<f64> = problem.views.iter().enumerate().filter_map(of_view).collect();
+        let known: Vec<f64> = seen.views.iter().enumerate().filter_map(of_view).collect();
         (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
     };
     progress.begin("leaving joints out", returns.joints() as u64);
     let all = iou(KeptJoints::All);
     let mut joints = Vec::with_capacity(returns.joints());
-    for joint in 0..returns.joints() {
-        if let Err(Cancelled) = progress.check() {
-            return Ok(None);
-        }
+    let leave_out = |(): &mut (), joint: usize, _: &Hand<'_>| -> Result<LeftOut, Halt> {
         let without = iou(KeptJoints::Without(joint));
-        let drop = all.unwrap_or(0.0) - without.unwrap_or(0.0);
-        joints.push(LeftOut { joint, iou: without, drop });
         progress.advance(1);
-    }
+        Ok(LeftOut { joint, iou: without, drop: all.unwrap_or(0.0) - without.unwrap_or(0.0) })
+    };
+    each((cores, progress), returns.joints(), || (), leave_out, |_, left_out| joints.push(left_out))?;
     joints.sort_by(|a, b| b.drop.total_cmp(&a.drop).then(a.joint.cmp(&b.joint)));
-    Ok(Some(LeaveOneOut { iou: all, joints }))
+    Ok(LeaveOneOut { iou: all, joints })
 }

@@ -13,17 +13,18 @@
 //! are told are those of the largest s² (A + B + ρ)⁻¹. Everything is of the frame alone, also where a window of frames is fitted; the
 //! body's own terms count with the paper's weight at least, also where a pose space holds the body in their place. Noise is complex and Gaussian under every cell, by default as strong as what the map's lowest third shows.
 
+use super::cores::{IdleCores, each};
 use super::modes::{PoseMode, modes};
+use super::{ExploredState, Halt};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::geometry::{Mat3, Vec3};
-use crate::mhp::{FitError, Objective, Precision, Problem, Weight, percentile};
+use crate::mhp::{FitError, Objective, Problem, Weight, percentile, without};
 use crate::radar::{Quantity, View};
-use crate::task::{Cancelled, Progress};
+use crate::task::Progress;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use rand_distr::StandardNormal;
-use rayon::prelude::*;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -33,7 +34,7 @@ const STEP_M: f64 = 1e-3;
 /// prior is in the joints' positions.
 const LEAST_KINE: f64 = 0.5;
 /// Maps with added noise that the gradient is taken at.
-const DRAWS: u64 = 48;
+const DRAWS: usize = 48;
 /// Nothing spreads farther than this, m.
 const LOOSE_M: f64 = 0.5;
 /// The least curvature of a direction that the echo fixes well, of the largest.
@@ -165,79 +166,65 @@ pub(super) fn noisy_problem(problem: &Problem, sigmas: &[f64], draw: u64) -> Res
     Problem::new(problem.radar.clone(), problem.skeleton.clone(), problem.views.clone(), &slices)
 }
 
-/// What fixes the pose `params`, in the EM region around `initial`. Directions are told from the middle of the views' radars.
+/// What fixes the pose of a state. Directions are told from the middle of the views' radars; erased cells are those of no map, with
+/// noise or without.
 ///
 /// # Errors
-/// As [`Objective::new`]; `Ok(None)` where it was cancelled.
+/// As [`Objective::new`], or where it was cancelled.
 pub fn observability(
-    problem: &Arc<Problem>,
-    config: &FitConfig,
-    (initial, params): (&Pppr, &Pppr),
+    state: &ExploredState,
     noise: Noise,
-    progress: &Progress,
-) -> Result<Option<Observability>, FitError> {
-    let of = |problem: &Arc<Problem>| Objective::new(Arc::clone(problem), *config, Precision::F32, initial);
-    let plain = of(problem)?;
+    (cores, progress): (&IdleCores, &Progress),
+) -> Result<Observability, Halt> {
+    let (problem, params, seen) = (&state.problem, &state.params, state.seen()?);
+    let plain = state.objective(&seen)?;
     let sigmas: Vec<(f64, f64)> = problem
         .views
         .iter()
         .enumerate()
-        .map(|(k, view)| noise_of(noise, view, problem.map(k), &plain.regions()[k].indices(&view.shape())))
+        .map(|(k, view)| noise_of(noise, view, seen.map(k), &plain.regions()[k].indices(&view.shape())))
         .collect();
     let size = params.group(Group::Position).len();
-    progress.begin("differences of the gradient", size as u64 + DRAWS);
+    progress.begin("differences of the gradient", size as u64 + DRAWS as u64);
     let only: Vec<f64> = sigmas.iter().map(|(sigma, _)| *sigma).collect();
-    let draws: Vec<Option<Vec<f64>>> = (0..DRAWS)
-        .into_par_iter()
-        .map(|draw| {
-            progress.check().ok()?;
-            let mut objective = of(&Arc::new(noisy_problem(problem, &only, draw).ok()?)).ok()?;
-            progress.advance(1);
-            let [em, _] = gradients(&mut objective, config, params);
-            Some(em)
-        })
-        .collect();
-    let Some(draws) = draws.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
-    if let Err(Cancelled) = progress.check() {
-        return Ok(None);
-    }
+    let mut draws = vec![Vec::new(); DRAWS];
+    let draw = |(): &mut (), draw: usize, _: &super::cores::Hand<'_>| -> Result<Vec<f64>, Halt> {
+        let noisy = Arc::new(noisy_problem(problem, &only, draw as u64).map_err(Halt::failed)?);
+        let noisy = without(&noisy, &state.erased).map_err(Halt::failed)?;
+        progress.advance(1);
+        let [em, _] = gradients(&mut state.objective(&noisy)?, &state.config, params);
+        Ok(em)
+    };
+    each((cores, progress), DRAWS, || (), draw, |k, gradient| draws[k] = gradient)?;
     let c = covariance(&draws, size);
-    let Some([a, b]) = curvature((problem, config), (initial, params), size, progress) else { return Ok(None) };
+    let [a, b] = curvature((state, &seen), size, (cores, progress))?;
     let spread = Spread::of(a, &b, &c);
     let noise = sigmas.iter().map(|(_, of)| *of).collect();
-    Ok(Some(judged(problem, params, &spread, noise)))
+    Ok(judged(problem, params, &spread, noise))
 }
 
-/// A and B by central differences along each coordinate; `None` where it was cancelled.
+/// A and B by central differences along each coordinate.
 fn curvature(
-    (problem, config): (&Arc<Problem>, &FitConfig),
-    (initial, params): (&Pppr, &Pppr),
+    (state, seen): (&ExploredState, &Arc<Problem>),
     size: usize,
-    progress: &Progress,
-) -> Option<[DMatrix<f64>; 2]> {
-    let columns: Vec<Option<[Vec<f64>; 2]>> = (0..size)
-        .into_par_iter()
-        .map_init(
-            || Objective::new(Arc::clone(problem), *config, Precision::F32, initial).ok(),
-            |objective, column| {
-                progress.check().ok()?;
-                let (objective, step) = (objective.as_mut()?, STEP_M);
-                let at = |by: f64, objective: &mut Objective| {
-                    let mut moved = params.clone();
-                    moved.group_mut(Group::Position)[column] += by;
-                    gradients(objective, config, &moved)
-                };
-                let (more, less) = (at(step, objective), at(-step, objective));
-                progress.advance(1);
-                Some(std::array::from_fn(|k| {
-                    more[k].iter().zip(&less[k]).map(|(a, b)| (a - b) / (2.0 * step)).collect()
-                }))
-            },
-        )
-        .collect();
-    let columns = columns.into_iter().collect::<Option<Vec<_>>>()?;
+    (cores, progress): (&IdleCores, &Progress),
+) -> Result<[DMatrix<f64>; 2], Halt> {
+    let mut columns: Vec<[Vec<f64>; 2]> = vec![Default::default(); size];
+    let difference = |objective: &mut Result<Objective, Halt>, column: usize, _: &super::cores::Hand<'_>| {
+        let objective = objective.as_mut().map_err(|halt| halt.clone())?;
+        let mut at = |by: f64| {
+            let mut moved = state.params.clone();
+            moved.group_mut(Group::Position)[column] += by;
+            gradients(objective, &state.config, &moved)
+        };
+        let (more, less) = (at(STEP_M), at(-STEP_M));
+        progress.advance(1);
+        let slope = |k: usize| more[k].iter().zip(&less[k]).map(|(a, b)| (a - b) / (2.0 * STEP_M)).collect();
+        Ok::<[Vec<f64>; 2], Halt>(std::array::from_fn(slope))
+    };
+    each((cores, progress), size, || state.objective(seen), difference, |k, column| columns[k] = column)?;
     let matrix = |which: usize| positive(&DMatrix::from_fn(size, size, |row, column| columns[column][which][row]));
-    Some([matrix(0), matrix(1)])
+    Ok([matrix(0), matrix(1)])
 }
 
 /// What curvature and noise make of each other.

@@ -39,12 +39,11 @@ impl ExploredState {
 
     /// What the fit sees of the frame.
     pub(super) fn seen(&self) -> Result<Arc<Problem>, Halt> {
-        without(&self.problem, &self.erased).map_err(|error| Halt::Failed(error.to_string()))
+        without(&self.problem, &self.erased).map_err(Halt::failed)
     }
 
     /// The loss of `seen`, with the EM region of the fit.
     pub(super) fn objective(&self, seen: &Arc<Problem>) -> Result<Objective, Halt> {
-        let objective = Objective::new(Arc::clone(seen), self.config, self.precision, &self.initial);
-        objective.map_err(|error| Halt::Failed(error.to_string()))
+        Objective::new(Arc::clone(seen), self.config, self.precision, &self.initial).map_err(Halt::failed)
     }
 }

@@ -16,6 +16,22 @@ pub enum Halt {
     Failed(String),
 }
 
+impl std::fmt::Display for Halt {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Cancelled => write!(out, "cancelled"),
+            Self::Failed(why) => write!(out, "{why}"),
+        }
+    }
+}
+
+impl Halt {
+    /// Something that cannot be done, with its reason.
+    pub(super) fn failed(why: impl std::fmt::Display) -> Self {
+        Self::Failed(why.to_string())
+    }
+}
+
 impl From<Cancelled> for Halt {
     fn from(_: Cancelled) -> Self {
         Self::Cancelled

@@ -1,9 +1,9 @@
 //! Which τ? The IoU of a state at every τ, without a refit, and the points that are kept of the maps at one.
 
-use crate::body::Pppr;
-use crate::config::FitConfig;
-use crate::mhp::{Masks, Problem, percentile};
+use super::{ExploredState, Halt, IdleCores};
+use crate::mhp::{Masks, erased_marks, percentile};
 use crate::representation::{CloudPoint, detected_cells, point_cloud};
+use crate::task::Progress;
 
 /// The least and the greatest τ, and the step between two, %.
 const TAU: [f64; 3] = [0.5, 60.0, 0.5];
@@ -117,15 +117,17 @@ pub struct TauClouds {
 /// Points that are placed of each view at most, the strongest first.
 const MOST_POINTS: usize = 400;
 
-/// The points that CFAR and a threshold at `tau_pct` keep of H_ori, and those of H_sim. What a map leaves open of a place is that of
-/// the joints that make the cell ([`point_cloud`]).
+/// The points that CFAR and a threshold at τ keep of H_ori, and those of H_sim. What a map leaves open of a place is that of the
+/// joints that make the cell ([`point_cloud`]). No point of H_ori is where cells are erased.
+///
+/// # Errors
+/// Where it was cancelled.
 pub fn tau_clouds(
-    problem: &Problem,
-    config: &FitConfig,
-    params: &Pppr,
-    h_sim: &[Vec<f64>],
-    masks: &[Masks],
-) -> TauClouds {
+    state: &ExploredState,
+    (h_sim, masks): (&[Vec<f64>], &[Masks]),
+    (cores, progress): (&IdleCores, &Progress),
+) -> Result<TauClouds, Halt> {
+    let ExploredState { problem, config, params, .. } = state;
     let ori: Vec<Vec<f64>> = (0..problem.views.len()).map(|view| problem.map(view).to_vec()).collect();
     let above = |(map, masks): (&Vec<f64>, &Masks)| -> Vec<usize> {
         let inside: Vec<f64> = map.iter().zip(&masks.inside).filter(|(_, inside)| **inside).map(|(x, _)| *x).collect();
@@ -137,12 +139,21 @@ pub fn tau_clouds(
         cells
     };
     let thresholded: Vec<Vec<usize>> = ori.iter().zip(masks).map(above).collect();
-    let cloud = |maps: &[Vec<f64>], cells: &[Vec<usize>]| point_cloud(problem, config, params, maps, cells);
-    TauClouds {
-        cfar: cloud(&ori, &detected_cells(problem, &ori, MOST_POINTS)),
-        threshold: cloud(&ori, &thresholded),
-        pppr: cloud(h_sim, &detected_cells(problem, h_sim, MOST_POINTS)),
+    let mut detected = detected_cells(problem, &ori, MOST_POINTS);
+    if !state.erased.is_empty() {
+        for (cells, marks) in detected.iter_mut().zip(erased_marks(&problem.views, &state.erased)) {
+            cells.retain(|&cell| marks.get(cell) != Some(&true));
+        }
     }
+    let cloud = |maps: &[Vec<f64>], cells: &[Vec<usize>]| -> Result<Vec<CloudPoint>, Halt> {
+        cores.make_way(0, progress)?;
+        Ok(point_cloud(problem, config, params, maps, cells))
+    };
+    Ok(TauClouds {
+        cfar: cloud(&ori, &detected)?,
+        threshold: cloud(&ori, &thresholded)?,
+        pppr: cloud(h_sim, &detected_cells(problem, h_sim, MOST_POINTS))?,
+    })
 }
 
 #[cfg(test)]

@@ -2,11 +2,10 @@
 
 use super::echo_radar::fft_of;
 use super::observe::{Noise, Observability, noisy_problem, observability};
-use crate::body::Pppr;
-use crate::config::FitConfig;
+use super::{ExploredState, Halt, IdleCores};
 use crate::dataset::{DatasetInfo, FftText, RadarPreset};
 use crate::geometry::{Mat3, Pose, Vec3, mat_mul, mat_vec};
-use crate::mhp::{FitError, Precision, Problem, simulate};
+use crate::mhp::{Precision, Problem, simulate};
 use crate::radar::{FftSetup, RadarConfig, View, ViewFft, Window};
 use crate::task::Progress;
 use serde::{Deserialize, Serialize};
@@ -140,20 +139,19 @@ impl RadarChange {
 /// The noise floor of measured maps, dB below their largest cell: what today's radar has where nothing else is asked.
 const USUAL_SNR_DB: f64 = 40.0;
 
-/// What today's radar and another see of the pose `params`, and what each would know of it. Both are asked of their own H_sim, with
-/// the noise that is asked for on it, so that nothing but the radar differs.
+/// What today's radar and another see of the pose of a state, and what each would know of it. Both are asked of their own H_sim, with
+/// the noise that is asked for on it and without the cells that are erased, so that nothing but the radar differs.
 ///
 /// # Errors
-/// As [`Problem::new`]; `Ok(None)` where it was cancelled.
+/// As [`Problem::new`], or where it was cancelled.
 pub fn what_if(
-    (info, problem): (&DatasetInfo, &Arc<Problem>),
-    config: &FitConfig,
-    (initial, params): (&Pppr, &Pppr),
+    info: &DatasetInfo,
+    state: &ExploredState,
     changes: &[RadarChange],
-    progress: &Progress,
-) -> Result<Option<WhatIf>, FitError> {
-    let ffts = info.ffts();
-    let seen = |changes: &[RadarChange]| -> Result<Option<Seen>, FitError> {
+    (cores, progress): (&IdleCores, &Progress),
+) -> Result<WhatIf, Halt> {
+    let (ffts, problem) = (info.ffts(), &state.problem);
+    let seen = |changes: &[RadarChange]| -> Result<Seen, Halt> {
         let change = |k: usize| changes.get(k).copied().unwrap_or_default();
         let views: Vec<View> = problem
             .views
@@ -164,9 +162,9 @@ pub fn what_if(
         let empty: Vec<Vec<f64>> = views.iter().map(|view| vec![1.0; view.cells()]).collect();
         let of = |maps: &[Vec<f64>]| {
             let slices: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
-            Problem::new(problem.radar.clone(), problem.skeleton.clone(), views.clone(), &slices)
+            Problem::new(problem.radar.clone(), problem.skeleton.clone(), views.clone(), &slices).map_err(Halt::failed)
         };
-        let clean = simulate(&of(&empty)?, config, Precision::F32, params);
+        let clean = simulate(&of(&empty)?, &state.config, Precision::F32, &state.params);
         // One number for all views: the least that is asked.
         let snr = (0..views.len()).map(|k| match change(k).noise() {
             Noise::SnrDb(snr) => snr,
@@ -177,14 +175,15 @@ pub fn what_if(
             .iter()
             .map(|map| map.iter().copied().fold(0.0, f64::max) * 10f64.powf(-snr / 20.0) / 2f64.sqrt())
             .collect();
-        let noisy = Arc::new(noisy_problem(&of(&clean)?, &sigmas, 0x51EE)?);
-        let known = observability(&noisy, config, (initial, params), Noise::SnrDb(snr), progress)?;
+        let noisy = Arc::new(noisy_problem(&of(&clean)?, &sigmas, 0x51EE).map_err(Halt::failed)?);
         let maps = (0..views.len()).map(|k| noisy.map(k).to_vec()).collect();
-        Ok(known.map(|known| Seen { views, maps, known }))
+        let state = ExploredState { problem: noisy, ..state.clone() };
+        let known = observability(&state, Noise::SnrDb(snr), (cores, progress))?;
+        Ok(Seen { views, maps, known })
     };
-    let Some(today) = seen(&[])? else { return Ok(None) };
-    let other = if changes.iter().all(RadarChange::is_nothing) { Some(today.clone()) } else { seen(changes)? };
-    Ok(other.map(|other| WhatIf { today, other }))
+    let today = seen(&[])?;
+    let other = if changes.iter().all(RadarChange::is_nothing) { today.clone() } else { seen(changes)? };
+    Ok(WhatIf { today, other })
 }
 
 /// The radar of a data set with these changes, as a preset that manifests can name: the chirp of the first view, the line of each.

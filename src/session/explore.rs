@@ -3,7 +3,9 @@
 use super::work::Work;
 use crate::body::Pppr;
 use crate::config::FitConfig;
-use crate::explore::{AmbiguityMap, Exploration, ExplorationKind, Explored, LossSlice, RestartCloud, TuningMap};
+use crate::explore::{
+    AmbiguityMap, Exploration, ExplorationKind, Explored, IdleCores, LossSlice, RestartCloud, TuningMap,
+};
 use crate::mhp::ErasedCells;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -28,6 +30,8 @@ pub struct ExplorationState {
 /// All of them.
 #[derive(Debug, Default)]
 pub struct Explorations {
+    /// The cores that they share, and what panes ask of the state on screen with them.
+    pub cores: IdleCores,
     states: BTreeMap<ExplorationKind, ExplorationState>,
     pub(super) requests: u64,
 }

@@ -4,7 +4,9 @@
 use crate::blob;
 use mhp_inspector::config::FitConfig;
 use mhp_inspector::dataset::Dataset;
-use mhp_inspector::explore::{Noise, observability, tau_ribbon};
+use mhp_inspector::explore::{
+    ExploredState, IdleCores, Noise, RadarChange, leave_one_out, observability, tau_ribbon, what_if,
+};
 use mhp_inspector::mhp::{ErasedCells, JointReturns, Objective, Precision, masks, simulate};
 use mhp_inspector::start::problem_of;
 use mhp_inspector::study::{BatchOptions, FrameFit, fit_frame, read_erased, write_erased};
@@ -124,8 +126,15 @@ fn explorations_tell_the_librarys_numbers() {
     assert!((told["iou"].as_f64().unwrap() - at_tau).abs() < 1e-12);
 
     let told = json(&[&["explore", "known", "--frames", "0", "--json"], &STATE[..]].concat(), folder.path());
-    let known = observability(&problem, &config, (&fit.initial, &fit.params), Noise::Measured, &Progress::new());
-    let known = known.unwrap().unwrap();
+    let state = ExploredState {
+        problem: Arc::clone(&problem),
+        erased: Arc::default(),
+        config,
+        precision: Precision::F32,
+        initial: fit.initial.clone(),
+        params: fit.params.clone(),
+    };
+    let known = observability(&state, Noise::Measured, (&IdleCores::all(), &Progress::new())).unwrap();
     assert_eq!(told["frames"][0]["refit_spread_mm"].as_f64().unwrap(), known.spread_mm[0]);
     assert_eq!(told["frames"][0]["least_observable"][0]["name"], known.unseen[0].name.as_str());
 
@@ -142,6 +151,87 @@ fn explorations_tell_the_librarys_numbers() {
         "{told}"
     );
     assert_eq!(told["radar_assumed"].as_array().unwrap().len(), 2);
+}
+
+/// What is erased is seen by no exploration: each tells the library's numbers of the state without the cells, others than with them,
+/// and a tuning map is the sweep without them, row by row.
+#[test]
+fn explorations_do_without_erased_cells() {
+    let (folder, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    blob::write_dataset(folder.path(), 3);
+    let (dataset, config, _) = fitted(folder.path());
+    let file = elsewhere.path().join("erased.json");
+    let cells = ErasedCells { view: 0, bins: vec![[18, 30], [10, 20]], cells: Vec::new() };
+    write_erased(&file, &dataset.info().views, std::slice::from_ref(&cells)).unwrap();
+    let erase = ["--erase", file.to_str().unwrap()];
+    let options = BatchOptions { config, erased: vec![cells.clone()], ..BatchOptions::default() };
+    let fit = fit_frame(&dataset, 0, &options, None).unwrap();
+    let problem = Arc::new(problem_of(&dataset, &dataset.load(0).unwrap()).unwrap());
+    let state = ExploredState {
+        problem,
+        erased: [cells].into(),
+        config,
+        precision: Precision::F32,
+        initial: fit.initial,
+        params: fit.params,
+    };
+    let cores = IdleCores::all();
+    let both = |what: &[&str]| {
+        let with = json(&[what, &STATE[..], &["--json"]].concat(), folder.path());
+        (json(&[what, &STATE[..], &["--json"], &erase[..]].concat(), folder.path()), with)
+    };
+
+    let known = observability(&state, Noise::Measured, (&cores, &Progress::new())).unwrap();
+    let (told, with) = both(&["explore", "known", "--frames", "0"]);
+    let spread = |told: &Value| told["frames"][0]["refit_spread_mm"].as_f64().unwrap();
+    assert_eq!(spread(&told), known.spread_mm[0]);
+    assert_ne!(spread(&told), spread(&with));
+
+    let worth = leave_one_out(&state, (&cores, &Progress::new())).unwrap();
+    let (told, with) = both(&["explore", "cell"]);
+    assert_eq!(told["iou"].as_f64(), worth.iou);
+    assert_ne!(told["iou"], with["iou"]);
+
+    let change = RadarChange { elements: Some(128), ..RadarChange::default() };
+    let found = what_if(dataset.info(), &state, &[change; 2], (&cores, &Progress::new())).unwrap();
+    let (told, with) = both(&["explore", "radar", "--elements", "128"]);
+    let spread = |told: &Value, of: &str| told[of]["refit_spread_mm"].as_f64().unwrap();
+    assert_eq!(spread(&told, "other"), found.other.known.spread_mm[0]);
+    assert_ne!(spread(&told, "today"), spread(&with, "today"));
+
+    let (told, with) = both(&["explore", "tau"]);
+    assert_ne!(told["iou_at"], with["iou_at"]);
+    for what in ["ambiguity", "restarts", "landscape"] {
+        let (told, with) = both(&["explore", what]);
+        assert_ne!(told, with, "{what}");
+    }
+
+    let axes = ["--grid", "w_em=0.1,1", "--grid", "tau_pct=5,20"];
+    let out = |name: &str| elsewhere.path().join(name).to_str().unwrap().to_owned();
+    let (map, swept, all) = (out("map"), out("swept"), out("all"));
+    let run_of = |head: &[&str], out: &str, erase: &[&str]| {
+        let output =
+            run(&[head, &axes[..], &STATE[..], &["--frames", "0", "--out", out], erase].concat(), folder.path());
+        assert!(output.status.success(), "{}", said(&output));
+    };
+    run_of(&["explore", "tuning"], &map, &erase);
+    run_of(&["study", "sweep"], &swept, &erase);
+    run_of(&["study", "sweep"], &all, &[]);
+    let rows = |folder: &str| -> Vec<String> {
+        let mut reader = csv::Reader::from_path(Path::new(folder).join("rows.csv")).unwrap();
+        let loss = reader.headers().unwrap().iter().position(|head| head == "loss").unwrap();
+        reader.records().map(|row| row.unwrap()[loss].to_owned()).collect()
+    };
+    assert_eq!(rows(&map).len(), 4);
+    assert_eq!(rows(&map), rows(&swept));
+    assert!(rows(&swept).iter().zip(rows(&all)).all(|(a, b)| *a != b));
+    // A folder of the run that sees the cells is not gone on with.
+    let output = run(
+        &[&["study", "sweep"], &axes[..], &STATE[..], &["--frames", "0", "--out", &all], &erase[..]].concat(),
+        folder.path(),
+    );
+    assert_eq!(output.status.code(), Some(2));
+    assert!(said(&output).contains("erased cells"), "{}", said(&output));
 }
 
 /// What a radar would be is kept under a name, listed, and is the radar of a data set whose manifest names it.

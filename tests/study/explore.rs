@@ -4,7 +4,7 @@
 use mhp_inspector::body::{Group, Pppr};
 use mhp_inspector::config::{BodyModel, EmLoss, FitConfig, Parameterization, Preset, Summation};
 use mhp_inspector::dataset::Dataset;
-use mhp_inspector::explore::{Noise, observability};
+use mhp_inspector::explore::{ExploredState, IdleCores, Noise, observability};
 use mhp_inspector::mhp::{Fitter, Precision, Problem, simulate};
 use mhp_inspector::radar::Quantity;
 use mhp_inspector::start::problem_alone;
@@ -111,8 +111,15 @@ fn the_spread_that_is_told_is_that_of_refits() {
         .collect();
     let measured_mm = 1000.0 * (spread.iter().sum::<f64>() / (size / 3) as f64).sqrt();
 
-    let known = observability(&noisy(0), &still, (&params, &begin), Noise::SnrDb(SNR_DB), &Progress::new());
-    let known = known.unwrap().unwrap();
+    let state = ExploredState {
+        problem: noisy(0),
+        erased: Arc::default(),
+        config: still,
+        precision: Precision::F32,
+        initial: params.clone(),
+        params: begin.clone(),
+    };
+    let known = observability(&state, Noise::SnrDb(SNR_DB), (&IdleCores::all(), &Progress::new())).unwrap();
     let told_mm = known.spread_mm[0];
     println!("refits spread {measured_mm:.2} mm, told {told_mm:.2} mm, ratio {:.2}", told_mm / measured_mm);
     assert!(told_mm < 2.0 * measured_mm && measured_mm < 2.0 * told_mm, "{told_mm} mm told, {measured_mm} mm measured");

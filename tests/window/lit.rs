@@ -4,7 +4,7 @@
 use crate::window::Window;
 use egui::{Key, pos2};
 use egui_kittest::kittest::Queryable as _;
-use mhp_inspector::explore::leave_one_out;
+use mhp_inspector::explore::{IdleCores, leave_one_out};
 use mhp_inspector::mhp::{JointReturns, KeptJoints};
 use mhp_inspector::session::{Command, Isolate};
 use mhp_inspector::task::Progress;
@@ -33,8 +33,8 @@ fn the_joints_that_light_a_cell_are_told() {
     assert!(window.named("Phasor diagram") == returns.is_coherent());
     // The worth of every joint, as the library has it.
     window.until("the joints left out", |w| w.says("its drop without a joint"));
-    let initial = window.fit().initial.clone().unwrap();
-    let worth = leave_one_out(&problem, &shown.config, (&initial, &shown.params), &Progress::new()).unwrap().unwrap();
+    let state = window.session().explored_state().unwrap();
+    let worth = leave_one_out(&state, (&IdleCores::all(), &Progress::new())).unwrap();
     let best = worth.joints[0];
     let name = format!("Joint {}", problem.skeleton.shown_name(best.joint));
     let told = format!("IoU {:+.4} without it", -best.drop);

@@ -4,7 +4,7 @@
 use crate::window::Window;
 use egui::{Key, Modifiers, pos2};
 use egui_kittest::kittest::Queryable as _;
-use mhp_inspector::explore::{Noise, observability, tau_ribbon};
+use mhp_inspector::explore::{IdleCores, Noise, observability, tau_ribbon};
 use mhp_inspector::task::Progress;
 
 #[test]
@@ -12,10 +12,8 @@ fn what_the_radar_knows_is_told_as_the_library_has_it() {
     let mut window = Window::fitted(1);
     window.show("Radar knows");
     window.until("the matrix", |w| w.says("Least observable, widest first"));
-    let (fit, shown) = (window.fit().clone(), window.fit().shown.clone().unwrap());
-    let (problem, initial) = (fit.problem.unwrap(), fit.initial.unwrap());
-    let known = observability(&problem, &shown.config, (&initial, &shown.params), Noise::Measured, &Progress::new());
-    let known = known.unwrap().unwrap();
+    let state = window.session().explored_state().unwrap();
+    let known = observability(&state, Noise::Measured, (&IdleCores::all(), &Progress::new())).unwrap();
     assert!(window.says(&format!("{:.1} of {:.0}", known.fixed[0], known.fixed[1])), "{:?}", window.names());
     let second = format!("Direction {}", known.unseen[1].name);
     let row = window.harness.query_all_by_label(&second).last().unwrap();

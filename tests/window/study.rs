@@ -41,6 +41,7 @@ fn run_with(dataset: &Dataset, out: &Path, study: StudyKind, grid: &[&str], base
         grid: grid.iter().map(|axis| axis.parse().unwrap()).collect(),
         iterations: Some(2),
         shard: None,
+        erased: Arc::default(),
     };
     let complexity = RunPlan::needs_strata(&request)
         .then(|| compute(dataset, &ComplexityOptions::default(), None, &Progress::new()).unwrap());

@@ -1,7 +1,7 @@
 //! What a pane asks of the state on screen and a thread answers: the newest question wins, and none is asked while a run goes on or
 //! something is dragged.
 
-use crate::mhp::FitError;
+use crate::explore::{Halt, IdleCores};
 use crate::session::Session;
 use crate::task::{Job, Progress};
 use crate::worker::Snapshot;
@@ -18,8 +18,8 @@ impl<K: PartialEq> PartialEq for Question<K> {
     }
 }
 
-/// A thread at work on a question; nothing where it was cancelled.
-type Asked<K, T> = (Question<K>, Job<Option<T>, String>);
+/// A thread at work on a question.
+type Asked<K, T> = (Question<K>, Job<T, Halt>);
 
 /// The last answer, and what is under way.
 pub(super) struct Answered<K, T: Send + 'static> {
@@ -52,12 +52,12 @@ impl<K: Clone + PartialEq, T: Send + 'static> Answered<K, T> {
     /// Takes an answer that came; whether one did.
     pub(super) fn poll(&mut self) -> bool {
         let Some(answer) = self.job.as_mut().and_then(|(_, job)| job.poll()) else { return false };
-        let answer = answer.and_then(|found| found.ok_or_else(|| "cancelled".to_owned()));
-        self.known = self.job.take().map(|(of, _)| (of, answer));
+        self.known = self.job.take().map(|(of, _)| (of, answer.map_err(|halt| halt.to_string())));
         true
     }
 
-    /// Asks for the state on screen with `with`, where that was not asked yet: `work` makes what a thread called `name` does.
+    /// Asks for the state on screen with `with`, where that was not asked yet: `work` makes what a thread called `name` does on
+    /// idle cores.
     pub(super) fn ask<W>(
         &mut self,
         (ui, session): (&Ui, &Session),
@@ -65,7 +65,7 @@ impl<K: Clone + PartialEq, T: Send + 'static> Answered<K, T> {
         name: &str,
         work: impl FnOnce(&Snapshot) -> Option<W>,
     ) where
-        W: FnOnce(&Progress) -> Result<Option<T>, FitError> + Send + 'static,
+        W: FnOnce((&IdleCores, &Progress)) -> Result<T, Halt> + Send + 'static,
     {
         let Some(shown) = &session.fit.shown else { return };
         let asked = Question(Arc::clone(shown), with);
@@ -75,9 +75,9 @@ impl<K: Clone + PartialEq, T: Send + 'static> Answered<K, T> {
             return;
         }
         let Some(work) = work(shown) else { return };
-        let (work, ctx) =
-            (move |progress: &Progress| work(progress).map_err(|error| error.to_string()), ui.ctx().clone());
+        let (cores, ctx) = (session.explore.cores.clone(), ui.ctx().clone());
+        let work = move |progress: &Progress| work((&cores, progress));
         // An older one is dropped, which cancels it.
-        self.job = Some((asked, Job::start(name, work, |why| why, move || ctx.request_repaint())));
+        self.job = Some((asked, Job::start(name, work, Halt::Failed, move || ctx.request_repaint())));
     }
 }

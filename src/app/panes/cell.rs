@@ -9,12 +9,11 @@ use crate::app::figure;
 use crate::app::map_image::Orientation;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::Mark;
-use crate::explore::{LeaveOneOut, leave_one_out};
+use crate::explore::{IdleCores, LeaveOneOut, leave_one_out};
 use crate::mhp::JointReturn;
 use crate::session::{Command, Session};
 use crate::task::Progress;
 use egui::{Align2, Color32, FontId, Rect, RichText, Role, Sense, Stroke, Ui, pos2, vec2};
-use std::sync::Arc;
 
 /// The pane.
 pub(super) static PANE: Pane = Pane {
@@ -81,10 +80,9 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
 /// Asks for the worth of the joints of a state that rests.
 fn follow(ui: &Ui, session: &Session, state: &mut State) {
     state.worth.poll();
-    state.worth.ask((ui, session), (), "leave-one-out", |shown| {
-        let (problem, initial) = (Arc::clone(session.fit.problem.as_ref()?), session.fit.region_pose()?.clone());
-        let (config, params) = (shown.config, shown.params.clone());
-        Some(move |progress: &Progress| leave_one_out(&problem, &config, (&initial, &params), progress))
+    state.worth.ask((ui, session), (), "leave-one-out", |_| {
+        let state = session.explored_state().ok()?;
+        Some(move |with: (&IdleCores, &Progress)| leave_one_out(&state, with))
     });
 }
 

@@ -8,7 +8,7 @@ use crate::app::figure;
 use crate::app::map_image::{Orientation, colorize};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Mark, Named as _, value_row};
-use crate::explore::{ClosureRequest, ClosureTest, closure_test};
+use crate::explore::{ClosureRequest, ClosureTest, Halt, closure_test};
 use crate::session::{CubeView, Session};
 use crate::task::Job;
 use crate::worker::Snapshot;
@@ -59,7 +59,7 @@ impl Default for Choice {
 }
 
 /// The test of a state that is under way.
-type Asked = (Arc<Snapshot>, Job<Option<ClosureTest>, String>);
+type Asked = (Arc<Snapshot>, Job<ClosureTest, Halt>);
 /// What came of one.
 type Tested = (Arc<Snapshot>, Result<Arc<ClosureTest>, String>);
 
@@ -105,8 +105,7 @@ fn toolbar(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     if let Some((of, job)) = &mut state.job
         && let Some(answer) = job.poll()
     {
-        let answer = answer.and_then(|test| test.ok_or_else(|| "cancelled".to_owned())).map(Arc::new);
-        state.test = Some((Arc::clone(of), answer));
+        state.test = Some((Arc::clone(of), answer.map(Arc::new).map_err(|halt| halt.to_string())));
         state.pictures.clear();
         (state.job, state.drawn) = (None, None);
     }
@@ -157,9 +156,9 @@ fn begin(ui: &Ui, session: &Session, choice: Choice) -> Option<Asked> {
         noise: choice.noise,
         seed: choice.seed,
     };
-    let ctx = ui.ctx().clone();
-    let work = move |progress: &crate::task::Progress| closure_test(&request, progress);
-    Some((Arc::clone(shown), Job::start("closure-test", work, |why| why, move || ctx.request_repaint())))
+    let (cores, ctx) = (session.explore.cores.clone(), ui.ctx().clone());
+    let work = move |progress: &crate::task::Progress| closure_test(&request, (&cores, progress));
+    Some((Arc::clone(shown), Job::start("closure-test", work, Halt::Failed, move || ctx.request_repaint())))
 }
 
 fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {

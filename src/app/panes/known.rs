@@ -7,7 +7,7 @@ use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::figure;
 use crate::app::theme::Tokens;
 use crate::app::widgets::{Mark, Named as _, value_row};
-use crate::explore::{Noise, Observability, observability};
+use crate::explore::{IdleCores, Noise, Observability, observability};
 use crate::geometry::add;
 use crate::session::Session;
 use crate::task::Progress;
@@ -130,11 +130,9 @@ fn follow(ui: &Ui, session: &Session, state: &mut State) {
         state.drawn = None;
     }
     let snr_db = state.choice.snr_db;
-    state.known.ask((ui, session), snr_db, "observability", |shown| {
-        let (problem, initial) = (Arc::clone(session.fit.problem.as_ref()?), session.fit.region_pose()?.clone());
-        let (config, params) = (shown.config, shown.params.clone());
-        let noise = snr_db.map_or(Noise::Measured, Noise::SnrDb);
-        Some(move |progress: &Progress| observability(&problem, &config, (&initial, &params), noise, progress))
+    state.known.ask((ui, session), snr_db, "observability", |_| {
+        let (state, noise) = (session.explored_state().ok()?, snr_db.map_or(Noise::Measured, Noise::SnrDb));
+        Some(move |with: (&IdleCores, &Progress)| observability(&state, noise, with))
     });
 }
 

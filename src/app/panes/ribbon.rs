@@ -6,9 +6,9 @@ use super::{PaneState, Shared};
 use crate::app::theme::Tokens;
 use crate::app::widgets::Named as _;
 use crate::config::FitConfig;
-use crate::explore::{TauClouds, TauRibbon, tau_clouds, tau_ribbon};
+use crate::explore::{Halt, TauClouds, TauRibbon, tau_clouds, tau_ribbon};
 use crate::session::Session;
-use crate::task::Job;
+use crate::task::{Job, Progress};
 use crate::worker::Snapshot;
 use egui::{RichText, Role, Sense, Stroke, Ui, pos2, vec2};
 use std::sync::Arc;
@@ -20,14 +20,11 @@ pub(super) const NEIGHBOURS: [f64; 3] = [2.0 / 3.0, 1.0, 1.5];
 /// Height of the ribbon, points.
 const HEIGHT: f32 = 40.0;
 
-/// What a broken job says; it is told in the log.
-type Answer<T> = Result<T, String>;
-
 #[derive(Default)]
 pub(super) struct Ribbon {
-    job: Option<(Arc<Snapshot>, Job<TauRibbon, String>)>,
+    job: Option<(Arc<Snapshot>, Job<TauRibbon, Halt>)>,
     known: Option<(Arc<Snapshot>, TauRibbon)>,
-    clouds_job: Option<(CloudsOf, Job<TauClouds, String>)>,
+    clouds_job: Option<(CloudsOf, Job<TauClouds, Halt>)>,
     clouds: Option<(CloudsOf, Arc<TauClouds>)>,
     drawn: Option<(CloudsOf, bool, Arc<Extras>)>,
 }
@@ -48,15 +45,7 @@ impl PaneState for Ribbon {
     }
 }
 
-/// Of a thread that could not run nothing is told but that.
-fn broken(reason: String) -> String {
-    reason
-}
-
-fn take<K: Clone, T>(job: &mut Option<(K, Job<T, String>)>) -> Option<(K, Answer<T>)>
-where
-    T: Send + 'static,
-{
+fn take<K: Clone, T: Send + 'static>(job: &mut Option<(K, Job<T, Halt>)>) -> Option<(K, Result<T, Halt>)> {
     let (of, running) = job.as_mut()?;
     let answer = running.poll()?;
     let of = of.clone();
@@ -76,28 +65,30 @@ impl Ribbon {
             return;
         }
         let (of, problem, ctx) = (Arc::clone(shown), Arc::clone(problem), ui.ctx().clone());
-        let work = move |_: &crate::task::Progress| {
+        let work = move |_: &Progress| {
             let maps: Vec<(&[f64], &[f64])> =
                 of.h_sim.iter().enumerate().map(|(k, sim)| (problem.map(k), sim.as_slice())).collect();
             Ok(tau_ribbon(&maps, &of.masks))
         };
-        self.job = Some((Arc::clone(shown), Job::start("tau-ribbon", work, broken, move || ctx.request_repaint())));
+        self.job =
+            Some((Arc::clone(shown), Job::start("tau-ribbon", work, Halt::Failed, move || ctx.request_repaint())));
     }
 
     /// The points of the newest state at its τ, while they are asked for.
     fn follow_clouds(&mut self, ui: &Ui, session: &Session, tokens: &Tokens) {
-        let (Some(shown), Some(problem)) = (&session.fit.shown, &session.fit.problem) else { return };
+        let Some(shown) = &session.fit.shown else { return };
         if let Some((of, Ok(clouds))) = take(&mut self.clouds_job) {
             self.clouds = Some((of, Arc::new(clouds)));
         }
         let asked = CloudsOf(Arc::clone(shown), session.config.tau_pct);
         let there = self.clouds.as_ref().is_some_and(|(of, _)| *of == asked);
         if !there && self.clouds_job.is_none() {
-            let (of, problem, ctx) = (Arc::clone(shown), Arc::clone(problem), ui.ctx().clone());
-            let config = FitConfig { tau_pct: session.config.tau_pct, ..of.config };
-            let work =
-                move |_: &crate::task::Progress| Ok(tau_clouds(&problem, &config, &of.params, &of.h_sim, &of.masks));
-            self.clouds_job = Some((asked, Job::start("tau-clouds", work, broken, move || ctx.request_repaint())));
+            let Ok(mut state) = session.explored_state() else { return };
+            state.config.tau_pct = session.config.tau_pct;
+            let (of, cores, ctx) = (Arc::clone(shown), session.explore.cores.clone(), ui.ctx().clone());
+            let work = move |progress: &Progress| tau_clouds(&state, (&of.h_sim, &of.masks), (&cores, progress));
+            self.clouds_job =
+                Some((asked, Job::start("tau-clouds", work, Halt::Failed, move || ctx.request_repaint())));
         }
         let Some((of, clouds)) = &self.clouds else { return };
         let same = self.drawn.as_ref().is_some_and(|(known, dark, _)| known == of && *dark == tokens.dark);

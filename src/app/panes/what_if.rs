@@ -9,7 +9,7 @@ use crate::app::figure;
 use crate::app::map_image::{Orientation, colorize};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Mark, Named as _};
-use crate::explore::{RadarChange, Seen, WhatIf, preset_of, what_if};
+use crate::explore::{IdleCores, RadarChange, Seen, WhatIf, preset_of, what_if};
 use crate::radar::{View, ViewFft, Window};
 use crate::session::{BackgroundTask, Command, CubeView, Session};
 use crate::task::Progress;
@@ -194,14 +194,9 @@ fn follow(ui: &Ui, session: &Session, state: &mut State) {
         state.drawn = None;
     }
     let changes = state.changes.clone();
-    state.known.ask((ui, session), state.changes.clone(), "what-if", |shown| {
-        let (problem, initial) = (Arc::clone(session.fit.problem.as_ref()?), session.fit.region_pose()?.clone());
-        let info = session.data.dataset.as_ref()?.info().clone();
-        let (config, params) = (shown.config, shown.params.clone());
-        Some(move |progress: &Progress| {
-            let found = what_if((&info, &problem), &config, (&initial, &params), &changes, progress);
-            found.map(|found| found.map(Arc::new))
-        })
+    state.known.ask((ui, session), state.changes.clone(), "what-if", |_| {
+        let (of, info) = (session.explored_state().ok()?, session.data.dataset.as_ref()?.info().clone());
+        Some(move |with: (&IdleCores, &Progress)| what_if(&info, &of, &changes, with).map(Arc::new))
     });
 }
 

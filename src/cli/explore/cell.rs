@@ -1,8 +1,9 @@
 //! `explore cell`: who lit a cell, and what each joint is worth.
 
 use super::frame::StateArgs;
+use super::target::halted;
 use crate::cli::common::{print, print_json};
-use crate::explore::leave_one_out;
+use crate::explore::{IdleCores, leave_one_out};
 use crate::mhp::JointReturns;
 use crate::radar::{View, unravel};
 use crate::task::Progress;
@@ -47,13 +48,12 @@ pub(super) fn run(args: &CellArgs) -> anyhow::Result<ExitCode> {
     };
     let Some(view) = views.get(index) else { bail!("there is no map") };
     let state = args.state.state(&dataset, args.frame, &config)?;
-    let returns = JointReturns::new(&state.problem, &state.config, &state.params);
+    let returns = JointReturns::new(&state.of.problem, &state.of.config, &state.of.params);
     let (h_sim, _) = state.maps()?;
     let cell = chosen(args, view, &h_sim[index])?;
     let bins = unravel(cell, &view.shape());
     let at = returns.at(index, cell);
-    let worth = leave_one_out(&state.problem, &state.config, (&state.initial, &state.params), &Progress::new())?;
-    let worth = worth.context("cancelled")?;
+    let worth = leave_one_out(&state.of, (&IdleCores::all(), &Progress::new())).map_err(halted)?;
     let place: Vec<String> = view
         .axes
         .iter()
@@ -75,7 +75,7 @@ pub(super) fn run(args: &CellArgs) -> anyhow::Result<ExitCode> {
             .collect();
         let object = json!({
             "frame": state.frame.name, "view": view.array, "cell": bins.to_vec(), "place": place,
-            "h_ori": state.problem.map(index).get(cell), "h_sim": h_sim[index].get(cell), "coherent": returns.is_coherent(),
+            "h_ori": state.of.problem.map(index).get(cell), "h_sim": h_sim[index].get(cell), "coherent": returns.is_coherent(),
             "lit_by": lit, "iou": worth.iou, "without": worth_of,
         });
         print_json(&(serde_json::to_string_pretty(&object)? + "\n"))?;

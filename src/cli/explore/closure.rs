@@ -1,10 +1,11 @@
 //! `explore closure`: a pose before an independent radar, started and fitted as a new frame.
 
 use super::frame::StateArgs;
+use super::target::halted;
 use crate::body::Group;
 use crate::cli::common::{print, print_json};
 use crate::dataset::npz::{ArrayView, write};
-use crate::explore::{ClosureRequest, closure_test};
+use crate::explore::{ClosureRequest, IdleCores, closure_test};
 use crate::task::Progress;
 use anyhow::{Context as _, bail, ensure};
 use clap::Args;
@@ -47,7 +48,7 @@ pub(super) fn run(args: &ClosureArgs) -> anyhow::Result<ExitCode> {
         crate::cli::common::inputs(&dataset, &args.state.path, &[]).check_file(file)?;
     }
     let state = args.state.state(&dataset, args.frame, &config)?;
-    let mut pose = state.params.clone();
+    let mut pose = state.of.params.clone();
     if args.truth {
         let truth = state.frame.truth.as_ref().context("--truth: the frame has no joints in metres")?;
         if truth.joints.len() != pose.shape().total_joints() {
@@ -72,10 +73,10 @@ pub(super) fn run(args: &ClosureArgs) -> anyhow::Result<ExitCode> {
         noise: args.noise,
         seed: args.seed,
     };
-    let test = closure_test(&request, &Progress::new()).map_err(anyhow::Error::msg)?.context("cancelled")?;
+    let test = closure_test(&request, (&IdleCores::all(), &Progress::new())).map_err(halted)?;
     if let Some(file) = &args.out {
         let named: Vec<(String, Vec<usize>)> =
-            state.problem.views.iter().map(|view| (format!("syn_{}", view.array), view.shape())).collect();
+            state.of.problem.views.iter().map(|view| (format!("syn_{}", view.array), view.shape())).collect();
         let arrays: Vec<(&str, ArrayView<'_>)> = named
             .iter()
             .zip(&test.maps)

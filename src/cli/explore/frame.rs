@@ -1,10 +1,11 @@
 //! The state that is explored: a frame's fit, or given parameters.
 
 use crate::body::Pppr;
-use crate::cli::common::{PeopleArg, PrecisionArg, open, presets, settings};
+use crate::cli::common::{EraseArg, PeopleArg, PrecisionArg, open, presets, settings};
 use crate::config::{FitConfig, Preset};
 use crate::dataset::{Dataset, Frame, read_pppr};
-use crate::mhp::{Masks, Objective, Precision, Problem, masks, simulate};
+use crate::explore::ExploredState;
+use crate::mhp::{ErasedCells, Masks, Objective, Precision, Problem, masks, simulate, without};
 use crate::start::problem_of;
 use crate::study::{BatchOptions, fit_frame};
 use anyhow::Context as _;
@@ -34,19 +35,17 @@ pub(super) struct StateArgs {
     /// Explore these parameters (PPPR npz) instead of a fit.
     #[arg(long, value_name = "P.npz")]
     params: Option<PathBuf>,
+    #[command(flatten)]
+    erase: EraseArg,
     /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
     #[arg(long, value_name = "FILE")]
     manifest: Option<PathBuf>,
 }
 
-/// What is explored of one frame.
+/// A frame, and the state of its fit that is explored.
 pub(super) struct State {
     pub(super) frame: Frame,
-    pub(super) problem: Arc<Problem>,
-    pub(super) config: FitConfig,
-    /// The pose that fixes the EM region.
-    pub(super) initial: Pppr,
-    pub(super) params: Pppr,
+    pub(super) of: ExploredState,
 }
 
 impl StateArgs {
@@ -59,36 +58,61 @@ impl StateArgs {
         self.precision.into()
     }
 
-    /// The state of a frame.
-    pub(super) fn state(&self, dataset: &Dataset, index: usize, config: &FitConfig) -> anyhow::Result<State> {
-        let config = *config;
-        let in_file = || dataset.frame_path(index).display().to_string();
+    /// The cells that no fit sees.
+    pub(super) fn erased(&self, dataset: &Dataset) -> anyhow::Result<Arc<[ErasedCells]>> {
+        Ok(self.erase.read(dataset)?.into())
+    }
+
+    /// The frame as it was measured, and the parameters that were given for it.
+    pub(super) fn measured(
+        &self,
+        dataset: &Dataset,
+        index: usize,
+    ) -> anyhow::Result<(Frame, Arc<Problem>, Option<Pppr>)> {
         let frame = dataset.load(index)?;
+        let in_file = || dataset.frame_path(index).display().to_string();
         let problem = Arc::new(problem_of(dataset, &frame).with_context(in_file)?);
-        if let Some(file) = &self.params {
+        let given = |file: &PathBuf| -> anyhow::Result<Pppr> {
             let params = read_pppr(file, None)?;
             problem.check(&params).with_context(|| file.display().to_string())?;
-            return Ok(State { frame: frame.clone(), problem, config, initial: params.clone(), params });
-        }
-        let options = BatchOptions { config, precision: self.precision.into(), ..BatchOptions::default() };
-        let fit = fit_frame(dataset, index, &options, None).map_err(anyhow::Error::msg)?;
-        Ok(State { frame: frame.clone(), problem, config, initial: fit.initial, params: fit.params })
+            Ok(params)
+        };
+        let given = self.params.as_ref().map(given).transpose()?;
+        Ok((frame, problem, given))
+    }
+
+    /// The state of a frame.
+    pub(super) fn state(&self, dataset: &Dataset, index: usize, config: &FitConfig) -> anyhow::Result<State> {
+        let (erased, precision) = (self.erased(dataset)?, self.precision());
+        let (frame, problem, given) = self.measured(dataset, index)?;
+        let (initial, params) = match given {
+            Some(params) => (params.clone(), params),
+            None => {
+                let options =
+                    BatchOptions { config: *config, precision, erased: erased.to_vec(), ..BatchOptions::default() };
+                let fit = fit_frame(dataset, index, &options, None).map_err(anyhow::Error::msg)?;
+                (fit.initial, fit.params)
+            }
+        };
+        Ok(State { frame, of: ExploredState { problem, erased, config: *config, precision, initial, params } })
     }
 }
 
 impl State {
     /// H_sim of every view, as the window shows it, and the masks.
     pub(super) fn maps(&self) -> anyhow::Result<(Vec<Vec<f64>>, Vec<Masks>)> {
-        let objective = Objective::new(Arc::clone(&self.problem), self.config, Precision::F32, &self.initial)?;
-        let h_sim = simulate(&self.problem, &self.config, Precision::F32, &self.params);
+        let ExploredState { problem, erased, config, initial, params, .. } = &self.of;
+        let objective = Objective::new(without(problem, erased)?, *config, Precision::F32, initial)?;
+        let h_sim = simulate(problem, config, Precision::F32, params);
         let masks = h_sim.iter().enumerate().map(|(view, map)| masks(&objective, view, map)).collect();
         Ok((h_sim, masks))
     }
 
     /// What a joint is called; with its person where there are several.
     pub(super) fn name(&self, joint: usize) -> String {
-        let joints = self.problem.skeleton.joints.len().max(1);
-        let name = self.problem.skeleton.shown_name(joint % joints);
-        if self.params.shape().persons > 1 { format!("person {} {name}", joint / joints + 1) } else { name }
+        let skeleton = &self.of.problem.skeleton;
+        let joints = skeleton.joints.len().max(1);
+        let name = skeleton.shown_name(joint % joints);
+        if self.of.params.shape().persons > 1 { format!("person {} {name}", joint / joints + 1) } else { name }
     }
 }

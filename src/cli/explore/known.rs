@@ -1,12 +1,12 @@
 //! `explore known`: what the echo fixes of a pose, and what only the prior does.
 
 use super::frame::StateArgs;
+use super::target::halted;
 use crate::cli::common::{complain, print, print_json, progress_bar};
 use crate::cli::frames::{FrameRange, chosen};
 use crate::cli::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
-use crate::explore::{Noise, Observability, observability};
+use crate::explore::{IdleCores, Noise, Observability, observability};
 use crate::task::Progress;
-use anyhow::Context as _;
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -42,9 +42,7 @@ pub(super) fn run(args: &KnownArgs) -> anyhow::Result<ExitCode> {
     let count = frames.len();
     for index in frames {
         let told = args.state.state(&dataset, index, &config).and_then(|state| {
-            let of = (&state.initial, &state.params);
-            let known =
-                observability(&state.problem, &state.config, of, noise, &Progress::new())?.context("cancelled")?;
+            let known = observability(&state.of, noise, (&IdleCores::all(), &Progress::new())).map_err(halted)?;
             Ok((state.frame.name, known))
         });
         bar.inc(1);

@@ -1,9 +1,10 @@
 //! `explore radar`: what another radar would see and know of the same pose.
 
 use super::frame::StateArgs;
+use super::target::halted;
 use crate::cli::common::{complain, print, print_json};
 use crate::dataset::npz::{ArrayView, write};
-use crate::explore::{RadarChange, Seen, preset_of, what_if};
+use crate::explore::{IdleCores, RadarChange, Seen, preset_of, what_if};
 use crate::radar::Window;
 use crate::task::Progress;
 use anyhow::{Context as _, ensure};
@@ -83,9 +84,8 @@ pub(super) fn run(args: &RadarArgs) -> anyhow::Result<ExitCode> {
     };
     let changes: Vec<RadarChange> = views.iter().map(of_view).collect();
     let state = args.state.state(&dataset, args.frame, &config)?;
-    let of = (&state.initial, &state.params);
-    let found = what_if((dataset.info(), &state.problem), &state.config, of, &changes, &Progress::new())?;
-    let found = found.context("cancelled")?;
+    let with = (&IdleCores::all(), &Progress::new());
+    let found = what_if(dataset.info(), &state.of, &changes, with).map_err(halted)?;
     if let Some(file) = &args.out {
         let both = [("today", &found.today), ("other", &found.other)];
         let named: Vec<(String, Vec<usize>, &[f64])> = both

@@ -1,68 +1,48 @@
 //! What the explorations of one frame are told, and the fit that they explore.
 
+use super::frame::StateArgs;
 use crate::body::Pppr;
-use crate::cli::common::{PeopleArg, PrecisionArg, open, presets, settings};
-use crate::config::{FitConfig, Preset};
-use crate::dataset::{Dataset, Frame, read_pppr};
+use crate::config::FitConfig;
+use crate::dataset::{Dataset, Frame};
 use crate::explore::{ExploredState, Halt, IdleCores, RestartRequest, RestartSettings, restart_cloud};
 use crate::geometry::Vec3;
-use crate::mhp::{FitState, Fitter, Problem};
+use crate::mhp::{ErasedCells, FitState, Fitter, Precision, Problem, without};
 use crate::start::{find_start_in, problem_of};
 use crate::study::BatchOptions;
 use crate::task::Progress;
 use anyhow::Context as _;
 use clap::Args;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 /// What they are told.
 #[derive(Debug, Args)]
 pub(super) struct TargetArgs {
-    /// An MMVR tree or any folder inside one, a `*_radar.npz`, a folder with `dataset.toml`, or an `.npy`/`.npz` of maps.
-    pub(super) path: PathBuf,
+    #[command(flatten)]
+    state: StateArgs,
     /// The frame, counted from 0. Default: the first, or the one that PATH names.
     #[arg(long, value_name = "I")]
     frame: Option<usize>,
-    /// Settings with a name.
-    #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = presets())]
-    preset: Preset,
-    /// A fit configuration instead of a preset; keys that it lacks are those of `baseline`.
-    #[arg(long, value_name = "FIT.toml", conflicts_with = "preset")]
-    config: Option<PathBuf>,
-    #[command(flatten)]
-    people: PeopleArg,
-    /// Adam steps of the fit, instead of the configuration's.
-    #[arg(long, value_name = "N")]
-    iterations: Option<usize>,
-    /// PPPR npz of the body to explore, instead of the end of a fit.
-    #[arg(long, value_name = "P.npz", conflicts_with = "iterations")]
-    params: Option<PathBuf>,
-    /// Scalar of the per-cell kernel.
-    #[arg(long, value_enum, default_value = "f32")]
-    precision: PrecisionArg,
     /// Threads; default: one for each core. The result is the same with any number.
     #[arg(long, value_name = "N")]
     threads: Option<std::num::NonZeroUsize>,
     /// Everything as JSON instead of a summary.
     #[arg(long)]
     pub(super) json: bool,
-    /// A manifest (as `dataset.toml`) that says what PATH is, instead of its own or the preset.
-    #[arg(long, value_name = "FILE")]
-    manifest: Option<PathBuf>,
 }
 
 /// A frame with its fit.
 pub(super) struct Target {
     pub(super) frame: Frame,
     pub(super) problem: Arc<Problem>,
-    pub(super) config: FitConfig,
+    erased: Arc<[ErasedCells]>,
+    config: FitConfig,
     /// The start that was found, or the parameters that were given.
-    pub(super) initial: Pppr,
+    initial: Pppr,
     /// Every state of the fit; one, where parameters were given.
     pub(super) states: Vec<Arc<FitState>>,
     /// ∂L/∂Θ at the last.
     pub(super) gradient: Pppr,
-    precision: crate::mhp::Precision,
+    precision: Precision,
     pub(super) cores: IdleCores,
 }
 
@@ -72,30 +52,26 @@ impl TargetArgs {
     /// # Errors
     /// Where the data, the frame, the settings or the parameters are bad, or the frame cannot be fitted.
     pub(super) fn open(&self, fitted: bool) -> anyhow::Result<Target> {
-        let config = self.people.of(&settings(self.config.as_deref(), self.preset, self.iterations)?);
-        let dataset = open(&self.path, self.manifest.as_deref())?;
+        let (dataset, config) = self.state.open()?;
         let index = self.frame.or_else(|| dataset.named_frame()).unwrap_or(0);
         anyhow::ensure!(
             index < dataset.len(),
             "{}: frame {index} was asked for; expected 0 ..= {}",
-            self.path.display(),
+            self.state.path.display(),
             dataset.len().saturating_sub(1)
         );
-        let frame = dataset.load(index)?;
         let told = || dataset.frame_path(index).display().to_string();
-        let problem = Arc::new(problem_of(&dataset, &frame).with_context(told)?);
-        let initial = match &self.params {
-            Some(path) => {
-                let params = read_pppr(path, None)?;
-                problem.check(&params).with_context(|| path.display().to_string())?;
-                params
-            }
+        let (erased, precision) = (self.state.erased(&dataset)?, self.state.precision());
+        let (frame, problem, given) = self.state.measured(&dataset, index)?;
+        let fitted = fitted && given.is_none();
+        let initial = match given {
+            Some(params) => params,
             None => find_start_in(&dataset, index, &problem, &config).with_context(told)?.initialisation.params,
         };
-        let precision = self.precision.into();
-        let mut fitter = Fitter::new(Arc::clone(&problem), config, precision, initial.clone()).with_context(told)?;
+        let seen = without(&problem, &erased).with_context(told)?;
+        let mut fitter = Fitter::new(seen, config, precision, initial.clone()).with_context(told)?;
         let mut states = vec![fitter.state()];
-        if fitted && self.params.is_none() {
+        if fitted {
             while fitter.iteration() < config.iterations {
                 let report = fitter.step().with_context(told)?;
                 states.push(fitter.state());
@@ -106,7 +82,7 @@ impl TargetArgs {
         }
         let gradient = fitter.evaluation().gradient.clone();
         let cores = self.threads.map_or_else(IdleCores::all, |threads| IdleCores::of(threads.into()));
-        Ok(Target { frame, problem, config, initial, states, gradient, precision, cores })
+        Ok(Target { frame, problem, erased, config, initial, states, gradient, precision, cores })
     }
 }
 
@@ -120,7 +96,7 @@ impl Target {
     pub(super) fn state(&self, at_start: bool) -> ExploredState {
         ExploredState {
             problem: Arc::clone(&self.problem),
-            erased: Arc::default(),
+            erased: Arc::clone(&self.erased),
             config: self.config,
             precision: self.precision,
             initial: self.initial.clone(),

@@ -1,9 +1,11 @@
 //! `explore tau`: the agreement of the masks at every τ.
 
 use super::frame::StateArgs;
+use super::target::halted;
 use crate::cli::common::{print, print_json};
-use crate::explore::{tau_clouds, tau_ribbon};
+use crate::explore::{IdleCores, tau_clouds, tau_ribbon};
 use crate::output::{Inputs, replace_file};
+use crate::task::Progress;
 use anyhow::{Context as _, ensure};
 use clap::Args;
 use serde_json::json;
@@ -37,13 +39,14 @@ pub(super) fn run(args: &TauArgs) -> anyhow::Result<ExitCode> {
     let state = args.state.state(&dataset, args.frame, &config)?;
     let (h_sim, masks) = state.maps()?;
     let maps: Vec<(&[f64], &[f64])> =
-        h_sim.iter().enumerate().map(|(k, sim)| (state.problem.map(k), sim.as_slice())).collect();
+        h_sim.iter().enumerate().map(|(k, sim)| (state.of.problem.map(k), sim.as_slice())).collect();
     let ribbon = tau_ribbon(&maps, &masks);
-    let clouds = tau_clouds(&state.problem, &state.config, &state.params, &h_sim, &masks);
+    let with = (&IdleCores::all(), &Progress::new());
+    let clouds = tau_clouds(&state.of, (&h_sim, &masks), with).map_err(halted)?;
     let (best, telling) = (ribbon.best(), ribbon.most_telling());
     if let Some(file) = &args.csv {
         let mut csv = String::from("tau_pct,iou");
-        for view in &state.problem.views {
+        for view in &state.of.problem.views {
             let _ = write!(csv, ",iou_{}", view.array);
         }
         csv.push('\n');
@@ -57,7 +60,7 @@ pub(super) fn run(args: &TauArgs) -> anyhow::Result<ExitCode> {
         }
         replace_file(file, |out| out.write_all(csv.as_bytes())).with_context(|| file.display().to_string())?;
     }
-    let now = state.config.tau_pct;
+    let now = state.of.config.tau_pct;
     if args.json {
         let object = json!({
             "frame": state.frame.name, "tau_pct": now, "iou": ribbon.at(now),

@@ -1,6 +1,8 @@
 //! `explore tuning`: the tuning map as a table, JSON, or the run folder of a sweep.
 
-use crate::cli::common::{PeopleArg, PrecisionArg, complain, inputs, open, presets, print, print_json, settings};
+use crate::cli::common::{
+    EraseArg, PeopleArg, PrecisionArg, complain, inputs, open, presets, print, print_json, settings,
+};
 use crate::cli::frames::{FrameRange, chosen_set};
 use crate::cli::{EXIT_BAD_INPUT, EXIT_SOME_FAILED};
 use crate::config::Preset;
@@ -67,6 +69,8 @@ pub struct TuningArgs {
     /// Threads; default: one for each core. The result is the same with any number.
     #[arg(long, value_name = "N")]
     threads: Option<std::num::NonZeroUsize>,
+    #[command(flatten)]
+    erase: EraseArg,
     /// Keep the fits as the run folder that `study sweep` would write.
     #[arg(long, value_name = "RUN")]
     out: Option<PathBuf>,
@@ -96,7 +100,10 @@ pub(super) fn run(args: &TuningArgs) -> anyhow::Result<ExitCode> {
     let base = args.people.of(&settings(args.config.as_deref(), args.preset, args.iterations)?);
     let dataset = Arc::new(open(&args.path, args.manifest.as_deref())?);
     if let Some(out) = &args.out {
-        check_run_folder(out, &inputs(&dataset, &args.path, &[args.config.as_deref(), args.manifest.as_deref()]))?;
+        check_run_folder(
+            out,
+            &inputs(&dataset, &args.path, &[args.config.as_deref(), args.manifest.as_deref(), args.erase.file()]),
+        )?;
     }
     let frames = if args.frames.is_empty() {
         let first = dataset.named_frame().unwrap_or(0);
@@ -116,6 +123,7 @@ pub(super) fn run(args: &TuningArgs) -> anyhow::Result<ExitCode> {
         base,
         precision: args.precision.into(),
         grid,
+        erased: args.erase.read(&dataset)?.into(),
     };
     let cores = args.threads.map_or_else(IdleCores::all, |threads| IdleCores::of(threads.into()));
     let map = match tuning_map(&request, &cores, &Progress::new()) {
@@ -152,6 +160,7 @@ fn keep(
         grid: request.grid.clone(),
         iterations: None,
         shard: None,
+        erased: Arc::clone(&request.erased),
     };
     let plan = RunPlan::new(&request.dataset, &run, None)?;
     let folder = RunFolder::of_data(out, &request.dataset);

@@ -1,6 +1,6 @@
 //! One study: arguments to a plan, the plan to a run, the run to its table.
 
-use crate::cli::common::{CsvArgs, PrecisionArg, complain, inputs, open, presets, print, print_json};
+use crate::cli::common::{CsvArgs, EraseArg, PrecisionArg, complain, inputs, open, presets, print, print_json};
 use crate::cli::complexity::compute;
 use crate::cli::frames::{FrameRange, chosen_set};
 use crate::cli::labels::acts_of;
@@ -62,6 +62,8 @@ pub struct RunArgs {
     #[arg(long, value_name = "N")]
     threads: Option<std::num::NonZeroUsize>,
     #[command(flatten)]
+    erase: EraseArg,
+    #[command(flatten)]
     cells: CsvArgs,
     /// Print the table as JSON instead of Markdown.
     #[arg(long)]
@@ -101,7 +103,7 @@ pub(super) fn run(kind: StudyKind, args: &RunArgs, all: Option<bool>, grid: &[Gr
     args.cells.apply();
     let (base, base_name) = base(args)?;
     let dataset = Arc::new(open(&args.path, args.manifest.as_deref())?);
-    let named = [args.config.as_deref(), args.manifest.as_deref()];
+    let named = [args.config.as_deref(), args.manifest.as_deref(), args.erase.file()];
     check_run_folder(&args.out, &inputs(&dataset, &args.path, &named))?;
     let request = RunRequest {
         study: kind,
@@ -113,6 +115,7 @@ pub(super) fn run(kind: StudyKind, args: &RunArgs, all: Option<bool>, grid: &[Gr
         grid: grid.to_vec(),
         iterations: args.iterations,
         shard: args.shard,
+        erased: args.erase.read(&dataset)?.into(),
     };
     let complexity = RunPlan::needs_strata(&request)
         .then(|| compute(&dataset, ComplexityOptions::default(), cache_folder()))

@@ -14,7 +14,7 @@ use super::task::Showing;
 use super::{Halt, coarse};
 use crate::config::{Field, FitConfig, Value};
 use crate::dataset::Dataset;
-use crate::mhp::Precision;
+use crate::mhp::{ErasedCells, Precision};
 use crate::study::run::{FrameSweep, GridAxis, RunRow, SweptFit, Variant, failed_row, sweep};
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, OnceLock};
@@ -94,13 +94,15 @@ pub struct TuningRequest {
     pub precision: Precision,
     /// One or two axes, the first across.
     pub grid: Vec<GridAxis>,
+    /// Cells that no fit sees.
+    pub erased: Arc<[ErasedCells]>,
 }
 
 impl TuningRequest {
     /// Whether another one asks for the same fits.
     pub fn is_same(&self, other: &Self) -> bool {
         let of = |r: &Self| (r.dataset.id(), r.base, r.precision);
-        of(self) == of(other) && self.grid == other.grid && self.frames == other.frames
+        of(self) == of(other) && (&self.grid, &self.frames, &self.erased) == (&other.grid, &other.frames, &other.erased)
     }
 }
 
@@ -113,6 +115,8 @@ pub struct TuningMap {
     pub frames: Arc<[u32]>,
     /// The settings that the cells build on.
     pub base: FitConfig,
+    /// Cells that no fit saw.
+    pub erased: Arc<[ErasedCells]>,
     /// The settings of each point.
     pub variants: Arc<[Variant]>,
     /// A fit a point and frame: point · frames + place of the frame.
@@ -239,6 +243,7 @@ pub(super) fn explore(
         grid: request.grid.clone(),
         frames: Arc::clone(frames),
         base: request.base,
+        erased: Arc::clone(&request.erased),
         fits: vec![None; variants.len() * frames.len()],
         variants: variants.into(),
         stride: usize::MAX,
@@ -249,9 +254,9 @@ pub(super) fn explore(
         let index = frames[piece.frame] as usize;
         let mut own = None;
         let sweep = if kept {
-            sweeps[piece.frame].get_or_init(|| FrameSweep::read(dataset, index))
+            sweeps[piece.frame].get_or_init(|| FrameSweep::read(dataset, index, &request.erased))
         } else {
-            own.insert(FrameSweep::read(dataset, index))
+            own.insert(FrameSweep::read(dataset, index, &request.erased))
         };
         let fitted = piece.points.iter().map(|&point| match sweep {
             Ok(sweep) => {

@@ -37,8 +37,11 @@ impl Session {
         }
     }
 
-    /// The state on screen.
-    fn explored_state(&self) -> Result<ExploredState, String> {
+    /// The state on screen, as its fit sees it.
+    ///
+    /// # Errors
+    /// Why there is none, for a person.
+    pub fn explored_state(&self) -> Result<ExploredState, String> {
         let fit = &self.fit;
         let known = fit.problem.as_ref().zip(fit.shown.as_ref()).zip(fit.region_pose());
         let ((problem, shown), initial) = known.ok_or("there is no fit on screen")?;
@@ -173,7 +176,9 @@ impl Session {
         for field in axes.iter().filter_map(|axis| axis.field().ok()) {
             field.set(&mut base, field.default());
         }
-        Ok(TuningRequest { dataset, frames, base, precision: self.precision, grid })
+        // What was erased by hand is of the frame on screen.
+        let erased = if settings.frames == TunedFrames::Shown { self.fit.erased() } else { Arc::default() };
+        Ok(TuningRequest { dataset, frames, base, precision: self.precision, grid, erased })
     }
 
     /// Whether what was asked last of an exploration is what would be asked now.
@@ -303,6 +308,7 @@ impl Session {
         for effect in &mut effects {
             if let Effect::StartStudy(request) = effect {
                 let StudyRequest { run, known, .. } = request.as_mut();
+                run.erased = Arc::clone(&map.erased);
                 // Its rows are of these settings only as long as nothing else was set otherwise since.
                 let same = |mut config: crate::config::FitConfig| {
                     for axis in &map.grid {

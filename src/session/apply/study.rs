@@ -39,6 +39,7 @@ impl Session {
             grid: order.grid,
             iterations: None,
             shard: None,
+            erased: Arc::default(),
         };
         if let Err(error) = points(run.study, &run.base, &run.grid, dataset.info().layout.word()) {
             self.note(LogLevel::Error, error.to_string());

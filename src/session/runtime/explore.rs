@@ -19,21 +19,15 @@ struct Running {
     told: (u64, u64),
 }
 
-/// All that are under way, and the cores that they share.
+/// All that are under way.
 #[derive(Default)]
 pub(super) struct Explorer {
-    cores: IdleCores,
     running: BTreeMap<ExplorationKind, Running>,
 }
 
 impl Explorer {
-    /// Whether fits run that nothing must slow down.
-    pub(super) fn make_way(&self, fits: bool) {
-        self.cores.fit_runs(fits);
-    }
-
-    pub(super) fn start(&mut self, number: u64, what: Exploration, wake: &Wake) {
-        let (kind, cores, newest) = (what.kind(), self.cores.clone(), Newest::default());
+    pub(super) fn start(&mut self, number: u64, what: Exploration, cores: IdleCores, wake: &Wake) {
+        let (kind, newest) = (what.kind(), Newest::default());
         let (shown, waker, wake) = (Arc::clone(&newest), Arc::clone(wake), Arc::clone(wake));
         let look = move |found| {
             *shown.lock().unwrap_or_else(PoisonError::into_inner) = Some(found);

@@ -201,7 +201,7 @@ impl Runtime {
 
     fn carry_out(&mut self, effects: Vec<Effect>) {
         // Before the worker hears of a run: whoever explores makes way from its first step on.
-        self.explorer.make_way(self.session.needs_cores());
+        self.session.explore.cores.fit_runs(self.session.needs_cores());
         for effect in effects {
             self.carry_out_one(effect);
         }
@@ -293,7 +293,9 @@ impl Runtime {
                     study.cancel();
                 }
             }
-            Effect::Explore(number, what) => self.explorer.start(number, *what, &self.wake),
+            Effect::Explore(number, what) => {
+                self.explorer.start(number, *what, self.session.explore.cores.clone(), &self.wake);
+            }
             Effect::StopExploring(kind) => self.explorer.stop(kind),
             Effect::FindKept(dataset) => self.on_thread("kept-fits", move || {
                 let (kept, faults) = batch::kept(&dataset);

@@ -117,7 +117,7 @@ impl Engine<'_> {
         let missing: Vec<usize> = variants.iter().copied().filter(|&v| !self.done.contains(&(v, frame))).collect();
         let Some(&first) = missing.first() else { return Ok(()) };
         let started = panic_as_error(|| {
-            let loaded = LoadedFrame::read(self.dataset, frame)?;
+            let loaded = LoadedFrame::read(self.dataset, frame, &self.plan.spec.erased)?;
             let variant = &self.plan.spec.variants[first];
             let start = match variant.start {
                 StartFrom::Truth => loaded.truth_start(&variant.config)?,
@@ -225,7 +225,7 @@ impl Engine<'_> {
         let config = &spec.variants[variant].config;
         let mut init_ms = None;
         let answer = panic_as_error(|| {
-            let loaded = LoadedFrame::read(self.dataset, frame)?;
+            let loaded = LoadedFrame::read(self.dataset, frame, &self.plan.spec.erased)?;
             let start = before.map_or_else(|| loaded.cold(config), |before| Ok(loaded.warm(config, before)))?;
             init_ms = start.init_ms;
             let mut answers = loaded.fit(config, spec.precision, &start, &[config.iterations]);

@@ -9,7 +9,7 @@ use crate::config::{FitConfig, Parameterization};
 use crate::dataset::{Dataset, Frame};
 use crate::diagnose::{Reprojection, joint_errors, map_box_coverage, reprojection};
 use crate::geometry::Vec3;
-use crate::mhp::{Fitter, Precision, Problem, StopReason, predict};
+use crate::mhp::{ErasedCells, Fitter, Precision, Problem, StopReason, predict, without};
 use crate::start::{find_start_along, problem_of};
 use crate::study::row::annotated;
 use crate::task::milliseconds;
@@ -30,6 +30,8 @@ pub(super) struct LoadedFrame<'a> {
     dataset: &'a Dataset,
     frame: Frame,
     problem: Arc<Problem>,
+    /// What fits see of it: without the erased cells.
+    seen: Arc<Problem>,
 }
 
 /// A start, and how long it took to find.
@@ -50,14 +52,16 @@ pub(super) struct Stop {
 }
 
 impl<'a> LoadedFrame<'a> {
-    /// Reads frame `index`.
+    /// Reads frame `index`. No fit sees the cells that are `erased`; a start that is sought does.
     ///
     /// # Errors
     /// In one line that names the file.
-    pub(super) fn read(dataset: &'a Dataset, index: usize) -> Result<Self, String> {
+    pub(super) fn read(dataset: &'a Dataset, index: usize, erased: &[ErasedCells]) -> Result<Self, String> {
+        let told = |error: &dyn std::fmt::Display| format!("{}: {error}", dataset.frame_name(index));
         let frame = dataset.load(index).map_err(|error| portable(dataset, &error.to_string()))?;
-        let problem = problem_of(dataset, &frame).map_err(|error| format!("{}: {error}", dataset.frame_name(index)))?;
-        Ok(Self { dataset, frame, problem: Arc::new(problem) })
+        let problem = Arc::new(problem_of(dataset, &frame).map_err(|error| told(&error))?);
+        let seen = without(&problem, erased).map_err(|error| told(&error))?;
+        Ok(Self { dataset, frame, problem, seen })
     }
 
     /// A start from the frame's own peaks.
@@ -126,7 +130,7 @@ impl<'a> LoadedFrame<'a> {
         mut go_on: impl FnMut(&Fitter) -> bool,
     ) -> Vec<Result<Stop, String>> {
         let began = Instant::now();
-        let begun = Fitter::new(Arc::clone(&self.problem), *config, precision, start.params.clone());
+        let begun = Fitter::new(Arc::clone(&self.seen), *config, precision, start.params.clone());
         *fitter = begun.map_err(|error| self.told(&error));
         let mut ended = false;
         let mut answers = Vec::with_capacity(stops.len());

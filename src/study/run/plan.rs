@@ -9,11 +9,12 @@ use super::variant::{Method, StartFrom, Variant};
 use super::{RunError, StudyKind, counting, plans};
 use crate::config::FitConfig;
 use crate::dataset::Dataset;
-use crate::mhp::Precision;
+use crate::mhp::{ErasedCells, Precision};
 use crate::start::start_key;
 use crate::study::complexity::{Complexity, Stratum};
 use crate::study::shard::{DataSpec, FrameRanges, Shard, Subset};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// What is asked for.
 #[derive(Debug, Clone)]
@@ -36,6 +37,8 @@ pub struct RunRequest {
     pub iterations: Option<usize>,
     /// Which part is done here.
     pub shard: Option<Shard>,
+    /// Cells that no fit sees, neither in its frame nor in those around.
+    pub erased: Arc<[ErasedCells]>,
 }
 
 /// How many variants a study compares on top of `base`, on data with this layout.
@@ -130,6 +133,7 @@ impl RunPlan {
             shard: request.shard,
             columns: compared.columns,
             data,
+            erased: request.erased.to_vec(),
             variants: compared.variants,
         };
         let spec = RunSpec { id: spec.digest(), ..spec };

@@ -8,7 +8,7 @@ use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::Dataset;
 use crate::geometry::Vec3;
-use crate::mhp::{Fitter, Precision, SETTLED_OVER, has_settled};
+use crate::mhp::{ErasedCells, Fitter, Precision, SETTLED_OVER, has_settled};
 use crate::start::start_key;
 use crate::task::panic_as_error;
 use std::collections::VecDeque;
@@ -37,12 +37,12 @@ pub struct SweptFit {
 }
 
 impl<'a> FrameSweep<'a> {
-    /// Reads frame `frame`.
+    /// Reads frame `frame`, of which no fit sees the cells that are `erased`.
     ///
     /// # Errors
     /// In one line that names the file.
-    pub fn read(dataset: &'a Dataset, frame: usize) -> Result<Self, String> {
-        let loaded = panic_as_error(|| LoadedFrame::read(dataset, frame))?;
+    pub fn read(dataset: &'a Dataset, frame: usize, erased: &[ErasedCells]) -> Result<Self, String> {
+        let loaded = panic_as_error(|| LoadedFrame::read(dataset, frame, erased))?;
         Ok(Self { dataset, frame, loaded, starts: Mutex::default() })
     }
 

@@ -9,7 +9,7 @@ use super::paper;
 use super::variant::Variant;
 use crate::digest;
 use crate::input::{MOST_TEXT, read_text};
-use crate::mhp::Precision;
+use crate::mhp::{ErasedCells, Precision};
 use crate::output::replace_file;
 use crate::study::shard::{DataSpec, Difference, Part, Shard};
 use serde::{Deserialize, Serialize};
@@ -45,6 +45,9 @@ pub struct RunSpec {
     pub columns: Vec<String>,
     /// The data.
     pub data: DataSpec,
+    /// Cells that no fit sees.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub erased: Vec<ErasedCells>,
     /// What is compared, in the order of the table.
     #[serde(rename = "variant")]
     pub variants: Vec<Variant>,
@@ -86,6 +89,13 @@ impl RunSpec {
         digest::short(Sha256::new_with_prefix(serde_json::to_string(&spec).unwrap_or_default()))
     }
 
+    /// Which cells no fit sees, in words.
+    fn erased_told(&self) -> String {
+        let one = |cells: &ErasedCells| format!("{} of view {} in {:?}", cells.count(), cells.view, cells.bins);
+        let all: Vec<String> = self.erased.iter().map(one).collect();
+        if all.is_empty() { "none".into() } else { all.join(", ") }
+    }
+
     /// What the paper's figures beside ours are of; `None` where there are none.
     pub fn paper(&self) -> Option<String> {
         paper::told(self.study, &self.data.layout)
@@ -121,7 +131,7 @@ impl Part for RunSpec {
     fn difference(&self, other: &Self) -> Option<Difference> {
         let shard = |spec: &Self| spec.shard.map_or_else(|| "the whole".to_owned(), |shard| shard.to_string());
         let precision = |spec: &Self| format!("{:?}", spec.precision).to_lowercase();
-        let named: [(&str, Told<'_>); 8] = [
+        let named: [(&str, Told<'_>); 9] = [
             ("study", &|spec| spec.study.to_string()),
             ("version", &|spec| spec.version.clone()),
             ("precision", &precision),
@@ -130,6 +140,7 @@ impl Part for RunSpec {
             ("shard", &shard),
             ("data set", &|spec| spec.data.told()),
             ("choice of frames", &|spec| spec.data.told_frames()),
+            ("erased cells", &|spec| spec.erased_told()),
         ];
         let found = named.into_iter().find(|(_, text)| text(self) != text(other));
         if let Some((what, text)) = found {

@@ -146,7 +146,7 @@ fn adopt(shared: &mut Shared<'_>, map: &TuningMap, point: usize) {
     shared.send(Command::DragFit(Box::new(AdoptedFit {
         around: Some(Arc::clone(&start)),
         start,
-        erased: Arc::default(),
+        erased: Arc::clone(&map.erased),
         config: variant.config,
         words: "of the tuning map".into(),
     })));
