@@ -11,19 +11,34 @@ pub(super) fn of(session: &Session, what: &str) -> Option<String> {
     session.view.figure.then(|| format!("{what} · {}", caption(session)))
 }
 
-/// What every picture of a fit has in common: frame, iteration, τ, weights, seed, version.
+/// What every picture of a fit has in common: frame, branch, iteration, τ, weights, what was erased, whose predictions are beside it,
+/// seed, version.
 fn caption(session: &Session) -> String {
     let Some(frame) = &session.data.frame else { return String::new() };
-    let config = session.fit.shown.as_ref().map_or(session.config, |shown| shown.config);
+    let shown = session.fit.shown.as_ref();
+    let config = shown.map_or(session.config, |shown| shown.config);
+    let mut parts = vec![frame.name.clone()];
+    if let Some(branch) = session.fit.branch().filter(|branch| branch.id > 0) {
+        let edit = branch.edit.as_deref().filter(|edit| !edit.is_empty());
+        parts
+            .push(edit.map_or_else(|| format!("branch {}", branch.id), |edit| format!("branch {}: {edit}", branch.id)));
+    }
+    parts.push(format!("iteration {}", shown.map_or(0, |shown| shown.iteration)));
+    parts.push(format!("τ_pct {} %", config.tau_pct));
+    parts.push(weights(&config));
+    let erased: usize = session.fit.erased().iter().map(crate::mhp::ErasedCells::count).sum();
+    if erased > 0 {
+        parts.push(format!("without {erased} erased cells"));
+    }
+    let sources = session.sources.list().iter().filter(|source| source.shown);
+    let sources: Vec<&str> = sources.map(crate::session::Source::name).collect();
+    if !sources.is_empty() {
+        parts.push(format!("beside {}", sources.join(", ")));
+    }
     // The fit draws no random number: it has no seed to print.
-    format!(
-        "{} · iteration {} · τ_pct {} % · {} · seed none (deterministic) · mhp-inspector {}",
-        frame.name,
-        session.fit.shown.as_ref().map_or(0, |shown| shown.iteration),
-        config.tau_pct,
-        weights(&config),
-        env!("CARGO_PKG_VERSION")
-    )
+    parts.push("seed none (deterministic)".into());
+    parts.push(format!("mhp-inspector {}", env!("CARGO_PKG_VERSION")));
+    parts.join(" · ")
 }
 
 /// The weights that are not left at a default of 0: `w_EM 0.5 · w_kine 0.5`.

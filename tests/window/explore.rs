@@ -312,6 +312,11 @@ fn restarts_end_in_basins_that_can_be_taken() {
     assert!(window.session().queue.rows().is_empty());
     window.apply(Command::SetFilter("basin>=0".into()));
     assert_eq!(window.session().queue.rows(), [0]);
+    // Its mean body is brought out in 3-D while it is pointed at, here or on the plot of the ends.
+    window.node("Take basin 1").hover();
+    window.harness.run_steps(3);
+    let told = format!("mean body of basin 1: {:.0} % of the starts", 100.0 * cloud.basins[0].share);
+    assert_eq!(window.text_of("3-D scene"), told);
     window.click("Take basin 1");
     window.paused_at(6);
     let best = cloud.restarts[cloud.basins[0].members[0]].as_ref().unwrap();

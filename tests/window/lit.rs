@@ -19,6 +19,7 @@ fn the_joints_that_light_a_cell_are_told() {
     let map = window.node("H_sim map of hori").rect();
     let at = pos2(map.left() + 0.5 * map.width(), map.top() + 0.5 * map.height());
     window.harness.hover_at(at);
+    window.until("the returns", |w| w.text_of("3-D scene").contains("glowing"));
     window.harness.run_steps(4);
     let shown = window.fit().shown.clone().unwrap();
     let problem = window.fit().problem.clone().unwrap();
@@ -31,6 +32,10 @@ fn the_joints_that_light_a_cell_are_told() {
         format!("{:.0} % of the amplitudes, {:+.0} % of the cell", 100.0 * first.amplitude_share, 100.0 * first.share);
     assert!(window.texts_of(&name).contains(&told), "{name}: {told} in {}", window.texts_of(&name));
     assert!(window.named("Phasor diagram") == returns.is_coherent());
+    // The same joints glow in 3-D, strongest first.
+    let glows = window.text_of("3-D scene");
+    let share = format!("glowing: {} {:.0} %", problem.skeleton.shown_name(first.joint), 100.0 * first.amplitude_share);
+    assert!(glows.starts_with("places of the cell of hori at column 16, row ") && glows.contains(&share), "{glows}");
     // The worth of every joint, as the library has it.
     window.until("the joints left out", |w| w.says("its drop without a joint"));
     let state = window.session().explored_state().unwrap();
@@ -39,6 +44,16 @@ fn the_joints_that_light_a_cell_are_told() {
     let name = format!("Joint {}", problem.skeleton.shown_name(best.joint));
     let told = format!("IoU {:+.4} without it", -best.drop);
     assert!(window.texts_of(&name).contains(&told), "{name}: {told} in {}", window.texts_of(&name));
+    // A joint that is pointed at leaves its footprint on every map.
+    let row = window.harness.query_all_by_label(&name).last().unwrap();
+    row.hover();
+    let (print, joint) = (format!("footprint of {}: ", problem.skeleton.shown_name(best.joint)), best.joint);
+    window.until("the footprint", |w| w.text_of("H_ori map of vert").starts_with(&print));
+    let told = window.text_of("H_sim map of hori");
+    let alone = returns.whole(0, KeptJoints::Only(joint));
+    let most = alone.iter().copied().fold(0.0, f64::max);
+    let within = |db: f64| alone.iter().filter(|x| **x >= most * 10f64.powf(-db / 20.0)).count();
+    assert_eq!(told, format!("{print}{} cells within 3 dB, {} within 10 dB", within(3.0), within(10.0)));
     // A click selects the joint; the key goes through the maps without and of it alone.
     let row = window.harness.query_all_by_label(&name).last().unwrap();
     row.scroll_to_me();

@@ -5,6 +5,7 @@ use crate::window::Window;
 use egui::{Key, Modifiers, pos2};
 use egui_kittest::kittest::Queryable as _;
 use mhp_inspector::explore::{IdleCores, Noise, observability, tau_ribbon};
+use mhp_inspector::folders::HOME_VARIABLE;
 use mhp_inspector::task::Progress;
 
 #[test]
@@ -53,6 +54,12 @@ fn tau_is_seen_at_every_value_and_taken_by_a_click() {
     let (tau, iou) = ribbon.best().unwrap();
     let told = window.value("IoU at every τ");
     assert!(told.contains(&format!("largest at τ {tau} % (IoU {iou:.3})")), "{told}");
+    // What is under the pointer is told, whichever τ is set.
+    window.reveal("IoU at every τ");
+    let rect = window.node("IoU at every τ").rect();
+    window.harness.hover_at(pos2(rect.left() + 0.25 * rect.width(), rect.center().y));
+    let at = format!("τ 15.0 %: IoU {:.3}", ribbon.at(15.0).unwrap());
+    window.until("the τ under the pointer", |w| w.value("IoU at every τ").starts_with(&at));
     window.click("Mask outlines at τ");
     assert!(window.session().view.show_outlines);
     window.click("Point clouds at τ");
@@ -89,6 +96,62 @@ fn another_radar_is_put_beside_todays() {
         at.parse::<f64>().unwrap()
     };
     assert!(width(&after, "other") < width(&after, "today"), "{after}");
+}
+
+/// A radar is kept under a name of the user's, and one of the program's is refused; alone in a process, with a home of its own.
+#[test]
+fn another_radar_is_kept_as_a_preset() {
+    if std::env::var_os(HOME_VARIABLE).is_none() {
+        let home = tempfile::tempdir().unwrap();
+        let mut alone = std::process::Command::new(std::env::current_exe().unwrap());
+        alone.args(["rests_on::another_radar_is_kept_as_a_preset", "--exact", "--nocapture"]);
+        let done = alone.env(HOME_VARIABLE, home.path()).output().unwrap();
+        let said = String::from_utf8_lossy(&done.stdout).into_owned() + &String::from_utf8_lossy(&done.stderr);
+        assert!(done.status.success() && said.contains("1 passed"), "{said}");
+        return;
+    }
+    let mut window = Window::fitted(1);
+    window.show("Radar what-if");
+    window.until("both radars", |w| w.named("What-if map of hori, other"));
+    let refused = window.session().log.len();
+    for (name, expected) in [("awr2243", "is a radar of the program"), ("rooftop", "radar rooftop kept in")] {
+        window.node("Name of the preset").focus();
+        window.harness.step();
+        window.key_with(Modifiers::COMMAND, Key::A);
+        window.type_text(name);
+        window.harness.run_steps(2);
+        window.click("Save as preset");
+        window.until(expected, |w| w.told(expected));
+    }
+    assert!(window.session().log.len() > refused);
+    let kept = mhp_inspector::dataset::RadarPreset::named("rooftop").unwrap();
+    assert!(kept.about.starts_with("what-if of "), "{}", kept.about);
+}
+
+/// The card of F1 offers the eraser for the reflector that it names.
+#[test]
+fn the_reflector_that_f1_names_is_erased() {
+    let sample = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/f1");
+    let harness = Window::empty(&[sample], [1440.0, 900.0]);
+    let mut window = Window { harness, folder: tempfile::tempdir().unwrap() };
+    window.ready(0);
+    for frame in 1..=5 {
+        window.click("Next frame");
+        window.ready(frame);
+    }
+    window.key(Key::Enter);
+    window.until("the end of the run", |w| w.fit().head() > 0 && !w.fit().is_running());
+    window.at_rest();
+    window.show("Failure modes");
+    let name = |w: &Window| w.names().into_iter().find(|name| name.starts_with("erase where F1 is seen"));
+    window.click("Findings of F1");
+    window.until("a reflector", |w| name(w).is_some());
+    let link = name(&window).unwrap();
+    window.reveal(&link);
+    window.click(&link);
+    window.until("the fit without it", |w| w.fit().erased().len() == 1 && !w.fit().is_running());
+    assert!(window.session().undo_name().unwrap().starts_with("erased "), "{:?}", window.session().undo_name());
+    window.until("what it was worth", |w| w.named("Without the erased cells"));
 }
 
 /// A whole echo goes by one click, cells go under the brush; what they were worth is told, and a label remembers them.

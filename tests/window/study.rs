@@ -15,6 +15,7 @@ use mhp_inspector::study::run::{RunFolder, RunPlan, RunRequest, StudyKind, execu
 use mhp_inspector::study::shard::Subset;
 use mhp_inspector::task::Progress;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Runs a small study of the window's data set.
 fn run(window: &Window, study: StudyKind, grid: &[&str]) -> PathBuf {

@@ -3,7 +3,7 @@
 //! elsewhere.
 
 use super::answered::Answered;
-use super::lit::{cell_at, lit};
+use super::lit::{cell_at, joint_name, lit};
 use super::{Blank, Dock, Pane, PaneState, PaneStates, Shared};
 use crate::app::figure;
 use crate::app::map_image::Orientation;
@@ -84,13 +84,6 @@ fn follow(ui: &Ui, session: &Session, state: &mut State) {
         let state = session.explored_state().ok()?;
         Some(move |with: (&IdleCores, &Progress)| leave_one_out(&state, with))
     });
-}
-
-fn name(session: &Session, joint: usize) -> String {
-    let Some(problem) = &session.fit.problem else { return String::new() };
-    let joints = problem.skeleton.joints.len().max(1);
-    let name = problem.skeleton.shown_name(joint % joints);
-    if session.shown_positions().len() > joints { format!("P{} {name}", joint / joints + 1) } else { name }
 }
 
 fn color(session: &Session, joint: usize, tokens: &Tokens) -> Color32 {
@@ -174,7 +167,7 @@ const ROW: f32 = 15.0;
 fn row(ui: &mut Ui, shared: &mut Shared<'_>, bar: &Bar, tokens: &Tokens) {
     let session = shared.session;
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
-    let name = name(session, bar.joint);
+    let name = joint_name(session, bar.joint);
     let pointed = response.hovered() || shared.pointed.joint == Some(bar.joint);
     if response.hovered() {
         shared.points.joint = Some(bar.joint);

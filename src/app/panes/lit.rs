@@ -1,5 +1,5 @@
 //! Who lit what, for every pane: the returns of the joints of the fit on screen, made once for each of its states, and the maps of
-//! single joints, made on idle cores when they are first asked for.
+//! single joints: both beside the window's thread.
 
 use crate::app::map_image::Orientation;
 use crate::mhp::{JointReturns, KeptJoints};
@@ -23,19 +23,41 @@ pub(super) struct Lit {
     maps: Mutex<Made>,
 }
 
-/// The returns of the fit on screen; `None` where there is none.
+/// What is known of the returns of the fit on screen: those of a state, and the state whose returns are being made.
+#[derive(Clone, Default)]
+struct Known {
+    lit: Option<Arc<Lit>>,
+    asked: Option<Arc<Snapshot>>,
+}
+
+/// The returns of the fit on screen, those of a state before as long as its own are being made, which wakes the window; `None` where
+/// there is none.
 pub(super) fn lit(ctx: &Context, session: &Session) -> Option<Arc<Lit>> {
     let (problem, shown) = (session.fit.problem.as_ref()?, session.fit.shown.as_ref()?);
     let id = Id::unique("lit");
-    let known: Option<Arc<Lit>> = ctx.data(|data| data.get_temp(id));
-    if let Some(known) = known.filter(|known| Arc::ptr_eq(&known.of, shown)) {
-        return Some(known);
+    let known: Known = ctx.data(|data| data.get_temp(id)).unwrap_or_default();
+    let of_shown = |of: &Option<Arc<Snapshot>>| of.as_ref().is_some_and(|of| Arc::ptr_eq(of, shown));
+    let lit = known.lit.filter(|lit| lit.of.job == shown.job);
+    if lit.as_ref().is_none_or(|lit| !Arc::ptr_eq(&lit.of, shown)) && !of_shown(&known.asked) {
+        problem.check(&shown.params).ok()?;
+        let asked = Known { lit: lit.clone(), asked: Some(Arc::clone(shown)) };
+        ctx.data_mut(|data| data.insert_temp(id, asked));
+        let (problem, of, ctx) = (Arc::clone(problem), Arc::clone(shown), ctx.clone());
+        rayon::spawn(move || {
+            let returns = JointReturns::new(&problem, &of.config, &of.params);
+            let lit = Arc::new(Lit { of, returns, maps: Mutex::default() });
+            ctx.data_mut(|data| {
+                let known = data.get_temp_mut_or_default::<Known>(id);
+                let is_asked = |of: &Arc<Snapshot>| known.asked.as_ref().is_some_and(|asked| Arc::ptr_eq(asked, of));
+                // Better an older one than none, but not in the place of the one that is asked for.
+                if known.lit.as_ref().is_none_or(|there| !is_asked(&there.of)) {
+                    known.lit = Some(lit);
+                }
+            });
+            ctx.request_repaint();
+        });
     }
-    problem.check(&shown.params).ok()?;
-    let returns = JointReturns::new(problem, &shown.config, &shown.params);
-    let lit = Arc::new(Lit { of: Arc::clone(shown), returns, maps: Mutex::default() });
-    ctx.data_mut(|data| data.insert_temp(id, Arc::clone(&lit)));
-    Some(lit)
+    lit
 }
 
 impl Lit {
@@ -62,6 +84,14 @@ impl Lit {
         });
         None
     }
+}
+
+/// What a joint is called, with its person where there are several.
+pub(super) fn joint_name(session: &Session, joint: usize) -> String {
+    let Some(problem) = &session.fit.problem else { return String::new() };
+    let joints = problem.skeleton.joints.len().max(1);
+    let name = problem.skeleton.shown_name(joint % joints);
+    if session.shown_positions().len() > joints { format!("P{} {name}", joint / joints + 1) } else { name }
 }
 
 /// What H_sim is made of instead of all joints, where that was chosen and a joint is selected.

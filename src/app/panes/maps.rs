@@ -346,7 +346,6 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
     }
     let tokens = Tokens::of(ui);
     let response = ui.interact(plot, ui.scope_id().with("plot"), Sense::click_and_drag());
-    response.widget_info(|| figure::spoken(&name, caption.as_deref()));
     let drawn = state.mark(ui, &response, plot, index, (view, orientation));
     let drawing = !matches!(drawn, Drawn::Nothing);
     match drawn {
@@ -375,9 +374,9 @@ fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColum
     if session.view.show_outlines {
         outlines(&painter, state, content, (index, view, orientation), &to_screen);
     }
-    if let Some(joint) = shared.pointed.joint {
-        footprint(ui, &painter, session, joint, (index, view, orientation), &to_screen);
-    }
+    let joint = shared.pointed.joint;
+    let print = joint.and_then(|joint| footprint(ui, &painter, session, joint, (index, view, orientation), &to_screen));
+    response.widget_info(|| figure::spoken(&name, print.as_deref().or(caption.as_deref())));
     overlay::title(&painter, plot, view, content, state.pictures.reference(), session);
     if row.axes {
         let first = column == MapColumn::Ori || state.solo.is_some();
@@ -430,7 +429,7 @@ fn outlines(
 /// Levels of a joint's footprint below its own largest cell, dB, and how its lines are drawn.
 const FOOTPRINT: [(f64, f32); 2] = [(-3.0, 2.0), (-10.0, 1.0)];
 
-/// Where the joint that is pointed at lights the map: lines 3 and 10 dB below its own largest cell.
+/// Where the joint that is pointed at lights the map: lines 3 and 10 dB below its own largest cell. Answers that in words.
 fn footprint(
     ui: &Ui,
     painter: &egui::Painter,
@@ -438,14 +437,14 @@ fn footprint(
     joint: usize,
     (index, view, o): (usize, &View, Orientation),
     to_screen: &dyn Fn([f64; 2]) -> egui::Pos2,
-) {
-    let Some(lit) = lit::lit(ui.ctx(), session).filter(|lit| joint < lit.returns.joints()) else { return };
-    let Some(map) = lit.map(ui.ctx(), index, crate::mhp::KeptJoints::Only(joint)) else { return };
+) -> Option<String> {
+    let lit = lit::lit(ui.ctx(), session).filter(|lit| joint < lit.returns.joints())?;
+    let map = lit.map(ui.ctx(), index, crate::mhp::KeptJoints::Only(joint))?;
     let picture = o.picture(view, &map);
     let most = picture.iter().copied().fold(0.0, f64::max);
     // What is nothing but H_sim's floor has no footprint.
     if most <= 1e-29 {
-        return;
+        return None;
     }
     for (db, width) in FOOTPRINT {
         let level = most * 10f64.powf(db / 20.0);
@@ -455,6 +454,10 @@ fn footprint(
             painter.line_segment(ends, egui::Stroke::new(width, theme::DARK.selected));
         }
     }
+    let [within_3, within_10] =
+        FOOTPRINT.map(|(db, _)| picture.iter().filter(|x| **x >= most * 10f64.powf(db / 20.0)).count());
+    let name = lit::joint_name(session, joint);
+    Some(format!("footprint of {name}: {within_3} cells within 3 dB, {within_10} within 10 dB"))
 }
 
 /// What belongs to a whole row: where on the map it is, where that is not all of it, and what its colours mean.

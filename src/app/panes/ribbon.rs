@@ -123,6 +123,12 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, ribbon: &mut Ribbon, co
     }
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), HEIGHT), Sense::click_and_drag());
     let told = told(ribbon, config.tau_pct);
+    let hover = response.hover_pos().and_then(|at| {
+        let tau = f64::from((at.x - rect.left()) / rect.width().max(1.0)) * MOST;
+        let iou = ribbon.known.as_ref()?.1.at(tau)?;
+        Some(format!("τ {tau:.1} %: IoU {iou:.3}\n"))
+    });
+    let told = format!("{}{told}", hover.unwrap_or_default());
     response.widget_info(|| {
         let mut info = egui::WidgetInfo::labeled(Role::Slider, true, "IoU at every τ");
         info.current_text_value = Some(told.clone());
@@ -157,12 +163,7 @@ pub(super) fn show(ui: &mut Ui, shared: &mut Shared<'_>, ribbon: &mut Ribbon, co
         config.tau_pct = tau.clamp(0.5, MOST);
     }
     let tip = "The IoU of the masks of the iteration on screen at every τ, without a refit: all views' mean thick, each view thin, chance dashed; the ring is where agreement is farthest from chance. Click or drag to take a τ.";
-    let hover = response.hover_pos().and_then(|at| {
-        let tau = f64::from((at.x - rect.left()) / rect.width().max(1.0)) * MOST;
-        let iou = ribbon.known.as_ref()?.1.at(tau)?;
-        Some(format!("τ {tau:.1} %: IoU {iou:.3}\n"))
-    });
-    response.on_hover_text(format!("{}{told}\n{tip}", hover.unwrap_or_default()));
+    response.on_hover_text(format!("{told}\n{tip}"));
     switches(ui, shared, ribbon, &tokens);
 }
 

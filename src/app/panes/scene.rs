@@ -13,6 +13,7 @@ use crate::app::figure;
 use crate::app::map_image::Orientation;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Mark, Named as _, grounded};
+use crate::mhp::JointReturn;
 use crate::render::{Camera, Scene, SceneRenderer, Undrawable, Vec2, Vec3, pick, shapes};
 use crate::session::{Command, Session, SplatMode, ViewState};
 use crate::worker::JobId;
@@ -221,8 +222,9 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     let sight = Sight { camera, rect, viewport, scale };
     take_joint(ui, shared, state, &response, &sight, &tokens);
     let readout = move_body(ui, shared, state, &response, &sight);
-    let cell = pointed_cell(shared);
-    let spoken = readout.as_deref().or(cell.as_deref()).or(caption.as_deref());
+    let glowing = glowing(ui, shared);
+    let told = pointed(shared, &glowing);
+    let spoken = readout.as_deref().or(told.as_deref()).or(caption.as_deref());
     response.widget_info(|| figure::spoken("3-D scene", spoken));
     if state.grab.is_none() {
         steer(ui, &response, rect, viewport, scale, &mut camera);
@@ -257,7 +259,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
         }
     }
     captions(&painter, rect, shared.session, &tokens, state);
-    glow(ui, &painter, shared, &sight, &tokens);
+    glow(&painter, shared, &glowing, &sight, &tokens);
     ring(&painter, shared, &sight, &tokens);
     if let Some(text) = readout {
         let font = theme::mono(theme::CAPTION);
@@ -323,22 +325,41 @@ fn move_body(
     Some(text.replace('-', "−"))
 }
 
-/// The cell whose places are drawn, in words.
-fn pointed_cell(shared: &Shared<'_>) -> Option<String> {
+/// What is drawn of what is pointed at in other panes, in words.
+fn pointed(shared: &Shared<'_>, glowing: &[JointReturn]) -> Option<String> {
+    let session = shared.session;
+    if let Some(basin) = shared.pointed.basin {
+        let cloud = session.explore.restarts(session.fit.frame)?;
+        let share = 100.0 * cloud.basins.get(basin)?.share;
+        return Some(format!("mean body of basin {}: {share:.0} % of the starts", basin + 1));
+    }
     let (view, [column, row]) = shared.pointed.cell?;
-    let array = &shared.session.data.dataset.as_ref()?.info().views.get(view)?.array;
-    Some(format!("places of the cell of {array} at column {column}, row {row}"))
+    let array = &session.data.dataset.as_ref()?.info().views.get(view)?.array;
+    let mut told = format!("places of the cell of {array} at column {column}, row {row}");
+    for (k, of) in glowing.iter().enumerate() {
+        let (word, name) = (if k == 0 { "; glowing:" } else { "," }, lit::joint_name(session, of.joint));
+        told.push_str(&format!("{word} {name} {:.0} %", 100.0 * of.amplitude_share));
+    }
+    Some(told)
+}
+
+/// The joints that light the cell that is pointed at, strongest first.
+fn glowing(ui: &Ui, shared: &Shared<'_>) -> Vec<JointReturn> {
+    let session = shared.session;
+    let found = || {
+        let ((index, pixel), dataset) = (shared.pointed.cell?, session.data.dataset.as_ref()?);
+        let (lit, view) = (lit::lit(ui.ctx(), session)?, dataset.info().views.get(index)?);
+        let map = session.fit.shown.as_ref().and_then(|shown| shown.h_sim.get(index)).map(Vec::as_slice);
+        let cell = lit::cell_at(view, Orientation::of(view, session.view.cube), pixel, map)?;
+        Some(lit.returns.at(index, cell).into_iter().filter(|of| of.amplitude_share > 0.02).collect())
+    };
+    found().unwrap_or_default()
 }
 
 /// The joints that light the cell that is pointed at glow, as strongly as they do.
-fn glow(ui: &Ui, painter: &egui::Painter, shared: &Shared<'_>, sight: &Sight, tokens: &Tokens) {
-    let session = shared.session;
-    let (Some((index, pixel)), Some(dataset)) = (shared.pointed.cell, &session.data.dataset) else { return };
-    let (Some(lit), Some(view)) = (lit::lit(ui.ctx(), session), dataset.info().views.get(index)) else { return };
-    let map = session.fit.shown.as_ref().and_then(|shown| shown.h_sim.get(index)).map(Vec::as_slice);
-    let Some(cell) = lit::cell_at(view, Orientation::of(view, session.view.cube), pixel, map) else { return };
-    for of in lit.returns.at(index, cell).iter().filter(|of| of.amplitude_share > 0.02) {
-        let Some(p) = session.shown_positions().get(of.joint) else { continue };
+fn glow(painter: &egui::Painter, shared: &Shared<'_>, glowing: &[JointReturn], sight: &Sight, tokens: &Tokens) {
+    for of in glowing {
+        let Some(p) = shared.session.shown_positions().get(of.joint) else { continue };
         let Some(at) = sight.on_screen(Vec3::from(p.map(|x| x as f32))) else { continue };
         let share = of.amplitude_share.sqrt() as f32;
         for (size, strength) in [(1.0, 0.18), (0.7, 0.22), (0.4, 0.35)] {
