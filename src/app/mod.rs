@@ -55,8 +55,8 @@ pub struct Begin {
     pub aim: StartAt,
     /// A table of results for the frame list.
     pub results: Option<PathBuf>,
-    /// Files of predictions, and what they are called.
-    pub predictions: Vec<(PathBuf, Option<String>)>,
+    /// Files of predictions, and what is told of them.
+    pub predictions: Vec<(PathBuf, Reading)>,
     /// The run folder of a study.
     pub study: Option<PathBuf>,
     /// The settings, in force before anything is opened.
@@ -174,9 +174,8 @@ impl InspectorApp {
         if let Some(results) = &begin.results {
             app.apply(Command::LoadResults(results.clone()));
         }
-        for (path, name) in &begin.predictions {
-            let reading = Reading { name: name.clone(), ..Reading::default() };
-            app.apply(Command::OpenPredictions(path.clone(), Box::new(reading)));
+        for (path, reading) in &begin.predictions {
+            app.apply(Command::OpenPredictions(path.clone(), Box::new(reading.clone())));
         }
         if let Some(run) = &begin.study {
             app.open_run(run.clone());

@@ -148,7 +148,7 @@ impl Tokens {
 
     /// The colour that a source names itself, or the one that it has by its order.
     pub(crate) fn of_source(&self, source: &crate::session::Source) -> Color32 {
-        let own = source.predictions.colour.map(|colour| colour.0);
+        let own = source.colour.map(|colour| colour.0);
         own.map_or_else(|| self.source(source.hue), |[r, g, b]| Color32::from_rgb(r, g, b))
     }
 

@@ -143,7 +143,7 @@ pub(super) fn run(args: &FitArgs) -> anyhow::Result<ExitCode> {
         &[args.config.as_deref(), args.manifest.as_deref(), args.erase.file(), args.init.as_deref()],
     );
     let init = args.init.as_ref().map(|path| {
-        let source = args.reading.open(&SourceFile { name: None, path: path.clone() }, &dataset)?;
+        let source = args.reading.open(&SourceFile { name: None, colour: None, path: path.clone() }, &dataset)?;
         source.notes.iter().for_each(|note| complain(&format!("note: {}: {note}", path.display())));
         anyhow::Ok(Arc::new(source))
     });

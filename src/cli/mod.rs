@@ -97,8 +97,8 @@ pub struct WindowArgs {
     /// Take the results of a batch into the frame list: the `summary.csv` that `fit --out` wrote.
     #[arg(long, value_name = "FILE")]
     pub results: Option<PathBuf>,
-    /// Show predictions of others beside the fits: FILE or NAME=FILE; several times for several sources.
-    #[arg(long = "pred", value_name = "[NAME=]FILE")]
+    /// Show predictions of others beside the fits: FILE, NAME=FILE or NAME#RRGGBB=FILE; several times for several sources.
+    #[arg(long = "pred", value_name = "[NAME[#RRGGBB]=]FILE")]
     predictions: Vec<sources::SourceFile>,
     /// Show the run folder of a study, as `study NAME --out RUN` wrote it.
     #[arg(long, value_name = "RUN")]
@@ -144,7 +144,7 @@ impl WindowArgs {
             paths: self.paths,
             aim,
             results: self.results,
-            predictions: self.predictions.into_iter().map(|source| (source.path, source.name)).collect(),
+            predictions: self.predictions.into_iter().map(|source| (source.path.clone(), source.reading())).collect(),
             study: self.study,
             config: Some(common::settings(self.config.as_deref(), self.preset, None)?),
             session: self.session,

@@ -102,7 +102,7 @@ pub(super) fn run(args: &PredictionsArgs) -> anyhow::Result<ExitCode> {
     let frames = chosen(args.frames, &args.path, &dataset)?;
     let sources = open_all(args, &dataset)?;
     let fit = args.fit.as_ref().map(|path| {
-        let file = SourceFile { name: Some("fit".into()), path: path.clone() };
+        let file = SourceFile { name: Some("fit".into()), colour: None, path: path.clone() };
         args.reading.open(&file, &dataset)
     });
     let fit = fit.transpose()?;

@@ -43,8 +43,8 @@ pub struct ScreenshotArgs {
     /// Show the run folder of a study in its pane.
     #[arg(long, value_name = "RUN")]
     study: Option<PathBuf>,
-    /// Show predictions of others beside the fit: FILE or NAME=FILE; several times for several sources.
-    #[arg(long = "pred", value_name = "[NAME=]FILE")]
+    /// Show predictions of others beside the fit: FILE, NAME=FILE or NAME#RRGGBB=FILE; several times for several sources.
+    #[arg(long = "pred", value_name = "[NAME[#RRGGBB]=]FILE")]
     predictions: Vec<SourceFile>,
     /// The frame, counted from 0.
     #[arg(long, value_name = "I", default_value_t = 0)]
@@ -136,7 +136,7 @@ pub(super) fn run(args: &ScreenshotArgs) -> anyhow::Result<ExitCode> {
     let begin = Begin {
         paths: args.path.iter().cloned().collect(),
         study: args.study.clone(),
-        predictions: args.predictions.iter().map(|source| (source.path.clone(), source.name.clone())).collect(),
+        predictions: args.predictions.iter().map(|source| (source.path.clone(), source.reading())).collect(),
         config: Some(args.people.of(&settings(args.config.as_deref(), args.preset, None)?)),
         session: args.session.clone(),
         allow_outside: outside_allowed(),

@@ -46,9 +46,7 @@ pub fn joint_errors(estimate: &[Vec3], truth: &[Vec3], joints: usize) -> Option<
     }
     let estimated: Vec<&[Vec3]> = estimate.chunks_exact(joints).collect();
     let true_persons: Vec<&[Vec3]> = truth.chunks_exact(joints).collect();
-    let pairs = assign(estimated.len(), true_persons.len(), |a, b| {
-        majpe_mm(estimated[a], true_persons[b]).unwrap_or(f64::INFINITY)
-    });
+    let pairs = person_pairs(estimate, truth, joints);
     let count = pairs.len() as f64;
     let ospa_mm = ospa_mm(&estimated, &true_persons);
     let mut errors = JointErrors { majpe_mm: 0.0, pa_majpe_mm: 0.0, ospa_mm };
@@ -57,6 +55,16 @@ pub fn joint_errors(estimate: &[Vec3], truth: &[Vec3], joints: usize) -> Option<
         errors.pa_majpe_mm += pa_majpe_mm(estimated[a], true_persons[b])? / count;
     }
     (!pairs.is_empty()).then_some(errors)
+}
+
+/// Who is who among persons of `joints` joints each (flat lists, person by person): pairs (estimated, true) whose distances have the
+/// smallest sum, ascending by the first; of the longer list some stay without a partner.
+pub fn person_pairs(estimate: &[Vec3], truth: &[Vec3], joints: usize) -> Vec<(usize, usize)> {
+    let persons = |of: &[Vec3]| of.len() / joints.max(1);
+    assign(persons(estimate), persons(truth), |a, b| {
+        let [estimated, annotated] = [(estimate, a), (truth, b)].map(|(of, k)| &of[k * joints..(k + 1) * joints]);
+        majpe_mm(estimated, annotated).unwrap_or(f64::INFINITY)
+    })
 }
 
 fn ospa_mm(estimated: &[&[Vec3]], true_persons: &[&[Vec3]]) -> f64 {
@@ -76,9 +84,7 @@ pub fn paired_joint_distances_mm(estimate: &[Vec3], truth: &[Vec3], joints: usiz
     }
     let estimated: Vec<&[Vec3]> = estimate.chunks_exact(joints).collect();
     let true_persons: Vec<&[Vec3]> = truth.chunks_exact(joints).collect();
-    let pairs = assign(estimated.len(), true_persons.len(), |a, b| {
-        majpe_mm(estimated[a], true_persons[b]).unwrap_or(f64::INFINITY)
-    });
+    let pairs = person_pairs(estimate, truth, joints);
     let distance = |joint: usize, &(a, b): &(usize, usize)| norm(sub(estimated[a][joint], true_persons[b][joint]));
     let mean_of = |joint: usize| pairs.iter().map(|pair| distance(joint, pair)).sum::<f64>() / pairs.len() as f64;
     (0..joints).map(|joint| MM_PER_M * mean_of(joint)).collect()

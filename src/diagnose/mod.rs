@@ -13,5 +13,6 @@ pub use evidence::{
 pub use evidence::{EvidenceExample, Measured, chosen_examples, learn_curves};
 pub use metrics::{
     JointErrors, OSPA_CUTOFF_MM, Similarity, joint_errors, majpe_mm, pa_majpe_mm, paired_joint_distances_mm,
+    person_pairs,
 };
 pub use reprojection::{Reprojection, map_box_coverage, reprojection};

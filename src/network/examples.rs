@@ -4,6 +4,7 @@ use super::card::{Architecture, Features};
 use super::features::person_input;
 use crate::body::Pppr;
 use crate::dataset::{Dataset, Frame};
+use crate::diagnose::person_pairs;
 use crate::geometry::{Vec3, mean, sub};
 use crate::start::problem_alone;
 use rayon::prelude::*;
@@ -35,7 +36,8 @@ pub struct ExampleSet {
     pub examples: Vec<Example>,
 }
 
-/// Examples of all frames with one person in truth and fit, by sequence; and how many frames were left out, by why.
+/// Examples of all people of frames with as many fitted as annotated, by sequence; and how many frames were left out, by why. Who is
+/// who is the best pairing of the fit with the annotation.
 ///
 /// # Errors
 /// Where no frame is left, in words.
@@ -45,32 +47,41 @@ pub fn examples(
     features: Features,
     architecture: Architecture,
 ) -> Result<(Vec<ExampleSet>, BTreeMap<&'static str, usize>), String> {
-    let made: Vec<Result<Example, &'static str>> = (0..dataset.len())
+    let joints = dataset.info().skeleton.joints.len();
+    let made: Vec<Result<Vec<Example>, &'static str>> = (0..dataset.len())
         .into_par_iter()
         .map(|index| {
             let frame = dataset.load(index).map_err(|_| "cannot be read")?;
             let truth = frame.truth.as_ref().ok_or("has no joints in metres")?;
-            if truth.persons != 1 {
-                return Err("shows not one person");
+            if truth.persons == 0 {
+                return Err("shows nobody");
             }
-            let mut inputs = inputs_of(dataset, &frame, params, features, architecture)?;
-            if inputs.len() != 1 {
-                return Err("is fitted with more than one person");
+            let inputs = inputs_of(dataset, &frame, params, features, architecture)?;
+            if inputs.len() != truth.persons {
+                return Err("is fitted with another number of people than annotated");
             }
-            let (input, middle) = inputs.remove(0);
-            let target = truth.joints.iter().flat_map(|&p| sub(p, middle)).map(|x| x as f32).collect();
-            Ok(Example { frame: index, input, target, middle })
+            let fitted = params.get(&index).filter(|fitted| fitted.shape().persons == truth.persons);
+            let pairs = match fitted {
+                Some(fitted) => person_pairs(fitted.positions(), &truth.joints, joints),
+                None => (0..inputs.len()).map(|person| (person, person)).collect(),
+            };
+            let example = |((input, middle), (_, person)): ((Vec<f32>, Vec3), (usize, usize))| {
+                let own = &truth.joints[person * joints..(person + 1) * joints];
+                let target = own.iter().flat_map(|&p| sub(p, middle)).map(|x| x as f32).collect();
+                Example { frame: index, input, target, middle }
+            };
+            Ok(inputs.into_iter().zip(pairs).map(example).collect())
         })
         .collect();
     let (mut sets, mut left_out) = (Vec::<ExampleSet>::new(), BTreeMap::new());
-    for (index, example) in made.into_iter().enumerate() {
-        match example {
+    for (index, of_frame) in made.into_iter().enumerate() {
+        match of_frame {
             Err(why) => *left_out.entry(why).or_default() += 1,
-            Ok(example) => {
+            Ok(of_frame) => {
                 let sequence = format!("{}/{}", dataset.info().name, dataset.sequence(index));
                 match sets.last_mut() {
-                    Some(set) if set.sequence == sequence => set.examples.push(example),
-                    _ => sets.push(ExampleSet { sequence, examples: vec![example] }),
+                    Some(set) if set.sequence == sequence => set.examples.extend(of_frame),
+                    _ => sets.push(ExampleSet { sequence, examples: of_frame }),
                 }
             }
         }
@@ -109,7 +120,7 @@ fn inputs_of(
         return Err("has no fit");
     }
     let centred = features.of_joints() && architecture != Architecture::Mlp;
-    let persons = if features.of_joints() { own.map_or(1, |own| own.shape().persons) } else { 1 };
+    let persons = own.map_or(1, |own| own.shape().persons).max(1);
     let reach = architecture.reach() as isize;
     let mut inputs = Vec::with_capacity(persons);
     for person in 0..persons {
@@ -119,12 +130,13 @@ fn inputs_of(
             let shown = beside.as_ref().unwrap_or(frame);
             // A frame that shows other people tells nothing of this one: the frame itself stands for it.
             let of = params.get(&shown.index).filter(|of| own.is_none_or(|own| own.shape() == of.shape())).or(own);
-            let problem = match features {
-                Features::PpprHeatmap => Some(problem_alone(dataset, shown).map_err(|_| "has no finite cell")?),
-                _ => None,
+            let of = of.map(|of| (of.as_ref(), person));
+            let problem = if features == Features::PpprHeatmap || (features == Features::Heatmap && persons > 1) {
+                Some(Arc::new(problem_alone(dataset, shown).map_err(|_| "has no finite cell")?))
+            } else {
+                None
             };
-            let read =
-                person_input(features, architecture, of.map(|of| (of.as_ref(), person)), &shown.maps, problem.as_ref());
+            let read = person_input(features, architecture, of, &shown.maps, problem.as_ref());
             input.extend(read.ok_or("has no fit")?);
         }
         let middle = own.filter(|_| centred).map_or([0.0; 3], |own| mean(own.person(person)));

@@ -2,11 +2,12 @@
 
 use super::card::{Architecture, Features};
 use crate::body::{Group, Pppr};
-use crate::config::Preset;
+use crate::config::{BodyModel, FitConfig, Parameterization, Preset};
 use crate::dataset::Heatmap;
 use crate::geometry::{Vec3, dot, mean, norm, scale, sub};
-use crate::mhp::{Precision, Problem, simulate};
+use crate::mhp::{Objective, Precision, Problem, Region, simulate};
 use crate::radar::coarse;
+use std::sync::Arc;
 
 /// Cells a side that a map is brought to.
 const SIDE: usize = 32;
@@ -37,19 +38,24 @@ pub fn input_width(
     frames * of_frame
 }
 
-/// What is read of person `person` of one frame. `maps` are the measured ones; `problem` simulates those of the parameters.
+/// What is read of person `person` of one frame. `maps` are the measured ones; `problem` simulates those of the parameters. Of several
+/// people each is read by themselves: of the simulated maps what their own parameters make, of the measured ones what lies within
+/// 1.25 m about them.
 pub fn person_input(
     features: Features,
     architecture: Architecture,
     params: Option<(&Pppr, usize)>,
     maps: &[Heatmap],
-    problem: Option<&Problem>,
+    problem: Option<&Arc<Problem>>,
 ) -> Option<Vec<f32>> {
     match features {
-        Features::Heatmap => Some(maps.iter().flat_map(|map| reduced(&map.shape, &map.data)).collect()),
+        Features::Heatmap => match params.filter(|(params, _)| params.shape().persons > 1) {
+            None => Some(maps.iter().flat_map(|map| reduced(&map.shape, &map.data)).collect()),
+            Some((params, person)) => about(problem?, &params.only(person), maps),
+        },
         Features::PpprHeatmap => {
-            let (params, _) = params?;
-            let simulated = simulate(problem?, &Preset::default().config(), Precision::F32, params);
+            let (params, person) = params?;
+            let simulated = simulate(problem?, &Preset::default().config(), Precision::F32, &params.only(person));
             let views = &problem?.views;
             Some(views.iter().zip(&simulated).flat_map(|(view, map)| reduced(&view.shape(), map)).collect())
         }
@@ -68,6 +74,21 @@ pub fn person_input(
             Some(if architecture == Architecture::Mlp { pooled(params, person) } else { each_joint(params, person) })
         }
     }
+}
+
+/// The measured maps in the EM region about somebody, and nothing beside it.
+fn about(problem: &Arc<Problem>, one: &Pppr, maps: &[Heatmap]) -> Option<Vec<f32>> {
+    let config =
+        FitConfig { body: BodyModel::Joints, parameterization: Parameterization::Joints, ..Preset::Baseline.config() };
+    let objective = Objective::new(Arc::clone(problem), config, Precision::F32, one).ok()?;
+    let of_view = |(map, region): (&Heatmap, &Region)| {
+        let mut cut = vec![0.0; map.data.len()];
+        for cell in region.indices(&map.shape) {
+            cut[cell] = map.data[cell];
+        }
+        reduced(&map.shape, &cut)
+    };
+    Some(maps.iter().zip(objective.regions()).flat_map(of_view).collect())
 }
 
 /// The numbers of a joint, its position about `middle`.
@@ -117,8 +138,12 @@ fn reduced(shape: &[usize], cells: &[f64]) -> Vec<f32> {
 
 #[cfg(test)]
 mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test stops where the sample is missing")]
     use super::*;
     use crate::body::PpprShape;
+    use crate::dataset::{Dataset, bundled_sample};
+    use crate::start::problem_alone;
+    use crate::task::Progress;
 
     #[test]
     fn the_papers_forty_eight_are_the_mean_over_the_joints() {
@@ -143,6 +168,40 @@ mod tests {
         assert_eq!(read, Some(vec![3.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0]));
         let read = person_input(Features::Pppr, Architecture::MlpJoints, Some((&params, 1)), &[], None);
         assert_eq!(read.map(|read| read.len()), Some(input_width(Features::Pppr, Architecture::MlpJoints, 2, 4, 0)));
+    }
+
+    /// Each of two people is read as if the other were not there: the simulated maps of their own parameters, the measured ones about
+    /// them.
+    #[test]
+    fn of_two_people_each_is_read_by_themselves() {
+        let dataset = Dataset::open(&bundled_sample().unwrap(), &Progress::new()).unwrap();
+        let frame = dataset.load(3).unwrap();
+        let problem = Arc::new(problem_alone(&dataset, &frame).unwrap());
+        let truth = frame.truth.as_ref().unwrap().joints.clone();
+        let joints = truth.len();
+        let shape = PpprShape { persons: 2, joints, doppler_features: problem.radar.doppler_features };
+        let mut two = Pppr::zeros(shape);
+        for (k, p) in truth.iter().chain(&truth).enumerate() {
+            let aside = if k < joints { 0.0 } else { 3.0 };
+            two.set_vec3(Group::Position, k, [p[0] + aside, p[1], p[2]]);
+            two.set_vec3(Group::LogScale, k, [-2.5; 3]);
+            two.joint_mut(Group::Rotation, k)[0] = 1.0;
+        }
+        let read = |features, of: &Pppr, person| {
+            person_input(features, Architecture::Mlp, Some((of, person)), &frame.maps, Some(&problem)).unwrap()
+        };
+        for person in 0..2 {
+            let alone = two.only(person);
+            assert_eq!(read(Features::PpprHeatmap, &two, person), read(Features::PpprHeatmap, &alone, 0));
+            assert_eq!(read(Features::Pppr, &two, person), read(Features::Pppr, &alone, 0));
+        }
+        // The echo is the first one's: about the second there is less of it, and what lies about neither is 0.
+        let [first, second] = [0, 1].map(|person| read(Features::Heatmap, &two, person));
+        let whole = read(Features::Heatmap, &two.only(0), 0);
+        assert_eq!(first.len(), whole.len());
+        assert_ne!(first, second);
+        let dark = |of: &[f32]| of.iter().filter(|x| **x == 0.0).count();
+        assert!(dark(&first) > dark(&whole) + 200, "{} {}", dark(&first), dark(&whole));
     }
 
     #[test]

@@ -194,6 +194,7 @@ impl Session {
             Command::LoadResults(path) => self.load_results(path),
             Command::OpenPredictions(path, reading) => self.open_predictions(path, *reading),
             Command::DismissPredictions => self.dismiss_predictions(),
+            Command::ColourPredictions(slot, colour) => self.colour_predictions(slot, colour),
             Command::ShowPredictions(slot, shown) => self.show_predictions(slot, shown),
             Command::RemovePredictions(slot) => self.remove_predictions(slot),
             Command::StartFromPredictions(slot) => self.start_from_predictions(slot),

@@ -14,7 +14,7 @@ use crate::explore::ExplorationKind;
 use crate::geometry::Vec3;
 use crate::labels::{CellRegion, Tag, Verdict};
 use crate::mhp::Precision;
-use crate::predictions::Reading;
+use crate::predictions::{Colour, Reading};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -193,6 +193,8 @@ pub enum Command {
     DismissPredictions,
     /// Draw a source, or draw it no longer.
     ShowPredictions(usize, bool),
+    /// Draw a source in this colour, or in one of the theme's.
+    ColourPredictions(usize, Option<Colour>),
     /// Take a source out of the window.
     RemovePredictions(usize),
     /// Begin the fit on screen at what a source predicts.

@@ -205,7 +205,7 @@ impl SavedSource {
     fn of(source: &super::sources::Source) -> Self {
         let of = &source.predictions;
         let path = std::path::absolute(&of.path).unwrap_or_else(|_| of.path.clone());
-        Self { path, reading: Reading { name: Some(of.name.clone()), ..of.reading.clone() } }
+        Self { path, reading: Reading { name: Some(of.name.clone()), colour: source.colour, ..of.reading.clone() } }
     }
 }
 

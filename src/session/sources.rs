@@ -4,7 +4,7 @@ use super::tracked::Tracked;
 use crate::dataset::Dataset;
 use crate::geometry::Vec3;
 use crate::predictions::{
-    PredictedFrame, Predictions, Reading, SourceRow, SourceSummary, compare_with_truth, source_row,
+    Colour, PredictedFrame, Predictions, Reading, SourceRow, SourceSummary, compare_with_truth, source_row,
 };
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -77,8 +77,10 @@ impl SourceErrors {
 pub struct Source {
     /// Its joints by frame.
     pub predictions: Arc<Predictions>,
-    /// Which of the colours it has, where it names none itself.
+    /// Which of the colours it has, where nobody chose one.
     pub hue: usize,
+    /// What it is drawn in, where somebody chose: its file, or a person since.
+    pub colour: Option<Colour>,
     /// Drawn.
     pub shown: bool,
     /// What it says against the truth; `None` until that was read.

@@ -2,7 +2,7 @@
 //!
 //! Of the part that is learned from whole sequences are kept back: every fifth to validate with, every fifth to ask, which is the row
 //! "within" of the tables. Each input is read by the same perceptron (paper A.6), so that what differs is the input. Where two data
-//! sets have other joints the errors are over those in common.
+//! sets have other joints the errors are over those in common. Of several people each is read and answered by themselves.
 
 use super::FileError;
 use crate::body::Skeleton;
@@ -119,11 +119,13 @@ pub struct CrossRow {
     pub parameters: usize,
     /// Frames that were asked.
     pub frames: usize,
+    /// People in them.
+    pub people: usize,
     /// Sequences that they are of.
     pub sequences: usize,
     /// Joints that are compared.
     pub joints: usize,
-    /// Mean over the frames, mm.
+    /// Mean over the people, mm.
     pub majpe_mm: Option<f64>,
     /// The same after alignment, mm.
     pub pa_majpe_mm: Option<f64>,
@@ -249,6 +251,7 @@ fn asked(
         input: input.name,
         parameters: network.parameters(),
         frames: 0,
+        people: 0,
         sequences: 0,
         joints: 0,
         majpe_mm: None,
@@ -271,7 +274,8 @@ fn asked(
     }
     let mean = |of: &[f64]| (!of.is_empty()).then(|| of.iter().sum::<f64>() / of.len() as f64);
     CrossRow {
-        frames: errors.len(),
+        people: errors.len(),
+        frames: sets.iter().map(|set| set.examples.chunk_by(|a, b| a.frame == b.frame).count()).sum(),
         sequences: sets.len(),
         joints: map.known.len(),
         majpe_mm: mean(&errors),
@@ -295,7 +299,9 @@ pub fn markdown(kind: CrossKind, rows: &[CrossRow]) -> String {
     let escaped = |text: &str| text.replace('|', "\\|").replace('\n', " ");
     let mut text = format!("# {}\n\n", kind.word());
     let first = rows.first().map_or("", |row| row.trained_on.as_str());
-    let _ = writeln!(text, "Learned on {}. MAJPE / PA-MAJPE, mm, means over frames with one person.\n", escaped(first));
+    let several = rows.iter().any(|row| row.people > row.frames);
+    let of = if several { "the people of frames with as many fitted as annotated" } else { "frames with one person" };
+    let _ = writeln!(text, "Learned on {}. MAJPE / PA-MAJPE, mm, means over {of}.\n", escaped(first));
     let heads: Vec<&str> = CROSS_INPUTS.iter().map(|input| input.name).collect();
     let _ = writeln!(text, "| asked on | frames in sequences | {} |", heads.join(" | "));
     let _ = writeln!(text, "| --- | ---: |{}", " ---: |".repeat(heads.len()));
@@ -303,8 +309,9 @@ pub fn markdown(kind: CrossKind, rows: &[CrossRow]) -> String {
         let most = of.iter().max_by_key(|row| row.frames);
         let cell = |row: &&CrossRow| format!("{} / {}", number(row.majpe_mm), number(row.pa_majpe_mm));
         let cells: Vec<String> = of.iter().map(cell).collect();
-        let (frames, sequences) = most.map_or((0, 0), |row| (row.frames, row.sequences));
-        format!("| {} | {frames} in {sequences} | {} |\n", escaped(name), cells.join(" | "))
+        let (frames, people, sequences) = most.map_or((0, 0, 0), |row| (row.frames, row.people, row.sequences));
+        let people = if several { format!(" ({people} people)") } else { String::new() };
+        format!("| {} | {frames} in {sequences}{people} | {} |\n", escaped(name), cells.join(" | "))
     };
     for (at, of) in &parts {
         text += &line(order[*at], of);

@@ -4,10 +4,18 @@
 use crate::window::Window;
 use egui::{Key, Modifiers, Pos2, pos2};
 use mhp_inspector::app::Pane;
+use mhp_inspector::condition::{Breakpoint, Watch};
 use mhp_inspector::config::{FitConfig, Preset};
-use mhp_inspector::explore::{ExplorationKind, RegionOf, RestartSettings, SliceAlong, TunedFrames, TunedQuantity};
-use mhp_inspector::session::{Command, ViewState};
+use mhp_inspector::explore::{
+    ClosureRequest, ExplorationKind, ExploredState, IdleCores, Noise, RadarChange, RegionOf, RestartSettings,
+    SliceAlong, TunedFrames, TunedQuantity, closure_test, leave_one_out, observability, tau_clouds, tau_ribbon,
+    what_if,
+};
+use mhp_inspector::mhp::{ErasedCells, Fitter, connected_echo, without};
+use mhp_inspector::session::{Command, Session, ViewState};
+use mhp_inspector::task::Progress;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Room for numbers at the left of a picture and below it, points.
 const LEFT: f32 = 64.0;
@@ -351,11 +359,8 @@ fn explorations_make_way_for_a_run() {
 #[test]
 #[ignore = "prints figures of this machine; run it alone, with --nocapture"]
 fn figures() {
-    use mhp_inspector::explore::IdleCores;
-    use mhp_inspector::task::Progress;
     use std::path::Path;
     use std::sync::Mutex;
-    use std::time::Instant;
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let sets = [(root.join("samples/walk"), 3), (root.join("../shared/data/mmvr"), 0)];
     for (path, frame) in sets {
@@ -394,6 +399,9 @@ fn figures() {
                 let first = first.lock().unwrap().unwrap_or_default();
                 println!("  {:<16} first {:>7}  all {:>7}", kind.title(), seconds(first), seconds(began.elapsed()));
             }
+            if preset == Preset::Recommended {
+                rests_on(&window.session().explored_state().unwrap(), window.session());
+            }
         }
         let mut took = [Vec::new(), Vec::new()];
         for k in 0..10 {
@@ -417,4 +425,93 @@ fn figures() {
             took[0][2], took[1][2]
         );
     }
+}
+
+/// The same of what a fit rests on: how long each takes on all cores, and what it says.
+fn rests_on(state: &ExploredState, session: &Session) {
+    let (cores, progress) = (IdleCores::all(), Progress::new());
+    let info = session.data.dataset.as_ref().unwrap().info();
+    let told = |name: &str, began: Instant, says: String| {
+        println!("  {name:<16} all {:>6.3} s  {says}", began.elapsed().as_secs_f64());
+    };
+    let began = Instant::now();
+    let worth = leave_one_out(state, (&cores, &progress)).unwrap();
+    let most = &worth.joints[0];
+    let name = state.problem.skeleton.shown_name(most.joint % state.problem.skeleton.joints.len());
+    told("who lit it", began, format!("IoU {:.3}, most missed: {name}, {:+.3}", worth.iou.unwrap(), -most.drop));
+
+    let began = Instant::now();
+    let known = observability(state, Noise::Measured, (&cores, &progress)).unwrap();
+    let unseen = &known.unseen[0];
+    let says = format!(
+        "the echo fixes {:.1} of {:.0} directions, refits ±{:.1} mm; least: {} ±{:.0} mm",
+        known.fixed[0], known.fixed[1], known.spread_mm[0], unseen.name, unseen.spread_mm
+    );
+    told("radar knows", began, says);
+
+    let began = Instant::now();
+    let change = RadarChange { elements: Some(172), ..RadarChange::default() };
+    let seen = what_if(info, state, &vec![change; info.views.len()], (&cores, &progress)).unwrap();
+    let [a, b] = [&seen.today, &seen.other].map(|seen| seen.known.spread_mm[0]);
+    told("radar what-if", began, format!("172 elements: refits ±{a:.1} → ±{b:.1} mm"));
+
+    let began = Instant::now();
+    let request = ClosureRequest {
+        info: Arc::new(info.clone()),
+        pose: state.params.clone(),
+        config: state.config,
+        precision: state.precision,
+        noise: 0.02,
+        seed: 1,
+    };
+    let test = closure_test(&request, (&cores, &progress)).unwrap();
+    let [start, fit] = test.errors;
+    told(
+        "closure test",
+        began,
+        format!("MAJPE {:.0} → {:.0} mm, PA {:.0} mm", start.majpe_mm, fit.majpe_mm, fit.pa_majpe_mm),
+    );
+
+    let shown = session.fit.shown.as_ref().unwrap();
+    let maps: Vec<(&[f64], &[f64])> =
+        shown.h_sim.iter().enumerate().map(|(k, sim)| (state.problem.map(k), sim.as_slice())).collect();
+    let began = Instant::now();
+    let ribbon = tau_ribbon(&maps, &shown.masks);
+    let (best, telling) = (ribbon.best().unwrap(), ribbon.most_telling().unwrap());
+    told(
+        "τ ribbon",
+        began,
+        format!("largest IoU {:.3} at {} %, farthest from chance at {} %", best.1, best.0, telling.0),
+    );
+    let began = Instant::now();
+    let clouds = tau_clouds(state, (&shown.h_sim, &shown.masks), (&cores, &progress)).unwrap();
+    let [cfar, threshold, pppr] = [&clouds.cfar, &clouds.threshold, &clouds.pppr].map(Vec::len);
+    told("τ clouds", began, format!("{cfar} points by CFAR, {threshold} above τ, {pppr} of PPPR-PC"));
+
+    // The strongest echo goes, and the fit is done anew.
+    let largest =
+        (0..state.problem.map(0).len()).max_by(|a, b| state.problem.map(0)[*a].total_cmp(&state.problem.map(0)[*b]));
+    let view = &state.problem.views[0];
+    let began = Instant::now();
+    let cells = connected_echo((view, state.problem.map(0)), None, 2.0, largest.unwrap());
+    let erased = ErasedCells::of_cells((0, view), cells).unwrap();
+    let seen = without(&state.problem, std::slice::from_ref(&erased)).unwrap();
+    let mut fitter = Fitter::new(seen, state.config, state.precision, state.initial.clone()).unwrap();
+    fitter.run_unseen(state.config.iterations, |_| false).unwrap();
+    let moved = fitter.params().positions().iter().zip(state.params.positions());
+    let moved: Vec<f64> =
+        moved.map(|(a, b)| 1000.0 * a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()).collect();
+    let mean = moved.iter().sum::<f64>() / moved.len() as f64;
+    told("eraser", began, format!("{} cells of {}: the pose moves {mean:.0} mm", erased.count(), view.array));
+
+    let began = Instant::now();
+    let breakpoint: Breakpoint = "step_mm<1".parse().unwrap();
+    let mut fitter =
+        Fitter::new(Arc::clone(&state.problem), state.config, state.precision, state.initial.clone()).unwrap();
+    let mut watch = Watch::new(vec![breakpoint]);
+    watch.begin(&fitter, None);
+    fitter
+        .run_until(state.config.iterations, |fitter| fitter.iteration() > 0 && watch.step(fitter, None).is_some())
+        .unwrap();
+    told("breakpoint", began, format!("step_mm<1 stops at iteration {}", fitter.iteration()));
 }

@@ -1,4 +1,6 @@
-//! Pictures of what a fit rests on, to be looked at: `MHP_PICTURES=FOLDER MHP_DATA=DATA cargo test --test window pictures -- --ignored`.
+//! Pictures of what a fit could have come to and rests on, and of networks beside it, to be looked at and to be put into a paper:
+//! `MHP_PICTURES=FOLDER MHP_DATA=DATA cargo test --release --test window pictures -- --ignored`; `MHP_FRAME` names the frame,
+//! `MHP_PREDICTIONS` files of predictions with commas between.
 #![expect(clippy::unwrap_used, reason = "a picture that cannot be made is no picture")]
 
 use crate::window::Window;
@@ -6,6 +8,7 @@ use egui::pos2;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use mhp_inspector::app::{InspectorApp, Pane};
+use mhp_inspector::explore::{ExplorationKind, SliceAlong};
 use mhp_inspector::session::{Command, Isolate, ThemeChoice};
 use std::path::{Path, PathBuf};
 
@@ -42,6 +45,60 @@ fn picture(window: &mut Window, folder: &Path, name: &str) {
     }
 }
 
+/// What else the fit could have come to.
+fn others(window: &mut Window, folder: &Path) {
+    for kind in ExplorationKind::ALL {
+        let mut view = window.session().view.clone();
+        view.explore.landscape.and = Some(SliceAlong::BodyY);
+        window.apply(Command::SetView(Box::new(view)));
+        let pane = Pane::all().iter().find(|pane| pane.title().eq_ignore_ascii_case(kind.title())).unwrap();
+        window.harness.state_mut().show_pane(pane);
+        window.harness.run_steps(3);
+        window.apply(Command::Explore(kind));
+        window.until(kind.title(), |w| !w.session().explore.is_running(kind) && w.session().explore.is_current(kind));
+        window.harness.run_steps(4);
+        if kind == ExplorationKind::Restarts {
+            window.node("Take basin 1").hover();
+            window.harness.run_steps(4);
+        }
+        picture(window, folder, &kind.title().replace(' ', "-"));
+        window.harness.remove_cursor();
+    }
+}
+
+/// The strongest echo is taken away, and the fit done anew.
+fn eraser(window: &mut Window, folder: &Path, array: &str) {
+    let problem = window.fit().problem.clone().unwrap();
+    let map = problem.map(0);
+    let strongest = (0..map.len()).max_by(|a, b| map[*a].total_cmp(&map[*b])).unwrap();
+    window.apply(Command::EraseEcho(0, strongest));
+    window.until("the fit without it", |w| w.fit().erased().len() == 1 && !w.fit().is_running());
+    window.until("what it was worth", |w| w.named("Without the erased cells"));
+    println!("{array}: {}", window.text_of("Without the erased cells"));
+    picture(window, folder, "eraser");
+    window.apply(Command::Undo);
+    window.until("the echo back", |w| w.fit().erased().is_empty() && !w.fit().is_running());
+}
+
+/// Networks beside fit and truth, the list sorted by how far the first is from the fit.
+fn predictions(window: &mut Window, folder: &Path) {
+    let Ok(files) = std::env::var("MHP_PREDICTIONS") else { return };
+    let known = files.split(',').count();
+    for file in files.split(',') {
+        window.apply(Command::OpenPredictions(file.into(), Box::default()));
+    }
+    window.until("the predictions", |w| w.session().sources.list().len() == known);
+    window.harness.state_mut().show_pane(Pane::called("Predictions").unwrap());
+    let slot = window.session().sources.list()[0].name().to_owned();
+    window.click("Sort frames by disagreement");
+    window.harness.run_steps(4);
+    println!("sorted by how far {slot} is from the fit");
+    picture(window, folder, "predictions");
+    for _ in 0..known {
+        window.apply(Command::RemovePredictions(0));
+    }
+}
+
 #[test]
 #[ignore = "writes pictures to be looked at"]
 fn pictures() {
@@ -51,6 +108,9 @@ fn pictures() {
     std::fs::create_dir_all(&folder).unwrap();
     let mut window = open(&data, frame);
     let view = window.session().data.dataset.as_ref().unwrap().info().views[0].array.clone();
+    others(&mut window, &folder);
+    eraser(&mut window, &folder, &view);
+    predictions(&mut window, &folder);
 
     window.show("Who lit it");
     window.until("the joints left out", |w| w.says("its drop without a joint"));

@@ -1,14 +1,14 @@
 //! Predictions of others beside truth and fit: a row a source, on this frame and over all, and each joint's error. The colour before a
-//! name is the one it is drawn in.
+//! name is the one it is drawn in, to be changed by a click.
 
 use super::{Blank, Dock, Pane, PaneStates, Shared};
 use crate::app::commands::{AppAct, CommandRow, Menu, UiAction};
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Mark, Named as _};
 use crate::geometry::Vec3;
-use crate::predictions::{Comparison, SourceRow};
-use crate::session::{Command, Session, Sort, SortKey, frame_rows};
-use egui::{Color32, RichText, Role, Sense, Ui, vec2};
+use crate::predictions::{Colour, Comparison, SourceRow};
+use crate::session::{Command, Session, Sort, SortKey, Source, frame_rows};
+use egui::{Color32, RichText, Role, Ui, vec2};
 
 /// The pane.
 pub(in crate::app) static PANE: Pane = Pane {
@@ -127,7 +127,7 @@ fn table(ui: &mut Ui, shared: &mut Shared<'_>, rows: &[SourceRow], tokens: &Toke
         for (slot, (source, row)) in session.sources.list().iter().zip(rows).enumerate() {
             let name = source.name();
             ui.horizontal(|ui| {
-                swatch(ui, tokens.of_source(source));
+                swatch(ui, shared, slot, source, tokens);
                 let mut on = source.shown;
                 let told = format!("{}\n{}", source.predictions.path.display(), source.predictions.notes.join("\n"));
                 let tick = ui.checkbox(&mut on, name).on_hover_text(told.trim_end());
@@ -167,9 +167,19 @@ fn right_titled(ui: &mut Ui, title: &str, tip: &str, tokens: &Tokens) {
     });
 }
 
-fn swatch(ui: &mut Ui, color: Color32) {
-    let (rect, _) = ui.allocate_exact_size(vec2(12.0, 12.0), Sense::hover());
-    ui.painter().hline(rect.x_range(), rect.center().y, egui::Stroke::new(2.5, color));
+/// The colour of a source: a click asks for another, a right click takes that of the theme.
+fn swatch(ui: &mut Ui, shared: &mut Shared<'_>, slot: usize, source: &Source, tokens: &Tokens) {
+    let [mut r, mut g, mut b, _] = tokens.of_source(source).to_array();
+    let mut color = [r, g, b];
+    ui.spacing_mut().interact_size = vec2(14.0, 12.0);
+    let button = ui.color_edit_button_srgb(&mut color).named(Role::ColorWell, &format!("Colour of {}", source.name()));
+    let button = button.on_hover_text("Click for another colour; right click for the theme's own.");
+    if button.secondary_clicked() {
+        shared.send(Command::ColourPredictions(slot, None));
+    } else if button.changed() {
+        [r, g, b] = color;
+        shared.send(Command::ColourPredictions(slot, Some(Colour([r, g, b]))));
+    }
 }
 
 /// The errors of each joint in this frame, a row a source.

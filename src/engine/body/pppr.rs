@@ -240,6 +240,18 @@ impl Pppr {
         self.positions().get(person * joints..(person + 1) * joints).unwrap_or_default()
     }
 
+    /// One person as if nobody else were there.
+    pub fn only(&self, person: usize) -> Self {
+        let joints = self.shape.joints;
+        let mut one = Self::zeros(PpprShape { persons: 1, ..self.shape });
+        for group in Group::ALL {
+            for joint in 0..joints {
+                one.joint_mut(group, joint).copy_from_slice(self.joint(group, person * joints + joint));
+            }
+        }
+        one
+    }
+
     /// Position p of flat joint `joint`, m, world frame.
     pub fn position(&self, joint: usize) -> Vec3 {
         self.vec3(Group::Position, joint)

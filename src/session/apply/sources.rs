@@ -2,7 +2,7 @@
 
 use crate::dataset::Dataset;
 use crate::geometry::Vec3;
-use crate::predictions::{PredictionError, Predictions, Reading, start_of};
+use crate::predictions::{Colour, PredictionError, Predictions, Reading, start_of};
 use crate::session::effect::Effect;
 use crate::session::sources::{MOST_SOURCES, Source, SourceErrors, SourceQuestion};
 use crate::session::state::{LogLevel, Session};
@@ -104,8 +104,10 @@ impl Session {
             );
             return Vec::new();
         }
-        let hue = known.and_then(|at| self.sources.get(at)).map_or(self.sources.made, |source| source.hue);
-        let source = Source { predictions: Arc::clone(&predictions), hue, shown: true, errors: None };
+        let before = known.and_then(|at| self.sources.get(at));
+        let hue = before.map_or(self.sources.made, |source| source.hue);
+        let colour = predictions.colour.or_else(|| before.and_then(|source| source.colour));
+        let source = Source { predictions: Arc::clone(&predictions), hue, colour, shown: true, errors: None };
         if let Some(at) = known {
             self.sources.list.change()[at] = source;
         } else {
@@ -130,6 +132,13 @@ impl Session {
     pub(super) fn show_predictions(&mut self, slot: usize, shown: bool) -> Vec<Effect> {
         if let Some(source) = self.sources.list.change().get_mut(slot) {
             source.shown = shown;
+        }
+        Vec::new()
+    }
+
+    pub(super) fn colour_predictions(&mut self, slot: usize, colour: Option<Colour>) -> Vec<Effect> {
+        if let Some(source) = self.sources.list.change().get_mut(slot) {
+            source.colour = colour;
         }
         Vec::new()
     }

@@ -1,13 +1,14 @@
 //! What a person does with 100,000 frames, one thing after the other.
 
 use super::meter::{Meter, memory_mib, peak_memory_mib};
-use egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, Rect, TouchPhase, pos2, vec2};
+use egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, Pos2, Rect, TouchPhase, pos2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use mhp_inspector::app::{InspectorApp, Pane};
 use mhp_inspector::config::{FitConfig, Preset};
 use mhp_inspector::explore::ExplorationKind;
 use mhp_inspector::labels::Tag;
+use mhp_inspector::predictions::{WriteFormat, write_predictions};
 use mhp_inspector::session::{Command, LabelStatus, Session, Sort, SortKey, StrataStatus, TimelineStrip};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -323,6 +324,69 @@ impl Window {
             meter.pass_with(&mut self.0, |harness| harness.hover_at(at));
         }
         meter.print();
+        self.hand();
+        self.predictions();
+    }
+
+    /// τ under the finger, and cells under the brush, each with the fit that follows it.
+    fn hand(&mut self) {
+        self.show("Fit");
+        let ribbon = self.rect("IoU at every τ");
+        let stroke = |k: usize| ribbon.min + ribbon.size() * vec2(0.1 + 0.006 * k as f32, 0.5);
+        self.drag("τ dragged over its ribbon", 100, stroke);
+        self.click("Erase cells");
+        self.click("Erase by brush");
+        let map = self.rect("H_ori map of hm_hori");
+        let stroke = |k: usize| map.min + map.size() * vec2(0.3 + 0.002 * k as f32, 0.3 + 0.001 * k as f32);
+        self.drag("cells under the brush", 100, stroke);
+        self.apply(Command::Undo);
+        self.click("Erase cells");
+    }
+
+    /// Takes hold of something and moves it.
+    fn drag(&mut self, name: &str, passes: usize, at: impl Fn(usize) -> Pos2) {
+        let mut meter = Meter::new(name);
+        meter.pass_with(&mut self.0, |harness| harness.hover_at(at(0)));
+        meter.pass_with(&mut self.0, |harness| harness.drag_at(at(0)));
+        for k in 0..passes {
+            meter.pass_with(&mut self.0, |harness| harness.hover_at(at(k)));
+        }
+        meter.pass_with(&mut self.0, |harness| harness.drop_at(at(passes)));
+        self.passes_until(&mut meter, |s| !s.is_dragging() && !s.fit.is_running());
+        meter.print();
+    }
+
+    /// Two networks beside the fit, of the first thousand frames.
+    fn predictions(&mut self) {
+        let dataset = self.session().data.dataset.clone().unwrap();
+        let joints = &dataset.info().skeleton.joints;
+        let folder = tempfile::tempdir().unwrap();
+        for (name, aside) in [("near", 0.0), ("far", 0.3)] {
+            let frame = |index: usize| {
+                let body = (0..joints.len()).map(|k| [3.0, aside + 0.02 * k as f64, 0.8 - 0.1 * k as f64]).collect();
+                (dataset.frame_name(index).to_owned(), vec![body])
+            };
+            let frames: Vec<_> = (0..dataset.len().min(1000)).map(frame).collect();
+            let path = folder.path().join(format!("{name}.npz"));
+            write_predictions(&path, WriteFormat::of(&path).unwrap(), joints, &frames).unwrap();
+            let known = self.session().sources.list().len();
+            let read = |s: &Session| s.sources.list().get(known).is_some();
+            self.measured(
+                &format!("opening the predictions {name}"),
+                read,
+                Some(Command::OpenPredictions(path, Box::default())),
+            );
+        }
+        self.show("Predictions");
+        self.repeat("idle, two networks beside the fit", 60, |_, _| {});
+        let mut meter = Meter::new("from frame to frame with two networks");
+        for frame in 1..40 {
+            meter.pass_with(&mut self.0, |harness| harness.state_mut().apply(Command::GotoFrame(frame)));
+            (0..3).for_each(|_| meter.pass(&mut self.0));
+        }
+        meter.print();
+        self.apply(Command::GotoFrame(0));
+        self.until("frame 0", |s| s.data.loading.is_none() && s.fit.is_ready());
     }
 
     /// A run while the list is filtered by what the run changes.
