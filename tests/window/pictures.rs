@@ -8,6 +8,7 @@ use egui::pos2;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use mhp_inspector::app::{InspectorApp, Pane};
+use mhp_inspector::config::Preset;
 use mhp_inspector::explore::{ExplorationKind, SliceAlong};
 use mhp_inspector::session::{Command, Isolate, ThemeChoice};
 use std::path::{Path, PathBuf};
@@ -22,6 +23,9 @@ fn open(path: &Path, frame: usize) -> Window {
         .wgpu()
         .build_eframe(|cc| InspectorApp::new(cc, &paths));
     let mut window = Window { harness, folder: tempfile::tempdir().unwrap() };
+    window.ready(0);
+    window.apply(Command::SetConfig(Box::new(Preset::Recommended.config())));
+    window.apply(Command::Reset);
     window.ready(0);
     if frame > 0 {
         window.apply(Command::GotoFrame(frame));
@@ -68,6 +72,7 @@ fn others(window: &mut Window, folder: &Path) {
 
 /// The strongest echo is taken away, and the fit done anew.
 fn eraser(window: &mut Window, folder: &Path, array: &str) {
+    window.harness.state_mut().show_pane(Pane::called("Curves").unwrap());
     let problem = window.fit().problem.clone().unwrap();
     let map = problem.map(0);
     let strongest = (0..map.len()).max_by(|a, b| map[*a].total_cmp(&map[*b])).unwrap();
@@ -89,6 +94,7 @@ fn predictions(window: &mut Window, folder: &Path) {
     }
     window.until("the predictions", |w| w.session().sources.list().len() == known);
     window.harness.state_mut().show_pane(Pane::called("Predictions").unwrap());
+    window.harness.run_steps(4);
     let slot = window.session().sources.list()[0].name().to_owned();
     window.click("Sort frames by disagreement");
     window.harness.run_steps(4);

@@ -27,6 +27,8 @@ pub(super) struct CellBox {
     pub bins: Vec<[usize; 2]>,
     /// Marks of the cells, in C order of these axes.
     pub marked: Vec<bool>,
+    /// Whether each takes part; `None` where all do.
+    pub there: Option<Vec<bool>>,
     /// The same in tiles; empty in double precision.
     pub grid: TileGrid,
     /// The place among the view's own axes of each.
@@ -35,8 +37,13 @@ pub(super) struct CellBox {
 }
 
 impl CellBox {
-    /// Of the box `bins` of `view` whose cells are `marked` (C order).
-    pub(super) fn new(view: &View, bins: &[[usize; 2]], marked: &[bool], precision: Precision) -> Self {
+    /// Of the box `bins` of `view` whose cells are `marked` (C order); where not all take part, `there` says which do.
+    pub(super) fn new(
+        view: &View,
+        bins: &[[usize; 2]],
+        (marked, there): (&[bool], Option<&[bool]>),
+        precision: Precision,
+    ) -> Self {
         let order = match precision {
             Precision::F64 => (0..bins.len()).collect(),
             Precision::F32 => order_of(bins, |k| view.axes.get(k).is_some_and(|axis| axis.kind == AxisKind::Doppler)),
@@ -44,12 +51,13 @@ impl CellBox {
         let axes = order.iter().filter_map(|&k| view.axes.get(k).cloned()).collect();
         let bins_in_order: Vec<[usize; 2]> = order.iter().map(|&k| bins[k]).collect();
         let marked = into_order(&order, bins, marked);
+        let there = there.map(|there| into_order(&order, bins, there));
         let grid = match precision {
-            Precision::F64 => TileGrid::new(&[], &[]),
-            Precision::F32 => TileGrid::new(&bins_in_order, &marked),
+            Precision::F64 => TileGrid::new(&[], &[], None),
+            Precision::F32 => TileGrid::new(&bins_in_order, &marked, there.as_deref()),
         };
         let view = View { axes, region: None, ..view.clone() };
-        Self { view, bins: bins_in_order, marked, grid, order, own_bins: bins.into() }
+        Self { view, bins: bins_in_order, marked, there, grid, order, own_bins: bins.into() }
     }
 
     /// Values of the cells in the order of the sum, from those in C order of the view's own axes.

@@ -70,7 +70,7 @@ impl Workspace {
         moments.reset(splats.joints(), &model.view.axes);
         match precision {
             Precision::F64 => plain::<f64>(model, splats, target, factor, moments),
-            Precision::F32 if tiles::holds(model.config.softness) && target.left.is_none() => {
+            Precision::F32 if tiles::holds(model.config.softness) => {
                 let FitConfig { summation, tau_pct, softness, .. } = *model.config;
                 let query = EmQuery {
                     splats,

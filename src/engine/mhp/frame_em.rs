@@ -111,19 +111,17 @@ impl FrameEm {
                 percentile(&cells, 100.0 - config.tau_pct)
             };
             let ori: Vec<bool> = cells.iter().map(|&h| h > threshold).collect();
-            let cell_box = CellBox::new(view, &region.bins, &ori, precision);
-            let left = erased.then(|| {
-                let marks: Vec<f64> = there.iter().map(|&there| f64::from(u8::from(there))).collect();
-                let marks = cell_box.in_order_of_sum(&marks);
-                Left { places: (0..marks.len()).filter(|&k| marks[k] > 0.0).collect(), cells: there }
+            let cell_box = CellBox::new(view, &region.bins, (&ori, erased.then_some(&there)), precision);
+            let left = cell_box.there.as_ref().map(|marks| {
+                let places = (0..marks.len()).filter(|&k| marks[k]).collect();
+                Left { places, cells: there }
             });
             let levels = (config.objective != EmLoss::Iou).then(|| {
                 let noise = measured.noises[k];
                 let background = measured.clutter(k, region, noise).map(|power| inside(&power));
                 // Powers that add, without a spectrum along an axis.
                 let spectral = view.axes.iter().any(|axis| axis.kind == AxisKind::Doppler);
-                let in_rows =
-                    precision == Precision::F32 && config.summation == Summation::Incoherent && !spectral && !erased;
+                let in_rows = precision == Precision::F32 && config.summation == Summation::Incoherent && !spectral;
                 let of = (cells.as_slice(), noise);
                 Levels::new(config.objective, view.quantity, &cell_box, of, background.as_deref(), in_rows)
             });

@@ -41,6 +41,8 @@ pub(super) struct LevelRows {
     base: Vec<f32>,
     /// B_ori, 1 or 0.
     marked: Vec<f32>,
+    /// Where cells are erased, ascending: they are as those beyond the region.
+    erased: Vec<u32>,
 }
 
 /// Scratch of an evaluation.
@@ -79,8 +81,13 @@ pub(super) struct RowQuery<'a> {
 }
 
 impl LevelRows {
-    /// Of these numbers a cell of the box `bins`, C order; `None` unless it has two axes.
-    pub(super) fn new(bins: &[[usize; 2]], marked: &[bool], values: [&[f64]; 3]) -> Option<Self> {
+    /// Of these numbers a cell of the box `bins`, C order; where not all take part, `there` says which do. `None` unless it has
+    /// two axes.
+    pub(super) fn new(
+        bins: &[[usize; 2]],
+        (marked, there): (&[bool], Option<&[bool]>),
+        values: [&[f64]; 3],
+    ) -> Option<Self> {
         let [rows, columns] = bins else { return None };
         let (lo, size) = ([rows[0], columns[0]], [rows[1] - rows[0], columns[1] - columns[0]]);
         let stride = size[1].div_ceil(LANES) * LANES;
@@ -95,7 +102,19 @@ impl LevelRows {
         };
         let [measured, by_noise, base] = values.map(|values| padded(&|cell| values[cell] as f32));
         let marked = padded(&|cell| f32::from(u8::from(marked[cell])));
-        Some(Self { lo, size, stride, measured, by_noise, base, marked })
+        let gone = there.map(|there| padded(&|cell| f32::from(u8::from(!there[cell])))).unwrap_or_default();
+        let erased = (0..gone.len() as u32).filter(|&cell| gone[cell as usize] > 0.5).collect();
+        Some(Self { lo, size, stride, measured, by_noise, base, marked, erased })
+    }
+
+    /// Nothing is in what lies beyond the region, or is erased.
+    fn blank(&self, cells: &mut [f32]) {
+        for row in cells.chunks_exact_mut(self.stride.max(1)) {
+            row[self.size[1]..].fill(0.0);
+        }
+        for &cell in &self.erased {
+            cells[cell as usize] = 0.0;
+        }
     }
 }
 
@@ -241,10 +260,7 @@ impl RowScratch {
                 at += count * S::F32_LANES;
             }
         }
-        // Nothing lies beyond the region.
-        for row in self.power.chunks_exact_mut(rows.stride.max(1)) {
-            row[rows.size[1]..].fill(0.0);
-        }
+        rows.blank(&mut self.power);
     }
 
     /// Σ of all powers.
@@ -348,9 +364,7 @@ impl RowScratch {
         for slope in slopes {
             *slope = ((Lanes::new(simd, *slope) - through_gain) * factor).value;
         }
-        for row in self.slopes.chunks_exact_mut(rows.stride.max(1)) {
-            row[rows.size[1]..].fill(0.0);
-        }
+        rows.blank(&mut self.slopes);
     }
 
     /// What the cells want of a joint.
@@ -404,9 +418,10 @@ impl RowScratch {
         for row in self.power.chunks_exact(rows.stride.max(1)) {
             self.ranked.extend(row[..rows.size[1]].iter().map(|power| power.to_bits()));
         }
-        let Some(last) = self.ranked.len().checked_sub(1) else { return (None, true) };
+        let Some(last) = self.ranked.len().checked_sub(1 + rows.erased.len()) else { return (None, true) };
         let (lower, _) = place(last, 100.0 - tau_pct);
-        let (_, &mut lower, _) = self.ranked.select_nth_unstable(lower);
+        // Erased cells hold 0: they rank below all.
+        let (_, &mut lower, _) = self.ranked.select_nth_unstable(lower + rows.erased.len());
         let lower = f32::from_bits(lower);
         if lower <= 0.0 {
             return (None, false);

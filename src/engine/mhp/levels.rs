@@ -107,7 +107,6 @@ impl Levels {
             None => vec![noise; ordered.len()],
             Some(of) => cell_box.in_order_of_sum(of).iter().map(|&b| noise + b.max(0.0) / unit).collect(),
         };
-        let of_all = ordered.len();
         let (intensity, noises): (Vec<f64>, Vec<f64>) =
             ordered.iter().zip(noises).filter(left).map(|(&x, n)| (power(x) / unit, n)).unzip();
         let count = intensity.len().max(1) as f64;
@@ -147,11 +146,16 @@ impl Levels {
             base_variation: product(&base, &base),
             idle: if kind == EmLoss::Gamma { idle } else { 0.0 },
         };
-        let values: [&[f64]; 3] = [&measured, &by_noise, &base];
-        let rows = in_rows.then(|| LevelRows::new(&cell_box.bins, &cell_box.marked, values)).flatten();
-        // Tiles hold whole boxes.
-        let none = rows.is_some() || intensity.len() < of_all;
-        let tiles = if none { LevelTiles::default() } else { LevelTiles::new(&cell_box.grid, values) };
+        // Tiles and rows hold whole boxes: an erased cell says nothing there, whatever is simulated in it.
+        let whole = [&measured, &by_noise, &base].map(|values| {
+            let mut values = values.iter();
+            let of_cell = |x: &f64| if x.is_nan() { 0.0 } else { values.next().copied().unwrap_or_default() };
+            ordered.iter().map(of_cell).collect::<Vec<f64>>()
+        });
+        let values = [whole[0].as_slice(), &whole[1], &whole[2]];
+        let marks = (cell_box.marked.as_slice(), cell_box.there.as_deref());
+        let rows = in_rows.then(|| LevelRows::new(&cell_box.bins, marks, values)).flatten();
+        let tiles = if rows.is_some() { LevelTiles::default() } else { LevelTiles::new(&cell_box.grid, values) };
         Self { kind, measured, by_noise, base, totals, tiles, rows }
     }
 

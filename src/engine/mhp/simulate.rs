@@ -27,7 +27,7 @@ pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, par
     let (mut splats, mut scratch) = (Splats::default(), Splats::default());
     let of_view = |view: &View| {
         let region = Region::whole(view);
-        let cell_box = CellBox::new(view, &region.bins, &vec![false; region.cells()], precision);
+        let cell_box = CellBox::new(view, &region.bins, (&vec![false; region.cells()], None), precision);
         let model = ViewModel::new(&problem.radar, &cell_box.view, config);
         model.splats_of(&model.lobes(), (params, &gaussians), precision, (&mut splats, &mut scratch));
         let map = match precision {

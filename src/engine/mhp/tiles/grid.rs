@@ -4,7 +4,7 @@ use super::cells::{
     BLOCK_TILES, HALF_TILE_ACROSS_BINS, HALF_TILE_ALONG_BINS, PerCell, TILE_ACROSS_BINS, TILE_ALONG_BINS,
 };
 
-/// A box of cells in tiles, and B_ori over it: fixed for a fit. Sixteen tiles beside each other are a block; the last
+/// A box of cells in tiles, and B_ori over it: fixed for a fit. Erased cells are as those beyond the box. Sixteen tiles beside each other are a block; the last
 /// block of a row may reach beyond the box, as may the last row and column of tiles.
 #[derive(Debug, Clone)]
 pub(in crate::mhp) struct TileGrid {
@@ -15,8 +15,9 @@ pub(in crate::mhp) struct TileGrid {
     pub(super) rows: usize,
     pub(super) columns: usize,
     pub(super) blocks: Vec<Block>,
-    /// Sixteen tiles a block: B_ori as 0 or 1, −1 beyond the box.
+    /// Sixteen tiles a block: B_ori as 0 or 1, −1 beyond the box and where a cell is erased.
     pub(super) target: Vec<PerCell>,
+    /// Cells that take part.
     pub(super) cells: usize,
     pub(super) marked: usize,
 }
@@ -36,23 +37,28 @@ pub(in crate::mhp) fn blocks_of(sizes: impl DoubleEndedIterator<Item = usize>) -
 }
 
 impl TileGrid {
-    /// Cuts the box `bins` ([lo, hi) per axis), with B_ori in C order.
-    pub(in crate::mhp) fn new(bins: &[[usize; 2]], ori: &[bool]) -> Self {
+    /// Cuts the box `bins` ([lo, hi) per axis), with B_ori in C order, and whether each cell takes part where not all do.
+    pub(in crate::mhp) fn new(bins: &[[usize; 2]], ori: &[bool], there: Option<&[bool]>) -> Self {
         let (mut lo, mut size) = ([0; 3], [1; 3]);
         for (k, &[from, to]) in bins.iter().rev().take(3).enumerate() {
             (lo[2 - k], size[2 - k]) = (from, to.saturating_sub(from));
         }
         let (rows, columns) = (size[1].div_ceil(TILE_ACROSS_BINS), size[2].div_ceil(TILE_ALONG_BINS));
-        let marked = ori.iter().filter(|&&b| b).count();
+        let is_there = |cell: usize| there.is_none_or(|there| there.get(cell) == Some(&true));
+        let marked = (0..ori.len()).filter(|&cell| ori[cell] && is_there(cell)).count();
+        let cells = (0..ori.len()).filter(|&cell| is_there(cell)).count();
         let of_line = |line| {
             let (slice, row) = (line / rows, line % rows);
             (0..columns).step_by(BLOCK_TILES).map(move |column| Block { slice, row, column })
         };
         let blocks = (0..size[0] * rows).flat_map(of_line).collect();
-        let mut grid = Self { lo, size, rows, columns, blocks, target: Vec::new(), cells: ori.len(), marked };
+        let mut grid = Self { lo, size, rows, columns, blocks, target: Vec::new(), cells, marked };
         let mut target = vec![PerCell::all(-1.0); size[0] * rows * columns.div_ceil(BLOCK_TILES) * BLOCK_TILES];
-        let mut ori = ori.iter();
-        grid.for_places(|tile, cell| target[tile][cell] = ori.next().map_or(-1.0, |&ori| f32::from(u8::from(ori))));
+        let mut ori = ori.iter().enumerate();
+        grid.for_places(|tile, cell| {
+            let marked = ori.next().filter(|(k, _)| is_there(*k)).map(|(_, &ori)| f32::from(u8::from(ori)));
+            target[tile][cell] = marked.unwrap_or(-1.0);
+        });
         grid.target = target;
         grid
     }
@@ -85,7 +91,7 @@ mod tests {
         for [slices, height, width] in [[1, 1, 1], [1, 8, 64], [1, 20, 70], [3, 9, 130], [2, 17, 3]] {
             let bins = [[5, 5 + slices], [2, 2 + height], [7, 7 + width]];
             let marks: Vec<bool> = (0..slices * height * width).map(|cell| cell % 3 == 0).collect();
-            let grid = TileGrid::new(&bins, &marks);
+            let grid = TileGrid::new(&bins, &marks, None);
             assert_eq!(grid.blocks.len(), blocks_of([slices, height, width].into_iter()));
             let mut cells = 0;
             grid.for_places(|tile, cell| {

@@ -36,7 +36,7 @@ fn bins_of(grid: &TileGrid, tile: usize, cell: usize) -> [usize; 2] {
 
 fn whole_box() -> TileGrid {
     let cells = BOX.iter().map(|[lo, hi]| hi - lo).product();
-    TileGrid::new(&BOX, &vec![false; cells])
+    TileGrid::new(&BOX, &vec![false; cells], None)
 }
 
 /// log₂ of what 1 stands for in the sums of a map of these joints.
