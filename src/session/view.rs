@@ -114,6 +114,8 @@ pub enum TimelineStrip {
     Tags,
     /// How far the predictions of others are from the fits.
     Disagreement,
+    /// How far they are from the truth, the farthest of each frame.
+    PredictionError,
 }
 
 /// What the curves over the iterations show.

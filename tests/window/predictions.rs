@@ -6,7 +6,7 @@ use egui::Key;
 use mhp_inspector::dataset::npz::{ArrayView, write_npy};
 use mhp_inspector::folders::HOME_VARIABLE;
 use mhp_inspector::geometry::Vec3;
-use mhp_inspector::predictions::{Axes, Unit, WriteFormat, write_predictions};
+use mhp_inspector::predictions::{Axes, Colour, Unit, WriteFormat, write_predictions};
 use mhp_inspector::session::{Command as Ask, SortKey, TimelineStrip};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -142,6 +142,19 @@ fn a_fit_begins_at_a_prediction_and_the_list_is_sorted_by_disagreement() {
     view.strip = TimelineStrip::Disagreement;
     window.apply(Ask::SetView(Box::new(view)));
     window.harness.run_steps(3);
+    // Against the truth: of each frame the farthest source.
+    let errors = window.session().prediction_errors_mm();
+    for (frame, of) in &errors {
+        let row = window.session().frame_row(*frame);
+        let largest = row.sources.iter().filter_map(|(_, numbers)| numbers.majpe_mm).fold(0.0, f64::max);
+        assert_eq!(*of, largest, "frame {frame}");
+    }
+    assert_eq!(errors.len(), window.session().data.len());
+    window.click("Strip shows");
+    window.harness.run_steps(2);
+    window.click("Pred. mm");
+    window.harness.run_steps(3);
+    assert_eq!(window.session().view.strip, TimelineStrip::PredictionError);
 }
 
 #[test]
@@ -150,6 +163,8 @@ fn a_session_opens_with_its_predictions() {
     let near = predictions(&window, "near.parquet", 0.02);
     window.apply(Ask::OpenPredictions(near, Box::default()));
     read(&mut window, 1);
+    let chosen = Some(Colour([0x10, 0xA3, 0x7F]));
+    window.apply(Ask::ColourPredictions(0, chosen));
     let talks = tempfile::tempdir().unwrap();
     let file = talks.path().join("talk.mhp-session");
     window.apply(Ask::SaveSession(file.clone(), serde_json::Value::Null));
@@ -158,4 +173,7 @@ fn a_session_opens_with_its_predictions() {
     window.apply(Ask::OpenSession(file));
     read(&mut window, 1);
     assert_eq!(window.session().sources.list()[0].name(), "near");
+    assert_eq!(window.session().sources.list()[0].colour, chosen);
+    window.show("Predictions");
+    assert!(window.named("Colour of near"), "{:?}", window.names());
 }

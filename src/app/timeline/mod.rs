@@ -63,6 +63,7 @@ fn choose_strip(ui: &mut Ui, shared: &mut Shared<'_>) {
         (TimelineStrip::Iou, "IoU"),
         (TimelineStrip::Tags, "Tags"),
         (TimelineStrip::Disagreement, "Disagree"),
+        (TimelineStrip::PredictionError, "Pred. mm"),
     ];
     let now = shared.session.view.strip;
     ui.allocate_ui_with_layout(vec2(CAPTION, 22.0), egui::Layout::left_to_right(egui::Align::Center), |ui| {
@@ -77,7 +78,7 @@ fn choose_strip(ui: &mut Ui, shared: &mut Shared<'_>) {
             }
         });
         let tip = "What the strip over all frames shows: bars for stratum or IoU, marks for tags, or how far \
-                   the predictions of others are from the fits (the whole height is 300 mm).";
+                   the predictions of others are from the fits or from the truth (the whole height is 300 mm).";
         button.response.named(egui::Role::Button, "Strip shows").on_hover_text(tip);
     });
 }

@@ -66,8 +66,9 @@ pub(super) struct Strips {
     iou: Lane<(Size, u64), (f64, u32)>,
     /// Every tag that is seen.
     tags: Lane<(Size, u64, LabelMode), Tags>,
-    /// Sum of distances between predictions and fits, mm, and of how many.
+    /// Sum of distances between predictions and fits, or truth, mm, and of how many.
     apart: Lane<(Size, [u64; 2]), (f64, u32)>,
+    off: Lane<(Size, u64), (f64, u32)>,
 }
 
 impl Strips {
@@ -87,6 +88,7 @@ impl Strips {
                 TimelineStrip::Stratum => strata(ui, column, self.strata.at(i), faded, tokens),
                 TimelineStrip::Iou => iou(ui, column, self.iou.at(i), faded, tokens),
                 TimelineStrip::Disagreement => apart(ui, column, self.apart.at(i), faded, tokens),
+                TimelineStrip::PredictionError => apart(ui, column, self.off.at(i), faded, tokens),
                 TimelineStrip::Tags => tags(ui, column, self.tags.at(i), faded, tokens),
             }
         }
@@ -113,6 +115,12 @@ impl Strips {
                     session.summaries.keys().filter_map(|&frame| Some((frame, session.disagreement_mm(frame)?)));
                 let key = (size, [session.sources.revision(), session.summaries.revision()]);
                 self.apart.update(size, key, known, |sum, mm| *sum = (sum.0 + mm, sum.1 + 1));
+            }
+            TimelineStrip::PredictionError => {
+                // Made only where something changed.
+                let known = std::iter::once(()).flat_map(|()| session.prediction_errors_mm());
+                let key = (size, session.sources.revision());
+                self.off.update(size, key, known, |sum, mm| *sum = (sum.0 + mm, sum.1 + 1));
             }
             TimelineStrip::Tags => {
                 let mode = session.view.label_mode;
@@ -157,7 +165,7 @@ fn iou(ui: &Ui, column: Rect, (sum, count): (f64, u32), faded: f32, tokens: &Tok
     }
 }
 
-/// Mean distance between predictions and fits: height and colour say the same.
+/// Mean distance between predictions and fits or truth: height and colour say the same.
 fn apart(ui: &Ui, column: Rect, (sum, count): (f64, u32), faded: f32, tokens: &Tokens) {
     if count > 0 {
         let share = (sum / f64::from(count) / WHOLE_MM).clamp(0.0, 1.0);

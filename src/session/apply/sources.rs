@@ -7,6 +7,7 @@ use crate::session::effect::Effect;
 use crate::session::sources::{MOST_SOURCES, Source, SourceErrors, SourceQuestion};
 use crate::session::state::{LogLevel, Session};
 use crate::worker::Start;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -180,6 +181,17 @@ impl Session {
         let fit = self.fit_joints(index)?;
         let of = self.sources.list().iter().filter_map(|source| source.numbers(index, Some(&fit), joints).to_fit_mm);
         of.max_by(f64::total_cmp)
+    }
+
+    /// The largest MAJPE of a source in each frame whose truth is known, mm.
+    pub fn prediction_errors_mm(&self) -> BTreeMap<usize, f64> {
+        let mut largest = BTreeMap::new();
+        let known = self.sources.list().iter().filter_map(|source| source.errors.as_ref());
+        for (&frame, &[majpe_mm, _]) in known.flat_map(|errors| &errors.frames) {
+            let of: &mut f64 = largest.entry(frame).or_insert(majpe_mm);
+            *of = of.max(majpe_mm);
+        }
+        largest
     }
 
     /// The joints of the fit of a frame, m, where this session knows them.
