@@ -60,8 +60,19 @@ const RIGHT: (f32, [f32; 2]) = (0.2, [258.0, 430.0]);
 /// Height of what is below the maps.
 const BELOW: (f32, [f32; 2]) = (0.165, [112.0, 300.0]);
 
-/// The same while a pane is in front there that needs more of it.
+/// The same while a pane is in front there that needs more of it, or still more.
+const BELOW_HIGH: (f32, [f32; 2]) = (0.27, [150.0, 420.0]);
 const BELOW_TALL: (f32, [f32; 2]) = (0.42, [200.0, 620.0]);
+
+/// The height of what is below the maps while one of these panes is in front there.
+fn below(in_front: &[Leaf]) -> (f32, [f32; 2]) {
+    let has = |dock: Dock| in_front.iter().any(|pane| pane.dock() == dock);
+    match (has(Dock::BottomTall), has(Dock::BottomHigh)) {
+        (true, _) => BELOW_TALL,
+        (_, true) => BELOW_HIGH,
+        _ => BELOW,
+    }
+}
 
 /// A share of the window's size, within bounds, points.
 fn within((share, [least, most]): (f32, [f32; 2]), of: f32) -> f32 {
@@ -81,9 +92,9 @@ impl Fitted {
     }
 
     /// Sets the borders for a window whose sides have these widths, points, 0 where one gave way; false where somebody moved one.
-    fn set(&mut self, tiles: &mut Tiles<Leaf>, size: egui::Vec2, sides: [f32; 2], tall: bool) -> bool {
+    fn set(&mut self, tiles: &mut Tiles<Leaf>, size: egui::Vec2, sides: [f32; 2], below: (f32, [f32; 2])) -> bool {
         let [left, right] = sides.map(|width| width / size.x.max(1.0));
-        let below = within(if tall { BELOW_TALL } else { BELOW }, size.y) / size.y.max(1.0);
+        let below = within(below, size.y) / size.y.max(1.0);
         // What gave way keeps a share that counts for nothing.
         let kept = |share: f32| if share > 0.0 { share } else { 0.2 };
         let middle = (1.0 - left - right).max(0.1);
@@ -209,8 +220,8 @@ impl PaneLayout {
             }
             let size = ui.available_size();
             let in_front = self.tree.active_tiles().into_iter().filter_map(|id| self.tree.tiles.get_pane(&id));
-            let tall = in_front.into_iter().any(|pane| pane.dock() == Dock::BottomTall);
-            let set = |mut fitted: Fitted| fitted.set(&mut self.tree.tiles, size, sides, tall).then_some(fitted);
+            let below = below(&in_front.copied().collect::<Vec<_>>());
+            let set = |mut fitted: Fitted| fitted.set(&mut self.tree.tiles, size, sides, below).then_some(fitted);
             self.fitted = self.fitted.take().and_then(set);
             let mut behavior = Behavior { shared, states, asked: &mut self.asked, icons: Vec::new() };
             self.tree.ui(&mut behavior, ui);

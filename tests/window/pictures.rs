@@ -39,6 +39,7 @@ fn open(path: &Path, frame: usize) -> Window {
 }
 
 fn picture(window: &mut Window, folder: &Path, name: &str) {
+    window.dismiss_all();
     for theme in [ThemeChoice::Dark, ThemeChoice::Light] {
         let mut view = window.session().view.clone();
         view.theme = theme;

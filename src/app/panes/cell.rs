@@ -27,7 +27,7 @@ pub(super) static PANE: Pane = Pane {
         Mark::Line(&[[12.0, 8.0], [15.0, 8.0]]),
     ],
     help: "the joints that light the cell under the pointer, and what each joint is worth",
-    dock: Dock::Bottom,
+    dock: Dock::BottomHigh,
     keys: &[],
     margin: 8,
     state: PaneStates::prepare::<State>,

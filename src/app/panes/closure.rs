@@ -30,7 +30,7 @@ pub(super) static PANE: Pane = Pane {
         Mark::Line(&[[5.5, 11.0], [3.0, 13.0], [5.5, 15.0]]),
     ],
     help: "whether the pipeline could have recovered this pose from this radar at all",
-    dock: Dock::Bottom,
+    dock: Dock::BottomHigh,
     keys: &[],
     margin: 8,
     state: PaneStates::prepare::<State>,

@@ -35,7 +35,7 @@ pub(super) static PANE: Pane = Pane {
         Mark::Line(&[[5.5, 8.0], [8.0, 6.5], [10.5, 8.0], [8.0, 9.5], [5.5, 8.0]]),
     ],
     help: "what the echo fixes of the pose, and what only the prior does",
-    dock: Dock::Bottom,
+    dock: Dock::BottomHigh,
     keys: &[],
     margin: 8,
     state: PaneStates::prepare::<State>,

@@ -89,7 +89,9 @@ pub(crate) enum Dock {
     Centre,
     /// Below the middle.
     Bottom,
-    /// There too, with more height while it is in front: pictures over two axes.
+    /// There too, with more height while it is in front: lists and tables beside maps that matter as much.
+    BottomHigh,
+    /// There too, with still more: pictures over two axes.
     BottomTall,
     /// The upper part of the column at the right edge.
     RightTop,
@@ -100,7 +102,10 @@ pub(crate) enum Dock {
 impl Dock {
     /// Whether panes of both are tabs of one place.
     pub(in crate::app) fn is_beside(self, other: Self) -> bool {
-        let place = |dock| if dock == Self::BottomTall { Self::Bottom } else { dock };
+        let place = |dock| match dock {
+            Self::BottomHigh | Self::BottomTall => Self::Bottom,
+            dock => dock,
+        };
         place(self) == place(other)
     }
 }

@@ -21,7 +21,7 @@ pub(in crate::app) static PANE: Pane = Pane {
         Mark::Line(&[[11.5, 8.0], [14.5, 14.0]]),
     ],
     help: "joints of networks and earlier runs beside truth and fit",
-    dock: Dock::Bottom,
+    dock: Dock::BottomHigh,
     keys: &[],
     margin: 8,
     state: PaneStates::prepare::<()>,

@@ -187,7 +187,7 @@ const COLUMNS: &[Column] = &[
         name: "Frame",
         tip: "The frame's name; the whole of it is in the tooltip of a row.",
         sort: SortKey::Index,
-        width: 44.0,
+        width: 48.0,
         right: false,
     },
     Column {
