@@ -71,9 +71,9 @@ fn point_at(wanted: [(AxisKind, f64); 3], near: Vec3) -> Option<Vec3> {
 /// Where a point goes that is moved on a map to picture coordinates `unit`, world frame, m; what the map does not show stays.
 pub(super) fn moved_on(view: &View, o: Orientation, from: Vec3, unit: [f64; 2]) -> Option<Vec3> {
     let third = third(view, o)?;
-    let p = view.pose.view_from_world(from);
+    let p = view.seen_at(from);
     let at = point_at(of_bins(view, o, o.bins_from_unit(view, unit), third, coordinate(third, p)), p)?;
-    at.iter().all(|x| x.is_finite()).then(|| view.pose.world_from_view(at))
+    at.iter().all(|x| x.is_finite()).then(|| view.place_of(at))
 }
 
 /// The coordinates at a horizontal and a vertical bin, and a third one.
@@ -105,7 +105,7 @@ pub(super) fn seen_by(views: &[View], view: &View, o: Orientation, pixel: [usize
     let points = (0..=PIECES).filter_map(|k| {
         near = point_at([wanted[0], wanted[1], (open, at(k))], near)?;
         // Behind the radar nothing is seen.
-        (near[0] >= -EXACT).then(|| view.pose.world_from_view(near))
+        (near[0] >= -EXACT).then(|| view.place_of(near))
     });
     points.collect()
 }

@@ -442,6 +442,9 @@ fn psf_fault(view: &View) -> Option<String> {
     widths_fault(&view.psf).map(|message| format!("psf {message}"))
 }
 
+/// No map adds more to a range, m.
+const MOST_OFFSET_M: f64 = 20.0;
+
 /// What is wrong with widths, naming the key.
 pub(super) fn widths_fault(psf: &PointSpread) -> Option<String> {
     let PointSpread { range_m, azimuth_rad, elevation_rad, doppler_mps, .. } = *psf;
@@ -452,7 +455,10 @@ pub(super) fn widths_fault(psf: &PointSpread) -> Option<String> {
         ("doppler_mps", doppler_mps, MAX_SPEED_MPS),
     ];
     let bad = widths.into_iter().find(|(_, value, most)| !(0.0..=*most).contains(value));
+    let offset_m = psf.range_offset_m;
+    let far = || format!("`range_offset_m` is {offset_m}; expected −{MOST_OFFSET_M} to {MOST_OFFSET_M}");
     bad.map(|(key, value, most)| format!("`{key}` is {value}; expected 0 to {most:.4}"))
+        .or_else(|| (!(-MOST_OFFSET_M..=MOST_OFFSET_M).contains(&offset_m)).then(far))
 }
 
 /// A rotation keeps lengths and angles; a mirror does too, and is let pass.

@@ -130,7 +130,7 @@ fn sought(problem: &Arc<Problem>, config: &FitConfig, seeds: &[Vec3]) -> Result<
 /// those before. The nearest in time are scanned last.
 fn count(problem: &Problem, config: &FitConfig) -> Result<Count, FitError> {
     let told = |error: crate::people::PeopleError| FitError::NoStart { reason: error.to_string() };
-    let counter = Counter::new(&problem.views).map_err(told)?;
+    let counter = Counter::new(problem.views_under(config)).map_err(told)?;
     let mut around: Vec<&Neighbour> = problem.neighbours_in(config.frames_around).iter().collect();
     around.sort_by(|a, b| b.offset_s.abs().total_cmp(&a.offset_s.abs()));
     let views = 0..problem.views.len();

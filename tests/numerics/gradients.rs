@@ -82,7 +82,15 @@ fn view(name: &str, kinds: &[AxisKind], rng: &mut StdRng) -> View {
         array: name.to_owned(),
         quantity: Quantity::default(),
         axes: axes.collect(),
-        psf: PointSpread { range_m: 0.08, azimuth_rad: 0.06, elevation_rad: 0.05, doppler_mps: 0.2, lobes: LOBES },
+        psf: PointSpread {
+            range_m: 0.08,
+            azimuth_rad: 0.06,
+            elevation_rad: 0.05,
+            doppler_mps: 0.2,
+            lobes: LOBES,
+            range_offset_m: 0.07,
+            measured_offset_m: 0.0,
+        },
         pose: Pose {
             rotation: rotation_from_quaternion(q),
             translation: std::array::from_fn(|_| rng.random_range(-0.2..0.2)),

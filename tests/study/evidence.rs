@@ -30,6 +30,8 @@ const PSF: PointSpread = PointSpread {
     elevation_rad: 0.03,
     doppler_mps: 0.05,
     lobes: Lobes { range: None, azimuth: None, elevation: None, doppler: None },
+    range_offset_m: 0.0,
+    measured_offset_m: 0.0,
 };
 
 fn axis(kind: AxisKind, bins: usize, lo: f64, hi: f64) -> Axis {

@@ -1,8 +1,12 @@
 //! A pose before other radars: the maps of another's, and one body fitted from three.
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
+use mhp_inspector::config::{FitConfig, Preset, RangeOffset};
+use mhp_inspector::dataset::Dataset;
 use mhp_inspector::dataset::npz::NpzArchive;
 use mhp_inspector::study::radars::{RADARS, ThreeRadars};
+use mhp_inspector::study::{BatchOptions, FitNumbers, fit_frame};
+use mhp_inspector::task::Progress;
 use std::path::Path;
 use std::process::Command;
 
@@ -77,4 +81,48 @@ fn one_body_is_fitted_from_three_radars() {
         assert!(row.frames == 1 && row.majpe_mm < 700.0 && row.pa_majpe_mm < 200.0 && row.iou > 0.2, "{row:?}");
         assert!(text.contains(&format!("| {:.0} | {:.0} |", row.start_mm, row.majpe_mm)), "{text}");
     }
+}
+
+/// Two radars in one place whose ranges begin elsewhere: what the maps tell of it is taken into account, and the pose is as good as
+/// before radars that agree. Which of the two is right nobody can tell: the body stands between.
+#[test]
+fn a_fit_bears_radars_whose_ranges_differ() {
+    const APART_M: f64 = 0.2;
+    let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/walk");
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("frames")).unwrap();
+    for frame in 0..6 {
+        let name = format!("frames/{frame:06}.npz");
+        std::fs::copy(sample.join(&name), folder.path().join(&name)).unwrap();
+    }
+    let text = std::fs::read_to_string(sample.join("dataset.toml")).unwrap();
+    let (hori, vert) = text.split_at(text.find("array = \"hm_vert\"").unwrap());
+    let farther =
+        |of: &str, key: &str, metres: f64| of.replacen(key, &format!("{} = {}", &key[..2], metres + APART_M), 1);
+    let shifted = farther(&farther(vert, "lo = 7.984375", 7.984_375), "hi = -0.015625", -0.015_625);
+    let fit = |text: &str, range_offset: RangeOffset| {
+        std::fs::write(folder.path().join("dataset.toml"), text).unwrap();
+        let dataset = Dataset::open(folder.path(), &Progress::new()).unwrap();
+        let config = FitConfig { range_offset, ..Preset::Recommended.config() };
+        let options = BatchOptions { config, ..BatchOptions::default() };
+        fit_frame(&dataset, 3, &options, None).unwrap().numbers
+    };
+    let agreed = fit(&text, RangeOffset::Measured);
+    assert_eq!(fit(&text, RangeOffset::Stated).report.loss, agreed.report.loss, "there is no offset to be found");
+    let apart = format!("{hori}{shifted}");
+    let [ignored, measured] = [RangeOffset::Stated, RangeOffset::Measured].map(|offset| fit(&apart, offset));
+    let em = |of: &FitNumbers| of.report.terms.get("em").unwrap();
+    println!("L_EM {:.4} agreed, {:.4} ignored, {:.4} measured", em(&agreed), em(&ignored), em(&measured));
+    assert!(em(&measured) < 1.2 * em(&agreed) && em(&ignored) > 1.8 * em(&agreed));
+    assert!(measured.pa_majpe_mm.unwrap() < agreed.pa_majpe_mm.unwrap() + 10.0);
+    // A manifest that states it needs no measuring, and knows which radar is right.
+    let (head, tail) = apart.split_at(apart.rfind("[view.psf]").unwrap());
+    let stated =
+        format!("{head}{}", tail.replacen("[view.psf]", &format!("[view.psf]\nrange_offset_m = {APART_M}"), 1));
+    let told = fit(&stated, RangeOffset::Stated);
+    assert!((told.majpe_mm.unwrap() - agreed.majpe_mm.unwrap()).abs() < 15.0, "{told:?}");
+    let far = stated.replacen(&format!("range_offset_m = {APART_M}"), "range_offset_m = 200.0", 1);
+    std::fs::write(folder.path().join("dataset.toml"), far).unwrap();
+    let why = Dataset::open(folder.path(), &Progress::new()).unwrap_err().to_string();
+    assert!(why.contains("`range_offset_m` is 200; expected −20 to 20"), "{why}");
 }

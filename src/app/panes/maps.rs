@@ -196,9 +196,11 @@ impl PaneState for State {
 
     /// Zooms every map to the person.
     fn focus(&mut self, session: &Session) {
-        let Some(dataset) = &session.data.dataset else { return };
+        if session.data.dataset.is_none() {
+            return;
+        }
         self.focus.whole = false;
-        self.show_person(session, &dataset.info().views, false);
+        self.show_person(session, session.seen_views(), false);
     }
 }
 
@@ -238,7 +240,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     state.begin_pass(ui.ctx());
     let session = shared.session;
     let (Some(dataset), Some(frame)) = (&session.data.dataset, &session.data.frame) else { return };
-    let views = &dataset.info().views;
+    let views = session.seen_views();
     let known = state.dataset.as_ref().and_then(std::sync::Weak::upgrade);
     if !known.is_some_and(|known| std::sync::Arc::ptr_eq(&known, dataset)) {
         state.dataset = Some(std::sync::Arc::downgrade(dataset));
@@ -330,7 +332,7 @@ fn name_of(session: &Session, content: Content, state: &State, view: &View) -> (
 /// One map of one view: picture, title, axes, overlays.
 fn one(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State, column: MapColumn, row: &GridRow, rect: Rect) {
     let (session, index) = (shared.session, row.view);
-    let Some(view) = session.data.dataset.as_ref().and_then(|d| d.info().views.get(index)) else { return };
+    let Some(view) = session.seen_views().get(index) else { return };
     let orientation = Orientation::of(view, session.view.cube);
     let content = content_of(column, state, session);
     let (name, what) = name_of(session, content, state, view);

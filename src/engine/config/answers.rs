@@ -65,6 +65,15 @@ pub(super) const SUMMATION: &[Answer] = &[
     answer("incoherent", "incoherent", "H_sim = √Σ (A K)²: powers add."),
 ];
 
+pub(super) const RANGE_OFFSET: &[Answer] = &[
+    answer("stated", "as stated", "What the manifest says, psf.range_offset_m of a view; 0 where it says nothing."),
+    answer(
+        "measured",
+        "measured",
+        "Besides what the maps tell: powers by range of the views of one place, shifted until they agree. Counts from 6 cm on, where it explains them clearly better.",
+    ),
+];
+
 pub(super) const LOBE: &[Answer] = &[
     answer("gaussian", "Gaussian", "One Gaussian a joint, of the width of psf: SPEC 3."),
     answer(

@@ -6,8 +6,8 @@ use super::field::{Access, Answer, Field, FieldGroup, ReadBy, Unset, Value};
 use super::rows::{choice, count_at, flag_at, maybe_at, number, number_at, one_of_at, switch};
 use super::{
     Background, BodyModel, Clutter, Convergence, EM_REGION_FORM, EmLoss, EmRegion, FitConfig, FramesAround,
-    GradientVelocity, Height, LobeShape, Parameterization, Scatterers, StartPlace, StaticEcho, Still, Summation,
-    WarmStart, Yaw, answers,
+    GradientVelocity, Height, LobeShape, Parameterization, RangeOffset, Scatterers, StartPlace, StaticEcho, Still,
+    Summation, WarmStart, Yaw, answers,
 };
 use FieldGroup::{Limits, Model, Optimiser, Perturbation, Radar, Start as Starting, StepSizes, Weights};
 use ReadBy::{Run, Start, Steps, StepsAndStart};
@@ -199,6 +199,18 @@ pub const FIELDS: &[Field] = &[
             one_of_at!(lobe, [LobeShape::Gaussian, LobeShape::Window]),
         )
         .row("the window's lobe")
+    },
+    Field {
+        help: "By how much the ranges of a map are too large: what the manifest states, or besides that what the maps tell, in which the radars of one place see the same echoes.",
+        ..choice(
+            Radar,
+            "range_offset",
+            "Range",
+            StepsAndStart,
+            answers::RANGE_OFFSET,
+            one_of_at!(range_offset, [RangeOffset::Stated, RangeOffset::Measured]),
+        )
+        .row("range offsets measured")
     },
     Field {
         help: "Where L_EM is computed: the whole map, or a box of this half width around the start pose.",

@@ -53,6 +53,17 @@ pub enum LobeShape {
     Window,
 }
 
+/// What the ranges of a map have too much.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RangeOffset {
+    /// What the manifest states, `range_offset_m` of a view's point spread; 0 where it states none.
+    #[default]
+    Stated,
+    /// Besides what the maps tell: the ranges at which the views of one place see the same echoes.
+    Measured,
+}
+
 /// How L_EM compares the simulated map with the measured one; SPEC sections 4 and 8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -198,6 +209,8 @@ pub struct FitConfig {
     pub summation: Summation,
     /// Gaussian or the window's own lobe; the latter where joints are summed coherently and the view's FFTs are known.
     pub lobe: LobeShape,
+    /// Range offsets as stated, or measured in the maps.
+    pub range_offset: RangeOffset,
     /// Where L_EM is evaluated.
     pub em_region: EmRegion,
     /// How far in front of the joint its echo comes from, m.
@@ -267,6 +280,7 @@ impl Default for FitConfig {
             d_joint_m: 0.1,
             summation: Summation::default(),
             lobe: LobeShape::default(),
+            range_offset: RangeOffset::default(),
             em_region: EmRegion::default(),
             surface_offset_m: 0.0,
             scale_max_m: 0.43,

@@ -55,6 +55,7 @@ impl Objective {
         initial: &Pppr,
     ) -> Result<Self, FitError> {
         problem.check(initial)?;
+        let problem = problem.shared_under(&config);
         let centres = region::centres(initial);
         let (regions, warnings) = region::regions(&problem.views, config.em_region, &centres)?;
         let em = FrameEm::new(&problem.measured(&config), &regions, &config, precision);

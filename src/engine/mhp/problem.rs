@@ -1,14 +1,17 @@
 //! One frame's worth of optimisation problem: radar, skeleton, views and their maps, checked and filled.
 
-use super::context::{Contexts, Neighbour, Reading, TemporalContext, anchors};
+use super::context::{Contexts, Neighbour, Reading, TemporalContext, anchors, range_offsets};
 use super::frame_em::Measured;
 use super::thinned::{Strides, ThinnedCache, ThinnedMaps};
 use super::{FitError, fill_missing};
 use crate::body::{Pppr, Skeleton};
-use crate::config::{Clutter, EmLoss, FitConfig, FramesAround};
+use crate::config::{Clutter, EmLoss, FitConfig, FramesAround, RangeOffset};
 use crate::geometry::Vec3;
 use crate::radar::{RadarConfig, View, ViewSet};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
+
+/// Frames whose ranges are compared at most, with that of the fit.
+const FRAMES_COMPARED: usize = 5;
 
 /// Everything a fit needs besides its configuration and its start. Maps are cast to f64 and their missing cells filled
 /// (SPEC section 4).
@@ -27,8 +30,26 @@ pub struct Problem {
     neighbours: Vec<Neighbour>,
     contexts: Contexts,
     thinned: ThinnedCache,
+    /// The same with the range offsets that the maps tell, if any.
+    offset: MeasuredOffset,
     /// Where cells were erased, which are NaN in the maps here: the same problem with what borders on them in their place.
     patched: Option<Arc<Self>>,
+}
+
+/// What range offsets make of a problem; nothing of its own, so that a copy works it out anew.
+#[derive(Debug, Default)]
+struct MeasuredOffset(OnceLock<Option<Arc<Problem>>>);
+
+impl Clone for MeasuredOffset {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl PartialEq for MeasuredOffset {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 impl Problem {
@@ -61,8 +82,46 @@ impl Problem {
             neighbours: Vec::new(),
             contexts: Contexts::default(),
             thinned: ThinnedCache::default(),
+            offset: MeasuredOffset::default(),
             patched: None,
         })
+    }
+
+    /// The problem as fits with this configuration see it: with [`RangeOffset::Measured`] the views' maps add to a range what they and
+    /// the frames around tell, worked out when first asked for; the problem must not be changed afterwards.
+    pub(super) fn under(&self, config: &FitConfig) -> &Self {
+        self.offset(config).map_or(self, |offset| offset)
+    }
+
+    /// As [`Self::under`].
+    pub(super) fn shared_under(self: &Arc<Self>, config: &FitConfig) -> Arc<Self> {
+        Arc::clone(self.offset(config).unwrap_or(self))
+    }
+
+    /// The views as fits with this configuration see them.
+    pub fn views_under(&self, config: &FitConfig) -> &ViewSet {
+        &self.under(config).views
+    }
+
+    fn offset(&self, config: &FitConfig) -> Option<&Arc<Self>> {
+        if config.range_offset != RangeOffset::Measured
+            || self.views.iter().any(|view| view.psf.measured_offset_m != 0.0)
+        {
+            return None;
+        }
+        self.offset.0.get_or_init(|| self.with_offsets().map(Arc::new)).as_ref()
+    }
+
+    fn with_offsets(&self) -> Option<Self> {
+        let mut around: Vec<&Neighbour> = self.neighbours.iter().collect();
+        around.sort_by(|a, b| a.offset_s.abs().total_cmp(&b.offset_s.abs()));
+        let own = self.maps.iter().map(Vec::as_slice).collect();
+        let around = around.into_iter().take(FRAMES_COMPARED - 1).map(Neighbour::slices);
+        let offsets = range_offsets(&self.views, std::iter::once(own).chain(around))?;
+        let views = self.views.with_range_offsets(&offsets);
+        let patched =
+            self.patched.as_ref().map(|patched| Arc::new(Self { views: views.clone(), ..(**patched).clone() }));
+        Some(Self { views, patched, contexts: Contexts::default(), thinned: ThinnedCache::default(), ..self.clone() })
     }
 
     /// Adds the maps of a frame shortly before or after: (seconds after this frame, one map a view). The start reads
@@ -77,6 +136,7 @@ impl Problem {
         let (maps, _) = fill(&self.views, maps)?;
         self.neighbours.push(Neighbour::new(offset_s, maps));
         (self.contexts, self.thinned) = (Contexts::default(), ThinnedCache::default());
+        self.offset = MeasuredOffset::default();
         self.neighbours.sort_by(|a, b| a.offset_s.total_cmp(&b.offset_s));
         Ok(())
     }

@@ -79,8 +79,7 @@ pub(super) fn regions(
 }
 
 fn around(view: &View, half_width_m: f64, centres: &[Vec3], warnings: &mut Vec<String>) -> Region {
-    let triads: Vec<SphericalTriad> =
-        centres.iter().map(|&c| SphericalTriad::new(view.pose.view_from_world(c))).collect();
+    let triads: Vec<SphericalTriad> = centres.iter().map(|&c| SphericalTriad::new(view.seen_at(c))).collect();
     let bins = view.axes.iter().map(|axis| {
         if axis.kind == AxisKind::Doppler {
             return [0, axis.bins];

@@ -64,6 +64,7 @@ pub struct JointReturns {
 impl JointReturns {
     /// Of the body that `params` describe, as the views of `problem` see it.
     pub fn new(problem: &Problem, config: &FitConfig, params: &Pppr) -> Self {
+        let problem = problem.under(config);
         let joints = params.shape().total_joints();
         let skin = skin_of(config, (&problem.views, &problem.skeleton, &problem.radar)).map(|mut skin| {
             skin.fill(params);

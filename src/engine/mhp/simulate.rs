@@ -16,6 +16,7 @@ use crate::radar::View;
 
 /// H_sim of every view over its whole map, C order, f64; SPEC section 3.
 pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, params: &Pppr) -> Vec<Vec<f64>> {
+    let problem = problem.under(config);
     let mut gaussians = WorldGaussians::default();
     let skin = skin_of(config, (&problem.views, &problem.skeleton, &problem.radar)).map(|mut skin| {
         skin.fill(params);

@@ -182,6 +182,8 @@ pub(super) struct ViewModel<'a> {
     phase: [f64; 4],
     /// Whether the point spread has a width along u, e_az and e_el.
     pub blurs: [bool; 3],
+    /// How much nearer than it is a joint is seen, m: its skin, less what the map adds to a range.
+    pub nearer_m: f64,
     /// ln of what all joints' weights share.
     ln_share: f64,
     radar: &'a RadarConfig,
@@ -234,7 +236,22 @@ impl<'a> ViewModel<'a> {
         let blurs = [psf.range_m, psf.azimuth_rad, psf.elevation_rad].map(|width| width != 0.0);
         let near = if on.attenuation { 4.0 * radar.r_max_m.ln() } else { 0.0 };
         let ln_share = near - 0.5 * view.axes.len().min(3) as f64 * LN_TAU;
-        Self { view, config, psf, cell, turned: 0.0, step, by_step, own_variance, phase, blurs, ln_share, radar }
+        let nearer_m = config.surface_offset_m - psf.offset_m();
+        Self {
+            view,
+            config,
+            psf,
+            cell,
+            turned: 0.0,
+            step,
+            by_step,
+            own_variance,
+            phase,
+            blurs,
+            nearer_m,
+            ln_share,
+            radar,
+        }
     }
 
     /// The Gaussians that one joint's lobe is the sum of; none where it is one Gaussian. Along each axis the lobe is that of
@@ -305,7 +322,7 @@ impl ViewModel<'_> {
     #[inline(always)]
     pub(super) fn surface_factor<T: Numeric>(&self, unmoved: Vec3<T>) -> (T, Floored<T>, Floored<T>) {
         let d = Floored::new(norm(unmoved), DISTANCE_FLOOR_M);
-        let skin = Floored::new(d.value - self.config.surface_offset_m, DISTANCE_FLOOR_M);
+        let skin = Floored::new(d.value - self.nearer_m, DISTANCE_FLOOR_M);
         (skin.value / d.value, d, skin)
     }
 
@@ -362,7 +379,7 @@ impl ViewModel<'_> {
         let turn = splat_matrix(gaussian.opacity, pose.rotation);
         let [x, y, z] = mat_vec(&turn, gaussian.position);
         let unmoved = [x + pose.translation[0], y + pose.translation[1], z + pose.translation[2]];
-        let moved = self.config.surface_offset_m != 0.0;
+        let moved = self.nearer_m != 0.0;
         let triad = SphericalTriad::new(if moved { scale(unmoved, self.surface_factor(unmoved).0) } else { unmoved });
         let psf = &self.psf;
         let mut blur = [x.splat(psf.range_m), x.splat(0.0), x.splat(0.0)];

@@ -95,7 +95,17 @@ impl Sight {
             }
         }
         let (kind, depth) = self.view.axes.iter().zip(bins).nth(self.depth).map_or((AxisKind::Range, 0.0), at);
-        Reading { range_m: range_m(kind, depth, y, z), y, z }
+        let (range_m, offset_m) = (range_m(kind, depth, y, z), self.view.psf.offset_m());
+        if offset_m == 0.0 {
+            return Reading { range_m, y, z };
+        }
+        // Metres across are nearer with the range; angles are what they are.
+        let true_m = (range_m - offset_m).max(0.0);
+        let nearer = |across: Across| match across {
+            Across::Metres(x) => Across::Metres(x * true_m / range_m.max(1e-9)),
+            angle => angle,
+        };
+        Reading { range_m: true_m, y: y.map(nearer), z: z.map(nearer) }
     }
 
     /// Metres from one bin to the next of the axis across, at a bin of the depth axis.

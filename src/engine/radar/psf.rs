@@ -191,6 +191,7 @@ impl FftSetup {
             elevation_rad: sine(self.elevation, radar.l_el_m),
             doppler_mps: doppler_sigma_mps(taper, chirps, radar.frame_s / chirps as f64, wavelength),
             lobes: self.lobes(),
+            ..PointSpread::default()
         }
     }
 }

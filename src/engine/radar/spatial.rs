@@ -1,7 +1,7 @@
 //! What the axes of a view alone decide of its maps: which cells lie at the same range, and how a map with a Doppler axis
 //! becomes one without.
 
-use super::{Axis, AxisKind, View, unravel};
+use super::{Axis, AxisKind, Quantity, View, unravel};
 use crate::config::Background;
 use std::sync::OnceLock;
 
@@ -13,7 +13,7 @@ const SMALLEST_RING: usize = 8;
 const FAINTEST: f32 = 1e-12;
 
 /// The cells of a view without its Doppler axes, and the rings of those at the same range.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct SpatialGrid {
     pub(crate) view: View,
     /// Spatial axes and their places among the view's axes.
@@ -27,6 +27,8 @@ pub(crate) struct SpatialGrid {
     rings: Vec<usize>,
     /// Rings before this are too near to the radar to tell anything.
     deaf: usize,
+    /// Range of the first ring, and from one to the next, m; `None` where no axis tells any.
+    ring_m: Option<[f64; 2]>,
 }
 
 impl SpatialGrid {
@@ -36,10 +38,10 @@ impl SpatialGrid {
         let shape: Vec<usize> = axes.iter().map(|(_, axis)| axis.bins).collect();
         let count: usize = shape.iter().product();
         let (ring_of, rings, cells) = (vec![0; count], vec![], vec![0; count]);
-        let mut grid = Self { view: view.clone(), axes, shape, ring_of, cells, rings, deaf: 0 };
+        let mut grid = Self { view: view.clone(), axes, shape, ring_of, cells, rings, deaf: 0, ring_m: None };
         if let Some(ranges) = grid.ranges_m() {
             let widths = grid.axes.iter().filter(|(_, a)| !a.kind.is_angular()).map(|(_, a)| a.step().abs());
-            (grid.ring_of, grid.deaf) = rings_at(&ranges, widths.fold(f64::INFINITY, f64::min));
+            (grid.ring_of, grid.deaf, grid.ring_m) = rings_at(&ranges, widths.fold(f64::INFINITY, f64::min));
         }
         // Counting sort: how many cells each ring has, where it begins, and each cell to its place.
         grid.rings = vec![0; grid.ring_of.iter().max().map_or(1, |&last| last as usize + 2)];
@@ -55,6 +57,11 @@ impl SpatialGrid {
             next[ring as usize] += 1;
         }
         grid
+    }
+
+    /// The same cells of a view with the same axes.
+    pub(crate) fn seen_as(&self, view: &View) -> Self {
+        Self { view: view.clone(), ..self.clone() }
     }
 
     /// Distance of each cell from the view's origin as far as the axes tell it, m; `None` where no axis tells any.
@@ -78,6 +85,34 @@ impl SpatialGrid {
         let ranges: Vec<f64> = squares.into_iter().map(f64::sqrt).collect();
         // Squares of what no radar sees leave the range of numbers, and then tell nothing.
         ranges.iter().all(|range| range.is_finite()).then_some(ranges)
+    }
+
+    /// Range of a ring, m; `None` where no axis tells any.
+    pub(crate) fn ring_m(&self, ring: usize) -> Option<f64> {
+        self.ring_m.map(|[first, step]| first + step * ring as f64)
+    }
+
+    /// The power of each ring's cells, of all Doppler bins, and how many they are. Cells that are no number count for nothing.
+    pub(crate) fn power_by_ring(&self, map: &[f64], quantity: Quantity) -> (Vec<f64>, Vec<f64>) {
+        let count = self.rings.len().saturating_sub(1);
+        let (mut powers, mut cells) = (vec![0.0; count], vec![0.0; count]);
+        let mut add = |ring: u32, h: f64| {
+            if h.is_finite() {
+                powers[ring as usize] += quantity.power(h);
+                cells[ring as usize] += 1.0;
+            }
+        };
+        if self.axes.len() == self.view.axes.len() {
+            self.ring_of.iter().zip(map).for_each(|(&ring, &h)| add(ring, h));
+            return (powers, cells);
+        }
+        let shape = self.view.shape();
+        for (cell, &h) in map.iter().enumerate() {
+            let bins = unravel(cell, &shape);
+            let spatial = self.axes.iter().fold(0, |flat, (k, axis)| flat * axis.bins + bins[*k]);
+            add(self.ring_of[spatial], h);
+        }
+        (powers, cells)
     }
 
     /// A place for the background of each ring, and one for that of the whole map.
@@ -164,19 +199,20 @@ impl SpatialGrid {
     }
 }
 
-/// The ring of each cell at one of `ranges` (m, finite), for rings `width_m` wide and counted from the nearest; and how
-/// many of the first are too near to the radar to tell anything.
+/// The ring of each cell at one of `ranges` (m, finite), for rings `width_m` wide and counted from the nearest; how many of the
+/// first are too near to the radar to tell anything; and the range of the first and the width of each, m.
 ///
 /// There are at most as many rings as cells, plus one: more could only be empty. Where axes are so far apart in scale that
 /// `width_m` asks for more (a depth axis to 10⁹ m beside steps of centimetres), rings are as much wider.
-fn rings_at(ranges: &[f64], width_m: f64) -> (Vec<u32>, usize) {
+fn rings_at(ranges: &[f64], width_m: f64) -> (Vec<u32>, usize, Option<[f64; 2]>) {
     let (nearest, farthest) =
         ranges.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), &range| (low.min(range), high.max(range)));
     let most = ranges.len() as f64;
     let width_m = width_m.max((farthest - nearest) / most).max(f64::MIN_POSITIVE);
     let first = (nearest / width_m).round();
     let ring = |range: f64| ((range / width_m).round() - first).clamp(0.0, most);
-    (ranges.iter().map(|&range| ring(range) as u32).collect(), ring(NEAREST_M) as usize)
+    let ring_m = Some([first * width_m, width_m]);
+    (ranges.iter().map(|&range| ring(range) as u32).collect(), ring(NEAREST_M) as usize, ring_m)
 }
 
 /// The middle value of positive floats given as their bits, the upper one of two; they are reordered. 1 where there are
@@ -192,7 +228,7 @@ fn median(bits: &mut [u32]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::radar::{PointSpread, Quantity, Spacing};
+    use crate::radar::{PointSpread, Spacing};
 
     fn view(axes: [(AxisKind, usize, f64, f64); 2]) -> View {
         let axis = |(kind, bins, lo, hi)| Axis { kind, bins, lo, hi, spacing: Spacing::Linear };

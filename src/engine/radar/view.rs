@@ -46,9 +46,20 @@ pub struct PointSpread {
     pub elevation_rad: f64,
     /// σ_dop, m/s.
     pub doppler_mps: f64,
+    /// What the map adds to a range, m: cables, filters, the sample at which a chirp is taken to begin.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub range_offset_m: f64,
+    /// What it adds beside that, as the maps themselves tell, m.
+    #[serde(skip)]
+    pub measured_offset_m: f64,
     /// What shape the lobes have besides, where the FFTs are known.
     #[serde(skip)]
     pub lobes: Lobes,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "what serde hands over")]
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
 }
 
 /// The main lobe of each quantity in its window's own shape; `None` where that is not known.
@@ -103,6 +114,11 @@ impl Resolves {
 }
 
 impl PointSpread {
+    /// What the map adds to a range in all, m.
+    pub fn offset_m(&self) -> f64 {
+        self.range_offset_m + self.measured_offset_m
+    }
+
     /// The lobe of a quantity.
     pub fn lobe(&self, of: Resolves) -> Option<Lobe> {
         let Lobes { range, azimuth, elevation, doppler } = self.lobes;
@@ -158,9 +174,26 @@ impl View {
         self.axes.iter().map(|axis| axis.bins).collect()
     }
 
+    /// Where the view sees a point, view frame, m: along its ray by what the map adds to a range.
+    pub fn seen_at(&self, p_world: Vec3) -> Vec3 {
+        let p_view = self.pose.view_from_world(p_world);
+        let offset_m = self.psf.offset_m();
+        if offset_m == 0.0 {
+            return p_view;
+        }
+        let range_m = norm(p_view).max(1e-9);
+        p_view.map(|x| x * (1.0 + offset_m / range_m).max(0.0))
+    }
+
+    /// The point that the view sees at a place, world metres: what [`Self::seen_at`] undoes.
+    pub fn place_of(&self, p_seen: Vec3) -> Vec3 {
+        let range_m = norm(p_seen).max(1e-9);
+        self.pose.world_from_view(p_seen.map(|x| x * (1.0 - self.psf.offset_m() / range_m).max(0.0)))
+    }
+
     /// Bin coordinates of a point at rest, world metres: where a drawing of it belongs on the map.
     pub fn bins_of(&self, p_world: Vec3) -> Vec<f64> {
-        let p_view = self.pose.view_from_world(p_world);
+        let p_view = self.seen_at(p_world);
         self.axes.iter().map(|axis| axis.bin(axis.coordinate(p_view))).collect()
     }
 
@@ -169,6 +202,7 @@ impl View {
         let p_view = self.pose.view_from_world(p_world);
         let v_view = sub(self.pose.view_from_world(add(p_world, v_world)), p_view);
         let radial = dot(v_view, p_view) / norm(p_view).max(1e-9);
+        let p_view = self.seen_at(p_world);
         let coordinate = |axis: &Axis| if axis.kind == AxisKind::Doppler { radial } else { axis.coordinate(p_view) };
         self.axes.iter().map(|axis| axis.bin(coordinate(axis))).collect()
     }

@@ -1,6 +1,6 @@
 //! The views of a data set's frames, and what their axes decide of every map.
 
-use super::{SpatialGrid, View};
+use super::{PointSpread, SpatialGrid, View};
 use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 
@@ -19,6 +19,22 @@ impl ViewSet {
     pub(crate) fn grid(&self, view: usize) -> Option<&Arc<SpatialGrid>> {
         let (view, grid) = (self.0.views.get(view)?, self.0.grids.get(view)?);
         Some(grid.get_or_init(|| Arc::new(SpatialGrid::new(view))))
+    }
+
+    /// The same views whose maps add these to a range, m, one a view, beside what is stated.
+    pub(crate) fn with_range_offsets(&self, offsets_m: &[f64]) -> Self {
+        let of = |(view, &measured_offset_m): (&View, &f64)| View {
+            psf: PointSpread { measured_offset_m, ..view.psf },
+            ..view.clone()
+        };
+        let views: Vec<View> = self.iter().zip(offsets_m).map(of).collect();
+        // Where cells lie in the map is the same.
+        let grid = |(k, view): (usize, &View)| match self.grid(k) {
+            Some(grid) => Arc::new(grid.seen_as(view)).into(),
+            None => OnceLock::new(),
+        };
+        let grids = views.iter().enumerate().map(grid).collect();
+        Self(Arc::new(Shared { views, grids }))
     }
 
     /// The spatial cells of every view.
@@ -69,7 +85,7 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests")]
 
     use super::*;
-    use crate::radar::{Axis, AxisKind, PointSpread, Quantity, Spacing};
+    use crate::radar::{Axis, AxisKind, Quantity, Spacing};
 
     #[test]
     fn what_axes_decide_is_shared_by_clones_and_by_nobody_else() {

@@ -10,6 +10,7 @@ use crate::explore::{
     SliceRequest, TunedFrames, TuningRequest, down_the_gradient, line,
 };
 use crate::mhp::FitState;
+use crate::radar::View;
 use crate::session::effect::Effect;
 use crate::session::explore::{AdoptedFit, ExploreNews};
 use crate::session::pins::Pin;
@@ -35,6 +36,19 @@ impl Session {
             }
             ExplorationKind::Restarts => self.restart_request().map(Box::new).map(Exploration::Restarts),
         }
+    }
+
+    /// The views as the fit on screen sees them: with the range offsets that it measured.
+    pub fn seen_views(&self) -> &[View] {
+        let stated = self.data.dataset.as_ref().map_or(&[][..], |dataset| &dataset.info().views);
+        let config = self.fit.shown.as_ref().map_or(&self.config, |shown| &shown.config);
+        let seen = self.fit.problem.as_ref().map(|problem| &problem.views_under(config)[..]);
+        // Of another data set that is being opened there is no fit yet.
+        let alike = |seen: &&[View]| {
+            seen.len() == stated.len()
+                && seen.iter().zip(stated).all(|(a, b)| (&a.array, &a.axes) == (&b.array, &b.axes))
+        };
+        seen.filter(alike).unwrap_or(stated)
     }
 
     /// The state on screen, as its fit sees it.

@@ -157,8 +157,8 @@ impl<'a> LoadedFrame<'a> {
     fn numbers(&self, fitter: &Fitter, start: &TimedStart, ended: bool) -> RunNumbers {
         let (report, params) = (fitter.report(), fitter.params());
         let reason = if ended { StopReason::Converged } else { StopReason::Iterations };
-        let now = self.measured(params);
-        let before = self.measured(&start.unrefined);
+        let now = self.measured(fitter.config(), params);
+        let before = self.measured(fitter.config(), &start.unrefined);
         RunNumbers {
             iterations: report.iteration,
             converged: report.converged,
@@ -173,7 +173,7 @@ impl<'a> LoadedFrame<'a> {
     }
 
     /// What the labels say of `params`.
-    fn measured(&self, params: &Pppr) -> RunNumbers {
+    fn measured(&self, config: &FitConfig, params: &Pppr) -> RunNumbers {
         let (frame, info) = (&self.frame, self.dataset.info());
         let joints = params.positions();
         let a_person = info.skeleton.joints.len();
@@ -187,7 +187,7 @@ impl<'a> LoadedFrame<'a> {
             annotated: annotated(frame),
             reprojection_px: image.reprojection_px,
             box_coverage: image.box_coverage,
-            map_box_coverage: self.map_box_coverage(joints, a_person),
+            map_box_coverage: self.map_box_coverage(config, joints, a_person),
             ..RunNumbers::default()
         }
     }
@@ -204,8 +204,8 @@ impl<'a> LoadedFrame<'a> {
         reprojection(&camera, joints, a_person, keypoints, &image.boxes)
     }
 
-    fn map_box_coverage(&self, joints: &[Vec3], a_person: usize) -> Option<f64> {
-        let views = self.dataset.info().views.iter().zip(&self.frame.map_boxes);
+    fn map_box_coverage(&self, config: &FitConfig, joints: &[Vec3], a_person: usize) -> Option<f64> {
+        let views = self.problem.views_under(config).iter().zip(&self.frame.map_boxes);
         let shares: Vec<f64> =
             views.filter_map(|(view, boxes)| map_box_coverage(view, joints, a_person, boxes)).collect();
         (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64)

@@ -18,6 +18,7 @@ const ORDER: &[&str] = &[
     "place",
     "heading from motion",
     "several starts",
+    "range offsets measured",
     "temporal term",
     "height from the floor",
     "convergence",

@@ -110,7 +110,7 @@ impl PaneState for State {
 
 /// The views with three axes: index and view.
 fn cubes(session: &Session) -> Vec<(usize, &View)> {
-    let views = session.data.dataset.iter().flat_map(|dataset| dataset.info().views.iter().enumerate());
+    let views = session.seen_views().iter().enumerate();
     views.filter(|(_, view)| view.axes.len() == 3).collect()
 }
 

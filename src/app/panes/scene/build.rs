@@ -119,8 +119,8 @@ pub(super) fn explored(scene: &mut Scene, shared: &Shared<'_>, tokens: &Tokens, 
 
 /// The places that the cell under the pointer sees, whichever map it is of.
 pub(super) fn cell(scene: &mut Scene, shared: &Shared<'_>, tokens: &Tokens, px: f32) {
-    let (Some((index, pixel)), Some(dataset)) = (shared.pointed.cell, &shared.session.data.dataset) else { return };
-    let views = &dataset.info().views;
+    let Some((index, pixel)) = shared.pointed.cell else { return };
+    let views = shared.session.seen_views();
     let Some(view) = views.get(index) else { return };
     let points = seen_by(views, view, Orientation::of(view, shared.session.view.cube), pixel);
     let stroke = |color, alpha, width| Stroke { color: rgba(color, alpha), width_px: width * px };

@@ -162,7 +162,7 @@ fn inverse<T: Numeric>(length_m: T) -> T {
 /// p = p₀ max(d₀ − δ, floor)/d₀.
 #[inline(always)]
 fn unmove<T: Numeric>(model: &ViewModel<'_>, unmoved: Vec3<T>, p_bar: Vec3<T>) -> Vec3<T> {
-    if model.config.surface_offset_m == 0.0 {
+    if model.nearer_m == 0.0 {
         return p_bar;
     }
     let (factor, d, skin) = model.surface_factor(unmoved);

@@ -3,13 +3,14 @@
 //!
 //! `saliency.rs` tells how far each cell of a map rises above its background, `variation.rs` what changes with time, and
 //! `temporal.rs` puts both together for the frame and its neighbours. `triangulate.rs` finds the point that the views agree
-//! on, `middle.rs` and `height.rs` the body there, `track.rs` follows it through the frames around, and `anchors.rs` says
+//! on, `middle.rs` and `height.rs` the body there, `range_offset.rs` by how much their ranges differ, `track.rs` follows it through the frames around, and `anchors.rs` says
 //! where the temporal term wants each person.
 
 mod anchors;
 mod height;
 mod middle;
 mod neighbour;
+mod range_offset;
 mod saliency;
 mod temporal;
 mod track;
@@ -20,6 +21,7 @@ pub(super) use anchors::{anchors, behind_skin};
 pub(super) use height::{Expectation, Stature, bent_if_below};
 pub(super) use middle::{apart_m, centre, near};
 pub use neighbour::Neighbour;
+pub(super) use range_offset::range_offsets;
 pub use saliency::Peak;
 pub(super) use saliency::SaliencyMap;
 pub(super) use temporal::{Contexts, Reading, TemporalContext};

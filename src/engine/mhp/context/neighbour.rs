@@ -21,4 +21,9 @@ impl Neighbour {
     pub fn map(&self, view: usize) -> &[f64] {
         self.maps.get(view).map_or(&[], Vec::as_slice)
     }
+
+    /// H_ori of every view at that time.
+    pub(in crate::mhp) fn slices(&self) -> Vec<&[f64]> {
+        self.maps.iter().map(Vec::as_slice).collect()
+    }
 }

@@ -202,10 +202,15 @@ impl SaliencyMap {
         }
     }
 
+    /// Where the view sees a world point, view frame, m.
+    fn seen_at(&self, p_world: Vec3) -> Vec3 {
+        self.grid.view.seen_at(p_world)
+    }
+
     /// The spatial cell at a world point; `None` outside the map.
     #[inline]
     pub(in crate::mhp) fn cell(&self, p_world: Vec3) -> Option<usize> {
-        let p = self.grid.view.pose.view_from_world(p_world);
+        let p = self.seen_at(p_world);
         self.grid.axes.iter().try_fold(0, |flat, (_, axis)| {
             let bin = axis.bin(axis.coordinate(p)).round();
             (bin >= 0.0 && bin < axis.bins as f64).then(|| flat * axis.bins + bin as usize)
@@ -220,7 +225,7 @@ impl SaliencyMap {
 
     /// Whether some axis of this view tells positions along `direction` (unit vector, world frame) near a world point.
     pub(in crate::mhp) fn resolves(&self, p_world: Vec3, direction: Vec3) -> bool {
-        let triad = SphericalTriad::new(self.grid.view.pose.view_from_world(p_world));
+        let triad = SphericalTriad::new(self.seen_at(p_world));
         self.grid.axes.iter().any(|(_, axis)| {
             let along = mat_t_vec(&self.grid.view.pose.rotation, triad.direction_and_arm(axis.kind).0);
             dot(along, direction).abs() > 0.7
@@ -325,7 +330,7 @@ impl SaliencyMap {
     /// are the salience's excess over [`DEPTH_LN`] below the strongest cell there, so that the whole body counts and not
     /// its brightest part, and the sidelobes do not. `None` where nothing is lit.
     pub(super) fn centroid(&self, p_world: Vec3, [floor_m, up_m]: [f64; 2]) -> Option<Mark> {
-        let triad = SphericalTriad::new(self.grid.view.pose.view_from_world(p_world));
+        let triad = SphericalTriad::new(self.seen_at(p_world));
         let window: Vec<[usize; 2]> = self
             .grid
             .axes

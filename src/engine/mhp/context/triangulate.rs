@@ -60,7 +60,7 @@ pub(in crate::mhp) fn triangulate_from(mut p: Vec3, tolerated_m: f64, views: &[V
 /// Tells for each spatial axis of the mark's view the unit direction in which the coordinate grows (world) and the gap
 /// between the mark's coordinate and that of `p`, m.
 fn equations(view: &View, mark: &Mark, p: Vec3, mut tell: impl FnMut(Vec3, f64)) {
-    let triad = SphericalTriad::new(view.pose.view_from_world(p));
+    let triad = SphericalTriad::new(view.seen_at(p));
     let spatial = view.axes.iter().filter(|axis| axis.kind != AxisKind::Doppler);
     for (axis, &bin) in spatial.zip(&mark.bin) {
         let (direction, arm) = triad.direction_and_arm(axis.kind);

@@ -16,6 +16,7 @@ pub fn standing_joints(skeleton: &Skeleton) -> Vec<Vec3> {
 /// A start with every joint where it is given, person by person, m and m/s, world frame: each has the Gaussian of a start, and is
 /// perturbed where the settings ask for it. Joints beyond the last whole person are left out.
 pub fn start_at(problem: &Problem, config: &FitConfig, joints: &[Vec3], velocities: &[Vec3]) -> Pppr {
+    let problem = problem.under(config);
     let of_person = problem.skeleton.joints.len().max(1);
     let doppler_features = problem.radar.doppler_features;
     let mut params = Pppr::zeros(PpprShape { persons: joints.len() / of_person, joints: of_person, doppler_features });

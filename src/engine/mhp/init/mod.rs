@@ -204,11 +204,18 @@ impl Hypotheses {
     /// # Errors
     /// [`FitError::NoStart`] where no view shows anything above its background.
     pub fn new(problem: &Arc<Problem>, config: &FitConfig, seeds: &[Vec3]) -> Result<Self, FitError> {
+        let problem = &problem.shared_under(config);
         let (maps, peaks) = shown(problem, config);
         let mut notes: Vec<String> = (0..problem.views.len())
             .filter(|&k| problem.filled_cells(k) > 0)
             .map(|k| format!("{}: {} missing cells filled", problem.views[k].array, problem.filled_cells(k)))
             .collect();
+        let offsets = problem.views.iter().filter(|view| view.psf.measured_offset_m != 0.0);
+        let told: Vec<String> =
+            offsets.map(|view| format!("{} {:+.2} m", view.array, view.psf.measured_offset_m)).collect();
+        if !told.is_empty() {
+            notes.push(format!("ranges differ: {}", told.join(", ").replace('-', "−")));
+        }
         let (own, persons) = persons(problem, config, (maps.as_ref(), &peaks), seeds, &mut notes)?;
         // It begins at standing persons: its own starts are the postures.
         let standing = || {
@@ -231,6 +238,7 @@ impl Hypotheses {
         config: &FitConfig,
         around: &[(f64, &Self)],
     ) -> Result<Initialisation, FitError> {
+        let problem = &problem.shared_under(config);
         let model = ScattererModel::new(&problem.skeleton, config.scatterers);
         let (mut persons, mut notes) = (self.persons.clone(), self.notes.clone());
         let chosen = self.searched.as_ref().map(|searched| {

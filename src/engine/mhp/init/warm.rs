@@ -15,6 +15,7 @@ const FASTEST_MPS: f64 = 4.0;
 /// perturbed where the settings ask for it. Without that frame among those around, or with [`WarmStart::AsLeft`], they stay
 /// where they are.
 pub fn predict(problem: &Problem, config: &FitConfig, before: &Pppr) -> Pppr {
+    let problem = problem.under(config);
     let mut params = before.clone();
     if config.warm_start == WarmStart::Moved {
         follow(problem, config, &mut params);
