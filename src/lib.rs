@@ -89,4 +89,4 @@ pub mod render;
 pub mod session;
 pub mod start;
 
-pub use mhp_engine::{body, config, geometry, input, mhp, people, radar, simulate};
+pub use mhp_engine::{body, config, dense, geometry, input, mhp, people, radar, simulate};

@@ -6,6 +6,7 @@
 
 pub mod body;
 pub mod config;
+pub mod dense;
 pub mod geometry;
 pub mod input;
 pub mod mhp;

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 const MAY_USE: &[(&str, &[&str])] = &[
     ("digest", &[]),
     ("geometry", &[]),
+    ("dense", &[]),
     ("escape", &[]),
     ("folders", &[]),
     ("input", &[]),
@@ -42,6 +43,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "digest",
             "input",
             "task",
+            "dense",
             "geometry",
             "output",
             "config",
@@ -50,6 +52,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "mhp",
             "dataset",
             "start",
+            // Whose joints a person's are.
+            "diagnose",
             "predictions",
             "representation",
         ],

@@ -88,8 +88,7 @@ fn view(name: &str, kinds: &[AxisKind], rng: &mut StdRng) -> View {
             elevation_rad: 0.05,
             doppler_mps: 0.2,
             lobes: LOBES,
-            range_offset_m: 0.07,
-            measured_offset_m: 0.0,
+            ..PointSpread::default()
         },
         pose: Pose {
             rotation: rotation_from_quaternion(q),
@@ -426,6 +425,36 @@ fn beside_a_null() {
         assert!(scene.depth_of_nulls() < 1.1 * NULL_DEPTH, "no null in {kinds:?}");
         let verdict = scene.check();
         assert!(verdict.is_ok(), "{kinds:?}: {verdict:?}");
+    }
+}
+
+/// What a map adds to a range moves a joint along its ray, as its skin does the other way: the same loss and the same gradient.
+#[test]
+fn a_range_offset_is_a_skin_behind_the_joint() {
+    use AxisKind::{Azimuth, DepthV, Range, Z};
+    for (seed, kinds) in [(5, &[Range, Azimuth] as &[_]), (6, &[DepthV, Z])] {
+        let before = scene(seed, kinds, Summation::Coherent, Operators::default(), 0.08);
+        let views: Vec<View> = before.problem.views.iter().cloned().collect();
+        let behind = views.iter().map(|view| {
+            let psf = PointSpread { range_offset_m: -0.05, measured_offset_m: -0.03, ..view.psf };
+            View { psf, ..view.clone() }
+        });
+        let maps: Vec<&[f64]> = (0..views.len()).map(|view| before.problem.map(view)).collect();
+        let (radar, skeleton) = (before.problem.radar.clone(), before.problem.skeleton.clone());
+        let offset = Arc::new(Problem::new(radar, skeleton, behind.collect::<Vec<_>>(), &maps).unwrap());
+        let of = |problem: &Arc<Problem>, surface_offset_m: f64| {
+            let em_region = EmRegion::Full;
+            let config = FitConfig { surface_offset_m, em_region, ..before.config };
+            let objective = Objective::new(Arc::clone(problem), config, Precision::F64, &before.params);
+            objective.unwrap().evaluate(&before.params)
+        };
+        let [a, b] = [of(&before.problem, 0.08), of(&offset, 0.0)];
+        assert!((a.loss - b.loss).abs() < 1e-12, "{} {}", a.loss, b.loss);
+        for group in Group::ALL {
+            let pairs = a.em_gradient().group(group).iter().zip(b.em_gradient().group(group));
+            let largest = a.em_gradient().group(group).iter().fold(0.0, |m: f64, g| m.max(g.abs()));
+            assert!(pairs.clone().all(|(a, b)| (a - b).abs() <= 1e-9 * largest), "{}", group.key());
+        }
     }
 }
 

@@ -29,6 +29,8 @@ const LEAST_GAIN: f64 = 0.02;
 const LEAST_LIKENESS: f64 = 0.7;
 /// Views whose radars are farther apart are of different places, m.
 const ONE_PLACE_M: f64 = 0.02;
+/// Wider rings tell no offset, m.
+const WIDEST_RING_M: f64 = 0.3;
 /// Powers below this share of the largest are alike.
 const FAINTEST: f64 = 1e-12;
 
@@ -42,7 +44,9 @@ pub(in crate::mhp) fn range_offsets<'a>(
     let first = views.first()?;
     let beside = |view: &&View| norm(sub(place(view), place(first))) <= ONE_PLACE_M;
     let alike: Vec<usize> = (0..views.len()).filter(|&k| beside(&&views[k])).collect();
-    if alike.len() < 2 || alike.iter().any(|&k| views.grid(k).is_none_or(|grid| grid.ring_m(0).is_none())) {
+    // Rings as wide as the offsets that are looked for tell none.
+    let tells = |&k: &usize| views.grid(k).and_then(|grid| Some(grid.ring_m(1)? - grid.ring_m(0)?));
+    if alike.len() < 2 || !alike.iter().all(|k| tells(k).is_some_and(|width| width > 0.0 && width <= WIDEST_RING_M)) {
         return None;
     }
     let lags = (MOST_M / STEP_M).round() as isize;
