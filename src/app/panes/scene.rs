@@ -335,12 +335,13 @@ fn pointed(shared: &Shared<'_>, glowing: &[JointReturn]) -> Option<String> {
     }
     let (view, [column, row]) = shared.pointed.cell?;
     let array = &session.data.dataset.as_ref()?.info().views.get(view)?.array;
-    let mut told = format!("places of the cell of {array} at column {column}, row {row}");
-    for (k, of) in glowing.iter().enumerate() {
-        let (word, name) = (if k == 0 { "; glowing:" } else { "," }, lit::joint_name(session, of.joint));
-        told.push_str(&format!("{word} {name} {:.0} %", 100.0 * of.amplitude_share));
-    }
-    Some(told)
+    let one = |of: &JointReturn| {
+        let name = lit::joint_name(session, of.joint);
+        format!("{name} {:.0} %", 100.0 * of.amplitude_share)
+    };
+    let joints: Vec<String> = glowing.iter().map(one).collect();
+    let glows = if joints.is_empty() { String::new() } else { format!("; glowing: {}", joints.join(", ")) };
+    Some(format!("places of the cell of {array} at column {column}, row {row}{glows}"))
 }
 
 /// The joints that light the cell that is pointed at, strongest first.

@@ -85,14 +85,13 @@ impl StateArgs {
     pub(super) fn state(&self, dataset: &Dataset, index: usize, config: &FitConfig) -> anyhow::Result<State> {
         let (erased, precision) = (self.erased(dataset)?, self.precision());
         let (frame, problem, given) = self.measured(dataset, index)?;
-        let (initial, params) = match given {
-            Some(params) => (params.clone(), params),
-            None => {
-                let options =
-                    BatchOptions { config: *config, precision, erased: erased.to_vec(), ..BatchOptions::default() };
-                let fit = fit_frame(dataset, index, &options, None).map_err(anyhow::Error::msg)?;
-                (fit.initial, fit.params)
-            }
+        let (initial, params) = if let Some(params) = given {
+            (params.clone(), params)
+        } else {
+            let options =
+                BatchOptions { config: *config, precision, erased: erased.to_vec(), ..BatchOptions::default() };
+            let fit = fit_frame(dataset, index, &options, None).map_err(anyhow::Error::msg)?;
+            (fit.initial, fit.params)
         };
         Ok(State { frame, of: ExploredState { problem, erased, config: *config, precision, initial, params } })
     }

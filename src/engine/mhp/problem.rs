@@ -94,8 +94,8 @@ impl Problem {
     }
 
     /// As [`Self::under`].
-    pub(super) fn shared_under(self: &Arc<Self>, config: &FitConfig) -> Arc<Self> {
-        Arc::clone(self.offset(config).unwrap_or(self))
+    pub(super) fn shared_under(self: Arc<Self>, config: &FitConfig) -> Arc<Self> {
+        self.offset(config).map(Arc::clone).unwrap_or(self)
     }
 
     /// The views as fits with this configuration see them.

@@ -67,7 +67,9 @@ pub(in crate::mhp) fn range_offsets<'a>(
         offsets[view] = best(of, lags as usize, count).unwrap_or(0.0);
     }
     let middle = alike.iter().map(|&view| offsets[view]).sum::<f64>() / alike.len() as f64;
-    alike.iter().for_each(|&view| offsets[view] -= middle);
+    for &view in &alike {
+        offsets[view] -= middle;
+    }
     offsets.iter().any(|offset| *offset != 0.0).then_some(offsets)
 }
 
@@ -173,7 +175,7 @@ mod tests {
             .collect()
     }
 
-    fn found(views: [View; 2], farther_m: f64) -> Option<Vec<f64>> {
+    fn found(views: &[View; 2], farther_m: f64) -> Option<Vec<f64>> {
         let maps = [map(&views[0], 0.0, 1), map(&views[1], farther_m, 2)];
         let views = ViewSet::from(views.to_vec());
         range_offsets(&views, std::iter::once(maps.iter().map(Vec::as_slice).collect()))
@@ -184,14 +186,14 @@ mod tests {
         let views =
             |place| [view("h", AxisKind::DepthH, AxisKind::Y, 0.0), view("v", AxisKind::DepthV, AxisKind::Z, place)];
         for farther_m in [0.2, -0.15, 0.37] {
-            let offsets = found(views(0.0), farther_m).unwrap_or_default();
+            let offsets = found(&views(0.0), farther_m).unwrap_or_default();
             assert_eq!(offsets.len(), 2, "{farther_m}");
             assert!((offsets[1] - offsets[0] - farther_m).abs() < 0.02, "{farther_m}: {offsets:?}");
             assert!((offsets[0] + offsets[1]).abs() < 1e-12, "nobody can tell which is right");
         }
         // What agrees has none, and what looks from elsewhere sees other ranges.
-        assert_eq!(found(views(0.0), 0.0), None);
-        assert_eq!(found(views(0.0), 0.03), None);
-        assert_eq!(found(views(0.3), 0.2), None);
+        assert_eq!(found(&views(0.0), 0.0), None);
+        assert_eq!(found(&views(0.0), 0.03), None);
+        assert_eq!(found(&views(0.3), 0.2), None);
     }
 }

@@ -204,7 +204,7 @@ impl Hypotheses {
     /// # Errors
     /// [`FitError::NoStart`] where no view shows anything above its background.
     pub fn new(problem: &Arc<Problem>, config: &FitConfig, seeds: &[Vec3]) -> Result<Self, FitError> {
-        let problem = &problem.shared_under(config);
+        let problem = &Arc::clone(problem).shared_under(config);
         let (maps, peaks) = shown(problem, config);
         let mut notes: Vec<String> = (0..problem.views.len())
             .filter(|&k| problem.filled_cells(k) > 0)
@@ -238,7 +238,7 @@ impl Hypotheses {
         config: &FitConfig,
         around: &[(f64, &Self)],
     ) -> Result<Initialisation, FitError> {
-        let problem = &problem.shared_under(config);
+        let problem = &Arc::clone(problem).shared_under(config);
         let model = ScattererModel::new(&problem.skeleton, config.scatterers);
         let (mut persons, mut notes) = (self.persons.clone(), self.notes.clone());
         let chosen = self.searched.as_ref().map(|searched| {
