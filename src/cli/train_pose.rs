@@ -166,7 +166,7 @@ fn data_of(
     let frames: usize = sets.iter().map(|set| set.examples.len()).sum();
     let why: Vec<String> = left_out.iter().map(|(why, n)| format!("{n} frames left out: {why}")).collect();
     let rest = if why.is_empty() { String::new() } else { format!(" ({})", why.join(", ")) };
-    let note = format!("{}: {frames} frames of {} sequences{rest}", info.name, sets.len());
+    let note = format!("{}: {frames} examples of {} sequences{rest}", info.name, sets.len());
     Ok((sets, card, note))
 }
 

@@ -15,7 +15,7 @@ use crate::dataset::DatasetInfo;
 use crate::diagnose::{JointErrors, joint_errors};
 use crate::geometry::{Mat3, Vec3, add, add_scaled, cross, dot, mat_vec, mean, norm, scale, sub, transpose};
 use crate::mhp::{Fitter, Precision, Problem};
-use crate::radar::{Echo, PointMotion, Receiver, View};
+use crate::radar::{Echo, PointMotion, PointSpread, Receiver, View};
 use crate::start::find_start;
 use crate::task::Progress;
 use rand::{SeedableRng, rngs::StdRng};
@@ -132,8 +132,10 @@ pub fn closure_test(request: &ClosureRequest, (cores, progress): (&IdleCores, &P
     let slices = |maps: &[Vec<f64>]| -> Vec<Vec<f64>> { maps.to_vec() };
     let own = slices(&synthesised[REACH as usize]);
     let of: Vec<&[f64]> = own.iter().map(Vec::as_slice).collect();
-    let mut problem =
-        Problem::new(info.radar.clone(), info.skeleton.clone(), info.views.clone(), &of).map_err(Halt::failed)?;
+    // The synthesis adds nothing to a range.
+    let exact = |view: &View| View { psf: PointSpread { range_offset_m: 0.0, ..view.psf }, ..view.clone() };
+    let views: Vec<View> = info.views.iter().map(exact).collect();
+    let mut problem = Problem::new(info.radar.clone(), info.skeleton.clone(), views, &of).map_err(Halt::failed)?;
     problem.static_removed = info.static_removed;
     for (frame, maps) in frames.iter().zip(&synthesised).filter(|(frame, _)| **frame != 0) {
         let of: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();

@@ -163,7 +163,8 @@ pub(super) fn noisy_problem(problem: &Problem, sigmas: &[f64], draw: u64) -> Res
         .map(|(k, view)| noisy(problem.map(k), view.quantity, sigmas.get(k).copied().unwrap_or(0.0), &mut rng))
         .collect();
     let slices: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
-    Problem::new(problem.radar.clone(), problem.skeleton.clone(), problem.views.clone(), &slices)
+    let noisy = Problem::new(problem.radar.clone(), problem.skeleton.clone(), problem.views.clone(), &slices)?;
+    Ok(noisy.calibrated_as(problem))
 }
 
 /// What fixes the pose of a state. Directions are told from the middle of the views' radars; erased cells are those of no map, with

@@ -162,7 +162,8 @@ pub fn what_if(
         let empty: Vec<Vec<f64>> = views.iter().map(|view| vec![1.0; view.cells()]).collect();
         let of = |maps: &[Vec<f64>]| {
             let slices: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
-            Problem::new(problem.radar.clone(), problem.skeleton.clone(), views.clone(), &slices).map_err(Halt::failed)
+            let new = Problem::new(problem.radar.clone(), problem.skeleton.clone(), views.clone(), &slices);
+            Ok::<Problem, Halt>(new.map_err(Halt::failed)?.calibrated_as(problem))
         };
         let clean = simulate(&of(&empty)?, &state.config, Precision::F32, &state.params);
         // One number for all views: the least that is asked.

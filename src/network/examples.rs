@@ -130,7 +130,15 @@ fn inputs_of(
             let shown = beside.as_ref().unwrap_or(frame);
             // A frame that shows other people tells nothing of this one: the frame itself stands for it.
             let of = params.get(&shown.index).filter(|of| own.is_none_or(|own| own.shape() == of.shape())).or(own);
-            let of = of.map(|of| (of.as_ref(), person));
+            let same = |of: &Pppr| match own {
+                // Persons are in the order of each frame's own count.
+                Some(own) if persons > 1 => {
+                    let pairs = person_pairs(own.positions(), of.positions(), own.shape().joints);
+                    pairs.into_iter().find(|(mine, _)| *mine == person).map_or(person, |(_, theirs)| theirs)
+                }
+                _ => person,
+            };
+            let of = of.map(|of| (of.as_ref(), same(of)));
             let problem = if features == Features::PpprHeatmap || (features == Features::Heatmap && persons > 1) {
                 Some(Arc::new(problem_alone(dataset, shown).map_err(|_| "has no finite cell")?))
             } else {

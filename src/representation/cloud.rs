@@ -51,7 +51,7 @@ pub fn point_cloud(
         .map(|joint| simulate(problem, &config, Precision::F32, &alone(params, joint)))
         .collect();
     let mut points = Vec::new();
-    for (view, (of, cells)) in problem.views.iter().zip(cells).enumerate() {
+    for (view, (of, cells)) in problem.views_under(&config).iter().zip(cells).enumerate() {
         for &cell in cells {
             let power = |joint: usize| parts[joint].get(view).and_then(|map| map.get(cell)).map_or(0.0, |a| a * a);
             let weights: Vec<f64> = (0..shape.total_joints()).map(power).collect();

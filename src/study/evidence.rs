@@ -103,6 +103,7 @@ pub fn state_evidence(
         image_boxes: frame.image.as_ref().map(|image| image.boxes.len().max(image.keypoints.len())),
         static_removed: dataset.info().static_removed,
     };
+    let problem = problem.under(config);
     evidence(&EvidenceInput { problem, config, params, masks, before: &before, annotated })
 }
 

@@ -4,7 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "a picture that cannot be made is no picture")]
 
 use crate::window::Window;
-use egui::pos2;
+use egui::{Key, Modifiers, pos2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use mhp_inspector::app::{InspectorApp, Pane};
@@ -94,6 +94,9 @@ fn predictions(window: &mut Window, folder: &Path) {
         window.apply(Command::OpenPredictions(file.into(), Box::default()));
     }
     window.until("the predictions", |w| w.session().sources.list().len() == known);
+    // Every frame has a fit to be compared with.
+    window.key_with(Modifiers::COMMAND, Key::Enter);
+    window.until("the batch", |w| !w.session().batch.is_running() && w.session().batch.fitted() > 0);
     window.harness.state_mut().show_pane(Pane::called("Predictions").unwrap());
     window.harness.run_steps(4);
     let slot = window.session().sources.list()[0].name().to_owned();
@@ -160,7 +163,7 @@ fn pictures() {
     window.apply(Command::AddBreakpoint("em·kine<-0.9".into()));
     window.apply(Command::Reset);
     window.ready(frame);
-    window.key(egui::Key::Enter);
+    window.key(Key::Enter);
     window.until("a stop", |w| w.session().breakpoints.list().iter().any(|point| point.hits > 0));
     picture(&mut window, &folder, "breakpoints");
     window.apply(Command::StepFit(70));

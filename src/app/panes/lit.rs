@@ -23,11 +23,11 @@ pub(super) struct Lit {
     maps: Mutex<Made>,
 }
 
-/// What is known of the returns of the fit on screen: those of a state, and the state whose returns are being made.
+/// What is known of the returns of the fit on screen: those of a state, and whether those of another are being made.
 #[derive(Clone, Default)]
 struct Known {
     lit: Option<Arc<Lit>>,
-    asked: Option<Arc<Snapshot>>,
+    working: bool,
 }
 
 /// The returns of the fit on screen, those of a state before as long as its own are being made, which wakes the window; `None` where
@@ -36,23 +36,19 @@ pub(super) fn lit(ctx: &Context, session: &Session) -> Option<Arc<Lit>> {
     let (problem, shown) = (session.fit.problem.as_ref()?, session.fit.shown.as_ref()?);
     let id = Id::unique("lit");
     let known: Known = ctx.data(|data| data.get_temp(id)).unwrap_or_default();
-    let of_shown = |of: &Option<Arc<Snapshot>>| of.as_ref().is_some_and(|of| Arc::ptr_eq(of, shown));
     let lit = known.lit.filter(|lit| lit.of.job == shown.job);
-    if lit.as_ref().is_none_or(|lit| !Arc::ptr_eq(&lit.of, shown)) && !of_shown(&known.asked) {
+    // One at a time; the newest state then is asked for when it has answered.
+    if !known.working && lit.as_ref().is_none_or(|lit| !Arc::ptr_eq(&lit.of, shown)) {
         problem.check(&shown.params).ok()?;
-        let asked = Known { lit: lit.clone(), asked: Some(Arc::clone(shown)) };
-        ctx.data_mut(|data| data.insert_temp(id, asked));
+        ctx.data_mut(|data| data.insert_temp(id, Known { lit: lit.clone(), working: true }));
         let (problem, of, ctx) = (Arc::clone(problem), Arc::clone(shown), ctx.clone());
         rayon::spawn(move || {
-            let returns = JointReturns::new(&problem, &of.config, &of.params);
-            let lit = Arc::new(Lit { of, returns, maps: Mutex::default() });
+            let made = crate::task::catch_panic(|| JointReturns::new(&problem, &of.config, &of.params));
+            let lit = made.ok().map(|returns| Arc::new(Lit { of, returns, maps: Mutex::default() }));
             ctx.data_mut(|data| {
                 let known = data.get_temp_mut_or_default::<Known>(id);
-                let is_asked = |of: &Arc<Snapshot>| known.asked.as_ref().is_some_and(|asked| Arc::ptr_eq(asked, of));
-                // Better an older one than none, but not in the place of the one that is asked for.
-                if known.lit.as_ref().is_none_or(|there| !is_asked(&there.of)) {
-                    known.lit = Some(lit);
-                }
+                known.working = false;
+                known.lit = lit.or_else(|| known.lit.take());
             });
             ctx.request_repaint();
         });

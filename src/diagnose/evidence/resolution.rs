@@ -88,7 +88,7 @@ impl Resolution {
 pub(super) fn echo(view: &View, config: &FitConfig, params: &Pppr, joint: usize) -> Vec3 {
     let p = view.pose.view_from_world(params.position(joint));
     let d = norm(p).max(DISTANCE_FLOOR_M);
-    scale(p, (d - config.surface_offset_m).max(DISTANCE_FLOOR_M) / d)
+    scale(p, (d - config.surface_offset_m + view.psf.offset_m()).max(DISTANCE_FLOOR_M) / d)
 }
 
 /// v_r of flat joint `joint` in `view`, m/s, positive moving away.

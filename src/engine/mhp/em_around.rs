@@ -25,6 +25,7 @@ pub struct EmAround<'a> {
 impl<'a> FrameEmLoss<'a> {
     /// Of the frame of `problem`, for persons who are about as far away as those of `params`.
     pub fn new(problem: &'a Problem, config: FitConfig, precision: Precision, params: &Pppr) -> Self {
+        let problem = problem.under(&config);
         let in_window = config.parameterization == Parameterization::Motion;
         let thinned = in_window.then(|| ThinnedViews::new(problem, &config, params));
         Self { problem, config, precision, thinned }

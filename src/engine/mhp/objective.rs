@@ -13,6 +13,8 @@ use std::sync::Arc;
 
 /// The objective of one fit: its EM region and the mask of H_ori are fixed by the initial parameters.
 pub struct Objective {
+    /// As it was measured, and as fits with this configuration see it.
+    measured: Arc<Problem>,
     problem: Arc<Problem>,
     config: FitConfig,
     precision: Precision,
@@ -55,11 +57,12 @@ impl Objective {
         initial: &Pppr,
     ) -> Result<Self, FitError> {
         problem.check(initial)?;
-        let problem = problem.shared_under(&config);
+        let (measured, problem) = (Arc::clone(&problem), problem.shared_under(&config));
         let centres = region::centres(initial);
         let (regions, warnings) = region::regions(&problem.views, config.em_region, &centres)?;
         let em = FrameEm::new(&problem.measured(&config), &regions, &config, precision);
         let mut objective = Self {
+            measured,
             problem,
             config,
             precision,
@@ -84,14 +87,18 @@ impl Objective {
     /// Changes the configuration; the EM region stays around the same initial persons.
     pub fn set_config(&mut self, config: FitConfig) {
         let before = std::mem::replace(&mut self.config, config);
-        if config.em_region != before.em_region
+        if config.range_offset != before.range_offset {
+            self.problem = Arc::clone(&self.measured).shared_under(&config);
+            self.anchors.clear();
+        }
+        if (config.em_region, config.range_offset) != (before.em_region, before.range_offset)
             && let Ok((regions, warnings)) = region::regions(&self.problem.views, config.em_region, &self.centres)
         {
             (self.regions, self.warnings) = (regions, warnings);
         }
         let asked = |config: &FitConfig| {
             let compared = (config.objective, config.clutter, config.tau_pct);
-            (config.em_region, compared, config.body, config.summation)
+            (config.em_region, config.range_offset, compared, config.body, config.summation)
         };
         if asked(&config) != asked(&before) {
             self.em = FrameEm::new(&self.problem.measured(&config), &self.regions, &config, self.precision);

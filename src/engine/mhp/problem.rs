@@ -30,7 +30,9 @@ pub struct Problem {
     neighbours: Vec<Neighbour>,
     contexts: Contexts,
     thinned: ThinnedCache,
-    /// The same with the range offsets that the maps tell, if any.
+    /// The range offsets that the maps tell; copies, and what is made of this problem, share them.
+    offsets: Arc<OnceLock<Option<Vec<f64>>>>,
+    /// The same problem with them, if any.
     offset: MeasuredOffset,
     /// Where cells were erased, which are NaN in the maps here: the same problem with what borders on them in their place.
     patched: Option<Arc<Self>>,
@@ -82,6 +84,7 @@ impl Problem {
             neighbours: Vec::new(),
             contexts: Contexts::default(),
             thinned: ThinnedCache::default(),
+            offsets: Arc::default(),
             offset: MeasuredOffset::default(),
             patched: None,
         })
@@ -89,7 +92,7 @@ impl Problem {
 
     /// The problem as fits with this configuration see it: with [`RangeOffset::Measured`] the views' maps add to a range what they and
     /// the frames around tell, worked out when first asked for; the problem must not be changed afterwards.
-    pub(super) fn under(&self, config: &FitConfig) -> &Self {
+    pub fn under(&self, config: &FitConfig) -> &Self {
         self.offset(config).map_or(self, |offset| offset)
     }
 
@@ -113,15 +116,30 @@ impl Problem {
     }
 
     fn with_offsets(&self) -> Option<Self> {
-        let mut around: Vec<&Neighbour> = self.neighbours.iter().collect();
-        around.sort_by(|a, b| a.offset_s.abs().total_cmp(&b.offset_s.abs()));
-        let own = self.maps.iter().map(Vec::as_slice).collect();
-        let around = around.into_iter().take(FRAMES_COMPARED - 1).map(Neighbour::slices);
-        let offsets = range_offsets(&self.views, std::iter::once(own).chain(around))?;
-        let views = self.views.with_range_offsets(&offsets);
-        let patched =
-            self.patched.as_ref().map(|patched| Arc::new(Self { views: views.clone(), ..(**patched).clone() }));
+        let views = self.views.with_range_offsets(self.measured_offsets()?);
+        let patched = self.patched.as_ref().map(|patched| {
+            let contexts = Contexts::default();
+            Arc::new(Self { views: views.clone(), contexts, ..(**patched).clone() })
+        });
         Some(Self { views, patched, contexts: Contexts::default(), thinned: ThinnedCache::default(), ..self.clone() })
+    }
+
+    fn measured_offsets(&self) -> Option<&[f64]> {
+        let measure = || {
+            let mut around: Vec<&Neighbour> = self.neighbours.iter().collect();
+            around.sort_by(|a, b| a.offset_s.abs().total_cmp(&b.offset_s.abs()));
+            let own = self.maps.iter().map(Vec::as_slice).collect();
+            let around = around.into_iter().take(FRAMES_COMPARED - 1).map(Neighbour::slices);
+            range_offsets(&self.views, std::iter::once(own).chain(around))
+        };
+        self.offsets.get_or_init(measure).as_deref()
+    }
+
+    /// With the range offsets that `other` measures, which has other maps of the same radars.
+    #[must_use]
+    pub fn calibrated_as(self, other: &Self) -> Self {
+        other.measured_offsets();
+        Self { offsets: Arc::clone(&other.offsets), offset: MeasuredOffset::default(), ..self }
     }
 
     /// Adds the maps of a frame shortly before or after: (seconds after this frame, one map a view). The start reads
@@ -136,7 +154,7 @@ impl Problem {
         let (maps, _) = fill(&self.views, maps)?;
         self.neighbours.push(Neighbour::new(offset_s, maps));
         (self.contexts, self.thinned) = (Contexts::default(), ThinnedCache::default());
-        self.offset = MeasuredOffset::default();
+        (self.offsets, self.offset) = (Arc::default(), MeasuredOffset::default());
         self.neighbours.sort_by(|a, b| a.offset_s.total_cmp(&b.offset_s));
         Ok(())
     }
@@ -163,6 +181,8 @@ impl Problem {
         if erased.iter().flatten().all(|erased| !erased) {
             return Ok(self.clone());
         }
+        // What is taken away of the maps changes nothing of the radars.
+        self.measured_offsets();
         let maps = holed(&|k| self.maps[k].clone())?;
         let slices = |maps: &[Vec<f64>]| -> Result<(Vec<Vec<f64>>, Vec<usize>), FitError> {
             fill(&self.views, &maps.iter().map(Vec::as_slice).collect::<Vec<_>>())

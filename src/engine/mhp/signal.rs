@@ -79,6 +79,7 @@ pub fn simulate_signal(
     params: &Pppr,
     cells: CellValue,
 ) -> Result<Vec<Vec<f64>>, FitError> {
+    let problem = problem.under(config);
     let skin = skin_of(config, (&problem.views, &problem.skeleton, &problem.radar)).map(|mut skin| {
         skin.fill(params);
         skin

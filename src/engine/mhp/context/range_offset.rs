@@ -5,8 +5,8 @@
 //! begin. Of a real set the two differ by 0.2 m, which no body can explain.
 //!
 //! The power over all angles at each range, in dB less its course over a metre, is shifted against that of the first view until both
-//! correlate best: the mean over the frame and those around it. What is found counts where it is larger than a map's resolution,
-//! explains the profiles clearly better, and explains them well; else it is 0, which is what is found of a simulated radar.
+//! correlate best: the mean over the frame and those around it, whatever frames a start may look at, for it is the radars' and no
+//! person's. What is found counts where it is larger than 6 cm, explains the profiles clearly better, and explains them well; else it is 0, which is what is found of a simulated radar.
 //! Nobody can tell which of the two is right: the offsets of all views have mean 0.
 
 use crate::geometry::{norm, sub};
@@ -29,6 +29,8 @@ const LEAST_GAIN: f64 = 0.02;
 const LEAST_LIKENESS: f64 = 0.7;
 /// Views whose radars are farther apart are of different places, m.
 const ONE_PLACE_M: f64 = 0.02;
+/// Ranges that two profiles have in common at least, m.
+const LEAST_COMMON_M: f64 = 1.5;
 /// Wider rings tell no offset, m.
 const WIDEST_RING_M: f64 = 0.3;
 /// Powers below this share of the largest are alike.
@@ -85,8 +87,8 @@ fn best(likeness: &[f64], lags: usize, count: f64) -> Option<f64> {
     (says && offset_m.abs() >= LEAST_M).then_some(offset_m)
 }
 
-/// Powers over all angles by range, ln less their course; `None` where a map is dark.
-fn profile(views: &ViewSet, view: usize, map: &[f64]) -> Option<Vec<f64>> {
+/// Powers over all angles by range, ln less their course, `None` at ranges that the map has not; none at all of a dark map.
+fn profile(views: &ViewSet, view: usize, map: &[f64]) -> Option<Vec<Option<f64>>> {
     let (grid, of) = (views.grid(view)?, views.get(view)?);
     let (sums, cells) = grid.power_by_ring(map, of.quantity);
     let steps = ((FARTHEST_M + MOST_M) / STEP_M).round() as usize;
@@ -100,16 +102,19 @@ fn profile(views: &ViewSet, view: usize, map: &[f64]) -> Option<Vec<f64>> {
         }
     }
     let sigma = SMOOTH_M.max(0.6 * (grid.ring_m(1)? - grid.ring_m(0)?)) / STEP_M;
-    let (power, weight) = (smoothed(&power, sigma), smoothed(&weight, sigma));
-    let mean: Vec<f64> = power.iter().zip(&weight).map(|(p, w)| if *w > 1e-9 { p / w } else { 0.0 }).collect();
-    let largest = mean.iter().copied().fold(0.0, f64::max);
+    let (power, seen) = (smoothed(&power, sigma), smoothed(&weight, sigma));
+    let mean: Vec<Option<f64>> = power.iter().zip(&seen).map(|(p, w)| (*w > 1e-9).then(|| p / w)).collect();
+    let largest = mean.iter().flatten().copied().fold(0.0, f64::max);
     if largest <= 0.0 || !largest.is_finite() {
         return None;
     }
-    let levels: Vec<f64> = mean.iter().map(|p| (p / largest).max(FAINTEST).ln()).collect();
-    let course = smoothed(&levels, COURSE_M / STEP_M);
-    let known = smoothed(&vec![1.0; steps], COURSE_M / STEP_M);
-    Some(levels.iter().zip(course.iter().zip(known)).map(|(level, (course, known))| level - course / known).collect())
+    let levels: Vec<Option<f64>> = mean.iter().map(|p| p.map(|p| (p / largest).max(FAINTEST).ln())).collect();
+    // The course is that of the ranges that the map has.
+    let filled: Vec<f64> = levels.iter().map(|level| level.unwrap_or(0.0)).collect();
+    let there: Vec<f64> = levels.iter().map(|level| f64::from(u8::from(level.is_some()))).collect();
+    let (course, known) = (smoothed(&filled, COURSE_M / STEP_M), smoothed(&there, COURSE_M / STEP_M));
+    let less = |(level, (course, known)): (&Option<f64>, (f64, f64))| level.map(|level| level - course / known);
+    Some(levels.iter().zip(course.into_iter().zip(known)).map(less).collect())
 }
 
 /// Convolved with a Gaussian of `sigma` steps.
@@ -124,12 +129,15 @@ fn smoothed(values: &[f64], sigma: f64) -> Vec<f64> {
     (0..values.len()).map(at).collect()
 }
 
-/// Of the first profile's compared ranges with those of the other, `lag` steps farther.
-fn correlation(first: &[f64], other: &[f64], lag: isize) -> f64 {
+/// Of the first profile's compared ranges with those of the other, `lag` steps farther; 0 where both have too few in common.
+fn correlation(first: &[Option<f64>], other: &[Option<f64>], lag: isize) -> f64 {
     let compared = (NEAREST_M / STEP_M).round() as usize..(FARTHEST_M / STEP_M).round() as usize;
     let pairs: Vec<[f64; 2]> =
-        compared.filter_map(|k| Some([*first.get(k)?, *other.get(k.checked_add_signed(lag)?)?])).collect();
-    let n = pairs.len().max(1) as f64;
+        compared.filter_map(|k| Some([(*first.get(k)?)?, (*other.get(k.checked_add_signed(lag)?)?)?])).collect();
+    if (pairs.len() as f64) < LEAST_COMMON_M / STEP_M {
+        return 0.0;
+    }
+    let n = pairs.len() as f64;
     let mean = [0, 1].map(|side| pairs.iter().map(|pair| pair[side]).sum::<f64>() / n);
     let [mut aa, mut bb, mut ab] = [0.0; 3];
     for [a, b] in pairs {
@@ -191,6 +199,17 @@ mod tests {
             assert!((offsets[1] - offsets[0] - farther_m).abs() < 0.02, "{farther_m}: {offsets:?}");
             assert!((offsets[0] + offsets[1]).abs() < 1e-12, "nobody can tell which is right");
         }
+        // Where a map begins and ends is no echo.
+        let cropped = |lo: f64| {
+            let mut views = views(0.0);
+            for (view, lo) in views.iter_mut().zip([0.8, lo]) {
+                view.axes[0] = Axis { bins: 120, lo: 4.2, hi: lo, ..view.axes[0].clone() };
+            }
+            views
+        };
+        assert_eq!(found(&cropped(1.1), 0.0), None);
+        let offsets = found(&cropped(0.8), 0.2).unwrap_or_default();
+        assert!((offsets[1] - offsets[0] - 0.2).abs() < 0.03, "{offsets:?}");
         // What agrees has none, and what looks from elsewhere sees other ranges.
         assert_eq!(found(&views(0.0), 0.0), None);
         assert_eq!(found(&views(0.0), 0.03), None);
