@@ -71,8 +71,8 @@ impl Batch {
     }
 }
 
-/// What the list says of a fit of a batch.
-pub(super) fn summary(row: &BatchRow) -> FrameSummary {
+/// What the list says of a fit of a batch; `counted` where as many people were fitted as were counted.
+pub(super) fn summary(row: &BatchRow, counted: bool) -> FrameSummary {
     let reason = Some(row.reason());
     let Ok(fit) = &row.fit else { return FrameSummary { reason, batch: true, ..FrameSummary::default() } };
     FrameSummary {
@@ -85,7 +85,7 @@ pub(super) fn summary(row: &BatchRow) -> FrameSummary {
         reason,
         hashes: None,
         batch: true,
-        people: Some(fit.people),
+        people: counted.then_some(fit.people),
         annotated: fit.annotated,
         joints: row.joints.clone(),
     }

@@ -142,7 +142,7 @@ pub struct FrameSummary {
     /// Whether a batch of the window made it.
     #[serde(default)]
     pub batch: bool,
-    /// Persons fitted, where that is known.
+    /// Persons counted, where as many were fitted; of a table that is opened, those that were fitted.
     #[serde(default)]
     pub people: Option<usize>,
     /// Persons annotated, where that is known.

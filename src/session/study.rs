@@ -85,7 +85,8 @@ pub(super) fn frames_of_row(run: &Run, row: usize, scene: Option<&str>, dataset:
     let of_row = run.table.get(row).into_iter().flat_map(|of| run.rows_of(of));
     for of in of_row.filter(|of| scene.is_none() || of.origin.scene.as_deref() == scene) {
         if let Some(&index) = names.get(of.name.as_str()) {
-            summaries.insert(index, summary(of));
+            let counted = run.spec.variants.get(of.variant).is_some_and(|variant| variant.config.people == 0);
+            summaries.insert(index, summary(of, counted));
         } else {
             unknown += 1;
             first_unknown.get_or_insert_with(|| of.name.clone());
@@ -94,7 +95,7 @@ pub(super) fn frames_of_row(run: &Run, row: usize, scene: Option<&str>, dataset:
     FoundResults { dataset: Arc::clone(dataset), summaries, unknown, first_unknown }
 }
 
-fn summary(row: &RunRow) -> FrameSummary {
+fn summary(row: &RunRow, counted: bool) -> FrameSummary {
     let fit = row.fit.as_ref().ok();
     FrameSummary {
         iterations: fit.map(|fit| fit.iterations),
@@ -106,7 +107,7 @@ fn summary(row: &RunRow) -> FrameSummary {
         reason: Some(row.fit.as_ref().map_or_else(|why| format!("error: {why}"), |fit| fit.reason.clone())),
         hashes: None,
         batch: false,
-        people: fit.map(|fit| fit.persons),
+        people: fit.filter(|_| counted).map(|fit| fit.persons),
         annotated: fit.and_then(|fit| fit.annotated),
         joints: None,
     }

@@ -2,7 +2,9 @@
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
 use crate::window::Window;
+use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
+use mhp_inspector::config::{FitConfig, Preset};
 use mhp_inspector::session::{Command, LogLevel, Session};
 use std::path::PathBuf;
 
@@ -124,4 +126,22 @@ fn a_wrong_table_is_told_and_nothing_changes() {
     until(&mut window, "that it is missing", |s| {
         s.log.iter().any(|l| l.text.starts_with("no/such/table.csv: cannot be read"))
     });
+}
+
+/// Whether people were counted as annotated is known where as many are fitted as are counted, and not where somebody says how many.
+#[test]
+fn a_mismatch_is_of_the_count() {
+    let mut window = Window::open(2);
+    for (people, known) in [(1, false), (0, true)] {
+        let config = FitConfig { people, iterations: 4, ..Preset::Baseline.config() };
+        window.apply(Command::SetConfig(Box::new(config)));
+        window.until("the fit on screen", |w| w.fit().is_ready());
+        let before = window.session().batch.fitted();
+        window.key_with(Modifiers::COMMAND, Key::Enter);
+        window.until("the batch", |w| !w.session().batch.is_running() && w.session().batch.fitted() >= before.max(2));
+        let (mismatch, summary) = (window.session().frame_row(1).mismatch, window.session().summaries.get(&1).cloned());
+        assert_eq!(mismatch.is_some(), known, "{people} people: {summary:?}");
+    }
+    window.apply(Command::SetFilter("mismatch:no".into()));
+    assert!(window.session().queue.rows().contains(&1));
 }

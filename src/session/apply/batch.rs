@@ -66,12 +66,13 @@ impl Session {
         if rows.is_empty() {
             return;
         }
+        let counted = self.batch.shown.as_ref().is_some_and(|of| of.config.people == 0);
         let summaries = self.summaries.change();
         for row in rows {
             self.batch.take(&row);
             let own = summaries.get(&row.index).is_some_and(|summary| summary.hashes.is_some());
             if !own {
-                summaries.insert(row.index, summary(&row));
+                summaries.insert(row.index, summary(&row, counted));
             }
         }
     }

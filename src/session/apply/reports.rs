@@ -49,6 +49,7 @@ impl Session {
             let config = self.fit.branch().map_or(self.config, super::super::Branch::newest_config);
             Box::new(hashes(&state.params, &config, row.report.iteration))
         });
+        let counted = self.fit.branch().map_or(self.config, super::super::Branch::newest_config).people == 0;
         let summary = FrameSummary {
             reason: self.fit.reason.map(str::to_owned),
             hashes,
@@ -59,7 +60,7 @@ impl Session {
             converged: Some(row.report.converged),
             majpe_mm: row.majpe_mm,
             batch: false,
-            people: row.state.as_ref().map(|state| state.params.shape().persons),
+            people: row.state.as_ref().filter(|_| counted).map(|state| state.params.shape().persons),
             annotated: self
                 .data
                 .frame

@@ -83,7 +83,7 @@ pub fn syntax() -> String {
         disagree>100: the source that is farthest from the fit, mm\n\
         {}: the terms of the loss\n\
         converged:no · fitted:yes · reason:diverged · verdict:detection-error · readable:no\n\
-        mismatch:yes: another number of people fitted (people = 0: counted) than annotated\n\
+        mismatch:yes: another number of people counted (fits with people = 0) than annotated\n\
         A bare word is looked for in the frame's name.",
         of_loss.join(" ")
     )

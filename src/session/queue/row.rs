@@ -41,7 +41,7 @@ pub struct FrameRow<'a> {
     pub converged: Option<bool>,
     /// Why the run ended.
     pub reason: Option<&'a str>,
-    /// Whether another number of people was fitted than is annotated, where both are known.
+    /// Whether another number of people was counted than is annotated, where both are known.
     pub mismatch: Option<bool>,
     /// MAJPE, mm.
     pub majpe_mm: Option<f64>,
