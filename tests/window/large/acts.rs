@@ -52,6 +52,7 @@ pub(super) fn measure(tree: &Path, warm: bool) {
     window.panes();
     window.fit();
     window.explorations();
+    window.heights();
     window.explore();
     window.batch(warm);
     window.results(tree);
@@ -407,6 +408,14 @@ impl Window {
         self.apply(Command::SetFilter(String::new()));
     }
 
+    /// Panes of another height below the maps, in turn: everything above them is laid out anew.
+    fn heights(&mut self) {
+        let panes = ["Curves", "Breakpoints", "Loss landscape"].map(|name| Pane::called(name).unwrap());
+        self.repeat("panes of other heights in turn", 300, |harness, k| {
+            harness.state_mut().show_pane(panes[k % panes.len()]);
+        });
+    }
+
     /// Each exploration on screen while it fills.
     fn explore(&mut self) {
         self.apply(Command::GotoFrame(0));
@@ -435,7 +444,9 @@ impl Window {
         self.passes_until(&mut meter, |s| s.batch.is_running());
         let begun = Instant::now();
         let patience = if warm { BATCH_PATIENCE } else { UNTIL_CANCELLED };
-        while self.session().batch.is_running() && begun.elapsed() < patience {
+        // A small tree is fitted in less: half of it is left for the second window.
+        let enough = |s: &Session| !warm && 2 * (s.batch.fitted() - known) > s.data.len();
+        while self.session().batch.is_running() && begun.elapsed() < patience && !enough(self.session()) {
             meter.pass(&mut self.0);
         }
         meter.print();

@@ -29,19 +29,21 @@ fn memory(key: &str) -> Option<f64> {
     Some(line.trim().trim_end_matches(" kB").parse::<f64>().ok()? / 1024.0)
 }
 
-/// Costs of the passes of one activity, ms.
+/// Costs of the frames of one activity, ms. A frame is one pass over the panes, or two where something was laid out for the
+/// first time and the window asks for its sizes before it is shown.
 pub(super) struct Meter {
     name: String,
     begun: Instant,
-    passes: Vec<f64>,
+    /// What each cost, and of how many passes it was.
+    frames: Vec<(f64, usize)>,
 }
 
 impl Meter {
     pub(super) fn new(name: &str) -> Self {
-        Self { name: name.into(), begun: Instant::now(), passes: Vec::new() }
+        Self { name: name.into(), begun: Instant::now(), frames: Vec::new() }
     }
 
-    /// One pass: logic, panes and the triangles that they become; what is sent to the graphics card is not in it.
+    /// One frame: logic, panes and the triangles that they become; what is sent to the graphics card is not in it.
     pub(super) fn pass(&mut self, harness: &mut Harness<'_, InspectorApp>) {
         self.pass_with(harness, |_| {});
     }
@@ -61,24 +63,28 @@ impl Meter {
         let triangles = harness.ctx.tessellate(shapes, harness.ctx.pixels_per_point());
         let to = cpu_ms(self.begun);
         drop(triangles);
-        self.passes.push(drawn - start + to - from);
+        let passes = harness.output().platform_output.num_completed_passes;
+        self.frames.push((drawn - start + to - from, passes));
     }
 
-    /// Median, 99th percentile and maximum.
+    /// Median, 99th percentile and maximum of the frames, and of how many passes the longest were.
     pub(super) fn print(mut self) {
-        self.passes.sort_by(f64::total_cmp);
+        self.frames.sort_by(|a, b| a.0.total_cmp(&b.0));
         let at = |share: f64| {
-            let last = self.passes.len().saturating_sub(1);
-            self.passes.get((last as f64 * share).ceil() as usize).copied().unwrap_or(f64::NAN)
+            let last = self.frames.len().saturating_sub(1);
+            self.frames.get((last as f64 * share).ceil() as usize).map_or(f64::NAN, |frame| frame.0)
         };
-        let over = self.passes.iter().filter(|&&ms| ms > 16.0).count();
+        let over = self.frames.iter().filter(|frame| frame.0 > 16.0);
+        let passes: Vec<_> = over.map(|(ms, passes)| format!("{ms:.1} of {passes}")).collect();
         println!(
-            "{:<44} {:>6} passes  median {:>6.2}  p99 {:>6.2}  max {:>6.2} ms  over 16 ms: {over}  ({:.2} s)",
+            "{:<44} {:>6} frames  median {:>6.2}  p99 {:>6.2}  max {:>6.2} ms  over 16 ms: {} [{}]  ({:.2} s)",
             self.name,
-            self.passes.len(),
+            self.frames.len(),
             at(0.5),
             at(0.99),
             at(1.0),
+            passes.len(),
+            passes.join(", "),
             self.begun.elapsed().as_secs_f64(),
         );
     }
