@@ -129,17 +129,15 @@ pub fn closure_test(request: &ClosureRequest, (cores, progress): (&IdleCores, &P
     let mut synthesised: Vec<Vec<Vec<f64>>> = vec![Vec::new(); frames.len()];
     each((cores, progress), frames.len(), || (), synthesise, |piece, maps| synthesised[piece] = maps)?;
     progress.begin("start and fit", 0);
-    let slices = |maps: &[Vec<f64>]| -> Vec<Vec<f64>> { maps.to_vec() };
-    let own = slices(&synthesised[REACH as usize]);
-    let of: Vec<&[f64]> = own.iter().map(Vec::as_slice).collect();
     // The synthesis adds nothing to a range.
     let exact = |view: &View| View { psf: PointSpread { range_offset_m: 0.0, ..view.psf }, ..view.clone() };
     let views: Vec<View> = info.views.iter().map(exact).collect();
-    let mut problem = Problem::new(info.radar.clone(), info.skeleton.clone(), views, &of).map_err(Halt::failed)?;
+    let mut problem =
+        Problem::new(info.radar.clone(), info.skeleton.clone(), views, &slices(&synthesised[REACH as usize]))
+            .map_err(Halt::failed)?;
     problem.static_removed = info.static_removed;
     for (frame, maps) in frames.iter().zip(&synthesised).filter(|(frame, _)| **frame != 0) {
-        let of: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
-        problem.add_neighbour(*frame as f64 / rate_hz, &of).map_err(Halt::failed)?;
+        problem.add_neighbour(*frame as f64 / rate_hz, &slices(maps)).map_err(Halt::failed)?;
     }
     let problem = Arc::new(problem);
     let people = pose.shape().persons;
@@ -171,6 +169,10 @@ pub fn closure_test(request: &ClosureRequest, (cores, progress): (&IdleCores, &P
         fitted,
         assumed,
     })
+}
+
+fn slices(maps: &[Vec<f64>]) -> Vec<&[f64]> {
+    maps.iter().map(Vec::as_slice).collect()
 }
 
 /// The bodies of a pose, and their skin.

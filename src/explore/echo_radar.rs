@@ -7,7 +7,6 @@ use crate::radar::{
     AdcCube, AxisKind, Chain, FftSetup, Fmcw, MimoArray, NativeAxes, Quantity, RadarConfig, SPEED_OF_LIGHT, View,
     ViewFft, Window, interpolate, main_lobe_sigma_bins, sine_sigma,
 };
-use rayon::prelude::*;
 
 /// Samples and chirps of a radar that is only known by its widths, and the fewest and most elements that one is given.
 const SAMPLES: usize = 256;
@@ -164,6 +163,6 @@ impl EchoRadar {
             let value = if value.is_finite() { value } else { 0.0 };
             if view.quantity == Quantity::Power { value * value } else { value }
         };
-        (0..view.cells()).into_par_iter().map(cell).collect()
+        (0..view.cells()).map(cell).collect()
     }
 }

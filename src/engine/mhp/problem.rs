@@ -28,27 +28,29 @@ pub struct Problem {
     maps: Vec<Vec<f64>>,
     filled: Vec<usize>,
     neighbours: Vec<Neighbour>,
-    contexts: Contexts,
-    thinned: ThinnedCache,
-    /// The range offsets that the maps tell; copies, and what is made of this problem, share them.
-    offsets: Arc<OnceLock<Option<Vec<f64>>>>,
-    /// The same problem with them, if any.
-    offset: MeasuredOffset,
+    derived: Derived,
     /// Where cells were erased, which are NaN in the maps here: the same problem with what borders on them in their place.
     patched: Option<Arc<Self>>,
 }
 
-/// What range offsets make of a problem; nothing of its own, so that a copy works it out anew.
+/// What follows from a problem's maps, worked out when first asked for. Equal to any other; a copy, whose maps may become others,
+/// works it out anew, but for the range offsets: they are the radars'.
 #[derive(Debug, Default)]
-struct MeasuredOffset(OnceLock<Option<Arc<Problem>>>);
+struct Derived {
+    contexts: Contexts,
+    thinned: ThinnedCache,
+    offsets: Arc<OnceLock<Option<Vec<f64>>>>,
+    /// The same problem with its range offsets, if any.
+    calibrated: OnceLock<Option<Arc<Problem>>>,
+}
 
-impl Clone for MeasuredOffset {
+impl Clone for Derived {
     fn clone(&self) -> Self {
-        Self::default()
+        Self { offsets: Arc::clone(&self.offsets), ..Self::default() }
     }
 }
 
-impl PartialEq for MeasuredOffset {
+impl PartialEq for Derived {
     fn eq(&self, _: &Self) -> bool {
         true
     }
@@ -82,10 +84,7 @@ impl Problem {
             maps,
             filled,
             neighbours: Vec::new(),
-            contexts: Contexts::default(),
-            thinned: ThinnedCache::default(),
-            offsets: Arc::default(),
-            offset: MeasuredOffset::default(),
+            derived: Derived::default(),
             patched: None,
         })
     }
@@ -112,16 +111,14 @@ impl Problem {
         {
             return None;
         }
-        self.offset.0.get_or_init(|| self.with_offsets().map(Arc::new)).as_ref()
+        self.derived.calibrated.get_or_init(|| self.with_offsets().map(Arc::new)).as_ref()
     }
 
     fn with_offsets(&self) -> Option<Self> {
         let views = self.views.with_range_offsets(self.measured_offsets()?);
-        let patched = self.patched.as_ref().map(|patched| {
-            let contexts = Contexts::default();
-            Arc::new(Self { views: views.clone(), contexts, ..(**patched).clone() })
-        });
-        Some(Self { views, patched, contexts: Contexts::default(), thinned: ThinnedCache::default(), ..self.clone() })
+        let calibrated = |patched: &Arc<Self>| Arc::new(Self { views: views.clone(), ..(**patched).clone() });
+        let patched = self.patched.as_ref().map(calibrated);
+        Some(Self { views, patched, ..self.clone() })
     }
 
     fn measured_offsets(&self) -> Option<&[f64]> {
@@ -132,14 +129,14 @@ impl Problem {
             let around = around.into_iter().take(FRAMES_COMPARED - 1).map(Neighbour::slices);
             range_offsets(&self.views, std::iter::once(own).chain(around))
         };
-        self.offsets.get_or_init(measure).as_deref()
+        self.derived.offsets.get_or_init(measure).as_deref()
     }
 
     /// With the range offsets that `other` measures, which has other maps of the same radars.
     #[must_use]
     pub fn calibrated_as(self, other: &Self) -> Self {
         other.measured_offsets();
-        Self { offsets: Arc::clone(&other.offsets), offset: MeasuredOffset::default(), ..self }
+        Self { derived: other.derived.clone(), ..self }
     }
 
     /// Adds the maps of a frame shortly before or after: (seconds after this frame, one map a view). The start reads
@@ -153,8 +150,7 @@ impl Problem {
         }
         let (maps, _) = fill(&self.views, maps)?;
         self.neighbours.push(Neighbour::new(offset_s, maps));
-        (self.contexts, self.thinned) = (Contexts::default(), ThinnedCache::default());
-        (self.offsets, self.offset) = (Arc::default(), MeasuredOffset::default());
+        self.derived = Derived::default();
         self.neighbours.sort_by(|a, b| a.offset_s.total_cmp(&b.offset_s));
         Ok(())
     }
@@ -187,9 +183,9 @@ impl Problem {
         let slices = |maps: &[Vec<f64>]| -> Result<(Vec<Vec<f64>>, Vec<usize>), FitError> {
             fill(&self.views, &maps.iter().map(Vec::as_slice).collect::<Vec<_>>())
         };
-        let mut patched = Self { maps: slices(&maps)?.0, contexts: Contexts::default(), patched: None, ..self.clone() };
+        let mut patched = Self { maps: slices(&maps)?.0, patched: None, ..self.clone() };
         patched.neighbours.clear();
-        let mut left = Self { maps, contexts: Contexts::default(), patched: None, ..self.clone() };
+        let mut left = Self { maps, patched: None, ..self.clone() };
         left.neighbours.clear();
         for neighbour in &self.neighbours {
             let maps = holed(&|k| neighbour.map(k).to_vec())?;
@@ -207,12 +203,12 @@ impl Problem {
         if let Some(patched) = &self.patched {
             return patched.context(reading);
         }
-        self.contexts.of(&self.views, &self.maps, self.neighbours_in(reading.frames), reading)
+        self.derived.contexts.of(&self.views, &self.maps, self.neighbours_in(reading.frames), reading)
     }
 
     /// Its maps in every so manyth cell, worked out when first asked for; views must not be changed afterwards.
     pub(super) fn thinned(&self, strides: Strides) -> Arc<ThinnedMaps> {
-        self.thinned.of(self, strides)
+        self.derived.thinned.of(self, strides)
     }
 
     /// Where the frames around say that the mean of each person's joints is, world frame, m; empty without frames around.
@@ -255,7 +251,10 @@ impl Problem {
             maps,
             background: None,
             grids: self.views.grids().filter(|_| by_range).map(AsRef::as_ref).collect(),
-            noises: (0..self.views.len()).filter(|_| levels).map(|view| self.thinned.noise(self, view)).collect(),
+            noises: (0..self.views.len())
+                .filter(|_| levels)
+                .map(|view| self.derived.thinned.noise(self, view))
+                .collect(),
         }
     }
 

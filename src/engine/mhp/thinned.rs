@@ -106,24 +106,11 @@ impl ThinnedMaps {
     }
 }
 
-/// The ways of thinning of a problem that were asked for last, and the noise of its own maps. Equal to any other, and empty in a
-/// clone, whose maps may become others.
+/// The ways of thinning of a problem that were asked for last, and the noise of its own maps.
 #[derive(Debug, Default)]
 pub(super) struct ThinnedCache {
     kept: Mutex<Vec<Arc<ThinnedMaps>>>,
     noises: OnceLock<Vec<OnceLock<f64>>>,
-}
-
-impl Clone for ThinnedCache {
-    fn clone(&self) -> Self {
-        Self::default()
-    }
-}
-
-impl PartialEq for ThinnedCache {
-    fn eq(&self, _: &Self) -> bool {
-        true
-    }
 }
 
 impl ThinnedCache {

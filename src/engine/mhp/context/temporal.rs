@@ -5,7 +5,7 @@ use super::saliency::SaliencyMap;
 use super::variation::coefficients_of_variation;
 use crate::config::{Background, FitConfig, FramesAround, Still};
 use crate::radar::{View, ViewSet};
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 /// Coefficients of variation over time: below the first of a pair a cell stands still, above the second it does not (a
 /// Rayleigh amplitude has 0.52). The second pair is for who only breathes.
@@ -92,16 +92,9 @@ fn moving(maps: &[Vec<f64>], around: &[Neighbour], plain: &[SaliencyMap]) -> Opt
 /// Ways of reading maps.
 const READINGS: usize = FramesAround::COUNT * 2 * 2;
 
-/// A frame's context for each way of reading it, worked out when first asked for. Equal to any other: they follow from the
-/// maps.
-#[derive(Debug, Clone, Default)]
-pub(in crate::mhp) struct Contexts([OnceLock<Arc<TemporalContext>>; READINGS]);
-
-impl PartialEq for Contexts {
-    fn eq(&self, _: &Self) -> bool {
-        true
-    }
-}
+/// A frame's context for each way of reading it, worked out when first asked for.
+#[derive(Debug, Default)]
+pub(in crate::mhp) struct Contexts([OnceLock<TemporalContext>; READINGS]);
 
 impl Contexts {
     /// What a frame's `maps`, one a view, show with the frames `around` that `reading` looks at; the arguments must be the
@@ -115,6 +108,6 @@ impl Contexts {
     ) -> &TemporalContext {
         let Reading { frames, still, background } = reading;
         let place = 4 * frames as usize + 2 * still as usize + background as usize;
-        self.0[place].get_or_init(|| Arc::new(TemporalContext::new(views, maps, around, reading)))
+        self.0[place].get_or_init(|| TemporalContext::new(views, maps, around, reading))
     }
 }
