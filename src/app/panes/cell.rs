@@ -186,7 +186,8 @@ fn row(ui: &mut Ui, shared: &mut Shared<'_>, bar: &Bar, tokens: &Tokens) {
         painter.rect_filled(rect, 2.0, tokens.raised);
     }
     let font = FontId::proportional(theme::CAPTION);
-    let (label, number) = ((0.42 * rect.width()).clamp(60.0, 110.0), 38.0);
+    let written = painter.layout_no_wrap(bar.text.clone(), theme::mono(theme::CAPTION), tokens.dim);
+    let (label, number) = ((0.42 * rect.width()).clamp(60.0, 110.0), written.size().x.max(38.0) + 6.0);
     let selected = session.joint == Some(bar.joint);
     painter.with_clip_rect(rect.with_max_x(rect.min.x + label - 4.0)).text(
         rect.left_center(),
@@ -205,7 +206,8 @@ fn row(ui: &mut Ui, shared: &mut Shared<'_>, bar: &Bar, tokens: &Tokens) {
     } else {
         painter.rect_filled(filled, 0.0, color);
     }
-    painter.text(rect.right_center(), Align2::RIGHT_CENTER, &bar.text, theme::mono(theme::CAPTION), tokens.dim);
+    let at = rect.right_center() - vec2(written.size().x, 0.5 * written.size().y);
+    painter.galley(at, written, tokens.dim);
 }
 
 /// The returns as arrows one after the other, the strongest first, and their sum: who interferes with whom.

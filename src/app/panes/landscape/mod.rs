@@ -9,7 +9,7 @@ use super::{Blank, Dock, MovedBody, Pane, PaneStates, Shared};
 use crate::app::figure;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Mark, Named as _, value_row};
-use crate::explore::{ExplorationKind, LossSlice};
+use crate::explore::{ExplorationKind, LossSlice, SampleAxis};
 use crate::mhp::TermId;
 use crate::session::Session;
 use egui::{RichText, Role, Sense, Ui};
@@ -105,13 +105,24 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>) {
     }
 }
 
+/// A value on an axis of the slice, without its unit.
+fn coordinate(axis: &SampleAxis, value: f64) -> String {
+    let digits = if axis.unit == "°" { 0 } else { 2 };
+    super::explore::signed(format!("{value:+.digits$}"))
+}
+
 /// A place on the slice in words.
 fn place(slice: &LossSlice, at: &[f64]) -> String {
     let named = slice.axes.iter().zip(at).map(|(axis, value)| {
-        let digits = if axis.unit == "°" { 0 } else { 2 };
-        format!("{} {value:+.digits$} {}", axis.name, axis.unit).trim_end().to_owned()
+        format!("{} {} {}", axis.name, coordinate(axis, *value), axis.unit).trim_end().to_owned()
     });
-    super::explore::signed(named.collect::<Vec<_>>().join(", "))
+    named.collect::<Vec<_>>().join(", ")
+}
+
+/// The same beside the picture, whose axes have the names.
+fn brief(slice: &LossSlice, at: &[f64]) -> String {
+    let numbers = slice.axes.iter().zip(at).map(|(axis, value)| coordinate(axis, *value));
+    numbers.collect::<Vec<_>>().join(", ")
 }
 
 /// A branch that begins with the body there.
@@ -136,8 +147,7 @@ fn numbers(
     if let Some(cell) = on {
         ui.label(dim("Under the pointer"));
         for (axis, k) in slice.axes.iter().zip(cell) {
-            let digits = if axis.unit == "°" { 0 } else { 2 };
-            value_row(ui, &axis.name, &super::explore::signed(format!("{:+.digits$}", axis.at(k as f64))), axis.unit);
+            value_row(ui, &axis.name, &coordinate(axis, axis.at(k as f64)), axis.unit);
         }
         if let Some(loss) = slice.value(cell, None) {
             value_row(ui, "L", &format!("{loss:.4}"), "");
@@ -157,9 +167,9 @@ fn numbers(
     }
     for (k, minimum) in found.iter().enumerate() {
         let at: Vec<f64> = slice.axes.iter().zip(minimum.cell).map(|(axis, k)| axis.at(k as f64)).collect();
-        let (words, text) = (place(slice, &at), format!("{} {:.4}", k + 1, minimum.value));
-        let link = ui.link(RichText::new(format!("{text}  {words}")).font(theme::mono(theme::CAPTION)));
-        let link = link.named(Role::Link, &format!("Minimum {} at {words}", k + 1));
+        let text = format!("{} {:.4}  {}", k + 1, minimum.value, brief(slice, &at));
+        let link = ui.link(RichText::new(text).font(theme::mono(theme::CAPTION)));
+        let link = link.named(Role::Link, &format!("Minimum {} at {}", k + 1, place(slice, &at)));
         if link.hovered() {
             shared.points.moved = Some(MovedBody::Slice([at[0], at.get(1).copied().unwrap_or(0.0)]));
         }
@@ -172,8 +182,7 @@ fn numbers(
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.label(RichText::new(mark.sign).color(mark.color(tokens)));
-            let at = super::explore::signed(mark.at.iter().map(|x| format!("{x:+.2}")).collect::<Vec<_>>().join(", "));
-            ui.label(dim(&format!("{}  {at}", mark.name)));
+            ui.label(dim(&format!("{}  {}", mark.name, brief(slice, &mark.at))));
         });
     }
 }
