@@ -47,7 +47,7 @@ pub(super) const CLUTTER: &[Answer] = &[
     answer(
         "modelled",
         "by range",
-        "The median of what is lit beside the person at each range joins the noise: sidelobes and walls are arcs. In a window also what stands still over time, where the person walks.",
+        "The median of what is lit beside the person at each range joins the noise: sidelobes and walls are arcs. In a window also what does not change over time, but where the trunk of who stands is.",
     ),
 ];
 

@@ -95,7 +95,7 @@ pub enum Clutter {
     /// Noise, as strong in every cell: SPEC section 8.
     #[default]
     None,
-    /// What is lit beside the person at each range; in a window also what stands still where the person walks.
+    /// What is lit beside the person at each range; in a window also what does not change over time, but for the trunk of who stands.
     Modelled,
 }
 

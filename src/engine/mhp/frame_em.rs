@@ -146,6 +146,12 @@ impl FrameEm {
         gaussians as f64 * cells as f64
     }
 
+    /// L_EM with nobody: what noise and clutter leave of the levels; 1 where masks are compared, or levels by their likelihood.
+    pub(super) fn empty_loss(&self) -> f64 {
+        let of_view = |target: &EmTarget| target.levels.as_ref().map_or(1.0, Levels::empty_loss);
+        self.targets.iter().map(of_view).sum::<f64>() / self.targets.len().max(1) as f64
+    }
+
     /// B_ori over a view's region, in C order.
     pub(super) fn ori(&self, view: usize) -> &[bool] {
         &self.targets[view].ori

@@ -159,6 +159,11 @@ impl Levels {
         Self { kind, measured, by_noise, base, totals, tiles, rows }
     }
 
+    /// L_view without any echo (`ncc_db`), or 1.
+    pub(super) fn empty_loss(&self) -> f64 {
+        if self.kind == EmLoss::NccDb { self.totals.correlation([0.0; 3]).loss } else { 1.0 }
+    }
+
     /// L_view where the cells' simulated powers are `power`; and, where a `factor` is given, its product with ∂L_view/∂ln|S| of
     /// each cell, S = H_sim.
     pub(super) fn compare(&self, power: &[f64], factor: Option<f64>) -> (f64, Option<Vec<f64>>) {

@@ -113,9 +113,10 @@ fn coordinate(axis: &SampleAxis, value: f64) -> String {
 
 /// A place on the slice in words.
 fn place(slice: &LossSlice, at: &[f64]) -> String {
-    let named = slice.axes.iter().zip(at).map(|(axis, value)| {
-        format!("{} {} {}", axis.name, coordinate(axis, *value), axis.unit).trim_end().to_owned()
-    });
+    let named =
+        slice.axes.iter().zip(at).map(|(axis, value)| {
+            format!("{} {} {}", axis.name, coordinate(axis, *value), axis.unit).trim_end().to_owned()
+        });
     named.collect::<Vec<_>>().join(", ")
 }
 

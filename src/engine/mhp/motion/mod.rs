@@ -36,9 +36,8 @@ use super::frame_em::FrameEm;
 use super::region;
 use super::{FitError, Precision, Problem};
 use crate::body::{Group, MotionPrior, Pppr};
-use crate::config::{Clutter, EmLoss, FitConfig};
+use crate::config::{EmLoss, FitConfig};
 use crate::geometry::{Vec3, add_scaled, mean, norm};
-use crate::radar::View;
 use serde::{Deserialize, Serialize};
 use space::{BODY, LN_SIZE, MOST_JOINTS, PoseSpace, STILL, YAW};
 use static_echo::StaticEchoModel;
@@ -181,34 +180,36 @@ impl Window {
         }
         let Some(space) = PoseSpace::new(prior, &problem.skeleton, &times) else { return Ok(Err(Held::Skeleton)) };
         let (centres, ways) = (region::centres(initial), ways(initial));
-        let mut frames = Vec::with_capacity(chosen.len());
         let thinned = ThinnedViews::new(problem, config, initial);
         let views = thinned.views();
         let (own_regions, _) = region::regions(views, config.em_region, &centres)?;
         let walks = !neighbours.is_empty() && ways.iter().all(|way| norm(*way) >= WALKING_MPS);
-        // What stands still over time is somebody who stands, too.
-        let asked = walks && config.clutter == Clutter::Modelled && !problem.static_removed;
-        let of_view = |view: &View, maps| clutter::background(maps, view.quantity);
-        let background =
-            asked.then(|| thinned.maps.backgrounds(problem, config.frames_around, of_view)).filter(|backgrounds| {
-                let mut seen = views.iter().zip(*backgrounds).zip(&own_regions);
-                seen.any(|((view, background), region)| clutter::is_cluttered(background, &view.shape(), region))
-            });
-        for &frame in &chosen {
+        let moved = |frame: Option<usize>| -> Vec<Vec3> {
             let t_s = frame.map_or(0.0, |k| offsets[k]);
-            let moved: Vec<Vec3> = centres
-                .iter()
-                .zip(&ways)
-                .map(|(&centre, &way)| {
-                    let mut at = centre;
-                    add_scaled(&mut at, way, t_s);
-                    at
-                })
-                .collect();
-            let (regions, _) = region::regions(views, config.em_region, &moved)?;
-            let em = thinned.compared(frame, &regions, (config, precision), background);
-            frames.push(WindowFrame { em, params: initial.clone(), gradient: Pppr::zeros(initial.shape()) });
+            let at = |(&centre, &way): (&Vec3, &Vec3)| {
+                let mut at = centre;
+                add_scaled(&mut at, way, t_s);
+                at
+            };
+            centres.iter().zip(&ways).map(at).collect()
+        };
+        let compared = |background: Option<&[Vec<f64>]>| -> Result<Vec<FrameEm>, FitError> {
+            let of_frame = |&frame: &Option<usize>| {
+                let (regions, _) = region::regions(views, config.em_region, &moved(frame))?;
+                Ok(thinned.compared(frame, &regions, (config, precision), background))
+            };
+            chosen.iter().map(of_frame).collect()
+        };
+        let background = clutter::known((problem, config), &thinned, &own_regions, (&centres, walks))?;
+        let mut ems = compared(background.as_deref())?;
+        if background.is_some() && !walks {
+            let empty = ems.iter().map(FrameEm::empty_loss).sum::<f64>() / ems.len().max(1) as f64;
+            if empty < clutter::HIDDEN {
+                ems = compared(None)?;
+            }
         }
+        let frame = |em| WindowFrame { em, params: initial.clone(), gradient: Pppr::zeros(initial.shape()) };
+        let frames = ems.into_iter().map(frame).collect();
         let own = chosen.iter().position(Option::is_none).unwrap_or(0);
         let stride = space.coordinates();
         let echo = StaticEchoModel::new(problem, config);

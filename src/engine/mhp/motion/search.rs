@@ -4,10 +4,11 @@
 //! runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
 
 use super::decode::lowest;
-use super::{BODY, Held, LN_SIZE, MotionState, Window, WindowLoss, YAW, ways};
+use super::{BODY, Held, LN_SIZE, MotionState, WALKING_MPS, Window, WindowLoss, YAW, ways};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::geometry::{Vec3, mean, norm, sub};
+use crate::mhp::skin::radar_place;
 use crate::mhp::{FitError, Precision, Problem, tiles};
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -62,6 +63,8 @@ pub(in crate::mhp) struct Hypothesis {
     pub(in crate::mhp) unlikeness: f64,
     /// Where it looks, rad.
     pub(in crate::mhp) yaw: f64,
+    /// How far away from the radar it looks where it does not walk: 0 at it, 1 the other way.
+    pub(in crate::mhp) away: f64,
     /// Its joints, world frame, m.
     pub(in crate::mhp) joints: Vec<Vec3>,
     /// Their velocities, m/s.
@@ -141,13 +144,19 @@ impl Search<'_> {
         self.window.place(&tried.state.coordinates, &mut placed);
         let joints = placed.shape().joints;
         let own = person * joints..(person + 1) * joints;
-        let way = sub(mean(placed.person(person)), mean(self.params.person(person)));
+        let middle = mean(placed.person(person));
+        let way = sub(middle, mean(self.params.person(person)));
+        let velocities = placed.velocities()[own.clone()].to_vec();
+        let yaw = tried.state.coordinates[person * self.window.stride + YAW];
+        let to_radar = sub(radar_place(&self.problem.views), middle);
+        let stands = norm(mean(&velocities)) < WALKING_MPS;
         Hypothesis {
             loss: tried.loss,
             unlikeness: super::unlikeness(self.config, tried.em, tried.prior) + OF_WAY * norm(way),
-            yaw: tried.state.coordinates[person * self.window.stride + YAW],
+            yaw,
+            away: if stands { 0.5 - 0.5 * (yaw - to_radar[1].atan2(to_radar[0])).cos() } else { 0.0 },
             joints: placed.positions()[own.clone()].to_vec(),
-            velocities: placed.velocities()[own.clone()].to_vec(),
+            velocities,
             beta: placed.group(Group::Beta)[own].to_vec(),
         }
     }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::body::{PpprShape, Skeleton};
-use crate::config::{BodyModel, EmLoss, StaticEcho, Summation};
+use crate::config::{BodyModel, Clutter, EmLoss, StaticEcho, Summation};
 use crate::geometry::{norm, sub};
 use crate::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
 use rand::rngs::StdRng;
@@ -167,4 +167,53 @@ fn a_mirrored_body_has_left_and_right_exchanged() {
         }
     }
     assert!(norm(sub(plain[1][9], plain[1][10])) > 0.05, "it is no symmetric pose");
+}
+
+/// Reflectors that stand everywhere, over six frames of noise: the background is them but where somebody's trunk stands, and of
+/// somebody who walks also there; five frames are the fewest that tell it around who stands, and where static echoes were
+/// removed there is none.
+#[test]
+fn a_background_is_known_but_under_the_trunk_of_who_stands() {
+    let mut rng = StdRng::seed_from_u64(3);
+    let alone = problem(&mut rng);
+    let reflector = |cell: usize| if cell.is_multiple_of(7) { 40.0 } else { 0.0 };
+    let with = |frames: usize, rng: &mut StdRng| {
+        let mut map = || -> Vec<f64> { (0..1200).map(|cell| reflector(cell) + rng.random_range(0.0..1.0)).collect() };
+        let (h, v) = (map(), map());
+        let (radar, skeleton) = (alone.radar.clone(), alone.skeleton.clone());
+        let mut problem = Problem::new(radar, skeleton, alone.views.clone(), &[&h, &v]).unwrap();
+        for k in 1..frames {
+            problem.add_neighbour(0.1 * k as f64, &[&map(), &map()]).unwrap();
+        }
+        problem
+    };
+    let config = config();
+    let shape = PpprShape { persons: 1, joints: 17, doppler_features: 2 };
+    let mut params = Pppr::zeros(shape);
+    params.motion_mut()[0].fill([3.0, 0.2, 0.1]);
+    let known = |problem: &Problem, walk: bool| {
+        let thinned = ThinnedViews::new(problem, &config, &params);
+        let centres = region::centres(&params);
+        let (regions, _) = region::regions(thinned.views(), config.em_region, &centres).unwrap();
+        let found = clutter::known((problem, &config), &thinned, &regions, (&centres, walk)).unwrap();
+        found.map(|maps| (thinned.views().to_vec(), maps.into_owned()))
+    };
+    let six = with(6, &mut rng);
+    let (views, standing) = known(&six, false).unwrap();
+    let (_, walking) = known(&six, true).unwrap();
+    for (view, (standing, walking)) in views.iter().zip(standing.iter().zip(&walking)) {
+        let vertical = view.array == "v";
+        let bins = view.axes[1].bins;
+        for (cell, (&of, &whole)) in standing.iter().zip(walking).enumerate() {
+            let [depth, across] = [(0, cell / bins), (1, cell % bins)].map(|(k, bin)| view.axes[k].at(bin as f64));
+            let trunk = (depth - 3.0).abs() <= 0.15 && (vertical || (across - 0.2).abs() <= 0.15);
+            assert_eq!(of, if trunk { 0.0 } else { whole }, "{} {depth} {across}", view.array);
+        }
+        assert!(standing.contains(&0.0) && walking.iter().any(|&power| power > 1000.0));
+    }
+    assert!(known(&with(4, &mut rng), false).is_none());
+    assert!(known(&with(4, &mut rng), true).is_some());
+    let mut removed = six;
+    removed.static_removed = true;
+    assert!(known(&removed, true).is_none());
 }
