@@ -85,11 +85,10 @@ fn stated(bed: &Bed) -> PathBuf {
 }
 
 /// IoU and image errors of one real frame, and L_EM.
-fn real(bed: &Bed, frame: &Path) -> String {
+fn real(bed: &Bed, frame: &Path, stated: &Path) -> String {
     let head =
         ["preset", "L_EM", "IoU horizontal", "IoU vertical", "reprojection, px", "joints in the boxes on the maps"];
     let mut rows = vec![row(&head)];
-    let stated = stated(bed);
     let presets = PRESETS.map(|preset| (format!("`{preset}`"), ["--preset", preset]));
     let ranges = ("`recommended`, `range_offset = \"stated\"`".to_owned(), ["--config", stated.to_str().unwrap()]);
     for (k, (name, options)) in presets.into_iter().chain([ranges]).enumerate() {
@@ -116,7 +115,7 @@ fn real(bed: &Bed, frame: &Path) -> String {
 }
 
 /// Errors on `samples/walk` where the ranges of its second radar are 0.2 m too large, as measured and as stated.
-fn moved(bed: &Bed) -> String {
+fn moved(bed: &Bed, stated: &Path) -> String {
     let (sample, moved) = (Bed::own("samples/walk"), bed.path("moved"));
     std::fs::create_dir(&moved).unwrap();
     std::os::unix::fs::symlink(sample.join("frames"), moved.join("frames")).unwrap();
@@ -125,7 +124,6 @@ fn moved(bed: &Bed) -> String {
     let axis = axis.replacen("lo = 7.984375", "lo = 8.184375", 1).replacen("hi = -0.015625", "hi = 0.184375", 1);
     assert!(axis.contains("8.184375") && axis.contains("0.184375"));
     std::fs::write(moved.join("dataset.toml"), format!("{before}kind = \"depth_v\"{axis}")).unwrap();
-    let stated = stated(bed);
     let figures = [["--preset", "recommended"], ["--config", stated.to_str().unwrap()]].map(|options| {
         let run = bed.study(
             "complexity",
@@ -175,11 +173,17 @@ pub(crate) fn section(bed: &Bed) -> String {
             rows.push(errors(bed, sets, preset).cells(name, preset));
         }
     }
+    let stated = stated(bed);
     let frame = Bed::shared("data/mmvr/00383_radar.npz").map_or_else(
         || "The real MMVR frame was not there to be measured.".to_owned(),
-        |frame| format!("One real MMVR frame (00383), which has labels in the image only:\n\n{}", real(bed, &frame)),
+        |frame| {
+            format!(
+                "One real MMVR frame (00383), which has labels in the image only:\n\n{}",
+                real(bed, &frame, &stated)
+            )
+        },
     );
-    let moved = moved(bed);
+    let moved = moved(bed, &stated);
     format!(
         "`study complexity DATA --preset PRESET`, single precision, the preset's iterations. Mean over sequences ± half of its 95 % interval; \
          frames with another number of people than annotated are left out. Settings were tuned on other seeds; of the second simulator \

@@ -169,24 +169,26 @@ fn a_mirrored_body_has_left_and_right_exchanged() {
     assert!(norm(sub(plain[1][9], plain[1][10])) > 0.05, "it is no symmetric pose");
 }
 
+/// Reflectors in every so manyth cell over frames of noise, `noise` strong; the radar, skeleton and views of [`problem`].
+fn reflectors(frames: usize, noise: f64, rng: &mut StdRng) -> Problem {
+    let alone = problem(rng);
+    let reflector = |cell: usize| if cell.is_multiple_of(7) { 40.0 } else { 0.0 };
+    let mut map =
+        || -> Vec<f64> { (0..1200).map(|cell| reflector(cell) + noise * rng.random_range(0.0..1.0)).collect() };
+    let (radar, skeleton) = (alone.radar.clone(), alone.skeleton.clone());
+    let mut problem = Problem::new(radar, skeleton, alone.views.clone(), &[&map(), &map()]).unwrap();
+    for k in 1..frames {
+        problem.add_neighbour(0.1 * k as f64, &[&map(), &map()]).unwrap();
+    }
+    problem
+}
+
 /// Reflectors that stand everywhere, over six frames of noise: the background is them but where somebody's trunk stands, and of
 /// somebody who walks also there; five frames are the fewest that tell it around who stands, and where static echoes were
 /// removed there is none.
 #[test]
 fn a_background_is_known_but_under_the_trunk_of_who_stands() {
     let mut rng = StdRng::seed_from_u64(3);
-    let alone = problem(&mut rng);
-    let reflector = |cell: usize| if cell.is_multiple_of(7) { 40.0 } else { 0.0 };
-    let with = |frames: usize, rng: &mut StdRng| {
-        let mut map = || -> Vec<f64> { (0..1200).map(|cell| reflector(cell) + rng.random_range(0.0..1.0)).collect() };
-        let (h, v) = (map(), map());
-        let (radar, skeleton) = (alone.radar.clone(), alone.skeleton.clone());
-        let mut problem = Problem::new(radar, skeleton, alone.views.clone(), &[&h, &v]).unwrap();
-        for k in 1..frames {
-            problem.add_neighbour(0.1 * k as f64, &[&map(), &map()]).unwrap();
-        }
-        problem
-    };
     let config = config();
     let shape = PpprShape { persons: 1, joints: 17, doppler_features: 2 };
     let mut params = Pppr::zeros(shape);
@@ -198,7 +200,7 @@ fn a_background_is_known_but_under_the_trunk_of_who_stands() {
         let found = clutter::known((problem, &config), &thinned, &regions, (&centres, walk)).unwrap();
         found.map(|maps| (thinned.views().to_vec(), maps.into_owned()))
     };
-    let six = with(6, &mut rng);
+    let six = reflectors(6, 1.0, &mut rng);
     let (views, standing) = known(&six, false).unwrap();
     let (_, walking) = known(&six, true).unwrap();
     for (view, (standing, walking)) in views.iter().zip(standing.iter().zip(&walking)) {
@@ -211,9 +213,43 @@ fn a_background_is_known_but_under_the_trunk_of_who_stands() {
         }
         assert!(standing.contains(&0.0) && walking.iter().any(|&power| power > 1000.0));
     }
-    assert!(known(&with(4, &mut rng), false).is_none());
-    assert!(known(&with(4, &mut rng), true).is_some());
+    assert!(known(&reflectors(4, 1.0, &mut rng), false).is_none());
+    assert!(known(&reflectors(4, 1.0, &mut rng), true).is_some());
     let mut removed = six;
     removed.static_removed = true;
     assert!(known(&removed, true).is_none());
+}
+
+/// Where noise and background explain the maps without anybody, who stands is compared as if nothing were known of either; where
+/// they do not, or somebody walks, the background counts.
+#[test]
+fn a_background_that_explains_the_maps_alone_is_not_used_for_who_stands() {
+    let mut rng = StdRng::seed_from_u64(5);
+    let config = config();
+    let hidden = reflectors(6, 1.0, &mut rng);
+    // The frame that the body is compared with shows something else than what stands in those around.
+    let standing = reflectors(8, 1.0, &mut rng);
+    let other: Vec<f64> = (0..1200).map(|cell| if (cell / 30) % 2 == 0 { 60.0 } else { 0.1 }).collect();
+    let (radar, skeleton) = (standing.radar.clone(), standing.skeleton.clone());
+    let mut seen = Problem::new(radar, skeleton, standing.views.clone(), &[&other, &other]).unwrap();
+    for around in standing.neighbours() {
+        seen.add_neighbour(1.0 + around.offset_s, &[around.map(0), around.map(1)]).unwrap();
+    }
+    let loss = |problem: &Problem, speed: f64| {
+        let (_, mut params) = person(&mut StdRng::seed_from_u64(1), None);
+        params.motion_mut()[1].fill([speed, 0.0, 0.0]);
+        let mut window = Window::new(problem, &config, Precision::F64, &params).unwrap().unwrap();
+        let coordinates = window.coordinates_of(&params);
+        let mut loss = WindowLoss::default();
+        window.evaluate((problem, &config), Precision::F64, (&coordinates, &params), None, &mut loss);
+        loss.em
+    };
+    let removed = |problem: &Problem| {
+        let mut problem = problem.clone();
+        problem.static_removed = true;
+        problem
+    };
+    assert_eq!(loss(&hidden, 0.0), loss(&removed(&hidden), 0.0));
+    assert_ne!(loss(&hidden, 1.0), loss(&removed(&hidden), 1.0));
+    assert_ne!(loss(&seen, 0.0), loss(&removed(&seen), 0.0));
 }
