@@ -46,7 +46,7 @@ pub struct SimulateArgs {
     /// People: a number, or a range such as 0..=4 to draw from for each sequence; without it, the preset's own number.
     #[arg(long, value_name = "N", value_parser = people)]
     pub people: Option<RangeInclusive<usize>>,
-    /// What they do, separated by commas; without it, the preset's own mixture.
+    /// What they do, separated by commas; without it, the preset's own mixture (hiber: they walk, as in its WALK).
     #[arg(long, value_enum, value_delimiter = ',')]
     pub action: Vec<ActionArg>,
     /// Seed of everything; the same seed gives the same bytes.

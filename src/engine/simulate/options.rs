@@ -78,6 +78,12 @@ impl SimulatedLayout {
         }
     }
 
+    /// What people do, where nothing is asked for and the preset's mixture is not what such a data set shows: of HIBER's categories
+    /// `WALK` is written.
+    pub(super) fn actions(self) -> Option<Vec<Action>> {
+        (self == Self::Hiber).then(|| vec![Action::Walk])
+    }
+
     /// Left and right end of where people may be, y in m.
     pub(super) fn lateral_m(self) -> [f64; 2] {
         match self {
@@ -129,7 +135,7 @@ pub struct Options {
     pub sequence_length: usize,
     /// People a sequence, drawn evenly; `None` is the preset's own number.
     pub people: Option<RangeInclusive<usize>>,
-    /// What they do, drawn evenly; empty is the preset's own mixture.
+    /// What they do, drawn evenly; empty is the preset's own mixture (HIBER's people walk).
     pub actions: Vec<Action>,
     /// Seed of everything.
     pub seed: u64,

@@ -86,8 +86,9 @@ impl Sequence {
             floor_z_m: -options.radar_height_m.unwrap_or(drawn_height_m),
             lasts_s: (options.sequence_length.saturating_sub(1)) as f64 / rate_hz,
         };
-        let actions = if options.actions.is_empty() { &recipe.actions } else { &options.actions };
-        let performers = draw_performers(&recipe, actions, count, &stage, &mut draw);
+        let usual = || options.layout.actions().unwrap_or_else(|| recipe.actions.clone());
+        let actions = if options.actions.is_empty() { usual() } else { options.actions.clone() };
+        let performers = draw_performers(&recipe, &actions, count, &stage, &mut draw);
         let multipath = options.multipath.unwrap_or(true);
         let centre = performers.first().map_or([3.0, 0.0], |p| {
             let hip = p.pose(0.5 * stage.lasts_s).joints[11];

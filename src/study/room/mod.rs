@@ -1,7 +1,7 @@
 //! Where a radar stands in the room whose frame a data set's joints are in: found from the joints and the maps.
 //!
-//! 1. Of every frame with one person the middle of the echo in the radar's frame ([`echo`]) and the middle of the joints in the
-//!    room's.
+//! 1. Of every frame with one person, where there are enough of those in which somebody walks, the middle of the echo in the radar's
+//!    frame ([`echo`]) and the middle of the joints in the room's.
 //! 2. The rigid transform on which most frames agree: triples of frames drawn at random, then the frames that agree, weighted
 //!    (Tukey), until nothing changes ([`rigid`]). It needs somebody who walked about: points on a line would leave a turn open.
 //! 3. The transform with which the joints' bodies explain the maps of these frames best ([`refine`]): echoes come from the skin before
@@ -129,7 +129,7 @@ pub fn estimate_room(
         let known = all.into_iter().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
         return Err(RoomError::NoEnvironment { environment: environment.to_owned(), known });
     };
-    let chosen = evenly(frames, most.max(1));
+    let chosen = who_walks(dataset, frames, most.max(1));
     progress.begin("looking at frames", chosen.len() as u64);
     let finder = EchoFinder::new(&dataset.info().views);
     let seen: Vec<Option<Seen>> = chosen
@@ -154,7 +154,6 @@ pub fn estimate_room(
         return Err(RoomError::NoAgreement { environment, agree, usable });
     };
     let used: Vec<&Seen> = agreeing.iter().filter_map(|&k| seen.get(k)).collect();
-    progress.begin("explaining the maps", refine::ROUNDS);
     let fine = refine::refine(dataset, &used, coarse.pose, progress)?;
     let apart: Vec<f64> =
         pairs.iter().map(|pair| norm(sub(fine.pose.view_from_world(pair.room), pair.radar))).collect();
@@ -182,6 +181,8 @@ pub(crate) struct Seen {
     pub(crate) index: usize,
     /// The person's joints, room frame, m.
     pub(crate) joints: Vec<Vec3>,
+    /// Their velocities, room frame, m/s; none where the frames around do not tell them.
+    pub(crate) velocities: Option<Vec<Vec3>>,
     /// The middle of the echo, radar frame, m.
     pub(crate) echo: Vec3,
 }
@@ -190,10 +191,52 @@ fn look(dataset: &Dataset, finder: &EchoFinder, index: usize) -> Option<Seen> {
     let persons =
         dataset.room_joints()?.joints(index).inspect_err(|error| tracing::debug!("not used: {error}")).ok()?;
     let [joints] = <[Vec<Vec3>; 1]>::try_from(persons).ok()?;
+    let velocities = velocities(dataset, index, &joints);
     let maps = dataset.maps(index..index + 1).next()?;
     let maps = maps.inspect_err(|error| tracing::debug!("not used: {error}")).ok()?;
     let echo = finder.find(&maps)?;
-    Some(Seen { index, joints, echo })
+    Some(Seen { index, joints, velocities, echo })
+}
+
+/// Frames whose joints are looked at for each that is used.
+const LOOK_AT: usize = 5;
+/// Who moves as fast as this walks, m/s.
+const WALKS_MPS: f64 = 0.3;
+/// Faster than this no joint is: who is in the frames around is somebody else, m/s.
+const FASTEST_MPS: f64 = 8.0;
+
+/// Half the way from the frame before to the frame after, or all of that to the only one of them.
+fn velocities(dataset: &Dataset, index: usize, joints: &[Vec3]) -> Option<Vec<Vec3>> {
+    let rate_hz = dataset.info().frame_rate_hz?;
+    let rooms = dataset.room_joints()?;
+    let of = |other: usize| {
+        let same = other < dataset.len() && dataset.sequence(other) == dataset.sequence(index);
+        let persons = if same { rooms.joints(other).ok()? } else { return None };
+        let [there] = <[Vec<Vec3>; 1]>::try_from(persons).ok()?;
+        let near = joints.iter().zip(&there).all(|(a, b)| norm(sub(*a, *b)) * rate_hz < FASTEST_MPS);
+        (near && there.len() == joints.len()).then_some(there)
+    };
+    let (before, after) = (index.checked_sub(1).and_then(of), of(index + 1));
+    let (from, to, frames) = match (&before, &after) {
+        (Some(before), Some(after)) => (&before[..], &after[..], 2.0),
+        (Some(before), None) => (&before[..], joints, 1.0),
+        (None, Some(after)) => (joints, &after[..], 1.0),
+        (None, None) => return None,
+    };
+    Some(from.iter().zip(to).map(|(a, b)| sub(*b, *a).map(|x| x * rate_hz / frames)).collect())
+}
+
+/// At most `most` of them, evenly; where there are as many, of those in which somebody walks: what stands still has often been taken
+/// from the maps, and tells the place of one spot alone.
+fn who_walks(dataset: &Dataset, frames: &[usize], most: usize) -> Vec<usize> {
+    let walks = |index: usize| {
+        let [joints] = <[Vec<Vec3>; 1]>::try_from(dataset.room_joints()?.joints(index).ok()?).ok()?;
+        let velocities = velocities(dataset, index, &joints)?;
+        (norm(mean(&velocities)) >= WALKS_MPS).then_some(index)
+    };
+    let looked = evenly(frames, LOOK_AT * most);
+    let walking: Vec<usize> = looked.par_iter().filter_map(|&index| walks(index)).collect();
+    evenly(if walking.len() >= most { &walking } else { frames }, most)
 }
 
 /// At most `most` of them, evenly.

@@ -17,7 +17,7 @@ use super::{DataFolder, FrameSource, FrameWriter, Layout, MapArray, Opened, Stor
 use crate::dataset::Origin;
 use crate::dataset::manifest::Manifest;
 use crate::dataset::npz::{Fold, NPY_KEY, NpzArchive, shape_text};
-use crate::dataset::room::{RoomJoints, RoomTransforms};
+use crate::dataset::room::{MapsOfMotion, RoomJoints, RoomTransforms};
 use crate::dataset::set::{DatasetInfo, parent};
 use crate::dataset::{DatasetError, Frame, Heatmap, Truth};
 use crate::geometry::Vec3;
@@ -32,6 +32,11 @@ use tree::{ANNOTATIONS, HEATMAPS, environment_of, find, frame_stem};
 
 /// Folders of this data set that no other layout needs to look into.
 pub(super) const FOLDERS: [&str; 3] = [HEATMAPS[0], HEATMAPS[1], ANNOTATIONS];
+
+/// Radar frames a second, of which each is less the one before it (as published).
+const RADAR_FRAMES_HZ: f64 = 20.0;
+/// A chirp with the idle time before it, s (as published): the next is the next transmitter's.
+const CHIRP_S: f64 = 45e-6;
 
 /// The layout.
 #[derive(Debug)]
@@ -189,6 +194,10 @@ impl RoomJoints for Frames {
         let Some((segment, stem)) = self.folders.find(i) else { return Ok(Vec::new()) };
         let number = stem.parse().unwrap_or(usize::MAX);
         Ok(labels_of(segment).joints(number, &mut Vec::new())?.unwrap_or_default())
+    }
+
+    fn maps_of_motion(&self) -> Option<MapsOfMotion> {
+        Some(MapsOfMotion { subtracted_s: 1.0 / RADAR_FRAMES_HZ, in_turn_s: CHIRP_S })
     }
 }
 
