@@ -11,7 +11,7 @@ const STAGES: &[(&str, &[&str])] = &[
     ("numbers", &["types", "percentile", "fill", "scalar", "lanes", "batch", "floors"]),
     ("a joint in a view", &["triad", "gaussian", "splat", "adjoint", "skin"]),
     ("cells and masks", &["kernel", "tiles", "cell_box", "level_rows", "levels", "em"]),
-    ("what maps and frames around show", &["region", "template", "context"]),
+    ("what maps and frames around show", &["region", "sidelobes", "template", "context"]),
     ("a frame", &["frame_em", "problem", "thinned", "erased", "simulate", "returns", "signal"]),
     ("the objective", &["objective"]),
     ("a window of frames", &["motion", "em_around"]),

@@ -74,6 +74,15 @@ pub(super) const RANGE_OFFSET: &[Answer] = &[
     ),
 ];
 
+pub(super) const SIDELOBES: &[Answer] = &[
+    answer("kept", "kept", "Part of H_ori, as any echo."),
+    answer(
+        "removed",
+        "removed",
+        "Their mean power is taken from H_ori, along range and along the sine of the angle, as far as they are there.",
+    ),
+];
+
 pub(super) const LOBE: &[Answer] = &[
     answer("gaussian", "Gaussian", "One Gaussian a joint, of the width of psf: SPEC 3."),
     answer(

@@ -6,8 +6,8 @@ use super::field::{Access, Answer, Field, FieldGroup, ReadBy, Unset, Value};
 use super::rows::{choice, count_at, flag_at, maybe_at, number, number_at, one_of_at, switch};
 use super::{
     Background, BodyModel, Clutter, Convergence, EM_REGION_FORM, EmLoss, EmRegion, FitConfig, FramesAround,
-    GradientVelocity, Height, LobeShape, Parameterization, RangeOffset, Scatterers, StartPlace, StaticEcho, Still,
-    Summation, WarmStart, Yaw, answers,
+    GradientVelocity, Height, LobeShape, Parameterization, RangeOffset, Scatterers, Sidelobes, StartPlace, StaticEcho,
+    Still, Summation, WarmStart, Yaw, answers,
 };
 use FieldGroup::{Limits, Model, Optimiser, Perturbation, Radar, Start as Starting, StepSizes, Weights};
 use ReadBy::{Run, Start, Steps, StepsAndStart};
@@ -211,6 +211,18 @@ pub const FIELDS: &[Field] = &[
             one_of_at!(range_offset, [RangeOffset::Stated, RangeOffset::Measured]),
         )
         .row("range offsets measured")
+    },
+    Field {
+        help: "What is done with the sidelobes of FFTs that no window tapers: every echo is a star in such maps. Only where a view's FFTs are known; whether sidelobes are there is measured.",
+        ..choice(
+            Radar,
+            "sidelobes",
+            "Sidelobes",
+            StepsAndStart,
+            answers::SIDELOBES,
+            one_of_at!(sidelobes, [Sidelobes::Kept, Sidelobes::Removed]),
+        )
+        .row("sidelobes removed")
     },
     Field {
         help: "Where L_EM is computed: the whole map, or a box of this half width around the start pose.",

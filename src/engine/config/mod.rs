@@ -64,6 +64,17 @@ pub enum RangeOffset {
     Measured,
 }
 
+/// What is done with the sidelobes of FFTs that no window tapers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sidelobes {
+    /// They are part of the map, as any echo.
+    #[default]
+    Kept,
+    /// Their mean power is taken from the map, as far as they are there; only where a view's FFTs are known.
+    Removed,
+}
+
 /// How L_EM compares the simulated map with the measured one; SPEC sections 4 and 8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -211,6 +222,8 @@ pub struct FitConfig {
     pub lobe: LobeShape,
     /// Range offsets as stated, or measured in the maps.
     pub range_offset: RangeOffset,
+    /// Sidelobes of FFTs without a window, kept or removed.
+    pub sidelobes: Sidelobes,
     /// Where L_EM is evaluated.
     pub em_region: EmRegion,
     /// How far in front of the joint its echo comes from, m.
@@ -281,6 +294,7 @@ impl Default for FitConfig {
             summation: Summation::default(),
             lobe: LobeShape::default(),
             range_offset: RangeOffset::default(),
+            sidelobes: Sidelobes::default(),
             em_region: EmRegion::default(),
             surface_offset_m: 0.0,
             scale_max_m: 0.43,

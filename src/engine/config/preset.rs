@@ -2,8 +2,8 @@
 
 use super::{
     Background, BodyModel, Clutter, Convergence, EmLoss, EmRegion, FitConfig, FramesAround, GradientVelocity, Height,
-    InitConfig, LearningRates, Parameterization, RangeOffset, Scatterers, StartPlace, StaticEcho, Still, Summation,
-    WarmStart, Yaw,
+    InitConfig, LearningRates, Parameterization, RangeOffset, Scatterers, Sidelobes, StartPlace, StaticEcho, Still,
+    Summation, WarmStart, Yaw,
 };
 
 /// A whole [`FitConfig`] with a name. Without a name, every command and the window take the recommended one; a FIT.toml begins at
@@ -95,6 +95,7 @@ impl Preset {
                 clutter: Clutter::Modelled,
                 static_echo: StaticEcho::Fitted,
                 range_offset: RangeOffset::Measured,
+                sidelobes: Sidelobes::Removed,
                 parameterization: Parameterization::Motion,
                 // What a body can do is what the prior says.
                 w_kine: 0.0,

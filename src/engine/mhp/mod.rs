@@ -11,7 +11,8 @@
 //!    `batch.rs`, `floors.rs`
 //! 2. a joint in a view: `triad.rs`, `gaussian.rs`, `splat.rs`, `adjoint.rs`; the skin between the joints, `skin.rs`
 //! 3. cells: `kernel.rs`, `tiles/mod.rs`, `cell_box.rs`; masks and levels over them, `levels.rs`, `em.rs`
-//! 4. what the maps of a frame and those around it show: `region.rs`, `template.rs`, `context/mod.rs`
+//! 4. what the maps of a frame and those around it show: `region.rs`, `template.rs`, `context/mod.rs`; without the stars of
+//!    echoes, `sidelobes.rs`
 //! 5. a frame: `frame_em.rs`, `problem.rs`, `thinned.rs`, `erased.rs`, `simulate.rs`, `returns.rs`, `signal.rs`
 //! 6. the objective: `objective.rs`; a window of frames: `motion/mod.rs`
 //! 7. the fit: `convergence.rs`, `articulation.rs`, `adam.rs`, `fitter.rs`; and the start of one: `init/mod.rs`
@@ -50,6 +51,7 @@ mod problem;
 mod region;
 mod returns;
 mod scalar;
+mod sidelobes;
 mod signal;
 mod simulate;
 mod skin;

@@ -87,18 +87,19 @@ impl Objective {
     /// Changes the configuration; the EM region stays around the same initial persons.
     pub fn set_config(&mut self, config: FitConfig) {
         let before = std::mem::replace(&mut self.config, config);
-        if config.range_offset != before.range_offset {
+        let seen = |config: &FitConfig| (config.range_offset, config.sidelobes);
+        if seen(&config) != seen(&before) {
             self.problem = Arc::clone(&self.measured).shared_under(&config);
             self.anchors.clear();
         }
-        if (config.em_region, config.range_offset) != (before.em_region, before.range_offset)
+        if (config.em_region, seen(&config)) != (before.em_region, seen(&before))
             && let Ok((regions, warnings)) = region::regions(&self.problem.views, config.em_region, &self.centres)
         {
             (self.regions, self.warnings) = (regions, warnings);
         }
         let asked = |config: &FitConfig| {
             let compared = (config.objective, config.clutter, config.tau_pct);
-            (config.em_region, config.range_offset, compared, config.body, config.summation)
+            (config.em_region, seen(config), compared, config.body, config.summation)
         };
         if asked(&config) != asked(&before) {
             self.em = FrameEm::new(&self.problem.measured(&config), &self.regions, &config, self.precision);

@@ -3,9 +3,9 @@
 use super::context::{Contexts, Neighbour, Reading, TemporalContext, anchors, range_offsets};
 use super::frame_em::Measured;
 use super::thinned::{Strides, ThinnedCache, ThinnedMaps};
-use super::{FitError, fill_missing};
+use super::{FitError, fill_missing, sidelobes};
 use crate::body::{Pppr, Skeleton};
-use crate::config::{Clutter, EmLoss, FitConfig, FramesAround, RangeOffset};
+use crate::config::{Clutter, EmLoss, FitConfig, FramesAround, RangeOffset, Sidelobes};
 use crate::geometry::Vec3;
 use crate::radar::{RadarConfig, View, ViewSet};
 use std::sync::{Arc, OnceLock};
@@ -28,6 +28,8 @@ pub struct Problem {
     maps: Vec<Vec<f64>>,
     filled: Vec<usize>,
     neighbours: Vec<Neighbour>,
+    /// Whether sidelobes were taken from the maps.
+    without_sidelobes: bool,
     derived: Derived,
     /// Where cells were erased, which are NaN in the maps here: the same problem with what borders on them in their place.
     patched: Option<Arc<Self>>,
@@ -40,8 +42,9 @@ struct Derived {
     contexts: Contexts,
     thinned: ThinnedCache,
     offsets: Arc<OnceLock<Option<Vec<f64>>>>,
-    /// The same problem with its range offsets, if any.
+    /// The same problem with its range offsets, if any, and without sidelobes, if there are any.
     calibrated: OnceLock<Option<Arc<Problem>>>,
+    cleared: OnceLock<Option<Arc<Problem>>>,
 }
 
 impl Clone for Derived {
@@ -84,20 +87,52 @@ impl Problem {
             maps,
             filled,
             neighbours: Vec::new(),
+            without_sidelobes: false,
             derived: Derived::default(),
             patched: None,
         })
     }
 
-    /// The problem as fits with this configuration see it: with [`RangeOffset::Measured`] the views' maps add to a range what they and
-    /// the frames around tell, worked out when first asked for; the problem must not be changed afterwards.
+    /// The problem as fits with this configuration see it: with [`Sidelobes::Removed`] without them, and with [`RangeOffset::Measured`]
+    /// the views' maps add to a range what they and the frames around tell; worked out when first asked for: the problem must not be
+    /// changed afterwards.
     pub fn under(&self, config: &FitConfig) -> &Self {
-        self.offset(config).map_or(self, |offset| offset)
+        let cleared = self.cleared(config).map_or(self, |cleared| cleared);
+        cleared.offset(config).map_or(cleared, |offset| offset)
     }
 
     /// As [`Self::under`].
     pub(super) fn shared_under(self: Arc<Self>, config: &FitConfig) -> Arc<Self> {
-        self.offset(config).map(Arc::clone).unwrap_or(self)
+        let cleared = self.cleared(config).map(Arc::clone).unwrap_or(self);
+        cleared.offset(config).map(Arc::clone).unwrap_or(cleared)
+    }
+
+    fn cleared(&self, config: &FitConfig) -> Option<&Arc<Self>> {
+        if config.sidelobes != Sidelobes::Removed || self.without_sidelobes {
+            return None;
+        }
+        self.derived.cleared.get_or_init(|| self.without_sidelobes().map(Arc::new)).as_ref()
+    }
+
+    /// `None` where no map has any.
+    fn without_sidelobes(&self) -> Option<Self> {
+        let of = |map: &dyn Fn(usize) -> Vec<f64>| -> (bool, Vec<Vec<f64>>) {
+            let each = self.views.iter().enumerate().map(|(k, view)| {
+                let map = map(k);
+                sidelobes::removed(view, &map).map_or((false, map), |map| (true, map))
+            });
+            let (found, maps): (Vec<bool>, Vec<Vec<f64>>) = each.unzip();
+            (found.contains(&true), maps)
+        };
+        let (found, maps) = of(&|k| self.maps[k].clone());
+        if !found {
+            return None;
+        }
+        let around =
+            self.neighbours.iter().map(|around| Neighbour::new(around.offset_s, of(&|k| around.map(k).to_vec()).1));
+        let patched =
+            self.patched.as_ref().map(|patched| patched.without_sidelobes().map_or(Arc::clone(patched), Arc::new));
+        Some(Self { maps, neighbours: around.collect(), without_sidelobes: true, patched, ..self.clone() })
     }
 
     /// The views as fits with this configuration see them.

@@ -81,6 +81,8 @@ pub struct Lobes {
 pub struct Lobe {
     /// f of each Gaussian.
     pub ratios: [f64; 2],
+    /// How many σ a natural bin is, where no window tapers the samples: then sidelobes fall no faster than 1/(πu)², u in such bins.
+    pub bare: Option<f64>,
 }
 
 impl Lobe {

@@ -19,6 +19,7 @@ const ORDER: &[&str] = &[
     "heading from motion",
     "several starts",
     "range offsets measured",
+    "sidelobes removed",
     "temporal term",
     "height from the floor",
     "convergence",
