@@ -39,7 +39,7 @@ macro_rules! targets {
 
 targets! {
     archives: 1500, 158_000, crate::readers::archive;
-    manifests: 1500, 180_000, crate::readers::manifest;
+    manifests: 1500, 185_000, crate::readers::manifest;
     fit_configurations: 1000, 40_000, crate::readers::fit_configuration;
     parameters: 400, 60_000, crate::readers::parameters;
     captures: 200, 50_000, crate::readers::capture;

@@ -4,11 +4,24 @@ use super::bed::{Bed, over_groups, row, table};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+/// The head of a table of errors.
+pub(crate) const HEAD: [&str; 9] = [
+    "data",
+    "preset",
+    "frames in sequences",
+    "start MAJPE, mm",
+    "MAJPE, mm",
+    "better than start",
+    "start PA-MAJPE, mm",
+    "PA-MAJPE, mm",
+    "IoU",
+];
+
 const PRESETS: [&str; 3] = ["baseline", "paper", "recommended"];
 
 /// Frames of rows files by sequence: error of the fit and of the start, mm, and whether the fit is nearer.
 #[derive(Default)]
-struct Errors {
+pub(crate) struct Errors {
     majpe: Vec<Vec<f64>>,
     pa_majpe: Vec<Vec<f64>>,
     start: Vec<Vec<f64>>,
@@ -19,7 +32,7 @@ struct Errors {
 }
 
 impl Errors {
-    fn add(&mut self, rows: &Path) {
+    pub(crate) fn add(&mut self, rows: &Path) {
         let mut reader = csv::Reader::from_path(rows).unwrap();
         let mut sequences: BTreeMap<String, Vec<[f64; 5]>> = BTreeMap::new();
         for row in reader.deserialize::<BTreeMap<String, String>>() {
@@ -42,7 +55,7 @@ impl Errors {
         }
     }
 
-    fn cells(&self, data: &str, preset: &str) -> Vec<String> {
+    pub(crate) fn cells(&self, data: &str, preset: &str) -> Vec<String> {
         let figure = |groups: &[Vec<f64>], digits: usize| {
             let (mean, half) = over_groups(groups);
             if half.is_finite() { format!("{mean:.digits$} ± {half:.digits$}") } else { format!("{mean:.digits$}") }
@@ -63,7 +76,7 @@ impl Errors {
 }
 
 /// One row: data sets that belong together, fitted with a preset.
-fn errors(bed: &Bed, sets: &[PathBuf], preset: &str) -> Errors {
+pub(crate) fn errors(bed: &Bed, sets: &[PathBuf], preset: &str) -> Errors {
     let mut errors = Errors::default();
     for set in sets {
         let name = format!("{}-{preset}", set.file_name().unwrap().to_string_lossy());
@@ -75,11 +88,15 @@ fn errors(bed: &Bed, sets: &[PathBuf], preset: &str) -> Errors {
 
 /// The recommended settings with ranges as they are stated, as a file.
 fn stated(bed: &Bed) -> PathBuf {
+    otherwise(bed, "stated.toml", ["range_offset = \"measured\"", "range_offset = \"stated\""])
+}
+
+/// The recommended settings with a line of them otherwise, as a file.
+pub(crate) fn otherwise(bed: &Bed, name: &str, [of, to]: [&str; 2]) -> PathBuf {
     bed.program(&["fit", Bed::own("samples/f2").to_str().unwrap(), "--frames", "0", "--out", "recommended"]);
     let settings = std::fs::read_to_string(bed.path("recommended/fit.toml")).unwrap();
-    let (of, to) = ("range_offset = \"measured\"", "range_offset = \"stated\"");
     assert!(settings.contains(of), "{settings}");
-    let path = bed.path("stated.toml");
+    let path = bed.path(name);
     std::fs::write(&path, settings.replace(of, to)).unwrap();
     path
 }
@@ -156,18 +173,7 @@ pub(crate) fn section(bed: &Bed) -> String {
             data.push((format!("second simulator, `{group}`"), sets));
         }
     }
-    let head = [
-        "data",
-        "preset",
-        "frames in sequences",
-        "start MAJPE, mm",
-        "MAJPE, mm",
-        "better than start",
-        "start PA-MAJPE, mm",
-        "PA-MAJPE, mm",
-        "IoU",
-    ];
-    let mut rows = vec![row(&head)];
+    let mut rows = vec![row(&HEAD)];
     for (name, sets) in &data {
         for preset in PRESETS {
             rows.push(errors(bed, sets, preset).cells(name, preset));

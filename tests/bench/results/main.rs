@@ -11,6 +11,7 @@ mod fits;
 mod networks;
 mod people;
 mod reference;
+mod rooms;
 mod speed;
 mod studies;
 
@@ -28,6 +29,7 @@ struct Section {
 const SECTIONS: &[Section] = &[
     Section { key: "reference", heading: "Reference cases", write: reference::section },
     Section { key: "fits", heading: "Fits against truth", write: fits::section },
+    Section { key: "rooms", heading: "Real joints in a room: HIBER and RT-Pose", write: rooms::section },
     Section { key: "people", heading: "Several people", write: people::several },
     Section { key: "networks", heading: "Networks beside the fit", write: networks::section },
     Section { key: "counting", heading: "Counting", write: people::counting },
