@@ -221,7 +221,7 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
     use super::*;
     use crate::geometry::Pose;
-    use crate::radar::{FftSetup, RadarConfig, Window};
+    use crate::radar::{FftSetup, Lobes, PointSpread, RadarConfig, Window};
 
     /// Depth and y before a line of 86 elements, as HIBER's.
     fn view(window: Window) -> View {
@@ -243,7 +243,7 @@ mod tests {
     /// An echo at 3 m and a sine of 0.2, with sidelobes or the foot of its main lobe alone, over noise; and its place.
     fn echo(view: &View, sidelobes: bool) -> (Vec<f64>, usize) {
         let sinc = |u: f64| if u.abs() < 1e-9 { 1.0 } else { (PI * u).sin() / (PI * u) };
-        let [depth, across] = &view.axes[..] else { panic!("two axes") };
+        let (depth, across) = (&view.axes[0], &view.axes[1]);
         let mut map = Vec::new();
         for i in 0..depth.bins {
             for k in 0..across.bins {
@@ -283,7 +283,7 @@ mod tests {
         assert_eq!(removed(&bare, &echo(&bare, false).0), None, "a window took them away");
         let tapered = view(Window::Hann);
         assert_eq!(removed(&tapered, &echo(&tapered, true).0), None);
-        let widths = View { psf: crate::radar::PointSpread { lobes: Default::default(), ..bare.psf }, ..bare };
+        let widths = View { psf: PointSpread { lobes: Lobes::default(), ..bare.psf }, ..bare };
         assert_eq!(removed(&widths, &echo(&widths, true).0), None);
     }
 
