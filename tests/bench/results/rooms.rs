@@ -6,7 +6,7 @@ use mhp_inspector::dataset::{ROOMS_NAME, RoomTransforms};
 use mhp_inspector::geometry::{Pose, mat_mul, norm, sub, transpose};
 use std::path::{Path, PathBuf};
 
-/// Seeds of rooms; on those of fits nothing was chosen.
+/// Seeds of rooms, on which one way of comparing was chosen before another; on those of fits nothing was.
 const ROOMS: [u64; 15] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 41, 42, 43, 44, 45];
 const FITS: [u64; 3] = [2, 3, 4];
 
