@@ -31,10 +31,10 @@ const HALVINGS: i32 = 6;
 
 /// Lobes without a foot, and no narrower than Gaussians with a cell's width, so that scenes have no more nulls; how large the ratios are is nothing to gradients.
 const LOBES: Lobes = Lobes {
-    range: Some(Lobe { ratios: [1.5, 0.9], bare: None }),
-    azimuth: Some(Lobe { ratios: [1.6, 1.0], bare: None }),
-    elevation: Some(Lobe { ratios: [1.4, 0.8], bare: None }),
-    doppler: Some(Lobe { ratios: [1.5, 1.1], bare: None }),
+    range: Some(Lobe { ratios: [1.5, 0.9], untapered: None }),
+    azimuth: Some(Lobe { ratios: [1.6, 1.0], untapered: None }),
+    elevation: Some(Lobe { ratios: [1.4, 0.8], untapered: None }),
+    doppler: Some(Lobe { ratios: [1.5, 1.1], untapered: None }),
 };
 
 /// Steps that balance truncation and rounding; from the README of the reference cases.

@@ -2,8 +2,9 @@
 
 use super::context::{Contexts, Neighbour, Reading, TemporalContext, anchors, range_offsets};
 use super::frame_em::Measured;
+use super::sidelobes::Polar;
 use super::thinned::{Strides, ThinnedCache, ThinnedMaps};
-use super::{FitError, fill_missing, sidelobes};
+use super::{FitError, fill_missing};
 use crate::body::{Pppr, Skeleton};
 use crate::config::{Clutter, EmLoss, FitConfig, FramesAround, RangeOffset, Sidelobes};
 use crate::geometry::Vec3;
@@ -29,7 +30,7 @@ pub struct Problem {
     filled: Vec<usize>,
     neighbours: Vec<Neighbour>,
     /// Whether sidelobes were taken from the maps.
-    without_sidelobes: bool,
+    cleared: bool,
     derived: Derived,
     /// Where cells were erased, which are NaN in the maps here: the same problem with what borders on them in their place.
     patched: Option<Arc<Self>>,
@@ -42,8 +43,9 @@ struct Derived {
     contexts: Contexts,
     thinned: ThinnedCache,
     offsets: Arc<OnceLock<Option<Vec<f64>>>>,
-    /// The same problem with its range offsets, if any, and without sidelobes, if there are any.
+    /// The same problem with its range offsets, if any.
     calibrated: OnceLock<Option<Arc<Problem>>>,
+    /// The same problem without sidelobes, if there are any.
     cleared: OnceLock<Option<Arc<Problem>>>,
 }
 
@@ -87,7 +89,7 @@ impl Problem {
             maps,
             filled,
             neighbours: Vec::new(),
-            without_sidelobes: false,
+            cleared: false,
             derived: Derived::default(),
             patched: None,
         })
@@ -108,7 +110,7 @@ impl Problem {
     }
 
     fn cleared(&self, config: &FitConfig) -> Option<&Arc<Self>> {
-        if config.sidelobes != Sidelobes::Removed || self.without_sidelobes {
+        if config.sidelobes != Sidelobes::Removed || self.cleared {
             return None;
         }
         self.derived.cleared.get_or_init(|| self.without_sidelobes().map(Arc::new)).as_ref()
@@ -116,10 +118,12 @@ impl Problem {
 
     /// `None` where no map has any.
     fn without_sidelobes(&self) -> Option<Self> {
+        let polar: Vec<Option<Polar>> = self.views.iter().map(Polar::of).collect();
         let of = |map: &dyn Fn(usize) -> Vec<f64>| -> (bool, Vec<Vec<f64>>) {
-            let each = self.views.iter().enumerate().map(|(k, view)| {
+            let each = polar.iter().zip(&*self.views).enumerate().map(|(k, (polar, view))| {
                 let map = map(k);
-                sidelobes::removed(view, &map).map_or((false, map), |map| (true, map))
+                let left = polar.as_ref().and_then(|polar| polar.without_sidelobes(view.quantity, &map));
+                (left.is_some(), left.unwrap_or(map))
             });
             let (found, maps): (Vec<bool>, Vec<Vec<f64>>) = each.unzip();
             (found.contains(&true), maps)
@@ -128,11 +132,13 @@ impl Problem {
         if !found {
             return None;
         }
+        // What is taken away of the maps changes nothing of the radars.
+        self.measured_offsets();
         let around =
             self.neighbours.iter().map(|around| Neighbour::new(around.offset_s, of(&|k| around.map(k).to_vec()).1));
         let patched =
             self.patched.as_ref().map(|patched| patched.without_sidelobes().map_or(Arc::clone(patched), Arc::new));
-        Some(Self { maps, neighbours: around.collect(), without_sidelobes: true, patched, ..self.clone() })
+        Some(Self { maps, neighbours: around.collect(), cleared: true, patched, ..self.clone() })
     }
 
     /// The views as fits with this configuration see them.

@@ -19,7 +19,7 @@
 //! array has eight elements, to 283 / 76 instead of 265 / 80 mm: no star, and so it is not done there.
 
 use super::percentile::percentile;
-use crate::radar::{Axis, AxisKind, Quantity, Resolves, Spacing, View};
+use crate::radar::{AxisKind, Quantity, Resolves, Spacing, View, interpolate};
 use std::f64::consts::{LN_2, PI};
 
 /// Steps of the polar map, of a natural bin.
@@ -41,117 +41,84 @@ const FEWEST_AROUND: f64 = 16.0;
 /// Cells of a polar map at most.
 const MOST_CELLS: usize = 1 << 20;
 
-/// Where the cells of a map lie in range and sine, and how far apart natural bins are.
-struct Polar {
-    /// Of each cell of a slice: range, m, and sine.
-    places: Vec<[f64; 2]>,
-    /// Of each cell of the polar map, the four cells of a slice around it with their weights.
-    sources: Vec<[(usize, f64); 4]>,
-    natural: [f64; 2],
-    /// Lowest range and sine, and steps of each.
-    lowest: [f64; 2],
-    steps: [usize; 2],
-    /// Offsets of the slices in the map, and of the cells in a slice.
+/// The map of a view over range and the sine of the angle, and where its cells and the view's lie in each other.
+pub(super) struct Polar {
+    /// Bins of range and sine, of [`STEP`] natural bins each.
+    bins: [usize; 2],
+    /// Rows and columns of a slice of the view: all but its speeds.
+    slice: [usize; 2],
+    /// Where in the view a slice begins, and the cells of each from there.
     slices: Vec<usize>,
     cells: Vec<usize>,
+    /// Of each cell of a slice where it is in the polar map, and of each of that where it is in a slice; bins.
+    places: Vec<[f64; 2]>,
+    sources: Vec<[f64; 2]>,
 }
 
 impl Polar {
-    /// `None` where the view has no range and angle of FFTs without a window.
-    fn of(view: &View) -> Option<Self> {
+    /// `None` where the view has no range and angle of FFTs without a window, or is no plane of them.
+    pub(super) fn of(view: &View) -> Option<Self> {
         let find = |kinds: &[AxisKind]| view.axes.iter().position(|axis| kinds.contains(&axis.kind));
         let far = find(&[AxisKind::Range, AxisKind::DepthH, AxisKind::DepthV])?;
         let aside = find(&[AxisKind::Azimuth, AxisKind::Cone, AxisKind::Elevation, AxisKind::Y, AxisKind::Z])?;
-        let rest: Vec<usize> = (0..view.axes.len()).filter(|axis| ![far, aside].contains(axis)).collect();
-        if rest.iter().any(|&axis| view.axes[axis].kind != AxisKind::Doppler) {
+        let speeds: Vec<usize> = (0..view.axes.len()).filter(|axis| ![far, aside].contains(axis)).collect();
+        let (rows, columns) = (&view.axes[far], &view.axes[aside]);
+        let flat = rows.kind.is_depth();
+        if speeds.iter().any(|&axis| view.axes[axis].kind != AxisKind::Doppler) || flat == columns.kind.is_angular() {
             return None;
         }
-        let bare = |of: Resolves| view.psf.lobe(of)?.bare;
-        let across = Resolves::of(view.axes[aside].kind);
+        let untapered = |of: Resolves| view.psf.lobe(of)?.untapered;
+        let across = Resolves::of(columns.kind);
         let width = if across == Resolves::Elevation { view.psf.elevation_rad } else { view.psf.azimuth_rad };
-        let natural = [view.psf.range_m * bare(Resolves::Range)?, width * bare(across)?];
+        let natural = [view.psf.range_m * untapered(Resolves::Range)?, width * untapered(across)?];
         if natural.iter().any(|step| !(1e-6..1e6).contains(step)) || 2.0 < FEWEST_AROUND * natural[1] {
             return None;
         }
-        let strides: Vec<usize> =
-            (0..view.axes.len()).map(|axis| view.axes[axis + 1..].iter().map(|axis| axis.bins).product()).collect();
-        let flat = view.axes[far].kind.is_depth();
-        let (mut places, mut cells) = (Vec::new(), Vec::new());
-        for i in 0..view.axes[far].bins {
-            for k in 0..view.axes[aside].bins {
-                let (depth, along) = (view.axes[far].value_at(i as f64), view.axes[aside].value_at(k as f64));
-                let range = if flat { depth.hypot(along) } else { depth };
-                places.push([range, if flat { along / range.max(1e-6) } else { along.sin() }]);
-                cells.push(i * strides[far] + k * strides[aside]);
-            }
-        }
-        let slices = rest
-            .first()
-            .map_or_else(|| vec![0], |&axis| (0..view.axes[axis].bins).map(|k| k * strides[axis]).collect());
-        let bounds = |k: usize| {
-            let ends = |(lo, hi): (f64, f64), place: &[f64; 2]| (lo.min(place[k]), hi.max(place[k]));
-            places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), ends)
+        let slice = [rows.bins, columns.bins];
+        let each = |[rows, columns]: [usize; 2]| (0..rows).flat_map(move |i| (0..columns).map(move |k| [i, k]));
+        let place = |[i, k]: [usize; 2]| {
+            let (depth, along) = (rows.value_at(i as f64), columns.value_at(k as f64));
+            let range = if flat { depth.hypot(along) } else { depth };
+            [range, if flat { along / range.max(1e-6) } else { along.sin() }]
         };
-        let (near, left) = (bounds(0), bounds(1));
-        let steps = [near, left].map(|(lo, hi)| hi - lo);
-        let steps = [0, 1].map(|k| (steps[k] / (STEP * natural[k])).ceil().max(1.0) as usize + 1);
-        if steps[0].saturating_mul(steps[1]) > MOST_CELLS {
+        let ends = |k: usize| {
+            let wider = |(lo, hi): (f64, f64), place: [f64; 2]| (lo.min(place[k]), hi.max(place[k]));
+            each(slice).map(place).fold((f64::INFINITY, f64::NEG_INFINITY), wider)
+        };
+        let ends = [ends(0), ends(1)];
+        let step = natural.map(|natural| STEP * natural);
+        let bins = [0, 1].map(|k| ((ends[k].1 - ends[k].0) / step[k]).ceil().max(1.0) as usize + 1);
+        if bins[0].saturating_mul(bins[1]) > MOST_CELLS {
             return None;
         }
-        let lowest = [near.0, left.0];
-        let (rows, columns) = (&view.axes[far], &view.axes[aside]);
-        let source = |cell: usize| {
-            let [range, sine] = [cell / steps[1], cell % steps[1]];
-            let range = lowest[0] + STEP * natural[0] * range as f64;
-            let sine = (lowest[1] + STEP * natural[1] * sine as f64).clamp(-1.0, 1.0);
+        let back = |at: [usize; 2]| {
+            let [range, sine] = [0, 1].map(|k| ends[k].0 + step[k] * at[k] as f64);
+            let sine = sine.clamp(-1.0, 1.0);
             let along = match (flat, columns.spacing) {
                 (true, _) => range * sine,
                 (false, Spacing::Sine) => sine,
                 (false, Spacing::Linear) => sine.asin(),
             };
-            let depth = if flat { range * (1.0 - sine * sine).sqrt() } else { range };
-            let weigh = |axis: &Axis, at: f64| {
-                let at = axis.bin(at).clamp(0.0, axis.bins as f64 - 1.0);
-                let below = (at as usize).min(axis.bins.saturating_sub(2));
-                [(below, 1.0 - at + below as f64), ((below + 1).min(axis.bins - 1), at - below as f64)]
-            };
-            let (down, across) = (weigh(rows, depth), weigh(columns, along));
-            std::array::from_fn(|k| {
-                let ((i, p), (j, q)) = (down[k / 2], across[k % 2]);
-                (i * columns.bins + j, p * q)
-            })
+            [rows.bin(if flat { range * (1.0 - sine * sine).sqrt() } else { range }), columns.bin(along)]
         };
+        let stride = |axis: usize| -> usize { view.axes[axis + 1..].iter().map(|axis| axis.bins).product() };
+        let slices = speeds
+            .first()
+            .map_or_else(|| vec![0], |&axis| (0..view.axes[axis].bins).map(|k| k * stride(axis)).collect());
+        let (down, right) = (stride(far), stride(aside));
         Some(Self {
-            sources: (0..steps[0] * steps[1]).map(source).collect(),
-            places,
-            natural,
-            lowest,
-            steps,
+            bins,
+            slice,
             slices,
-            cells,
+            cells: each(slice).map(|[i, k]| i * down + k * right).collect(),
+            places: each(slice).map(place).map(|at| [0, 1].map(|k| (at[k] - ends[k].0) / step[k])).collect(),
+            sources: each(bins).map(back).collect(),
         })
-    }
-
-    /// The four cells of the polar map around a place, and their weights.
-    fn around(&self, place: [f64; 2]) -> [(usize, f64); 4] {
-        let at = |k: usize| {
-            let at = ((place[k] - self.lowest[k]) / (STEP * self.natural[k])).clamp(0.0, (self.steps[k] - 1) as f64);
-            let below = (at as usize).min(self.steps[k].saturating_sub(2));
-            (below, at - below as f64)
-        };
-        let ((i, p), (j, q)) = (at(0), at(1));
-        let cell = |i: usize, j: usize| i.min(self.steps[0] - 1) * self.steps[1] + j.min(self.steps[1] - 1);
-        [
-            (cell(i, j), (1.0 - p) * (1.0 - q)),
-            (cell(i, j + 1), (1.0 - p) * q),
-            (cell(i + 1, j), p * (1.0 - q)),
-            (cell(i + 1, j + 1), p * q),
-        ]
     }
 
     /// b of each cell of a slice whose cells have these powers.
     fn sidelobes(&self, power: &[f64]) -> Vec<f64> {
-        let [rows, columns] = self.steps;
+        let [rows, columns] = self.bins;
         let largest = power.iter().copied().fold(0.0, f64::max);
         let foot = |n: usize| -> Vec<f64> {
             let at = |k: usize| {
@@ -162,9 +129,10 @@ impl Polar {
         };
         let [down, across] = [foot(rows), foot(columns)];
         let mut lobes = vec![0.0; rows * columns];
-        for (cell, around) in self.sources.iter().enumerate() {
-            let echo: f64 = around.iter().map(|(cell, weight)| weight * power[*cell]).sum();
-            if echo <= FAINTEST * largest {
+        for (cell, place) in self.sources.iter().enumerate() {
+            let echo = interpolate(power, &self.slice, place);
+            // Not a number outside the view.
+            if echo.is_nan() || echo <= FAINTEST * largest {
                 continue;
             }
             let (i, j) = (cell / columns, cell % columns);
@@ -175,45 +143,35 @@ impl Polar {
                 *slot += echo * down[k.abs_diff(i)];
             }
         }
-        let read = |place: &[f64; 2]| self.around(*place).into_iter().map(|(cell, weight)| weight * lobes[cell]).sum();
-        self.places.iter().map(read).collect()
+        self.places.iter().map(|place| interpolate(&lobes, &self.bins, place)).collect()
     }
-}
 
-/// A map of `view` without its sidelobes, C order; `None` where none are known of or none are there. Erased cells, NaN, stay so.
-pub(super) fn removed(view: &View, map: &[f64]) -> Option<Vec<f64>> {
-    let polar = Polar::of(view)?;
-    let power = |h: f64| if h.is_nan() { 0.0 } else { view.quantity.power(h) };
-    let slices: Vec<(Vec<f64>, Vec<f64>)> = polar
-        .slices
-        .iter()
-        .map(|slice| {
-            let powers: Vec<f64> =
-                polar.cells.iter().map(|cell| map.get(slice + cell).map_or(0.0, |&h| power(h))).collect();
-            let lobes = polar.sidelobes(&powers);
+    /// A map of the view, C order, without its sidelobes; `None` where none are there. Erased cells, NaN, stay so.
+    pub(super) fn without_sidelobes(&self, quantity: Quantity, map: &[f64]) -> Option<Vec<f64>> {
+        let all: Vec<f64> = map.iter().map(|&h| if h.is_nan() { 0.0 } else { quantity.power(h) }).collect();
+        let of_slice = |slice: &usize| -> (Vec<f64>, Vec<f64>) {
+            let powers =
+                self.cells.iter().map(|cell| all.get(slice + cell).copied().unwrap_or(0.0)).collect::<Vec<_>>();
+            let lobes = self.sidelobes(&powers);
             (powers, lobes)
-        })
-        .collect();
-    let all: Vec<f64> = map.iter().map(|&h| power(h)).collect();
-    let (largest, noise) = (all.iter().copied().fold(0.0, f64::max), percentile(&all, NOISE_PCT));
-    let both = || slices.iter().flat_map(|(powers, lobes)| powers.iter().zip(lobes));
-    let told: Vec<f64> = both().filter(|(_, b)| **b > ABOVE_NOISE * noise).map(|(i, b)| i / b).collect();
-    if told.len() < FEWEST {
-        return None;
-    }
-    let share = (percentile(&told, 50.0) / LN_2).min(1.0);
-    if share.is_nan() || share < LEAST_SHARE {
-        return None;
-    }
-    let mut out = map.to_vec();
-    for (slice, (powers, lobes)) in polar.slices.iter().zip(&slices) {
-        for (cell, (i, b)) in polar.cells.iter().zip(powers.iter().zip(lobes)) {
-            let Some(slot) = out.get_mut(slice + cell).filter(|h| !h.is_nan()) else { continue };
-            let left = (i - TIMES * share * b).max(LEAST * largest);
-            *slot = if view.quantity == Quantity::Amplitude { left.sqrt() } else { left };
+        };
+        let slices: Vec<(Vec<f64>, Vec<f64>)> = self.slices.iter().map(of_slice).collect();
+        let (largest, noise) = (all.iter().copied().fold(0.0, f64::max), percentile(&all, NOISE_PCT));
+        let both = slices.iter().flat_map(|(powers, lobes)| powers.iter().zip(lobes));
+        let told: Vec<f64> = both.filter(|(_, b)| **b > ABOVE_NOISE * noise).map(|(i, b)| i / b).collect();
+        let share = if told.len() < FEWEST { 0.0 } else { (percentile(&told, 50.0) / LN_2).min(1.0) };
+        if share.is_nan() || share < LEAST_SHARE {
+            return None;
         }
+        let mut out = map.to_vec();
+        for (slice, (powers, lobes)) in self.slices.iter().zip(&slices) {
+            for (cell, (i, b)) in self.cells.iter().zip(powers.iter().zip(lobes)) {
+                let Some(slot) = out.get_mut(slice + cell).filter(|h| !h.is_nan()) else { continue };
+                *slot = quantity.stored((i - TIMES * share * b).max(LEAST * largest));
+            }
+        }
+        Some(out)
     }
-    Some(out)
 }
 
 #[cfg(test)]
@@ -221,7 +179,11 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
     use super::*;
     use crate::geometry::Pose;
-    use crate::radar::{FftSetup, Lobes, PointSpread, RadarConfig, Window};
+    use crate::radar::{Axis, FftSetup, Lobes, PointSpread, RadarConfig, Window};
+
+    fn removed(view: &View, map: &[f64]) -> Option<Vec<f64>> {
+        Polar::of(view)?.without_sidelobes(view.quantity, map)
+    }
 
     /// Depth and y before a line of 86 elements, as HIBER's.
     fn view(window: Window) -> View {

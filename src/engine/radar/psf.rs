@@ -111,7 +111,7 @@ pub fn main_lobe_shape(window: Window, n: usize) -> Option<Lobe> {
     });
     let ratios = if misfit(narrow) < misfit(wide) { narrow } else { wide };
     (n > 2 && misfit(ratios) < misfit([1.0, 1.0]))
-        .then_some(Lobe { ratios, bare: (window == Window::Rectangular).then_some(1.0 / sigma) })
+        .then_some(Lobe { ratios, untapered: (window == Window::Rectangular).then_some(1.0 / sigma) })
 }
 
 /// Standard deviation of the unit-peak Gaussian about 0 that is closest to (place, amplitude) points of a lobe which ends at

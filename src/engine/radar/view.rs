@@ -25,6 +25,14 @@ impl Quantity {
         }
     }
 
+    /// What is stored of a power: the other way of [`Self::power`].
+    pub fn stored(self, power: f64) -> f64 {
+        match self {
+            Self::Amplitude => power.sqrt(),
+            Self::Power => power,
+        }
+    }
+
     /// The factor before log₁₀ that makes decibels.
     pub fn db_factor(self) -> f64 {
         match self {
@@ -82,7 +90,7 @@ pub struct Lobe {
     /// f of each Gaussian.
     pub ratios: [f64; 2],
     /// How many σ a natural bin is, where no window tapers the samples: then sidelobes fall no faster than 1/(πu)², u in such bins.
-    pub bare: Option<f64>,
+    pub untapered: Option<f64>,
 }
 
 impl Lobe {
