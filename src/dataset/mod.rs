@@ -57,7 +57,7 @@ pub use npz::NpzError;
 pub use origin::{Origin, OriginPart, OriginRule};
 pub use pppr_io::{read_pppr, write_pppr};
 pub use room::{
-    MapsOfMotion, ROOMS_NAME, RoomJoints, RoomTransform, RoomTransforms, remember_room, write_stated_rooms,
+    FrameDifference, ROOMS_NAME, RoomJoints, RoomTransform, RoomTransforms, remember_room, write_stated_rooms,
 };
 pub use sample::bundled_sample;
 pub use set::{Dataset, DatasetInfo, MANIFEST_NAME, OpenOptions};

@@ -30,17 +30,18 @@ pub trait RoomJoints: std::fmt::Debug + Send + Sync {
     /// Where the file of the joints is there and cannot be read.
     fn joints(&self, i: usize) -> Result<Vec<Vec<Vec3>>, DatasetError>;
 
-    /// How the maps were made, where they show nothing but what moves.
-    fn maps_of_motion(&self) -> Option<MapsOfMotion>;
+    /// How the maps were made, where the radar frame before was subtracted.
+    fn frame_difference(&self) -> Option<FrameDifference>;
 }
 
-/// How maps were made from which what stands still was taken away, by transmitters that sent one after the other.
+/// Maps of radar frames less the one before, of transmitters that send in turn (TDM-MIMO): what stands still is not in them.
+/// Of HIBER both times are published.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MapsOfMotion {
+pub struct FrameDifference {
     /// From the radar frame that is subtracted to the one it is subtracted from, s.
-    pub subtracted_s: f64,
+    pub interval_s: f64,
     /// From one transmitter's chirp to the next one's, whose antenna is four half waves farther along the array, s.
-    pub in_turn_s: f64,
+    pub chirp_s: f64,
 }
 
 /// Where the radar of an environment is.

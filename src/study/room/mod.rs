@@ -129,7 +129,7 @@ pub fn estimate_room(
         let known = all.into_iter().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
         return Err(RoomError::NoEnvironment { environment: environment.to_owned(), known });
     };
-    let chosen = who_walks(dataset, frames, most.max(1));
+    let chosen = walking_frames(dataset, frames, most.max(1));
     progress.begin("looking at frames", chosen.len() as u64);
     let finder = EchoFinder::new(&dataset.info().views);
     let seen: Vec<Option<Seen>> = chosen
@@ -228,7 +228,7 @@ fn velocities(dataset: &Dataset, index: usize, joints: &[Vec3]) -> Option<Vec<Ve
 
 /// At most `most` of them, evenly; where there are as many, of those in which somebody walks: what stands still has often been taken
 /// from the maps, and tells the place of one spot alone.
-fn who_walks(dataset: &Dataset, frames: &[usize], most: usize) -> Vec<usize> {
+fn walking_frames(dataset: &Dataset, frames: &[usize], most: usize) -> Vec<usize> {
     let walks = |index: usize| {
         let [joints] = <[Vec<Vec3>; 1]>::try_from(dataset.room_joints()?.joints(index).ok()?).ok()?;
         let velocities = velocities(dataset, index, &joints)?;

@@ -4,7 +4,7 @@
 //! part of the body, a skin's depth before which its echo comes from, with their bright cells (the soft IoU of masks, SPEC section 4),
 //! and the skin of the recommended fit with their levels (`ncc_db`, section 8). Levels tell a roll about boresight several times as well,
 //! but how deep the trunk's skin lies before the legs' is a tilt to them; the bright cells hardly see that.
-//! Two things that follow from how such maps are made ([`MapsOfMotion`]) are part of it:
+//! Two things that follow from how such maps are made ([`FrameDifference`]) are part of it:
 //!
 //! - What is left of an echo after the frame before is taken away, is 1 − e^{iφ} of it, φ = 4π d/λ, d its way towards the radar
 //!   meanwhile. Of who stands and waves an arm the maps show that arm. A part that goes d has 1 − exp(−φ²/2) of its power, for its points
@@ -15,9 +15,9 @@
 //! Of 200 simulated frames of people who walk, ten sequences of twenty (`simulate DIR --layout hiber --frames 200 --seed S`), seeds
 //! 101 to 108, on which nothing was chosen: it turns 0.27° to 0.73° too far, the translation is 0.6 to 1.7 cm off, the radar's place in
 //! the room 0.3 to 3.1 cm. Of seeds 1 to 10 and 41 to 45, on which both comparisons were chosen before the bright cells alone: 0.24° to
-//! 0.85° (0.57° on average), 0.5 to 1.7 cm and 0.6 to 3.2 cm; by the bright cells alone
-//! 0.33° to 1.40° (0.64°). Of four people a set who mostly act on one spot (seeds 21 to 30 with `--sequence-length 50 --action
-//! walk,turn,raise,sit` in the preset's mixture), 0.1° to 1.7°: who stays on a spot tells the place of that spot and little of a tilt.
+//! 0.85° (0.57° on average), 0.5 to 1.7 cm and 0.6 to 3.2 cm; by the bright cells alone 0.33° to 1.40° (0.64°). Of four people a set who
+//! mostly act on one spot (seeds 21 to 30 with `--sequence-length 50 --action walk,walk,walk,turn,raise,sit`), 0.1° to 1.7°: who stays
+//! on a spot tells the place of that spot and little of a tilt.
 //!
 //! The gradient by the joints' places gives that by a shift and a turn; BFGS goes down it. A frame counts the less the worse it is
 //! explained (Tukey, by the median), so that a wrong one has no say.
@@ -25,7 +25,7 @@
 use super::{RoomError, Seen};
 use crate::body::{Group, Pppr, PpprShape, Skeleton, scatterer};
 use crate::config::{BodyModel, EmLoss, EmRegion, FitConfig, Summation};
-use crate::dataset::{Dataset, MapsOfMotion, RoomJoints, map_cells};
+use crate::dataset::{Dataset, FrameDifference, RoomJoints, map_cells};
 use crate::geometry::{
     Pose, Vec3, add, cross, dot, mat_mul, mat_vec, mean, norm, rotation_from_quaternion, scale, sub,
 };
@@ -119,8 +119,8 @@ struct FrameTerm<'a> {
 /// # Errors
 /// Where a frame is no problem for a fit, or on cancel.
 pub(super) fn refine(dataset: &Dataset, seen: &[&Seen], pose: Pose, progress: &Progress) -> Result<Refined, RoomError> {
-    let made = dataset.room_joints().and_then(RoomJoints::maps_of_motion);
-    let aside = made.map_or(0.0, |made| made.in_turn_s / dataset.info().radar.wavelength_m());
+    let made = dataset.room_joints().and_then(RoomJoints::frame_difference);
+    let aside = made.map_or(0.0, |made| made.chirp_s / dataset.info().radar.wavelength_m());
     let both = |y: f64| [[y, aside], [y, -aside]];
     let cases = if aside > 0.0 { [both(aside), both(-aside)].concat() } else { vec![[0.0; 2]] };
     progress.begin("explaining the maps", ROUNDS * cases.len() as u64);
@@ -148,7 +148,7 @@ impl<'a> FrameTerm<'a> {
         dataset: &Dataset,
         seen: &'a Seen,
         pose: &Pose,
-        made: Option<MapsOfMotion>,
+        made: Option<FrameDifference>,
         case: [f64; 2],
     ) -> Result<Option<Self>, RoomError> {
         let Some(Ok(maps)) = dataset.maps(seen.index..seen.index + 1).next() else { return Ok(None) };
@@ -158,7 +158,7 @@ impl<'a> FrameTerm<'a> {
         let (mut left, mut aside) = (1.0, [0.0; 3]);
         if let (Some(velocities), Some(made)) = (&seen.velocities, made) {
             let speeds = speeds_away(&params, pose, velocities);
-            left = leave_what_moves(&mut params, &speeds, made.subtracted_s, info.radar.wavelength_m());
+            left = leave_what_moves(&mut params, &speeds, made.interval_s, info.radar.wavelength_m());
             let away = speeds.iter().sum::<f64>() / speeds.len().max(1) as f64;
             let distance = norm(pose.view_from_world(mean(&seen.joints)));
             aside = [0.0, case[0] * away * distance, case[1] * away * distance];
@@ -211,10 +211,10 @@ fn speeds_away(params: &Pppr, pose: &Pose, velocities: &[Vec3]) -> Vec<f64> {
 }
 
 /// Takes from each joint what the subtraction of the frame before takes; the share of all joints' power that is left.
-fn leave_what_moves(params: &mut Pppr, speeds: &[f64], subtracted_s: f64, wavelength_m: f64) -> f64 {
+fn leave_what_moves(params: &mut Pppr, speeds: &[f64], interval_s: f64, wavelength_m: f64) -> f64 {
     let mut sum = 0.0;
     for (joint, speed) in speeds.iter().enumerate() {
-        let phase = 2.0 * TAU * speed * subtracted_s / wavelength_m;
+        let phase = 2.0 * TAU * speed * interval_s / wavelength_m;
         let power = 1.0 - (1.0 - LEFT_OF_STILL) * (-0.5 * phase * phase).exp();
         sum += power;
         let beta = params.joint(Group::Beta, joint).first().copied().unwrap_or(0.0);

@@ -17,7 +17,7 @@ use super::{DataFolder, FrameSource, FrameWriter, Layout, MapArray, Opened, Stor
 use crate::dataset::Origin;
 use crate::dataset::manifest::Manifest;
 use crate::dataset::npz::{Fold, NPY_KEY, NpzArchive, shape_text};
-use crate::dataset::room::{MapsOfMotion, RoomJoints, RoomTransforms};
+use crate::dataset::room::{FrameDifference, RoomJoints, RoomTransforms};
 use crate::dataset::set::{DatasetInfo, parent};
 use crate::dataset::{DatasetError, Frame, Heatmap, Truth};
 use crate::geometry::Vec3;
@@ -196,8 +196,8 @@ impl RoomJoints for Frames {
         Ok(labels_of(segment).joints(number, &mut Vec::new())?.unwrap_or_default())
     }
 
-    fn maps_of_motion(&self) -> Option<MapsOfMotion> {
-        Some(MapsOfMotion { subtracted_s: 1.0 / RADAR_FRAMES_HZ, in_turn_s: CHIRP_S })
+    fn frame_difference(&self) -> Option<FrameDifference> {
+        Some(FrameDifference { interval_s: 1.0 / RADAR_FRAMES_HZ, chirp_s: CHIRP_S })
     }
 }
 
