@@ -307,9 +307,16 @@ pub const FIELDS: &[Field] = &[
         .row("place")
     },
     Field {
-        help: "What tells how high a start stands.",
-        ..choice(Model, "height", "Height", Start, answers::HEIGHT, one_of_at!(height, [Height::Echo, Height::Floor]))
-            .row("height from the floor")
+        help: "What tells how high somebody stands.",
+        ..choice(
+            Model,
+            "height",
+            "Height",
+            StepsAndStart,
+            answers::HEIGHT,
+            one_of_at!(height, [Height::Echo, Height::Floor]),
+        )
+        .row("height from the floor")
     },
     Field {
         help: "Weight of the temporal term: L_time = Σ ‖c − ĉ‖² (m²), c the mean of a person's joints, ĉ where a line through its places in this frame and those around says it is. Only where a frame has neighbours. Above 0 a start stands on that line too. 0 is the paper.",

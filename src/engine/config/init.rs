@@ -59,7 +59,8 @@ pub enum Height {
     /// The middle of the echo.
     #[default]
     Echo,
-    /// The floor and the top of the echo, where the data set tells the radar's height; else as `echo`.
+    /// The floor and the top of the echo, where the data set tells the radar's height; else as `echo`. In a window bodies stand on
+    /// that floor.
     Floor,
 }
 

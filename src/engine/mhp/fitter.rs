@@ -298,7 +298,8 @@ impl Fitter {
         let before = *self.objective.config();
         self.objective.set_config(config);
         let kept = (Arc::clone(&self.state), self.window.take());
-        let another = config.parameterization != before.parameterization;
+        // With a floor and without, coordinates are of other numbers, too.
+        let another = config.parameterization != before.parameterization || config.height != before.height;
         let evaluated = if config.parameterization == Parameterization::Motion || another {
             let before = Arc::clone(&kept.0);
             self.begin_again(&before, &config, another)

@@ -1,15 +1,16 @@
 //! Which of the bodies that a search ended at a person is: the one on the cheapest path through those of the frames around.
 //!
 //! Maps of a few tenths of a second tell front from back, or one leg from the other, by little, and now and then wrongly. But
-//! nobody turns about between two frames, and who stands before a radar looks at it more often than not. A path takes one
+//! nobody turns about between two frames, who stands before a radar looks at it more often than not, and who walks goes where he
+//! looks. A path takes one
 //! hypothesis of every frame and costs
 //!
 //! ```text
 //! Σ over frames of (L/L_min + 0.08 away) + Σ over steps of min(apart/0.5 m, 0.9)
 //! ```
 //!
-//! with L_min the lowest loss of a frame, `away` from 0 (who walks, or looks at the radar) to 1 (who stands and looks the other
-//! way), and `apart` the mean distance between the joints of two hypotheses, each moved as its
+//! with L_min the lowest loss of a frame, `away` from 0 (who looks at the radar, or where he walks) to 1 (who stands and looks the other
+//! way) or 2 (who walks backwards), and `apart` the mean distance between the joints of two hypotheses, each moved as its
 //! velocities say to the middle of the time between them. The cheapest paths come from dynamic programming (Viterbi 1967) from
 //! both ends to the frame that is fitted.
 
@@ -20,7 +21,7 @@ use std::iter::zip;
 /// What a step costs a metre between the joints, and at most.
 const PER_M: f64 = 2.0;
 const MOST: f64 = 0.9;
-/// What looking the other way costs of a frame's lowest loss.
+/// What looking away from the radar costs of a frame's lowest loss.
 const AWAY: f64 = 0.08;
 /// Nobody is farther from where the frame before has them, m, and for every second between the two, m/s.
 const LEASH_M: f64 = 0.4;

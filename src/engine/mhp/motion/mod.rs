@@ -1,15 +1,15 @@
 //! A window of frames fitted as one: the body moves through a space of poses that real people have taught.
 //!
-//! With `parameterization = "motion"` a fit's coordinates are, for each person, place, heading and size in the middle of the window
-//! and the coefficients of `body::MotionPrior` ([`space`]). They place the joints in all frames of the window at once; each
+//! With `parameterization = "motion"` a fit's coordinates are, for each person, place (where the floor is known, height above it:
+//! [`ground`]), heading and size in the middle of the window and the coefficients of `body::MotionPrior` ([`space`]). They place the joints in all frames of the window at once; each
 //! frame compares its own maps (`mhp/frame_em.rs`), and
 //!
 //! ```text
 //! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior
-//! L_prior = (‖c‖² + ((s − s₀)/σ_s)² + ((q − q₀)/σ_q)²)/(K + 2) + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)²
+//! L_prior = (‖c‖² + ((s − s₀)/σ_s)² + ((q − q₀)/σ_q)²)/(K + 2) + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)² + ρ(h/σ_h)
 //! ```
 //!
-//! the last part of it that of the body's proportions (`proportions.rs`), the kinematic terms those of the frame that is fitted.
+//! the parts behind it those of the body's proportions (`proportions.rs`) and of the floor (`ground.rs`), the kinematic terms those of the frame that is fitted.
 //! q says how bright what stands still is (`static_echo.rs`). PPPR stays the state that is shown, kept and exported: positions and
 //! velocities follow the coordinates, and opacities do where the settings ask for it; scales and the rest move by themselves and
 //! are the same in all frames of the window. The frame stands as near the window's middle as its
@@ -18,6 +18,8 @@
 
 mod clutter;
 mod decode;
+mod ground;
+mod lbfgs;
 mod proportions;
 mod search;
 mod space;
@@ -36,10 +38,12 @@ use super::frame_em::FrameEm;
 use super::region;
 use super::{FitError, Precision, Problem};
 use crate::body::{Group, MotionPrior, Pppr};
-use crate::config::{EmLoss, FitConfig};
+use crate::config::{EmLoss, FitConfig, Height};
 use crate::geometry::{Vec3, add_scaled, mean, norm};
+use ground::Contact;
 use serde::{Deserialize, Serialize};
-use space::{BODY, LN_SIZE, MOST_JOINTS, PoseSpace, STILL, YAW};
+use smallvec::SmallVec;
+use space::{BODY, HEIGHT, LN_SIZE, MOST_JOINTS, PoseSpace, STILL, YAW};
 use static_echo::StaticEchoModel;
 
 /// Frames of a window lie no farther from its middle, s: the prior reaches no farther.
@@ -48,7 +52,7 @@ const REACH_S: f64 = 0.201;
 const BETA_1: f64 = 0.9;
 const BETA_2: f64 = 0.99;
 const EPSILON: f64 = 1e-8;
-/// Steps of t, y, s, q and c at the default learning rate.
+/// Steps of t and h, y, s, q and c at the default learning rate.
 const RATES: [f64; 5] = [0.01, 0.04, 0.006, 0.2, 0.08];
 const DEFAULT_RATE: f64 = 1e-3;
 /// From this share of the iterations on steps are shorter, by so much.
@@ -67,7 +71,7 @@ const WALKING_MPS: f64 = 0.35;
 /// The coordinates of a fit in a window, and Adam's moments of them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct MotionState {
-    /// A person after the other: t (3, m), heading y (rad), ln size s, what is left of static echoes q, c in standard deviations.
+    /// A person after the other: t (3, m; the third is the height above the floor where that is known), heading y (rad), ln size s, what is left of static echoes q, c in standard deviations.
     pub coordinates: Vec<f64>,
     /// Exponential mean of the gradient.
     pub first: Vec<f64>,
@@ -178,7 +182,10 @@ impl Window {
         if problem.skeleton.joints.len() > MOST_JOINTS {
             return Ok(Err(Held::Skeleton));
         }
-        let Some(space) = PoseSpace::new(prior, &problem.skeleton, &times) else { return Ok(Err(Held::Skeleton)) };
+        let floor_z_m = problem.radar.height_m.filter(|_| config.height == Height::Floor).map(|height_m| -height_m);
+        let Some(space) = PoseSpace::new(prior, &problem.skeleton, &times, floor_z_m) else {
+            return Ok(Err(Held::Skeleton));
+        };
         let (centres, ways) = (region::centres(initial), ways(initial));
         let thinned = ThinnedViews::new(problem, config, initial);
         let views = thinned.views();
@@ -256,7 +263,7 @@ impl Window {
         let [positions, velocities] = params.motion_mut();
         for (person, of) in coordinates.chunks_exact(self.stride).enumerate() {
             let own = person * joints..(person + 1) * joints;
-            self.space.pose(of, self.own, &mut positions[own.clone()]);
+            self.space.pose(of, self.space.contact(of).as_ref(), self.own, &mut positions[own.clone()]);
             self.space.velocity(of, self.own, &mut velocities[own]);
         }
         self.dim(coordinates, params);
@@ -301,6 +308,8 @@ impl Window {
         let persons = (coordinates.len() / *stride).max(1) as f64;
         (loss.em, loss.prior) = (0.0, 0.0);
         let mut kept = looks;
+        let contacts: SmallVec<[Option<Contact>; 1]> =
+            coordinates.chunks_exact(*stride).map(|own| space.contact(own)).collect();
         for (frame, of) in frames.iter_mut().enumerate().step_by(every) {
             for group in Group::ALL[1..].iter().filter(|&&group| group != Group::Velocity) {
                 of.params.group_mut(*group).copy_from_slice(params.group(*group));
@@ -308,7 +317,7 @@ impl Window {
             let [positions, velocities] = of.params.motion_mut();
             for (person, own) in coordinates.chunks_exact(*stride).enumerate() {
                 let joints = person * joints..(person + 1) * joints;
-                space.pose(own, frame, &mut positions[joints.clone()]);
+                space.pose(own, contacts[person].as_ref(), frame, &mut positions[joints.clone()]);
                 space.velocity(own, frame, &mut velocities[joints]);
             }
             if let Some(echo) = echo {
@@ -340,7 +349,7 @@ impl Window {
                 let gain = share * config.w_prior / persons;
                 let misfit = space.proportions.misfit(own, pose, gain, (&mut pose_bar, &mut *bars));
                 loss.prior += share * misfit / persons;
-                space.pull_back(own, frame, (pose, &pose_bar[..joints]), bars);
+                space.pull_back(own, contacts[person].as_ref(), frame, (pose, &pose_bar[..joints]), bars);
                 space.pull_back_velocity(own, frame, (velocities, &velocity_bar[..joints]), bars);
             }
             if let Some(looks) = kept.as_deref_mut() {
@@ -360,7 +369,7 @@ impl Window {
         {
             let joints = person * joints..(person + 1) * joints;
             let pose = (&params.positions()[joints.clone()], &gradient.positions()[joints]);
-            self.space.pull_back(own, self.own, pose, bars);
+            self.space.pull_back(own, self.space.contact(own).as_ref(), self.own, pose, bars);
         }
     }
 }

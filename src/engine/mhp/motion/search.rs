@@ -1,10 +1,10 @@
 //! Where a fit in a window begins: clusters of the prior and headings, coarse, then the best of them fine.
 //!
-//! Every start is moved a little with its pose held; the few with the lowest loss are fitted with it. What wins is the start; the
-//! runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
+//! Every start is moved a little with its pose held; the few with the lowest loss are fitted with it, in the end by the bend of the
+//! loss ([`lbfgs`]). What wins is the start; the runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
 
 use super::decode::lowest;
-use super::{BODY, Held, LN_SIZE, MotionState, WALKING_MPS, Window, WindowLoss, YAW, ways};
+use super::{BODY, HEIGHT, Held, LN_SIZE, MotionState, STILL, WALKING_MPS, Window, WindowLoss, YAW, lbfgs, ways};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::geometry::{Vec3, mean, norm, sub};
@@ -15,12 +15,14 @@ use std::ops::Range;
 
 /// The sieves that starts go through, coarse then fine.
 const SIEVES: [Sieve; 3] = [
-    Sieve { steps: 6, every: 4, held: true, kept: 8 },
-    Sieve { steps: 6, every: 2, held: false, kept: 4 },
-    Sieve { steps: 14, every: 1, held: false, kept: 4 },
+    Sieve { steps: 6, every: 4, held: true, kept: 12 },
+    Sieve { steps: 10, every: 2, held: false, kept: 8 },
+    Sieve { steps: 14, every: 1, held: false, kept: 6 },
 ];
-/// Steps of what is left.
+/// Evaluations of what is left.
 const FINE: usize = 28;
+/// How far t and h, y, s, q and c may go in a step of it.
+const UNITS: [f64; 5] = [0.03, 0.12, 0.03, 1.0, 0.5];
 /// What a search may cost: Gaussians times cells, over all frames and evaluations. A map of 256 × 128 cells as a whole, five frames of
 /// two views, takes all the starts of the recommended settings.
 const MOST_WORK: f64 = 2e10;
@@ -44,6 +46,9 @@ const OF_WAY: f64 = 0.4;
 const CLEARER: f64 = 0.85;
 const MOST_MOVED_M: f64 = 0.5;
 
+/// How much less people walk backwards than they stand with their back to a radar.
+const BACKWARDS: f64 = 2.0;
+
 /// Moves every start by some steps and keeps the few with the lowest loss.
 struct Sieve {
     steps: usize,
@@ -63,7 +68,7 @@ pub(in crate::mhp) struct Hypothesis {
     pub(in crate::mhp) unlikeness: f64,
     /// Where it looks, rad.
     pub(in crate::mhp) yaw: f64,
-    /// How far away from the radar it looks where it does not walk: 0 at it, 1 the other way.
+    /// How unusual where it looks is: of who stands 0 at the radar, 1 the other way; of who walks 0 ahead, [`BACKWARDS`] back.
     pub(in crate::mhp) away: f64,
     /// Its joints, world frame, m.
     pub(in crate::mhp) joints: Vec<Vec3>,
@@ -138,6 +143,29 @@ impl Search<'_> {
         tried.state = MotionState { coordinates: best, ..state };
     }
 
+    /// Lowers the loss of a start by the bend that it meets.
+    fn settle(&mut self, tried: &mut Tried, evaluations: usize) {
+        let units: Vec<f64> = (0..tried.state.coordinates.len())
+            .map(|k| match k % self.window.stride {
+                0..=HEIGHT => UNITS[0],
+                YAW => UNITS[1],
+                LN_SIZE => UNITS[2],
+                STILL => UNITS[3],
+                _ => UNITS[4],
+            })
+            .collect();
+        let Tried { state, loss, em, prior } = tried;
+        lbfgs::minimise(&mut state.coordinates, &units, evaluations, |coordinates, gradient| {
+            let found = self.evaluate(coordinates);
+            if found.is_finite() && found < *loss {
+                (*loss, *em, *prior) = (found, self.loss.em, self.loss.prior);
+            }
+            gradient.clone_from(&self.loss.gradient);
+            found
+        });
+        *state = MotionState::at(std::mem::take(&mut state.coordinates));
+    }
+
     /// Where a start ended.
     fn hypothesis(&self, tried: &Tried, person: usize) -> Hypothesis {
         let mut placed = self.params.clone();
@@ -149,12 +177,11 @@ impl Search<'_> {
         let velocities = placed.velocities()[own.clone()].to_vec();
         let yaw = tried.state.coordinates[person * self.window.stride + YAW];
         let to_radar = sub(radar_place(&self.problem.views), middle);
-        let stands = norm(mean(&velocities)) < WALKING_MPS;
         Hypothesis {
             loss: tried.loss,
             unlikeness: super::unlikeness(self.config, tried.em, tried.prior) + OF_WAY * norm(way),
             yaw,
-            away: if stands { 0.5 - 0.5 * (yaw - to_radar[1].atan2(to_radar[0])).cos() } else { 0.0 },
+            away: away(yaw, mean(&velocities), to_radar),
             joints: placed.positions()[own.clone()].to_vec(),
             velocities,
             beta: placed.group(Group::Beta)[own].to_vec(),
@@ -167,7 +194,11 @@ impl Search<'_> {
         for tried in &mut *all {
             // What was seen of fewer frames is no measure any more.
             tried.loss = f64::INFINITY;
-            self.descend(tried, sieve.steps, sieve.held);
+            if sieve.every == 1 {
+                self.settle(tried, sieve.steps);
+            } else {
+                self.descend(tried, sieve.steps, sieve.held);
+            }
         }
         all.sort_by(|a, b| a.loss.total_cmp(&b.loss));
         let mut kept: Vec<Tried> = Vec::with_capacity(sieve.kept);
@@ -186,7 +217,8 @@ impl Search<'_> {
         let ends = [0, self.window.frames.len() - 1];
         let apart = ends.map(|frame| {
             for (of, pose) in [a, b].into_iter().zip(&mut poses) {
-                self.window.space.pose(&of.state.coordinates[own.clone()], frame, pose);
+                let (mine, space) = (&of.state.coordinates[own.clone()], &self.window.space);
+                space.pose(mine, space.contact(mine).as_ref(), frame, pose);
             }
             poses[0].iter().zip(&poses[1]).map(|(p, q)| norm(sub(*p, *q))).sum::<f64>()
         });
@@ -215,7 +247,7 @@ pub(in crate::mhp) fn search(
     window.choose_brightness((problem, config), Precision::F32, (&mut coordinates, params), &mut found);
     let (stride, joints) = (window.stride, params.shape().joints.max(1));
     let walks: Vec<bool> = ways(params).iter().map(|way| way[0].hypot(way[1]) > 0.5).collect();
-    let floor = problem.radar.height_m;
+    let (floor, grounded) = (problem.radar.height_m, window.space.ground.is_some());
     let starts = window.space.starts.clone();
     let mut search = Search {
         problem,
@@ -242,8 +274,10 @@ pub(in crate::mhp) fn search(
                 mine[BODY..].copy_from_slice(c);
                 mine[YAW] += turn;
                 mine[..3].copy_from_slice(&hips);
-                if let Some(height_m) = floor {
-                    mine[2] = hip_height * mine[LN_SIZE].exp() - height_m;
+                if grounded {
+                    mine[HEIGHT] = 0.0;
+                } else if let Some(height_m) = floor {
+                    mine[HEIGHT] = hip_height * mine[LN_SIZE].exp() - height_m;
                 }
                 all.push(Tried::at(of));
             }
@@ -257,8 +291,7 @@ pub(in crate::mhp) fn search(
         search.descend(&mut own_start, SIEVES[0].steps, true);
         all.push(own_start);
         for tried in &mut all {
-            tried.state = MotionState::at(tried.state.coordinates.clone());
-            search.descend(tried, FINE, false);
+            search.settle(tried, FINE);
         }
         // A stride with the other leg in front looks much the same from afar, and so does a back.
         if let Some(best) = all.iter().min_by(|a, b| a.loss.total_cmp(&b.loss)) {
@@ -272,7 +305,7 @@ pub(in crate::mhp) fn search(
             }
             for of in others {
                 let mut tried = Tried::at(of);
-                search.descend(&mut tried, FINE, false);
+                search.settle(&mut tried, FINE);
                 all.push(tried);
             }
         }
@@ -309,6 +342,12 @@ fn way(problem: &Problem, params: &Pppr, person: usize, found: &[Hypothesis]) ->
     let [from, to] = [params, &there].map(|of| hips_of(problem, of, person, joints));
     let way = sub(to, from);
     if norm(way) <= MOST_MOVED_M { way } else { [0.0; 3] }
+}
+
+/// How unusual it is to look along `yaw` while going with a velocity, m/s, before a radar that lies in this direction.
+fn away(yaw: f64, velocity: Vec3, to_radar: Vec3) -> f64 {
+    let opposed = |[x, y, _]: Vec3| 0.5 - 0.5 * (yaw - y.atan2(x)).cos();
+    if norm(velocity) < WALKING_MPS { opposed(to_radar) } else { BACKWARDS * opposed(velocity) }
 }
 
 /// The middle of a person's hips, or of all its joints where it has none, world frame, m.
@@ -352,5 +391,19 @@ impl Searched {
             None => String::new(),
         };
         format!("motion: loss {:.3} → {:.3}{other}", self.begun, found.loss)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_stands_looks_at_the_radar_and_who_walks_ahead() {
+        let (still, left) = ([0.1, 0.0, 0.0], [0.0, 1.0, 0.0]);
+        let to_radar = [-3.0, 0.0, 0.2];
+        assert!(away(PI, still, to_radar).abs() < 1e-12 && (away(0.0, still, to_radar) - 1.0).abs() < 1e-12);
+        assert!(away(0.5 * PI, left, to_radar).abs() < 1e-12);
+        assert!((away(-0.5 * PI, left, to_radar) - BACKWARDS).abs() < 1e-12);
     }
 }

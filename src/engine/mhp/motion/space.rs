@@ -5,20 +5,23 @@
 //! p_f    = e^s R_z(y) X_f(c) + t         world frame, m
 //! ```
 //!
-//! Coordinates of a person are t (3, m), y (rad), s (ln m), q (how bright what stands still is, `static_echo.rs`) and c.
+//! Coordinates of a person are t (3, m), y (rad), s (ln m), q (how bright what stands still is, `static_echo.rs`) and c. Where the
+//! floor is known the third is how high the lowest part of the body is above it instead of t_z (`ground.rs`).
 
+use super::ground::{self, Contact, Ground};
 use super::proportions::Proportions;
 use super::static_echo;
 use crate::body::{MotionPrior, Skeleton};
 use crate::geometry::Vec3;
 
 /// Components of the prior that are used: with more a search ends in other poses more often, with fewer poses are no people's.
-const MOST_COMPONENTS: usize = 24;
+const MOST_COMPONENTS: usize = 28;
 /// Half the time over which a velocity is taken, s.
 const HALF_STEP_S: f64 = 0.05;
 /// t, y, s and q: what a person has beside c.
 pub(super) const BODY: usize = 6;
-/// Where y, s and q stand.
+/// Where t_z, or the height above the floor, y, s and q stand.
+pub(super) const HEIGHT: usize = 2;
 pub(super) const YAW: usize = 3;
 pub(super) const LN_SIZE: usize = 4;
 pub(super) const STILL: usize = 5;
@@ -41,6 +44,8 @@ pub(super) struct PoseSpace {
     signs: Vec<f64>,
     /// How long bones are.
     pub(super) proportions: Proportions,
+    /// What bodies stand on, where that is known.
+    pub(super) ground: Option<Ground>,
     /// From where a search may begin: c, and how high the hips are, sizes.
     pub(super) starts: Vec<(Vec<f64>, f64)>,
 }
@@ -76,7 +81,12 @@ fn sources(name: &str) -> Vec<(&'static str, f64)> {
 impl PoseSpace {
     /// Of `prior` on `skeleton` at `times_s` after a window's middle; `None` where a joint has a name that the prior knows
     /// nothing of.
-    pub(super) fn new(prior: &MotionPrior, skeleton: &Skeleton, times_s: &[f64]) -> Option<Self> {
+    pub(super) fn new(
+        prior: &MotionPrior,
+        skeleton: &Skeleton,
+        times_s: &[f64],
+        floor_z_m: Option<f64>,
+    ) -> Option<Self> {
         let shares: Option<Vec<Vec<(usize, f64)>>> = skeleton
             .joints
             .iter()
@@ -117,6 +127,7 @@ impl PoseSpace {
             ln_size: prior.ln_size(),
             signs: prior.mirror_signs()[..components].to_vec(),
             proportions: Proportions::of(skeleton),
+            ground: floor_z_m.and_then(|floor_z_m| Ground::new(skeleton, floor_z_m)),
             starts: starts.collect(),
         })
     }
@@ -144,10 +155,20 @@ impl PoseSpace {
         }
     }
 
-    /// The joints of a person with these coordinates at time `frame`, world frame, m.
-    pub(super) fn pose(&self, coordinates: &[f64], frame: usize, out: &mut [Vec3]) {
+    /// Which parts of a person with these coordinates are lowest over the window's frames, where the floor is known.
+    pub(super) fn contact(&self, coordinates: &[f64]) -> Option<Contact> {
+        Some(self.ground.as_ref()?.contact(coordinates, &self.poses, self.joints))
+    }
+
+    /// t of a person with these coordinates who has this contact with the floor, world frame, m.
+    fn place(coordinates: &[f64], contact: Option<&Contact>) -> Vec3 {
+        [coordinates[0], coordinates[1], coordinates[2] + contact.map_or(0.0, |contact| contact.z_m)]
+    }
+
+    /// The joints of a person with these coordinates, and this contact with the floor, at time `frame`, world frame, m.
+    pub(super) fn pose(&self, coordinates: &[f64], contact: Option<&Contact>, frame: usize, out: &mut [Vec3]) {
         self.mixed(&self.poses[frame], &coordinates[BODY..], out);
-        let (turn, place) = (Turn::of(coordinates), [coordinates[0], coordinates[1], coordinates[2]]);
+        let (turn, place) = (Turn::of(coordinates), Self::place(coordinates, contact));
         for p in out {
             let turned = turn.forwards(*p);
             *p = [0, 1, 2].map(|k| turned[k] + place[k]);
@@ -167,13 +188,14 @@ impl PoseSpace {
     pub(super) fn pull_back(
         &self,
         coordinates: &[f64],
+        contact: Option<&Contact>,
         frame: usize,
         (pose, pose_bar): (&[Vec3], &[Vec3]),
         bars: &mut [f64],
     ) {
         let turn = Turn::of(coordinates);
         let [mut x, mut y, mut z, mut yaw, mut ln_size] = [0.0; 5];
-        let place = [coordinates[0], coordinates[1], coordinates[2]];
+        let place = Self::place(coordinates, contact);
         let mut own = [[0.0; 3]; MOST_JOINTS];
         for ((p, bar), own) in pose.iter().zip(pose_bar).zip(&mut own) {
             let beside = [p[0] - place[0], p[1] - place[1], p[2] - place[2]];
@@ -188,6 +210,9 @@ impl PoseSpace {
             *bar += sum;
         }
         self.mixed_back(&self.poses[frame], &own, bars);
+        if let Some(contact) = contact {
+            contact.pull_back(z, bars);
+        }
     }
 
     /// Adds to `bars` what the adjoints of a frame's velocities imply.
@@ -220,7 +245,8 @@ impl PoseSpace {
         }
     }
 
-    /// How unlikely the coordinates are: the mean square of c, s and q, in standard deviations; adds `gain` times its gradient.
+    /// How unlikely the coordinates are: the mean square of c, s and q, in standard deviations, and how far from the floor they
+    /// are; adds `gain` times its gradient.
     pub(super) fn unlikeliness(&self, coordinates: &[f64], gain: f64, bars: &mut [f64]) -> f64 {
         let share = 1.0 / (self.components + 2) as f64;
         let [mean, deviation] = self.ln_size;
@@ -233,7 +259,9 @@ impl PoseSpace {
             sum += c * c;
             *bar += 2.0 * gain * share * c;
         }
-        sum * share
+        let (off, by_height) = self.ground.as_ref().map_or((0.0, 0.0), |_| ground::unlikeliness(coordinates[HEIGHT]));
+        bars[HEIGHT] += gain * by_height;
+        sum * share + off
     }
 
     /// The coordinates whose joints and velocities at time `frame` are nearest to these, in a space that has its mean at 0.
@@ -248,6 +276,7 @@ impl PoseSpace {
             self.solve(frame, joints, velocities, &mut coordinates);
         }
         self.align(frame, joints, &mut coordinates);
+        coordinates[HEIGHT] -= self.contact(&coordinates).map_or(0.0, |contact| contact.z_m);
         coordinates
     }
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::body::{PpprShape, Skeleton};
-use crate::config::{BodyModel, Clutter, EmLoss, StaticEcho, Summation};
+use crate::config::{BodyModel, Clutter, EmLoss, Height, StaticEcho, Summation};
 use crate::geometry::{norm, sub};
 use crate::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, View};
 use rand::rngs::StdRng;
@@ -75,15 +75,26 @@ fn person(rng: &mut StdRng, window: Option<&Window>) -> (Vec<f64>, Pppr) {
 
 #[test]
 fn the_gradient_by_the_coordinates_agrees_with_central_differences() {
+    agrees(&config(), None);
+}
+
+#[test]
+fn so_does_that_of_a_body_on_the_floor() {
+    agrees(&FitConfig { height: Height::Floor, ..config() }, Some(1.0));
+}
+
+fn agrees(config: &FitConfig, height_m: Option<f64>) {
     let rng = &mut StdRng::seed_from_u64(3);
-    let (problem, config) = (problem(rng), config());
+    let mut problem = problem(rng);
+    problem.radar.height_m = height_m;
     let (_, initial) = person(rng, None);
-    let mut window = Window::new(&problem, &config, Precision::F64, &initial).unwrap().unwrap();
+    let mut window = Window::new(&problem, config, Precision::F64, &initial).unwrap().unwrap();
     assert_eq!((window.frames.len(), window.own), (4, 1), "the frames are those within reach");
+    assert_eq!(window.space.ground.is_some(), height_m.is_some());
     let (coordinates, params) = person(rng, Some(&window));
     let mut loss = WindowLoss::default();
     let mut value = |coordinates: &[f64], loss: &mut WindowLoss| {
-        window.evaluate((&problem, &config), Precision::F64, (coordinates, &params), None, loss);
+        window.evaluate((&problem, config), Precision::F64, (coordinates, &params), None, loss);
         config.w_em * loss.em + config.w_prior * loss.prior
     };
     value(&coordinates, &mut loss);
@@ -102,15 +113,39 @@ fn the_gradient_by_the_coordinates_agrees_with_central_differences() {
 
 #[test]
 fn coordinates_come_back_from_joints_and_velocities() {
-    let rng = &mut StdRng::seed_from_u64(5);
-    let (problem, config) = (problem(rng), config());
-    let (_, initial) = person(rng, None);
-    let window = Window::new(&problem, &config, Precision::F64, &initial).unwrap().unwrap();
-    let (_, params) = person(rng, Some(&window));
-    let mut again = params.clone();
-    window.place(&window.coordinates_of(&params), &mut again);
-    let off = (0..17).map(|joint| norm(sub(params.position(joint), again.position(joint)))).fold(0.0, f64::max);
-    assert!(off < 0.03, "a joint is {off} m away");
+    for height_m in [None, Some(1.0)] {
+        let rng = &mut StdRng::seed_from_u64(5);
+        let (mut problem, config) = (problem(rng), FitConfig { height: Height::Floor, ..config() });
+        problem.radar.height_m = height_m;
+        let (_, initial) = person(rng, None);
+        let window = Window::new(&problem, &config, Precision::F64, &initial).unwrap().unwrap();
+        let (_, params) = person(rng, Some(&window));
+        let mut again = params.clone();
+        window.place(&window.coordinates_of(&params), &mut again);
+        let off = (0..17).map(|joint| norm(sub(params.position(joint), again.position(joint)))).fold(0.0, f64::max);
+        assert!(off < 0.03, "a joint is {off} m away");
+    }
+}
+
+/// Where the floor is known and asked for, a body that bends its knees comes down until it stands.
+#[test]
+fn a_body_stands_on_the_floor_in_any_pose() {
+    let prior = MotionPrior::committed().unwrap();
+    let skeleton = Skeleton::preset("coco17").unwrap();
+    let space = PoseSpace::new(prior, &skeleton, &[-0.1, 0.0, 0.1], Some(-1.0)).unwrap();
+    let rng = &mut StdRng::seed_from_u64(7);
+    for _ in 0..20 {
+        let mut coordinates: Vec<f64> = (0..space.coordinates()).map(|_| rng.random_range(-0.7..0.7)).collect();
+        coordinates[..BODY].copy_from_slice(&[3.0, 0.1, 0.0, 0.4, 0.08, -1.5]);
+        let contact = space.contact(&coordinates);
+        let lowest = (0..3).flat_map(|frame| {
+            let mut pose = vec![[0.0; 3]; 17];
+            space.pose(&coordinates, contact.as_ref(), frame, &mut pose);
+            [pose[15][2], pose[16][2]]
+        });
+        let lowest = lowest.fold(f64::INFINITY, f64::min);
+        assert!((lowest + 1.0 - 0.06 * 0.08_f64.exp()).abs() < 0.025, "{lowest}");
+    }
 }
 
 #[test]
@@ -132,11 +167,11 @@ fn a_window_holds_its_frame_as_near_its_middle_as_it_can() {
 fn every_skeleton_with_known_names_is_moved() {
     let prior = MotionPrior::committed().unwrap();
     for name in ["coco17", "h36m17", "hupr14"] {
-        assert!(PoseSpace::new(prior, &Skeleton::preset(name).unwrap(), &[0.0]).is_some(), "{name}");
+        assert!(PoseSpace::new(prior, &Skeleton::preset(name).unwrap(), &[0.0], None).is_some(), "{name}");
     }
     let mut other = Skeleton::preset("coco17").unwrap();
     other.joints[3] = "tail".into();
-    assert!(PoseSpace::new(prior, &other, &[0.0]).is_none());
+    assert!(PoseSpace::new(prior, &other, &[0.0], None).is_none());
 }
 
 /// Left for right, and y for −y in the body's own frame.
@@ -144,7 +179,7 @@ fn every_skeleton_with_known_names_is_moved() {
 fn a_mirrored_body_has_left_and_right_exchanged() {
     let skeleton = Skeleton::preset("coco17").unwrap();
     let prior = MotionPrior::committed().unwrap();
-    let space = PoseSpace::new(prior, &skeleton, &[-0.1, 0.0, 0.1]).unwrap();
+    let space = PoseSpace::new(prior, &skeleton, &[-0.1, 0.0, 0.1], None).unwrap();
     let rng = &mut StdRng::seed_from_u64(9);
     let mut coordinates: Vec<f64> = (0..space.coordinates()).map(|_| rng.random_range(-1.0..1.0)).collect();
     coordinates[..BODY].fill(0.0);
@@ -155,7 +190,7 @@ fn a_mirrored_body_has_left_and_right_exchanged() {
     };
     let pose = |coordinates: &[f64], frame: usize| {
         let mut pose = vec![[0.0; 3]; 17];
-        space.pose(coordinates, frame, &mut pose);
+        space.pose(coordinates, None, frame, &mut pose);
         pose
     };
     let plain = [0, 1, 2].map(|frame| pose(&coordinates, frame));
