@@ -232,6 +232,8 @@ fn every_study_has_its_rows_and_no_row_is_without_reason() {
             let of_truth = row["labels"][0] == "truth";
             assert!(if of_truth { start == 0.0 } else { start > 0.0 }, "{words:?}: {start}");
             assert_eq!(row["share_below_truth"].is_number(), words[0] == "truth" && !of_truth);
+            assert_eq!(row["share_clearly_below_truth"].is_number(), row["share_below_truth"].is_number());
+            assert!(row["share_clearly_below_truth"].as_f64() <= row["share_below_truth"].as_f64());
             assert!(row["converged_share"].is_number() && row["share_improved"].is_number());
         }
         let run = Run::read(&case.run(&out)).unwrap();

@@ -88,6 +88,7 @@ fn columns<'a>(spec: &'a RunSpec, rows: &[TableRow]) -> Vec<Column<'a>> {
     add("better than start", true, Box::new(|row| percent(row.share_improved)));
     add("loss", true, Box::new(move |row| spread(row.loss.filter(|_| of_truth), 4)));
     add("loss below truth's", true, Box::new(|row| percent(row.share_below_truth)));
+    add("by over 3 %", true, Box::new(|row| percent(row.share_clearly_below_truth)));
     add("IoU", false, Box::new(|row| spread(row.iou, 3)));
     add("converged", false, Box::new(|row| percent(row.converged_share)));
     add("reprojection, px", true, Box::new(|row| spread(row.reprojection_px, 1)));

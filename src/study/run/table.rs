@@ -98,6 +98,9 @@ pub struct TableRow {
     /// Share of frames whose loss ends below that of the fit from the truth, 0..1: there the loss prefers another pose.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub share_below_truth: Option<f64>,
+    /// The same of those whose loss is lower by more than 3 %: two fits that end in one pose differ by less.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub share_clearly_below_truth: Option<f64>,
     /// Forward-consistency IoU, mean over views, 0..1.
     pub iou: Option<Spread>,
     /// Share of frames that met the convergence criterion, 0..1.
@@ -210,14 +213,25 @@ fn beside_truth(row: TableRow, spec: &RunSpec, rows: &[&RunRow], all_rows: &Rows
         n => middle(n / 2 - 1).zip(middle(n / 2)).map(|(a, b)| f64::midpoint(a, b)),
     };
     let truth = spec.variants.iter().position(|variant| variant.start == StartFrom::Truth);
-    let below = |row: &&RunRow| {
+    let by_truth = |row: &&RunRow| {
         let of_truth = matched(all_rows.get(&(truth?, row.frame))?)?;
-        Some(matched(row)?.loss < of_truth.loss)
+        Some(matched(row)?.loss / of_truth.loss)
     };
-    let below: Vec<bool> = rows.iter().filter(|row| Some(row.variant) != truth).filter_map(below).collect();
-    let share = below.iter().filter(|&&yes| yes).count() as f64 / below.len().max(1) as f64;
-    TableRow { median_majpe_mm: median, share_below_truth: (!below.is_empty()).then_some(share), ..row }
+    let by_truth: Vec<f64> = rows.iter().filter(|row| Some(row.variant) != truth).filter_map(by_truth).collect();
+    let share = |most: f64| {
+        let below = by_truth.iter().filter(|&&loss| loss < most).count();
+        (!by_truth.is_empty()).then(|| below as f64 / by_truth.len() as f64)
+    };
+    TableRow {
+        median_majpe_mm: median,
+        share_below_truth: share(1.0),
+        share_clearly_below_truth: share(1.0 - SAME_POSE),
+        ..row
+    }
 }
+
+/// The share of a loss by which two fits that end in one pose differ.
+const SAME_POSE: f64 = 0.03;
 
 /// Errors of joints that differ by less are those of the same joints, mm: the rounding of a sum that is 0 may differ.
 const SAME_MM: f64 = 1e-6;
@@ -261,6 +275,7 @@ fn summed(labels: Vec<String>, variant: usize, rows: &[&RunRow]) -> TableRow {
         init_pa_majpe_mm: spread(|fit| fit.init_pa_majpe_mm),
         share_improved: share(used.iter().filter_map(|fit| fit.improved()).collect()),
         share_below_truth: None,
+        share_clearly_below_truth: None,
         iou: spread(RunNumbers::mean_iou),
         converged_share: share(used.iter().map(|fit| fit.converged).collect()),
         loss: spread(|fit| Some(fit.loss)),

@@ -46,8 +46,8 @@ const OF_WAY: f64 = 0.4;
 const CLEARER: f64 = 0.85;
 const MOST_MOVED_M: f64 = 0.5;
 
-/// How much less people walk backwards than they stand with their back to a radar.
-const BACKWARDS: f64 = 2.0;
+/// Who turns as fast as this about himself looks anywhere, rad/s.
+const TURNING_RADPS: f64 = 0.5;
 
 /// Moves every start by some steps and keeps the few with the lowest loss.
 struct Sieve {
@@ -68,7 +68,8 @@ pub(in crate::mhp) struct Hypothesis {
     pub(in crate::mhp) unlikeness: f64,
     /// Where it looks, rad.
     pub(in crate::mhp) yaw: f64,
-    /// How unusual where it looks is: of who stands 0 at the radar, 1 the other way; of who walks 0 ahead, [`BACKWARDS`] back.
+    /// How unusual it is to look there: of who walks 0 ahead, 1 back; of who stands 0 at the radar, 1 the other way, less the faster
+    /// he turns.
     pub(in crate::mhp) away: f64,
     /// Its joints, world frame, m.
     pub(in crate::mhp) joints: Vec<Vec3>,
@@ -181,7 +182,7 @@ impl Search<'_> {
             loss: tried.loss,
             unlikeness: super::unlikeness(self.config, tried.em, tried.prior) + OF_WAY * norm(way),
             yaw,
-            away: away(yaw, mean(&velocities), to_radar),
+            away: away(yaw, (&placed.positions()[own.clone()], &velocities), to_radar),
             joints: placed.positions()[own.clone()].to_vec(),
             velocities,
             beta: placed.group(Group::Beta)[own].to_vec(),
@@ -344,10 +345,22 @@ fn way(problem: &Problem, params: &Pppr, person: usize, found: &[Hypothesis]) ->
     if norm(way) <= MOST_MOVED_M { way } else { [0.0; 3] }
 }
 
-/// How unusual it is to look along `yaw` while going with a velocity, m/s, before a radar that lies in this direction.
-fn away(yaw: f64, velocity: Vec3, to_radar: Vec3) -> f64 {
+/// How unusual it is to look along `yaw` with these joints (m) and velocities (m/s) before a radar that lies in this direction.
+fn away(yaw: f64, (joints, velocities): (&[Vec3], &[Vec3]), to_radar: Vec3) -> f64 {
     let opposed = |[x, y, _]: Vec3| 0.5 - 0.5 * (yaw - y.atan2(x)).cos();
-    if norm(velocity) < WALKING_MPS { opposed(to_radar) } else { BACKWARDS * opposed(velocity) }
+    let goes = mean(velocities);
+    if norm(goes) >= WALKING_MPS {
+        return opposed(goes);
+    }
+    let middle = mean(joints);
+    let (mut spin, mut square) = (0.0, 0.0);
+    for (joint, velocity) in joints.iter().zip(velocities) {
+        let (at, v) = (sub(*joint, middle), sub(*velocity, goes));
+        spin += at[0] * v[1] - at[1] * v[0];
+        square += at[0] * at[0] + at[1] * at[1];
+    }
+    let rate = spin / (square.max(1e-9) * TURNING_RADPS);
+    (-rate * rate).exp() * opposed(to_radar)
 }
 
 /// The middle of a person's hips, or of all its joints where it has none, world frame, m.
@@ -400,10 +413,18 @@ mod tests {
 
     #[test]
     fn who_stands_looks_at_the_radar_and_who_walks_ahead() {
-        let (still, left) = ([0.1, 0.0, 0.0], [0.0, 1.0, 0.0]);
-        let to_radar = [-3.0, 0.0, 0.2];
-        assert!(away(PI, still, to_radar).abs() < 1e-12 && (away(0.0, still, to_radar) - 1.0).abs() < 1e-12);
-        assert!(away(0.5 * PI, left, to_radar).abs() < 1e-12);
-        assert!((away(-0.5 * PI, left, to_radar) - BACKWARDS).abs() < 1e-12);
+        let joints = [[3.0, 0.2, 0.0], [3.0, -0.2, 0.0], [3.2, 0.0, 0.5], [2.8, 0.0, 0.5]];
+        let turning =
+            |rate: f64, goes: Vec3| joints.map(|[x, y, _]| [goes[0] - rate * y, goes[1] + rate * (x - 3.0), 0.0]);
+        let of = |yaw: f64, velocities: &[Vec3]| away(yaw, (&joints, velocities), [-3.0, 0.0, 0.2]);
+        let (still, left) = (turning(0.0, [0.1, 0.0, 0.0]), turning(0.0, [0.0, 1.0, 0.0]));
+        assert!(of(PI, &still).abs() < 1e-12 && (of(0.0, &still) - 1.0).abs() < 1e-12);
+        assert!(of(0.5 * PI, &left).abs() < 1e-12 && (of(-0.5 * PI, &left) - 1.0).abs() < 1e-12);
+        // Who turns about looks anywhere.
+        for way in [-1.0, 1.0] {
+            let turned = of(0.0, &turning(way * TURNING_RADPS, [0.0; 3]));
+            assert!((turned - (-1.0_f64).exp()).abs() < 1e-9, "{turned}");
+        }
+        assert!(of(0.0, &turning(1.5, [0.0; 3])) < 1e-3);
     }
 }
