@@ -44,7 +44,9 @@ fn direction(gradient: &[f64], memory: &VecDeque<Step>) -> Vec<f64> {
     }
     if let Some(last) = memory.back() {
         let flatness = 1.0 / (last.rho * dot(&last.bent, &last.bent));
-        way.iter_mut().for_each(|x| *x *= flatness);
+        for x in &mut way {
+            *x *= flatness;
+        }
     }
     for (step, gain) in memory.iter().zip(gains) {
         let back = step.rho * dot(&step.bent, &way);
@@ -84,7 +86,9 @@ pub(super) fn minimise(
             return;
         }
         if memory.is_empty() || long > most {
-            way.iter_mut().for_each(|x| *x *= most / long);
+            for x in &mut way {
+                *x *= most / long;
+            }
         }
         let slope = dot(&way, &gradient);
         let mut share = 1.0;
