@@ -2,8 +2,7 @@
 //!
 //! Maps of a few tenths of a second tell front from back, or one leg from the other, by little, and now and then wrongly. But
 //! nobody turns about between two frames, who stands before a radar looks at it more often than not, and who walks goes where he
-//! looks. A path takes one
-//! hypothesis of every frame and costs
+//! looks. A path takes one hypothesis of every frame and costs
 //!
 //! ```text
 //! Σ over frames of (L/L_min + 0.25 away) + Σ over steps of min(apart/0.5 m, 0.9)

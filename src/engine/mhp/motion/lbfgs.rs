@@ -1,7 +1,7 @@
 //! Limited-memory BFGS (Nocedal and Wright, *Numerical Optimization*, algorithms 3.1 and 7.4): the descent that ends a search.
 //!
 //! A window has a few dozen coordinates whose losses bend differently by orders of magnitude; the bend that the last steps met
-//! makes the next ones as long as they should be. A step halves, by a parabola, until the loss falls by a share of what its slope
+//! makes the next ones as long as they should be. A step is shortened, by a parabola, until the loss falls by a share of what its slope
 //! promises, and goes no farther than a unit of any coordinate.
 
 use std::collections::VecDeque;

@@ -29,7 +29,7 @@ const MOST_WORK: f64 = 2e10;
 /// Where every cell is summed by itself each costs so many.
 const PLAIN: f64 = 10.0;
 /// Evaluations of a person's search beside those of the first sieve, and those of a start in it, in whole windows.
-const LATER: f64 = 300.0;
+const LATER: f64 = 470.0;
 const FIRST: f64 = 7.0 / 4.0;
 /// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start.
 const WEIGHTS: [f64; 2] = [0.5, 8e-3];
@@ -45,7 +45,6 @@ const OF_WAY: f64 = 0.4;
 /// The share of the start's L_EM below which another place is believed even where the pose there is not, and how far it may be, m.
 const CLEARER: f64 = 0.85;
 const MOST_MOVED_M: f64 = 0.5;
-
 /// Who turns as fast as this about himself looks anywhere, rad/s.
 const TURNING_RADPS: f64 = 0.5;
 

@@ -162,7 +162,7 @@ impl PoseSpace {
 
     /// t of a person with these coordinates who has this contact with the floor, world frame, m.
     fn place(coordinates: &[f64], contact: Option<&Contact>) -> Vec3 {
-        [coordinates[0], coordinates[1], coordinates[2] + contact.map_or(0.0, |contact| contact.z_m)]
+        [coordinates[0], coordinates[1], coordinates[HEIGHT] + contact.map_or(0.0, |contact| contact.z_m)]
     }
 
     /// The joints of a person with these coordinates, and this contact with the floor, at time `frame`, world frame, m.
