@@ -365,10 +365,12 @@ proptest! {
         offset_m in prop::sample::select(vec![0.0, 0.08]),
         objective in prop::sample::select(vec![EmLoss::Iou, EmLoss::NccDb, EmLoss::Gamma]),
         lobe in prop::sample::select(vec![LobeShape::Gaussian, LobeShape::Gaussian, LobeShape::Window]),
+        dynamic_range_db in prop::sample::select(vec![200.0, 25.0]),
     ) {
         let summation = if coherent { Summation::Coherent } else { Summation::Incoherent };
         let mut scene = scene(seed, &kinds, summation, operators, offset_m);
         (scene.config.objective, scene.config.lobe) = (objective, lobe);
+        scene.config.dynamic_range_db = dynamic_range_db;
         prop_assume!(scene.depth_of_nulls() > NULL_DEPTH);
         scene.check()?;
     }

@@ -148,6 +148,7 @@ fn scene(seed: u64, bins: &Range<usize>, (objective, erases): (EmLoss, bool)) ->
         softness: *[0.1, 0.5, 0.5, 1.0, 1.5, 4.0].get(rng.random_range(0..6_usize)).unwrap(),
         tau_pct: *[2.0, 10.0, 10.0, 40.0, 100.0].get(rng.random_range(0..5_usize)).unwrap(),
         operators: Operators { attenuation: on(rng), range: on(rng), doppler: on(rng), angle: on(rng) },
+        dynamic_range_db: if seed.is_multiple_of(2) { 200.0 } else { 25.0 },
         ..FitConfig::default()
     };
     // Over a region the powers of a whole map do not tell whether somebody is in it.

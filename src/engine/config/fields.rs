@@ -7,7 +7,7 @@ use super::rows::{choice, count_at, flag_at, maybe_at, number, number_at, one_of
 use super::{
     Background, BodyModel, Clutter, Convergence, EM_REGION_FORM, EmLoss, EmRegion, FitConfig, FramesAround,
     GradientVelocity, Height, LobeShape, Parameterization, RangeOffset, Scatterers, Sidelobes, StartPlace, StaticEcho,
-    Still, Summation, WarmStart, Yaw, answers,
+    Still, Summation, WHOLE_RANGE_DB, WarmStart, Yaw, answers,
 };
 use FieldGroup::{Limits, Model, Optimiser, Perturbation, Radar, Start as Starting, StepSizes, Weights};
 use ReadBy::{Run, Start, Steps, StepsAndStart};
@@ -95,6 +95,19 @@ pub const FIELDS: &[Field] = &[
             one_of_at!(static_echo, [StaticEcho::Kept, StaticEcho::Fitted]),
         )
         .row("static echo")
+    },
+    Field {
+        help: "How far below the brightest cell of the EM region levels are told apart, where the objective is ncc_db: beyond are the sidelobes of the echo. 200: as far as the noise.",
+        ..number(
+            Model,
+            "dynamic_range_db",
+            "Dynamic range",
+            StepsAndStart,
+            (6.0, WHOLE_RANGE_DB),
+            number_at!(dynamic_range_db),
+        )
+        .unit("dB")
+        .row("dynamic range")
     },
     Field {
         help: "Share of the EM region's cells that a mask holds: B = [H > P_{100−τ}(H)]. At 100 % all but the smallest cell: no masking.",

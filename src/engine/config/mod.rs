@@ -137,6 +137,8 @@ impl Default for EmRegion {
 }
 
 /// What `FIT.toml` holds of it.
+/// A dynamic range beyond any noise, dB: all levels are told apart.
+const WHOLE_RANGE_DB: f64 = 200.0;
 const EM_REGION_FORM: &str = "\"full\" or { half_width_m = METRES } with METRES > 0";
 
 #[derive(Serialize, Deserialize)]
@@ -206,6 +208,8 @@ pub struct FitConfig {
     pub clutter: Clutter,
     /// How bright a joint is that stands still.
     pub static_echo: StaticEcho,
+    /// How far below the brightest cell of a region levels are compared, dB.
+    pub dynamic_range_db: f64,
     /// Share of cells in a mask, percent.
     pub tau_pct: f64,
     /// Temperature T of the soft mask.
@@ -286,6 +290,7 @@ impl Default for FitConfig {
             body: BodyModel::default(),
             clutter: Clutter::default(),
             static_echo: StaticEcho::default(),
+            dynamic_range_db: WHOLE_RANGE_DB,
             tau_pct: 10.0,
             softness: 0.5,
             theta_max_deg: 170.0,

@@ -94,6 +94,7 @@ impl Preset {
                 body: BodyModel::Skin,
                 clutter: Clutter::Modelled,
                 static_echo: StaticEcho::Fitted,
+                dynamic_range_db: 40.0,
                 range_offset: RangeOffset::Measured,
                 sidelobes: Sidelobes::Removed,
                 parameterization: Parameterization::Motion,

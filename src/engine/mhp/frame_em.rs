@@ -123,7 +123,14 @@ impl FrameEm {
                 let spectral = view.axes.iter().any(|axis| axis.kind == AxisKind::Doppler);
                 let in_rows = precision == Precision::F32 && config.summation == Summation::Incoherent && !spectral;
                 let of = (cells.as_slice(), noise);
-                Levels::new(config.objective, view.quantity, &cell_box, of, background.as_deref(), in_rows)
+                Levels::new(
+                    (config.objective, config.dynamic_range_db),
+                    view.quantity,
+                    &cell_box,
+                    of,
+                    background.as_deref(),
+                    in_rows,
+                )
             });
             EmTarget { ori, cell_box, levels, left }
         };

@@ -2,8 +2,10 @@
 //!
 //! With I the measured power of a cell, n its noise and S the simulated power, M = g S + n, g so that both have the same power
 //! above the noise. `ncc_db` is one minus the correlation of ln(I + n) with ln(M + n), `gamma` the mean of the Itakura–Saito
-//! divergence of I from M. What a cell without an echo says is the same in every evaluation and is summed once: an evaluation
-//! adds what the simulated power changes of it, d = ln(1 + g S / 2n) or y = g S / n.
+//! divergence of I from M. Under a body's main lobe there are its sidelobes, which no model of a person has; beyond the dynamic range D
+//! that is compared (`dynamic_range_db`), `ncc_db` therefore tells nothing apart: it is one minus the correlation of ln(I + n̂) with
+//! ln(M + n̂), n̂ = max(n, 10^(−D/10)), both relative to the brightest cell of the region. What a cell without an echo says is the same in every evaluation and is summed once: an evaluation
+//! adds what the simulated power changes of it, d = ln(1 + g S / (n + n̂)) or y = g S / n.
 
 use super::cell_box::CellBox;
 use super::level_rows::LevelRows;
@@ -23,11 +25,11 @@ pub(super) const REGULARISER: f64 = 1e-20;
 /// What is measured over a region's cells, in the order of its sum.
 pub(super) struct Levels {
     kind: EmLoss,
-    /// ln(I + n) less its mean (`ncc_db`), or I/n (`gamma`).
+    /// ln(I + n̂) less its mean (`ncc_db`), or I/n (`gamma`).
     measured: Vec<f64>,
-    /// 1/2n or 1/n: what turns g S into x or y.
+    /// 1/(n + n̂) or 1/n: what turns g S into x or y.
     by_noise: Vec<f64>,
-    /// ln 2n less its mean; 0 where the noise is the same everywhere.
+    /// ln(n + n̂) less its mean; 0 where the noise is the same everywhere.
     base: Vec<f64>,
     pub(super) totals: LevelTotals,
     /// The same in tiles; empty in double precision, and where there are rows.
@@ -44,7 +46,7 @@ pub(super) struct LevelTotals {
     pub(super) count: f64,
     /// max(Σ (I − n), 10⁻⁶ Σ I)
     pub(super) above: f64,
-    /// The least noise.
+    /// The least (n + n̂)/2 or n.
     pub(super) noise: f64,
     /// Σ a², Σ a b₀ and Σ b₀² of the deviations from the means (`ncc_db`).
     pub(super) variation: f64,
@@ -90,7 +92,7 @@ impl Levels {
     /// whole map's noise and `background` a power to be added to the noise of each cell, of the same unit as the map's power, if there is one. Cells
     /// that are NaN are erased: the others alone are compared, and what is handed to [`Self::compare`] is theirs.
     pub(super) fn new(
-        kind: EmLoss,
+        (kind, dynamic_range_db): (EmLoss, f64),
         quantity: Quantity,
         cell_box: &CellBox,
         (cells, noise): (&[f64], f64),
@@ -117,6 +119,10 @@ impl Levels {
             values.into_iter().map(|x| x - mean).collect()
         };
         let levels = || intensity.iter().zip(&noises);
+        let least = 10f64.powf(-0.1 * dynamic_range_db);
+        // n̂, and n + n̂
+        let raised = |n: f64| n.max(least);
+        let both = |n: f64| n + raised(n);
         let (measured, by_noise, base): (Vec<f64>, Vec<f64>, Vec<f64>) = match kind {
             EmLoss::Gamma => (
                 levels().map(|(&i, &n)| if i > 0.0 { i / n } else { LEAST_POWER / n }).collect(),
@@ -124,10 +130,10 @@ impl Levels {
                 vec![0.0; intensity.len()],
             ),
             EmLoss::Iou | EmLoss::NccDb => (
-                centred(levels().map(|(i, n)| (i + n).ln()).collect()),
-                noises.iter().map(|n| 0.5 / n).collect(),
+                centred(levels().map(|(&i, &n)| (i + raised(n)).ln()).collect()),
+                noises.iter().map(|&n| 1.0 / both(n)).collect(),
                 if background.is_some() {
-                    centred(noises.iter().map(|n| (2.0 * n).ln()).collect())
+                    centred(noises.iter().map(|&n| both(n).ln()).collect())
                 } else {
                     vec![0.0; intensity.len()]
                 },
@@ -140,7 +146,10 @@ impl Levels {
             kind,
             count,
             above: above.max(LEAST_ABOVE * total).max(f64::MIN_POSITIVE),
-            noise: noises.iter().copied().fold(f64::INFINITY, f64::min),
+            noise: noises
+                .iter()
+                .map(|&n| if kind == EmLoss::Gamma { n } else { 0.5 * both(n) })
+                .fold(f64::INFINITY, f64::min),
             variation: product(&measured, &measured),
             common: product(&measured, &base),
             base_variation: product(&base, &base),
