@@ -96,7 +96,7 @@ impl Fitter {
         if config.parameterization == Parameterization::Motion {
             let problem = Arc::clone(self.objective.problem());
             // Where there is none, persons stay where they are.
-            self.window = Window::new(&problem, &config, precision, &state.params)?.ok();
+            self.window = Window::fitted(&problem, &config, precision, &state.params)?.ok();
             if let Some(window) = &mut self.window {
                 let mut coordinates = window.coordinates_of(&state.params);
                 let mut found = WindowLoss::default();

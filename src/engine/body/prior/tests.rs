@@ -60,7 +60,7 @@ fn twin(name: &str) -> String {
 fn the_committed_prior_is_of_people() {
     let prior = MotionPrior::committed().unwrap();
     assert!(prior.header()[0].contains("train-motion"), "it says how it came about");
-    assert_eq!((prior.times_s().len(), prior.components().len(), prior.starts().len()), (9, 32, 24));
+    assert_eq!((prior.times_s().len(), prior.components().len(), prior.starts().len()), (9, 64, 24));
     assert!((prior.starts().iter().map(|start| start.share).sum::<f64>() - 1.0).abs() < 1e-3);
     let size = prior.ln_size()[0].exp();
     assert!((1.0..1.15).contains(&size), "{size} m");

@@ -20,7 +20,7 @@ pub const MOTION_JOINTS: [&str; JOINTS] = {
     names
 };
 /// So many components carry the figures of [`MotionCoverage`].
-pub const MOTION_COUNTS: [usize; 6] = [8, 12, 16, 20, 24, 32];
+pub const MOTION_COUNTS: [usize; 6] = [8, 12, 16, 20, 28, 64];
 
 const JOINTS: usize = 20;
 /// The joint on the other side of the body.
@@ -40,7 +40,7 @@ const SIZE_OF_TALL_M: f64 = 1.75 / 1.612;
 const POSES: usize = 9;
 const STEP_S: f64 = 0.05;
 /// Components that are kept, at most.
-const COMPONENTS: usize = 32;
+const COMPONENTS: usize = 64;
 /// Clusters, at most, and the components in which they are sought.
 const STARTS: usize = 24;
 const CLUSTERED: usize = 12;

@@ -6,16 +6,19 @@
 //!
 //! ```text
 //! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior
-//! L_prior = (‖c‖² + ((s − s₀)/σ_s)² + ((q − q₀)/σ_q)²)/(K + 2) + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)² + ρ(h/σ_h)
+//! L_prior = W/F · ((‖c‖² + ((s − s₀)/σ_s)² + ((q − q₀)/σ_q)²)/30 + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)² + ρ(h/σ_h))
 //! ```
 //!
-//! the parts behind it those of the body's proportions (`proportions.rs`) and of the floor (`ground.rs`), the kinematic terms those of the frame that is fitted.
+//! with F the frames there are and W those that are asked for (`window`), for fewer frames are less evidence against a prior that
+//! stays. The parts behind it are those of the body's proportions (`proportions.rs`) and of the floor (`ground.rs`); for several
+//! persons there is one for bodies that stand in one another (`apart.rs`). The kinematic terms are those of the frame that is fitted.
 //! q says how bright what stands still is (`static_echo.rs`). PPPR stays the state that is shown, kept and exported: positions and
 //! velocities follow the coordinates, and opacities do where the settings ask for it; scales and the rest move by themselves and
 //! are the same in all frames of the window. The frame stands as near the window's middle as its
 //! sequence lets it; without frames around the window is one frame. A start is searched from clusters of the prior and from
 //! several headings, coarse then fine ([`search`]).
 
+mod apart;
 mod clutter;
 mod decode;
 mod ground;
@@ -43,7 +46,7 @@ use crate::geometry::{Vec3, add_scaled, mean, norm};
 use ground::Contact;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
-use space::{BODY, HEIGHT, LN_SIZE, MOST_JOINTS, PoseSpace, STILL, YAW};
+use space::{BODY, Detail, HEIGHT, LN_SIZE, MOST_JOINTS, PoseSpace, STILL, YAW};
 use static_echo::StaticEchoModel;
 
 /// Frames of a window lie no farther from its middle, s: the prior reaches no farther.
@@ -121,6 +124,8 @@ pub(super) struct Window {
     stride: usize,
     /// Whether what stands around the persons is known: they walk, or static echoes were removed.
     clear: bool,
+    /// W/F.
+    scarcity: f64,
 }
 
 struct WindowFrame {
@@ -152,6 +157,19 @@ pub(super) fn is_unlike(unlikeness: f64) -> bool {
 }
 
 impl Window {
+    /// That of a fit: see [`Self::new`].
+    ///
+    /// # Errors
+    /// Where a position is not finite.
+    pub(super) fn fitted(
+        problem: &Problem,
+        config: &FitConfig,
+        precision: Precision,
+        initial: &Pppr,
+    ) -> Result<Result<Self, Held>, FitError> {
+        Self::new(problem, config, (precision, Detail::Fit), initial)
+    }
+
     /// Whether the window's maps are explained by persons with these coordinates.
     pub(super) fn explains(
         &mut self,
@@ -164,14 +182,15 @@ impl Window {
         config.objective != EmLoss::NccDb || loss.em <= MOST_BEGUN[usize::from(!self.clear)]
     }
 
-    /// Around the persons of `initial`, who move as their velocities say; or why they stay where they are.
+    /// Around the persons of `initial`, who move as their velocities say; or why they stay where they are. The space of their poses
+    /// has this `detail`.
     ///
     /// # Errors
     /// Where a position is not finite.
-    pub(super) fn new(
+    fn new(
         problem: &Problem,
         config: &FitConfig,
-        precision: Precision,
+        (precision, detail): (Precision, Detail),
         initial: &Pppr,
     ) -> Result<Result<Self, Held>, FitError> {
         let Some(prior) = MotionPrior::committed() else { return Ok(Err(Held::Skeleton)) };
@@ -183,7 +202,7 @@ impl Window {
             return Ok(Err(Held::Skeleton));
         }
         let floor_z_m = problem.radar.height_m.filter(|_| config.height == Height::Floor).map(|height_m| -height_m);
-        let Some(space) = PoseSpace::new(prior, &problem.skeleton, &times, floor_z_m) else {
+        let Some(space) = PoseSpace::new(prior, &problem.skeleton, &times, floor_z_m, detail) else {
             return Ok(Err(Held::Skeleton));
         };
         let (centres, ways) = (region::centres(initial), ways(initial));
@@ -220,7 +239,8 @@ impl Window {
         let own = chosen.iter().position(Option::is_none).unwrap_or(0);
         let stride = space.coordinates();
         let echo = StaticEchoModel::new(problem, config);
-        Ok(Ok(Self { space, echo, own, frames, stride, clear: walks || problem.static_removed }))
+        let scarcity = config.window.max(1) as f64 / chosen.len() as f64;
+        Ok(Ok(Self { space, echo, own, frames, stride, clear: walks || problem.static_removed, scarcity }))
     }
 
     /// Gives all persons of `coordinates` the q at which the loss is lowest, where it is fitted.
@@ -300,12 +320,14 @@ impl Window {
         looks: Option<&mut Pppr>,
         loss: &mut WindowLoss,
     ) {
-        let Self { space, echo, frames, stride, .. } = self;
+        let Self { space, echo, frames, stride, scarcity, .. } = self;
         let joints = params.shape().joints;
         loss.gradient.clear();
         loss.gradient.resize(coordinates.len(), 0.0);
         let share = 1.0 / frames.len().div_ceil(every) as f64;
         let persons = (coordinates.len() / *stride).max(1) as f64;
+        let prior_share = *scarcity / persons;
+        let prior_gain = config.w_prior * prior_share;
         (loss.em, loss.prior) = (0.0, 0.0);
         let mut kept = looks;
         let contacts: SmallVec<[Option<Contact>; 1]> =
@@ -346,9 +368,9 @@ impl Window {
                     let onto = (&mut pose_bar[..], &mut velocity_bar[..]);
                     bars[STILL] += echo.pull_back(own[STILL], person, &of.params, &beta_bar, onto);
                 }
-                let gain = share * config.w_prior / persons;
+                let gain = share * prior_gain;
                 let misfit = space.proportions.misfit(own, pose, gain, (&mut pose_bar, &mut *bars));
-                loss.prior += share * misfit / persons;
+                loss.prior += share * prior_share * misfit;
                 space.pull_back(own, contacts[person].as_ref(), frame, (pose, &pose_bar[..joints]), bars);
                 space.pull_back_velocity(own, frame, (velocities, &velocity_bar[..joints]), bars);
             }
@@ -357,8 +379,10 @@ impl Window {
             }
         }
         for (own, bars) in coordinates.chunks_exact(*stride).zip(loss.gradient.chunks_exact_mut(*stride)) {
-            loss.prior += space.unlikeliness(own, config.w_prior / persons, bars) / persons;
+            loss.prior += prior_share * space.unlikeliness(own, prior_gain, bars);
         }
+        // Of each person its own share, of whom stand in one another all.
+        loss.prior += apart::overlap(coordinates, *stride, config.w_prior, &mut loss.gradient);
     }
 
     /// Adds what a gradient by the joints of the frame that is fitted says of the coordinates.

@@ -5,18 +5,26 @@
 //! wrists, hips, knees and ankles,
 //!
 //! ```text
-//! mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)²,  σ_b = 0.12,  λ = ℓ/size of the skeleton's reference lengths
+//! mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)²,  σ_b = 0.12 in a search and 0.05 in a fit,  λ = ℓ/size of the skeleton's reference lengths
 //! ```
 //!
 //! the size of a body being that of the prior (`body::MotionPrior`): of its height, 0.635. Of a skeleton it is the height at which
 //! the long bones that it has are as long together as Winter's. It asks nothing of s: a larger body has longer bones.
 
 use super::LN_SIZE;
+use super::space::Detail;
 use crate::body::{Skeleton, is_named};
 use crate::geometry::{Vec3, add_scaled, norm, sub};
 
-/// How far a bone is from its length, share of it, standard deviation.
-const SPREAD: f64 = 0.12;
+/// How far a bone is from its length, share of it, standard deviation: a search passes between poses, and few components shorten
+/// bones between them.
+fn spread(detail: Detail) -> f64 {
+    match detail {
+        Detail::Search => 0.12,
+        Detail::Fit => 0.05,
+    }
+}
+
 /// Sizes of a height.
 const SIZES: f64 = 0.635;
 /// The ends of long bones and their length, heights; Winter, *Biomechanics and Motor Control of Human Movement*.
@@ -29,11 +37,13 @@ const RIGID: [&str; 6] = ["shoulder", "elbow", "wrist", "hip", "knee", "ankle"];
 #[derive(Debug, Clone)]
 pub(super) struct Proportions {
     bones: Vec<([usize; 2], f64)>,
+    /// σ_b
+    spread: f64,
 }
 
 impl Proportions {
     /// Of the skeleton's reference lengths; no bones where it has no long one.
-    pub(super) fn of(skeleton: &Skeleton) -> Self {
+    pub(super) fn of(skeleton: &Skeleton, detail: Detail) -> Self {
         let is = |joint: usize, name: &str| is_named(skeleton, joint, &[name]);
         let joins = |[a, b]: [usize; 2], [from, to]: [&str; 2]| is(a, from) && is(b, to) || is(b, from) && is(a, to);
         let all = || skeleton.bones.iter().copied().zip(skeleton.bone_lengths_m.iter().copied());
@@ -42,11 +52,11 @@ impl Proportions {
             .fold((0.0, 0.0), |(found, expected), (length_m, heights)| (found + length_m, expected + heights));
         let size_m = SIZES * found / expected;
         if !size_m.is_finite() || size_m <= 0.0 {
-            return Self { bones: Vec::new() };
+            return Self { bones: Vec::new(), spread: spread(detail) };
         }
         let rigid = |joint: usize| RIGID.iter().any(|name| is(joint, name));
         let bones = all().filter(|&([a, b], length_m)| rigid(a) && rigid(b) && length_m > 0.0);
-        Self { bones: bones.map(|(bone, length_m)| (bone, length_m / size_m)).collect() }
+        Self { bones: bones.map(|(bone, length_m)| (bone, length_m / size_m)).collect(), spread: spread(detail) }
     }
 
     /// How far the bones of `pose` (m) are from those of a body with these coordinates, mean square in standard deviations; adds
@@ -59,7 +69,7 @@ impl Proportions {
         (pose_bar, bars): (&mut [Vec3], &mut [f64]),
     ) -> f64 {
         let size_m = coordinates[LN_SIZE].exp();
-        let share = 1.0 / (self.bones.len().max(1) as f64 * SPREAD * SPREAD);
+        let share = 1.0 / (self.bones.len().max(1) as f64 * self.spread * self.spread);
         let mut sum = 0.0;
         for &([a, b], sizes) in &self.bones {
             let along = sub(pose[a], pose[b]);
@@ -84,7 +94,7 @@ mod tests {
     fn every_named_skeleton_has_limbs_of_its_size() {
         for name in ["coco17", "h36m17", "hupr14"] {
             let skeleton = Skeleton::preset(name).unwrap();
-            let proportions = Proportions::of(&skeleton);
+            let proportions = Proportions::of(&skeleton, Detail::Search);
             assert!(proportions.bones.len() >= 8, "{name}: {}", proportions.bones.len());
             let thigh = proportions.bones.iter().find(|(bone, _)| {
                 bone.iter().any(|&j| is_named(&skeleton, j, &["hip"]))
@@ -98,11 +108,11 @@ mod tests {
     #[test]
     fn a_body_of_any_size_with_its_bones_fits_and_one_with_short_limbs_does_not() {
         let skeleton = Skeleton::preset("coco17").unwrap();
-        let proportions = Proportions::of(&skeleton);
+        let proportions = Proportions::of(&skeleton, Detail::Search);
         // A star in which every bone stands alone has any length that is wanted.
         let misfit = |scale: f64, ln_size: f64| {
             let (bone, sizes) = proportions.bones[0];
-            let one = Proportions { bones: vec![(bone, sizes)] };
+            let one = Proportions { bones: vec![(bone, sizes)], spread: proportions.spread };
             let mut pose = vec![[0.0; 3]; skeleton.joints.len()];
             pose[bone[0]] = [0.0, scale * sizes, 0.0];
             one.misfit(&[0.0, 0.0, 0.0, 0.0, ln_size], &pose, 0.0, (&mut pose.clone(), &mut [0.0; 5]))

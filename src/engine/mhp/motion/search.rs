@@ -4,7 +4,9 @@
 //! loss ([`lbfgs`]). What wins is the start; the runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
 
 use super::decode::lowest;
-use super::{BODY, HEIGHT, Held, LN_SIZE, MotionState, STILL, WALKING_MPS, Window, WindowLoss, YAW, lbfgs, ways};
+use super::{
+    BODY, Detail, HEIGHT, Held, LN_SIZE, MotionState, STILL, WALKING_MPS, Window, WindowLoss, YAW, lbfgs, ways,
+};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::geometry::{Vec3, mean, norm, sub};
@@ -179,7 +181,8 @@ impl Search<'_> {
         let to_radar = sub(radar_place(&self.problem.views), middle);
         Hypothesis {
             loss: tried.loss,
-            unlikeness: super::unlikeness(self.config, tried.em, tried.prior) + OF_WAY * norm(way),
+            unlikeness: super::unlikeness(self.config, tried.em, tried.prior / self.window.scarcity)
+                + OF_WAY * norm(way),
             yaw,
             away: away(yaw, (&placed.positions()[own.clone()], &velocities), to_radar),
             joints: placed.positions()[own.clone()].to_vec(),
@@ -237,7 +240,7 @@ pub(in crate::mhp) fn search(
 ) -> Result<Result<Searched, Held>, FitError> {
     let [w_em, w_prior] = WEIGHTS;
     let config = &FitConfig { w_em, w_prior, ..*config };
-    let mut window = match Window::new(problem, config, Precision::F32, params)? {
+    let mut window = match Window::new(problem, config, (Precision::F32, Detail::Search), params)? {
         Ok(window) => window,
         Err(held) => return Ok(Err(held)),
     };

@@ -14,8 +14,27 @@ use super::static_echo;
 use crate::body::{MotionPrior, Skeleton};
 use crate::geometry::Vec3;
 
-/// Components of the prior that are used: with more a search ends in other poses more often, with fewer poses are no people's.
-const MOST_COMPONENTS: usize = 28;
+/// How finely poses are told apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Detail {
+    /// In a search: with more components it ends in other poses more often, with fewer poses are no people's.
+    Search,
+    /// In the fit of what a search found.
+    Fit,
+}
+
+impl Detail {
+    /// Components of the prior that are used, at most.
+    fn components(self) -> usize {
+        match self {
+            Self::Search => 28,
+            Self::Fit => 64,
+        }
+    }
+}
+
+/// What a coordinate's square counts in L_prior, however many there are.
+const SHARE: f64 = 1.0 / 30.0;
 /// Half the time over which a velocity is taken, s.
 const HALF_STEP_S: f64 = 0.05;
 /// t, y, s and q: what a person has beside c.
@@ -86,6 +105,7 @@ impl PoseSpace {
         skeleton: &Skeleton,
         times_s: &[f64],
         floor_z_m: Option<f64>,
+        detail: Detail,
     ) -> Option<Self> {
         let shares: Option<Vec<Vec<(usize, f64)>>> = skeleton
             .joints
@@ -98,7 +118,7 @@ impl PoseSpace {
             })
             .collect();
         let shares = shares?;
-        let components = prior.components().len().min(MOST_COMPONENTS);
+        let components = prior.components().len().min(detail.components());
         let rows = || std::iter::once(prior.mean()).chain(prior.components()[..components].iter().map(Vec::as_slice));
         let at = |t_s: f64| -> Vec<Vec3> {
             let (lower, share) = between(prior.times_s(), t_s);
@@ -126,7 +146,7 @@ impl PoseSpace {
             changes: times_s.iter().map(change).collect(),
             ln_size: prior.ln_size(),
             signs: prior.mirror_signs()[..components].to_vec(),
-            proportions: Proportions::of(skeleton),
+            proportions: Proportions::of(skeleton, detail),
             ground: floor_z_m.and_then(|floor_z_m| Ground::new(skeleton, floor_z_m)),
             starts: starts.collect(),
         })
@@ -245,23 +265,22 @@ impl PoseSpace {
         }
     }
 
-    /// How unlikely the coordinates are: the mean square of c, s and q, in standard deviations, and how far from the floor they
+    /// How unlikely the coordinates are: [`SHARE`] of the squares of c, s and q, in standard deviations, and how far from the floor they
     /// are; adds `gain` times its gradient.
     pub(super) fn unlikeliness(&self, coordinates: &[f64], gain: f64, bars: &mut [f64]) -> f64 {
-        let share = 1.0 / (self.components + 2) as f64;
         let [mean, deviation] = self.ln_size;
         let size = (coordinates[LN_SIZE] - mean) / deviation;
-        bars[LN_SIZE] += 2.0 * gain * share * size / deviation;
+        bars[LN_SIZE] += 2.0 * gain * SHARE * size / deviation;
         let (still, by_still) = static_echo::unlikeliness(coordinates[STILL]);
-        bars[STILL] += gain * share * by_still;
+        bars[STILL] += gain * SHARE * by_still;
         let mut sum = size * size + still;
         for (c, bar) in coordinates[BODY..].iter().zip(&mut bars[BODY..]) {
             sum += c * c;
-            *bar += 2.0 * gain * share * c;
+            *bar += 2.0 * gain * SHARE * c;
         }
         let (off, by_height) = self.ground.as_ref().map_or((0.0, 0.0), |_| ground::unlikeliness(coordinates[HEIGHT]));
         bars[HEIGHT] += gain * by_height;
-        sum * share + off
+        SHARE * sum + off
     }
 
     /// The coordinates whose joints and velocities at time `frame` are nearest to these, in a space that has its mean at 0.

@@ -15,6 +15,7 @@ fn config() -> FitConfig {
         summation: Summation::Incoherent,
         clutter: Clutter::Modelled,
         static_echo: StaticEcho::Fitted,
+        dynamic_range_db: 25.0,
         w_em: 0.7,
         w_prior: 0.03,
         ..FitConfig::default()
@@ -88,7 +89,7 @@ fn agrees(config: &FitConfig, height_m: Option<f64>) {
     let mut problem = problem(rng);
     problem.radar.height_m = height_m;
     let (_, initial) = person(rng, None);
-    let mut window = Window::new(&problem, config, Precision::F64, &initial).unwrap().unwrap();
+    let mut window = Window::fitted(&problem, config, Precision::F64, &initial).unwrap().unwrap();
     assert_eq!((window.frames.len(), window.own), (4, 1), "the frames are those within reach");
     assert_eq!(window.space.ground.is_some(), height_m.is_some());
     let (coordinates, params) = person(rng, Some(&window));
@@ -118,7 +119,7 @@ fn coordinates_come_back_from_joints_and_velocities() {
         let (mut problem, config) = (problem(rng), FitConfig { height: Height::Floor, ..config() });
         problem.radar.height_m = height_m;
         let (_, initial) = person(rng, None);
-        let window = Window::new(&problem, &config, Precision::F64, &initial).unwrap().unwrap();
+        let window = Window::fitted(&problem, &config, Precision::F64, &initial).unwrap().unwrap();
         let (_, params) = person(rng, Some(&window));
         let mut again = params.clone();
         window.place(&window.coordinates_of(&params), &mut again);
@@ -132,7 +133,7 @@ fn coordinates_come_back_from_joints_and_velocities() {
 fn a_body_stands_on_the_floor_in_any_pose() {
     let prior = MotionPrior::committed().unwrap();
     let skeleton = Skeleton::preset("coco17").unwrap();
-    let space = PoseSpace::new(prior, &skeleton, &[-0.1, 0.0, 0.1], Some(-1.0)).unwrap();
+    let space = PoseSpace::new(prior, &skeleton, &[-0.1, 0.0, 0.1], Some(-1.0), Detail::Fit).unwrap();
     let rng = &mut StdRng::seed_from_u64(7);
     for _ in 0..20 {
         let mut coordinates: Vec<f64> = (0..space.coordinates()).map(|_| rng.random_range(-0.7..0.7)).collect();
@@ -167,11 +168,11 @@ fn a_window_holds_its_frame_as_near_its_middle_as_it_can() {
 fn every_skeleton_with_known_names_is_moved() {
     let prior = MotionPrior::committed().unwrap();
     for name in ["coco17", "h36m17", "hupr14"] {
-        assert!(PoseSpace::new(prior, &Skeleton::preset(name).unwrap(), &[0.0], None).is_some(), "{name}");
+        assert!(PoseSpace::new(prior, &Skeleton::preset(name).unwrap(), &[0.0], None, Detail::Fit).is_some(), "{name}");
     }
     let mut other = Skeleton::preset("coco17").unwrap();
     other.joints[3] = "tail".into();
-    assert!(PoseSpace::new(prior, &other, &[0.0], None).is_none());
+    assert!(PoseSpace::new(prior, &other, &[0.0], None, Detail::Fit).is_none());
 }
 
 /// Left for right, and y for −y in the body's own frame.
@@ -179,7 +180,7 @@ fn every_skeleton_with_known_names_is_moved() {
 fn a_mirrored_body_has_left_and_right_exchanged() {
     let skeleton = Skeleton::preset("coco17").unwrap();
     let prior = MotionPrior::committed().unwrap();
-    let space = PoseSpace::new(prior, &skeleton, &[-0.1, 0.0, 0.1], None).unwrap();
+    let space = PoseSpace::new(prior, &skeleton, &[-0.1, 0.0, 0.1], None, Detail::Fit).unwrap();
     let rng = &mut StdRng::seed_from_u64(9);
     let mut coordinates: Vec<f64> = (0..space.coordinates()).map(|_| rng.random_range(-1.0..1.0)).collect();
     coordinates[..BODY].fill(0.0);
@@ -273,7 +274,7 @@ fn a_background_that_explains_the_maps_alone_is_not_used_for_who_stands() {
     let loss = |problem: &Problem, speed: f64| {
         let (_, mut params) = person(&mut StdRng::seed_from_u64(1), None);
         params.motion_mut()[1].fill([speed, 0.0, 0.0]);
-        let mut window = Window::new(problem, &config, Precision::F64, &params).unwrap().unwrap();
+        let mut window = Window::fitted(problem, &config, Precision::F64, &params).unwrap().unwrap();
         let coordinates = window.coordinates_of(&params);
         let mut loss = WindowLoss::default();
         window.evaluate((problem, &config), Precision::F64, (&coordinates, &params), None, &mut loss);
