@@ -190,10 +190,11 @@ pub(crate) fn section(bed: &Bed) -> String {
         },
     );
     let moved = moved(bed, &stated);
+    let truth = super::truth::section(bed, &data);
     format!(
         "`study complexity DATA --preset PRESET`, single precision, the preset's iterations. Mean over sequences ± half of its 95 % interval; \
          frames with another number of people than annotated are left out. Settings were tuned on other seeds; of the second simulator \
-         `walk0`, `walk2`, `away0`, `clutter0` and `still0` were looked at when choosing.\n\n{}\n{frame}\n{moved}\n",
+         `walk0`, `walk2`, `away0`, `clutter0` and `still0` were looked at when choosing.\n\n{}\n{frame}\n{moved}\n\n{truth}",
         table(&rows)
     )
 }

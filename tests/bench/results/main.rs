@@ -14,6 +14,7 @@ mod reference;
 mod rooms;
 mod speed;
 mod studies;
+mod truth;
 
 use bed::Bed;
 use std::fmt::Write as _;
