@@ -208,7 +208,7 @@ pub struct FitConfig {
     pub clutter: Clutter,
     /// How bright a joint is that stands still.
     pub static_echo: StaticEcho,
-    /// How far below the brightest cell of a region levels are compared, dB.
+    /// How far below the brightest cell of a region `ncc_db` compares levels, dB (`mhp/levels.rs`).
     pub dynamic_range_db: f64,
     /// Share of cells in a mask, percent.
     pub tau_pct: f64,

@@ -1,10 +1,10 @@
 //! L_EM that compares levels instead of one mask; SPEC section 8.
 //!
 //! With I the measured power of a cell, n its noise and S the simulated power, M = g S + n, g so that both have the same power
-//! above the noise. `ncc_db` is one minus the correlation of ln(I + n) with ln(M + n), `gamma` the mean of the Itakura–Saito
-//! divergence of I from M. Under a body's main lobe there are its sidelobes, which no model of a person has; beyond the dynamic range D
-//! that is compared (`dynamic_range_db`), `ncc_db` therefore tells nothing apart: it is one minus the correlation of ln(I + n̂) with
-//! ln(M + n̂), n̂ = max(n, 10^(−D/10)), both relative to the brightest cell of the region. What a cell without an echo says is the same in every evaluation and is summed once: an evaluation
+//! above the noise. `ncc_db` is one minus the correlation of ln(I + n̂) with ln(M + n̂), `gamma` the mean of the Itakura–Saito
+//! divergence of I from M. Under a body's main lobe are its sidelobes, which no model of a person has: n̂ = max(n, 10^(−D/10)) of the
+//! brightest cell's power, so that beyond the dynamic range D (`dynamic_range_db`) levels are not told apart; SPEC's formula has n̂ = n.
+//! What a cell without an echo says is the same in every evaluation and is summed once: an evaluation
 //! adds what the simulated power changes of it, d = ln(1 + g S / (n + n̂)) or y = g S / n.
 
 use super::cell_box::CellBox;

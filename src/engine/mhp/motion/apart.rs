@@ -1,16 +1,18 @@
 //! Bodies are not in one another.
 //!
 //! Of two people who stand close a radar often shows one echo, and both bodies are drawn to it. L_prior therefore has, for every
-//! pair of persons whose places in the middle of the window are nearer than two pairs of shoulders let them be,
+//! pair of persons whose hips are nearer than shoulders let them stand side by side,
 //!
 //! ```text
-//! ((D − d)/σ_d)²,  d = |t_a − t_b| on the floor plan,  D = 0.4 m, σ_d = 0.1 m
+//! ((D − d)/σ_d)² where d < D,  d = |t_a − t_b| on the floor plan,  D = 0.4 m, σ_d = 0.1 m
 //! ```
+//!
+//! with t where the hips are in the middle of the window.
 
 /// D and σ_d, m.
 const NEAREST_M: f64 = 0.4;
 const SPREAD_M: f64 = 0.1;
-/// Below a distance, m: two at one point have a slope of nothing, not none.
+/// The least d, m: two at one point have a slope of zero instead of none.
 const LEAST_M: f64 = 1e-6;
 
 /// The sum over the pairs of persons of `stride` coordinates each; adds `gain` times its gradient to `bars`.

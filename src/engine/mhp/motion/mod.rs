@@ -381,7 +381,7 @@ impl Window {
         for (own, bars) in coordinates.chunks_exact(*stride).zip(loss.gradient.chunks_exact_mut(*stride)) {
             loss.prior += prior_share * space.unlikeliness(own, prior_gain, bars);
         }
-        // Of each person its own share, of whom stand in one another all.
+        // The other parts are means over persons and grow as frames get fewer; nobody stands in another, however many look.
         loss.prior += apart::overlap(coordinates, *stride, config.w_prior, &mut loss.gradient);
     }
 
