@@ -3,6 +3,7 @@
 
 mod people;
 mod problem;
+mod recent;
 mod scans;
 mod sequence;
 

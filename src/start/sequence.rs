@@ -6,12 +6,12 @@
 
 use super::people::{FoundStart, Sought, find_start_in, seek_in};
 use super::problem::{problem_of, rate_hz};
+use super::recent::Recent;
 use crate::config::{EmLoss, FIELDS, FitConfig, FramesAround, Parameterization};
 use crate::dataset::Dataset;
 use crate::mhp::{FitError, Problem};
-use std::collections::VecDeque;
 use std::ops::Range;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 /// Frames whose hypotheses are kept: those around one, under all variants of the largest study.
 const KEPT: usize = 1024;
@@ -24,24 +24,8 @@ struct Key {
     config: FitConfig,
 }
 
-/// What was found, or why nothing; `None` before anybody looked, and who looks holds the lock.
-struct Slot {
-    key: Key,
-    found: Mutex<Option<Result<Arc<Sought>, FitError>>>,
-}
-
-impl Slot {
-    /// Looks where nobody did.
-    fn filled(
-        found: &mut Option<Result<Arc<Sought>, FitError>>,
-        look: impl FnOnce() -> Result<Sought, FitError>,
-    ) -> &Result<Arc<Sought>, FitError> {
-        found.get_or_insert_with(|| look().map(Arc::new))
-    }
-}
-
-/// The slots that were asked for last, the latest first.
-static SLOTS: Mutex<VecDeque<Arc<Slot>>> = Mutex::new(VecDeque::new());
+/// What was found, or why nothing.
+static SOUGHT: Recent<Key, Result<Arc<Sought>, FitError>> = Recent::new(KEPT);
 
 /// A configuration with everything at its default that a start does not depend on: two with the same key start from the same
 /// pose. Where postures are tried, the unweighted L_EM alone decides between them, and a search in a space of motion has weights of
@@ -71,41 +55,34 @@ pub fn find_start_along(
     problem: &Arc<Problem>,
     config: &FitConfig,
 ) -> Result<FoundStart, FitError> {
-    let reach = around(dataset, frame, config);
+    let reach = around(dataset, frame, config, config.decode_frames);
     if reach.len() < 2 || config.parameterization != Parameterization::Motion {
         return find_start_in(dataset, frame, problem, config);
     }
     let searched = search_key(config);
-    let key = |frame: usize| Key { dataset: dataset.id(), frame, config: searched };
-    let slots: Vec<Arc<Slot>> = reach.clone().map(|other| slot(&key(other))).collect();
-    let look = |slot: &Slot| match slot.key.frame {
-        own if own == frame => seek_in(dataset, frame, problem, config),
-        other => seek(dataset, other, config),
-    };
-    // First what nobody looks at, then what others looked at meanwhile.
-    for slot in &slots {
-        if let Ok(mut found) = slot.found.try_lock() {
-            Slot::filled(&mut found, || look(slot));
+    let keys = reach.clone().map(|frame| Key { dataset: dataset.id(), frame, config: searched });
+    let found = SOUGHT.all(keys, |key| {
+        let own = key.frame == frame;
+        let sought = if own { seek_in(dataset, frame, problem, config) } else { seek(dataset, key.frame, config) };
+        sought.map(Arc::new)
+    });
+    let t_s = |other: usize| (other as f64 - frame as f64) / rate_hz(dataset);
+    let (mut own, mut others) = (None, Vec::new());
+    for (other, sought) in reach.zip(found) {
+        match sought {
+            sought if other == frame => own = Some(sought?),
+            Ok(sought) => others.push((t_s(other), sought)),
+            Err(_) => {}
         }
     }
-    let looked = |slot: &Arc<Slot>| {
-        let mut found = slot.found.lock().unwrap_or_else(PoisonError::into_inner);
-        Slot::filled(&mut found, || look(slot)).clone()
-    };
-    let own = looked(&slots[frame - reach.start])?;
-    let t_s = |other: usize| (other as f64 - frame as f64) / rate_hz(dataset);
-    let others: Vec<(f64, Arc<Sought>)> = slots
-        .iter()
-        .filter(|slot| slot.key.frame != frame)
-        .filter_map(|slot| Some((t_s(slot.key.frame), looked(slot).ok()?)))
-        .collect();
+    let Some(own) = own else { return find_start_in(dataset, frame, problem, config) };
     let around: Vec<(f64, &Sought)> = others.iter().map(|(t_s, found)| (*t_s, found.as_ref())).collect();
     own.start(problem, config, &around)
 }
 
-/// The frames of the sequence of `frame` that decide with it.
-fn around(dataset: &Dataset, frame: usize, config: &FitConfig) -> Range<usize> {
-    let most = config.decode_frames;
+/// The frames of the sequence of `frame` that may decide with it, itself among them: at most so many on each side that the settings look
+/// at.
+pub(super) fn around(dataset: &Dataset, frame: usize, config: &FitConfig, most: usize) -> Range<usize> {
     let [before, after] = match config.frames_around {
         FramesAround::Both => [most, most],
         FramesAround::Past => [most, 0],
@@ -116,15 +93,6 @@ fn around(dataset: &Dataset, frame: usize, config: &FitConfig) -> Range<usize> {
     let first = (frame.saturating_sub(before)..frame).rev().take_while(own).last().unwrap_or(frame);
     let last = (frame + 1..(frame + 1 + after).min(dataset.len())).take_while(own).last().unwrap_or(frame);
     first..last + 1
-}
-
-fn slot(key: &Key) -> Arc<Slot> {
-    let mut slots = SLOTS.lock().unwrap_or_else(PoisonError::into_inner);
-    let known = slots.iter().position(|slot| slot.key == *key).and_then(|k| slots.remove(k));
-    let slot = known.unwrap_or_else(|| Arc::new(Slot { key: *key, found: Mutex::default() }));
-    slots.push_front(Arc::clone(&slot));
-    slots.truncate(KEPT);
-    slot
 }
 
 fn seek(dataset: &Dataset, frame: usize, config: &FitConfig) -> Result<Sought, FitError> {
