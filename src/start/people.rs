@@ -1,11 +1,13 @@
 //! How many persons a fit has: as many as the settings say, or as many as are counted (paper section 4.4).
 
-use super::scans::count_people;
+use super::problem::rate_hz;
+use super::scans::{count_each, count_people};
+use super::sequence::around;
 use crate::config::{FitConfig, FramesAround, StartPlace};
 use crate::dataset::Dataset;
 use crate::geometry::Vec3;
 use crate::mhp::{FitError, Hypotheses, Initialisation, Neighbour, Problem};
-use crate::people::{Count, Counter, Scan};
+use crate::people::{Count, Counter, Scan, seeds_along};
 use std::sync::Arc;
 
 /// A start, and the count that it rests on where people were counted.
@@ -50,7 +52,7 @@ const SURE: f64 = 0.9;
 /// # Errors
 /// [`FitError::NoStart`] where nothing stands above the background, or surely nobody is there.
 pub fn find_start(problem: &Arc<Problem>, config: &FitConfig) -> Result<FoundStart, FitError> {
-    seek(problem, config, || count(problem, config))?.start(problem, config, &[])
+    seek(problem, config, || count(problem, config), Count::seeds)?.start(problem, config, &[])
 }
 
 /// As [`find_start`] for frame `frame` of a data set; people are counted with up to two seconds of frames before it
@@ -74,16 +76,38 @@ pub(super) fn seek_in(
     problem: &Arc<Problem>,
     config: &FitConfig,
 ) -> Result<Sought, FitError> {
-    seek(problem, config, || match config.frames_around {
+    let count = || match config.frames_around {
         FramesAround::None => count(problem, config),
         _ => count_people(dataset, frame).map_err(|reason| FitError::NoStart { reason }),
+    };
+    seek(problem, config, count, |count, people| match config.frames_around {
+        FramesAround::None => count.seeds(people),
+        _ => along(dataset, frame, config, people).unwrap_or_else(|| count.seeds(people)),
     })
+}
+
+/// Frames on each side that decide with a frame where its people are: longer than a mirror or a passing makes two of them one.
+const DECIDE: usize = 12;
+
+/// Places of `people` on paths through the frames around.
+fn along(dataset: &Dataset, frame: usize, config: &FitConfig, people: usize) -> Option<Vec<Vec3>> {
+    let frames = around(dataset, frame, config, DECIDE);
+    let t_s = |other: usize| other as f64 / rate_hz(dataset);
+    let counted: Vec<(usize, Arc<Count>)> = frames
+        .clone()
+        .zip(count_each(dataset, frames))
+        .filter_map(|(other, count)| Some((other, count.ok()?)))
+        .collect();
+    let now = counted.iter().position(|(other, _)| *other == frame)?;
+    let counts: Vec<(f64, &Count)> = counted.iter().map(|(other, count)| (t_s(*other), count.as_ref())).collect();
+    Some(seeds_along(&counts, now, people))
 }
 
 fn seek(
     problem: &Arc<Problem>,
     config: &FitConfig,
     count: impl FnOnce() -> Result<Count, FitError>,
+    places: impl FnOnce(&Count, usize) -> Vec<Vec3>,
 ) -> Result<Sought, FitError> {
     if config.people == 1 {
         // The paper looks for one person without a count, and so it goes where nothing can be counted, or nobody is.
@@ -109,7 +133,7 @@ fn seek(
     let found = if people == 1 && config.place == StartPlace::Counted {
         one(problem, config, Some(&count))?
     } else {
-        sought(problem, config, &count.seeds(people))?
+        sought(problem, config, &places(&count, people))?
     };
     let counted = count.people();
     let note = format!("{counted} counted (p = {:.2}), {people} fitted", count.probability(counted));

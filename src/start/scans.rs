@@ -1,22 +1,29 @@
 //! Counting people with the frames before: twenty of them agree on a number that the few around a frame do not know.
 
+use super::recent::Recent;
 use crate::dataset::{Dataset, Heatmap, map_cells};
 use crate::mhp::fill_missing;
 use crate::people::{COMPARED, Count, Counter, HISTORY, Scan};
 use std::cell::RefCell;
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Frames read before the first one asked for: those that are looked at, those whose detections are looked at with these,
 /// and those that these are compared with.
 pub const LEAD_IN: usize = HISTORY + 2 * COMPARED;
 
+/// Counts that are kept: those around the frames that are fitted at a time.
+const KEPT: usize = 256;
+
+/// The counts of frames that were asked for last, by data set and frame.
+static COUNTS: Recent<(u64, usize), Result<Arc<Count>, String>> = Recent::new(KEPT);
+
 /// What a thread counted last: the next frame of the sequence takes one scan, not all of them.
 struct Latest {
     dataset: u64,
     frame: usize,
     window: ScanWindow,
-    count: Result<Count, String>,
 }
 
 thread_local! {
@@ -29,10 +36,17 @@ thread_local! {
 /// # Errors
 /// Where people cannot be counted in these views, or the frame cannot be read, in words.
 pub fn count_people(dataset: &Dataset, frame: usize) -> Result<Count, String> {
+    let counted = count_each(dataset, frame..frame + 1).pop();
+    counted.unwrap_or_else(|| Err("no frame".to_owned())).map(Arc::unwrap_or_clone)
+}
+
+/// As [`count_people`] for each of consecutive frames.
+pub(super) fn count_each(dataset: &Dataset, frames: Range<usize>) -> Vec<Result<Arc<Count>, String>> {
+    COUNTS.all(frames.map(|frame| (dataset.id(), frame)), |&(_, frame)| counted(dataset, frame).map(Arc::new))
+}
+
+fn counted(dataset: &Dataset, frame: usize) -> Result<Count, String> {
     LATEST.with_borrow_mut(|latest| {
-        if let Some(known) = latest.as_ref().filter(|known| (known.dataset, known.frame) == (dataset.id(), frame)) {
-            return known.count.clone();
-        }
         let follows = |known: &Latest| {
             let next = (known.dataset, known.frame + 1) == (dataset.id(), frame);
             next && dataset.sequence(known.frame) == dataset.sequence(frame)
@@ -42,7 +56,7 @@ pub fn count_people(dataset: &Dataset, frame: usize) -> Result<Count, String> {
             None => before(dataset, frame)?,
         };
         let count = step(dataset, frame, &mut window);
-        *latest = Some(Latest { dataset: dataset.id(), frame, window, count: count.clone() });
+        *latest = Some(Latest { dataset: dataset.id(), frame, window });
         count
     })
 }

@@ -9,6 +9,7 @@
 //!      ─ network.rs  31 → 64 → 32 → 5: how many people a cluster is
 //!      ─ counter.rs  the distribution of their sum, over twenty frames → Count: number, probabilities
 //!      ─ seeds.rs ── places for that number, or another         → starts of a fit
+//!      ─ paths.rs ── the same along a sequence
 //!      ─ identity.rs assignment to the frame before             → Tracker, match_people
 //! ```
 //!
@@ -36,6 +37,7 @@ mod identity;
 mod map_network;
 mod map_statistics;
 mod network;
+mod paths;
 mod scan;
 mod seeds;
 mod sight;
@@ -53,4 +55,5 @@ pub use identity::{Track, Tracker, TrackerOptions, match_people};
 pub use map_network::{CHANNELS, FilterLayer, IMAGE, MapNetwork, map_image};
 pub use map_statistics::{STATISTICS, map_statistics};
 pub use network::{CLASSES, LAYERS, Layer, Network};
+pub use paths::seeds_along;
 pub use scan::{COMPARED, HISTORY, Point, Scan};

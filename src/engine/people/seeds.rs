@@ -3,7 +3,7 @@
 //! Which cluster stands for how many people is the most probable way to share the number among them; a cluster of several
 //! is cut by hierarchical clustering (Ward). Where there are not enough clusters, detections that belong to none fill up.
 
-use super::cluster::{ClusterOptions, split};
+use super::cluster::split;
 use super::counter::{Count, Counted};
 use super::network::CLASSES;
 use super::scan::Point;
@@ -26,13 +26,19 @@ impl Count {
     /// `people` places, world frame, m: about the middles of the bodies, those of the largest clusters first. The number
     /// may be the predicted one or set by hand; there are always as many places as asked for.
     pub fn seeds(&self, people: usize) -> Vec<Vec3> {
-        let mut places: Vec<Vec3> = self
-            .shares(people)
-            .into_iter()
+        self.places(&self.shares(people), &[], people)
+    }
+
+    /// Places of `people` of whom the clusters stand for so many each, and of whom some are `unseen`; what is missing are detections that
+    /// belong to no cluster.
+    pub(super) fn places(&self, shares: &[usize], unseen: &[Vec3], people: usize) -> Vec<Vec3> {
+        let mut places: Vec<Vec3> = shares
+            .iter()
             .zip(&self.clusters)
-            .filter(|(share, _)| *share > 0)
-            .flat_map(|(share, counted)| split(&counted.cluster.points, share))
+            .filter(|(share, _)| **share > 0)
+            .flat_map(|(share, counted)| split(&counted.cluster.points, *share))
             .map(|group| middle(&group))
+            .chain(unseen.iter().copied())
             .collect();
         places.truncate(people);
         let mut loose: Vec<&Point> = self.loose.iter().collect();
@@ -58,7 +64,7 @@ impl Count {
         for counted in &self.clusters {
             let mut next: Vec<Option<(f64, Vec<usize>)>> = vec![None; people + 1];
             for (n, (score, shares)) in best.iter().enumerate().filter_map(|(n, way)| Some((n, way.as_ref()?))) {
-                for share in 0..=most(counted).min(people - n) {
+                for share in 0..=room(counted).min(people - n) {
                     let score = score + counted.probabilities[share.min(CLASSES - 1)].max(LEAST).ln();
                     if next[n + share].as_ref().is_none_or(|(other, _)| score > *other) {
                         next[n + share] = Some((score, shares.iter().copied().chain([share]).collect()));
@@ -74,20 +80,19 @@ impl Count {
 /// Moves places that are nearer to each other than two bodies can stand apart about their middle, along the line between them:
 /// the halves of a cluster that is cut in two may be a hand's breadth apart.
 fn stand_apart(places: &mut [Vec3]) {
-    let least = ClusterOptions::default().one_body_m;
     for _ in 0..PASSES {
         let mut moved = false;
         for a in 0..places.len() {
             for b in 0..a {
                 let (one, other) = (places[a], places[b]);
                 let apart = flat_distance(one, other);
-                if apart >= least * (1.0 - 1e-9) {
+                if apart >= APART_M * (1.0 - 1e-9) {
                     continue;
                 }
                 // Across, where nothing says which way.
                 let way =
                     if apart > 1e-6 { [(one[0] - other[0]) / apart, (one[1] - other[1]) / apart] } else { [0.0, 1.0] };
-                let step = 0.5 * (least - apart);
+                let step = 0.5 * (APART_M - apart);
                 (0..2).for_each(|k| {
                     places[a][k] += step * way[k];
                     places[b][k] -= step * way[k];
@@ -102,13 +107,13 @@ fn stand_apart(places: &mut [Vec3]) {
 }
 
 /// People that a cluster may stand for: no more than its points.
-fn most(counted: &Counted) -> usize {
+pub(super) fn room(counted: &Counted) -> usize {
     counted.cluster.points.len().min(CLASSES - 1)
 }
 
 /// The middle of a body of these echoes: their mean weighted by contrast, of the present frame where it has any, and
 /// moved from the skin to the middle.
-fn middle(points: &[Point]) -> Vec3 {
+pub(super) fn middle(points: &[Point]) -> Vec3 {
     let present = points.iter().any(|p| p.age == 0);
     let (mut sum, mut weights) = ([0.0; 3], 0.0);
     for p in points.iter().filter(|p| p.age == 0 || !present) {
@@ -173,7 +178,7 @@ mod tests {
             alone: false,
         };
         let places = count.seeds(2);
-        assert!(flat_distance(places[0], places[1]) > 0.2999, "{places:?}");
+        assert!(flat_distance(places[0], places[1]) > 0.999 * APART_M, "{places:?}");
         let mean = 0.5 * (places[0][1] + places[1][1]);
         assert!((mean - 0.125).abs() < 0.03, "about where the cluster is: {places:?}");
         for (k, a) in count.seeds(4).iter().enumerate() {
