@@ -11,7 +11,8 @@
 //!
 //! with F the frames there are and W those that are asked for (`window`), for fewer frames are less evidence against a prior that
 //! stays. The parts behind it are those of the body's proportions (`proportions.rs`) and of the floor (`ground.rs`); for several
-//! persons there is one for bodies that stand in one another (`apart.rs`). The kinematic terms are those of the frame that is fitted.
+//! persons there is one for bodies that stand in one another or go far from where they were counted (`apart.rs`). The kinematic terms are
+//! those of the frame that is fitted.
 //! q says how bright what stands still is (`static_echo.rs`). PPPR stays the state that is shown, kept and exported: positions and
 //! velocities follow the coordinates, and opacities do where the settings ask for it; scales and the rest move by themselves and
 //! are the same in all frames of the window. The frame stands as near the window's middle as its
@@ -126,6 +127,8 @@ pub(super) struct Window {
     clear: bool,
     /// W/F.
     scarcity: f64,
+    /// Where several persons began, floor plan, m; of one alone empty.
+    places: Vec<[f64; 2]>,
 }
 
 struct WindowFrame {
@@ -240,7 +243,12 @@ impl Window {
         let stride = space.coordinates();
         let echo = StaticEchoModel::new(problem, config);
         let scarcity = config.window.max(1) as f64 / chosen.len() as f64;
-        Ok(Ok(Self { space, echo, own, frames, stride, clear: walks || problem.static_removed, scarcity }))
+        let clear = walks || problem.static_removed;
+        let mut window = Self { space, echo, own, frames, stride, clear, scarcity, places: Vec::new() };
+        if initial.shape().persons > 1 {
+            window.places = window.coordinates_of(initial).chunks_exact(stride).map(|of| [of[0], of[1]]).collect();
+        }
+        Ok(Ok(window))
     }
 
     /// Gives all persons of `coordinates` the q at which the loss is lowest, where it is fitted.
@@ -320,7 +328,7 @@ impl Window {
         looks: Option<&mut Pppr>,
         loss: &mut WindowLoss,
     ) {
-        let Self { space, echo, frames, stride, scarcity, .. } = self;
+        let Self { space, echo, frames, stride, scarcity, places, .. } = self;
         let joints = params.shape().joints;
         loss.gradient.clear();
         loss.gradient.resize(coordinates.len(), 0.0);
@@ -383,6 +391,7 @@ impl Window {
         }
         // The other parts are means over persons and grow as frames get fewer; nobody stands in another, however many look.
         loss.prior += apart::overlap(coordinates, *stride, config.w_prior, &mut loss.gradient);
+        loss.prior += apart::astray(coordinates, *stride, places, config.w_prior, &mut loss.gradient);
     }
 
     /// Adds what a gradient by the joints of the frame that is fitted says of the coordinates.
