@@ -63,7 +63,9 @@ pub fn seeds_along(counts: &[(f64, &Count)], now: usize, people: usize) -> Vec<V
     let (mut shares, mut unseen) = (vec![0; own.clusters.len()], Vec::new());
     for _ in 0..people {
         let path = cheapest(&nodes, counts);
-        path.iter().for_each(|&k| nodes[k].persons += 1);
+        for &k in &path {
+            nodes[k].persons += 1;
+        }
         let before = path.iter().rev().map(|&k| &nodes[k]).find(|node| node.frame <= now);
         let after = path.iter().map(|&k| &nodes[k]).find(|node| node.frame >= now);
         match (before, after) {
