@@ -67,15 +67,12 @@ pub fn find_start_along(
         sought.map(Arc::new)
     });
     let t_s = |other: usize| (other as f64 - frame as f64) / rate_hz(dataset);
-    let (mut own, mut others) = (None, Vec::new());
-    for (other, sought) in reach.zip(found) {
-        match sought {
-            sought if other == frame => own = Some(sought?),
-            Ok(sought) => others.push((t_s(other), sought)),
-            Err(_) => {}
-        }
-    }
-    let Some(own) = own else { return find_start_in(dataset, frame, problem, config) };
+    let own = found[frame - reach.start].clone()?;
+    let others: Vec<(f64, Arc<Sought>)> = reach
+        .zip(found)
+        .filter(|(other, _)| *other != frame)
+        .filter_map(|(other, found)| Some((t_s(other), found.ok()?)))
+        .collect();
     let around: Vec<(f64, &Sought)> = others.iter().map(|(t_s, found)| (*t_s, found.as_ref())).collect();
     own.start(problem, config, &around)
 }

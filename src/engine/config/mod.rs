@@ -136,9 +136,9 @@ impl Default for EmRegion {
     }
 }
 
-/// What `FIT.toml` holds of it.
 /// A dynamic range beyond any noise, dB: all levels are told apart.
 const WHOLE_RANGE_DB: f64 = 200.0;
+/// What `FIT.toml` holds of an EM region.
 const EM_REGION_FORM: &str = "\"full\" or { half_width_m = METRES } with METRES > 0";
 
 #[derive(Serialize, Deserialize)]

@@ -56,7 +56,8 @@ impl Node {
     }
 }
 
-/// As [`Count::seeds`] of the count `counts[now]`, decided by all of `counts`: in the order of their times, s.
+/// As [`Count::seeds`] of the count `counts[now]`, a place a person, world frame, m, decided by all of `counts`: in the order of their
+/// times, s. None where there is no such count. Source: the module's sum; the paper (4.4) takes each frame's clusters alone.
 pub fn seeds_along(counts: &[(f64, &Count)], now: usize, people: usize) -> Vec<Vec3> {
     let Some(&(now_s, own)) = counts.get(now) else { return Vec::new() };
     let mut nodes = Node::all(counts);
