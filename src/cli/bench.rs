@@ -1,8 +1,8 @@
 //! `bench`: what an iteration, a simulation and a whole frame cost here.
 
-use super::common::{PrecisionArg, open, print, print_json};
+use super::common::{PrecisionArg, open, presets, print, print_json};
 use crate::body::Pppr;
-use crate::config::{EmRegion, FitConfig};
+use crate::config::{EmRegion, FitConfig, Preset};
 use crate::dataset::{Dataset, read_pppr};
 use crate::mhp::{Fitter, Precision, Problem, simd_path, simulate};
 use crate::start::{find_start, problem_of};
@@ -28,12 +28,15 @@ const BATCH: Duration = Duration::from_secs(1);
 pub(super) const HELP: &str = "\
 Exit codes: 0 measured; 2 bad input.
 
-The fit starts from --params, or from the data set's own params.npz beside its manifest, or from the frame's peaks. A
-fit.toml beside the manifest is the configuration. Times are of one thread, except frames_per_s.
+The fit starts from --params, or from the data set's own params.npz beside its manifest, or from the frame's peaks. The
+configuration is the --preset, or a fit.toml beside the manifest, or has every field at its own default (one Adam fit of
+masks, as the paper has it, without a search). Times are of one thread, except frames_per_s.
 
 Examples:
   mhp-inspector bench --dataset case
       An iteration in the EM region, in single precision.
+  mhp-inspector bench --dataset samples/walk --preset recommended --threads 1
+      A window of five frames with all its starts.
   mhp-inspector bench --dataset case --region full --iterations 500 --json
       On whole maps; one JSON object.";
 
@@ -55,6 +58,9 @@ pub struct BenchArgs {
     /// PPPR npz to start from.
     #[arg(long, value_name = "P.npz")]
     params: Option<PathBuf>,
+    /// A setting by name instead of a fit.toml.
+    #[arg(long, value_name = "NAME", value_parser = presets())]
+    preset: Option<Preset>,
     /// Iterations that are timed.
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     iterations: u32,
@@ -124,7 +130,11 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
 fn measure(args: &BenchArgs) -> anyhow::Result<Figures> {
     let dataset = open(&args.dataset, None)?;
     let beside = |name: &str| Some(args.dataset.join(name)).filter(|path| path.is_file());
-    let mut config = beside("fit.toml").map_or_else(|| Ok(FitConfig::default()), |path| FitConfig::from_file(&path))?;
+    let mut config = match (args.preset, beside("fit.toml")) {
+        (Some(preset), _) => preset.config(),
+        (None, Some(path)) => FitConfig::from_file(&path)?,
+        (None, None) => FitConfig::default(),
+    };
     if args.region == RegionArg::Full {
         config.em_region = EmRegion::Full;
     }
