@@ -29,6 +29,17 @@ pub(super) struct Sought {
 }
 
 impl Sought {
+    /// These, and what bodies of the frames `around`, each with its time, s after this one, become here.
+    pub(super) fn carried_on(
+        &self,
+        problem: &Arc<Problem>,
+        config: &FitConfig,
+        around: &[(f64, &Self)],
+    ) -> Result<Self, FitError> {
+        let hypotheses = self.hypotheses.carried_on(problem, config, &of_each(around))?;
+        Ok(Self { hypotheses, ..self.clone() })
+    }
+
     /// The start, decided by the frames `around` with it, each with its time, s after this one.
     pub(super) fn start(
         &self,
@@ -36,11 +47,14 @@ impl Sought {
         config: &FitConfig,
         around: &[(f64, &Self)],
     ) -> Result<FoundStart, FitError> {
-        let around: Vec<(f64, &Hypotheses)> = around.iter().map(|&(t_s, other)| (t_s, &other.hypotheses)).collect();
-        let mut initialisation = self.hypotheses.start(problem, config, &around)?;
+        let mut initialisation = self.hypotheses.start(problem, config, &of_each(around))?;
         initialisation.notes.splice(0..0, self.note.clone());
         Ok(FoundStart { initialisation, count: self.count.clone() })
     }
+}
+
+fn of_each<'a>(around: &[(f64, &'a Sought)]) -> Vec<(f64, &'a Hypotheses)> {
+    around.iter().map(|&(t_s, other)| (t_s, &other.hypotheses)).collect()
 }
 
 /// A number of people is believed from this probability on, where the other is that there is nobody at all.

@@ -1,8 +1,13 @@
 //! Starts that the frames of a sequence decide together.
 //!
-//! What the persons of each frame may be is searched in that frame's own window, once: the frames around it ask for it, too, and
-//! so does whoever fits them next. The decision of a frame hangs on a fixed number of frames on each side of it and not on which
-//! frames are fitted with it, in which order or by how many threads.
+//! ```text
+//! SOUGHT   what the persons of each frame may be, searched in that frame's own window
+//! CARRIED  that, and what bodies of the frames beside become in it
+//! start    the body on the cheapest path through what the frames around carried
+//! ```
+//!
+//! Each is worked out once: the frames around ask for it, too, and so does whoever fits them next. The decision of a frame hangs on
+//! a fixed number of frames on each side of it and not on which frames are fitted with it, in which order or by how many threads.
 
 use super::people::{FoundStart, Sought, find_start_in, seek_in};
 use super::problem::{problem_of, rate_hz};
@@ -25,7 +30,13 @@ struct Key {
 }
 
 /// What was found, or why nothing.
-static SOUGHT: Recent<Key, Result<Arc<Sought>, FitError>> = Recent::new(KEPT);
+type Found = Result<Arc<Sought>, FitError>;
+
+static SOUGHT: Recent<Key, Found> = Recent::new(KEPT);
+static CARRIED: Recent<Key, Found> = Recent::new(KEPT);
+
+/// Frames on each side that decide which of their bodies are carried on.
+const CARRY: usize = 6;
 
 /// A configuration with everything at its default that a start does not depend on: two with the same key start from the same
 /// pose. Where postures are tried, the unweighted L_EM alone decides between them, and a search in a space of motion has weights of
@@ -59,22 +70,64 @@ pub fn find_start_along(
     if reach.len() < 2 || config.parameterization != Parameterization::Motion {
         return find_start_in(dataset, frame, problem, config);
     }
-    let searched = search_key(config);
-    let keys = reach.clone().map(|frame| Key { dataset: dataset.id(), frame, config: searched });
-    let found = SOUGHT.all(keys, |key| {
-        let own = key.frame == frame;
-        let sought = if own { seek_in(dataset, frame, problem, config) } else { seek(dataset, key.frame, config) };
-        sought.map(Arc::new)
-    });
-    let t_s = |other: usize| (other as f64 - frame as f64) / rate_hz(dataset);
-    let own = found[frame - reach.start].clone()?;
-    let others: Vec<(f64, Arc<Sought>)> = reach
-        .zip(found)
-        .filter(|(other, _)| *other != frame)
-        .filter_map(|(other, found)| Some((t_s(other), found.ok()?)))
-        .collect();
-    let around: Vec<(f64, &Sought)> = others.iter().map(|(t_s, found)| (*t_s, found.as_ref())).collect();
-    own.start(problem, config, &around)
+    let along = Along { dataset, frame, problem, config };
+    let (own, others) = along.decided(frame, reach.clone(), along.carried(reach))?;
+    own.start(problem, config, &each(&others))
+}
+
+/// A frame that is started with those around it.
+struct Along<'a> {
+    dataset: &'a Dataset,
+    frame: usize,
+    problem: &'a Arc<Problem>,
+    config: &'a FitConfig,
+}
+
+impl Along<'_> {
+    fn keys(&self, frames: Range<usize>, config: &FitConfig) -> impl Iterator<Item = Key> {
+        let (dataset, config) = (self.dataset.id(), *config);
+        frames.map(move |frame| Key { dataset, frame, config })
+    }
+
+    fn problem(&self, frame: usize) -> Result<Arc<Problem>, FitError> {
+        if frame == self.frame {
+            return Ok(Arc::clone(self.problem));
+        }
+        let read = self.dataset.load(frame).map_err(|error| FitError::NoStart { reason: error.to_string() })?;
+        Ok(Arc::new(problem_of(self.dataset, &read)?))
+    }
+
+    fn sought(&self, frames: Range<usize>) -> Vec<Found> {
+        SOUGHT.all(self.keys(frames, &search_key(self.config)), |key| {
+            seek_in(self.dataset, key.frame, &self.problem(key.frame)?, self.config).map(Arc::new)
+        })
+    }
+
+    fn carried(&self, frames: Range<usize>) -> Vec<Found> {
+        let decode_frames = self.config.decode_frames.min(CARRY);
+        let carried = FitConfig { decode_frames, ..search_key(self.config) };
+        CARRIED.all(self.keys(frames, &carried), |key| {
+            let reach = around(self.dataset, key.frame, self.config, decode_frames);
+            let (own, others) = self.decided(key.frame, reach.clone(), self.sought(reach))?;
+            own.carried_on(&self.problem(key.frame)?, self.config, &each(&others)).map(Arc::new)
+        })
+    }
+
+    /// What was found in `frame`, and in the others of `reach`, with their times, s after it; what is wrong with one of those decides
+    /// nothing.
+    fn decided(&self, frame: usize, reach: Range<usize>, found: Vec<Found>) -> Result<(Arc<Sought>, Timed), FitError> {
+        let t_s = |other: usize| (other as f64 - frame as f64) / rate_hz(self.dataset);
+        let own = found[frame - reach.start].clone()?;
+        let others = reach.zip(found).filter(|(other, _)| *other != frame);
+        Ok((own, others.filter_map(|(other, found)| Some((t_s(other), found.ok()?))).collect()))
+    }
+}
+
+/// What was found in frames, and when those are, s.
+type Timed = Vec<(f64, Arc<Sought>)>;
+
+fn each(found: &Timed) -> Vec<(f64, &Sought)> {
+    found.iter().map(|(t_s, found)| (*t_s, found.as_ref())).collect()
 }
 
 /// The frames of the sequence of `frame` that may decide with it, itself among them: at most so many on each side that the settings look
@@ -90,9 +143,4 @@ pub(super) fn around(dataset: &Dataset, frame: usize, config: &FitConfig, most: 
     let first = (frame.saturating_sub(before)..frame).rev().take_while(own).last().unwrap_or(frame);
     let last = (frame + 1..(frame + 1 + after).min(dataset.len())).take_while(own).last().unwrap_or(frame);
     first..last + 1
-}
-
-fn seek(dataset: &Dataset, frame: usize, config: &FitConfig) -> Result<Sought, FitError> {
-    let read = dataset.load(frame).map_err(|error| FitError::NoStart { reason: error.to_string() })?;
-    seek_in(dataset, frame, &Arc::new(problem_of(dataset, &read)?), config)
 }

@@ -130,7 +130,7 @@ pub const FIELDS: &[Field] = &[
         ..number(Model, "window", "Window", StepsAndStart, (1.0, 9.0), count_at!(window)).whole().row("motion")
     },
     Field {
-        help: "Frames on each side whose hypotheses decide with this frame's which of them is fitted (Viterbi); 0: a frame decides by itself.",
+        help: "Frames on each side whose hypotheses decide with this frame's which of them is fitted (Viterbi), and whose bodies it tries; 0: a frame decides by itself.",
         ..number(Starting, "decode_frames", "Decoded frames", Start, (0.0, 60.0), count_at!(decode_frames))
             .whole()
             .row("decoding along the sequence")

@@ -266,7 +266,8 @@ pub struct FitConfig {
     pub w_prior: f64,
     /// Frames that are fitted together in a space of motion.
     pub window: usize,
-    /// Frames on each side whose hypotheses decide with this frame's which is fitted; 0: a frame decides by itself.
+    /// Frames on each side whose hypotheses decide with this frame's which is fitted, and whose bodies are tried in it; 0: a frame
+    /// decides by itself.
     pub decode_frames: usize,
     /// Weight of a term that only tests know.
     #[cfg(any(test, feature = "dummies"))]

@@ -226,6 +226,31 @@ impl Hypotheses {
         Ok(Self { own, persons, searched, peaks, notes })
     }
 
+    /// These, and what the body of one person alone becomes that the frames `around` have on the cheapest path, each frame with its
+    /// time, s after this one. Bodies of several are not carried on: they would stand in each other's way.
+    ///
+    /// # Errors
+    /// Where a position is not finite.
+    pub fn carried_on(
+        &self,
+        problem: &Arc<Problem>,
+        config: &FitConfig,
+        around: &[(f64, &Self)],
+    ) -> Result<Self, FitError> {
+        let mut all = self.clone();
+        let (Some(Ok(searched)), Some(Ok(found))) = (&self.searched, &mut all.searched) else { return Ok(all) };
+        if self.persons.len() > 1 {
+            return Ok(all);
+        }
+        let problem = &Arc::clone(problem).shared_under(config);
+        let model = ScattererModel::new(&problem.skeleton, config.scatterers);
+        let params = assemble(problem, config, &model, &self.persons);
+        let seen = stages(around);
+        let others: Vec<_> = searched.persons.iter().map(|own| motion::carried(own, &seen)).collect();
+        motion::carry_on(problem, config, &params, found, &others)?;
+        Ok(all)
+    }
+
     /// The start. Of what a search ended at it is the body on the cheapest path through what the frames `around` ended at, each
     /// with its time, s after this one; of a frame alone the one with the lowest loss. Where bodies do not explain the maps of
     /// all these frames, it is a posture.
@@ -301,9 +326,14 @@ impl Hypotheses {
     }
 }
 
+/// What is told of the frames around.
+fn stages<'a>(around: &[(f64, &'a Hypotheses)]) -> Vec<Stage<'a>> {
+    around.iter().filter_map(|&(t_s, other)| other.stage(t_s)).collect()
+}
+
 /// The body of each person on the cheapest path, and what is said of them; `None` where bodies do not explain the maps.
 fn chosen<'a>(searched: &'a Searched, around: &[(f64, &Hypotheses)]) -> Option<(Vec<&'a Hypothesis>, String)> {
-    let seen: Vec<Stage> = around.iter().filter_map(|&(t_s, other)| other.stage(t_s)).collect();
+    let seen = stages(around);
     let decoded: Vec<Decoded> = searched.persons.iter().map(|own| motion::decode(own, &seen)).collect();
     let unlikeness = decoded.iter().map(|person| person.unlikeness).sum::<f64>() / decoded.len().max(1) as f64;
     if motion::is_unlike(unlikeness) {

@@ -11,7 +11,8 @@
 //! with L_min the lowest loss of a frame, `away` from 0 (who looks at the radar, or where he walks) to 1 (who stands and looks the other
 //! way, or walks backwards; less of who turns), and `apart` the mean distance between the joints of two hypotheses, each moved as its
 //! velocities say to the middle of the time between them. The cheapest paths come from dynamic programming (Viterbi 1967) from
-//! both ends to the frame that is fitted.
+//! both ends to the frame that is fitted. Before that the bodies on such a path are carried on into the frames beside
+//! ([`carried`], `search::carry_on`): what one search missed another found.
 
 use super::search::Hypothesis;
 use crate::geometry::{Vec3, flat_distance, mean, norm};
@@ -25,6 +26,10 @@ const AWAY: f64 = 0.25;
 /// Nobody is farther from where the frame before has them, m, and for every second between the two, m/s.
 const LEASH_M: f64 = 0.4;
 const LEASH_MPS: f64 = 2.0;
+
+/// Frames on each side whose bodies are carried on into a frame, the next one first. Two of them see what a mistake of the next one
+/// hides.
+const CARRIED: [usize; 2] = [1, 3];
 
 /// A stage of the trellis: what the persons of a frame may be, and when that is, s after the frame that is fitted.
 #[derive(Debug, Clone, Copy)]
@@ -54,11 +59,7 @@ pub(in crate::mhp) struct Decoded {
 /// Decodes one person of a frame by what is seen in those around it, in any order.
 pub(in crate::mhp) fn decode(own: &[Hypothesis], around: &[Stage]) -> Decoded {
     let own = Link { t_s: 0.0, of: own };
-    let sides = [-1.0, 1.0].map(|sign: f64| {
-        let mut side: Vec<&Stage> = around.iter().filter(|stage| stage.t_s * sign > 0.0).collect();
-        side.sort_by(|a, b| a.t_s.abs().total_cmp(&b.t_s.abs()));
-        followed(own, &side)
-    });
+    let sides = sides(own, around);
     let [past, future] = sides.each_ref().map(|side| message(own, side));
     let whole: Vec<f64> =
         zip(shares(own.of), zip(past, future)).map(|(share, (past, future))| share + past + future).collect();
@@ -69,6 +70,36 @@ pub(in crate::mhp) fn decode(own: &[Hypothesis], around: &[Stage]) -> Decoded {
         costs: whole.iter().map(|cost| cost - lowest + 1.0).collect(),
         unlikeness: unlike.iter().sum::<f64>() / unlike.len().max(1) as f64,
     }
+}
+
+/// The bodies that a person of a frame is carried on from: those of the frames [`CARRIED`] on each side that the cheapest path goes
+/// through, each with its time, s after this one.
+pub(in crate::mhp) fn carried<'a>(own: &'a [Hypothesis], around: &[Stage<'a>]) -> Vec<(f64, &'a Hypothesis)> {
+    let own_link = Link { t_s: 0.0, of: own };
+    let Some(best) = lowest(&decode(own, around).costs) else { return Vec::new() };
+    let side = |links: Vec<Link<'a>>| {
+        let mut at = (0.0, &own[best]);
+        let mut path = Vec::with_capacity(links.len());
+        for (k, to) in links.iter().enumerate() {
+            let beyond = zip(shares(to.of), message(*to, &links[k + 1..])).map(|(share, beyond)| share + beyond);
+            let costs: Vec<f64> =
+                zip(to.of, beyond).map(|(body, beyond)| beyond + step(at.1, body, to.t_s - at.0)).collect();
+            let Some(next) = lowest(&costs) else { break };
+            at = (to.t_s, &to.of[next]);
+            path.push(at);
+        }
+        CARRIED.iter().filter_map(|k| path.get(k - 1).copied()).collect::<Vec<_>>()
+    };
+    sides(own_link, around).into_iter().flat_map(side).collect()
+}
+
+/// The person of `own` in the frames before and after, as [`followed`].
+fn sides<'a>(own: Link, around: &[Stage<'a>]) -> [Vec<Link<'a>>; 2] {
+    [-1.0, 1.0].map(|sign: f64| {
+        let mut side: Vec<&Stage> = around.iter().filter(|stage| stage.t_s * sign > 0.0).collect();
+        side.sort_by(|a, b| a.t_s.abs().total_cmp(&b.t_s.abs()));
+        followed(own, &side)
+    })
 }
 
 /// The person of `own` in the frames on one side, the nearest first, as far as it can be followed.
@@ -141,6 +172,7 @@ mod tests {
             away: 0.0,
             velocities: vec![[1.0, 0.0, 0.0]; 2],
             beta: vec![0.0; 2],
+            coordinates: Vec::new(),
             joints,
         }
     }
@@ -174,6 +206,20 @@ mod tests {
         // Somebody else, farther than the leash, says nothing.
         let far: Vec<Stage> = around.iter().map(|stage| Stage { persons: &stage.persons[..1], ..*stage }).collect();
         assert_eq!(decode(&own, &far), decode(&own, &[]));
+    }
+
+    #[test]
+    fn bodies_are_carried_on_from_the_path() {
+        let own = [body(3.0, 0.0, 0.2)];
+        let frame = |x: f64| vec![vec![body(x, 3.0, 0.19), body(x, 0.0, 0.2)]];
+        let others = [frame(2.6), frame(2.7), frame(2.9), frame(3.1)];
+        let around: Vec<Stage> =
+            zip([-0.4, -0.3, -0.1, 0.1], &others).map(|(t_s, persons)| Stage { t_s, persons }).collect();
+        let found = carried(&own, &around);
+        // The first and the third before it, and the first after it; of each the body that looks the same way.
+        assert_eq!(found.iter().map(|(t_s, _)| *t_s).collect::<Vec<_>>(), [-0.1, -0.4, 0.1]);
+        assert!(found.iter().all(|(_, body)| body.yaw == 0.0), "{found:?}");
+        assert!(carried(&own, &[]).is_empty());
     }
 
     #[test]

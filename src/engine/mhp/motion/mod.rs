@@ -33,8 +33,8 @@ mod tests;
 mod thinned;
 mod turn;
 
-pub(super) use decode::{Decoded, Stage, decode, lowest};
-pub(super) use search::{Hypothesis, Searched, search};
+pub(super) use decode::{Decoded, Stage, carried, decode, lowest};
+pub(super) use search::{Hypothesis, Searched, carry_on, search};
 pub(super) use thinned::ThinnedViews;
 pub(super) use turn::turn;
 

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::{Vec3, mean, norm, sub};
+use crate::geometry::{Vec3, add, mean, norm, scale, sub};
 use crate::mhp::skin::radar_place;
 use crate::mhp::{FitError, Precision, Problem, tiles};
 use std::f64::consts::{PI, TAU};
@@ -17,12 +17,12 @@ use std::ops::Range;
 
 /// The sieves that starts go through, coarse then fine.
 const SIEVES: [Sieve; 3] = [
-    Sieve { steps: 6, every: 4, held: true, kept: 12 },
-    Sieve { steps: 10, every: 2, held: false, kept: 8 },
-    Sieve { steps: 14, every: 1, held: false, kept: 6 },
+    Sieve { steps: 6, every: 4, held: true, kept: 10 },
+    Sieve { steps: 10, every: 2, held: false, kept: 6 },
+    Sieve { steps: 14, every: 1, held: false, kept: 4 },
 ];
-/// Evaluations of what is left.
-const FINE: usize = 28;
+/// Evaluations of what is left, and of each body that is carried on from another frame.
+const FINE: usize = 16;
 /// How far t and h, y, s, q and c may go in a step of it.
 const UNITS: [f64; 5] = [0.03, 0.12, 0.03, 1.0, 0.5];
 /// What a search may cost: Gaussians times cells, over all frames and evaluations. A map of 256 × 128 cells as a whole, five frames of
@@ -30,8 +30,9 @@ const UNITS: [f64; 5] = [0.03, 0.12, 0.03, 1.0, 0.5];
 const MOST_WORK: f64 = 2e10;
 /// Where every cell is summed by itself each costs so many.
 const PLAIN: f64 = 10.0;
-/// Evaluations of a person's search beside those of the first sieve, and those of a start in it, in whole windows.
-const LATER: f64 = 470.0;
+/// Evaluations of a person's search beside those of the first sieve, with those of what is carried on, and those of a start in it, in
+/// whole windows.
+const LATER: f64 = 350.0;
 const FIRST: f64 = 7.0 / 4.0;
 /// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start.
 const WEIGHTS: [f64; 2] = [0.5, 8e-3];
@@ -78,6 +79,8 @@ pub(in crate::mhp) struct Hypothesis {
     pub(in crate::mhp) velocities: Vec<Vec3>,
     /// How opaque they are: what static echoes leave.
     pub(in crate::mhp) beta: Vec<f64>,
+    /// Its coordinates in the window.
+    pub(in crate::mhp) coordinates: Vec<f64>,
 }
 
 /// What a search found.
@@ -118,7 +121,12 @@ struct Search<'a> {
     every: usize,
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    /// Among the poses of `window`, as settings with [`WEIGHTS`] compare them.
+    fn new((problem, config): (&'a Problem, &'a FitConfig), window: &'a mut Window, params: &'a Pppr) -> Self {
+        Self { problem, config, window, params, loss: WindowLoss::default(), next: MotionState::default(), every: 1 }
+    }
+
     fn evaluate(&mut self, coordinates: &[f64]) -> f64 {
         let how = (self.problem, self.config);
         self.window.evaluate_some(self.every, how, Precision::F32, (coordinates, self.params), None, &mut self.loss);
@@ -188,6 +196,7 @@ impl Search<'_> {
             joints: placed.positions()[own.clone()].to_vec(),
             velocities,
             beta: placed.group(Group::Beta)[own].to_vec(),
+            coordinates: tried.state.coordinates[person * self.window.stride..][..self.window.stride].to_vec(),
         }
     }
 
@@ -238,8 +247,7 @@ pub(in crate::mhp) fn search(
     config: &FitConfig,
     params: &Pppr,
 ) -> Result<Result<Searched, Held>, FitError> {
-    let [w_em, w_prior] = WEIGHTS;
-    let config = &FitConfig { w_em, w_prior, ..*config };
+    let config = &weighted(config);
     let mut window = match Window::new(problem, config, (Precision::F32, Detail::Search), params)? {
         Ok(window) => window,
         Err(held) => return Ok(Err(held)),
@@ -252,15 +260,7 @@ pub(in crate::mhp) fn search(
     let walks: Vec<bool> = ways(params).iter().map(|way| way[0].hypot(way[1]) > 0.5).collect();
     let (floor, grounded) = (problem.radar.height_m, window.space.ground.is_some());
     let starts = window.space.starts.clone();
-    let mut search = Search {
-        problem,
-        config,
-        window: &mut window,
-        params,
-        loss: WindowLoss::default(),
-        next: MotionState::default(),
-        every: 1,
-    };
+    let mut search = Search::new((problem, config), &mut window, params);
     let begun = search.evaluate(&coordinates);
     let begun_em = search.loss.em;
     let mut persons: Vec<Vec<Hypothesis>> = Vec::with_capacity(params.shape().persons);
@@ -325,6 +325,51 @@ pub(in crate::mhp) fn search(
     let clearer = window.clear && em < CLEARER * begun_em;
     let moved = (0..persons.len()).map(|k| if clearer { way(problem, params, k, &persons[k]) } else { [0.0; 3] });
     Ok(Ok(Searched { begun, moved: moved.collect(), persons }))
+}
+
+/// Adds to what a search around `params` ended at what bodies of other frames become in this one: for each person some with
+/// their times, s after this frame, moved as each goes as a whole.
+///
+/// # Errors
+/// Where a position is not finite.
+pub(in crate::mhp) fn carry_on(
+    problem: &Problem,
+    config: &FitConfig,
+    params: &Pppr,
+    searched: &mut Searched,
+    others: &[Vec<(f64, &Hypothesis)>],
+) -> Result<(), FitError> {
+    if others.iter().all(Vec::is_empty) {
+        return Ok(());
+    }
+    let config = &weighted(config);
+    let Ok(mut window) = Window::new(problem, config, (Precision::F32, Detail::Search), params)? else { return Ok(()) };
+    let stride = window.stride;
+    let best: Vec<f64> = searched.persons.iter().flat_map(|found| found[0].coordinates.iter().copied()).collect();
+    let mut search = Search::new((problem, config), &mut window, params);
+    for (person, (found, others)) in searched.persons.iter_mut().zip(others).enumerate() {
+        let own = person * stride..(person + 1) * stride;
+        for (t_s, other) in others {
+            let way = scale(mean(&other.velocities), -t_s);
+            let mut moved = params.clone();
+            Hypothesis { joints: other.joints.iter().map(|&p| add(p, way)).collect(), ..(*other).clone() }
+                .place(person, &mut moved);
+            let mut of = best.clone();
+            of[own.clone()].copy_from_slice(&search.window.coordinates_of(&moved)[own.clone()]);
+            of[own.start + STILL] = other.coordinates[STILL];
+            let mut tried = Tried::at(of);
+            search.settle(&mut tried, FINE);
+            found.push(search.hypothesis(&tried, person));
+        }
+        found.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    }
+    Ok(())
+}
+
+/// The settings, with a search's weights.
+fn weighted(config: &FitConfig) -> FitConfig {
+    let [w_em, w_prior] = WEIGHTS;
+    FitConfig { w_em, w_prior, ..*config }
 }
 
 /// How many starts a search of these persons may have; `None` where one is too many: nothing that is asked for takes minutes.

@@ -129,6 +129,30 @@ fn coordinates_come_back_from_joints_and_velocities() {
 }
 
 /// Where the floor is known and asked for, a body that bends its knees comes down until it stands.
+/// The body of a frame before, moved as it goes, becomes as good as what the search of this one found.
+#[test]
+fn a_body_is_carried_on_to_where_it_goes() {
+    let rng = &mut StdRng::seed_from_u64(6);
+    let (problem, (_, params)) = (problem(rng), person(rng, None));
+    let config = FitConfig { starts: 2, ..config() };
+    let mut searched = search(&problem, &config, &params).unwrap().unwrap();
+    let found = searched.persons[0].clone();
+    let best = found[0].clone();
+    let way = mean(&best.velocities);
+    let earlier = best.joints.iter().map(|p| sub(*p, way.map(|v| 0.1 * v))).collect();
+    let earlier = Hypothesis { joints: earlier, loss: f64::NAN, ..best.clone() };
+    carry_on(&problem, &config, &params, &mut searched, &[vec![(-0.1, &earlier)]]).unwrap();
+    let all = &searched.persons[0];
+    assert_eq!(all.len(), found.len() + 1);
+    assert!(all.is_sorted_by(|a, b| a.loss <= b.loss));
+    let new = all.iter().find(|body| !found.contains(body)).unwrap();
+    assert!(new.loss <= best.loss + 1e-3, "{} {}", new.loss, best.loss);
+    // Nothing comes of nothing.
+    let before = searched.clone();
+    carry_on(&problem, &config, &params, &mut searched, &[Vec::new()]).unwrap();
+    assert_eq!(searched, before);
+}
+
 #[test]
 fn a_body_stands_on_the_floor_in_any_pose() {
     let prior = MotionPrior::committed().unwrap();
