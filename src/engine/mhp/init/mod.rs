@@ -239,14 +239,11 @@ impl Hypotheses {
     ) -> Result<Self, FitError> {
         let mut all = self.clone();
         let (Some(Ok(searched)), Some(Ok(found))) = (&self.searched, &mut all.searched) else { return Ok(all) };
-        if self.persons.len() > 1 {
-            return Ok(all);
-        }
+        let [own] = searched.persons.as_slice() else { return Ok(all) };
         let problem = &Arc::clone(problem).shared_under(config);
         let model = ScattererModel::new(&problem.skeleton, config.scatterers);
         let params = assemble(problem, config, &model, &self.persons);
-        let seen = stages(around);
-        let others: Vec<_> = searched.persons.iter().map(|own| motion::carried(own, &seen)).collect();
+        let others = motion::carried(own, &stages(around));
         motion::carry_on(problem, config, &params, found, &others)?;
         Ok(all)
     }

@@ -172,7 +172,7 @@ mod tests {
             away: 0.0,
             velocities: vec![[1.0, 0.0, 0.0]; 2],
             beta: vec![0.0; 2],
-            coordinates: Vec::new(),
+            still: 0.0,
             joints,
         }
     }

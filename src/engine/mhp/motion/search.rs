@@ -79,8 +79,8 @@ pub(in crate::mhp) struct Hypothesis {
     pub(in crate::mhp) velocities: Vec<Vec3>,
     /// How opaque they are: what static echoes leave.
     pub(in crate::mhp) beta: Vec<f64>,
-    /// Its coordinates in the window.
-    pub(in crate::mhp) coordinates: Vec<f64>,
+    /// q.
+    pub(in crate::mhp) still: f64,
 }
 
 /// What a search found.
@@ -196,7 +196,7 @@ impl<'a> Search<'a> {
             joints: placed.positions()[own.clone()].to_vec(),
             velocities,
             beta: placed.group(Group::Beta)[own].to_vec(),
-            coordinates: tried.state.coordinates[person * self.window.stride..][..self.window.stride].to_vec(),
+            still: tried.state.coordinates[person * self.window.stride + STILL],
         }
     }
 
@@ -327,8 +327,8 @@ pub(in crate::mhp) fn search(
     Ok(Ok(Searched { begun, moved: moved.collect(), persons }))
 }
 
-/// Adds to what a search around `params` ended at what bodies of other frames become in this one: for each person some with
-/// their times, s after this frame, moved as each goes as a whole.
+/// Adds to what a search around the one person of `params` ended at what bodies of other frames become in this one, each with its
+/// time, s after this frame, moved as it goes as a whole.
 ///
 /// # Errors
 /// Where a position is not finite.
@@ -337,32 +337,24 @@ pub(in crate::mhp) fn carry_on(
     config: &FitConfig,
     params: &Pppr,
     searched: &mut Searched,
-    others: &[Vec<(f64, &Hypothesis)>],
+    others: &[(f64, &Hypothesis)],
 ) -> Result<(), FitError> {
-    if others.iter().all(Vec::is_empty) {
-        return Ok(());
-    }
+    let Some(found) = searched.persons.first_mut().filter(|_| !others.is_empty()) else { return Ok(()) };
     let config = &weighted(config);
     let Ok(mut window) = Window::new(problem, config, (Precision::F32, Detail::Search), params)? else { return Ok(()) };
-    let stride = window.stride;
-    let best: Vec<f64> = searched.persons.iter().flat_map(|found| found[0].coordinates.iter().copied()).collect();
     let mut search = Search::new((problem, config), &mut window, params);
-    for (person, (found, others)) in searched.persons.iter_mut().zip(others).enumerate() {
-        let own = person * stride..(person + 1) * stride;
-        for (t_s, other) in others {
-            let way = scale(mean(&other.velocities), -t_s);
-            let mut moved = params.clone();
-            Hypothesis { joints: other.joints.iter().map(|&p| add(p, way)).collect(), ..(*other).clone() }
-                .place(person, &mut moved);
-            let mut of = best.clone();
-            of[own.clone()].copy_from_slice(&search.window.coordinates_of(&moved)[own.clone()]);
-            of[own.start + STILL] = other.coordinates[STILL];
-            let mut tried = Tried::at(of);
-            search.settle(&mut tried, FINE);
-            found.push(search.hypothesis(&tried, person));
-        }
-        found.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    for (t_s, other) in others {
+        let way = scale(mean(&other.velocities), -t_s);
+        let mut moved = params.clone();
+        Hypothesis { joints: other.joints.iter().map(|&p| add(p, way)).collect(), ..(*other).clone() }
+            .place(0, &mut moved);
+        let mut coordinates = search.window.coordinates_of(&moved);
+        coordinates[STILL] = other.still;
+        let mut tried = Tried::at(coordinates);
+        search.settle(&mut tried, FINE);
+        found.push(search.hypothesis(&tried, 0));
     }
+    found.sort_by(|a, b| a.loss.total_cmp(&b.loss));
     Ok(())
 }
 

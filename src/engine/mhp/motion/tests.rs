@@ -141,7 +141,7 @@ fn a_body_is_carried_on_to_where_it_goes() {
     let way = mean(&best.velocities);
     let earlier = best.joints.iter().map(|p| sub(*p, way.map(|v| 0.1 * v))).collect();
     let earlier = Hypothesis { joints: earlier, loss: f64::NAN, ..best.clone() };
-    carry_on(&problem, &config, &params, &mut searched, &[vec![(-0.1, &earlier)]]).unwrap();
+    carry_on(&problem, &config, &params, &mut searched, &[(-0.1, &earlier)]).unwrap();
     let all = &searched.persons[0];
     assert_eq!(all.len(), found.len() + 1);
     assert!(all.is_sorted_by(|a, b| a.loss <= b.loss));
@@ -149,7 +149,7 @@ fn a_body_is_carried_on_to_where_it_goes() {
     assert!(new.loss <= best.loss + 1e-3, "{} {}", new.loss, best.loss);
     // Nothing comes of nothing.
     let before = searched.clone();
-    carry_on(&problem, &config, &params, &mut searched, &[Vec::new()]).unwrap();
+    carry_on(&problem, &config, &params, &mut searched, &[]).unwrap();
     assert_eq!(searched, before);
 }
 
