@@ -27,26 +27,28 @@ pub(super) enum Source {
     Gradient,
 }
 
-/// The radial velocity at `at` from the first view that tells it.
+/// The radial velocity at `at` from the first view that tells a finite one.
 pub(super) fn radial(problem: &Problem, config: &FitConfig, at: Vec3) -> Option<Radial> {
     let (context, gain_mps) = (problem.context(config), config.init.velocity_gain_mps);
     let now = &context.now;
     let along = |k: usize, mps: f64, source: Source| {
         let from_radar = sub(at, problem.views[k].pose.world_from_view([0.0; 3]));
-        Radial { mps, vector: scale(from_radar, mps / norm(from_radar).max(1e-6)), source }
+        let vector = scale(from_radar, mps / norm(from_radar).max(1e-6));
+        // The bins of an axis may be any numbers.
+        vector.iter().all(|v| v.is_finite()).then_some(Radial { mps, vector, source })
     };
-    let doppler = now.iter().enumerate().find_map(|(k, e)| Some(along(k, e.radial_mps(at)?, Source::Doppler)));
+    let doppler = now.iter().enumerate().find_map(|(k, e)| along(k, e.radial_mps(at)?, Source::Doppler));
     doppler.or_else(|| {
         if config.init.gradient == GradientVelocity::Magnitude {
             let steepness = |(k, e): (usize, &SaliencyMap)| Some((k, e.steepness(at)?));
             let (k, steepness) = now.iter().enumerate().find_map(steepness)?;
-            return Some(along(k, gain_mps * steepness, Source::Gradient));
+            return along(k, gain_mps * steepness, Source::Gradient);
         }
         // The nearest frame in time tells the change best.
         let (offset_s, near) = context.around().min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))?;
         now.iter().zip(near()).enumerate().find_map(|(k, (now, then))| {
             let flow = now.flow(then, at)?;
-            Some(along(k, gain_mps * flow.steepness * flow.sign * offset_s.signum(), Source::Gradient))
+            along(k, gain_mps * flow.steepness * flow.sign * offset_s.signum(), Source::Gradient)
         })
     })
 }
