@@ -29,6 +29,11 @@ pub(super) struct Sought {
 }
 
 impl Sought {
+    /// Whether bodies of the frames around become something here.
+    pub(super) fn is_carried_on(&self) -> bool {
+        self.hypotheses.is_carried_on()
+    }
+
     /// These, and what bodies of the frames `around`, each with its time, s after this one, become here.
     pub(super) fn carried_on(
         &self,

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! SOUGHT   what the persons of each frame may be, searched in that frame's own window
-//! CARRIED  that, and what bodies of the frames beside become in it
+//! CARRIED  that, and what bodies of the frames beside become in it, where there is one person
 //! start    the body on the cheapest path through what the frames around carried
 //! ```
 //!
@@ -107,6 +107,10 @@ impl Along<'_> {
         let decode_frames = self.config.decode_frames.min(CARRY);
         let carried = FitConfig { decode_frames, ..search_key(self.config) };
         CARRIED.all(self.keys(frames, &carried), |key| {
+            let alone = self.sought(key.frame..key.frame + 1)[0].clone()?;
+            if !alone.is_carried_on() {
+                return Ok(alone);
+            }
             let reach = around(self.dataset, key.frame, self.config, decode_frames);
             let (own, others) = self.decided(key.frame, reach.clone(), self.sought(reach))?;
             own.carried_on(&self.problem(key.frame)?, self.config, &each(&others)).map(Arc::new)

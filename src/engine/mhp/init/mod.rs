@@ -226,8 +226,13 @@ impl Hypotheses {
         Ok(Self { own, persons, searched, peaks, notes })
     }
 
-    /// These, and what the body of one person alone becomes that the frames `around` have on the cheapest path, each frame with its
-    /// time, s after this one. Bodies of several are not carried on: they would stand in each other's way.
+    /// Whether there is one person, with bodies that a search ended at: those of several would be carried on into each other.
+    pub fn is_carried_on(&self) -> bool {
+        self.searched.as_ref().is_some_and(|found| found.as_ref().is_ok_and(|found| found.persons.len() == 1))
+    }
+
+    /// These, and what the body of the one person becomes that the frames `around` have on the cheapest path, each frame with its
+    /// time, s after this one; the same where [`Self::is_carried_on`] says no.
     ///
     /// # Errors
     /// Where a position is not finite.
