@@ -399,11 +399,12 @@ fn evaluate_state(
     let (config, precision) = (*objective.config(), objective.precision());
     // How the persons look is what all frames say of it; where they are is the window's affair.
     let em = &mut evaluation.gradients[Weight::Em as usize];
-    let places = em.group(Group::Position).to_vec();
+    loss.places.clear();
+    loss.places.extend_from_slice(em.group(Group::Position));
     em.reset(state.params.shape());
     let of = (state.motion.coordinates.as_slice(), &state.params);
     window.evaluate((objective.problem(), &config), precision, of, Some(em), loss);
-    em.group_mut(Group::Position).copy_from_slice(&places);
+    em.group_mut(Group::Position).copy_from_slice(&loss.places);
     let kinematic: SmallVec<[Weight; 8]> =
         Weight::ALL.iter().copied().filter(|&weight| weight != Weight::Em && weight.of(&config) != 0.0).collect();
     evaluation.gradient.reset(state.params.shape());

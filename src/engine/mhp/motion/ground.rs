@@ -12,7 +12,7 @@
 //! jump, too, and sit on tables, so that L_prior has 2 δ² (√(1 + (h/(δ σ_h))²) − 1), δ = 2: a square of deviations near the floor, and a
 //! slope beyond (pseudo-Huber).
 
-use super::space::{BODY, HEIGHT, LN_SIZE};
+use super::space::{BODY, HEIGHT, LN_SIZE, MOST_COMPONENTS};
 use crate::body::{Skeleton, is_named};
 use crate::geometry::Vec3;
 use smallvec::SmallVec;
@@ -50,7 +50,7 @@ pub(super) struct Contact {
     pub(super) z_m: f64,
     /// Its derivatives by s and by c.
     by_size: f64,
-    by_pose: SmallVec<[f64; 32]>,
+    by_pose: SmallVec<[f64; MOST_COMPONENTS]>,
 }
 
 /// How unlikely a height above the floor is, m, and its derivative.

@@ -147,6 +147,8 @@ pub(super) struct WindowLoss {
     pub(super) prior: f64,
     /// ∂(w_EM L_EM + w_prior L_prior) by the coordinates.
     pub(super) gradient: Vec<f64>,
+    /// What the frame that is fitted alone says of the positions, kept while the others are asked.
+    pub(super) places: Vec<f64>,
 }
 
 /// How little bodies explain maps whose levels they are compared with, or zero where masks are compared.
@@ -338,7 +340,7 @@ impl Window {
         let prior_gain = config.w_prior * prior_share;
         (loss.em, loss.prior) = (0.0, 0.0);
         let mut kept = looks;
-        let contacts: SmallVec<[Option<Contact>; 1]> =
+        let contacts: SmallVec<[Option<Contact>; 4]> =
             coordinates.chunks_exact(*stride).map(|own| space.contact(own)).collect();
         for (frame, of) in frames.iter_mut().enumerate().step_by(every) {
             for group in Group::ALL[1..].iter().filter(|&&group| group != Group::Velocity) {

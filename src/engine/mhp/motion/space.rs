@@ -14,6 +14,9 @@ use super::static_echo;
 use crate::body::{MotionPrior, Skeleton};
 use crate::geometry::Vec3;
 
+/// Components of the prior that a pose has at most.
+pub(super) const MOST_COMPONENTS: usize = 64;
+
 /// How finely poses are told apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Detail {
@@ -28,7 +31,7 @@ impl Detail {
     fn components(self) -> usize {
         match self {
             Self::Search => 28,
-            Self::Fit => 64,
+            Self::Fit => MOST_COMPONENTS,
         }
     }
 }
