@@ -27,6 +27,10 @@ const AWAY: f64 = 0.25;
 const LEASH_M: f64 = 0.4;
 const LEASH_MPS: f64 = 2.0;
 
+/// A frame this far away in time says e^(−½) of what this one says of how well bodies explain its maps, s: who stood there hidden
+/// among reflectors may have begun to walk, or to fall.
+const LIKE_S: f64 = 0.5;
+
 /// Frames on each side whose bodies are carried on into a frame, the next one first. Two of them see what a mistake of the next one
 /// hides.
 const CARRIED: [usize; 2] = [1, 3];
@@ -52,7 +56,7 @@ pub(in crate::mhp) struct Decoded {
     /// What each hypothesis costs more than the best, in lowest losses of the frame, and one: where nothing is known of the frames
     /// around, its loss by the lowest.
     pub(in crate::mhp) costs: Vec<f64>,
-    /// How little bodies explain the maps, on average over the frames in which the person is followed.
+    /// How little bodies explain the maps, on average over the frames in which the person is followed, the nearest the most.
     pub(in crate::mhp) unlikeness: f64,
 }
 
@@ -64,11 +68,17 @@ pub(in crate::mhp) fn decode(own: &[Hypothesis], around: &[Stage]) -> Decoded {
     let whole: Vec<f64> =
         zip(shares(own.of), zip(past, future)).map(|(share, (past, future))| share + past + future).collect();
     let lowest = whole.iter().copied().fold(f64::INFINITY, f64::min);
-    let best = std::iter::once(&own).chain(sides.iter().flatten()).filter_map(|link| link.of.first());
-    let unlike: Vec<f64> = best.map(|best| best.unlikeness).collect();
+    let best =
+        std::iter::once(&own).chain(sides.iter().flatten()).filter_map(|link| Some((link.t_s, link.of.first()?)));
+    let (mut unlike, mut weights) = (0.0, 0.0);
+    for (t_s, best) in best {
+        let weight = (-0.5 * (t_s / LIKE_S).powi(2)).exp();
+        unlike += weight * best.unlikeness;
+        weights += weight;
+    }
     Decoded {
         costs: whole.iter().map(|cost| cost - lowest + 1.0).collect(),
-        unlikeness: unlike.iter().sum::<f64>() / unlike.len().max(1) as f64,
+        unlikeness: unlike / weights.max(f64::MIN_POSITIVE),
     }
 }
 

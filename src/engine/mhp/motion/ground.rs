@@ -1,7 +1,7 @@
 //! What bodies stand on, where the radar's height above the floor is known.
 //!
 //! Maps tell the height of a body by a decimetre, and worse the darker its head or its feet are; the floor tells it to centimetres.
-//! With z_fj the height of joint j of the pose X_f(c) (`space.rs`) and ρ_j how thick the body is below it, both in sizes,
+//! With z_fj the height of joint j of the tilted pose X_f(c) (`space.rs`) and ρ_j how thick the body is below it, both in sizes,
 //!
 //! ```text
 //! m(c) = −1/κ ln(mean over the window's frames f of Σ_j e^(−κ (z_fj − ρ_j)))     how far down it reaches; κ = 100 a size
@@ -12,9 +12,10 @@
 //! jump, too, and sit on tables, so that L_prior has 2 δ² (√(1 + (h/(δ σ_h))²) − 1), δ = 2: a square of deviations near the floor, and a
 //! slope beyond (pseudo-Huber).
 
-use super::space::{BODY, HEIGHT, LN_SIZE, MOST_COMPONENTS};
+use super::space::{BODY, LN_SIZE, MOST_COMPONENTS, TILT};
+use super::tilt::{self, Tilt};
 use crate::body::{Skeleton, is_named};
-use crate::geometry::Vec3;
+use crate::geometry::{Vec3, add_scaled, cross, dot};
 use smallvec::SmallVec;
 
 /// κ, 1/sizes.
@@ -48,8 +49,9 @@ pub(super) struct Ground {
 pub(super) struct Contact {
     /// t_z − h, m.
     pub(super) z_m: f64,
-    /// Its derivatives by s and by c.
+    /// Its derivatives by s, by w and ẇ, and by c.
     by_size: f64,
+    by_tilt: [f64; tilt::NUMBERS],
     by_pose: SmallVec<[f64; MOST_COMPONENTS]>,
 }
 
@@ -69,37 +71,51 @@ impl Ground {
         (!supports.is_empty()).then_some(Self { z_m, supports })
     }
 
-    /// How a person with these coordinates stands; `poses` are a row a frame of a mean and components of `joints` joints each, in sizes.
-    pub(super) fn contact(&self, coordinates: &[f64], poses: &[Vec<Vec3>], joints: usize) -> Contact {
+    /// How a person with these coordinates stands; `poses` are a row a frame of a mean and components of `joints` joints each, in sizes,
+    /// and how the frame is tilted about what is `hips` below.
+    pub(super) fn contact(
+        &self,
+        coordinates: &[f64],
+        (poses, tilts): (&[Vec<Vec3>], &[Tilt]),
+        joints: usize,
+        hips: f64,
+    ) -> Contact {
         let c = &coordinates[BODY..];
-        let reaches = |row: &[Vec3], &(joint, below): &(usize, f64)| -> f64 {
-            let moved = c.iter().enumerate().map(|(k, c)| c * row[(k + 1) * joints + joint][HEIGHT]);
-            row[joint][HEIGHT] - below + moved.sum::<f64>()
+        let reaches = |row: &[Vec3], tilt: &Tilt, &(joint, below): &(usize, f64)| -> (Vec3, f64) {
+            let mut at = row[joint];
+            at[2] += hips;
+            c.iter().enumerate().for_each(|(k, &c)| add_scaled(&mut at, row[(k + 1) * joints + joint], c));
+            (at, dot(tilt.upwards(), at) - hips - below)
         };
-        let all = || poses.iter().flat_map(|row| self.supports.iter().map(move |support| (row, support)));
-        let heights: SmallVec<[f64; 96]> = all().map(|(row, support)| reaches(row, support)).collect();
-        let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
+        let all =
+            || poses.iter().zip(tilts).flat_map(|(row, tilt)| self.supports.iter().map(move |of| (row, tilt, of)));
+        let found: SmallVec<[(Vec3, f64); 96]> = all().map(|(row, tilt, of)| reaches(row, tilt, of)).collect();
+        let lowest = found.iter().map(|(_, height)| *height).fold(f64::INFINITY, f64::min);
         let weight = |height: f64| (-SHARPNESS * (height - lowest)).exp();
-        let total: f64 = heights.iter().map(|&height| weight(height)).sum();
+        let total: f64 = found.iter().map(|(_, height)| weight(*height)).sum();
         let size_m = coordinates[LN_SIZE].exp();
         let reach_m = size_m * (lowest - (total / poses.len().max(1) as f64).ln() / SHARPNESS);
         let mut by_pose = SmallVec::from_elem(0.0, c.len());
-        for ((row, (joint, _)), &height) in all().zip(&heights) {
-            let share = weight(height) / total;
+        let mut by_tilt = [0.0; tilt::NUMBERS];
+        for ((row, tilt, (joint, _)), (at, height)) in all().zip(&found) {
+            let share = weight(*height) / total;
             if share > NEGLIGIBLE {
+                let up = tilt.upwards();
                 for (k, by) in by_pose.iter_mut().enumerate() {
-                    *by -= size_m * share * row[(k + 1) * joints + joint][HEIGHT];
+                    *by -= size_m * share * dot(up, row[(k + 1) * joints + joint]);
                 }
+                tilt.pull_back(cross(tilt.forwards(*at), [0.0, 0.0, -size_m * share]), &mut by_tilt);
             }
         }
-        Contact { z_m: self.z_m - reach_m, by_size: -reach_m, by_pose }
+        Contact { z_m: self.z_m - reach_m, by_size: -reach_m, by_tilt, by_pose }
     }
 }
 
 impl Contact {
-    /// Adds to `bars` what ∂L/∂t_z implies for size and pose.
+    /// Adds to `bars` what ∂L/∂t_z implies for size, tilt and pose.
     pub(super) fn pull_back(&self, z_bar: f64, bars: &mut [f64]) {
         bars[LN_SIZE] += z_bar * self.by_size;
+        bars[TILT..BODY].iter_mut().zip(&self.by_tilt).for_each(|(bar, by)| *bar += z_bar * by);
         bars[BODY..].iter_mut().zip(&self.by_pose).for_each(|(bar, by)| *bar += z_bar * by);
     }
 }
@@ -123,6 +139,10 @@ mod tests {
         (Ground::new(&skeleton, -1.2).unwrap(), vec![row(15, 0.1), row(16, 0.0)], joints)
     }
 
+    fn upright() -> [Tilt; 2] {
+        [0.0, 0.1].map(|t_s| Tilt::of(&[0.0; tilt::NUMBERS], t_s))
+    }
+
     fn at(ln_size: f64, c: f64) -> Vec<f64> {
         let mut coordinates = vec![0.0; BODY + 1];
         (coordinates[LN_SIZE], coordinates[BODY]) = (ln_size, c);
@@ -132,7 +152,7 @@ mod tests {
     #[test]
     fn a_body_stands_with_its_sole_on_the_floor() {
         let (ground, poses, joints) = ground();
-        let of = |ln_size, c| ground.contact(&at(ln_size, c), &poses, joints).z_m;
+        let of = |ln_size, c| ground.contact(&at(ln_size, c), (&poses, &upright()), joints, 0.9).z_m;
         assert!((of(0.0, 0.0) - (-1.2 + 0.96)).abs() < 1e-9, "{}", of(0.0, 0.0));
         assert!((of(0.1, 0.0) - (-1.2 + 0.96 * 0.1_f64.exp())).abs() < 1e-9);
         // With the first foot up by 0.2 it stands on the second alone, half of the frames.
@@ -148,7 +168,7 @@ mod tests {
     fn its_derivatives_agree_with_central_differences() {
         let (ground, poses, joints) = ground();
         for (ln_size, c) in [(0.0, 0.0), (0.1, 0.05), (-0.1, -0.08), (0.05, 1.0)] {
-            let of = |ln_size, c| ground.contact(&at(ln_size, c), &poses, joints);
+            let of = |ln_size, c| ground.contact(&at(ln_size, c), (&poses, &upright()), joints, 0.9);
             let mut bars = at(0.0, 0.0);
             of(ln_size, c).pull_back(2.0, &mut bars);
             let h = 1e-6;

@@ -1,12 +1,12 @@
 //! A window of frames fitted as one: the body moves through a space of poses that real people have taught.
 //!
 //! With `parameterization = "motion"` a fit's coordinates are, for each person, place (where the floor is known, height above it:
-//! [`ground`]), heading and size in the middle of the window and the coefficients of `body::MotionPrior` ([`space`]). They place the joints in all frames of the window at once; each
+//! [`ground`]), heading, size and tilt ([`tilt`]) in the middle of the window and the coefficients of `body::MotionPrior` ([`space`]). They place the joints in all frames of the window at once; each
 //! frame compares its own maps (`mhp/frame_em.rs`), and
 //!
 //! ```text
 //! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior
-//! L_prior = W/F · ((‖c‖² + ((s − s₀)/σ_s)² + ((q − q₀)/σ_q)²)/30 + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)² + ρ(h/σ_h))
+//! L_prior = W/F · ((‖c‖² + ((s − s₀)/σ_s)² + ((q − q₀)/σ_q)² + ρ(w, ẇ))/30 + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)² + ρ(h/σ_h))
 //! ```
 //!
 //! with F the frames there are and W those that are asked for (`window`), for fewer frames are less evidence against a prior that
@@ -31,6 +31,7 @@ mod static_echo;
 #[cfg(test)]
 mod tests;
 mod thinned;
+mod tilt;
 mod turn;
 
 pub(super) use decode::{Decoded, Stage, carried, decode, lowest};
@@ -44,10 +45,9 @@ use super::{FitError, Precision, Problem};
 use crate::body::{Group, MotionPrior, Pppr};
 use crate::config::{EmLoss, FitConfig, Height};
 use crate::geometry::{Vec3, add_scaled, mean, norm};
-use ground::Contact;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
-use space::{BODY, Detail, HEIGHT, LN_SIZE, MOST_JOINTS, PoseSpace, STILL, YAW};
+use space::{BODY, Detail, HEIGHT, LN_SIZE, MOST_JOINTS, PoseSpace, STILL, Stance, TILT, YAW};
 use static_echo::StaticEchoModel;
 
 /// Frames of a window lie no farther from its middle, s: the prior reaches no farther.
@@ -56,8 +56,8 @@ const REACH_S: f64 = 0.201;
 const BETA_1: f64 = 0.9;
 const BETA_2: f64 = 0.99;
 const EPSILON: f64 = 1e-8;
-/// Steps of t and h, y, s, q and c at the default learning rate.
-const RATES: [f64; 5] = [0.01, 0.04, 0.006, 0.2, 0.08];
+/// Steps of t and h, y, s, q, w, ẇ and c at the default learning rate.
+const RATES: [f64; 7] = [0.01, 0.04, 0.006, 0.2, 0.02, 0.1, 0.08];
 const DEFAULT_RATE: f64 = 1e-3;
 /// From this share of the iterations on steps are shorter, by so much.
 const SLOW_FROM: f64 = 0.6;
@@ -75,7 +75,7 @@ const WALKING_MPS: f64 = 0.35;
 /// The coordinates of a fit in a window, and Adam's moments of them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct MotionState {
-    /// A person after the other: t (3, m; the third is the height above the floor where that is known), heading y (rad), ln size s, what is left of static echoes q, c in standard deviations.
+    /// A person after the other: t (3, m; the third is the height above the floor where that is known), heading y (rad), ln size s, what is left of static echoes q, tilt w (2, rad) and ẇ (2, rad/s), c in standard deviations.
     pub coordinates: Vec<f64>,
     /// Exponential mean of the gradient.
     pub first: Vec<f64>,
@@ -293,8 +293,9 @@ impl Window {
         let [positions, velocities] = params.motion_mut();
         for (person, of) in coordinates.chunks_exact(self.stride).enumerate() {
             let own = person * joints..(person + 1) * joints;
-            self.space.pose(of, self.space.contact(of).as_ref(), self.own, &mut positions[own.clone()]);
-            self.space.velocity(of, self.own, &mut velocities[own]);
+            let stance = self.space.stance(of);
+            self.space.pose(of, &stance, self.own, &mut positions[own.clone()]);
+            self.space.velocity(of, &stance, (self.own, &positions[own.clone()]), &mut velocities[own]);
         }
         self.dim(coordinates, params);
     }
@@ -340,8 +341,7 @@ impl Window {
         let prior_gain = config.w_prior * prior_share;
         (loss.em, loss.prior) = (0.0, 0.0);
         let mut kept = looks;
-        let contacts: SmallVec<[Option<Contact>; 4]> =
-            coordinates.chunks_exact(*stride).map(|own| space.contact(own)).collect();
+        let stances: SmallVec<[Stance; 4]> = coordinates.chunks_exact(*stride).map(|own| space.stance(own)).collect();
         for (frame, of) in frames.iter_mut().enumerate().step_by(every) {
             for group in Group::ALL[1..].iter().filter(|&&group| group != Group::Velocity) {
                 of.params.group_mut(*group).copy_from_slice(params.group(*group));
@@ -349,8 +349,8 @@ impl Window {
             let [positions, velocities] = of.params.motion_mut();
             for (person, own) in coordinates.chunks_exact(*stride).enumerate() {
                 let joints = person * joints..(person + 1) * joints;
-                space.pose(own, contacts[person].as_ref(), frame, &mut positions[joints.clone()]);
-                space.velocity(own, frame, &mut velocities[joints]);
+                space.pose(own, &stances[person], frame, &mut positions[joints.clone()]);
+                space.velocity(own, &stances[person], (frame, &positions[joints.clone()]), &mut velocities[joints]);
             }
             if let Some(echo) = echo {
                 let each = coordinates.chunks_exact(*stride).enumerate();
@@ -381,8 +381,8 @@ impl Window {
                 let gain = share * prior_gain;
                 let misfit = space.proportions.misfit(own, pose, gain, (&mut pose_bar, &mut *bars));
                 loss.prior += share * prior_share * misfit;
-                space.pull_back(own, contacts[person].as_ref(), frame, (pose, &pose_bar[..joints]), bars);
-                space.pull_back_velocity(own, frame, (velocities, &velocity_bar[..joints]), bars);
+                let moving = Some((velocities, &velocity_bar[..joints]));
+                space.pull_back(own, &stances[person], frame, ((pose, &pose_bar[..joints]), moving), bars);
             }
             if let Some(looks) = kept.as_deref_mut() {
                 looks.add_scaled(share, &of.gradient);
@@ -404,7 +404,7 @@ impl Window {
         {
             let joints = person * joints..(person + 1) * joints;
             let pose = (&params.positions()[joints.clone()], &gradient.positions()[joints]);
-            self.space.pull_back(own, self.space.contact(own).as_ref(), self.own, pose, bars);
+            self.space.pull_back(own, &self.space.stance(own), self.own, (pose, None), bars);
         }
     }
 }
@@ -429,8 +429,9 @@ impl MotionState {
                 YAW => RATES[1],
                 LN_SIZE => RATES[2],
                 STILL => RATES[3],
+                at @ TILT..BODY => RATES[4 + (at - TILT) / 2],
                 _ if held => 0.0,
-                _ => RATES[4],
+                _ => RATES[6],
             };
             *m = BETA_1 * *m + (1.0 - BETA_1) * g;
             *v = BETA_2 * *v + (1.0 - BETA_2) * g * g;

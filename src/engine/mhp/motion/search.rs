@@ -5,11 +5,12 @@
 
 use super::decode::lowest;
 use super::{
-    BODY, Detail, HEIGHT, Held, LN_SIZE, MotionState, STILL, WALKING_MPS, Window, WindowLoss, YAW, lbfgs, ways,
+    BODY, Detail, HEIGHT, Held, LN_SIZE, MotionState, STILL, TILT, WALKING_MPS, Window, WindowLoss, YAW, lbfgs, tilt,
+    ways,
 };
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::{Vec3, add, mean, norm, scale, sub};
+use crate::geometry::{Vec3, mean, norm, sub};
 use crate::mhp::skin::radar_place;
 use crate::mhp::{FitError, Precision, Problem, tiles};
 use std::f64::consts::{PI, TAU};
@@ -23,8 +24,8 @@ const SIEVES: [Sieve; 3] = [
 ];
 /// Evaluations of what is left, and of each body that is carried on from another frame.
 const FINE: usize = 16;
-/// How far t and h, y, s, q and c may go in a step of it.
-const UNITS: [f64; 5] = [0.03, 0.12, 0.03, 1.0, 0.5];
+/// How far t and h, y, s, q, w, ẇ and c may go in a step of it.
+const UNITS: [f64; 7] = [0.03, 0.12, 0.03, 1.0, 0.06, 0.3, 0.5];
 /// What a search may cost: Gaussians times cells, over all frames and evaluations. A map of 256 × 128 cells as a whole, five frames of
 /// two views, takes all the starts of the recommended settings.
 const MOST_WORK: f64 = 2e10;
@@ -32,12 +33,16 @@ const MOST_WORK: f64 = 2e10;
 const PLAIN: f64 = 10.0;
 /// Evaluations of a person's search beside those of the first sieve, with those of what is carried on, and those of a start in it, in
 /// whole windows.
-const LATER: f64 = 350.0;
+const LATER: f64 = 370.0;
 const FIRST: f64 = 7.0 / 4.0;
 /// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start.
 const WEIGHTS: [f64; 2] = [0.5, 8e-3];
 /// Starts whose joints have come nearer to each other than this, on average, have become one, m.
 const ONE_M: f64 = 0.03;
+/// Of the bodies that fall or lie, those with the lowest loss that are tried beside the others.
+const FALLEN: usize = 4;
+/// A body that is tilted farther is tried on its other sides, rad.
+const LIES_RAD: f64 = 0.3;
 /// A heading whose loss is larger by a smaller share than this is as good.
 const AMBIGUOUS: f64 = 0.1;
 /// Headings farther apart than this are different ones.
@@ -161,7 +166,8 @@ impl<'a> Search<'a> {
                 YAW => UNITS[1],
                 LN_SIZE => UNITS[2],
                 STILL => UNITS[3],
-                _ => UNITS[4],
+                at @ TILT..BODY => UNITS[4 + (at - TILT) / 2],
+                _ => UNITS[6],
             })
             .collect();
         let Tried { state, loss, em, prior } = tried;
@@ -187,17 +193,39 @@ impl<'a> Search<'a> {
         let velocities = placed.velocities()[own.clone()].to_vec();
         let yaw = tried.state.coordinates[person * self.window.stride + YAW];
         let to_radar = sub(radar_place(&self.problem.views), middle);
+        let mine = &tried.state.coordinates[person * self.window.stride..];
+        let upright = mine[TILT].hypot(mine[TILT + 1]).cos().max(0.0);
         Hypothesis {
             loss: tried.loss,
             unlikeness: super::unlikeness(self.config, tried.em, tried.prior / self.window.scarcity)
-                + OF_WAY * norm(way),
+                + OF_WAY * way[0].hypot(way[1]),
             yaw,
-            away: away(yaw, (&placed.positions()[own.clone()], &velocities), to_radar),
+            away: 1.0 - upright * (1.0 - away(yaw, (&placed.positions()[own.clone()], &velocities), to_radar)),
             joints: placed.positions()[own.clone()].to_vec(),
             velocities,
             beta: placed.group(Group::Beta)[own].to_vec(),
             still: tried.state.coordinates[person * self.window.stride + STILL],
         }
+    }
+
+    /// The most promising of the bodies that fall or lie, of a person that goes this way, m/s, with its hips about here, m, the radar
+    /// so high above the floor, m.
+    fn fallen(
+        &mut self,
+        coordinates: &[f64],
+        own: Range<usize>,
+        (hips, radar_height_m, way): (Vec3, Option<f64>, Vec3),
+    ) -> Vec<Tried> {
+        self.every = SIEVES[0].every;
+        let mut all: Vec<(f64, Tried)> = tilt::fallen(way)
+            .map(|fallen| {
+                let mut of = coordinates.to_vec();
+                self.window.space.lay(&mut of[own.clone()], &fallen, hips, radar_height_m);
+                (self.evaluate(&of), Tried::at(of))
+            })
+            .collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        all.into_iter().take(FALLEN).map(|(_, tried)| tried).collect()
     }
 
     /// What a sieve leaves of `all`, the best first; of those that have become one, one.
@@ -230,7 +258,7 @@ impl<'a> Search<'a> {
         let apart = ends.map(|frame| {
             for (of, pose) in [a, b].into_iter().zip(&mut poses) {
                 let (mine, space) = (&of.state.coordinates[own.clone()], &self.window.space);
-                space.pose(mine, space.contact(mine).as_ref(), frame, pose);
+                space.pose(mine, &space.stance(mine), frame, pose);
             }
             poses[0].iter().zip(&poses[1]).map(|(p, q)| norm(sub(*p, *q))).sum::<f64>()
         });
@@ -257,7 +285,8 @@ pub(in crate::mhp) fn search(
     let mut found = WindowLoss::default();
     window.choose_brightness((problem, config), Precision::F32, (&mut coordinates, params), &mut found);
     let (stride, joints) = (window.stride, params.shape().joints.max(1));
-    let walks: Vec<bool> = ways(params).iter().map(|way| way[0].hypot(way[1]) > 0.5).collect();
+    let ways = ways(params);
+    let walks: Vec<bool> = ways.iter().map(|way| way[0].hypot(way[1]) > 0.5).collect();
     let (floor, grounded) = (problem.radar.height_m, window.space.ground.is_some());
     let starts = window.space.starts.clone();
     let mut search = Search::new((problem, config), &mut window, params);
@@ -285,6 +314,7 @@ pub(in crate::mhp) fn search(
                 all.push(Tried::at(of));
             }
         }
+        all.extend(search.fallen(&coordinates, own.clone(), (hips, floor, ways[person])));
         for sieve in &SIEVES {
             search.sift(&mut all, sieve, &own);
         }
@@ -301,10 +331,16 @@ pub(in crate::mhp) fn search(
             let found = best.state.coordinates.clone();
             let mut others = vec![found.clone()];
             search.window.space.mirror(&mut others[0][own.clone()]);
-            if !walks[person] {
-                let mut behind = found;
-                behind[own.start + YAW] += PI;
-                others.push(behind);
+            let tilted = found[own.start + TILT].hypot(found[own.start + TILT + 1]) > LIES_RAD;
+            let sides: &[f64] = match () {
+                () if tilted => &[0.5 * PI, PI, 1.5 * PI],
+                () if walks[person] => &[],
+                () => &[PI],
+            };
+            for side in sides {
+                let mut rolled = found.clone();
+                tilt::roll(&mut rolled[own.clone()], *side);
+                others.push(rolled);
             }
             for of in others {
                 let mut tried = Tried::at(of);
@@ -344,10 +380,9 @@ pub(in crate::mhp) fn carry_on(
     let Ok(mut window) = Window::new(problem, config, (Precision::F32, Detail::Search), params)? else { return Ok(()) };
     let mut search = Search::new((problem, config), &mut window, params);
     for (t_s, other) in others {
-        let way = scale(mean(&other.velocities), -t_s);
         let mut moved = params.clone();
-        Hypothesis { joints: other.joints.iter().map(|&p| add(p, way)).collect(), ..(*other).clone() }
-            .place(0, &mut moved);
+        let joints = tilt::later(&other.joints, &other.velocities, -t_s);
+        Hypothesis { joints, ..(*other).clone() }.place(0, &mut moved);
         let mut coordinates = search.window.coordinates_of(&moved);
         coordinates[STILL] = other.still;
         let mut tried = Tried::at(coordinates);

@@ -2,17 +2,21 @@
 //!
 //! ```text
 //! X_f(c) = μ_f + Σ_k c_k B_fk            (joints, 3), sizes; c in standard deviations
-//! p_f    = e^s R_z(y) X_f(c) + t         world frame, m
+//! u_f    = exp([w + ẇ t_f]×) (X_f(c) + η e_z)
+//! p_f    = e^s R_z(y) (u_f − η e_z) + t    world frame, m
 //! ```
 //!
-//! Coordinates of a person are t (3, m), y (rad), s (ln m), q (how bright what stands still is, `static_echo.rs`) and c. Where the
-//! floor is known the third is how high the lowest part of the body is above it instead of t_z (`ground.rs`).
+//! Coordinates of a person are t (3, m), y (rad), s (ln m), q (how bright what stands still is, `static_echo.rs`), the tilt w and ẇ (2
+//! each, `tilt.rs`) and c. Where the floor is known the third is how high the lowest part of the body is above it instead of t_z
+//! (`ground.rs`).
 
 use super::ground::{self, Contact, Ground};
 use super::proportions::Proportions;
 use super::static_echo;
+use super::tilt::{self, Fallen, Tilt};
 use crate::body::{MotionPrior, Skeleton};
-use crate::geometry::Vec3;
+use crate::geometry::{Vec3, add, cross, norm, scale, sub};
+use smallvec::SmallVec;
 
 /// Components of the prior that a pose has at most.
 pub(super) const MOST_COMPONENTS: usize = 64;
@@ -40,21 +44,30 @@ impl Detail {
 const SHARE: f64 = 1.0 / 30.0;
 /// Half the time over which a velocity is taken, s.
 const HALF_STEP_S: f64 = 0.05;
-/// t, y, s and q: what a person has beside c.
-pub(super) const BODY: usize = 6;
-/// Where t_z, or the height above the floor, y, s and q stand.
+/// t, y, s, q, w and ẇ: what a person has beside c.
+pub(super) const BODY: usize = TILT + tilt::NUMBERS;
+/// Where t_z, or the height above the floor, y, s, q, and w and ẇ stand.
 pub(super) const HEIGHT: usize = 2;
 pub(super) const YAW: usize = 3;
 pub(super) const LN_SIZE: usize = 4;
 pub(super) const STILL: usize = 5;
+pub(super) const TILT: usize = 6;
 /// How far joints and what they travel in `HALF_STEP_S` may be from the prior's, sizes: those of a start are no measurements.
 const MISFIT: f64 = 0.05;
+/// A body that has to be turned by less than this from the prior's mean is bent, not tilted, rad.
+const BENT: f64 = 0.2;
+/// How high the hips of a body that lies are, sizes.
+const LIES: f64 = 0.1;
 
 /// Poses of a skeleton at some times.
 #[derive(Debug, Clone)]
 pub(super) struct PoseSpace {
     joints: usize,
     components: usize,
+    /// When the frames are, s after the window's middle.
+    times_s: Vec<f64>,
+    /// η
+    hips: f64,
     /// A row a time: the mean and then the components, (1 + components, joints), sizes.
     poses: Vec<Vec<Vec3>>,
     /// What these change in a second at each time.
@@ -142,9 +155,12 @@ impl PoseSpace {
             at(to).into_iter().zip(at(from)).map(|(b, a)| [0, 1, 2].map(|k| (b[k] - a[k]) * slope)).collect()
         };
         let starts = prior.starts().iter().map(|start| (start.coefficients[..components].to_vec(), start.hip_height));
+        let lowest = at(0.0)[..skeleton.joints.len()].iter().map(|p| p[HEIGHT]).fold(f64::INFINITY, f64::min);
         Some(Self {
             joints: skeleton.joints.len(),
             components,
+            times_s: times_s.to_vec(),
+            hips: -lowest,
             poses: times_s.iter().map(|&t_s| at(t_s)).collect(),
             changes: times_s.iter().map(change).collect(),
             ln_size: prior.ln_size(),
@@ -155,7 +171,7 @@ impl PoseSpace {
         })
     }
 
-    /// The same body with left and right exchanged.
+    /// The same body with left and right exchanged; how it is tilted stays.
     pub(super) fn mirror(&self, coordinates: &mut [f64]) {
         coordinates[BODY..].iter_mut().zip(&self.signs).for_each(|(c, sign)| *c *= sign);
     }
@@ -178,82 +194,134 @@ impl PoseSpace {
         }
     }
 
-    /// Which parts of a person with these coordinates are lowest over the window's frames, where the floor is known.
-    pub(super) fn contact(&self, coordinates: &[f64]) -> Option<Contact> {
-        Some(self.ground.as_ref()?.contact(coordinates, &self.poses, self.joints))
-    }
-
-    /// t of a person with these coordinates who has this contact with the floor, world frame, m.
-    fn place(coordinates: &[f64], contact: Option<&Contact>) -> Vec3 {
-        [coordinates[0], coordinates[1], coordinates[HEIGHT] + contact.map_or(0.0, |contact| contact.z_m)]
-    }
-
-    /// The joints of a person with these coordinates, and this contact with the floor, at time `frame`, world frame, m.
-    pub(super) fn pose(&self, coordinates: &[f64], contact: Option<&Contact>, frame: usize, out: &mut [Vec3]) {
-        self.mixed(&self.poses[frame], &coordinates[BODY..], out);
-        let (turn, place) = (Turn::of(coordinates), Self::place(coordinates, contact));
-        for p in out {
-            let turned = turn.forwards(*p);
-            *p = [0, 1, 2].map(|k| turned[k] + place[k]);
+    /// Gives a person of these coordinates this body, in the pose that people have most often, with its hips (world frame, m) as far
+    /// along it as that says; on the floor where the radar's height above that is known, m.
+    pub(super) fn lay(&self, coordinates: &mut [f64], fallen: &Fallen, hips: Vec3, radar_height_m: Option<f64>) {
+        fallen.place(coordinates);
+        match self.starts.first() {
+            Some((c, _)) => coordinates[BODY..].copy_from_slice(c),
+            None => coordinates[BODY..].fill(0.0),
         }
-    }
-
-    /// Their velocities, m/s.
-    pub(super) fn velocity(&self, coordinates: &[f64], frame: usize, out: &mut [Vec3]) {
-        self.mixed(&self.changes[frame], &coordinates[BODY..], out);
         let turn = Turn::of(coordinates);
-        for v in out.iter_mut() {
-            *v = turn.forwards(*v);
+        let [x, y, z] = Tilt::of(&coordinates[TILT..BODY], 0.0).forwards([0.0, 0.0, self.hips]);
+        let beside = turn.forwards([x, y, z - self.hips]);
+        let lies = z + LIES * x.hypot(y) / self.hips;
+        let lies_m = radar_height_m.map_or(hips[2], |height_m| lies * turn.size - height_m);
+        let [x, y, _] = sub(add(hips, scale(fallen.towards(), fallen.along_m)), beside);
+        let height = if self.ground.is_some() { 0.0 } else { lies_m - beside[2] };
+        coordinates[..YAW].copy_from_slice(&[x, y, height]);
+    }
+
+    /// How a person with these coordinates is tilted in each frame, and stands on the floor where that is known.
+    pub(super) fn stance(&self, coordinates: &[f64]) -> Stance {
+        let tilts: SmallVec<[Tilt; FRAMES]> =
+            self.times_s.iter().map(|&t_s| Tilt::of(&coordinates[TILT..BODY], t_s)).collect();
+        let upright = coordinates[TILT..BODY].iter().all(|&x| x == 0.0);
+        let contact = self
+            .ground
+            .as_ref()
+            .map(|ground| ground.contact(coordinates, (&self.poses, &tilts), self.joints, self.hips));
+        Stance { tilts, upright, contact }
+    }
+
+    /// t of a person with these coordinates, world frame, m.
+    fn place(coordinates: &[f64], stance: &Stance) -> Vec3 {
+        let ground_m = stance.contact.as_ref().map_or(0.0, |contact| contact.z_m);
+        [coordinates[0], coordinates[1], coordinates[HEIGHT] + ground_m]
+    }
+
+    /// X or its change, of a frame, as the tilt turns it; `above` is added to its height before.
+    fn turned(&self, row: &[Vec3], c: &[f64], (tilt, above): (&Tilt, f64), out: &mut [Vec3]) {
+        self.mixed(row, c, out);
+        for p in out {
+            *p = tilt.forwards([p[0], p[1], p[2] + above]);
         }
     }
 
-    /// Adds to `bars` (a coordinate each) what the adjoints of a frame's joints imply; `pose` are the joints.
+    /// The joints of a person with these coordinates, and this stance, at time `frame`, world frame, m.
+    pub(super) fn pose(&self, coordinates: &[f64], stance: &Stance, frame: usize, out: &mut [Vec3]) {
+        self.turned(&self.poses[frame], &coordinates[BODY..], (&stance.tilts[frame], self.hips), out);
+        let (turn, place) = (Turn::of(coordinates), Self::place(coordinates, stance));
+        for p in out {
+            *p = add(turn.forwards([p[0], p[1], p[2] - self.hips]), place);
+        }
+    }
+
+    /// Their velocities, m/s, where they are at `pose`.
+    pub(super) fn velocity(
+        &self,
+        coordinates: &[f64],
+        stance: &Stance,
+        (frame, pose): (usize, &[Vec3]),
+        out: &mut [Vec3],
+    ) {
+        let tilt = &stance.tilts[frame];
+        self.turned(&self.changes[frame], &coordinates[BODY..], (tilt, 0.0), out);
+        let (turn, place) = (Turn::of(coordinates), Self::place(coordinates, stance));
+        for (v, p) in out.iter_mut().zip(pose) {
+            *v = turn.forwards(tilt.swept(self.before_turn(&turn, place, *p), *v));
+        }
+    }
+
+    /// u of a joint at `p`.
+    fn before_turn(&self, turn: &Turn, place: Vec3, p: Vec3) -> Vec3 {
+        let [x, y, z] = turn.inverse(sub(p, place));
+        [x, y, z + self.hips]
+    }
+
+    /// Adds to `bars` (a coordinate each) what the adjoints of a frame's joints and velocities imply.
     pub(super) fn pull_back(
         &self,
         coordinates: &[f64],
-        contact: Option<&Contact>,
+        stance: &Stance,
         frame: usize,
-        (pose, pose_bar): (&[Vec3], &[Vec3]),
+        ((pose, pose_bar), moving): (Barred, Option<Barred>),
         bars: &mut [f64],
     ) {
         let turn = Turn::of(coordinates);
+        let tilt = &stance.tilts[frame];
         let [mut x, mut y, mut z, mut yaw, mut ln_size] = [0.0; 5];
-        let place = Self::place(coordinates, contact);
-        let mut own = [[0.0; 3]; MOST_JOINTS];
-        for ((p, bar), own) in pose.iter().zip(pose_bar).zip(&mut own) {
-            let beside = [p[0] - place[0], p[1] - place[1], p[2] - place[2]];
+        let place = Self::place(coordinates, stance);
+        let (mut torque, mut swing) = ([0.0; 3], [0.0; 3]);
+        let (mut own, mut own_change) = ([[0.0; 3]; MOST_JOINTS], [[0.0; 3]; MOST_JOINTS]);
+        for (joint, ((p, bar), own)) in pose.iter().zip(pose_bar).zip(&mut own).enumerate() {
+            let beside = sub(*p, place);
+            let turned = self.before_turn(&turn, place, *p);
             x += bar[0];
             y += bar[1];
             z += bar[2];
             yaw += beside[0] * bar[1] - beside[1] * bar[0];
             ln_size += beside[0] * bar[0] + beside[1] * bar[1] + beside[2] * bar[2];
-            *own = turn.backwards(*bar);
+            let mut at_bar = turn.backwards(*bar);
+            if let Some((velocities, velocity_bar)) = moving {
+                let (v, bar) = (velocities[joint], velocity_bar[joint]);
+                yaw += v[0] * bar[1] - v[1] * bar[0];
+                ln_size += v[0] * bar[0] + v[1] * bar[1] + v[2] * bar[2];
+                let bar = turn.backwards(bar);
+                let own_v = sub(turn.inverse(v), tilt.swept(turned, [0.0; 3]));
+                at_bar = add(at_bar, tilt.swept_back(bar));
+                swing = add(swing, cross(turned, bar));
+                torque = add(torque, cross(own_v, bar));
+                own_change[joint] = tilt.backwards(bar);
+            }
+            torque = add(torque, cross(turned, at_bar));
+            *own = tilt.backwards(at_bar);
         }
         for (bar, sum) in bars.iter_mut().zip([x, y, z, yaw, ln_size]) {
             *bar += sum;
         }
+        tilt.pull_back(torque, &mut bars[TILT..BODY]);
         self.mixed_back(&self.poses[frame], &own, bars);
-        if let Some(contact) = contact {
+        if moving.is_some() {
+            tilt.pull_back_spin(swing, &mut bars[TILT..BODY]);
+            self.mixed_back(&self.changes[frame], &own_change, bars);
+        }
+        if let Some(contact) = &stance.contact {
             contact.pull_back(z, bars);
         }
-    }
-
-    /// Adds to `bars` what the adjoints of a frame's velocities imply.
-    pub(super) fn pull_back_velocity(
-        &self,
-        coordinates: &[f64],
-        frame: usize,
-        (velocities, velocity_bar): (&[Vec3], &[Vec3]),
-        bars: &mut [f64],
-    ) {
-        let turn = Turn::of(coordinates);
-        let mut own = [[0.0; 3]; MOST_JOINTS];
-        for ((v, bar), own) in velocities.iter().zip(velocity_bar).zip(&mut own) {
-            bars[YAW] += v[0] * bar[1] - v[1] * bar[0];
-            bars[LN_SIZE] += v[0] * bar[0] + v[1] * bar[1] + v[2] * bar[2];
-            *own = turn.backwards(*bar);
+        if stance.upright {
+            bars[TILT..BODY].fill(0.0);
         }
-        self.mixed_back(&self.changes[frame], &own, bars);
     }
 
     /// Adds to the bars of c what the adjoints of [`Self::mixed`] imply.
@@ -268,15 +336,16 @@ impl PoseSpace {
         }
     }
 
-    /// How unlikely the coordinates are: [`SHARE`] of the squares of c, s and q, in standard deviations, and how far from the floor they
-    /// are; adds `gain` times its gradient.
+    /// How unlikely the coordinates are: [`SHARE`] of the squares of c, s and q, in standard deviations, and of what the tilt costs, and how
+    /// far from the floor they are; adds `gain` times its gradient.
     pub(super) fn unlikeliness(&self, coordinates: &[f64], gain: f64, bars: &mut [f64]) -> f64 {
         let [mean, deviation] = self.ln_size;
         let size = (coordinates[LN_SIZE] - mean) / deviation;
         bars[LN_SIZE] += 2.0 * gain * SHARE * size / deviation;
         let (still, by_still) = static_echo::unlikeliness(coordinates[STILL]);
         bars[STILL] += gain * SHARE * by_still;
-        let mut sum = size * size + still;
+        let tilted = tilt::unlikeliness(&coordinates[TILT..BODY], gain * SHARE, &mut bars[TILT..BODY]);
+        let mut sum = size * size + still + tilted;
         for (c, bar) in coordinates[BODY..].iter().zip(&mut bars[BODY..]) {
             sum += c * c;
             *bar += 2.0 * gain * SHARE * c;
@@ -288,28 +357,66 @@ impl PoseSpace {
 
     /// The coordinates whose joints and velocities at time `frame` are nearest to these, in a space that has its mean at 0.
     pub(super) fn project(&self, frame: usize, joints: &[Vec3], velocities: &[Vec3]) -> Vec<f64> {
+        let upright = self.nearest(frame, joints, velocities, false);
+        let w = tilt::between(&self.poses[frame][..self.joints], joints);
+        let best = if w[0].hypot(w[1]) < BENT {
+            upright
+        } else {
+            let tilted = self.nearest(frame, joints, velocities, true);
+            if tilted.1 < upright.1 { tilted } else { upright }
+        };
+        best.0
+    }
+
+    /// The same of a body that is upright or tilted, and how far they are from it: squares over all joints, sizes.
+    fn nearest(&self, frame: usize, joints: &[Vec3], velocities: &[Vec3], tilted: bool) -> (Vec<f64>, f64) {
         let mut coordinates = vec![0.0; self.coordinates()];
         coordinates[LN_SIZE] = self.ln_size[0];
         coordinates[STILL] = static_echo::USUAL;
         coordinates[YAW] = yaw_of(joints, &self.poses[frame][..self.joints]);
-        // Place, size and pose in turn: each is linear where the others are known, and a few rounds settle.
+        // Tilt, place and size, and pose in turn: a few rounds settle.
         for _ in 0..ROUNDS {
+            if tilted {
+                self.tilt(frame, (joints, velocities), &mut coordinates);
+            }
             self.align(frame, joints, &mut coordinates);
             self.solve(frame, joints, velocities, &mut coordinates);
         }
         self.align(frame, joints, &mut coordinates);
-        coordinates[HEIGHT] -= self.contact(&coordinates).map_or(0.0, |contact| contact.z_m);
-        coordinates
+        let mut pose = vec![[0.0; 3]; self.joints];
+        let plain = Stance { contact: None, ..self.stance(&coordinates) };
+        self.pose(&coordinates, &plain, frame, &mut pose);
+        let off: f64 = pose.iter().zip(joints).map(|(p, q)| norm(sub(*p, *q)).powi(2)).sum();
+        let size_m = coordinates[LN_SIZE].exp();
+        let unlikely: f64 = coordinates[BODY..].iter().map(|c| c * c).sum::<f64>()
+            + tilt::unlikeliness(&coordinates[TILT..BODY], 0.0, &mut [0.0; tilt::NUMBERS]);
+        coordinates[HEIGHT] -= self.stance(&coordinates).contact.map_or(0.0, |contact| contact.z_m);
+        (coordinates, off / (size_m * size_m) + MISFIT * MISFIT * unlikely)
     }
 
-    /// t, y and s that bring the pose of c onto `joints`.
-    fn align(&self, frame: usize, joints: &[Vec3], coordinates: &mut [f64]) {
+    /// w and ẇ that bring the pose of c nearest to `joints` and what they do.
+    fn tilt(&self, frame: usize, (joints, velocities): (&[Vec3], &[Vec3]), coordinates: &mut [f64]) {
         let mut pose = vec![[0.0; 3]; self.joints];
         self.mixed(&self.poses[frame], &coordinates[BODY..], &mut pose);
+        let w = tilt::between(&pose, joints);
+        let tilt = Tilt::of(&[w[0], w[1], 0.0, 0.0], 0.0);
+        let turned: Vec<Vec3> = pose.iter().map(|&p| tilt.forwards(p)).collect();
+        coordinates[YAW] = yaw_of(joints, &turned);
+        let turn = Turn::of(coordinates);
+        let [there, moving] = [joints, velocities].map(|of| of.iter().map(|&p| turn.inverse(p)).collect::<Vec<_>>());
+        let (rate, t_s) = (tilt::spin_of(&there, &moving), self.times_s[frame]);
+        coordinates[TILT..BODY].copy_from_slice(&[w[0] - t_s * rate[0], w[1] - t_s * rate[1], rate[0], rate[1]]);
+    }
+
+    /// t, y and s that bring the pose of c and the tilt onto `joints`.
+    fn align(&self, frame: usize, joints: &[Vec3], coordinates: &mut [f64]) {
+        let mut pose = vec![[0.0; 3]; self.joints];
+        let tilt = Tilt::of(&coordinates[TILT..BODY], self.times_s[frame]);
+        self.turned(&self.poses[frame], &coordinates[BODY..], (&tilt, self.hips), &mut pose);
         let (a, b) = (crate::geometry::mean(&pose), crate::geometry::mean(joints));
         let (mut cosine, mut sine, mut square, mut height) = (0.0, 0.0, 0.0, 0.0);
         for (p, q) in pose.iter().zip(joints) {
-            let (p, q) = ([0, 1, 2].map(|k| p[k] - a[k]), [0, 1, 2].map(|k| q[k] - b[k]));
+            let (p, q) = (sub(*p, a), sub(*q, b));
             cosine += p[0] * q[0] + p[1] * q[1];
             sine += p[0] * q[1] - p[1] * q[0];
             height += p[2] * q[2];
@@ -319,10 +426,8 @@ impl PoseSpace {
         let [mean, deviation] = self.ln_size;
         let size = ((cosine.hypot(sine) + height) / square.max(1e-9)).max(1e-3).ln();
         coordinates[LN_SIZE] = size.clamp(mean - 3.0 * deviation, mean + 3.0 * deviation);
-        let turned = Turn::of(coordinates).forwards(a);
-        for k in 0..3 {
-            coordinates[k] = b[k] - turned[k];
-        }
+        let middle = Turn::of(coordinates).forwards([a[0], a[1], a[2] - self.hips]);
+        coordinates[..3].copy_from_slice(&sub(b, middle));
     }
 
     /// c by least squares with the prior, for the t, y and s that are there.
@@ -331,12 +436,15 @@ impl PoseSpace {
         let turn = Turn::of(coordinates);
         let (mut normal, mut right) = (vec![0.0; n * n], vec![0.0; n]);
         let place = [coordinates[0], coordinates[1], coordinates[2]];
-        let own = |p: Vec3| {
-            let back = turn.backwards(p);
-            back.map(|x| x / (turn.size * turn.size))
+        let tilt = Tilt::of(&coordinates[TILT..BODY], self.times_s[frame]);
+        let turned: Vec<Vec3> = joints.iter().map(|&p| self.before_turn(&turn, place, p)).collect();
+        let own = |&u: &Vec3| {
+            let [x, y, z] = tilt.backwards(u);
+            [x, y, z - self.hips]
         };
-        let poses = joints.iter().map(|p| own([0, 1, 2].map(|k| p[k] - place[k]))).collect::<Vec<_>>();
-        let changes = velocities.iter().map(|&v| own(v)).collect::<Vec<_>>();
+        let poses = turned.iter().map(own).collect::<Vec<_>>();
+        let swept = velocities.iter().zip(&turned).map(|(&v, &u)| sub(turn.inverse(v), tilt.swept(u, [0.0; 3])));
+        let changes = swept.map(|v| tilt.backwards(v)).collect::<Vec<_>>();
         for (row, wanted, weight) in [(&self.poses[frame], &poses, 1.0), (&self.changes[frame], &changes, HALF_STEP_S)]
         {
             for (joint, wanted) in wanted.iter().enumerate() {
@@ -362,6 +470,20 @@ impl PoseSpace {
     }
 }
 
+/// Frames of a window of which nothing has to be allocated.
+const FRAMES: usize = 9;
+
+/// Points or velocities, and their adjoints.
+type Barred<'a> = (&'a [Vec3], &'a [Vec3]);
+
+/// How a person is in the frames of a window.
+#[derive(Debug, Clone)]
+pub(super) struct Stance {
+    tilts: SmallVec<[Tilt; FRAMES]>,
+    upright: bool,
+    contact: Option<Contact>,
+}
+
 /// Joints of a skeleton at most: those of larger ones are not moved by a prior.
 pub(super) const MOST_JOINTS: usize = 64;
 /// Rounds in which place and pose are found from joints.
@@ -383,6 +505,11 @@ impl Turn {
 
     fn forwards(&self, [x, y, z]: Vec3) -> Vec3 {
         [self.cosine * x - self.sine * y, self.sine * x + self.cosine * y, self.size * z]
+    }
+
+    /// What [`Self::forwards`] makes this of.
+    fn inverse(&self, p: Vec3) -> Vec3 {
+        self.backwards(p).map(|x| x / (self.size * self.size))
     }
 
     /// The transpose.

@@ -67,7 +67,7 @@ fn person(rng: &mut StdRng, window: Option<&Window>) -> (Vec<f64>, Pppr) {
     }
     let stride = window.map_or(BODY + 1, |window| window.stride);
     let mut coordinates: Vec<f64> = (0..stride).map(|_| rng.random_range(-0.6..0.6)).collect();
-    coordinates[..BODY].copy_from_slice(&[3.0, 0.1, 0.0, 0.4, 0.08, -1.5]);
+    coordinates[..BODY].copy_from_slice(&[3.0, 0.1, 0.0, 0.4, 0.08, -1.5, 0.1, -0.3, 0.4, 0.9]);
     if let Some(window) = window {
         window.place(&coordinates, &mut params);
     }
@@ -128,7 +128,40 @@ fn coordinates_come_back_from_joints_and_velocities() {
     }
 }
 
-/// Where the floor is known and asked for, a body that bends its knees comes down until it stands.
+/// Who lies comes back from the joints, on any side and while falling, and the body is where it was laid.
+#[test]
+fn who_falls_or_lies_comes_back_from_joints_and_velocities() {
+    let prior = MotionPrior::committed().unwrap();
+    let skeleton = Skeleton::preset("coco17").unwrap();
+    for floor_z_m in [None, Some(-1.0)] {
+        let times_s = [-0.2, -0.1, 0.0, 0.1, 0.2];
+        let space = PoseSpace::new(prior, &skeleton, &times_s, floor_z_m, Detail::Fit).unwrap();
+        for (k, fallen) in tilt::fallen([0.9, -0.3, 0.0]).enumerate().step_by(5) {
+            let mut coordinates = vec![0.0; space.coordinates()];
+            coordinates[LN_SIZE] = -0.05;
+            let hips = [3.0, 0.4, -0.7];
+            space.lay(&mut coordinates, &fallen, hips, Some(1.0));
+            let at = |coordinates: &[f64], frame: usize| {
+                let (mut pose, mut velocities) = (vec![[0.0; 3]; 17], vec![[0.0; 3]; 17]);
+                let stance = space.stance(coordinates);
+                space.pose(coordinates, &stance, frame, &mut pose);
+                space.velocity(coordinates, &stance, (frame, &pose), &mut velocities);
+                (pose, velocities)
+            };
+            let (pose, velocities) = at(&coordinates, 2);
+            let middle = mean(&[pose[11], pose[12]]);
+            let wanted = crate::geometry::add(hips, crate::geometry::scale(fallen.towards(), fallen.along_m));
+            assert!(crate::geometry::flat_distance(middle, wanted) < 0.1, "{k}: {middle:?} {wanted:?}");
+            let lowest = pose.iter().map(|p| p[2]).fold(f64::INFINITY, f64::min);
+            assert!((-1.1..-0.7).contains(&lowest), "{k}: {lowest}");
+            let (again, moving) = at(&space.project(2, &pose, &velocities), 2);
+            let off = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(p, q)| norm(sub(*p, *q))).fold(0.0, f64::max);
+            assert!(off(&pose, &again) < 0.03, "{k}: a joint is {} m away", off(&pose, &again));
+            assert!(off(&velocities, &moving) < 0.4, "{k}: {} m/s", off(&velocities, &moving));
+        }
+    }
+}
+
 /// The body of a frame before, moved as it goes, becomes as good as what the search of this one found.
 #[test]
 fn a_body_is_carried_on_to_where_it_goes() {
@@ -153,6 +186,7 @@ fn a_body_is_carried_on_to_where_it_goes() {
     assert_eq!(searched, before);
 }
 
+/// Where the floor is known and asked for, a body that bends its knees comes down until it stands.
 #[test]
 fn a_body_stands_on_the_floor_in_any_pose() {
     let prior = MotionPrior::committed().unwrap();
@@ -161,11 +195,13 @@ fn a_body_stands_on_the_floor_in_any_pose() {
     let rng = &mut StdRng::seed_from_u64(7);
     for _ in 0..20 {
         let mut coordinates: Vec<f64> = (0..space.coordinates()).map(|_| rng.random_range(-0.7..0.7)).collect();
-        coordinates[..BODY].copy_from_slice(&[3.0, 0.1, 0.0, 0.4, 0.08, -1.5]);
-        let contact = space.contact(&coordinates);
+        let tilted = [0; 4].map(|_| rng.random_range(-0.2..0.2));
+        coordinates[..TILT].copy_from_slice(&[3.0, 0.1, 0.0, 0.4, 0.08, -1.5]);
+        coordinates[TILT..BODY].copy_from_slice(&tilted);
+        let stance = space.stance(&coordinates);
         let lowest = (0..3).flat_map(|frame| {
             let mut pose = vec![[0.0; 3]; 17];
-            space.pose(&coordinates, contact.as_ref(), frame, &mut pose);
+            space.pose(&coordinates, &stance, frame, &mut pose);
             [pose[15][2], pose[16][2]]
         });
         let lowest = lowest.fold(f64::INFINITY, f64::min);
@@ -215,7 +251,7 @@ fn a_mirrored_body_has_left_and_right_exchanged() {
     };
     let pose = |coordinates: &[f64], frame: usize| {
         let mut pose = vec![[0.0; 3]; 17];
-        space.pose(coordinates, None, frame, &mut pose);
+        space.pose(coordinates, &space.stance(coordinates), frame, &mut pose);
         pose
     };
     let plain = [0, 1, 2].map(|frame| pose(&coordinates, frame));
