@@ -419,12 +419,9 @@ impl MotionState {
     /// One step of Adam of persons with `stride` numbers each against `gradient`, written over `next`; `pace` scales the steps,
     /// and a pose that is `held` takes none.
     fn step_into(&self, stride: usize, gradient: &[f64], pace: f64, held: bool, next: &mut Self) {
-        let kept = [
-            (&self.coordinates, &mut next.coordinates),
-            (&self.first, &mut next.first),
-            (&self.second, &mut next.second),
-        ];
-        kept.into_iter().for_each(|(from, to)| to.clone_from(from));
+        next.coordinates.clone_from(&self.coordinates);
+        next.first.clone_from(&self.first);
+        next.second.clone_from(&self.second);
         next.steps = self.steps + 1;
         let unbias = [BETA_1, BETA_2].map(|beta| 1.0 / (1.0 - beta.powf(f64::from(next.steps))));
         let moments = next.first.iter_mut().zip(&mut next.second);
