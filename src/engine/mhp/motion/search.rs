@@ -314,7 +314,10 @@ pub(in crate::mhp) fn search(
                 all.push(Tried::at(of));
             }
         }
-        all.extend(search.fallen(&coordinates, own.clone(), (hips, floor, ways[person])));
+        // Among several, who lies would lie through others.
+        if params.shape().persons == 1 {
+            all.extend(search.fallen(&coordinates, own.clone(), (hips, floor, ways[person])));
+        }
         for sieve in &SIEVES {
             search.sift(&mut all, sieve, &own);
         }
