@@ -1,5 +1,6 @@
 //! Where a fit in a window begins: clusters of the prior and headings, coarse, then the best of them fine.
 //!
+//! Clusters stand, walk and sit; of one person alone bodies that lie and, where it moves, fall are tried beside them (`tilt.rs`).
 //! Every start is moved a little with its pose held; the few with the lowest loss are fitted with it, in the end by the bend of the
 //! loss ([`lbfgs`]). What wins is the start; the runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
 
@@ -76,7 +77,7 @@ pub(in crate::mhp) struct Hypothesis {
     /// Where it looks, rad.
     pub(in crate::mhp) yaw: f64,
     /// How unusual it is to look there: of who walks 0 ahead, 1 back; of who stands 0 at the radar, 1 the other way, less the faster
-    /// he turns.
+    /// he turns. Who lies is as unusual as who looks away, 1.
     pub(in crate::mhp) away: f64,
     /// Its joints, world frame, m.
     pub(in crate::mhp) joints: Vec<Vec3>,
@@ -367,7 +368,7 @@ pub(in crate::mhp) fn search(
 }
 
 /// Adds to what a search around the one person of `params` ended at what bodies of other frames become in this one, each with its
-/// time, s after this frame, moved as it goes as a whole.
+/// time, s after this frame, moved and turned as it goes as a whole.
 ///
 /// # Errors
 /// Where a position is not finite.

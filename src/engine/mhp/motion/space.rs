@@ -384,13 +384,14 @@ impl PoseSpace {
         }
         self.align(frame, joints, &mut coordinates);
         let mut pose = vec![[0.0; 3]; self.joints];
-        let plain = Stance { contact: None, ..self.stance(&coordinates) };
-        self.pose(&coordinates, &plain, frame, &mut pose);
+        let mut stance = self.stance(&coordinates);
+        let ground_m = stance.contact.take().map_or(0.0, |contact| contact.z_m);
+        self.pose(&coordinates, &stance, frame, &mut pose);
         let off: f64 = pose.iter().zip(joints).map(|(p, q)| norm(sub(*p, *q)).powi(2)).sum();
         let size_m = coordinates[LN_SIZE].exp();
         let unlikely: f64 = coordinates[BODY..].iter().map(|c| c * c).sum::<f64>()
             + tilt::unlikeliness(&coordinates[TILT..BODY], 0.0, &mut [0.0; tilt::NUMBERS]);
-        coordinates[HEIGHT] -= self.stance(&coordinates).contact.map_or(0.0, |contact| contact.z_m);
+        coordinates[HEIGHT] -= ground_m;
         (coordinates, off / (size_m * size_m) + MISFIT * MISFIT * unlikely)
     }
 

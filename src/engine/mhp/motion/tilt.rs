@@ -117,7 +117,7 @@ impl Tilt {
         }
     }
 
-    /// What a point before it was turned is high, behind that: this times the point.
+    /// How high a point is once it is turned: this times the point (the last row of the rotation).
     pub(super) fn upwards(&self) -> Vec3 {
         self.rotation[2]
     }
