@@ -10,12 +10,14 @@
 //! each, `tilt.rs`) and c. Where the floor is known the third is how high the lowest part of the body is above it instead of t_z
 //! (`ground.rs`).
 
+mod project;
+
 use super::ground::{self, Contact, Ground};
 use super::proportions::Proportions;
 use super::static_echo;
 use super::tilt::{self, Fallen, Tilt};
 use crate::body::{MotionPrior, Skeleton};
-use crate::geometry::{Vec3, add, cross, norm, scale, sub};
+use crate::geometry::{Vec3, add, cross, scale, sub};
 use smallvec::SmallVec;
 
 /// Components of the prior that a pose has at most.
@@ -52,10 +54,6 @@ pub(super) const YAW: usize = 3;
 pub(super) const LN_SIZE: usize = 4;
 pub(super) const STILL: usize = 5;
 pub(super) const TILT: usize = 6;
-/// How far joints and what they travel in `HALF_STEP_S` may be from the prior's, sizes: those of a start are no measurements.
-const MISFIT: f64 = 0.05;
-/// A body that has to be turned by less than this from the prior's mean is bent, not tilted, rad.
-const BENT: f64 = 0.2;
 /// How high the hips of a body that lies are, sizes.
 const LIES: f64 = 0.1;
 
@@ -354,121 +352,6 @@ impl PoseSpace {
         bars[HEIGHT] += gain * by_height;
         SHARE * sum + off
     }
-
-    /// The coordinates whose joints and velocities at time `frame` are nearest to these, in a space that has its mean at 0.
-    pub(super) fn project(&self, frame: usize, joints: &[Vec3], velocities: &[Vec3]) -> Vec<f64> {
-        let upright = self.nearest(frame, joints, velocities, false);
-        let w = tilt::between(&self.poses[frame][..self.joints], joints);
-        let best = if w[0].hypot(w[1]) < BENT {
-            upright
-        } else {
-            let tilted = self.nearest(frame, joints, velocities, true);
-            if tilted.1 < upright.1 { tilted } else { upright }
-        };
-        best.0
-    }
-
-    /// The same of a body that is upright or tilted, and how far they are from it: squares over all joints, sizes.
-    fn nearest(&self, frame: usize, joints: &[Vec3], velocities: &[Vec3], tilted: bool) -> (Vec<f64>, f64) {
-        let mut coordinates = vec![0.0; self.coordinates()];
-        coordinates[LN_SIZE] = self.ln_size[0];
-        coordinates[STILL] = static_echo::USUAL;
-        coordinates[YAW] = yaw_of(joints, &self.poses[frame][..self.joints]);
-        // Tilt, place and size, and pose in turn: a few rounds settle.
-        for _ in 0..ROUNDS {
-            if tilted {
-                self.tilt(frame, (joints, velocities), &mut coordinates);
-            }
-            self.align(frame, joints, &mut coordinates);
-            self.solve(frame, joints, velocities, &mut coordinates);
-        }
-        self.align(frame, joints, &mut coordinates);
-        let mut pose = vec![[0.0; 3]; self.joints];
-        let mut stance = self.stance(&coordinates);
-        let ground_m = stance.contact.take().map_or(0.0, |contact| contact.z_m);
-        self.pose(&coordinates, &stance, frame, &mut pose);
-        let off: f64 = pose.iter().zip(joints).map(|(p, q)| norm(sub(*p, *q)).powi(2)).sum();
-        let size_m = coordinates[LN_SIZE].exp();
-        let unlikely: f64 = coordinates[BODY..].iter().map(|c| c * c).sum::<f64>()
-            + tilt::unlikeliness(&coordinates[TILT..BODY], 0.0, &mut [0.0; tilt::NUMBERS]);
-        coordinates[HEIGHT] -= ground_m;
-        (coordinates, off / (size_m * size_m) + MISFIT * MISFIT * unlikely)
-    }
-
-    /// w and ẇ that bring the pose of c nearest to `joints` and what they do.
-    fn tilt(&self, frame: usize, (joints, velocities): (&[Vec3], &[Vec3]), coordinates: &mut [f64]) {
-        let mut pose = vec![[0.0; 3]; self.joints];
-        self.mixed(&self.poses[frame], &coordinates[BODY..], &mut pose);
-        let w = tilt::between(&pose, joints);
-        let tilt = Tilt::of(&[w[0], w[1], 0.0, 0.0], 0.0);
-        let turned: Vec<Vec3> = pose.iter().map(|&p| tilt.forwards(p)).collect();
-        coordinates[YAW] = yaw_of(joints, &turned);
-        let turn = Turn::of(coordinates);
-        let [there, moving] = [joints, velocities].map(|of| of.iter().map(|&p| turn.inverse(p)).collect::<Vec<_>>());
-        let (rate, t_s) = (tilt::spin_of(&there, &moving), self.times_s[frame]);
-        coordinates[TILT..BODY].copy_from_slice(&[w[0] - t_s * rate[0], w[1] - t_s * rate[1], rate[0], rate[1]]);
-    }
-
-    /// t, y and s that bring the pose of c and the tilt onto `joints`.
-    fn align(&self, frame: usize, joints: &[Vec3], coordinates: &mut [f64]) {
-        let mut pose = vec![[0.0; 3]; self.joints];
-        let tilt = Tilt::of(&coordinates[TILT..BODY], self.times_s[frame]);
-        self.turned(&self.poses[frame], &coordinates[BODY..], (&tilt, self.hips), &mut pose);
-        let (a, b) = (crate::geometry::mean(&pose), crate::geometry::mean(joints));
-        let (mut cosine, mut sine, mut square, mut height) = (0.0, 0.0, 0.0, 0.0);
-        for (p, q) in pose.iter().zip(joints) {
-            let (p, q) = (sub(*p, a), sub(*q, b));
-            cosine += p[0] * q[0] + p[1] * q[1];
-            sine += p[0] * q[1] - p[1] * q[0];
-            height += p[2] * q[2];
-            square += p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
-        }
-        coordinates[YAW] = sine.atan2(cosine);
-        let [mean, deviation] = self.ln_size;
-        let size = ((cosine.hypot(sine) + height) / square.max(1e-9)).max(1e-3).ln();
-        coordinates[LN_SIZE] = size.clamp(mean - 3.0 * deviation, mean + 3.0 * deviation);
-        let middle = Turn::of(coordinates).forwards([a[0], a[1], a[2] - self.hips]);
-        coordinates[..3].copy_from_slice(&sub(b, middle));
-    }
-
-    /// c by least squares with the prior, for the t, y and s that are there.
-    fn solve(&self, frame: usize, joints: &[Vec3], velocities: &[Vec3], coordinates: &mut [f64]) {
-        let n = self.components;
-        let turn = Turn::of(coordinates);
-        let (mut normal, mut right) = (vec![0.0; n * n], vec![0.0; n]);
-        let place = [coordinates[0], coordinates[1], coordinates[2]];
-        let tilt = Tilt::of(&coordinates[TILT..BODY], self.times_s[frame]);
-        let turned: Vec<Vec3> = joints.iter().map(|&p| self.before_turn(&turn, place, p)).collect();
-        let own = |&u: &Vec3| {
-            let [x, y, z] = tilt.backwards(u);
-            [x, y, z - self.hips]
-        };
-        let poses = turned.iter().map(own).collect::<Vec<_>>();
-        let swept = velocities.iter().zip(&turned).map(|(&v, &u)| sub(turn.inverse(v), tilt.swept(u, [0.0; 3])));
-        let changes = swept.map(|v| tilt.backwards(v)).collect::<Vec<_>>();
-        for (row, wanted, weight) in [(&self.poses[frame], &poses, 1.0), (&self.changes[frame], &changes, HALF_STEP_S)]
-        {
-            for (joint, wanted) in wanted.iter().enumerate() {
-                for axis in 0..3 {
-                    let rest = weight * (wanted[axis] - row[joint][axis]);
-                    for k in 0..n {
-                        let by_k = weight * row[(k + 1) * self.joints + joint][axis];
-                        right[k] += by_k * rest;
-                        for l in 0..=k {
-                            normal[k * n + l] += by_k * weight * row[(l + 1) * self.joints + joint][axis];
-                        }
-                    }
-                }
-            }
-        }
-        for k in 0..n {
-            normal[k * n + k] += MISFIT * MISFIT;
-            for l in 0..k {
-                normal[l * n + k] = normal[k * n + l];
-            }
-        }
-        coordinates[BODY..].copy_from_slice(&solved(&mut normal, right));
-    }
 }
 
 /// Frames of a window of which nothing has to be allocated.
@@ -487,9 +370,6 @@ pub(super) struct Stance {
 
 /// Joints of a skeleton at most: those of larger ones are not moved by a prior.
 pub(super) const MOST_JOINTS: usize = 64;
-/// Rounds in which place and pose are found from joints.
-const ROUNDS: usize = 6;
-
 /// e^s R_z(y)
 struct Turn {
     cosine: f64,
@@ -519,18 +399,6 @@ impl Turn {
     }
 }
 
-/// The yaw that turns `mean` onto `joints`, by their horizontal extent.
-fn yaw_of(joints: &[Vec3], mean: &[Vec3]) -> f64 {
-    let (a, b) = (crate::geometry::mean(mean), crate::geometry::mean(joints));
-    let (mut cosine, mut sine) = (0.0, 0.0);
-    for (p, q) in mean.iter().zip(joints) {
-        let (p, q) = ([p[0] - a[0], p[1] - a[1]], [q[0] - b[0], q[1] - b[1]]);
-        cosine += p[0] * q[0] + p[1] * q[1];
-        sine += p[0] * q[1] - p[1] * q[0];
-    }
-    sine.atan2(cosine)
-}
-
 /// The sample at or before a time, and the share of the next.
 fn between(times: &[f64], t: f64) -> (usize, f64) {
     let upper = times.partition_point(|&sample| sample <= t);
@@ -539,26 +407,4 @@ fn between(times: &[f64], t: f64) -> (usize, f64) {
         Some(next) => (lower, (t - times[lower]) / (next - times[lower])),
         None => (lower, 0.0),
     }
-}
-
-/// Solves a symmetric positive definite system, C order.
-fn solved(a: &mut [f64], mut b: Vec<f64>) -> Vec<f64> {
-    let n = b.len();
-    for k in 0..n {
-        for l in 0..k {
-            let sum: f64 = (0..l).map(|m| a[k * n + m] * a[l * n + m]).sum();
-            a[k * n + l] = (a[k * n + l] - sum) / a[l * n + l];
-        }
-        let sum: f64 = (0..k).map(|m| a[k * n + m] * a[k * n + m]).sum();
-        a[k * n + k] = (a[k * n + k] - sum).max(f64::MIN_POSITIVE).sqrt();
-    }
-    for k in 0..n {
-        let sum: f64 = (0..k).map(|m| a[k * n + m] * b[m]).sum();
-        b[k] = (b[k] - sum) / a[k * n + k];
-    }
-    for k in (0..n).rev() {
-        let sum: f64 = (k + 1..n).map(|m| a[m * n + k] * b[m]).sum();
-        b[k] = (b[k] - sum) / a[k * n + k];
-    }
-    b
 }
