@@ -338,7 +338,7 @@ fn chosen<'a>(searched: &'a Searched, around: &[(f64, &Hypotheses)]) -> Option<(
     let seen = stages(around);
     let decoded: Vec<Decoded> = searched.persons.iter().map(|own| motion::decode(own, &seen)).collect();
     let unlikeness = decoded.iter().map(|person| person.unlikeness).sum::<f64>() / decoded.len().max(1) as f64;
-    if motion::is_unlike(unlikeness) {
+    if motion::is_unlike(unlikeness, decoded.len()) {
         return None;
     }
     let best = searched.persons.iter().zip(&decoded).filter_map(|(own, of)| own.get(motion::lowest(&of.costs)?));

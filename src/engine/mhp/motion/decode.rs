@@ -5,11 +5,11 @@
 //! looks. A path takes one hypothesis of every frame and costs
 //!
 //! ```text
-//! Σ over frames of (L/L_min + 0.25 away) + Σ over steps of min(apart/0.5 m, 0.9)
+//! Σ over frames of (L/L_min + 0.5 away) + Σ over steps of min(apart/0.5 m, 3) + 0.5 max(turned/rad − 0.6, 0)
 //! ```
 //!
 //! with L_min the lowest loss of a frame, `away` from 0 (who looks at the radar, or where he walks) to 1 (who stands and looks the other
-//! way, or walks backwards; less of who turns), and `apart` the mean distance between the joints of two hypotheses, each moved as its
+//! way, or walks backwards; less of who turns about in these frames), `turned` the angle between two headings, and `apart` the mean distance between the joints of two hypotheses, each moved as its
 //! velocities say to the middle of the time between them. The cheapest paths come from dynamic programming (Viterbi 1967) from
 //! both ends to the frame that is fitted. Before that the bodies on such a path are carried on into the frames beside
 //! ([`carried`], `search::carry_on`): what one search missed another found.
@@ -20,9 +20,14 @@ use std::iter::zip;
 
 /// What a step costs a metre between the joints, and at most.
 const PER_M: f64 = 2.0;
-const MOST: f64 = 0.9;
+const MOST: f64 = 3.0;
 /// What looking the other way costs of a frame's lowest loss.
-const AWAY: f64 = 0.25;
+const AWAY: f64 = 0.5;
+/// Who turns as fast as this about himself, on average over the frames, looks anywhere, rad/s.
+const TURNING_RADPS: f64 = 0.2;
+/// What turning costs a radian of a step, beyond so much, rad.
+const PER_RAD: f64 = 0.5;
+const TURNED_RAD: f64 = 0.6;
 /// Nobody is farther from where the frame before has them, m, and for every second between the two, m/s.
 const LEASH_M: f64 = 0.4;
 const LEASH_MPS: f64 = 2.0;
@@ -62,36 +67,20 @@ pub(in crate::mhp) struct Decoded {
 
 /// Decodes one person of a frame by what is seen in those around it, in any order.
 pub(in crate::mhp) fn decode(own: &[Hypothesis], around: &[Stage]) -> Decoded {
-    let own = Link { t_s: 0.0, of: own };
-    let sides = sides(own, around);
-    let [past, future] = sides.each_ref().map(|side| message(own, side));
-    let whole: Vec<f64> =
-        zip(shares(own.of), zip(past, future)).map(|(share, (past, future))| share + past + future).collect();
-    let lowest = whole.iter().copied().fold(f64::INFINITY, f64::min);
-    let best =
-        std::iter::once(&own).chain(sides.iter().flatten()).filter_map(|link| Some((link.t_s, link.of.first()?)));
-    let (mut unlike, mut weights) = (0.0, 0.0);
-    for (t_s, best) in best {
-        let weight = (-0.5 * (t_s / LIKE_S).powi(2)).exp();
-        unlike += weight * best.unlikeness;
-        weights += weight;
-    }
-    Decoded {
-        costs: whole.iter().map(|cost| cost - lowest + 1.0).collect(),
-        unlikeness: unlike / weights.max(f64::MIN_POSITIVE),
-    }
+    Trellis::new(own, around).decoded()
 }
 
 /// The bodies that a person of a frame is carried on from: those of the frames [`CARRIED`] on each side that the cheapest path goes
 /// through, each with its time, s after this one.
 pub(in crate::mhp) fn carried<'a>(own: &'a [Hypothesis], around: &[Stage<'a>]) -> Vec<(f64, &'a Hypothesis)> {
-    let own_link = Link { t_s: 0.0, of: own };
-    let Some(best) = lowest(&decode(own, around).costs) else { return Vec::new() };
-    let side = |links: Vec<Link<'a>>| {
+    let trellis = Trellis::new(own, around);
+    let Some(best) = lowest(&trellis.decoded().costs) else { return Vec::new() };
+    let side = |links: &[Link<'a>]| {
         let mut at = (0.0, &own[best]);
         let mut path = Vec::with_capacity(links.len());
         for (k, to) in links.iter().enumerate() {
-            let beyond = zip(shares(to.of), message(*to, &links[k + 1..])).map(|(share, beyond)| share + beyond);
+            let beyond =
+                zip(trellis.shares(to.of), trellis.message(*to, &links[k + 1..])).map(|(share, beyond)| share + beyond);
             let costs: Vec<f64> =
                 zip(to.of, beyond).map(|(body, beyond)| beyond + step(at.1, body, to.t_s - at.0)).collect();
             let Some(next) = lowest(&costs) else { break };
@@ -100,19 +89,84 @@ pub(in crate::mhp) fn carried<'a>(own: &'a [Hypothesis], around: &[Stage<'a>]) -
         }
         CARRIED.iter().filter_map(|k| path.get(k - 1).copied()).collect::<Vec<_>>()
     };
-    sides(own_link, around).into_iter().flat_map(side).collect()
+    trellis.sides.iter().flat_map(|links| side(links)).collect()
 }
 
-/// The person of `own` in the frames before and after, as [`followed`].
-fn sides<'a>(own: Link, around: &[Stage<'a>]) -> [Vec<Link<'a>>; 2] {
-    [-1.0, 1.0].map(|sign: f64| {
-        let mut side: Vec<&Stage> = around.iter().filter(|stage| stage.t_s * sign > 0.0).collect();
-        side.sort_by(|a, b| a.t_s.abs().total_cmp(&b.t_s.abs()));
-        followed(own, &side)
-    })
+/// One person of a frame, and in the frames before and after as far as it can be followed.
+struct Trellis<'a> {
+    own: Link<'a>,
+    sides: [Vec<Link<'a>>; 2],
+    /// What looking away from the radar counts of a person who stands: 1, and less of one who turns about.
+    stands: f64,
 }
 
-/// The person of `own` in the frames on one side, the nearest first, as far as it can be followed.
+impl<'a> Trellis<'a> {
+    fn new(own: &'a [Hypothesis], around: &[Stage<'a>]) -> Self {
+        let own = Link { t_s: 0.0, of: own };
+        let sides = [-1.0, 1.0].map(|sign: f64| {
+            let mut side: Vec<&Stage> = around.iter().filter(|stage| stage.t_s * sign > 0.0).collect();
+            side.sort_by(|a, b| a.t_s.abs().total_cmp(&b.t_s.abs()));
+            followed(own, &side)
+        });
+        let mut trellis = Self { own, sides, stands: 1.0 };
+        let (count, sum) = trellis.best().fold((0.0, 0.0), |(count, sum), (_, best)| (count + 1.0, sum + best.spin));
+        let turns = sum / (f64::max(count, 1.0) * TURNING_RADPS);
+        trellis.stands = (-turns * turns).exp();
+        trellis
+    }
+
+    /// The body with the lowest loss of every frame, with its time.
+    fn best(&self) -> impl Iterator<Item = (f64, &'a Hypothesis)> + '_ {
+        let links = std::iter::once(&self.own).chain(self.sides.iter().flatten());
+        links.filter_map(|link| Some((link.t_s, link.of.first()?)))
+    }
+
+    fn decoded(&self) -> Decoded {
+        let [past, future] = self.sides.each_ref().map(|side| self.message(self.own, side));
+        let whole: Vec<f64> = zip(self.shares(self.own.of), zip(past, future))
+            .map(|(share, (past, future))| share + past + future)
+            .collect();
+        let lowest = whole.iter().copied().fold(f64::INFINITY, f64::min);
+        let (mut unlike, mut weights) = (0.0, 0.0);
+        for (t_s, best) in self.best() {
+            let weight = (-0.5 * (t_s / LIKE_S).powi(2)).exp();
+            unlike += weight * best.unlikeness;
+            weights += weight;
+        }
+        Decoded {
+            costs: whole.iter().map(|cost| cost - lowest + 1.0).collect(),
+            unlikeness: unlike / weights.max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// The cost of the cheapest path from each hypothesis of `own` to the end of `links`, its own share left out.
+    fn message(&self, own: Link, links: &[Link]) -> Vec<f64> {
+        let Some(last) = links.last() else { return vec![0.0; own.of.len()] };
+        let mut beyond = vec![0.0; last.of.len()];
+        for k in (0..links.len()).rev() {
+            let (to, from) = (links[k], if k == 0 { own } else { links[k - 1] });
+            let there: Vec<f64> = zip(self.shares(to.of), &beyond).map(|(share, beyond)| share + beyond).collect();
+            let cheapest = |a: &Hypothesis| {
+                let each = zip(to.of, &there).map(|(b, there)| there + step(a, b, to.t_s - from.t_s));
+                each.fold(f64::INFINITY, f64::min)
+            };
+            beyond = from.of.iter().map(cheapest).collect();
+        }
+        beyond
+    }
+
+    /// The losses by the lowest of them, and what looking away costs.
+    fn shares<'b>(&self, of: &'b [Hypothesis]) -> impl Iterator<Item = f64> + use<'b> {
+        let lowest = of.iter().map(|hypothesis| hypothesis.loss).fold(f64::INFINITY, f64::min);
+        let stands = self.stands;
+        of.iter().map(move |hypothesis| {
+            let away = hypothesis.away + stands * hypothesis.averted;
+            hypothesis.loss / lowest.max(f64::MIN_POSITIVE) + AWAY * away
+        })
+    }
+}
+
+/// The person of `own` in the frames on one side, the nearest first.
 fn followed<'a>(own: Link, side: &[&Stage<'a>]) -> Vec<Link<'a>> {
     let (mut at, mut from_s) = (place(own.of), own.t_s);
     let mut links = Vec::with_capacity(side.len());
@@ -132,35 +186,14 @@ fn place(of: &[Hypothesis]) -> Option<Vec3> {
     of.first().map(|best| mean(&best.joints))
 }
 
-/// The cost of the cheapest path from each hypothesis of `own` to the end of `links`, its own share left out.
-fn message(own: Link, links: &[Link]) -> Vec<f64> {
-    let Some(last) = links.last() else { return vec![0.0; own.of.len()] };
-    let mut beyond = vec![0.0; last.of.len()];
-    for k in (0..links.len()).rev() {
-        let (to, from) = (links[k], if k == 0 { own } else { links[k - 1] });
-        let there: Vec<f64> = zip(shares(to.of), &beyond).map(|(share, beyond)| share + beyond).collect();
-        let cheapest = |a: &Hypothesis| {
-            let each = zip(to.of, &there).map(|(b, there)| there + step(a, b, to.t_s - from.t_s));
-            each.fold(f64::INFINITY, f64::min)
-        };
-        beyond = from.of.iter().map(cheapest).collect();
-    }
-    beyond
-}
-
-/// The losses by the lowest of them, and what looking away costs.
-fn shares(of: &[Hypothesis]) -> impl Iterator<Item = f64> + '_ {
-    let lowest = of.iter().map(|hypothesis| hypothesis.loss).fold(f64::INFINITY, f64::min);
-    of.iter().map(move |hypothesis| hypothesis.loss / lowest.max(f64::MIN_POSITIVE) + AWAY * hypothesis.away)
-}
-
 /// What it costs to be `a` and, `dt_s` later, `b`.
 fn step(a: &Hypothesis, b: &Hypothesis, dt_s: f64) -> f64 {
     let moved = |(p, v): (&Vec3, &Vec3), dt_s: f64| [0, 1, 2].map(|k| p[k] + dt_s * v[k]);
     let [here, there] = [(a, 0.5 * dt_s), (b, -0.5 * dt_s)]
         .map(|(of, dt_s)| zip(&of.joints, &of.velocities).map(move |joint| moved(joint, dt_s)));
     let apart_m: f64 = zip(here, there).map(|(p, q)| norm([0, 1, 2].map(|k| p[k] - q[k]))).sum();
-    (PER_M * apart_m / a.joints.len().max(1) as f64).min(MOST)
+    let turned = (a.turned(b) - TURNED_RAD).max(0.0);
+    (PER_M * apart_m / a.joints.len().max(1) as f64).min(MOST) + PER_RAD * turned
 }
 
 /// The place of the smallest number.
@@ -180,6 +213,8 @@ mod tests {
             unlikeness: loss,
             yaw,
             away: 0.0,
+            averted: 0.0,
+            spin: 0.0,
             velocities: vec![[1.0, 0.0, 0.0]; 2],
             beta: vec![0.0; 2],
             still: 0.0,
@@ -234,11 +269,28 @@ mod tests {
 
     #[test]
     fn who_stands_looks_at_the_radar_where_the_loss_does_not_say_otherwise() {
-        let with = |back: f64| {
-            let away = Hypothesis { away: 1.0, ..body(3.0, 0.0, back) };
-            let here = Hypothesis { away: 0.0, ..body(3.0, std::f64::consts::PI, 0.2) };
+        let with = |back: f64, spin: f64| {
+            let away = Hypothesis { averted: 1.0, spin, ..body(3.0, 0.0, back) };
+            let here = Hypothesis { spin, ..body(3.0, std::f64::consts::PI, 0.2) };
             lowest(&decode(&[away, here], &[]).costs)
         };
-        assert_eq!((with(0.17), with(0.15)), (Some(1), Some(0)));
+        assert_eq!((with(0.17, 0.0), with(0.12, 0.0)), (Some(1), Some(0)));
+        // Who turns about looks anywhere, whichever way he turns.
+        assert_eq!([1.0, -1.0].map(|spin| with(0.17, spin)), [Some(0), Some(0)]);
+    }
+
+    #[test]
+    fn nobody_turns_about_between_two_frames() {
+        let back = std::f64::consts::PI;
+        let own = [body(3.0, back, 0.2), body(3.0, 0.0, 0.24)];
+        let others = vec![vec![body(3.1, 0.0, 0.2), body(3.1, back, 0.3)]];
+        let around = [Stage { t_s: 0.1, persons: &others }];
+        let found = decode(&own, &around).costs;
+        assert_eq!(lowest(&found), Some(1));
+        // To stay a back costs 0.5 there, and a front 0.2 here.
+        assert!((found[0] - 1.3).abs() < 1e-9, "{found:?}");
+        // The joints of a back are 0.4 m from those of a front.
+        let turn = step(&body(0.0, back, 1.0), &body(0.1, 0.0, 1.0), 0.1);
+        assert!((turn - 0.8 - PER_RAD * (back - TURNED_RAD)).abs() < 1e-9, "{turn}");
     }
 }

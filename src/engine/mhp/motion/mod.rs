@@ -63,9 +63,10 @@ const DEFAULT_RATE: f64 = 1e-3;
 const SLOW_FROM: f64 = 0.6;
 const SLOW: f64 = 0.3;
 /// Maps whose [`unlikeness`] is larger are of something else than a body: of walkers, also among furniture, it is 0.15 at most, of
-/// somebody who stands in a bright room 0.3, of a crowd 0.45.
-const MOST_UNLIKE: f64 = 0.27;
-/// A fit goes on where the L_EM that it begins with is smaller: where what stands around the persons is known, and where it is not.
+/// somebody who stands in a bright room or lies 0.3, of a crowd 0.45. Of one person alone, and of several, who explain more.
+const MOST_UNLIKE: [f64; 2] = [0.38, 0.27];
+/// A fit goes on where the L_EM that it begins with is smaller: of one person, or where what stands around several is known; and of
+/// several where it is not.
 const MOST_BEGUN: [f64; 2] = [0.2, 0.16];
 /// What a window's L_prior counts of its L_EM there: a pose that nobody takes explains maps, too.
 const OF_PRIOR: f64 = 0.1;
@@ -156,9 +157,9 @@ fn unlikeness(config: &FitConfig, em: f64, prior: f64) -> f64 {
     if config.objective == EmLoss::NccDb { em + OF_PRIOR * prior } else { 0.0 }
 }
 
-/// Whether maps with this [`unlikeness`], on average over frames, are of something else than bodies.
-pub(super) fn is_unlike(unlikeness: f64) -> bool {
-    unlikeness > MOST_UNLIKE
+/// Whether maps with this [`unlikeness`], on average over frames, are of something else than so many bodies.
+pub(super) fn is_unlike(unlikeness: f64, persons: usize) -> bool {
+    unlikeness > MOST_UNLIKE[usize::from(persons > 1)]
 }
 
 impl Window {
@@ -184,7 +185,8 @@ impl Window {
         loss: &mut WindowLoss,
     ) -> bool {
         self.evaluate((problem, config), precision, of, None, loss);
-        config.objective != EmLoss::NccDb || loss.em <= MOST_BEGUN[usize::from(!self.clear)]
+        let alone = self.places.is_empty();
+        config.objective != EmLoss::NccDb || loss.em <= MOST_BEGUN[usize::from(!alone && !self.clear)]
     }
 
     /// Around the persons of `initial`, who move as their velocities say; or why they stay where they are. The space of their poses

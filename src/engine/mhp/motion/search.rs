@@ -54,8 +54,6 @@ const OF_WAY: f64 = 0.4;
 /// The share of the start's L_EM below which another place is believed even where the pose there is not, and how far it may be, m.
 const CLEARER: f64 = 0.85;
 const MOST_MOVED_M: f64 = 0.5;
-/// Who turns as fast as this about himself looks anywhere, rad/s.
-const TURNING_RADPS: f64 = 0.5;
 
 /// Moves every start by some steps and keeps the few with the lowest loss.
 struct Sieve {
@@ -76,9 +74,12 @@ pub(in crate::mhp) struct Hypothesis {
     pub(in crate::mhp) unlikeness: f64,
     /// Where it looks, rad.
     pub(in crate::mhp) yaw: f64,
-    /// How unusual it is to look there: of who walks 0 ahead, 1 back; of who stands 0 at the radar, 1 the other way, less the faster
-    /// he turns. Who lies is as unusual as who looks away, 1.
+    /// How unusual it is to look there: of who walks 0 ahead, 1 back; who lies is as unusual, 1.
     pub(in crate::mhp) away: f64,
+    /// Of who stands 0 at the radar, 1 the other way: unusual of who does not turn about.
+    pub(in crate::mhp) averted: f64,
+    /// How fast it turns about itself, rad/s.
+    pub(in crate::mhp) spin: f64,
     /// Its joints, world frame, m.
     pub(in crate::mhp) joints: Vec<Vec3>,
     /// Their velocities, m/s.
@@ -196,12 +197,15 @@ impl<'a> Search<'a> {
         let to_radar = sub(radar_place(&self.problem.views), middle);
         let mine = &tried.state.coordinates[person * self.window.stride..];
         let upright = mine[TILT].hypot(mine[TILT + 1]).cos().max(0.0);
+        let [away, averted] = away(yaw, &velocities, to_radar).map(|share| upright * share);
         Hypothesis {
             loss: tried.loss,
             unlikeness: super::unlikeness(self.config, tried.em, tried.prior / self.window.scarcity)
                 + OF_WAY * way[0].hypot(way[1]),
             yaw,
-            away: 1.0 - upright * (1.0 - away(yaw, (&placed.positions()[own.clone()], &velocities), to_radar)),
+            away: 1.0 - upright + away,
+            averted,
+            spin: spin(&placed.positions()[own.clone()], &velocities),
             joints: placed.positions()[own.clone()].to_vec(),
             velocities,
             beta: placed.group(Group::Beta)[own].to_vec(),
@@ -423,22 +427,24 @@ fn way(problem: &Problem, params: &Pppr, person: usize, found: &[Hypothesis]) ->
     if norm(way) <= MOST_MOVED_M { way } else { [0.0; 3] }
 }
 
-/// How unusual it is to look along `yaw` with these joints (m) and velocities (m/s) before a radar that lies in this direction.
-fn away(yaw: f64, (joints, velocities): (&[Vec3], &[Vec3]), to_radar: Vec3) -> f64 {
+/// How unusual it is to look along `yaw` with these velocities, m/s, before a radar that lies in this direction: of who walks, and of
+/// who stands.
+fn away(yaw: f64, velocities: &[Vec3], to_radar: Vec3) -> [f64; 2] {
     let opposed = |[x, y, _]: Vec3| 0.5 - 0.5 * (yaw - y.atan2(x)).cos();
     let goes = mean(velocities);
-    if norm(goes) >= WALKING_MPS {
-        return opposed(goes);
-    }
-    let middle = mean(joints);
-    let (mut spin, mut square) = (0.0, 0.0);
+    if norm(goes) >= WALKING_MPS { [opposed(goes), 0.0] } else { [0.0, opposed(to_radar)] }
+}
+
+/// How fast joints turn about the vertical axis through their middle, rad/s.
+fn spin(joints: &[Vec3], velocities: &[Vec3]) -> f64 {
+    let (middle, goes) = (mean(joints), mean(velocities));
+    let (mut momentum, mut inertia) = (0.0, 0.0);
     for (joint, velocity) in joints.iter().zip(velocities) {
         let (at, v) = (sub(*joint, middle), sub(*velocity, goes));
-        spin += at[0] * v[1] - at[1] * v[0];
-        square += at[0] * at[0] + at[1] * at[1];
+        momentum += at[0] * v[1] - at[1] * v[0];
+        inertia += at[0] * at[0] + at[1] * at[1];
     }
-    let rate = spin / (square.max(1e-9) * TURNING_RADPS);
-    (-rate * rate).exp() * opposed(to_radar)
+    momentum / inertia.max(1e-9)
 }
 
 /// The middle of a person's hips, or of all its joints where it has none, world frame, m.
@@ -460,7 +466,7 @@ impl Hypothesis {
     }
 
     /// By how much it is turned against another, rad, at most π.
-    fn turned(&self, other: &Self) -> f64 {
+    pub(super) fn turned(&self, other: &Self) -> f64 {
         let turn = (self.yaw - other.yaw).rem_euclid(TAU);
         turn.min(TAU - turn)
     }
@@ -491,18 +497,25 @@ mod tests {
 
     #[test]
     fn who_stands_looks_at_the_radar_and_who_walks_ahead() {
+        let to_radar = [-3.0, 0.0, 0.2];
+        let of = |yaw: f64, goes: Vec3| away(yaw, &[goes; 4], to_radar);
+        let near = |found: [f64; 2], expected: [f64; 2]| {
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}, {expected:?}");
+        };
+        let (still, left) = ([0.1, 0.0, 0.0], [0.0, 1.0, 0.0]);
+        near(of(PI, still), [0.0, 0.0]);
+        near(of(0.0, still), [0.0, 1.0]);
+        near(of(0.5 * PI, left), [0.0, 0.0]);
+        near(of(-0.5 * PI, left), [1.0, 0.0]);
+    }
+
+    #[test]
+    fn a_body_that_turns_about_itself_while_it_goes_is_seen_to() {
         let joints = [[3.0, 0.2, 0.0], [3.0, -0.2, 0.0], [3.2, 0.0, 0.5], [2.8, 0.0, 0.5]];
-        let turning =
-            |rate: f64, goes: Vec3| joints.map(|[x, y, _]| [goes[0] - rate * y, goes[1] + rate * (x - 3.0), 0.0]);
-        let of = |yaw: f64, velocities: &[Vec3]| away(yaw, (&joints, velocities), [-3.0, 0.0, 0.2]);
-        let (still, left) = (turning(0.0, [0.1, 0.0, 0.0]), turning(0.0, [0.0, 1.0, 0.0]));
-        assert!(of(PI, &still).abs() < 1e-12 && (of(0.0, &still) - 1.0).abs() < 1e-12);
-        assert!(of(0.5 * PI, &left).abs() < 1e-12 && (of(-0.5 * PI, &left) - 1.0).abs() < 1e-12);
-        // Who turns about looks anywhere.
-        for way in [-1.0, 1.0] {
-            let turned = of(0.0, &turning(way * TURNING_RADPS, [0.0; 3]));
-            assert!((turned - (-1.0_f64).exp()).abs() < 1e-9, "{turned}");
+        for rate in [-1.5, 0.0, 0.3] {
+            let velocities = joints.map(|[x, y, _]| [0.4 - rate * y, 0.1 + rate * (x - 3.0), 0.2]);
+            assert!((spin(&joints, &velocities) - rate).abs() < 1e-12);
         }
-        assert!(of(0.0, &turning(1.5, [0.0; 3])) < 1e-3);
+        assert_eq!(spin(&[[1.0, 2.0, 0.0]], &[[3.0, 0.0, 0.0]]), 0.0, "a point turns about nothing");
     }
 }
