@@ -5,14 +5,15 @@
 //! looks. A path takes one hypothesis of every frame and costs
 //!
 //! ```text
-//! Σ over frames of (L/L_min + 0.5 away) + Σ over steps of min(apart/0.5 m, 3) + 0.5 max(turned/rad − 0.6, 0)
+//! Σ over frames of (L/L_min + 0.25 away + 0.5 averted) + Σ over steps of min(apart/0.5 m, 3) + 0.5 max(turned/rad − 0.6, 0)
 //! ```
 //!
-//! with L_min the lowest loss of a frame, `away` from 0 (who looks at the radar, or where he walks) to 1 (who stands and looks the other
-//! way, or walks backwards; less of who turns about in these frames), `turned` the angle between two headings, and `apart` the mean distance between the joints of two hypotheses, each moved as its
-//! velocities say to the middle of the time between them. The cheapest paths come from dynamic programming (Viterbi 1967) from
-//! both ends to the frame that is fitted. Before that the bodies on such a path are carried on into the frames beside
-//! ([`carried`], `search::carry_on`): what one search missed another found.
+//! with L_min the lowest loss of a frame, `away` from 0 (who walks ahead) to 1 (who walks backwards), `averted` from 0 (who stands and
+//! looks at the radar) to 1 (who looks the other way; less of who turns about in these frames), `turned` the angle between two
+//! headings, and `apart` the mean distance between the joints of two hypotheses, each moved as its velocities say to the middle of
+//! the time between them. The cheapest paths come from dynamic programming (Viterbi 1967) from both ends to the frame that is
+//! fitted. Before that the bodies on such a path are carried on into the frames beside ([`carried`], `search::carry_on`): what one
+//! search missed another found.
 
 use super::search::Hypothesis;
 use crate::geometry::{Vec3, flat_distance, mean, norm};
@@ -21,8 +22,9 @@ use std::iter::zip;
 /// What a step costs a metre between the joints, and at most.
 const PER_M: f64 = 2.0;
 const MOST: f64 = 3.0;
-/// What looking the other way costs of a frame's lowest loss.
-const AWAY: f64 = 0.5;
+/// What looking the other way costs of a frame's lowest loss: of who walks, or falls, and of who stands.
+const AWAY: f64 = 0.25;
+const AVERTED: f64 = 0.5;
 /// Who turns as fast as this about himself, on average over the frames, looks anywhere, rad/s.
 const TURNING_RADPS: f64 = 0.2;
 /// What turning costs a radian of a step, beyond so much, rad.
@@ -158,10 +160,10 @@ impl<'a> Trellis<'a> {
     /// The losses by the lowest of them, and what looking away costs.
     fn shares<'b>(&self, of: &'b [Hypothesis]) -> impl Iterator<Item = f64> + use<'b> {
         let lowest = of.iter().map(|hypothesis| hypothesis.loss).fold(f64::INFINITY, f64::min);
-        let stands = self.stands;
+        let averted = AVERTED * self.stands;
         of.iter().map(move |hypothesis| {
-            let away = hypothesis.away + stands * hypothesis.averted;
-            hypothesis.loss / lowest.max(f64::MIN_POSITIVE) + AWAY * away
+            let away = AWAY * hypothesis.away + averted * hypothesis.averted;
+            hypothesis.loss / lowest.max(f64::MIN_POSITIVE) + away
         })
     }
 }
