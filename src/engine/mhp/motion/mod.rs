@@ -185,8 +185,8 @@ impl Window {
         loss: &mut WindowLoss,
     ) -> bool {
         self.evaluate((problem, config), precision, of, None, loss);
-        let alone = self.places.is_empty();
-        config.objective != EmLoss::NccDb || loss.em <= MOST_BEGUN[usize::from(!alone && !self.clear)]
+        let sure = self.clear || self.places.is_empty();
+        config.objective != EmLoss::NccDb || loss.em <= MOST_BEGUN[usize::from(!sure)]
     }
 
     /// Around the persons of `initial`, who move as their velocities say; or why they stay where they are. The space of their poses

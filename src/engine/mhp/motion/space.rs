@@ -370,6 +370,7 @@ pub(super) struct Stance {
 
 /// Joints of a skeleton at most: those of larger ones are not moved by a prior.
 pub(super) const MOST_JOINTS: usize = 64;
+
 /// e^s R_z(y)
 struct Turn {
     cosine: f64,
