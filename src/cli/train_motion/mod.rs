@@ -131,7 +131,10 @@ fn told(coverage: &MotionCoverage) -> String {
         format!("{residual:.0} mm and {mahalanobis:.2} by {}", MOTION_COUNTS[k])
     };
     let figures: Vec<String> = (0..MOTION_COUNTS.len()).map(of).collect();
-    format!("of its {} windows, residual and squared distance a component: {}", coverage.windows, figures.join(", "))
+    let [windows, gain, figures] = [coverage.windows.to_string(), format!("{:+.1}", coverage.gain), figures.join(", ")];
+    format!(
+        "of its {windows} windows, residual and squared distance a component: {figures}; by the mixture: {gain} nats"
+    )
 }
 
 /// Figures by kind of motion, in Markdown.
@@ -140,14 +143,14 @@ fn table(title: &str, of_groups: &[MotionCoverage]) -> anyhow::Result<String> {
     for count in MOTION_COUNTS {
         write!(text, " {count} |")?;
     }
-    writeln!(text, "\n|---|---|{}", "---|".repeat(MOTION_COUNTS.len()))?;
+    writeln!(text, " mixture |\n|---|---|{}", "---|".repeat(MOTION_COUNTS.len() + 1))?;
     for coverage in of_groups {
         let group = if coverage.group.is_empty() { "**all**" } else { &coverage.group };
         write!(text, "| {group} | {} |", coverage.windows)?;
         for (residual, mahalanobis) in coverage.residual_m.iter().zip(coverage.mahalanobis) {
             write!(text, " {:.0} / {mahalanobis:.2} |", 1e3 * residual)?;
         }
-        writeln!(text)?;
+        writeln!(text, " {:+.1} |", coverage.gain)?;
     }
     Ok(text)
 }

@@ -18,7 +18,7 @@ pub use parts::{HEAD, PARTS, Parts, Scatterer, is_named, scatterer};
 pub use pppr::{Group, Pppr, PpprShape};
 #[cfg(feature = "train")]
 pub use prior::{MOTION_COUNTS, MOTION_JOINTS, MotionClip, MotionCoverage, learn_motion, motion_coverage};
-pub use prior::{MotionPrior, MotionStart};
+pub use prior::{Mixture, MotionPrior, MotionStart};
 pub use segment::{BodyPose, Segment, SegmentFrame};
 pub use skeleton::{Side, Skeleton};
 pub use surface::{BodySurface, Capsule, SurfacePoint};

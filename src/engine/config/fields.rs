@@ -122,7 +122,7 @@ pub const FIELDS: &[Field] = &[
         ..number(Weights, "w_dummy", "w_dummy", Steps, (0.0, 1000.0), number_at!(w_dummy)).logarithmic().row("weights")
     },
     Field {
-        help: "Weight of the prior of motion: the mean square of a window's coordinates in standard deviations.",
+        help: "Weight of the prior of motion: how unlikely a window's coordinates are among those of real people.",
         ..number(Weights, "w_prior", "w_prior", Steps, (0.0, 1000.0), number_at!(w_prior)).logarithmic().row("motion")
     },
     Field {

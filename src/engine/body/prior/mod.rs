@@ -3,18 +3,24 @@
 //! A window is a few poses in a row, seen from the person: the origin is the middle of the hips at the middle sample, +x is
 //! where the person faces then, +y its left, z is up, and all is divided by the size of the body. What such windows have in
 //! common is learned from recorded motion (`train-motion`) and committed in `assets/motion.json`: their mean, the
-//! principal components about it, and the middles of clusters, from which a search may start. Joints have names, so that
-//! the same prior serves every skeleton that has some of them. `assets/motion.md` says from which recordings it comes,
+//! principal components about it, a mixture that says how likely their coefficients are, and the middles of clusters, from
+//! which a search may start. Joints have names, so that the same prior serves every skeleton that has some of them. `assets/motion.md` says from which recordings it comes,
 //! what it covers and what it does not.
 
 #[cfg(feature = "train")]
 mod clusters;
 #[cfg(feature = "train")]
+mod learn_mixture;
+mod mixture;
+#[cfg(feature = "train")]
 mod train;
+
+pub use mixture::Mixture;
 
 #[cfg(feature = "train")]
 pub use train::{MOTION_COUNTS, MOTION_JOINTS, MotionClip, MotionCoverage, learn_motion, motion_coverage};
 
+use mixture::MixtureComponent;
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 
@@ -39,6 +45,11 @@ pub struct MotionPrior {
     components: Vec<Vec<f64>>,
     /// From where a search may start, the most frequent first.
     starts: Vec<MotionStart>,
+    /// How likely the first coefficients are; empty: each is normal, as the others are.
+    mixture: Vec<MixtureComponent>,
+    /// The same, when first asked for.
+    #[serde(skip)]
+    likelihood: OnceLock<Mixture>,
     /// What becomes of each component where left and right are exchanged, when first asked for.
     #[serde(skip)]
     signs: OnceLock<Vec<f64>>,
@@ -83,14 +94,15 @@ impl MotionPrior {
         }
         let text = || {
             Ok::<_, serde_json::Error>(format!(
-                "{{\"header\":[{}],\n\"times_s\":{},\n\"joints\":{},\n\"ln_size\":{},\n\"mean\":{},\n\"components\":[{}],\n\"starts\":[{}]}}\n",
+                "{{\"header\":[{}],\n\"times_s\":{},\n\"joints\":{},\n\"ln_size\":{},\n\"mean\":{},\n\"components\":[{}],\n\"starts\":[{}],\n\"mixture\":[{}]}}\n",
                 lines(&self.header)?,
                 serde_json::to_string(&self.times_s)?,
                 serde_json::to_string(&self.joints)?,
                 serde_json::to_string(&self.ln_size)?,
                 serde_json::to_string(&self.mean)?,
                 lines(&self.components)?,
-                lines(&self.starts)?
+                lines(&self.starts)?,
+                lines(&self.mixture)?
             ))
         };
         text().map_err(|error| error.to_string())
@@ -152,6 +164,7 @@ impl MotionPrior {
         }
         let bad = self.starts.iter().find(|start| !(0.0..=1.0).contains(&start.share));
         bad.map(|start| format!("`share` is {}; expected 0 to 1", start.share))
+            .or_else(|| mixture::fault(&self.mixture, components))
     }
 
     /// How it came about, and what it reaches.
@@ -192,6 +205,11 @@ impl MotionPrior {
     /// Each (times, joints, 3) and as long as its standard deviation, in sizes; the largest first.
     pub fn components(&self) -> &[Vec<f64>] {
         &self.components
+    }
+
+    /// How likely the first coefficients are.
+    pub fn mixture(&self) -> &Mixture {
+        self.likelihood.get_or_init(|| Mixture::new(&self.mixture, self.mirror_signs()))
     }
 
     /// From where a search may start, the most frequent first.

@@ -13,6 +13,8 @@ fn tiny() -> MotionPrior {
         mean: vec![0.1, 0.2, 0.3, 0.1, 0.25, 0.3],
         components: vec![vec![0.0, 1.0, 0.0, 0.0, 1.0, 0.0], vec![0.5, 0.0, 0.0, -0.5, 0.0, 0.0]],
         starts: vec![MotionStart { share: 0.75, hip_height: 0.8, coefficients: vec![1.0, -2.0] }],
+        mixture: vec![MixtureComponent { weight: 1.0, mean: vec![0.5], whitening: vec![1.25] }],
+        likelihood: OnceLock::new(),
         signs: OnceLock::new(),
     }
 }
@@ -37,6 +39,11 @@ fn what_does_not_fit_is_told() {
     assert_eq!(told(|prior| prior.times_s.reverse()), "`times_s`: expected each time after the one before");
     assert_eq!(told(|prior| prior.ln_size[1] = 0.0), "`ln_size` has the standard deviation 0; expected one above 0");
     assert_eq!(told(|prior| prior.starts[0].share = 1.5), "`share` is 1.5; expected 0 to 1");
+    assert_eq!(told(|prior| prior.mixture[0].weight = 0.0), "`weight` is 0; expected one above 0, at most 1");
+    assert_eq!(told(|prior| prior.mixture[0].whitening[0] = -1.0), "`whitening`: expected a diagonal above 0");
+    assert_eq!(told(|prior| prior.mixture[0].whitening.push(0.0)), "`whitening` has 2 numbers; expected 1");
+    let wide = told(|prior| prior.mixture[0].mean = vec![0.0; 3]);
+    assert_eq!(wide, "`mixture`: `mean` has 3 numbers; expected as many in each component, 1 to 2");
     assert!(told(|prior| prior.components.clear()).contains("0 components"));
     assert!(told(|prior| prior.joints.push("nose".into())).contains("listed twice"));
     let infinite = tiny().to_json().unwrap().replace("0.25", "1e999");

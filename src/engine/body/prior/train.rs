@@ -1,7 +1,8 @@
 //! Learns the prior from recorded motion: principal components of windows of poses, and clusters of them.
 
 use super::clusters::clusters;
-use super::{MotionPrior, MotionStart};
+use super::learn_mixture::learn_mixture;
+use super::{MixtureComponent, MotionPrior, MotionStart};
 use crate::body::skeletons::COCO_JOINTS;
 use crate::geometry::{Vec3, add, norm, scale, sub};
 use nalgebra::{DMatrix, SymmetricEigen};
@@ -78,6 +79,8 @@ pub struct MotionCoverage {
     pub residual_m: [f64; 6],
     /// Mean over these components of the squared coefficients, in standard deviations: 1 for windows like those learned from.
     pub mahalanobis: [f64; 6],
+    /// By how much likelier the mixture has a window than independent normal coefficients have it, mean of ln.
+    pub gain: f64,
 }
 
 /// Poses as the person sees them.
@@ -176,15 +179,23 @@ pub fn learn_motion(clips: &[MotionClip]) -> Option<MotionPrior> {
         mean,
         components,
         starts: starts(&windows, &weights, &coefficients, &members),
+        mixture: Vec::new(),
+        likelihood: OnceLock::new(),
         signs: OnceLock::new(),
     };
+    prior.mixture = learn_mixture(&coefficients, &weights, prior.mirror_signs());
     let of_starts = prior
         .starts
         .iter_mut()
         .flat_map(|start| [&mut start.share, &mut start.hip_height].into_iter().chain(&mut start.coefficients));
+    let of_mixture = prior.mixture.iter_mut().flat_map(|component| {
+        let MixtureComponent { weight, mean, whitening } = component;
+        std::iter::once(weight).chain(mean).chain(whitening)
+    });
     let numbers = prior.mean.iter_mut().chain(prior.components.iter_mut().flatten()).chain(&mut prior.ln_size);
-    numbers.chain(of_starts).for_each(|number| *number = rounded(*number));
-    Some(prior)
+    numbers.chain(of_starts).chain(of_mixture).for_each(|number| *number = rounded(*number));
+    // What was asked of numbers that were not rounded yet is forgotten.
+    Some(MotionPrior { signs: OnceLock::new(), ..prior })
 }
 
 /// To 0.01 mm of a metre, and never −0.
@@ -266,6 +277,7 @@ pub fn motion_coverage(prior: &MotionPrior, clips: &[MotionClip]) -> Vec<MotionC
         windows: 0,
         residual_m: [0.0; 6],
         mahalanobis: [0.0; 6],
+        gain: 0.0,
     };
     let mut all = vec![none("")];
     for (group, begins) in beginnings(clips) {
@@ -274,6 +286,7 @@ pub fn motion_coverage(prior: &MotionPrior, clips: &[MotionClip]) -> Vec<MotionC
             sum.windows += 1;
             let mut rest: Vec<f64> = window.values.iter().zip(&prior.mean).map(|(value, mean)| value - mean).collect();
             let coefficients = coefficients(&prior.components, &rest);
+            sum.gain += prior.mixture().gain(&coefficients);
             let mut squares = 0.0;
             for (done, (component, c)) in prior.components.iter().zip(&coefficients).enumerate() {
                 rest.iter_mut().zip(component).for_each(|(rest, component)| *rest -= c * component);
@@ -286,6 +299,7 @@ pub fn motion_coverage(prior: &MotionPrior, clips: &[MotionClip]) -> Vec<MotionC
             }
         }
         all[0].windows += sum.windows;
+        all[0].gain += sum.gain;
         for k in 0..MOTION_COUNTS.len() {
             all[0].residual_m[k] += sum.residual_m[k];
             all[0].mahalanobis[k] += sum.mahalanobis[k];
@@ -294,7 +308,12 @@ pub fn motion_coverage(prior: &MotionPrior, clips: &[MotionClip]) -> Vec<MotionC
     }
     for coverage in &mut all {
         let count = coverage.windows.max(1) as f64;
-        coverage.residual_m.iter_mut().chain(&mut coverage.mahalanobis).for_each(|sum| *sum /= count);
+        coverage
+            .residual_m
+            .iter_mut()
+            .chain(&mut coverage.mahalanobis)
+            .chain([&mut coverage.gain])
+            .for_each(|sum| *sum /= count);
     }
     all
 }

@@ -6,10 +6,10 @@
 //!
 //! ```text
 //! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior
-//! L_prior = W/F · ((‖c‖² + ((s − s₀)/σ_s)² + ((q − q₀)/σ_q)² + ρ(w, ẇ))/30 + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)² + ρ(h/σ_h))
+//! L_prior = W/F · ((ρ(c) + ((s − s₀)/σ_s)² + ((q − q₀)/σ_q)² + ρ_w(w, ẇ))/30 + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)² + ρ_h(h/σ_h))
 //! ```
 //!
-//! with F the frames there are and W those that are asked for (`window`), for fewer frames are less evidence against a prior that
+//! with ρ(c) how unlikely a Gaussian mixture has the first coefficients, and the squares of the others, F the frames there are and W those that are asked for (`window`), for fewer frames are less evidence against a prior that
 //! stays. The parts behind it are those of the body's proportions (`proportions.rs`) and of the floor (`ground.rs`); for several
 //! persons there is one for bodies that stand in one another or go far from where they were counted (`apart.rs`). The kinematic terms are
 //! those of the frame that is fitted.

@@ -16,7 +16,7 @@ use super::ground::{self, Contact, Ground};
 use super::proportions::Proportions;
 use super::static_echo;
 use super::tilt::{self, Fallen, Tilt};
-use crate::body::{MotionPrior, Skeleton};
+use crate::body::{Mixture, MotionPrior, Skeleton};
 use crate::geometry::{Vec3, add, cross, scale, sub};
 use smallvec::SmallVec;
 
@@ -70,6 +70,8 @@ pub(super) struct PoseSpace {
     poses: Vec<Vec<Vec3>>,
     /// What these change in a second at each time.
     changes: Vec<Vec<Vec3>>,
+    /// How likely c is.
+    mixture: &'static Mixture,
     /// Mean and standard deviation of s.
     ln_size: [f64; 2],
     /// Of each component: 1 where it is the same of left and right, −1 where it is opposite. The mirror image of a pose has c
@@ -115,7 +117,7 @@ impl PoseSpace {
     /// Of `prior` on `skeleton` at `times_s` after a window's middle; `None` where a joint has a name that the prior knows
     /// nothing of.
     pub(super) fn new(
-        prior: &MotionPrior,
+        prior: &'static MotionPrior,
         skeleton: &Skeleton,
         times_s: &[f64],
         floor_z_m: Option<f64>,
@@ -161,6 +163,7 @@ impl PoseSpace {
             hips: -lowest,
             poses: times_s.iter().map(|&t_s| at(t_s)).collect(),
             changes: times_s.iter().map(change).collect(),
+            mixture: prior.mixture(),
             ln_size: prior.ln_size(),
             signs: prior.mirror_signs()[..components].to_vec(),
             proportions: Proportions::of(skeleton, detail),
@@ -334,8 +337,8 @@ impl PoseSpace {
         }
     }
 
-    /// How unlikely the coordinates are: [`SHARE`] of the squares of c, s and q, in standard deviations, and of what the tilt costs, and how
-    /// far from the floor they are; adds `gain` times its gradient.
+    /// How unlikely the coordinates are: [`SHARE`] of how unlikely the mixture has c, of the squares of what it is not of, of s and q, in
+    /// standard deviations, and of what the tilt costs, and how far from the floor they are; adds `gain` times its gradient.
     pub(super) fn unlikeliness(&self, coordinates: &[f64], gain: f64, bars: &mut [f64]) -> f64 {
         let [mean, deviation] = self.ln_size;
         let size = (coordinates[LN_SIZE] - mean) / deviation;
@@ -344,7 +347,9 @@ impl PoseSpace {
         bars[STILL] += gain * SHARE * by_still;
         let tilted = tilt::unlikeliness(&coordinates[TILT..BODY], gain * SHARE, &mut bars[TILT..BODY]);
         let mut sum = size * size + still + tilted;
-        for (c, bar) in coordinates[BODY..].iter().zip(&mut bars[BODY..]) {
+        sum += self.mixture.unlikeliness(&coordinates[BODY..], gain * SHARE, &mut bars[BODY..]);
+        let rest = BODY + self.mixture.coefficients();
+        for (c, bar) in coordinates[rest..].iter().zip(&mut bars[rest..]) {
             sum += c * c;
             *bar += 2.0 * gain * SHARE * c;
         }
