@@ -18,8 +18,8 @@ pub(super) const MIXTURE_COEFFICIENTS: usize = 28;
 const MEMBERS: usize = 24;
 /// π₀
 pub(super) const UNSEEN: f64 = 0.05;
-/// What belongs to a member with a smaller chance than this has no gradient of it.
-const NONE: f64 = 1e-9;
+/// A member that is farther than the nearest by this has a chance of less than 1e-9: it is left out.
+const NONE: f64 = 42.0;
 
 /// A component of a Gaussian mixture of coefficients, and its mirror image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -40,20 +40,25 @@ impl MixtureComponent {
         -2.0 * ((0.5 * (1.0 - UNSEEN) * self.weight).ln() + diagonal.map(f64::ln).sum::<f64>())
     }
 
-    /// W (σ∘c − μ).
-    fn white(&self, c: &[f64], sign: impl Fn(usize) -> f64) -> Point {
+    /// W (σ∘c − μ), and its square; `None` where that is more than `most`.
+    fn white(&self, c: &[f64], most: f64, sign: impl Fn(usize) -> f64) -> Option<(Point, f64)> {
         let mut off = [0.0; MIXTURE_COEFFICIENTS];
         for (k, (off, (c, mean))) in off.iter_mut().zip(c.iter().zip(&self.mean)).enumerate() {
             *off = sign(k) * c - mean;
         }
         let mut white = [0.0; MIXTURE_COEFFICIENTS];
+        let mut square = 0.0;
         let mut rest = self.whitening.as_slice();
         for (row, white) in white.iter_mut().enumerate().take(self.mean.len()) {
             let (own, after) = rest.split_at(row + 1);
             *white = own.iter().zip(&off).map(|(a, b)| a * b).sum();
+            square += *white * *white;
+            if square > most {
+                return None;
+            }
             rest = after;
         }
-        white
+        Some((white, square))
     }
 
     /// Wᵀ `white`.
@@ -147,27 +152,27 @@ impl Mixture {
     /// ρ of the first of these coefficients (standard deviations); adds `gain` times its gradient to `bars`.
     pub fn unlikeliness(&self, coefficients: &[f64], gain: f64, bars: &mut [f64]) -> f64 {
         let c = &coefficients[..self.coefficients()];
-        let mut members: SmallVec<[Member; MEMBERS]> = SmallVec::new();
-        for (component, offset) in &self.components {
-            for mirrored in [false, true] {
-                let white = component.white(c, |k| if mirrored { self.signs[k] } else { 1.0 });
-                let far = offset + white.iter().map(|z| z * z).sum::<f64>();
-                members.push(Member { far, of: Some((component, mirrored)), white });
-            }
-        }
         let mut white = [0.0; MIXTURE_COEFFICIENTS];
         white[..c.len()].copy_from_slice(c);
-        let far = c.iter().map(|c| c * c).sum::<f64>() - 2.0 * UNSEEN.ln();
-        members.push(Member { far, of: None, white });
-
-        let nearest = members.iter().map(|member| member.far).fold(f64::INFINITY, f64::min);
+        let mut nearest = c.iter().map(|c| c * c).sum::<f64>() - 2.0 * UNSEEN.ln();
+        let mut members: SmallVec<[Member; MEMBERS]> = SmallVec::new();
+        members.push(Member { far: nearest, of: None, white });
+        for (component, offset) in &self.components {
+            for mirrored in [false, true] {
+                let sign = |k: usize| if mirrored { self.signs[k] } else { 1.0 };
+                if let Some((white, square)) = component.white(c, nearest + NONE - offset, sign) {
+                    nearest = nearest.min(offset + square);
+                    members.push(Member { far: offset + square, of: Some((component, mirrored)), white });
+                }
+            }
+        }
         let chance = |member: &Member| (-0.5 * (member.far - nearest)).exp();
         let total: f64 = members.iter().map(chance).sum();
         for member in &members {
-            let share = chance(member) / total;
-            if share < NONE {
+            if member.far > nearest + NONE {
                 continue;
             }
+            let share = chance(member) / total;
             let by_c = member.of.map_or(member.white, |(component, _)| component.back(&member.white));
             let mirrored = member.of.is_some_and(|(_, mirrored)| mirrored);
             for ((bar, by_c), sign) in bars.iter_mut().zip(by_c).zip(&self.signs) {

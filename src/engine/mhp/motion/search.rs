@@ -19,12 +19,12 @@ use std::ops::Range;
 
 /// The sieves that starts go through, coarse then fine.
 const SIEVES: [Sieve; 3] = [
-    Sieve { steps: 6, every: 4, held: true, kept: 10 },
-    Sieve { steps: 10, every: 2, held: false, kept: 6 },
+    Sieve { steps: 4, every: 4, held: true, kept: 10 },
+    Sieve { steps: 8, every: 2, held: false, kept: 6 },
     Sieve { steps: 14, every: 1, held: false, kept: 4 },
 ];
 /// Evaluations of what is left, and of each body that is carried on from another frame.
-const FINE: usize = 16;
+const FINE: usize = 12;
 /// How far t and h, y, s, q, w, ẇ and c may go in a step of it.
 const UNITS: [f64; 7] = [0.03, 0.12, 0.03, 1.0, 0.06, 0.3, 0.5];
 /// What a search may cost: Gaussians times cells, over all frames and evaluations. A map of 256 × 128 cells as a whole, five frames of
@@ -34,8 +34,8 @@ const MOST_WORK: f64 = 2e10;
 const PLAIN: f64 = 10.0;
 /// Evaluations of a person's search beside those of the first sieve, with those of what is carried on, and those of a start in it, in
 /// whole windows.
-const LATER: f64 = 370.0;
-const FIRST: f64 = 7.0 / 4.0;
+const LATER: f64 = 310.0;
+const FIRST: f64 = 5.0 / 4.0;
 /// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start.
 const WEIGHTS: [f64; 2] = [0.5, 8e-3];
 /// Starts whose joints have come nearer to each other than this, on average, have become one, m.
