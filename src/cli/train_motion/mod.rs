@@ -131,9 +131,9 @@ fn told(coverage: &MotionCoverage) -> String {
         format!("{residual:.0} mm and {mahalanobis:.2} by {}", MOTION_COUNTS[k])
     };
     let figures: Vec<String> = (0..MOTION_COUNTS.len()).map(of).collect();
-    let [windows, gain, figures] = [coverage.windows.to_string(), format!("{:+.1}", coverage.gain), figures.join(", ")];
+    let (windows, gain, figures) = (coverage.windows, coverage.gain, figures.join(", "));
     format!(
-        "of its {windows} windows, residual and squared distance a component: {figures}; by the mixture: {gain} nats"
+        "of its {windows} windows, residual and squared distance a component: {figures}; by the mixture: {gain:+.1} nats"
     )
 }
 

@@ -17,7 +17,7 @@ pub(super) const MIXTURE_COEFFICIENTS: usize = 28;
 /// Members of a mixture of which nothing has to be allocated, mirror images and what nobody does among them.
 const MEMBERS: usize = 24;
 /// π₀
-pub(super) const UNSEEN: f64 = 0.05;
+const UNSEEN: f64 = 0.05;
 /// A member that is farther than the nearest by this has a chance of less than 1e-9: it is left out.
 const NONE: f64 = 42.0;
 
