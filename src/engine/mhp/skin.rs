@@ -56,6 +56,8 @@ const LIMB_SCALE: f64 = 0.3;
 /// static echoes leaves it.
 const MOST_LN: f64 = 1.386_294_361_119_890_6;
 const LEAST_LN_ALPHA: f64 = -5.0;
+/// No point is more opaque.
+const MOST_ALPHA: f64 = 0.999;
 /// α and standard deviation, m, of a joint of which nothing is known.
 const PLAIN: [f64; 2] = [0.5, 0.08];
 
@@ -83,17 +85,42 @@ struct Point {
     shares: Shares,
     /// The same of the skeleton's joints.
     joints: Shares,
-    scale_m: f64,
-    /// ln of its amplitude but for what is seen of it.
-    ln_amplitude: f64,
+    /// ln of its standard deviation, m.
+    ln_scale: f64,
+    /// Its amplitude but for what is seen of it.
+    amplitude: f64,
 }
 
-/// ln of how much brighter and larger a joint is than at the start, and how opaque it is.
+/// ln of how much brighter and larger a joint or point is than at the start, and how opaque it is.
 #[derive(Debug, Clone, Copy, Default)]
 struct Look {
     ln_alpha: f64,
     ln_scale: f64,
     opacity: f64,
+}
+
+/// A point as the radar sees it.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    /// On the bone, from the radar, m.
+    place: Vec3,
+    /// Where the skin is, as the former.
+    at: Vec3,
+    /// The share of its area that is seen, and how that comes about.
+    share: f64,
+    facing: Facing,
+    look: Look,
+}
+
+/// What of a point's side decides where it is seen.
+#[derive(Debug, Clone, Copy)]
+enum Facing {
+    /// The side of the limb with these ends and this radius.
+    Limb { ends: [usize; 2], radius_m: f64, side: Side },
+    /// The line of sight, its cosine with the trunk's normal, and how far out along that.
+    Trunk { sight: (Vec3, f64), cosine: f64, out: f64 },
+    /// The line of sight.
+    Head((Vec3, f64)),
 }
 
 /// The skin of a skeleton, and its Gaussians in the last evaluation.
@@ -105,6 +132,8 @@ pub(super) struct Skin {
     plain: Vec<[f64; 2]>,
     /// What each joint of the last evaluation adds to its points.
     looks: Vec<Look>,
+    /// The points of the last evaluation.
+    seen: Vec<Seen>,
     /// Where the radar is, world frame, m.
     radar: Vec3,
     /// The Gaussians, `POINTS` a person, as the forward model takes them.
@@ -158,6 +187,7 @@ impl Normal {
 }
 
 /// A limb's side as it is seen from the radar.
+#[derive(Debug, Clone, Copy)]
 struct Side {
     /// The direction along the limb and its length.
     along: Vec3,
@@ -192,8 +222,8 @@ impl Skin {
                     kind: Kind::Limb { ends, radius_m },
                     shares: [(ends[0], 1.0 - u), (ends[1], u)].into_iter().collect(),
                     joints: Shares::new(),
-                    scale_m: LIMB_SCALE * share_m,
-                    ln_amplitude: 0.5 * (2.0 * radius_m * share_m).ln(),
+                    ln_scale: (LIMB_SCALE * share_m).ln(),
+                    amplitude: (2.0 * radius_m * share_m).sqrt(),
                 });
             }
         }
@@ -205,8 +235,8 @@ impl Skin {
                     kind: Kind::Trunk,
                     shares: CORNERS.into_iter().zip(shares).collect(),
                     joints: Shares::new(),
-                    scale_m: TRUNK_SCALE_M,
-                    ln_amplitude: 0.5 * TRUNK_AREA_M2.ln(),
+                    ln_scale: TRUNK_SCALE_M.ln(),
+                    amplitude: TRUNK_AREA_M2.sqrt(),
                 });
             }
         }
@@ -214,8 +244,8 @@ impl Skin {
             kind: Kind::Head,
             shares: [(HEAD, 1.0)].into_iter().collect(),
             joints: Shares::new(),
-            scale_m: HEAD_SCALE_M,
-            ln_amplitude: 0.5 * HEAD_AREA_M2.ln(),
+            ln_scale: HEAD_SCALE_M.ln(),
+            amplitude: HEAD_AREA_M2.sqrt(),
         });
         for point in &mut body {
             let of_part = |&(part, share): &(usize, f64)| {
@@ -234,6 +264,7 @@ impl Skin {
             body,
             plain: plain.collect(),
             looks: Vec::new(),
+            seen: Vec::new(),
             radar,
             points: empty.clone(),
             gradient: empty,
@@ -251,6 +282,7 @@ impl Skin {
         let features = self.points.shape().doppler_features;
         self.points.reset(PpprShape { persons: shape.persons, joints: POINTS, doppler_features: features });
         self.look(params);
+        self.seen.clear();
         for person in 0..shape.persons {
             let places = self.places(params.person(person));
             let normal = Normal::of(&places);
@@ -259,12 +291,14 @@ impl Skin {
                 let joint = person * POINTS + k;
                 let mut place = [0.0; 3];
                 of.shares.iter().for_each(|&(part, share)| add_scaled(&mut place, places[part], share));
-                let (at, seen) = of.seen(place, &places, &normal);
+                let mut seen = of.seen(place, &places, &normal);
                 let [ln_alpha, ln_scale] = self.looks(first, of);
-                let (ln_alpha, ln_scale) = (ln_alpha.clamp(LEAST_LN_ALPHA, MOST_LN), ln_scale.clamp(-MOST_LN, MOST_LN));
-                let alpha = (of.ln_amplitude + 0.5 * seen.ln() + ln_alpha).exp().min(0.999);
-                self.points.set_vec3(Group::Position, joint, add(at, self.radar));
-                self.points.set_vec3(Group::LogScale, joint, [of.scale_m.ln() + ln_scale; 3]);
+                let alpha = of.amplitude * seen.share.sqrt() * ln_alpha.clamp(LEAST_LN_ALPHA, MOST_LN).exp();
+                let alpha = alpha.min(MOST_ALPHA);
+                seen.look = Look { ln_alpha, ln_scale, opacity: alpha };
+                self.seen.push(seen);
+                self.points.set_vec3(Group::Position, joint, add(seen.at, self.radar));
+                self.points.set_vec3(Group::LogScale, joint, [of.ln_scale + ln_scale.clamp(-MOST_LN, MOST_LN); 3]);
                 self.points.joint_mut(Group::Rotation, joint)[0] = 1.0;
                 self.points.joint_mut(Group::Beta, joint)[0] = (alpha / (1.0 - alpha)).ln();
                 let mut velocity = [0.0; 3];
@@ -300,16 +334,17 @@ impl Skin {
             let (mut bars, mut normal_bar) = ([[0.0; 3]; PARTS], [0.0; 3]);
             for (k, of) in self.body.iter().enumerate() {
                 let joint = person * POINTS + k;
-                let mut place = [0.0; 3];
-                of.shares.iter().for_each(|&(part, share)| add_scaled(&mut place, places[part], share));
-                let alpha = self.points.opacity(joint);
+                let seen = &self.seen[joint];
+                let Look { ln_alpha, ln_scale, opacity } = seen.look;
                 // By ln α of the point; where it is as bright as can be it has no slope.
-                let by_ln =
-                    if alpha < 0.999 { self.gradient.joint(Group::Beta, joint)[0] / (1.0 - alpha) } else { 0.0 };
+                let by_ln = if opacity < MOST_ALPHA {
+                    self.gradient.joint(Group::Beta, joint)[0] / (1.0 - opacity)
+                } else {
+                    0.0
+                };
                 let bar = self.gradient.vec3(Group::Position, joint);
-                let place_bar = of.pull_back(place, (&places, &normal), (bar, by_ln), &mut bars, &mut normal_bar);
+                let place_bar = seen.pull_back(&normal, (bar, by_ln), &mut bars, &mut normal_bar);
                 of.shares.iter().for_each(|&(part, share)| add_scaled(&mut bars[part], place_bar, share));
-                let [ln_alpha, ln_scale] = self.looks(first, of);
                 let pass = |x: f64, least: f64, bar: f64| if x > least && x < MOST_LN { bar } else { 0.0 };
                 let scale_bar = self.gradient.vec3(Group::LogScale, joint).iter().sum();
                 let (alpha_bar, scale_bar) =
@@ -374,44 +409,48 @@ impl Skin {
 }
 
 impl Point {
-    /// Where the point is that is seen, and the share of its area, for its place on the bone.
-    fn seen(&self, place: Vec3, places: &[Vec3; PARTS], normal: &Normal) -> (Vec3, f64) {
+    /// How it is seen at this place on the bone.
+    fn seen(&self, place: Vec3, places: &[Vec3; PARTS], normal: &Normal) -> Seen {
         let mut at = place;
-        match self.kind {
+        let (share, facing) = match self.kind {
             Kind::Limb { ends, radius_m } => {
                 let side = Side::of(place, sub(places[ends[1]], places[ends[0]]));
                 add_scaled(&mut at, side.outwards, -(OUT) * radius_m / side.sine);
-                (at, side.sine * side.sine + LIMB_END)
+                (side.sine * side.sine + LIMB_END, Facing::Limb { ends, radius_m, side })
             }
             Kind::Trunk => {
-                let cosine = dot(unit(place, 1e-12).0, normal.front.0);
-                add_scaled(&mut at, normal.front.0, -(TRUNK_OUT_M) * (cosine / TRUNK_EDGE).tanh());
-                (at, cosine * cosine + TRUNK_SIDE)
+                let sight = unit(place, 1e-12);
+                let cosine = dot(sight.0, normal.front.0);
+                let out = (cosine / TRUNK_EDGE).tanh();
+                add_scaled(&mut at, normal.front.0, -(TRUNK_OUT_M) * out);
+                (cosine * cosine + TRUNK_SIDE, Facing::Trunk { sight, cosine, out })
             }
             Kind::Head => {
-                add_scaled(&mut at, unit(place, 1e-12).0, -(HEAD_OUT_M));
-                (at, 1.0)
+                let sight = unit(place, 1e-12);
+                add_scaled(&mut at, sight.0, -(HEAD_OUT_M));
+                (1.0, Facing::Head(sight))
             }
-        }
+        };
+        Seen { place, at, share, facing, look: Look::default() }
     }
+}
 
+impl Seen {
     /// ∂L/∂(its place on the bone) of the adjoints of where it is seen and of its ln α; what limbs' directions and the trunk's
     /// normal want is added to `bars` and `normal_bar`.
     fn pull_back(
         &self,
-        place: Vec3,
-        (places, normal): (&[Vec3; PARTS], &Normal),
+        normal: &Normal,
         (bar, by_ln): (Vec3, f64),
         bars: &mut [Vec3; PARTS],
         normal_bar: &mut Vec3,
     ) -> Vec3 {
         let mut place_bar = bar;
         let sight_bar = |sight: (Vec3, f64), bar: Vec3, place_bar: &mut Vec3| {
-            add_scaled(place_bar, unit_back(place, sight.1, bar), 1.0);
+            add_scaled(place_bar, unit_back(self.place, sight.1, bar), 1.0);
         };
-        match self.kind {
-            Kind::Limb { ends, radius_m } => {
-                let side = Side::of(place, sub(places[ends[1]], places[ends[0]]));
+        match self.facing {
+            Facing::Limb { ends, radius_m, side } => {
                 let (n, s) = (side.outwards, side.sine);
                 let pushed = scale(bar, -(OUT) * radius_m);
                 let mut n_bar = unit_back(n, s, pushed);
@@ -427,18 +466,15 @@ impl Point {
                 add_scaled(&mut bars[ends[1]], along_bar, 1.0);
                 add_scaled(&mut bars[ends[0]], along_bar, -1.0);
             }
-            Kind::Trunk => {
-                let sight = unit(place, 1e-12);
+            Facing::Trunk { sight, cosine, out } => {
                 let front = normal.front.0;
-                let cosine = dot(sight.0, front);
-                let out = (cosine / TRUNK_EDGE).tanh();
                 add_scaled(normal_bar, bar, -(TRUNK_OUT_M) * out);
                 let cosine_bar = -(TRUNK_OUT_M) * dot(front, bar) * (1.0 - out * out) / TRUNK_EDGE
                     + by_ln * cosine / (cosine * cosine + TRUNK_SIDE);
                 add_scaled(normal_bar, sight.0, cosine_bar);
                 sight_bar(sight, scale(front, cosine_bar), &mut place_bar);
             }
-            Kind::Head => sight_bar(unit(place, 1e-12), scale(bar, -(HEAD_OUT_M)), &mut place_bar),
+            Facing::Head(sight) => sight_bar(sight, scale(bar, -(HEAD_OUT_M)), &mut place_bar),
         }
         place_bar
     }

@@ -187,11 +187,7 @@ impl PoseSpace {
         out.copy_from_slice(&row[..self.joints]);
         for (k, c) in c.iter().enumerate() {
             let of = &row[(k + 1) * self.joints..(k + 2) * self.joints];
-            for (out, of) in out.iter_mut().zip(of) {
-                for i in 0..3 {
-                    out[i] += c * of[i];
-                }
-            }
+            out.as_flattened_mut().iter_mut().zip(of.as_flattened()).for_each(|(out, of)| *out += c * of);
         }
     }
 
@@ -329,11 +325,11 @@ impl PoseSpace {
     fn mixed_back(&self, row: &[Vec3], own: &[Vec3], bars: &mut [f64]) {
         for (k, bar) in bars[BODY..].iter_mut().enumerate() {
             let of = &row[(k + 1) * self.joints..(k + 2) * self.joints];
-            let mut sum = 0.0;
+            let mut sums = [0.0; 3];
             for (of, own) in of.iter().zip(own) {
-                sum += of[0] * own[0] + of[1] * own[1] + of[2] * own[2];
+                sums.iter_mut().zip(of.iter().zip(own)).for_each(|(sum, (of, own))| *sum += of * own);
             }
-            *bar += sum;
+            *bar += sums.iter().sum::<f64>();
         }
     }
 
