@@ -109,7 +109,6 @@ struct Seen {
     /// The share of its area that is seen, and how that comes about.
     share: f64,
     facing: Facing,
-    look: Look,
 }
 
 /// What of a point's side decides where it is seen.
@@ -133,7 +132,7 @@ pub(super) struct Skin {
     /// What each joint of the last evaluation adds to its points.
     looks: Vec<Look>,
     /// The points of the last evaluation.
-    seen: Vec<Seen>,
+    seen: Vec<(Seen, Look)>,
     /// Where the radar is, world frame, m.
     radar: Vec3,
     /// The Gaussians, `POINTS` a person, as the forward model takes them.
@@ -291,12 +290,11 @@ impl Skin {
                 let joint = person * POINTS + k;
                 let mut place = [0.0; 3];
                 of.shares.iter().for_each(|&(part, share)| add_scaled(&mut place, places[part], share));
-                let mut seen = of.seen(place, &places, &normal);
+                let seen = of.seen(place, &places, &normal);
                 let [ln_alpha, ln_scale] = self.looks(first, of);
                 let alpha = of.amplitude * seen.share.sqrt() * ln_alpha.clamp(LEAST_LN_ALPHA, MOST_LN).exp();
                 let alpha = alpha.min(MOST_ALPHA);
-                seen.look = Look { ln_alpha, ln_scale, opacity: alpha };
-                self.seen.push(seen);
+                self.seen.push((seen, Look { ln_alpha, ln_scale, opacity: alpha }));
                 self.points.set_vec3(Group::Position, joint, add(seen.at, self.radar));
                 self.points.set_vec3(Group::LogScale, joint, [of.ln_scale + ln_scale.clamp(-MOST_LN, MOST_LN); 3]);
                 self.points.joint_mut(Group::Rotation, joint)[0] = 1.0;
@@ -334,8 +332,7 @@ impl Skin {
             let (mut bars, mut normal_bar) = ([[0.0; 3]; PARTS], [0.0; 3]);
             for (k, of) in self.body.iter().enumerate() {
                 let joint = person * POINTS + k;
-                let seen = &self.seen[joint];
-                let Look { ln_alpha, ln_scale, opacity } = seen.look;
+                let (seen, Look { ln_alpha, ln_scale, opacity }) = self.seen[joint];
                 // By ln α of the point; where it is as bright as can be it has no slope.
                 let by_ln = if opacity < MOST_ALPHA {
                     self.gradient.joint(Group::Beta, joint)[0] / (1.0 - opacity)
@@ -431,7 +428,7 @@ impl Point {
                 (1.0, Facing::Head(sight))
             }
         };
-        Seen { place, at, share, facing, look: Look::default() }
+        Seen { place, at, share, facing }
     }
 }
 
@@ -454,7 +451,7 @@ impl Seen {
                 let (n, s) = (side.outwards, side.sine);
                 let pushed = scale(bar, -(OUT) * radius_m);
                 let mut n_bar = unit_back(n, s, pushed);
-                add_scaled(&mut n_bar, n, by_ln / (s * s + LIMB_END));
+                add_scaled(&mut n_bar, n, by_ln / self.share);
                 let (e, k) = (side.axis.0, side.sight.0);
                 let along = dot(e, n_bar);
                 let mut k_bar = n_bar;
@@ -469,8 +466,8 @@ impl Seen {
             Facing::Trunk { sight, cosine, out } => {
                 let front = normal.front.0;
                 add_scaled(normal_bar, bar, -(TRUNK_OUT_M) * out);
-                let cosine_bar = -(TRUNK_OUT_M) * dot(front, bar) * (1.0 - out * out) / TRUNK_EDGE
-                    + by_ln * cosine / (cosine * cosine + TRUNK_SIDE);
+                let cosine_bar =
+                    -(TRUNK_OUT_M) * dot(front, bar) * (1.0 - out * out) / TRUNK_EDGE + by_ln * cosine / self.share;
                 add_scaled(normal_bar, sight.0, cosine_bar);
                 sight_bar(sight, scale(front, cosine_bar), &mut place_bar);
             }

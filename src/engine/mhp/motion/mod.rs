@@ -9,10 +9,11 @@
 //! L_prior = W/F · ((ρ(c) + ((s − s₀)/σ_s)² + ((q − q₀)/σ_q)² + ρ_w(w, ẇ))/30 + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)² + ρ_h(h/σ_h))
 //! ```
 //!
-//! where ρ(c) is −2 ln of how likely a Gaussian mixture has the first coefficients (`body::Mixture`), and the squares of the others. F are
-//! the frames there are and W those that are asked for (`window`), for fewer frames are less evidence against a prior that stays. The parts behind it are those of the body's proportions (`proportions.rs`) and of the floor (`ground.rs`); for several
-//! persons there is one for bodies that stand in one another or go far from where they were counted (`apart.rs`). The kinematic terms are
-//! those of the frame that is fitted.
+//! where ρ(c) is −2 ln of how likely a Gaussian mixture has the first coefficients (`body::Mixture`), and the squares of the others.
+//! F are the frames there are and W those that are asked for (`window`), for fewer frames are less evidence against a prior that
+//! stays. The parts behind it are those of the body's proportions (`proportions.rs`) and of the floor (`ground.rs`); for several
+//! persons there is one for bodies that stand in one another or go far from where they were counted (`apart.rs`). The kinematic
+//! terms are those of the frame that is fitted.
 //! q says how bright what stands still is (`static_echo.rs`). PPPR stays the state that is shown, kept and exported: positions and
 //! velocities follow the coordinates, and opacities do where the settings ask for it; scales and the rest move by themselves and
 //! are the same in all frames of the window. The frame stands as near the window's middle as its
