@@ -35,6 +35,8 @@ mod train_evidence;
 mod train_motion;
 #[cfg(feature = "train")]
 mod train_pose;
+#[cfg(feature = "train")]
+mod train_pose_network;
 mod transfer;
 
 pub use common::allow_outside;
@@ -251,6 +253,10 @@ pub enum CliCommand {
     #[cfg(feature = "train")]
     #[command(after_help = train_pose::HELP)]
     TrainPose(train_pose::TrainPoseArgs),
+    /// Make the network anew that a fit asks where joints are expected
+    #[cfg(feature = "train")]
+    #[command(after_help = train_pose_network::HELP)]
+    TrainPoseNetwork(train_pose_network::TrainPoseNetworkArgs),
 }
 
 /// Starts the program once more where a subcommand needs another environment than it has, and never returns then. For `main`
@@ -301,5 +307,7 @@ pub fn run(command: CliCommand) -> anyhow::Result<ExitCode> {
         CliCommand::TrainMotion(args) => train_motion::run(&args),
         #[cfg(feature = "train")]
         CliCommand::TrainPose(args) => train_pose::run(&args),
+        #[cfg(feature = "train")]
+        CliCommand::TrainPoseNetwork(args) => train_pose_network::run(&args),
     }
 }

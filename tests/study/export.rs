@@ -145,7 +145,7 @@ fn curves_read_back_exactly() {
     ];
     let table = curves_csv(&arrays, rows).unwrap();
     let mut reader = csv::Reader::from_reader(table.as_slice());
-    let terms = ["em", "bone", "rigid", "joint", "sep", "coll", "time", "prior"];
+    let terms = ["em", "bone", "rigid", "joint", "sep", "coll", "time", "prior", "net"];
     let last = ["iou_hori", "iou_a, \"b\"", "majpe_mm", "converged", "flag"];
     let head: Vec<&str> = ["iteration", "branch", "loss"].into_iter().chain(terms).chain(last).collect();
     assert_eq!(reader.headers().unwrap().iter().collect::<Vec<_>>(), head);

@@ -82,7 +82,7 @@ pub(super) fn run(args: &TrainMotionArgs) -> anyhow::Result<ExitCode> {
 }
 
 /// The clips of a recording.
-fn clips(path: &Path) -> anyhow::Result<Vec<MotionClip>> {
+pub(super) fn clips(path: &Path) -> anyhow::Result<Vec<MotionClip>> {
     let mut archive = NpzArchive::open(path)?;
     let joints = archive.read("joints")?;
     let pose = 3 * MOTION_JOINTS.len();
@@ -116,7 +116,7 @@ fn clips(path: &Path) -> anyhow::Result<Vec<MotionClip>> {
 }
 
 /// How much there is, for people.
-fn amount(what: &str, clips: &[MotionClip]) -> String {
+pub(super) fn amount(what: &str, clips: &[MotionClip]) -> String {
     let mut subjects: Vec<&str> = clips.iter().map(|clip| clip.subject.as_str()).collect();
     subjects.sort_unstable();
     subjects.dedup();

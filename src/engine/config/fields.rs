@@ -126,6 +126,12 @@ pub const FIELDS: &[Field] = &[
         ..number(Weights, "w_prior", "w_prior", Steps, (0.0, 1000.0), number_at!(w_prior)).logarithmic().row("motion")
     },
     Field {
+        help: "Weight of what a network that looks at the maps alone expects, where the parameterization is motion; above 0 its bodies are starts, too.",
+        ..number(Weights, "w_net", "w_net", StepsAndStart, (0.0, 1000.0), number_at!(w_net))
+            .logarithmic()
+            .row("network")
+    },
+    Field {
         help: "Frames that are fitted together where the parameterization is motion.",
         ..number(Model, "window", "Window", StepsAndStart, (1.0, 9.0), count_at!(window)).whole().row("motion")
     },

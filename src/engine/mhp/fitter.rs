@@ -413,7 +413,9 @@ fn evaluate_state(
     }
     window.pull_back(&state.motion.coordinates, &state.params, &evaluation.gradient, &mut loss.gradient);
     evaluation.gradient.add_scaled(config.w_em, &evaluation.gradients[Weight::Em as usize]);
-    for (key, value) in [("em", loss.em), ("prior", if config.w_prior > 0.0 { loss.prior } else { 0.0 })] {
+    let weighed = |weight: f64, value: f64| if weight > 0.0 { value } else { 0.0 };
+    let prior = weighed(config.w_prior, loss.prior);
+    for (key, value) in [("em", loss.em), ("prior", prior), ("net", weighed(config.w_net, loss.network))] {
         evaluation.terms.put(key, value);
     }
     evaluation.loss = evaluation.terms.loss(&config);

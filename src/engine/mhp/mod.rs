@@ -13,7 +13,8 @@
 //! 3. cells: `kernel.rs`, `tiles/mod.rs`, `cell_box.rs`; masks and levels over them, `levels.rs`, `em.rs`
 //! 4. what the maps of a frame and those around it show: `region.rs`, `template.rs`, `context/mod.rs`; without the stars of
 //!    echoes, `sidelobes.rs`
-//! 5. a frame: `frame_em.rs`, `problem.rs`, `thinned.rs`, `erased.rs`, `simulate.rs`, `returns.rs`, `signal.rs`
+//! 5. a frame: `frame_em.rs`, `problem.rs`, `thinned.rs`, `erased.rs`, `simulate.rs`, `returns.rs`, `signal.rs`;
+//!    where a network expects the joints, `pose_network/mod.rs`
 //! 6. the objective: `objective.rs`; a window of frames: `motion/mod.rs`
 //! 7. the fit: `convergence.rs`, `articulation.rs`, `adam.rs`, `fitter.rs`; and the start of one: `init/mod.rs`
 //!
@@ -47,6 +48,7 @@ mod levels;
 mod motion;
 mod objective;
 mod percentile;
+mod pose_network;
 mod problem;
 mod region;
 mod returns;
@@ -77,6 +79,8 @@ pub use init::{Hypotheses, Initialisation, initialise, initialise_people, predic
 pub use motion::MotionState;
 pub use objective::{Masks, Objective, masks};
 pub use percentile::{percentile, percentiles};
+#[cfg(feature = "train")]
+pub use pose_network::{Actors, PoseNetwork, PoseTrainOptions, pose_network_reach, train_pose_network};
 pub use problem::Problem;
 pub use region::Region;
 pub use returns::{JointReturn, JointReturns, KeptJoints};

@@ -10,6 +10,7 @@ const ORDER: &[&str] = &[
     "clutter",
     "static echo",
     "motion",
+    "network",
     "decoding along the sequence",
     "bones turn",
     "scales and opacities by body part",

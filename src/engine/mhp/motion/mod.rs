@@ -5,7 +5,7 @@
 //! frame compares its own maps (`mhp/frame_em.rs`), and
 //!
 //! ```text
-//! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior
+//! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior + w_net · W/F · L_net
 //! L_prior = W/F · ((ρ(c) + ((s − s₀)/σ_s)² + ((q − q₀)/σ_q)² + ρ_w(w, ẇ))/30 + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)² + ρ_h(h/σ_h))
 //! ```
 //!
@@ -41,6 +41,7 @@ pub(super) use thinned::ThinnedViews;
 pub(super) use turn::turn;
 
 use super::frame_em::FrameEm;
+use super::pose_network::Expected;
 use super::region;
 use super::{FitError, Precision, Problem};
 use crate::body::{Group, MotionPrior, Pppr};
@@ -50,6 +51,7 @@ use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use space::{BODY, Detail, HEIGHT, LN_SIZE, MOST_JOINTS, PoseSpace, STILL, Stance, TILT, YAW};
 use static_echo::StaticEchoModel;
+use std::iter::zip;
 
 /// Frames of a window lie no farther from its middle, s: the prior reaches no farther.
 const REACH_S: f64 = 0.201;
@@ -131,6 +133,8 @@ pub(super) struct Window {
     scarcity: f64,
     /// Where several persons began, floor plan, m; of one alone empty.
     places: Vec<[f64; 2]>,
+    /// Where the network expects each person.
+    expected: Vec<Option<Expected>>,
 }
 
 struct WindowFrame {
@@ -147,6 +151,8 @@ pub(super) struct WindowLoss {
     pub(super) em: f64,
     /// L_prior.
     pub(super) prior: f64,
+    /// L_net.
+    pub(super) network: f64,
     /// ∂(w_EM L_EM + w_prior L_prior) by the coordinates.
     pub(super) gradient: Vec<f64>,
     /// What the frame that is fitted alone says of the positions, kept while the others are asked.
@@ -195,6 +201,11 @@ impl Window {
     ///
     /// # Errors
     /// Where a position is not finite.
+    /// Where the network expects a person.
+    pub(super) fn expected(&self, person: usize) -> Option<&Expected> {
+        self.expected.get(person)?.as_ref()
+    }
+
     fn new(
         problem: &Problem,
         config: &FitConfig,
@@ -249,7 +260,12 @@ impl Window {
         let echo = StaticEchoModel::new(problem, config);
         let scarcity = config.window.max(1) as f64 / chosen.len() as f64;
         let clear = walks || problem.static_removed;
-        let mut window = Self { space, echo, own, frames, stride, clear, scarcity, places: Vec::new() };
+        let mut window =
+            Self { space, echo, own, frames, stride, clear, scarcity, places: Vec::new(), expected: Vec::new() };
+        if config.w_net > 0.0 {
+            let about = |person| Expected::about(problem, config, mean(initial.person(person)));
+            window.expected = (0..initial.shape().persons).map(about).collect();
+        }
         if initial.shape().persons > 1 {
             window.places = window.coordinates_of(initial).chunks_exact(stride).map(|of| [of[0], of[1]]).collect();
         }
@@ -334,7 +350,7 @@ impl Window {
         looks: Option<&mut Pppr>,
         loss: &mut WindowLoss,
     ) {
-        let Self { space, echo, frames, stride, scarcity, places, .. } = self;
+        let Self { space, echo, frames, stride, scarcity, places, own: own_frame, expected, .. } = self;
         let joints = params.shape().joints;
         loss.gradient.clear();
         loss.gradient.resize(coordinates.len(), 0.0);
@@ -393,6 +409,17 @@ impl Window {
         }
         for (own, bars) in coordinates.chunks_exact(*stride).zip(loss.gradient.chunks_exact_mut(*stride)) {
             loss.prior += prior_share * space.unlikeliness(own, prior_gain, bars);
+        }
+        loss.network = 0.0;
+        let each = zip(coordinates.chunks_exact(*stride), loss.gradient.chunks_exact_mut(*stride));
+        for (person, ((own, bars), expected)) in zip(each, &*expected).enumerate() {
+            let Some(expected) = expected else { continue };
+            let (mut pose, mut bar) = ([[0.0; 3]; MOST_JOINTS], [[0.0; 3]; MOST_JOINTS]);
+            space.pose(own, &stances[person], *own_frame, &mut pose[..joints]);
+            let gain = config.w_net * prior_share;
+            loss.network += prior_share * expected.misfit(&pose[..joints], gain, &mut bar[..joints]);
+            let moved = (&pose[..joints], &bar[..joints]);
+            space.pull_back(own, &stances[person], *own_frame, (moved, None), bars);
         }
         // The other parts are means over persons and grow as frames get fewer; nobody stands in another, however many look.
         loss.prior += apart::overlap(coordinates, *stride, config.w_prior, &mut loss.gradient);

@@ -36,7 +36,8 @@ const PLAIN: f64 = 10.0;
 /// whole windows.
 const LATER: f64 = 310.0;
 const FIRST: f64 = 5.0 / 4.0;
-/// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start.
+/// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start, but for what a network
+/// expects, whose weight says whether it is asked.
 const WEIGHTS: [f64; 2] = [0.5, 8e-3];
 /// Starts whose joints have come nearer to each other than this, on average, have become one, m.
 const ONE_M: f64 = 0.03;
@@ -137,7 +138,7 @@ impl<'a> Search<'a> {
     fn evaluate(&mut self, coordinates: &[f64]) -> f64 {
         let how = (self.problem, self.config);
         self.window.evaluate_some(self.every, how, Precision::F32, (coordinates, self.params), None, &mut self.loss);
-        self.config.w_em * self.loss.em + self.config.w_prior * self.loss.prior
+        self.config.w_em * self.loss.em + self.config.w_prior * self.loss.prior + self.config.w_net * self.loss.network
     }
 
     /// Takes `steps` from a start, its pose `held` or not, and stays at the best that is met.
@@ -233,6 +234,19 @@ impl<'a> Search<'a> {
         all.into_iter().take(FALLEN).map(|(_, tried)| tried).collect()
     }
 
+    /// The bodies that the network expects a person to be, the others as in `coordinates`.
+    fn expected(&self, coordinates: &[f64], person: usize) -> Vec<Tried> {
+        let own = person * self.window.stride..(person + 1) * self.window.stride;
+        let starts = self.window.expected(person).into_iter().flat_map(|expected| expected.starts(person, self.params));
+        let tried = |start: Pppr| {
+            let mut of = coordinates.to_vec();
+            of[own.clone()].copy_from_slice(&self.window.coordinates_of(&start)[own.clone()]);
+            of[own.start + STILL] = coordinates[own.start + STILL];
+            Tried::at(of)
+        };
+        starts.map(tried).collect()
+    }
+
     /// What a sieve leaves of `all`, the best first; of those that have become one, one.
     fn sift(&mut self, all: &mut Vec<Tried>, sieve: &Sieve, own: &Range<usize>) {
         self.every = sieve.every;
@@ -323,6 +337,7 @@ pub(in crate::mhp) fn search(
         if params.shape().persons == 1 {
             all.extend(search.fallen(&coordinates, own.clone(), (hips, floor, ways[person])));
         }
+        let of_network: Vec<Tried> = search.expected(&coordinates, person);
         for sieve in &SIEVES {
             search.sift(&mut all, sieve, &own);
         }
@@ -331,6 +346,7 @@ pub(in crate::mhp) fn search(
         let mut own_start = begun_at;
         search.descend(&mut own_start, SIEVES[0].steps, true);
         all.push(own_start);
+        all.extend(of_network);
         for tried in &mut all {
             search.settle(tried, FINE);
         }

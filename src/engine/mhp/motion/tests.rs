@@ -84,6 +84,11 @@ fn so_does_that_of_a_body_on_the_floor() {
     agrees(&FitConfig { height: Height::Floor, ..config() }, Some(1.0));
 }
 
+#[test]
+fn so_does_that_of_a_body_that_the_network_expects_elsewhere() {
+    agrees(&FitConfig { w_net: 0.02, ..config() }, None);
+}
+
 fn agrees(config: &FitConfig, height_m: Option<f64>) {
     let rng = &mut StdRng::seed_from_u64(3);
     let mut problem = problem(rng);
@@ -96,7 +101,7 @@ fn agrees(config: &FitConfig, height_m: Option<f64>) {
     let mut loss = WindowLoss::default();
     let mut value = |coordinates: &[f64], loss: &mut WindowLoss| {
         window.evaluate((&problem, config), Precision::F64, (coordinates, &params), None, loss);
-        config.w_em * loss.em + config.w_prior * loss.prior
+        config.w_em * loss.em + config.w_prior * loss.prior + config.w_net * loss.network
     };
     value(&coordinates, &mut loss);
     let gradient = loss.gradient.clone();

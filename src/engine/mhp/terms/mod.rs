@@ -14,6 +14,7 @@
 //! | `collision.rs` | L_coll |
 //! | `time.rs` | L_time |
 //! | `prior.rs` | L_prior: only its row, for the fit of a window computes it |
+//! | `network.rs` | L_net: only its row, for the fit of a window computes it |
 //! | `penalties.rs` | what they share: ψ, lengths that have a slope everywhere, repulsion |
 
 mod angles;
@@ -22,6 +23,7 @@ mod collision;
 #[cfg(any(test, feature = "dummies"))]
 mod dummy;
 mod electromagnetic;
+mod network;
 mod penalties;
 mod prior;
 mod separation;
@@ -51,6 +53,7 @@ pub const TERMS: &[Term] = &[
     collision::COLL,
     time::TIME,
     prior::PRIOR,
+    network::NET,
     #[cfg(any(test, feature = "dummies"))]
     dummy::DUMMY,
 ];

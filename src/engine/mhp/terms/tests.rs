@@ -129,7 +129,7 @@ fn a_line_of_the_table_says_all_there_is_to_say() {
     }
     let grouped: usize = TermGroup::ALL.iter().map(|group| group.terms().count()).sum();
     assert_eq!(grouped, TERMS.len());
-    let known = "L = w_EM·L_EM + w_kine·(L_bone + L_rigid + L_joint + L_sep + L_coll) + w_time·L_time + w_prior·L_prior + w_dummy·L_dummy";
+    let known = "L = w_EM·L_EM + w_kine·(L_bone + L_rigid + L_joint + L_sep + L_coll) + w_time·L_time + w_prior·L_prior + w_net·L_net + w_dummy·L_dummy";
     assert_eq!(formula(), known);
 }
 

@@ -15,6 +15,8 @@ pub enum Weight {
     Time,
     /// w_prior, of L_prior.
     Prior,
+    /// w_net, of L_net.
+    Network,
     /// Of the term that unit tests have.
     #[cfg(any(test, feature = "dummies"))]
     Dummy,
@@ -62,6 +64,7 @@ impl Weight {
         Self::Kine,
         Self::Time,
         Self::Prior,
+        Self::Network,
         #[cfg(any(test, feature = "dummies"))]
         Self::Dummy,
     ];
@@ -75,6 +78,7 @@ impl Weight {
             Self::Kine => ("w_kine", TermGroup::Kinematic),
             Self::Time => ("w_time", TermGroup::Temporal),
             Self::Prior => ("w_prior", TermGroup::Temporal),
+            Self::Network => ("w_net", TermGroup::Electromagnetic),
             #[cfg(any(test, feature = "dummies"))]
             Self::Dummy => ("w_dummy", TermGroup::Temporal),
         }
@@ -87,6 +91,7 @@ impl Weight {
             Self::Kine => config.w_kine,
             Self::Time => config.w_time,
             Self::Prior => config.w_prior,
+            Self::Network => config.w_net,
             #[cfg(any(test, feature = "dummies"))]
             Self::Dummy => config.w_dummy,
         }

@@ -1,0 +1,210 @@
+//! Where a network expects the joints of a person, from the maps of half a second at once: amortised inference.
+//!
+//! A fit asks which body explains the maps, and several do. A network that has seen many bodies before many radars tells which of them
+//! it usually was. It looks at levels over range and angle about a place ([`glimpse`]), each view's at five times and what stands
+//! there, and says of four bodies how likely each is, and of each joint where it is and how far off that may be ([`layers`]):
+//!
+//! ```text
+//! p(x) = Σ over bodies k of π_k (Π over joints j of e^(−|x_j − μ_kj|/b_kj)/b_kj³)^0.3
+//! L_net = −ln(p(x)/p(μ))/(0.3 J)
+//! ```
+//!
+//! with |·| rounded off where it is smaller than b, and p(μ) what the bodies themselves have. The power is what joints know of each
+//! other. It was taught (`train-pose-network`) with recorded people and the actors of the synthetic source, turned every way, before
+//! radars whose widths, sidelobes, noise, clutter and ghosts are drawn anew for each lesson: neither simulator that it is judged
+//! by is among them. It says nothing of which way people usually look: that is the prior's and the path's affair.
+
+mod glimpse;
+mod layers;
+#[cfg(test)]
+mod tests;
+#[cfg(feature = "train")]
+mod train;
+
+#[cfg(feature = "train")]
+pub use train::{Actors, PoseTrainOptions, pose_network_reach, train_pose_network};
+
+use super::Problem;
+use crate::body::{Group, Pppr};
+use crate::config::FitConfig;
+use crate::geometry::{Vec3, add_scaled, mean, norm, sub};
+use glimpse::{Glimpse, Seen};
+use layers::{BODIES, JOINTS, Layers, OUT};
+use smallvec::SmallVec;
+use std::iter::zip;
+use std::sync::OnceLock;
+
+/// Joints of the network.
+const NAMES: [&str; JOINTS] = [
+    "nose",
+    "left_eye",
+    "right_eye",
+    "left_ear",
+    "right_ear",
+    "left_shoulder",
+    "right_shoulder",
+    "left_elbow",
+    "right_elbow",
+    "left_wrist",
+    "right_wrist",
+    "left_hip",
+    "right_hip",
+    "left_knee",
+    "right_knee",
+    "left_ankle",
+    "right_ankle",
+];
+/// Shoulders and hips: what it looks about.
+const TRUNK: [usize; 4] = [5, 6, 11, 12];
+/// What the joints of a body say counts as much as that of so many that know nothing of each other, of one.
+const APART: f64 = 0.3;
+/// How often it looks, each time about where it expected the trunk before.
+const LOOKS: usize = 2;
+/// A body that is less likely is no start.
+const LEAST: f64 = 0.02;
+
+/// The network: weights that `train-pose-network` makes.
+#[derive(Debug, Clone)]
+pub struct PoseNetwork(Layers);
+
+/// Where the joints of a person are expected.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Expected {
+    bodies: SmallVec<[ExpectedBody; BODIES]>,
+    /// −ln of what the bodies themselves have.
+    best: f64,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct ExpectedBody {
+    /// ln π.
+    ln_chance: f64,
+    /// μ, world frame, m, and b, m, of each joint of the skeleton that the network knows.
+    joints: Vec<Option<(Vec3, f64)>>,
+}
+
+impl PoseNetwork {
+    /// The network that comes with the program; `None` where it is damaged.
+    fn committed() -> Option<&'static Self> {
+        static READ: OnceLock<Option<PoseNetwork>> = OnceLock::new();
+        let read = || PoseNetwork::from_bytes(include_bytes!("../../../../assets/pose-network.safetensors"));
+        let told = |error: &String| tracing::error!("assets/pose-network.safetensors: {error}");
+        READ.get_or_init(|| read().inspect_err(told).ok()).as_ref()
+    }
+
+    /// Reads a network.
+    ///
+    /// # Errors
+    /// Names the tensor that is missing, or has another type or size.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
+        Layers::from_tensors(bytes).map(Self)
+    }
+
+    /// As a safetensors file, with what is told of it.
+    ///
+    /// # Errors
+    /// Where it cannot be written, in words.
+    #[cfg(feature = "train")]
+    pub fn to_bytes(&self, told: std::collections::HashMap<String, String>) -> Result<Vec<u8>, String> {
+        self.0.to_tensors(told)
+    }
+
+    /// What it says of what is seen: ln of the chance of each body, and μ (along the sight, to its left, and up from the radar, from the
+    /// place, m) and b of its joints.
+    fn bodies(&self, seen: &Seen) -> SmallVec<[(f64, [(Vec3, f64); JOINTS]); BODIES]> {
+        let said: Vec<f64> = self.0.run(seen).into_iter().map(f64::from).collect();
+        let (chances, joints) = said.split_at(BODIES);
+        let whole = ln_sum_exp(chances.iter().copied());
+        let joint = |of: &[f64]| ([of[0], of[1], of[2]], of[3].exp());
+        let body = |of: &[f64]| std::array::from_fn(|k| joint(&of[k * OUT..(k + 1) * OUT]));
+        zip(chances, joints.chunks_exact(JOINTS * OUT)).map(|(chance, of)| (chance - whole, body(of))).collect()
+    }
+}
+
+fn ln_sum_exp(of: impl Iterator<Item = f64> + Clone) -> f64 {
+    let most = of.clone().fold(f64::NEG_INFINITY, f64::max);
+    most + of.map(|x| (x - most).exp()).sum::<f64>().ln()
+}
+
+impl Expected {
+    /// The person about `place`, world frame, m; `None` where no view has a range and an angle, or no joint is known.
+    pub(super) fn about(problem: &Problem, config: &FitConfig, place: Vec3) -> Option<Self> {
+        let network = PoseNetwork::committed()?;
+        let known: Vec<Option<usize>> =
+            problem.skeleton.joints.iter().map(|name| NAMES.iter().position(|known| known == name)).collect();
+        if known.iter().flatten().count() == 0 {
+            return None;
+        }
+        let (mut at, mut found) = (place, None);
+        for _ in 0..LOOKS {
+            let glimpse = Glimpse::at(problem, config, at)?;
+            let ([cos, sin], origin) = (glimpse.sight, glimpse.origin);
+            let world = |[along, left, up]: Vec3| {
+                [at[0] + cos * along - sin * left, at[1] + sin * along + cos * left, origin[2] + up]
+            };
+            let bodies = network.bodies(&glimpse.seen);
+            let likeliest = bodies.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+            let trunk = mean(&TRUNK.map(|joint| world(likeliest.1[joint].0)));
+            let body = |(ln_chance, joints): &(f64, [(Vec3, f64); JOINTS])| ExpectedBody {
+                ln_chance: *ln_chance,
+                joints: known.iter().map(|known| known.map(|k| (world(joints[k].0), joints[k].1))).collect(),
+            };
+            found = Some(bodies.iter().map(body).collect::<SmallVec<_>>());
+            at = [trunk[0], trunk[1], at[2]];
+        }
+        let bodies = found?;
+        let best = -ln_sum_exp(bodies.iter().map(|body: &ExpectedBody| body.ln_chance - APART * body.narrowness()));
+        best.is_finite().then_some(Self { bodies, best })
+    }
+
+    /// The joints of the bodies that are not unlikely, put where those of a person are.
+    pub(super) fn starts(&self, person: usize, params: &Pppr) -> impl Iterator<Item = Pppr> {
+        let joints = params.shape().joints;
+        let likely = self.bodies.iter().filter(|body| body.ln_chance > LEAST.ln());
+        likely.map(move |body| {
+            let mut start = params.clone();
+            for (k, expected) in body.joints.iter().enumerate() {
+                if let Some((at, _)) = expected {
+                    start.set_vec3(Group::Position, person * joints + k, *at);
+                }
+            }
+            start
+        })
+    }
+
+    /// L_net of a person's joints; `gain` times its gradient is added to `bars`.
+    pub(super) fn misfit(&self, joints: &[Vec3], gain: f64, bars: &mut [Vec3]) -> f64 {
+        let likely: SmallVec<[f64; BODIES]> = self.bodies.iter().map(|body| body.likely(joints)).collect();
+        let all = ln_sum_exp(likely.iter().copied());
+        let known = self.bodies.first().map_or(1.0, |body| body.joints.iter().flatten().count() as f64);
+        for (body, likely) in zip(&self.bodies, likely) {
+            let share = gain * (likely - all).exp() / known;
+            for ((at, bar), expected) in zip(zip(joints, &mut *bars), &body.joints) {
+                let Some((mean, b)) = expected else { continue };
+                let way = sub(*at, *mean);
+                add_scaled(bar, way, share / (b * b * rounded(norm(way) / b)));
+            }
+        }
+        (-all - self.best) / (APART * known)
+    }
+}
+
+/// √(1 + u²)
+fn rounded(u: f64) -> f64 {
+    (1.0 + u * u).sqrt()
+}
+
+impl ExpectedBody {
+    /// Σ 3 ln b.
+    fn narrowness(&self) -> f64 {
+        self.joints.iter().flatten().map(|(_, b)| 3.0 * b.ln()).sum()
+    }
+
+    /// ln of π times how likely joints are.
+    fn likely(&self, joints: &[Vec3]) -> f64 {
+        let of = |(at, expected): (&Vec3, &Option<(Vec3, f64)>)| {
+            expected.map_or(0.0, |(mean, b)| rounded(norm(sub(*at, mean)) / b) - 1.0)
+        };
+        self.ln_chance - APART * (self.narrowness() + zip(joints, &self.joints).map(of).sum::<f64>())
+    }
+}
