@@ -169,7 +169,7 @@ mod tests {
         let wave = |k: usize, step: f64| 2.0 * (step * k as f64).fract() - 1.0;
         let own = |k: usize| {
             let (along, across) = (wave(k, 0.618_034), 0.02 * wave(k, 0.414_214));
-            if k % 4 == 0 { [-6.0 + across, across] } else { [4.0 + 3.0 * along, 5.0 + 3.0 * along + across] }
+            if k.is_multiple_of(4) { [-6.0 + across, across] } else { [4.0 + 3.0 * along, 5.0 + 3.0 * along + across] }
         };
         let points: Vec<Vec<f64>> = (0..2000).map(own).flat_map(|[x, y]| [vec![x, y], vec![x, -y]]).collect();
         let weights = vec![1.0 / points.len() as f64; points.len()];

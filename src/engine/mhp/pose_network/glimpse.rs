@@ -97,7 +97,9 @@ pub(super) fn told(window: &[&[f32]], all: &[&[f32]]) -> Vec<f32> {
             seen.push(*over_time.select_nth_unstable_by(rank, f32::total_cmp).1);
         }
     }
-    seen.iter_mut().for_each(|level| *level = ((*level - brightest).max(FLOOR_DB) + MIDDLE_DB) / SPREAD_DB);
+    for level in &mut seen {
+        *level = ((*level - brightest).max(FLOOR_DB) + MIDDLE_DB) / SPREAD_DB;
+    }
     seen
 }
 

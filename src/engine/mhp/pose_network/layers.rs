@@ -111,7 +111,7 @@ impl Layers {
         for (k, layer) in self.dense.iter().enumerate() {
             x = layer.weights.chunks_exact(x.len()).zip(&layer.bias).map(|(w, b)| b + dot(w, &x)).collect();
             if k + 1 < self.dense.len() {
-                x.iter_mut().for_each(|x| *x = x.max(0.0));
+                rectify(&mut x);
             }
         }
         x
@@ -151,6 +151,13 @@ fn ends(mut columns: usize) -> usize {
     rows * columns
 }
 
+/// max(x, 0) of each.
+pub(super) fn rectify(x: &mut [f32]) {
+    for x in x {
+        *x = x.max(0.0);
+    }
+}
+
 fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut sums = [0.0_f32; 8];
     let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));
@@ -179,7 +186,7 @@ fn convolve(layer: &Layer, x: &[f32], size: [usize; 2], stride: usize) -> (Vec<f
     let mut out: Vec<f32> = layer.bias.iter().flat_map(|&bias| std::iter::repeat_n(bias, cells)).collect();
     let outputs = layer.bias.len();
     product(&mut out, [outputs, cells], (&layer.weights, false), (&shifted, false), 1.0);
-    out.iter_mut().for_each(|y| *y = y.max(0.0));
+    rectify(&mut out);
     (out, [high, wide])
 }
 

@@ -83,6 +83,9 @@ struct ExpectedBody {
     joints: Vec<Option<(Vec3, f64)>>,
 }
 
+/// ln of how likely each body is, and of each joint where it is and how far off, m.
+type Bodies = SmallVec<[(f64, [(Vec3, f64); JOINTS]); BODIES]>;
+
 impl PoseNetwork {
     /// The network that comes with the program; `None` where it is damaged.
     fn committed() -> Option<&'static Self> {
@@ -111,7 +114,7 @@ impl PoseNetwork {
 
     /// What it says of what is seen: ln of the chance of each body, and μ (along the sight, to its left, and up from the radar, from the
     /// place, m) and b of its joints.
-    fn bodies(&self, seen: &Seen) -> SmallVec<[(f64, [(Vec3, f64); JOINTS]); BODIES]> {
+    fn bodies(&self, seen: &Seen) -> Bodies {
         let said: Vec<f64> = self.0.run(seen).into_iter().map(f64::from).collect();
         let (chances, joints) = said.split_at(BODIES);
         let whole = ln_sum_exp(chances.iter().copied());

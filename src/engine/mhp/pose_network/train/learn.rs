@@ -1,7 +1,7 @@
 //! What lessons say of the weights, and steps down.
 
 use super::super::glimpse::{ACROSS, CHANNELS, RANGES, UP};
-use super::super::layers::{BODIES, HIDDEN, JOINTS, OUT, STRIDES, TOLD, TOWER, flat, product, shifted};
+use super::super::layers::{BODIES, HIDDEN, JOINTS, OUT, STRIDES, TOLD, TOWER, flat, product, rectify, shifted};
 use super::PoseLesson;
 use super::motion::MIRRORED;
 use rand::{Rng, rngs::StdRng};
@@ -146,7 +146,7 @@ impl Plan {
             let mut out = numbers[place.bias.clone()].repeat(n);
             product(&mut out, [n, place.outputs], (&x, false), (&numbers[place.weights.clone()], true), 1.0);
             if !last {
-                out.iter_mut().for_each(|x| *x = x.max(0.0));
+                rectify(&mut out);
             }
             layers[k] = x;
             masks.push(mask);
@@ -210,7 +210,7 @@ fn forwards(numbers: &[f32], places: &[Place], maps: &[f32], columns: usize) -> 
             numbers[place.bias.clone()].iter().flat_map(|&bias| std::iter::repeat_n(bias, cells)).collect();
         let weights = (&numbers[place.weights.clone()], false);
         product(&mut out, [place.outputs, cells], weights, (&shifted, false), 1.0);
-        out.iter_mut().for_each(|x| *x = x.max(0.0));
+        rectify(&mut out);
         kept.push(Kept { size, shifted, out });
         size = after;
     }
