@@ -6,6 +6,7 @@ use crate::mhp::{Actors, PoseTrainOptions, pose_network_reach, train_pose_networ
 use anyhow::Context as _;
 use clap::Args;
 use std::collections::HashMap;
+use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -112,7 +113,7 @@ pub(super) fn run(args: &TrainPoseNetworkArgs) -> anyhow::Result<ExitCode> {
         for (what, acted) in [("recorded", 0.0), ("acted", 1.0)] {
             let options = PoseTrainOptions { lessons: TESTS, acted, seed, ..options };
             let [distance, unlikely] = pose_network_reach(&network, &others_act, &options);
-            card += &format!("| {what} | {:.0} | {unlikely:.2} |\n", 1e3 * distance);
+            writeln!(card, "| {what} | {:.0} | {unlikely:.2} |", 1e3 * distance)?;
             told.insert(format!("{what}_mm"), format!("{:.0}", 1e3 * distance));
         }
     }
