@@ -79,8 +79,9 @@ pub use init::{Hypotheses, Initialisation, initialise, initialise_people, predic
 pub use motion::MotionState;
 pub use objective::{Masks, Objective, masks};
 pub use percentile::{percentile, percentiles};
+pub use pose_network::PoseNetwork;
 #[cfg(feature = "train")]
-pub use pose_network::{Actors, PoseNetwork, PoseTrainOptions, pose_network_reach, train_pose_network};
+pub use pose_network::{Actors, PoseTrainOptions, pose_network_reach, train_pose_network};
 pub use problem::Problem;
 pub use region::Region;
 pub use returns::{JointReturn, JointReturns, KeptJoints};
