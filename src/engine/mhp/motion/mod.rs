@@ -133,7 +133,7 @@ pub(super) struct Window {
     scarcity: f64,
     /// Where several persons began, floor plan, m; of one alone empty.
     places: Vec<[f64; 2]>,
-    /// Where the network expects each person.
+    /// Where the network expects each person; empty where it is not asked.
     expected: Vec<Option<Expected>>,
 }
 
@@ -153,7 +153,7 @@ pub(super) struct WindowLoss {
     pub(super) prior: f64,
     /// L_net.
     pub(super) network: f64,
-    /// ∂(w_EM L_EM + w_prior L_prior) by the coordinates.
+    /// ∂(w_EM L_EM + w_prior L_prior + w_net L_net) by the coordinates.
     pub(super) gradient: Vec<f64>,
     /// What the frame that is fitted alone says of the positions, kept while the others are asked.
     pub(super) places: Vec<f64>,
@@ -201,11 +201,6 @@ impl Window {
     ///
     /// # Errors
     /// Where a position is not finite.
-    /// Where the network expects a person.
-    pub(super) fn expected(&self, person: usize) -> Option<&Expected> {
-        self.expected.get(person)?.as_ref()
-    }
-
     fn new(
         problem: &Problem,
         config: &FitConfig,
@@ -270,6 +265,11 @@ impl Window {
             window.places = window.coordinates_of(initial).chunks_exact(stride).map(|of| [of[0], of[1]]).collect();
         }
         Ok(Ok(window))
+    }
+
+    /// Where the network expects a person; `None` where it is not asked, or knows nothing.
+    fn expected(&self, person: usize) -> Option<&Expected> {
+        self.expected.get(person)?.as_ref()
     }
 
     /// Gives all persons of `coordinates` the q at which the loss is lowest, where it is fitted.

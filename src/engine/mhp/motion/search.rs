@@ -2,7 +2,7 @@
 //!
 //! Clusters stand, walk and sit; of one person alone bodies that lie and, where it moves, fall are tried beside them (`tilt.rs`).
 //! Every start is moved a little with its pose held; the few with the lowest loss are fitted with it, in the end by the bend of the
-//! loss ([`lbfgs`]). What wins is the start; the runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
+//! loss ([`lbfgs`]), and with them the bodies that a network expects. What wins is the start; the runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
 
 use super::decode::lowest;
 use super::{
@@ -32,9 +32,9 @@ const UNITS: [f64; 7] = [0.03, 0.12, 0.03, 1.0, 0.06, 0.3, 0.5];
 const MOST_WORK: f64 = 2e10;
 /// Where every cell is summed by itself each costs so many.
 const PLAIN: f64 = 10.0;
-/// Evaluations of a person's search beside those of the first sieve, with those of what is carried on, and those of a start in it, in
+/// Evaluations of a person's search beside those of the first sieve, with those of what is carried on and of what the network expects, and those of a start in it, in
 /// whole windows.
-const LATER: f64 = 310.0;
+const LATER: f64 = 358.0;
 const FIRST: f64 = 5.0 / 4.0;
 /// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start, but for what a network
 /// expects, whose weight says whether it is asked.
@@ -337,16 +337,16 @@ pub(in crate::mhp) fn search(
         if params.shape().persons == 1 {
             all.extend(search.fallen(&coordinates, own.clone(), (hips, floor, ways[person])));
         }
-        let of_network: Vec<Tried> = search.expected(&coordinates, person);
+        let expected = search.expected(&coordinates, person);
         for sieve in &SIEVES {
             search.sift(&mut all, sieve, &own);
         }
         search.every = 1;
-        // What the start itself becomes is among those that are compared in the end.
+        // What the start itself and what the network expects become is among those that are compared in the end.
         let mut own_start = begun_at;
         search.descend(&mut own_start, SIEVES[0].steps, true);
         all.push(own_start);
-        all.extend(of_network);
+        all.extend(expected);
         for tried in &mut all {
             search.settle(tried, FINE);
         }

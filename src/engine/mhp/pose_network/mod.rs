@@ -81,6 +81,8 @@ struct ExpectedBody {
     ln_chance: f64,
     /// μ, world frame, m, and b, m, of each joint of the skeleton that the network knows.
     joints: Vec<Option<(Vec3, f64)>>,
+    /// Σ 3 ln b over them.
+    narrowness: f64,
 }
 
 /// ln of how likely each body is, and of each joint where it is and how far off, m.
@@ -148,15 +150,15 @@ impl Expected {
             let bodies = network.bodies(&glimpse.seen);
             let likeliest = bodies.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
             let trunk = mean(&TRUNK.map(|joint| world(likeliest.1[joint].0)));
-            let body = |(ln_chance, joints): &(f64, [(Vec3, f64); JOINTS])| ExpectedBody {
-                ln_chance: *ln_chance,
-                joints: known.iter().map(|known| known.map(|k| (world(joints[k].0), joints[k].1))).collect(),
+            let body = |(ln_chance, joints): &(f64, [(Vec3, f64); JOINTS])| {
+                let joint = |k: usize| (world(joints[k].0), joints[k].1);
+                ExpectedBody::new(*ln_chance, known.iter().map(|known| known.map(joint)).collect())
             };
             found = Some(bodies.iter().map(body).collect::<SmallVec<_>>());
             at = [trunk[0], trunk[1], at[2]];
         }
         let bodies = found?;
-        let best = -ln_sum_exp(bodies.iter().map(|body: &ExpectedBody| body.ln_chance - APART * body.narrowness()));
+        let best = -ln_sum_exp(bodies.iter().map(|body: &ExpectedBody| body.ln_chance - APART * body.narrowness));
         best.is_finite().then_some(Self { bodies, best })
     }
 
@@ -198,9 +200,9 @@ fn rounded(u: f64) -> f64 {
 }
 
 impl ExpectedBody {
-    /// Σ 3 ln b.
-    fn narrowness(&self) -> f64 {
-        self.joints.iter().flatten().map(|(_, b)| 3.0 * b.ln()).sum()
+    fn new(ln_chance: f64, joints: Vec<Option<(Vec3, f64)>>) -> Self {
+        let narrowness = joints.iter().flatten().map(|(_, b)| 3.0 * b.ln()).sum();
+        Self { ln_chance, joints, narrowness }
     }
 
     /// ln of π times how likely joints are.
@@ -208,6 +210,6 @@ impl ExpectedBody {
         let of = |(at, expected): (&Vec3, &Option<(Vec3, f64)>)| {
             expected.map_or(0.0, |(mean, b)| rounded(norm(sub(*at, mean)) / b) - 1.0)
         };
-        self.ln_chance - APART * (self.narrowness() + zip(joints, &self.joints).map(of).sum::<f64>())
+        self.ln_chance - APART * (self.narrowness + zip(joints, &self.joints).map(of).sum::<f64>())
     }
 }

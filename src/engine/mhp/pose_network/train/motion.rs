@@ -2,7 +2,7 @@
 
 use crate::body::MotionClip;
 use crate::geometry::Vec3;
-use crate::simulate::{Options, Recording, ScenePreset, SimulateError};
+use crate::simulate::{Options, Recording, ScenePreset};
 use rand::{Rng, rngs::StdRng};
 use std::f64::consts::PI;
 
@@ -62,11 +62,8 @@ pub struct Actors {
 }
 
 impl Actors {
-    /// Recorded people, and so many sequences of the synthetic source's.
-    ///
-    /// # Errors
-    /// Where there are no sequences.
-    pub fn new(clips: &[MotionClip], acted: usize, seed: u64) -> Result<Self, SimulateError> {
+    /// Recorded people, and so many sequences of the synthetic source's; `None` where no clip is long enough for a window.
+    pub fn new(clips: &[MotionClip], acted: usize, seed: u64) -> Option<Self> {
         let long = clips.iter().filter(|clip| clip.poses.len() > 2 * MARGIN + 8);
         let recorded: Vec<(Stretch, String)> = long
             .map(|clip| {
@@ -94,13 +91,13 @@ impl Actors {
             radar_height_m: Some(1.0),
             ..Options::default()
         };
-        let recording = Recording::new(&options)?;
+        let recording = Recording::new(&options).ok()?;
         let act = |k: usize| -> Stretch {
             let sequence = recording.sequence(k);
             let performer = sequence.performers().next();
             (0..STRETCH).filter_map(|i| Some(performer?.pose(i as f64 / HZ).joints)).collect()
         };
-        Ok(Self { recorded, chances, acted: (0..acted).map(act).collect() })
+        (!recorded.is_empty()).then(|| Self { recorded, chances, acted: (0..acted).map(act).collect() })
     }
 
     /// One, of the actors with this chance.

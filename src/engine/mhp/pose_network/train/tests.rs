@@ -20,6 +20,17 @@ fn lessons(actors: &Actors, count: u64) -> Vec<PoseLesson> {
 }
 
 #[test]
+fn clips_that_are_too_short_are_no_actors() {
+    let clip = |samples: usize| MotionClip {
+        group: "walk".into(),
+        subject: String::new(),
+        own_size: false,
+        poses: vec![[[0.0; 3]; 20]; samples],
+    };
+    assert!(Actors::new(&[], 1, 5).is_none() && Actors::new(&[clip(9)], 1, 5).is_none());
+}
+
+#[test]
 fn a_lesson_is_what_its_number_says_and_within_the_levels() {
     let actors = actors();
     let (all, again) = (lessons(&actors, 12), lessons(&actors, 12));
