@@ -30,15 +30,22 @@ const OWN_SIZE: [&str; 2] = ["asfamc", "vicon"];
 /// The card up to the figures.
 const CARD: &str = include_str!("card.md");
 
+/// Recorded motion.
+#[derive(Debug, Args)]
+pub(super) struct RecordingsArgs {
+    /// Recordings to learn from.
+    #[arg(value_name = "NPZ")]
+    pub(super) recordings: PathBuf,
+    /// Recordings of other people, to test on.
+    #[arg(long, value_name = "NPZ")]
+    pub(super) validation: Option<PathBuf>,
+}
+
 /// What `train-motion` is told.
 #[derive(Debug, Args)]
 pub struct TrainMotionArgs {
-    /// Recordings to learn from.
-    #[arg(value_name = "NPZ")]
-    recordings: PathBuf,
-    /// Recordings of other people, to test on.
-    #[arg(long, value_name = "NPZ")]
-    validation: Option<PathBuf>,
+    #[command(flatten)]
+    motion: RecordingsArgs,
     /// Folder for `motion.json` and `motion.md`.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -49,21 +56,21 @@ pub struct TrainMotionArgs {
 /// # Errors
 /// Where recordings cannot be read or teach nothing, or a file cannot be written.
 pub(super) fn run(args: &TrainMotionArgs) -> anyhow::Result<ExitCode> {
-    let clips = clips(&args.recordings)?;
-    let nothing = || format!("{}: no clip is long enough to teach anything", args.recordings.display());
+    let clips = clips(&args.motion.recordings)?;
+    let nothing = || format!("{}: no clip is long enough to teach anything", args.motion.recordings.display());
     let learned = learn_motion(&clips).with_context(nothing)?;
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let validation = args.validation.as_deref().map(|path| format!(" --validation {}", name(path)));
+    let validation = args.motion.validation.as_deref().map(|path| format!(" --validation {}", name(path)));
     let command = format!(
         "cargo run --release --no-default-features --features train -- train-motion {}{} --out assets",
-        name(&args.recordings),
+        name(&args.motion.recordings),
         validation.unwrap_or_default()
     );
     let mut header = vec![command, amount("learned", &clips)];
     header.extend(learned.header().iter().cloned());
     let mut card = format!("{CARD}\nMade by `{}`; {}; {}.\n", header[0], header[1], header[2]);
     let mut tables = table("Recordings learned from", &motion_coverage(&learned, &clips))?;
-    if let Some(path) = &args.validation {
+    if let Some(path) = &args.motion.validation {
         let others = self::clips(path)?;
         let coverage = motion_coverage(&learned, &others);
         header.push(amount("validation", &others));

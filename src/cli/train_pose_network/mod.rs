@@ -1,7 +1,7 @@
 //! `train-pose-network`: makes the network anew that a fit asks where joints are expected.
 
 use super::common::{at_least_one, epochs_bar, print};
-use super::train_motion::{amount, clips};
+use super::train_motion::{RecordingsArgs, amount, clips};
 use crate::mhp::{Actors, PoseTrainOptions, pose_network_reach, train_pose_network};
 use anyhow::Context as _;
 use clap::Args;
@@ -35,12 +35,8 @@ const TESTS: usize = 2048;
 /// What `train-pose-network` is told.
 #[derive(Debug, Args)]
 pub struct TrainPoseNetworkArgs {
-    /// Recordings to learn from.
-    #[arg(value_name = "NPZ")]
-    recordings: PathBuf,
-    /// Recordings of other people, to test on.
-    #[arg(long, value_name = "NPZ")]
-    validation: Option<PathBuf>,
+    #[command(flatten)]
+    motion: RecordingsArgs,
     /// Folder for `pose-network.safetensors` and `pose-network.md`.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -70,9 +66,9 @@ pub struct TrainPoseNetworkArgs {
 /// Where recordings cannot be read or teach nothing, or a file cannot be written.
 pub(super) fn run(args: &TrainPoseNetworkArgs) -> anyhow::Result<ExitCode> {
     anyhow::ensure!((0.0..=1.0).contains(&args.acted), "--acted {}: expected a share, 0 to 1", args.acted);
-    let recorded = clips(&args.recordings)?;
+    let recorded = clips(&args.motion.recordings)?;
     let actors = Actors::new(&recorded, args.actors, ACTORS_SEEDS[0])
-        .with_context(|| format!("{}: no clip is long enough to teach anything", args.recordings.display()))?;
+        .with_context(|| format!("{}: no clip is long enough to teach anything", args.motion.recordings.display()))?;
     let options = PoseTrainOptions {
         rounds: args.rounds,
         lessons: args.lessons,
@@ -89,10 +85,10 @@ pub(super) fn run(args: &TrainPoseNetworkArgs) -> anyhow::Result<ExitCode> {
     .context("the layers do not fit together")?;
     bar.finish_and_clear();
     let name = |path: &std::path::Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let validation = args.validation.as_deref().map(|path| format!(" --validation {}", name(path)));
+    let validation = args.motion.validation.as_deref().map(|path| format!(" --validation {}", name(path)));
     let made_by = format!(
         "cargo run --release --no-default-features --features train -- train-pose-network {}{} --out assets --rounds {} --lessons {} --passes {} --actors {} --acted {} --seed {}",
-        name(&args.recordings),
+        name(&args.motion.recordings),
         validation.unwrap_or_default(),
         args.rounds,
         args.lessons,
@@ -104,7 +100,7 @@ pub(super) fn run(args: &TrainPoseNetworkArgs) -> anyhow::Result<ExitCode> {
     let learned = amount("learned", &recorded);
     let mut told = HashMap::from([("made_by".to_owned(), made_by.clone()), ("data".to_owned(), learned.clone())]);
     let mut card = format!("{CARD}\nMade by `{made_by}`; {learned}, and {} acted sequences.\n", args.actors);
-    if let Some(path) = &args.validation {
+    if let Some(path) = &args.motion.validation {
         let others = clips(path)?;
         let seed = args.seed.wrapping_add(1);
         let others_act = Actors::new(&others, OTHER_ACTORS, ACTORS_SEEDS[1])

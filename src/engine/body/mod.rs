@@ -21,4 +21,5 @@ pub use prior::{MOTION_COUNTS, MOTION_JOINTS, MotionClip, MotionCoverage, learn_
 pub use prior::{Mixture, MotionPrior, MotionStart};
 pub use segment::{BodyPose, Segment, SegmentFrame};
 pub use skeleton::{Side, Skeleton};
+pub(crate) use skeletons::COCO_JOINTS;
 pub use surface::{BodySurface, Capsule, SurfacePoint};

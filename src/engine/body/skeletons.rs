@@ -21,7 +21,7 @@ const NECK_TO_HIP: f64 = 0.515_815_55;
 const NECK_TO_NOSE: f64 = 0.197_230_8;
 
 /// The joints of COCO's 17 keypoints.
-pub(super) const COCO_JOINTS: [&str; 17] = [
+pub(crate) const COCO_JOINTS: [&str; 17] = [
     "nose",
     "left_eye",
     "right_eye",

@@ -13,7 +13,7 @@ use std::collections::HashMap;
 pub(super) const TOWER: [usize; 5] = [CHANNELS, 24, 48, 48, 32];
 pub(super) const STRIDES: [usize; 4] = [2, 1, 2, 2];
 /// Numbers of the hidden layers.
-pub(super) const HIDDEN: usize = 192;
+const HIDDEN: usize = 192;
 /// Joints, and numbers of each: place, m, and ln of how far off it may be, m.
 pub(super) const JOINTS: usize = 17;
 pub(super) const OUT: usize = 4;
@@ -38,19 +38,19 @@ pub(super) struct Layers {
 }
 
 impl Layers {
-    /// From all weights, one after the other: each tower's layers, then the dense ones; `None` where there are more or fewer.
+    /// From all weights, one layer after the other in the order of [`shapes`]; `None` where there are more or fewer.
     pub(super) fn from_numbers(numbers: &[f32]) -> Option<Self> {
         let mut rest = numbers;
-        let mut layer = |inputs: usize, outputs: usize| {
-            let (weights, others) = rest.split_at_checked(inputs * outputs)?;
-            let (bias, others) = others.split_at_checked(outputs)?;
+        let mut layer = |shape: &Shape| {
+            let (weights, others) = rest.split_at_checked(shape.inputs * shape.outputs)?;
+            let (bias, others) = others.split_at_checked(shape.outputs)?;
             rest = others;
             Some(Layer { weights: weights.to_vec(), bias: bias.to_vec() })
         };
-        let mut tower = || -> Option<Vec<Layer>> { TOWER.windows(2).map(|pair| layer(9 * pair[0], pair[1])).collect() };
-        let towers = [tower()?, tower()?];
-        let dense = vec![layer(flat(), HIDDEN)?, layer(HIDDEN, HIDDEN)?, layer(HIDDEN, TOLD)?];
-        rest.is_empty().then_some(Self { towers, dense })
+        let mut all = shapes().iter().map(&mut layer).collect::<Option<Vec<Layer>>>()?;
+        let dense = all.split_off(2 * STRIDES.len());
+        let vertical = all.split_off(STRIDES.len());
+        rest.is_empty().then_some(Self { towers: [all, vertical], dense })
     }
 
     /// From tensors of bfloat16, as [`Self::to_tensors`] writes them.
@@ -58,10 +58,10 @@ impl Layers {
     /// # Errors
     /// Names the tensor that is missing, or has another type or size.
     pub(super) fn from_tensors(bytes: &[u8]) -> Result<Self, String> {
-        let tensors = SafeTensors::deserialize(bytes).map_err(|error| error.to_string())?;
+        let read = SafeTensors::deserialize(bytes).map_err(|error| error.to_string())?;
         let mut numbers = Vec::new();
-        for (name, shape) in tensors_of() {
-            let tensor = tensors.tensor(&name).map_err(|error| error.to_string())?;
+        for (name, shape) in tensors() {
+            let tensor = read.tensor(&name).map_err(|error| error.to_string())?;
             if tensor.dtype() != Dtype::BF16 || tensor.shape() != shape {
                 return Err(format!("`{name}` is {:?} {:?}; expected BF16 {shape:?}", tensor.dtype(), tensor.shape()));
             }
@@ -95,7 +95,7 @@ impl Layers {
             (((bits + 0x7FFF + (bits >> 16 & 1)) >> 16) as u16).to_le_bytes()
         };
         let halves: Vec<Vec<u8>> = numbers.map(|of| of.iter().flat_map(half).collect()).collect();
-        let views = tensors_of().into_iter().zip(&halves).map(|((name, shape), halves)| {
+        let views = tensors().zip(&halves).map(|((name, shape), halves)| {
             let view = TensorView::new(Dtype::BF16, shape, halves).map_err(|error| error.to_string())?;
             Ok((name, view))
         });
@@ -109,7 +109,9 @@ impl Layers {
         x.extend(tower(&self.towers[1], &seen.vertical, UP));
         x.extend(seen.about);
         for (k, layer) in self.dense.iter().enumerate() {
-            x = layer.weights.chunks_exact(x.len()).zip(&layer.bias).map(|(w, b)| b + dot(w, &x)).collect();
+            let mut out = layer.bias.clone();
+            product(&mut out, [layer.bias.len(), 1], (&layer.weights, false), (&x, false), 1.0);
+            x = out;
             if k + 1 < self.dense.len() {
                 rectify(&mut x);
             }
@@ -118,23 +120,35 @@ impl Layers {
     }
 }
 
-/// Names and shapes of all tensors, in the order of [`Layers::from_numbers`].
-fn tensors_of() -> Vec<(String, Vec<usize>)> {
-    let mut all = Vec::new();
-    let mut layer = |name: String, shape: Vec<usize>| {
-        let outputs = shape[0];
-        all.push((format!("{name}.weight"), shape));
-        all.push((format!("{name}.bias"), vec![outputs]));
-    };
-    for tower in ["horizontal", "vertical"] {
-        for (k, pair) in TOWER.windows(2).enumerate() {
-            layer(format!("{tower}.{k}"), vec![pair[1], pair[0], 3, 3]);
-        }
-    }
-    for (k, pair) in [flat(), HIDDEN, HIDDEN, TOLD].windows(2).enumerate() {
-        layer(format!("dense.{k}"), vec![pair[1], pair[0]]);
-    }
-    all
+/// A layer's name and size.
+pub(super) struct Shape {
+    name: String,
+    /// Numbers that an output is made of: of a convolution nine a channel.
+    pub(super) inputs: usize,
+    pub(super) outputs: usize,
+}
+
+/// The layers: those of the horizontal tower, of the vertical one, and the dense ones.
+pub(super) fn shapes() -> Vec<Shape> {
+    let towers = ["horizontal", "vertical"].into_iter().flat_map(|tower| {
+        let of = move |(k, pair): (usize, &[usize])| Shape {
+            name: format!("{tower}.{k}"),
+            inputs: 9 * pair[0],
+            outputs: pair[1],
+        };
+        TOWER.windows(2).enumerate().map(of)
+    });
+    let dense = |(k, pair): (usize, &[usize])| Shape { name: format!("dense.{k}"), inputs: pair[0], outputs: pair[1] };
+    towers.chain([flat(), HIDDEN, HIDDEN, TOLD].windows(2).enumerate().map(dense)).collect()
+}
+
+/// Names and shapes of all tensors, in the order of [`shapes`].
+fn tensors() -> impl Iterator<Item = (String, Vec<usize>)> {
+    shapes().into_iter().enumerate().flat_map(|(k, Shape { name, inputs, outputs })| {
+        let convolves = k < 2 * STRIDES.len();
+        let shape = if convolves { vec![outputs, inputs / 9, 3, 3] } else { vec![outputs, inputs] };
+        [(format!("{name}.weight"), shape), (format!("{name}.bias"), vec![outputs])]
+    })
 }
 
 /// Numbers that the towers end in, and what is said about the place.
@@ -158,40 +172,38 @@ pub(super) fn rectify(x: &mut [f32]) {
     }
 }
 
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    let mut sums = [0.0_f32; 8];
-    let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f32 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a.zip(b) {
-        for k in 0..8 {
-            sums[k] += a[k] * b[k];
-        }
-    }
-    sums.iter().sum::<f32>() + rest
-}
-
 /// The last channels of a tower, C order.
 fn tower(layers: &[Layer], maps: &[f32], columns: usize) -> Vec<f32> {
     let (mut x, mut size) = (maps.to_vec(), [RANGES, columns]);
     for (layer, stride) in layers.iter().zip(STRIDES) {
-        (x, size) = convolve(layer, &x, size, stride);
+        let Convolved { out, size: after, .. } = convolve((&layer.weights, &layer.bias), &x, size, stride);
+        (x, size) = (out, after);
     }
     x
 }
 
+/// What a convolution makes of maps.
+pub(super) struct Convolved {
+    /// What [`shifted`] makes of them.
+    pub(super) shifted: Vec<f32>,
+    /// (outputs, cells), C order.
+    pub(super) out: Vec<f32>,
+    /// Rows and columns of it.
+    pub(super) size: [usize; 2],
+}
+
 /// A convolution with 3 × 3 cells, beyond the edges of zeros, at every so manyth cell of each axis, and max(x, 0).
-fn convolve(layer: &Layer, x: &[f32], size: [usize; 2], stride: usize) -> (Vec<f32>, [usize; 2]) {
-    let (shifted, [high, wide]) = shifted(x, size, stride);
-    let cells = high * wide;
-    let mut out: Vec<f32> = layer.bias.iter().flat_map(|&bias| std::iter::repeat_n(bias, cells)).collect();
-    let outputs = layer.bias.len();
-    product(&mut out, [outputs, cells], (&layer.weights, false), (&shifted, false), 1.0);
+pub(super) fn convolve((weights, bias): (&[f32], &[f32]), x: &[f32], size: [usize; 2], stride: usize) -> Convolved {
+    let (shifted, size) = shifted(x, size, stride);
+    let cells = size[0] * size[1];
+    let mut out: Vec<f32> = bias.iter().flat_map(|&bias| std::iter::repeat_n(bias, cells)).collect();
+    product(&mut out, [bias.len(), cells], (weights, false), (&shifted, false), 1.0);
     rectify(&mut out);
-    (out, [high, wide])
+    Convolved { shifted, out, size }
 }
 
 /// Of each weight of a convolution the cells that it is multiplied by, (channels · 9, cells), and the size of what comes of it.
-pub(super) fn shifted(x: &[f32], [rows, columns]: [usize; 2], stride: usize) -> (Vec<f32>, [usize; 2]) {
+fn shifted(x: &[f32], [rows, columns]: [usize; 2], stride: usize) -> (Vec<f32>, [usize; 2]) {
     let [high, wide] = [rows.div_ceil(stride), columns.div_ceil(stride)];
     let (cells, channels) = (high * wide, x.len() / (rows * columns));
     let mut shifted = vec![0.0_f32; channels * 9 * cells];

@@ -25,7 +25,7 @@ mod train;
 pub use train::{Actors, PoseTrainOptions, pose_network_reach, train_pose_network};
 
 use super::Problem;
-use crate::body::{Group, Pppr};
+use crate::body::{COCO_JOINTS, Group, Pppr};
 use crate::config::FitConfig;
 use crate::geometry::{Vec3, add_scaled, mean, norm, sub};
 use glimpse::{Glimpse, Seen};
@@ -34,26 +34,6 @@ use smallvec::SmallVec;
 use std::iter::zip;
 use std::sync::OnceLock;
 
-/// Joints of the network.
-const NAMES: [&str; JOINTS] = [
-    "nose",
-    "left_eye",
-    "right_eye",
-    "left_ear",
-    "right_ear",
-    "left_shoulder",
-    "right_shoulder",
-    "left_elbow",
-    "right_elbow",
-    "left_wrist",
-    "right_wrist",
-    "left_hip",
-    "right_hip",
-    "left_knee",
-    "right_knee",
-    "left_ankle",
-    "right_ankle",
-];
 /// Shoulders and hips: what it looks about.
 const TRUNK: [usize; 4] = [5, 6, 11, 12];
 /// What the joints of a body say counts as much as that of so many that know nothing of each other, of one.
@@ -126,6 +106,7 @@ impl PoseNetwork {
     }
 }
 
+/// ln Σ eˣ
 fn ln_sum_exp(of: impl Iterator<Item = f64> + Clone) -> f64 {
     let most = of.clone().fold(f64::NEG_INFINITY, f64::max);
     most + of.map(|x| (x - most).exp()).sum::<f64>().ln()
@@ -136,7 +117,7 @@ impl Expected {
     pub(super) fn about(problem: &Problem, config: &FitConfig, place: Vec3) -> Option<Self> {
         let network = PoseNetwork::committed()?;
         let known: Vec<Option<usize>> =
-            problem.skeleton.joints.iter().map(|name| NAMES.iter().position(|known| known == name)).collect();
+            problem.skeleton.joints.iter().map(|name| COCO_JOINTS.iter().position(|known| known == name)).collect();
         if known.iter().flatten().count() == 0 {
             return None;
         }

@@ -1,7 +1,9 @@
 //! What lessons say of the weights, and steps down.
 
-use super::super::glimpse::{ACROSS, CHANNELS, RANGES, UP};
-use super::super::layers::{BODIES, HIDDEN, JOINTS, OUT, STRIDES, TOLD, TOWER, flat, product, rectify, shifted};
+use super::super::glimpse::{ACROSS, RANGES, UP};
+use super::super::layers::{
+    BODIES, Convolved, JOINTS, OUT, STRIDES, Shape, TOLD, convolve, flat, product, rectify, shapes,
+};
 use super::PoseLesson;
 use super::motion::MIRRORED;
 use rand::{Rng, rngs::StdRng};
@@ -30,7 +32,7 @@ const STANDING: [[f32; 2]; JOINTS] = [
     [-0.1, -0.9],
 ];
 /// What the joints of a body say counts as much as that of so many that know nothing of each other, of one.
-const APART: f32 = 0.3;
+const APART: f32 = super::super::APART as f32;
 /// Share of the numbers between dense layers that is dropped.
 const DROPPED: f64 = 0.1;
 /// Adam's, and the share of the weights that a step of size 1 takes off; a gradient is no longer than this.
@@ -67,23 +69,24 @@ pub(super) struct Learned {
 
 /// What is kept of a convolution for the way back.
 struct Kept {
+    /// Of the maps before it.
     size: [usize; 2],
-    shifted: Vec<f32>,
-    out: Vec<f32>,
+    made: Convolved,
 }
 
 impl Plan {
     pub(super) fn new() -> Self {
         let mut end = 0;
-        let mut place = |inputs: usize, outputs: usize| {
-            let weights = end..end + inputs * outputs;
-            let bias = weights.end..weights.end + outputs;
+        let place = |shape: Shape| {
+            let weights = end..end + shape.inputs * shape.outputs;
+            let bias = weights.end..weights.end + shape.outputs;
             end = bias.end;
-            Place { inputs, outputs, weights, bias }
+            Place { inputs: shape.inputs, outputs: shape.outputs, weights, bias }
         };
-        let towers = [0, 1].map(|_| TOWER.windows(2).map(|pair| place(9 * pair[0], pair[1])).collect::<Vec<Place>>());
-        let sizes = [flat(), HIDDEN, HIDDEN, TOLD];
-        let dense = sizes.windows(2).map(|pair| place(pair[0], pair[1])).collect();
+        let mut all: Vec<Place> = shapes().into_iter().map(place).collect();
+        let dense = all.split_off(2 * STRIDES.len());
+        let vertical = all.split_off(STRIDES.len());
+        let towers = [all, vertical];
         Self { towers, dense, numbers: end }
     }
 
@@ -125,7 +128,7 @@ impl Plan {
                 forwards(numbers, &self.towers[0], &horizontal, ACROSS),
                 forwards(numbers, &self.towers[1], &seen.vertical, UP),
             ];
-            towers.iter().filter_map(|tower| tower.last()).for_each(|last| inputs.extend_from_slice(&last.out));
+            towers.iter().filter_map(|tower| tower.last()).for_each(|last| inputs.extend_from_slice(&last.made.out));
             let [distance, sine, height] = seen.about;
             inputs.extend([distance, if mirrored { -sine } else { sine }, height]);
             kept.push(towers);
@@ -189,7 +192,7 @@ impl Plan {
         for (towers, bars) in kept.iter().zip(bars.chunks_exact(flat())) {
             let mut from = 0;
             for (tower, places) in towers.iter().zip(&self.towers) {
-                let end = tower.last().map_or(0, |last| last.out.len());
+                let end = tower.last().map_or(0, |last| last.made.out.len());
                 backwards(numbers, places, tower, &bars[from..from + end], &mut gradient);
                 from += end;
             }
@@ -199,20 +202,12 @@ impl Plan {
 }
 
 fn forwards(numbers: &[f32], places: &[Place], maps: &[f32], columns: usize) -> Vec<Kept> {
-    let mut size = [RANGES, columns];
-    debug_assert_eq!(maps.len(), CHANNELS * RANGES * columns);
     let mut kept: Vec<Kept> = Vec::with_capacity(places.len());
     for (place, stride) in places.iter().zip(STRIDES) {
-        let x = kept.last().map_or(maps, |before| before.out.as_slice());
-        let (shifted, after) = shifted(x, size, stride);
-        let cells = after[0] * after[1];
-        let mut out: Vec<f32> =
-            numbers[place.bias.clone()].iter().flat_map(|&bias| std::iter::repeat_n(bias, cells)).collect();
-        let weights = (&numbers[place.weights.clone()], false);
-        product(&mut out, [place.outputs, cells], weights, (&shifted, false), 1.0);
-        rectify(&mut out);
-        kept.push(Kept { size, shifted, out });
-        size = after;
+        let before = kept.last().map(|kept| &kept.made);
+        let (x, size) = before.map_or((maps, [RANGES, columns]), |made| (made.out.as_slice(), made.size));
+        let layer = (&numbers[place.weights.clone()], &numbers[place.bias.clone()]);
+        kept.push(Kept { size, made: convolve(layer, x, size, stride) });
     }
     kept
 }
@@ -220,10 +215,10 @@ fn forwards(numbers: &[f32], places: &[Place], maps: &[f32], columns: usize) -> 
 fn backwards(numbers: &[f32], places: &[Place], tower: &[Kept], bars: &[f32], gradient: &mut [f32]) {
     let mut bars = bars.to_vec();
     for (k, (place, kept)) in places.iter().zip(tower).enumerate().rev() {
-        bars.iter_mut().zip(&kept.out).filter(|(_, x)| **x <= 0.0).for_each(|(bar, _)| *bar = 0.0);
-        let cells = kept.out.len() / place.outputs;
+        bars.iter_mut().zip(&kept.made.out).filter(|(_, x)| **x <= 0.0).for_each(|(bar, _)| *bar = 0.0);
+        let cells = kept.made.out.len() / place.outputs;
         let size = [place.outputs, place.inputs];
-        product(&mut gradient[place.weights.clone()], size, (&bars, false), (&kept.shifted, true), 1.0);
+        product(&mut gradient[place.weights.clone()], size, (&bars, false), (&kept.made.shifted, true), 1.0);
         for (sum, bars) in gradient[place.bias.clone()].iter_mut().zip(bars.chunks_exact(cells)) {
             *sum += bars.iter().sum::<f32>();
         }
@@ -237,7 +232,7 @@ fn backwards(numbers: &[f32], places: &[Place], tower: &[Kept], bars: &[f32], gr
     }
 }
 
-/// What [`shifted`] does, backwards: what the cells under all weights say of the maps.
+/// What `shifted` does, backwards: what the cells under all weights say of the maps.
 fn unshifted(of_taps: &[f32], [rows, columns]: [usize; 2], stride: usize) -> Vec<f32> {
     let [high, wide] = [rows.div_ceil(stride), columns.div_ceil(stride)];
     let channels = of_taps.len() / (9 * high * wide);

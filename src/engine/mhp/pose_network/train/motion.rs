@@ -6,6 +6,7 @@ use crate::simulate::{Options, Recording, ScenePreset};
 use rand::{Rng, rngs::StdRng};
 use std::f64::consts::PI;
 
+use super::super::TRUNK;
 use super::super::layers::JOINTS;
 
 /// Samples of a second, and of the stretch that a lesson sees.
@@ -37,9 +38,6 @@ const SIZES: [f64; 2] = [0.9, 1.12];
 /// Joint of the other side.
 pub(in crate::mhp::pose_network) const MIRRORED: [usize; JOINTS] =
     [0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15];
-/// Shoulders and hips.
-const TRUNK: [usize; 4] = [5, 6, 11, 12];
-
 /// Joints of a stretch, radar's frame, m.
 pub(super) type Stretch = Vec<[Vec3; JOINTS]>;
 
