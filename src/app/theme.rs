@@ -205,6 +205,7 @@ impl Tokens {
             Hue::Red => self.pick(0xEB9191, 0x963538),
             Hue::Rose => self.pick(0xF2B0D5, 0xB4608A),
             Hue::Teal => self.pick(0x6BCACA, 0x208182),
+            Hue::Orchid => self.pick(0xC46BC4, 0x861A86),
         }
     }
 }

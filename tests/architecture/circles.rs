@@ -13,6 +13,7 @@ const STAGES: &[(&str, &[&str])] = &[
     ("cells and masks", &["kernel", "tiles", "cell_box", "level_rows", "levels", "em"]),
     ("what maps and frames around show", &["region", "sidelobes", "template", "context"]),
     ("a frame", &["frame_em", "problem", "thinned", "erased", "simulate", "returns", "signal"]),
+    ("what a network expects", &["pose_network"]),
     ("the objective", &["objective"]),
     ("a window of frames", &["motion", "em_around"]),
     ("the fit", &["convergence", "articulation", "adam", "fitter"]),

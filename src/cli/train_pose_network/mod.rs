@@ -2,7 +2,9 @@
 
 use super::common::{at_least_one, epochs_bar, print};
 use super::train_motion::{RecordingsArgs, amount, clips};
-use crate::mhp::{Actors, PoseTrainOptions, pose_network_reach, train_pose_network};
+use crate::geometry::Vec3;
+use crate::mhp::{Actors, POSE_STRETCH, PoseTrainOptions, pose_network_reach, train_pose_network};
+use crate::simulate::{Options, Recording, ScenePreset};
 use anyhow::Context as _;
 use clap::Args;
 use std::collections::HashMap;
@@ -67,7 +69,7 @@ pub struct TrainPoseNetworkArgs {
 pub(super) fn run(args: &TrainPoseNetworkArgs) -> anyhow::Result<ExitCode> {
     anyhow::ensure!((0.0..=1.0).contains(&args.acted), "--acted {}: expected a share, 0 to 1", args.acted);
     let recorded = clips(&args.motion.recordings)?;
-    let actors = Actors::new(&recorded, args.actors, ACTORS_SEEDS[0])
+    let actors = Actors::new(&recorded, acted(args.actors, ACTORS_SEEDS[0])?)
         .with_context(|| format!("{}: no clip is long enough to teach anything", args.motion.recordings.display()))?;
     let options = PoseTrainOptions {
         rounds: args.rounds,
@@ -103,7 +105,7 @@ pub(super) fn run(args: &TrainPoseNetworkArgs) -> anyhow::Result<ExitCode> {
     if let Some(path) = &args.motion.validation {
         let others = clips(path)?;
         let seed = args.seed.wrapping_add(1);
-        let others_act = Actors::new(&others, OTHER_ACTORS, ACTORS_SEEDS[1])
+        let others_act = Actors::new(&others, acted(OTHER_ACTORS, ACTORS_SEEDS[1])?)
             .with_context(|| format!("{}: no clip is long enough to test on", path.display()))?;
         card += "\nLessons of people and actors not learned from, mean distance of a joint of the likeliest body:\n\n| | mm | nats a joint |\n|---|---|---|\n";
         for (what, acted) in [("recorded", 0.0), ("acted", 1.0)] {
@@ -120,4 +122,25 @@ pub(super) fn run(args: &TrainPoseNetworkArgs) -> anyhow::Result<ExitCode> {
     }
     print(&card)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Frames of a sequence of the synthetic source.
+const SEQUENCE: usize = 20;
+
+/// What the synthetic source's actors do in so many sequences: joints at 20 Hz, radar's frame, m.
+fn acted(sequences: usize, seed: u64) -> anyhow::Result<Vec<Vec<[Vec3; 17]>>> {
+    let recording = Recording::new(&Options {
+        presets: vec![ScenePreset::Easy, ScenePreset::Medium, ScenePreset::Hard],
+        frames: sequences * SEQUENCE,
+        sequence_length: SEQUENCE,
+        seed,
+        radar_height_m: Some(1.0),
+        ..Options::default()
+    })?;
+    let act = |k: usize| {
+        let sequence = recording.sequence(k);
+        let performer = sequence.performers().next();
+        (0..POSE_STRETCH).filter_map(|i| Some(performer?.pose(0.05 * i as f64).joints)).collect()
+    };
+    Ok((0..sequences).map(act).collect())
 }

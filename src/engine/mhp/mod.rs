@@ -13,10 +13,10 @@
 //! 3. cells: `kernel.rs`, `tiles/mod.rs`, `cell_box.rs`; masks and levels over them, `levels.rs`, `em.rs`
 //! 4. what the maps of a frame and those around it show: `region.rs`, `template.rs`, `context/mod.rs`; without the stars of
 //!    echoes, `sidelobes.rs`
-//! 5. a frame: `frame_em.rs`, `problem.rs`, `thinned.rs`, `erased.rs`, `simulate.rs`, `returns.rs`, `signal.rs`;
-//!    where a network expects the joints, `pose_network/mod.rs`
-//! 6. the objective: `objective.rs`; a window of frames: `motion/mod.rs`
-//! 7. the fit: `convergence.rs`, `articulation.rs`, `adam.rs`, `fitter.rs`; and the start of one: `init/mod.rs`
+//! 5. a frame: `frame_em.rs`, `problem.rs`, `thinned.rs`, `erased.rs`, `simulate.rs`, `returns.rs`, `signal.rs`
+//! 6. where a network expects the joints: `pose_network/mod.rs`
+//! 7. the objective: `objective.rs`; a window of frames: `motion/mod.rs`
+//! 8. the fit: `convergence.rs`, `articulation.rs`, `adam.rs`, `fitter.rs`; and the start of one: `init/mod.rs`
 //!
 //! **What it does not do.** A fit by masks moves the body onto its echo and does not find the pose; one of a window by levels
 //! (`motion/mod.rs`) finds that of who walks. Yaw and left/right are hardly visible
@@ -79,9 +79,9 @@ pub use init::{Hypotheses, Initialisation, initialise, initialise_people, predic
 pub use motion::MotionState;
 pub use objective::{Masks, Objective, masks};
 pub use percentile::{percentile, percentiles};
-pub use pose_network::PoseNetwork;
+pub use pose_network::MixtureDensityNetwork;
 #[cfg(feature = "train")]
-pub use pose_network::{Actors, PoseTrainOptions, pose_network_reach, train_pose_network};
+pub use pose_network::{Actors, POSE_STRETCH, PoseTrainOptions, pose_network_reach, train_pose_network};
 pub use problem::Problem;
 pub use region::Region;
 pub use returns::{JointReturn, JointReturns, KeptJoints};

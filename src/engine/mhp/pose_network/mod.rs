@@ -22,7 +22,7 @@ mod tests;
 mod train;
 
 #[cfg(feature = "train")]
-pub use train::{Actors, PoseTrainOptions, pose_network_reach, train_pose_network};
+pub use train::{Actors, POSE_STRETCH, PoseTrainOptions, pose_network_reach, train_pose_network};
 
 use super::Problem;
 use crate::body::{COCO_JOINTS, Group, Pppr};
@@ -43,9 +43,9 @@ const LOOKS: usize = 2;
 /// A body that is less likely is no start.
 const LEAST: f64 = 0.02;
 
-/// The network: weights that `train-pose-network` makes.
+/// The network: weights that `train-pose-network` makes (Bishop 1994 names what it is).
 #[derive(Debug, Clone)]
-pub struct PoseNetwork(Layers);
+pub struct MixtureDensityNetwork(Layers);
 
 /// Where the joints of a person are expected.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,11 +68,11 @@ struct ExpectedBody {
 /// ln of how likely each body is, and of each joint where it is and how far off, m.
 type Bodies = SmallVec<[(f64, [(Vec3, f64); JOINTS]); BODIES]>;
 
-impl PoseNetwork {
+impl MixtureDensityNetwork {
     /// The network that comes with the program; `None` where it is damaged.
     fn committed() -> Option<&'static Self> {
-        static READ: OnceLock<Option<PoseNetwork>> = OnceLock::new();
-        let read = || PoseNetwork::from_bytes(include_bytes!("../../../../assets/pose-network.safetensors"));
+        static READ: OnceLock<Option<MixtureDensityNetwork>> = OnceLock::new();
+        let read = || MixtureDensityNetwork::from_bytes(include_bytes!("../../../../assets/pose-network.safetensors"));
         let told = |error: &String| tracing::error!("assets/pose-network.safetensors: {error}");
         READ.get_or_init(|| read().inspect_err(told).ok()).as_ref()
     }
@@ -115,7 +115,7 @@ fn ln_sum_exp(of: impl Iterator<Item = f64> + Clone) -> f64 {
 impl Expected {
     /// The person about `place`, world frame, m; `None` where no view has a range and an angle, or no joint is known.
     pub(super) fn about(problem: &Problem, config: &FitConfig, place: Vec3) -> Option<Self> {
-        let network = PoseNetwork::committed()?;
+        let network = MixtureDensityNetwork::committed()?;
         let known: Vec<Option<usize>> =
             problem.skeleton.joints.iter().map(|name| COCO_JOINTS.iter().position(|known| known == name)).collect();
         if known.iter().flatten().count() == 0 {

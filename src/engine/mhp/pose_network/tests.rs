@@ -128,7 +128,7 @@ fn the_gradient_by_the_joints_agrees_with_central_differences() {
 
 #[test]
 fn the_committed_network_is_whole_and_a_damaged_one_is_told() {
-    assert!(PoseNetwork::committed().is_some());
+    assert!(MixtureDensityNetwork::committed().is_some());
     let problem = problem(false, [3.0, 0.8, 0.3], 5);
     let expected = Expected::about(&problem, &FitConfig::default(), [2.8, 0.6, 0.0]).unwrap();
     let chances: f64 = expected.bodies.iter().map(|body| body.ln_chance.exp()).sum();
@@ -138,9 +138,9 @@ fn the_committed_network_is_whole_and_a_damaged_one_is_told() {
         assert!(norm(sub(start.position(11), [2.8, 0.6, 0.0])) < 1.5, "{:?}", start.position(11));
     }
     let bytes = include_bytes!("../../../../assets/pose-network.safetensors");
-    assert!(PoseNetwork::from_bytes(&bytes[..bytes.len() - 2]).is_err());
+    assert!(MixtureDensityNetwork::from_bytes(&bytes[..bytes.len() - 2]).is_err());
     let renamed = String::from_utf8_lossy(&bytes[..4000]).find("horizontal.1.bias").unwrap();
     let mut other = bytes.to_vec();
     other[renamed] = b'H';
-    assert!(PoseNetwork::from_bytes(&other).unwrap_err().contains("horizontal.1.bias"));
+    assert!(MixtureDensityNetwork::from_bytes(&other).unwrap_err().contains("horizontal.1.bias"));
 }

@@ -110,6 +110,8 @@ pub enum Hue {
     Rose,
     /// Of what people do.
     Teal,
+    /// Of what a network expects.
+    Orchid,
 }
 
 /// How a term is evaluated: its value, and `gain` times its gradient on top of what is there.

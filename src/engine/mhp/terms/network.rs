@@ -10,6 +10,6 @@ pub(super) const NET: Term = Term {
     help: "How unlikely a network that looks at the maps alone calls the joints, against the bodies that it expects: about the mean distance from them, in what it may be off.",
     weight: Weight::Network,
     scope: Scope::Weighed,
-    hue: Hue::Rose,
+    hue: Hue::Orchid,
     evaluate: Evaluate::Window,
 };

@@ -6,15 +6,15 @@ mod motion;
 #[cfg(test)]
 mod tests;
 
-pub use motion::Actors;
+pub use motion::{Actors, POSE_STRETCH};
 
-use super::PoseNetwork;
+use super::MixtureDensityNetwork;
 use super::glimpse::{ACROSS, CHANNELS, RANGES, Seen, UP, about, told};
 use super::layers::{JOINTS, Layers};
 use crate::geometry::Vec3;
 use echo::{Frame, Radar, Skin, beside};
 use learn::{Adam, Learned, Plan};
-use motion::{HZ, STRETCH, Scene, Stretch, shift, trunk};
+use motion::{HZ, Scene, Stretch, shift, trunk};
 use rand::{Rng, SeedableRng, rngs::StdRng, seq::SliceRandom as _};
 use rand_distr::{Distribution as _, StandardNormal};
 use rayon::prelude::*;
@@ -135,8 +135,8 @@ fn maps(
         _ => {}
     }
     let mut times: Vec<usize> =
-        offsets.iter().map(|offset| (middle + offset).clamp(0, STRETCH as i64 - 1) as usize).collect();
-    times.extend((0..FRAMES_BESIDE).map(|_| rng.random_range(0..STRETCH)));
+        offsets.iter().map(|offset| (middle + offset).clamp(0, POSE_STRETCH as i64 - 1) as usize).collect();
+    times.extend((0..FRAMES_BESIDE).map(|_| rng.random_range(0..POSE_STRETCH)));
     let radar = Radar::draw(place, scene.height_m, rng);
     let person = Skin::draw(false, rng);
     let other = rng.random_bool(BESIDE).then(|| {
@@ -182,7 +182,7 @@ pub fn train_pose_network(
     actors: &Actors,
     options: &PoseTrainOptions,
     mut on: impl FnMut(usize, [f32; 2]),
-) -> Option<PoseNetwork> {
+) -> Option<MixtureDensityNetwork> {
     let mut rng = StdRng::seed_from_u64(options.seed);
     let plan = Plan::new();
     let mut numbers = plan.first(&mut rng);
@@ -225,12 +225,12 @@ pub fn train_pose_network(
         let seen = (options.passes * lessons.len()).max(1) as f32;
         on(round + 1, sums.map(|sum| sum / seen));
     }
-    Layers::from_numbers(&numbers).map(PoseNetwork)
+    Layers::from_numbers(&numbers).map(MixtureDensityNetwork)
 }
 
 /// What a network reaches in lessons of another seed: the mean distance of a joint of the likeliest body, m, and −ln of how likely the
 /// truth was, a joint.
-pub fn pose_network_reach(network: &PoseNetwork, actors: &Actors, options: &PoseTrainOptions) -> [f32; 2] {
+pub fn pose_network_reach(network: &MixtureDensityNetwork, actors: &Actors, options: &PoseTrainOptions) -> [f32; 2] {
     let numbers = network.0.numbers();
     let plan = Plan::new();
     let count = options.lessons.max(1);

@@ -2,16 +2,16 @@
 
 use crate::body::MotionClip;
 use crate::geometry::Vec3;
-use crate::simulate::{Options, Recording, ScenePreset};
 use rand::{Rng, rngs::StdRng};
 use std::f64::consts::PI;
 
 use super::super::TRUNK;
 use super::super::layers::JOINTS;
 
-/// Samples of a second, and of the stretch that a lesson sees.
+/// Samples of a second.
 pub(super) const HZ: f64 = 20.0;
-pub(super) const STRETCH: usize = 40;
+/// Samples of the stretch that a lesson sees.
+pub const POSE_STRETCH: usize = 40;
 /// Samples on each side of the middle of a window.
 pub(super) const MARGIN: usize = 4;
 /// How often each kind of recorded motion is drawn, others [`ELSE`].
@@ -60,8 +60,9 @@ pub struct Actors {
 }
 
 impl Actors {
-    /// Recorded people, and so many sequences of the synthetic source's; `None` where no clip is long enough for a window.
-    pub fn new(clips: &[MotionClip], acted: usize, seed: u64) -> Option<Self> {
+    /// Recorded people, and acted stretches, each [`POSE_STRETCH`] poses of COCO's joints every 0.05 s before a radar that stands 1 m above
+    /// the floor, m; `None` where no clip is long enough for a window, or a stretch has another length.
+    pub fn new(clips: &[MotionClip], acted: Vec<Vec<[Vec3; JOINTS]>>) -> Option<Self> {
         let long = clips.iter().filter(|clip| clip.poses.len() > 2 * MARGIN + 8);
         let recorded: Vec<(Stretch, String)> = long
             .map(|clip| {
@@ -81,21 +82,8 @@ impl Actors {
                 sum
             })
             .collect();
-        let options = Options {
-            presets: vec![ScenePreset::Easy, ScenePreset::Medium, ScenePreset::Hard],
-            frames: acted.max(1) * 20,
-            sequence_length: 20,
-            seed,
-            radar_height_m: Some(1.0),
-            ..Options::default()
-        };
-        let recording = Recording::new(&options).ok()?;
-        let act = |k: usize| -> Stretch {
-            let sequence = recording.sequence(k);
-            let performer = sequence.performers().next();
-            (0..STRETCH).filter_map(|i| Some(performer?.pose(i as f64 / HZ).joints)).collect()
-        };
-        (!recorded.is_empty()).then(|| Self { recorded, chances, acted: (0..acted).map(act).collect() })
+        let whole = acted.iter().all(|stretch| stretch.len() == POSE_STRETCH);
+        (whole && !recorded.is_empty()).then_some(Self { recorded, chances, acted })
     }
 
     /// One, of the actors with this chance.
@@ -115,9 +103,9 @@ impl Actors {
 
     fn act(&self, rng: &mut StdRng) -> Scene {
         let mut stretch = self.acted[rng.random_range(0..self.acted.len())].clone();
-        let middle = rng.random_range(MARGIN..STRETCH - MARGIN);
+        let middle = rng.random_range(MARGIN..POSE_STRETCH - MARGIN);
         if rng.random_bool(0.5) {
-            let at = trunk(&stretch[STRETCH / 2]);
+            let at = trunk(&stretch[POSE_STRETCH / 2]);
             let (azimuth, distance) = place(rng);
             turn(&mut stretch, azimuth - at[1].atan2(at[0]));
             let farther = distance - at[0].hypot(at[1]);
@@ -130,10 +118,10 @@ impl Actors {
         let last = self.chances.last().copied().unwrap_or(1.0);
         let drawn = rng.random_range(0.0..last);
         let (poses, _) = &self.recorded[self.chances.partition_point(|&chance| chance <= drawn)];
-        let middle = STRETCH / 2;
+        let middle = POSE_STRETCH / 2;
         let at = rng.random_range(MARGIN..poses.len() - MARGIN);
         let sample = |k: usize| poses[(at + k).saturating_sub(middle).min(poses.len() - 1)];
-        let mut stretch: Stretch = (0..STRETCH).map(sample).collect();
+        let mut stretch: Stretch = (0..POSE_STRETCH).map(sample).collect();
         let size = rng.random_range(SIZES[0]..SIZES[1]);
         stretch.as_flattened_mut().iter_mut().for_each(|p| *p = p.map(|x| size * x));
         let (azimuth, distance) = place(rng);

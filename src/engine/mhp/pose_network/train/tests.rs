@@ -5,14 +5,17 @@ use super::*;
 use crate::body::MotionClip;
 
 fn actors() -> Actors {
-    let pose = |k: usize| std::array::from_fn(|joint| [0.02 * k as f64, 0.01 * joint as f64, 0.08 * joint as f64]);
+    let pose = |k: usize| -> [Vec3; 20] {
+        std::array::from_fn(|joint| [0.02 * k as f64, 0.01 * joint as f64, 0.08 * joint as f64])
+    };
     let clip = MotionClip {
         group: "walk".into(),
         subject: String::new(),
         own_size: false,
         poses: (0..60).map(pose).collect(),
     };
-    Actors::new(&[clip], 3, 5).unwrap()
+    let acted = (0..POSE_STRETCH).map(|k| pose(k)[..17].try_into().unwrap()).collect();
+    Actors::new(&[clip], vec![acted]).unwrap()
 }
 
 fn lessons(actors: &Actors, count: u64) -> Vec<PoseLesson> {
@@ -27,7 +30,7 @@ fn clips_that_are_too_short_are_no_actors() {
         own_size: false,
         poses: vec![[[0.0; 3]; 20]; samples],
     };
-    assert!(Actors::new(&[], 1, 5).is_none() && Actors::new(&[clip(9)], 1, 5).is_none());
+    assert!(Actors::new(&[], vec![]).is_none() && Actors::new(&[clip(9)], vec![]).is_none());
 }
 
 #[test]
@@ -88,7 +91,8 @@ fn training_learns_its_lessons_and_tensors_bring_it_back() {
     let network = train_pose_network(&actors, &options, |_, losses| told.push(losses[1])).unwrap();
     assert!(told[2] < told[0] - 0.1, "{told:?}");
     let reach = pose_network_reach(&network, &actors, &options);
-    let again = PoseNetwork::from_bytes(&network.to_bytes(std::collections::HashMap::default()).unwrap()).unwrap();
+    let again =
+        MixtureDensityNetwork::from_bytes(&network.to_bytes(std::collections::HashMap::default()).unwrap()).unwrap();
     let rounded = pose_network_reach(&again, &actors, &options);
     assert!((reach[0] - rounded[0]).abs() < 0.01, "{reach:?} {rounded:?}");
 }
