@@ -176,34 +176,24 @@ pub(super) fn rectify(x: &mut [f32]) {
 fn tower(layers: &[Layer], maps: &[f32], columns: usize) -> Vec<f32> {
     let (mut x, mut size) = (maps.to_vec(), [RANGES, columns]);
     for (layer, stride) in layers.iter().zip(STRIDES) {
-        let Convolved { out, size: after, .. } = convolve((&layer.weights, &layer.bias), &x, size, stride);
-        (x, size) = (out, after);
+        let (taps, after) = shifted(&x, size, stride);
+        (x, size) = (convolved((&layer.weights, &layer.bias), &taps, after), after);
     }
     x
 }
 
-/// What a convolution makes of maps.
-pub(super) struct Convolved {
-    /// What [`shifted`] makes of them.
-    pub(super) shifted: Vec<f32>,
-    /// (outputs, cells), C order.
-    pub(super) out: Vec<f32>,
-    /// Rows and columns of it.
-    pub(super) size: [usize; 2],
-}
-
-/// A convolution with 3 × 3 cells, beyond the edges of zeros, at every so manyth cell of each axis, and max(x, 0).
-pub(super) fn convolve((weights, bias): (&[f32], &[f32]), x: &[f32], size: [usize; 2], stride: usize) -> Convolved {
-    let (shifted, size) = shifted(x, size, stride);
-    let cells = size[0] * size[1];
+/// A convolution with 3 × 3 cells, beyond the edges of zeros, and max(x, 0): of what [`shifted`] makes of maps (outputs, cells), C order.
+pub(super) fn convolved((weights, bias): (&[f32], &[f32]), shifted: &[f32], [rows, columns]: [usize; 2]) -> Vec<f32> {
+    let cells = rows * columns;
     let mut out: Vec<f32> = bias.iter().flat_map(|&bias| std::iter::repeat_n(bias, cells)).collect();
-    product(&mut out, [bias.len(), cells], (weights, false), (&shifted, false), 1.0);
+    product(&mut out, [bias.len(), cells], (weights, false), (shifted, false), 1.0);
     rectify(&mut out);
-    Convolved { shifted, out, size }
+    out
 }
 
-/// Of each weight of a convolution the cells that it is multiplied by, (channels · 9, cells), and the size of what comes of it.
-fn shifted(x: &[f32], [rows, columns]: [usize; 2], stride: usize) -> (Vec<f32>, [usize; 2]) {
+/// Of each weight of a convolution, at every so manyth cell of each axis, the cells that it is multiplied by, (channels · 9, cells),
+/// and the rows and columns of what comes of it.
+pub(super) fn shifted(x: &[f32], [rows, columns]: [usize; 2], stride: usize) -> (Vec<f32>, [usize; 2]) {
     let [high, wide] = [rows.div_ceil(stride), columns.div_ceil(stride)];
     let (cells, channels) = (high * wide, x.len() / (rows * columns));
     let mut shifted = vec![0.0_f32; channels * 9 * cells];

@@ -2,7 +2,7 @@
 
 use super::super::glimpse::{ACROSS, RANGES, UP};
 use super::super::layers::{
-    BODIES, Convolved, JOINTS, OUT, STRIDES, Shape, TOLD, convolve, flat, product, rectify, shapes,
+    BODIES, JOINTS, OUT, STRIDES, Shape, TOLD, convolved, flat, product, rectify, shapes, shifted,
 };
 use super::PoseLesson;
 use super::motion::MIRRORED;
@@ -71,7 +71,11 @@ pub(super) struct Learned {
 struct Kept {
     /// Of the maps before it.
     size: [usize; 2],
-    made: Convolved,
+    /// What it multiplies its weights by.
+    shifted: Vec<f32>,
+    out: Vec<f32>,
+    /// Rows and columns of that.
+    after: [usize; 2],
 }
 
 impl Plan {
@@ -128,7 +132,7 @@ impl Plan {
                 forwards(numbers, &self.towers[0], &horizontal, ACROSS),
                 forwards(numbers, &self.towers[1], &seen.vertical, UP),
             ];
-            towers.iter().filter_map(|tower| tower.last()).for_each(|last| inputs.extend_from_slice(&last.made.out));
+            towers.iter().filter_map(|tower| tower.last()).for_each(|last| inputs.extend_from_slice(&last.out));
             let [distance, sine, height] = seen.about;
             inputs.extend([distance, if mirrored { -sine } else { sine }, height]);
             kept.push(towers);
@@ -192,7 +196,7 @@ impl Plan {
         for (towers, bars) in kept.iter().zip(bars.chunks_exact(flat())) {
             let mut from = 0;
             for (tower, places) in towers.iter().zip(&self.towers) {
-                let end = tower.last().map_or(0, |last| last.made.out.len());
+                let end = tower.last().map_or(0, |last| last.out.len());
                 backwards(numbers, places, tower, &bars[from..from + end], &mut gradient);
                 from += end;
             }
@@ -204,10 +208,10 @@ impl Plan {
 fn forwards(numbers: &[f32], places: &[Place], maps: &[f32], columns: usize) -> Vec<Kept> {
     let mut kept: Vec<Kept> = Vec::with_capacity(places.len());
     for (place, stride) in places.iter().zip(STRIDES) {
-        let before = kept.last().map(|kept| &kept.made);
-        let (x, size) = before.map_or((maps, [RANGES, columns]), |made| (made.out.as_slice(), made.size));
-        let layer = (&numbers[place.weights.clone()], &numbers[place.bias.clone()]);
-        kept.push(Kept { size, made: convolve(layer, x, size, stride) });
+        let (x, size) = kept.last().map_or((maps, [RANGES, columns]), |kept| (kept.out.as_slice(), kept.after));
+        let (shifted, after) = shifted(x, size, stride);
+        let out = convolved((&numbers[place.weights.clone()], &numbers[place.bias.clone()]), &shifted, after);
+        kept.push(Kept { size, shifted, out, after });
     }
     kept
 }
@@ -215,10 +219,10 @@ fn forwards(numbers: &[f32], places: &[Place], maps: &[f32], columns: usize) -> 
 fn backwards(numbers: &[f32], places: &[Place], tower: &[Kept], bars: &[f32], gradient: &mut [f32]) {
     let mut bars = bars.to_vec();
     for (k, (place, kept)) in places.iter().zip(tower).enumerate().rev() {
-        bars.iter_mut().zip(&kept.made.out).filter(|(_, x)| **x <= 0.0).for_each(|(bar, _)| *bar = 0.0);
-        let cells = kept.made.out.len() / place.outputs;
+        bars.iter_mut().zip(&kept.out).filter(|(_, x)| **x <= 0.0).for_each(|(bar, _)| *bar = 0.0);
+        let cells = kept.out.len() / place.outputs;
         let size = [place.outputs, place.inputs];
-        product(&mut gradient[place.weights.clone()], size, (&bars, false), (&kept.made.shifted, true), 1.0);
+        product(&mut gradient[place.weights.clone()], size, (&bars, false), (&kept.shifted, true), 1.0);
         for (sum, bars) in gradient[place.bias.clone()].iter_mut().zip(bars.chunks_exact(cells)) {
             *sum += bars.iter().sum::<f32>();
         }
