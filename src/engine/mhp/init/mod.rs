@@ -16,8 +16,9 @@
 //! Switches beside the default setting refine the start: where counting finds the one person, behind the skin, on the
 //! line through the frames around, as high as floor and head say in all of them ([`context`]), in the posture that fits
 //! ([`pose`]). What it is without them is kept beside it. A search in the space of motion ends at several bodies; which of them
-//! a person is, the frames around may decide ([`Hypotheses`]). What the maps show is worked out once for a problem
-//! ([`context`]). A warm start goes where the persons of the frame before went ([`warm`]).
+//! a person is, the frames around may decide ([`Hypotheses`]); where none explains the maps, it is one that a network expects.
+//! What the maps show is worked out once for a problem ([`context`]). A warm start goes where the persons of the frame before went
+//! ([`warm`]).
 //!
 //! Nothing here reads a label.
 
@@ -248,7 +249,7 @@ impl Hypotheses {
         let problem = &Arc::clone(problem).shared_under(config);
         let model = ScattererModel::new(&problem.skeleton, config.scatterers);
         let params = assemble(problem, config, &model, &self.persons);
-        let others = motion::carried(own, &stages(around));
+        let others = motion::carried(own, &stages(around, |found| &found.persons));
         motion::carry_on(problem, config, &params, found, &others)?;
         Ok(all)
     }
@@ -279,6 +280,12 @@ impl Hypotheses {
                 notes.push(note.clone());
                 (params, Some(Ok(note)))
             }
+            Some(Err(Held::Unlike)) if let Some(bodies) = self.expected(around) => {
+                let mut params = assemble(problem, config, &model, &persons);
+                bodies.iter().enumerate().for_each(|(person, body)| body.place(person, &mut params));
+                notes.push(Held::Expected.note().to_owned());
+                (params, Some(Err(Held::Expected.note())))
+            }
             Some(Err(held)) => {
                 (self.posture(problem, config, Some(held), (&mut persons, &mut notes))?, Some(Err(held.note())))
             }
@@ -290,6 +297,16 @@ impl Hypotheses {
         }
         notes.extend(persons.iter().flat_map(|person| notes_of(person, config)));
         Ok(Initialisation { params, unrefined, peaks: self.peaks.clone(), notes, motion })
+    }
+
+    /// The bodies that a network expects, each on the cheapest path through those that it expects in the frames `around`; `None` where
+    /// it expects nobody in one of the places.
+    fn expected(&self, around: &[(f64, &Self)]) -> Option<Vec<&Hypothesis>> {
+        let of_network: Bodies = |found| &found.expected;
+        let own = self.stage(0.0, of_network)?;
+        let seen = stages(around, of_network);
+        let likeliest = |own: &'_ Vec<Hypothesis>| motion::lowest(&motion::decode(own, &seen).costs);
+        own.persons.iter().map(|own| own.get(likeliest(own)?)).collect()
     }
 
     /// The `persons` in the postures that explain their masks best; where `held` they are turned and moved as levels say.
@@ -321,21 +338,24 @@ impl Hypotheses {
         Ok(params)
     }
 
-    /// What other frames are told of this one, `t_s` after them.
-    fn stage(&self, t_s: f64) -> Option<Stage<'_>> {
+    /// What other frames are told of these bodies of this one, `t_s` after them.
+    fn stage(&self, t_s: f64, bodies: Bodies) -> Option<Stage<'_>> {
         let searched = self.searched.as_ref()?.as_ref().ok()?;
-        Some(Stage { t_s, persons: &searched.persons })
+        Some(Stage { t_s, persons: bodies(searched) })
     }
 }
 
-/// What is told of the frames around.
-fn stages<'a>(around: &[(f64, &'a Hypotheses)]) -> Vec<Stage<'a>> {
-    around.iter().filter_map(|&(t_s, other)| other.stage(t_s)).collect()
+/// Some of the bodies of each person.
+type Bodies = fn(&Searched) -> &[Vec<Hypothesis>];
+
+/// What is told of these bodies of the frames around.
+fn stages<'a>(around: &[(f64, &'a Hypotheses)], bodies: Bodies) -> Vec<Stage<'a>> {
+    around.iter().filter_map(|&(t_s, other)| other.stage(t_s, bodies)).collect()
 }
 
 /// The body of each person on the cheapest path, and what is said of them; `None` where bodies do not explain the maps.
 fn chosen<'a>(searched: &'a Searched, around: &[(f64, &Hypotheses)]) -> Option<(Vec<&'a Hypothesis>, String)> {
-    let seen = stages(around);
+    let seen = stages(around, |found| &found.persons);
     let decoded: Vec<Decoded> = searched.persons.iter().map(|own| motion::decode(own, &seen)).collect();
     let unlikeness = decoded.iter().map(|person| person.unlikeness).sum::<f64>() / decoded.len().max(1) as f64;
     if motion::is_unlike(unlikeness, decoded.len()) {

@@ -5,15 +5,19 @@
 //! looks. A path takes one hypothesis of every frame and costs
 //!
 //! ```text
-//! Σ over frames of (L/L_min + 0.25 away + 0.5 averted) + Σ over steps of min(apart/0.5 m, 3) + 0.5 max(turned/rad − 0.6, 0)
+//! Σ over frames of (L/L_min + w_net L_net/0.015 + 0.25 away + 0.5 averted)
+//!     + Σ over steps of min(apart/0.5 m, 3) + 0.5 max(turned/rad − 0.6, 0)
 //! ```
 //!
-//! with L_min the lowest loss of a frame, `away` from 0 (who walks ahead) to 1 (who walks backwards), `averted` from 0 (who stands and
-//! looks at the radar) to 1 (who looks the other way; less of who turns about in these frames), `turned` the angle between two
-//! headings, and `apart` the mean distance between the joints of two hypotheses, each moved as its velocities say to the middle of
-//! the time between them. The cheapest paths come from dynamic programming (Viterbi 1967) from both ends to the frame that is
-//! fitted. Before that the bodies on such a path are carried on into the frames beside ([`carried`], `search::carry_on`): what one
-//! search missed another found.
+//! with L the loss but for what a network says, which counts as much where nothing explains the maps well, L_min the lowest of a
+//! frame, `away` from 0 (who walks ahead) to 1 (who walks backwards), `averted` from 0 (who stands and looks at the radar) to 1 (who
+//! looks the other way; less of who turns about in these frames), `turned` the angle between two headings, and `apart` the mean
+//! distance between the joints of two hypotheses, each moved as its velocities say to the middle of the time between them. The
+//! cheapest paths come from dynamic programming (Viterbi 1967) from both ends to the frame that is fitted. Before that the bodies on
+//! such a path are carried on into the frames beside ([`carried`], `search::carry_on`): what one search missed another found.
+//!
+//! Where no body explains the maps of such a path, those that a network expects are decoded likewise, with losses that say how
+//! unlikely it calls them.
 
 use super::search::Hypothesis;
 use crate::geometry::{Vec3, flat_distance, mean, norm};
@@ -25,6 +29,8 @@ const MOST: f64 = 3.0;
 /// What looking the other way costs of a frame's lowest loss: of who walks, or falls, and of who stands.
 const AWAY: f64 = 0.25;
 const AVERTED: f64 = 0.5;
+/// The loss of a frame whose maps a body explains: there L_net counts a little more than in the fit.
+const CLEAR_LOSS: f64 = 0.015;
 /// Who turns as fast as this about himself, on average over the frames, looks anywhere, rad/s.
 const TURNING_RADPS: f64 = 0.2;
 /// What turning costs a radian of a step, beyond so much, rad.
@@ -163,7 +169,7 @@ impl<'a> Trellis<'a> {
         let averted = AVERTED * self.stands;
         of.iter().map(move |hypothesis| {
             let away = AWAY * hypothesis.away + averted * hypothesis.averted;
-            hypothesis.loss / lowest.max(f64::MIN_POSITIVE) + away
+            hypothesis.loss / lowest.max(f64::MIN_POSITIVE) + away + hypothesis.network / CLEAR_LOSS
         })
     }
 }
@@ -213,6 +219,7 @@ mod tests {
         Hypothesis {
             loss,
             unlikeness: loss,
+            network: 0.0,
             yaw,
             away: 0.0,
             averted: 0.0,
@@ -279,6 +286,20 @@ mod tests {
         assert_eq!((with(0.17, 0.0), with(0.12, 0.0)), (Some(1), Some(0)));
         // Who turns about looks anywhere, whichever way he turns.
         assert_eq!([1.0, -1.0].map(|spin| with(0.17, spin)), [Some(0), Some(0)]);
+    }
+
+    #[test]
+    fn a_network_decides_where_nothing_explains_the_maps_well() {
+        // Of two bodies a tenth apart the network expects the one that explains less.
+        let with = |loss: f64| {
+            let unexpected = Hypothesis { network: 6e-3, ..body(3.0, 0.0, loss) };
+            let found = decode(&[unexpected, body(3.2, 0.0, 1.1 * loss)], &[]).costs;
+            (found[1] - found[0], lowest(&found))
+        };
+        let (poorly, well) = (with(0.2), with(0.01));
+        assert!((poorly.0 + 0.3).abs() < 1e-9 && poorly.1 == Some(1), "{poorly:?}");
+        // It says so by as much whatever the loss.
+        assert!((well.0 - poorly.0).abs() < 1e-9, "{well:?}");
     }
 
     #[test]

@@ -100,6 +100,8 @@ pub(super) enum Held {
     Skeleton,
     /// No body of the prior explains the maps.
     Unlike,
+    /// As [`Self::Unlike`], but a network expects one.
+    Expected,
     /// There are too many cells and persons to try bodies.
     Large,
 }
@@ -110,6 +112,9 @@ impl Held {
         match self {
             Self::Skeleton => "held at the start: an unknown skeleton; the prior of motion has nothing of it",
             Self::Large => TOO_LARGE,
+            Self::Expected => {
+                "held where a network that looks at the maps alone expects the joints: no body of the prior explains the maps"
+            }
             Self::Unlike => {
                 "held at the start: no body explains the maps; each leaves too much of their levels, takes a pose that nobody takes, or stands too far from the echo"
             }

@@ -2,7 +2,8 @@
 //!
 //! Clusters stand, walk and sit; of one person alone bodies that lie and, where it moves, fall are tried beside them (`tilt.rs`).
 //! Every start is moved a little with its pose held; the few with the lowest loss are fitted with it, in the end by the bend of the
-//! loss ([`lbfgs`]), and with them the bodies that a network expects. What wins is the start; the runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
+//! loss ([`lbfgs`]), and with them the bodies that a network expects. What wins is the start; the runner-up with another heading
+//! and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
 
 use super::decode::lowest;
 use super::{
@@ -19,9 +20,9 @@ use std::ops::Range;
 
 /// The sieves that starts go through, coarse then fine.
 const SIEVES: [Sieve; 3] = [
-    Sieve { steps: 4, every: 4, held: true, kept: 10 },
-    Sieve { steps: 8, every: 2, held: false, kept: 6 },
-    Sieve { steps: 14, every: 1, held: false, kept: 4 },
+    Sieve { steps: 4, every: 4, held: true, kept: 8 },
+    Sieve { steps: 8, every: 2, held: false, kept: 5 },
+    Sieve { steps: 14, every: 1, held: false, kept: 3 },
 ];
 /// Evaluations of what is left, and of each body that is carried on from another frame.
 const FINE: usize = 12;
@@ -32,9 +33,9 @@ const UNITS: [f64; 7] = [0.03, 0.12, 0.03, 1.0, 0.06, 0.3, 0.5];
 const MOST_WORK: f64 = 2e10;
 /// Where every cell is summed by itself each costs so many.
 const PLAIN: f64 = 10.0;
-/// Evaluations of a person's search beside those of the first sieve, with those of what is carried on and of what the network expects, and those of a start in it, in
-/// whole windows.
-const LATER: f64 = 358.0;
+/// Evaluations of a person's search beside those of the first sieve, with those of what is carried on and of what the network
+/// expects, and those of a start in it, in whole windows.
+const LATER: f64 = 323.0;
 const FIRST: f64 = 5.0 / 4.0;
 /// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start, but for what a network
 /// expects, whose weight says whether it is asked.
@@ -45,6 +46,8 @@ const ONE_M: f64 = 0.03;
 const FALLEN: usize = 4;
 /// A body that is tilted farther is tried on its other sides, rad.
 const LIES_RAD: f64 = 0.3;
+/// What a body that a network calls e times less likely than another has more than its loss of 1.
+const UNLIKELIER: f64 = 0.25;
 /// A heading whose loss is larger by a smaller share than this is as good.
 const AMBIGUOUS: f64 = 0.1;
 /// Headings farther apart than this are different ones.
@@ -69,8 +72,10 @@ struct Sieve {
 /// A body that a search ended at, in the frame that is fitted.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::mhp) struct Hypothesis {
-    /// L of the window, by the search's weights, with this body in it.
+    /// L of the window, by the search's weights, with this body in it, but for the network's share.
     pub(in crate::mhp) loss: f64,
+    /// That share, w_net · L_net.
+    pub(in crate::mhp) network: f64,
     /// How little it explains the maps ([`super::unlikeness`]), and how far it is from the start.
     pub(in crate::mhp) unlikeness: f64,
     /// Where it looks, rad.
@@ -98,6 +103,8 @@ pub(in crate::mhp) struct Searched {
     pub(in crate::mhp) begun: f64,
     /// What the search ended at, a list a person, the lowest loss first; none is empty.
     pub(in crate::mhp) persons: Vec<Vec<Hypothesis>>,
+    /// The bodies that a network expects each person to be, as it says them; of nobody where it is not asked.
+    pub(in crate::mhp) expected: Vec<Vec<Hypothesis>>,
     /// How each person is to move, m, where the pose there is not believed.
     pub(in crate::mhp) moved: Vec<Vec3>,
 }
@@ -110,11 +117,21 @@ struct Tried {
     /// Its parts, unweighted.
     em: f64,
     prior: f64,
+    network: f64,
 }
 
 impl Tried {
     fn at(coordinates: Vec<f64>) -> Self {
-        Self { state: MotionState::at(coordinates), loss: f64::INFINITY, em: 0.0, prior: 0.0 }
+        Self { state: MotionState::at(coordinates), loss: f64::INFINITY, em: 0.0, prior: 0.0, network: 0.0 }
+    }
+
+    /// Takes what is found where it is lower.
+    fn take(&mut self, loss: f64, parts: &WindowLoss) -> bool {
+        let better = loss.is_finite() && loss < self.loss;
+        if better {
+            (self.loss, self.em, self.prior, self.network) = (loss, parts.em, parts.prior, parts.network);
+        }
+        better
     }
 }
 
@@ -147,8 +164,7 @@ impl<'a> Search<'a> {
         let mut best = state.coordinates.clone();
         for step in 0..=steps {
             let loss = self.evaluate(&state.coordinates);
-            if loss.is_finite() && loss < tried.loss {
-                (tried.loss, tried.em, tried.prior) = (loss, self.loss.em, self.loss.prior);
+            if tried.take(loss, &self.loss) {
                 best.clone_from(&state.coordinates);
             }
             if step < steps {
@@ -173,16 +189,14 @@ impl<'a> Search<'a> {
                 _ => UNITS[6],
             })
             .collect();
-        let Tried { state, loss, em, prior } = tried;
-        lbfgs::minimise(&mut state.coordinates, &units, evaluations, |coordinates, gradient| {
+        let mut coordinates = std::mem::take(&mut tried.state.coordinates);
+        lbfgs::minimise(&mut coordinates, &units, evaluations, |coordinates, gradient| {
             let found = self.evaluate(coordinates);
-            if found.is_finite() && found < *loss {
-                (*loss, *em, *prior) = (found, self.loss.em, self.loss.prior);
-            }
+            tried.take(found, &self.loss);
             gradient.clone_from(&self.loss.gradient);
             found
         });
-        *state = MotionState::at(std::mem::take(&mut state.coordinates));
+        tried.state = MotionState::at(coordinates);
     }
 
     /// Where a start ended.
@@ -199,8 +213,10 @@ impl<'a> Search<'a> {
         let mine = &tried.state.coordinates[person * self.window.stride..];
         let upright = mine[TILT].hypot(mine[TILT + 1]).cos().max(0.0);
         let [away, averted] = away(yaw, &velocities, to_radar).map(|share| upright * share);
+        let network = self.config.w_net * tried.network;
         Hypothesis {
-            loss: tried.loss,
+            loss: tried.loss - network,
+            network,
             unlikeness: super::unlikeness(self.config, tried.em, tried.prior / self.window.scarcity)
                 + OF_WAY * way[0].hypot(way[1]),
             yaw,
@@ -234,17 +250,28 @@ impl<'a> Search<'a> {
         all.into_iter().take(FALLEN).map(|(_, tried)| tried).collect()
     }
 
-    /// The bodies that the network expects a person to be, the others as in `coordinates`.
-    fn expected(&self, coordinates: &[f64], person: usize) -> Vec<Tried> {
+    /// The bodies that the network expects a person to be, the others as in `coordinates`, each with ln of its chance.
+    fn expected(&self, coordinates: &[f64], person: usize) -> Vec<(f64, Tried)> {
         let own = person * self.window.stride..(person + 1) * self.window.stride;
         let starts = self.window.expected(person).into_iter().flat_map(|expected| expected.starts(person, self.params));
-        let tried = |start: Pppr| {
+        let tried = |(ln_chance, start): (f64, Pppr)| {
             let mut of = coordinates.to_vec();
             of[own.clone()].copy_from_slice(&self.window.coordinates_of(&start)[own.clone()]);
             of[own.start + STILL] = coordinates[own.start + STILL];
-            Tried::at(of)
+            (ln_chance, Tried::at(of))
         };
         starts.map(tried).collect()
+    }
+
+    /// These bodies as they are: their losses are how unlikely the network calls them.
+    fn said(&self, expected: &[(f64, Tried)], person: usize) -> Vec<Hypothesis> {
+        let best = expected.iter().map(|(ln_chance, _)| *ln_chance).fold(f64::NEG_INFINITY, f64::max);
+        let loss = |ln_chance: f64| 1.0 + UNLIKELIER * (best - ln_chance);
+        let body =
+            |(ln_chance, tried): &(f64, Tried)| Hypothesis { loss: loss(*ln_chance), ..self.hypothesis(tried, person) };
+        let mut said: Vec<Hypothesis> = expected.iter().map(body).collect();
+        said.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+        said
     }
 
     /// What a sieve leaves of `all`, the best first; of those that have become one, one.
@@ -312,6 +339,7 @@ pub(in crate::mhp) fn search(
     let begun = search.evaluate(&coordinates);
     let begun_em = search.loss.em;
     let mut persons: Vec<Vec<Hypothesis>> = Vec::with_capacity(params.shape().persons);
+    let mut expected: Vec<Vec<Hypothesis>> = Vec::with_capacity(params.shape().persons);
     for person in 0..params.shape().persons {
         let own = person * stride..(person + 1) * stride;
         let hips = hips_of(problem, params, person, joints);
@@ -337,7 +365,8 @@ pub(in crate::mhp) fn search(
         if params.shape().persons == 1 {
             all.extend(search.fallen(&coordinates, own.clone(), (hips, floor, ways[person])));
         }
-        let expected = search.expected(&coordinates, person);
+        let of_network = search.expected(&coordinates, person);
+        expected.push(search.said(&of_network, person));
         for sieve in &SIEVES {
             search.sift(&mut all, sieve, &own);
         }
@@ -346,7 +375,7 @@ pub(in crate::mhp) fn search(
         let mut own_start = begun_at;
         search.descend(&mut own_start, SIEVES[0].steps, true);
         all.push(own_start);
-        all.extend(expected);
+        all.extend(of_network.into_iter().map(|(_, tried)| tried));
         for tried in &mut all {
             search.settle(tried, FINE);
         }
@@ -384,7 +413,7 @@ pub(in crate::mhp) fn search(
     // Among reflectors that nothing is known of, another place may be theirs.
     let clearer = window.clear && em < CLEARER * begun_em;
     let moved = (0..persons.len()).map(|k| if clearer { way(problem, params, k, &persons[k]) } else { [0.0; 3] });
-    Ok(Ok(Searched { begun, moved: moved.collect(), persons }))
+    Ok(Ok(Searched { begun, moved: moved.collect(), persons, expected }))
 }
 
 /// Adds to what a search around the one person of `params` ended at what bodies of other frames become in this one, each with its
@@ -413,7 +442,7 @@ pub(in crate::mhp) fn carry_on(
         search.settle(&mut tried, FINE);
         found.push(search.hypothesis(&tried, 0));
     }
-    found.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    found.sort_by(|a, b| (a.loss + a.network).total_cmp(&(b.loss + b.network)));
     Ok(())
 }
 

@@ -41,7 +41,7 @@ const APART: f64 = 0.3;
 /// How often it looks, each time about where it expected the trunk before.
 const LOOKS: usize = 2;
 /// A body that is less likely is no start.
-const LEAST: f64 = 0.02;
+const LEAST: f64 = 0.1;
 
 /// The network: weights that `train-pose-network` makes (Bishop 1994 names what it is).
 #[derive(Debug, Clone)]
@@ -143,8 +143,8 @@ impl Expected {
         best.is_finite().then_some(Self { bodies, best })
     }
 
-    /// The joints of the bodies that are not unlikely, put where those of a person are.
-    pub(super) fn starts(&self, person: usize, params: &Pppr) -> impl Iterator<Item = Pppr> {
+    /// The joints of the bodies that are not unlikely, put where those of a person are, each with ln of its chance.
+    pub(super) fn starts(&self, person: usize, params: &Pppr) -> impl Iterator<Item = (f64, Pppr)> {
         let joints = params.shape().joints;
         let likely = self.bodies.iter().filter(|body| body.ln_chance > LEAST.ln());
         likely.map(move |body| {
@@ -154,7 +154,7 @@ impl Expected {
                     start.set_vec3(Group::Position, person * joints + k, *at);
                 }
             }
-            start
+            (body.ln_chance, start)
         })
     }
 

@@ -134,7 +134,9 @@ fn the_committed_network_is_whole_and_a_damaged_one_is_told() {
     let chances: f64 = expected.bodies.iter().map(|body| body.ln_chance.exp()).sum();
     assert!((chances - 1.0).abs() < 1e-6);
     let params = Pppr::zeros(PpprShape { persons: 1, joints: 17, doppler_features: 1 });
-    for start in expected.starts(0, &params) {
+    let starts: Vec<(f64, Pppr)> = expected.starts(0, &params).collect();
+    assert!(!starts.is_empty() && starts.iter().all(|(ln_chance, _)| *ln_chance > LEAST.ln()));
+    for (_, start) in starts {
         assert!(norm(sub(start.position(11), [2.8, 0.6, 0.0])) < 1.5, "{:?}", start.position(11));
     }
     let bytes = include_bytes!("../../../../assets/pose-network.safetensors");
