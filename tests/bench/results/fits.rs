@@ -194,7 +194,7 @@ pub(crate) fn section(bed: &Bed) -> String {
     format!(
         "`study complexity DATA --preset PRESET`, single precision, the preset's iterations. Mean over sequences ± half of its 95 % interval; \
          frames with another number of people than annotated are left out. Settings were tuned on other seeds; of the second simulator \
-         `walk0`, `walk2`, `away0`, `clutter0` and `still0` were looked at when choosing, and all of it when the mixture of poses was.\n\n{}\n{frame}\n{moved}\n\n{truth}",
+         `walk0`, `walk2`, `away0`, `clutter0` and `still0` were looked at when choosing, and all of it when the mixture of poses and w_net were.\n\n{}\n{frame}\n{moved}\n\n{truth}",
         table(&rows)
     )
 }

@@ -29,6 +29,8 @@ mod perturb;
 mod place;
 mod pose;
 mod scatterers;
+#[cfg(test)]
+mod tests;
 mod velocity;
 mod warm;
 
@@ -43,7 +45,7 @@ use super::template::Template;
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
 use crate::config::{BodyModel, EmLoss, FitConfig, Height, Parameterization, StartPlace, Summation, Yaw};
-use crate::geometry::{Vec3, add, flat_distance, norm};
+use crate::geometry::{Vec3, add, flat_distance, mean, norm};
 use find::{find_one, middle_of_views};
 use notes::notes_of;
 use pose::Posture;
@@ -59,6 +61,8 @@ const MOST_STEPS: usize = 12;
 const POSTURES: usize = 9;
 /// What counting finds farther from a place than this is another place, m.
 const ELSEWHERE_M: f64 = 1.0;
+/// Two bodies whose middles are nearer over the floor than this are one, m.
+const ONE_PLACE_M: f64 = 0.3;
 /// The L_EM of a posture other than standing, of that of standing, at which it is believed of somebody who does not walk.
 const CLEARLY_BETTER: f64 = 0.9;
 
@@ -300,13 +304,16 @@ impl Hypotheses {
     }
 
     /// The bodies that a network expects, each on the cheapest path through those that it expects in the frames `around`; `None` where
-    /// it expects nobody in one of the places.
+    /// it expects nobody in one of the places, or the same one in two.
     fn expected(&self, around: &[(f64, &Self)]) -> Option<Vec<&Hypothesis>> {
         let of_network: Bodies = |found| &found.expected;
         let own = self.stage(0.0, of_network)?;
         let seen = stages(around, of_network);
         let likeliest = |own: &'_ Vec<Hypothesis>| motion::lowest(&motion::decode(own, &seen).costs);
-        own.persons.iter().map(|own| own.get(likeliest(own)?)).collect()
+        let bodies = own.persons.iter().map(|own| own.get(likeliest(own)?)).collect::<Option<Vec<_>>>()?;
+        let places: Vec<Vec3> = bodies.iter().map(|body| mean(&body.joints)).collect();
+        let is_one = |k: usize| places[..k].iter().any(|other| flat_distance(*other, places[k]) < ONE_PLACE_M);
+        (!(1..places.len()).any(is_one)).then_some(bodies)
     }
 
     /// The `persons` in the postures that explain their masks best; where `held` they are turned and moved as levels say.

@@ -113,7 +113,7 @@ impl Held {
             Self::Skeleton => "held at the start: an unknown skeleton; the prior of motion has nothing of it",
             Self::Large => TOO_LARGE,
             Self::Expected => {
-                "held where a network that looks at the maps alone expects the joints: no body of the prior explains the maps"
+                "held where a network expects the joints; no body explains the maps: each leaves too much of their levels, takes a pose that nobody takes, or stands too far from the echo"
             }
             Self::Unlike => {
                 "held at the start: no body explains the maps; each leaves too much of their levels, takes a pose that nobody takes, or stands too far from the echo"
