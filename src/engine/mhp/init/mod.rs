@@ -277,18 +277,19 @@ impl Hypotheses {
             let searched = searched.as_ref().map_err(|held| *held)?;
             chosen(searched, around).ok_or(Held::Unlike)
         });
+        let placed = |bodies: Vec<&Hypothesis>| {
+            let mut params = assemble(problem, config, &model, &self.persons);
+            bodies.iter().enumerate().for_each(|(person, body)| body.place(person, &mut params));
+            params
+        };
         let (params, motion) = match chosen {
             Some(Ok((bodies, note))) => {
-                let mut params = assemble(problem, config, &model, &persons);
-                bodies.iter().enumerate().for_each(|(person, body)| body.place(person, &mut params));
                 notes.push(note.clone());
-                (params, Some(Ok(note)))
+                (placed(bodies), Some(Ok(note)))
             }
             Some(Err(Held::Unlike)) if let Some(bodies) = self.expected(around) => {
-                let mut params = assemble(problem, config, &model, &persons);
-                bodies.iter().enumerate().for_each(|(person, body)| body.place(person, &mut params));
                 notes.push(Held::Expected.note().to_owned());
-                (params, Some(Err(Held::Expected.note())))
+                (placed(bodies), Some(Err(Held::Expected.note())))
             }
             Some(Err(held)) => {
                 (self.posture(problem, config, Some(held), (&mut persons, &mut notes))?, Some(Err(held.note())))

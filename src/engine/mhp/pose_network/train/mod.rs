@@ -55,7 +55,7 @@ pub struct PoseTrainOptions {
 
 impl Default for PoseTrainOptions {
     fn default() -> Self {
-        Self { rounds: 60, lessons: 4096, passes: 2, batch: 64, learning_rate: 6e-4, acted: 0.45, seed: 1 }
+        Self { rounds: 90, lessons: 4096, passes: 2, batch: 64, learning_rate: 6e-4, acted: 0.45, seed: 1 }
     }
 }
 
