@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 /// Iterations of a whole frame, as in the paper's timing.
 const FRAME_ITERATIONS: usize = 80;
 /// Iterations that are not timed: buffers grow, caches warm.
-const WARM_UP: usize = 20;
+const WARM_UP: usize = 60;
 /// How often initialisation, simulation and a whole frame are repeated; the fastest counts.
 const REPEATS: usize = 5;
 /// How long the batch runs at least.

@@ -1,9 +1,9 @@
 //! Where a fit in a window begins: clusters of the prior and headings, coarse, then the best of them fine.
 //!
 //! Clusters stand, walk and sit; of one person alone bodies that lie and, where it moves, fall are tried beside them (`tilt.rs`).
-//! Every start is moved a little with its pose held; the few with the lowest loss are fitted with it, in the end by the bend of the
-//! loss ([`lbfgs`]), and with them the bodies that a network expects. What wins is the start; the runner-up with another heading
-//! and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
+//! Every start is moved a little with its pose held; the few with the lowest loss are fitted with it, and in the end with the
+//! bodies that a network expects, by the bend of the loss ([`lbfgs`]). What wins is the start; the runner-up with another heading and
+//! how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
 
 use super::decode::lowest;
 use super::{
@@ -20,8 +20,8 @@ use std::ops::Range;
 
 /// The sieves that starts go through, coarse then fine.
 const SIEVES: [Sieve; 3] = [
-    Sieve { steps: 4, every: 4, held: true, kept: 8 },
-    Sieve { steps: 8, every: 2, held: false, kept: 5 },
+    Sieve { steps: 4, every: 4, held: true, kept: 6 },
+    Sieve { steps: 8, every: 2, held: false, kept: 4 },
     Sieve { steps: 14, every: 1, held: false, kept: 3 },
 ];
 /// Evaluations of what is left, and of each body that is carried on from another frame.
@@ -35,7 +35,7 @@ const MOST_WORK: f64 = 2e10;
 const PLAIN: f64 = 10.0;
 /// Evaluations of a person's search beside those of the first sieve, with those of what is carried on and of what the network
 /// expects, and those of a start in it, in whole windows.
-const LATER: f64 = 323.0;
+const LATER: f64 = 293.0;
 const FIRST: f64 = 5.0 / 4.0;
 /// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start, but for what a network
 /// expects, whose weight says whether it is asked.
@@ -343,8 +343,7 @@ pub(in crate::mhp) fn search(
     for person in 0..params.shape().persons {
         let own = person * stride..(person + 1) * stride;
         let hips = hips_of(problem, params, person, joints);
-        let begun_at = Tried::at(coordinates.clone());
-        let mut all = vec![begun_at.clone()];
+        let mut all = vec![Tried::at(coordinates.clone())];
         let turns: &[f64] = if walks[person] { &[0.0, PI] } else { &[0.0, 0.5 * PI, PI, 1.5 * PI] };
         for (c, hip_height) in starts.iter().take(config.starts.min(most_starts).saturating_sub(1)) {
             for turn in turns {
@@ -367,15 +366,13 @@ pub(in crate::mhp) fn search(
         }
         let of_network = search.expected(&coordinates, person);
         expected.push(search.said(&of_network, person));
-        for sieve in &SIEVES {
+        let [coarse @ .., whole] = &SIEVES;
+        for sieve in coarse {
             search.sift(&mut all, sieve, &own);
         }
-        search.every = 1;
-        // What the start itself and what the network expects become is among those that are compared in the end.
-        let mut own_start = begun_at;
-        search.descend(&mut own_start, SIEVES[0].steps, true);
-        all.push(own_start);
+        // What the network expects needs no way there.
         all.extend(of_network.into_iter().map(|(_, tried)| tried));
+        search.sift(&mut all, whole, &own);
         for tried in &mut all {
             search.settle(tried, FINE);
         }
