@@ -65,7 +65,7 @@ impl Preset {
             Self::Baseline => "The paper's fit within 1.25 m of the person, from a start that leaves the room out",
             Self::Paper => "The paper to the letter: the whole map, the strongest cluster of peaks, one frame alone",
             Self::Recommended => {
-                "As many people as are counted, in windows of frames fitted at once: levels instead of masks, skin, poses that real people have, and what lies beside a person; whom no body explains is where a network expects them"
+                "As many people as are counted, in windows of frames fitted at once: levels instead of masks, skin, poses that real people have, and what lies beside a person; whom no body explains is where they were seen last, or a network expects them"
             }
         }
     }

@@ -16,7 +16,8 @@
 //! Switches beside the default setting refine the start: where counting finds the one person, behind the skin, on the
 //! line through the frames around, as high as floor and head say in all of them ([`context`]), in the posture that fits
 //! ([`pose`]). What it is without them is kept beside it. A search in the space of motion ends at several bodies; which of them
-//! a person is, the frames around may decide ([`Hypotheses`]); where none explains the maps, it is one that a network expects.
+//! a person is, the frames around may decide ([`Hypotheses`]); where none explains the maps, it is where it was seen last ([`seen`]),
+//! or one that a network expects.
 //! What the maps show is worked out once for a problem ([`context`]). A warm start goes where the persons of the frame before went
 //! ([`warm`]).
 //!
@@ -29,6 +30,7 @@ mod perturb;
 mod place;
 mod pose;
 mod scatterers;
+mod seen;
 #[cfg(test)]
 mod tests;
 mod velocity;
@@ -286,6 +288,10 @@ impl Hypotheses {
             Some(Ok((bodies, note))) => {
                 notes.push(note.clone());
                 (placed(bodies), Some(Ok(note)))
+            }
+            Some(Err(Held::Unlike)) if let Some(body) = self.last_seen(problem.radar.height_m, around) => {
+                notes.push(Held::Seen.note().to_owned());
+                (placed(vec![&body]), Some(Err(Held::Seen.note())))
             }
             Some(Err(Held::Unlike)) if let Some(bodies) = self.expected(around) => {
                 notes.push(Held::Expected.note().to_owned());

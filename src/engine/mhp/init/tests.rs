@@ -1,7 +1,7 @@
 use super::*;
 
 /// Somebody at `x` who looks along `yaw`.
-fn body(x: f64, yaw: f64, loss: f64) -> Hypothesis {
+pub(super) fn body(x: f64, yaw: f64, loss: f64) -> Hypothesis {
     Hypothesis {
         loss,
         network: 0.0,
@@ -15,6 +15,13 @@ fn body(x: f64, yaw: f64, loss: f64) -> Hypothesis {
         beta: vec![0.0; 2],
         still: 0.0,
     }
+}
+
+/// A frame of one person who may be this body alone.
+pub(super) fn frame_of(body: Hypothesis) -> Hypotheses {
+    let searched =
+        Some(Ok(Searched { begun: 1.0, persons: vec![vec![body]], expected: Vec::new(), moved: vec![[0.0; 3]] }));
+    Hypotheses { own: Vec::new(), persons: Vec::new(), searched, peaks: Vec::new(), notes: Vec::new() }
 }
 
 /// A frame whose maps no body explains, where a network expects one of these of each person.

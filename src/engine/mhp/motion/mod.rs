@@ -38,6 +38,7 @@ mod turn;
 pub(super) use decode::{Decoded, Stage, carried, decode, lowest};
 pub(super) use search::{Hypothesis, Searched, carry_on, search};
 pub(super) use thinned::ThinnedViews;
+pub(super) use tilt::later;
 pub(super) use turn::turn;
 
 use super::frame_em::FrameEm;
@@ -100,6 +101,8 @@ pub(super) enum Held {
     Skeleton,
     /// No body of the prior explains the maps.
     Unlike,
+    /// As [`Self::Unlike`], but bodies explain those of a frame nearby.
+    Seen,
     /// As [`Self::Unlike`], but a network expects one.
     Expected,
     /// There are too many cells and persons to try bodies.
@@ -112,6 +115,9 @@ impl Held {
         match self {
             Self::Skeleton => "held at the start: an unknown skeleton; the prior of motion has nothing of it",
             Self::Large => TOO_LARGE,
+            Self::Seen => {
+                "held where the nearest frame that shows a body has it; none explains the maps here: each leaves too much of their levels, takes a pose that nobody takes, or stands too far from the echo"
+            }
             Self::Expected => {
                 "held where a network expects the joints; no body explains the maps: each leaves too much of their levels, takes a pose that nobody takes, or stands too far from the echo"
             }

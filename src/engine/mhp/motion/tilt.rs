@@ -243,7 +243,7 @@ pub(super) fn spin_of(joints: &[Vec3], velocities: &[Vec3]) -> Vec3 {
 }
 
 /// Where the points of a body that moves as one are `dt_s` later.
-pub(super) fn later(joints: &[Vec3], velocities: &[Vec3], dt_s: f64) -> Vec<Vec3> {
+pub(in crate::mhp) fn later(joints: &[Vec3], velocities: &[Vec3], dt_s: f64) -> Vec<Vec3> {
     let turn = exponential(scale(spin_of(joints, velocities), dt_s));
     let (from, way) = (mean(joints), scale(mean(velocities), dt_s));
     joints.iter().map(|&p| add(add(from, way), mat_vec(&turn, sub(p, from)))).collect()
