@@ -5,15 +5,15 @@
 //! frame compares its own maps (`mhp/frame_em.rs`), and
 //!
 //! ```text
-//! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior + w_net · W/F · L_net
+//! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior + w_net · L_net
 //! L_prior = W/F · ((ρ(c) + ((s − s₀)/σ_s)² + ((q − q₀)/σ_q)² + ρ_w(w, ẇ))/30 + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)² + ρ_h(h/σ_h))
 //! ```
 //!
 //! where ρ(c) is −2 ln of how likely a Gaussian mixture has the first coefficients (`body::Mixture`), and the squares of the others.
 //! F are the frames there are and W those that are asked for (`window`), for fewer frames are less evidence against a prior that
-//! stays. The parts behind it are those of the body's proportions (`proportions.rs`) and of the floor (`ground.rs`); for several
-//! persons there is one for bodies that stand in one another or go far from where they were counted (`apart.rs`). The kinematic
-//! terms are those of the frame that is fitted.
+//! stays, but not against a network, which has seen no more of them. The parts behind it are those of the body's proportions
+//! (`proportions.rs`) and of the floor (`ground.rs`); for several persons there is one for bodies that stand in one another or go
+//! far from where they were counted (`apart.rs`). The kinematic terms are those of the frame that is fitted.
 //! q says how bright what stands still is (`static_echo.rs`). PPPR stays the state that is shown, kept and exported: positions and
 //! velocities follow the coordinates, and opacities do where the settings ask for it; scales and the rest move by themselves and
 //! are the same in all frames of the window. The frame stands as near the window's middle as its
@@ -427,8 +427,8 @@ impl Window {
             let Some(expected) = expected else { continue };
             let (mut pose, mut bar) = ([[0.0; 3]; MOST_JOINTS], [[0.0; 3]; MOST_JOINTS]);
             space.pose(own, &stances[person], *own_frame, &mut pose[..joints]);
-            let gain = config.w_net * prior_share;
-            loss.network += prior_share * expected.misfit(&pose[..joints], gain, &mut bar[..joints]);
+            let gain = config.w_net / persons;
+            loss.network += expected.misfit(&pose[..joints], gain, &mut bar[..joints]) / persons;
             let moved = (&pose[..joints], &bar[..joints]);
             space.pull_back(own, &stances[person], *own_frame, (moved, None), bars);
         }
