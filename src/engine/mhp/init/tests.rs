@@ -19,17 +19,19 @@ pub(super) fn body(x: f64, yaw: f64, loss: f64) -> Hypothesis {
 
 /// A frame of one person who may be this body alone.
 pub(super) fn frame_of(body: Hypothesis) -> Hypotheses {
-    let searched =
-        Some(Ok(Searched { begun: 1.0, persons: vec![vec![body]], expected: Vec::new(), moved: vec![[0.0; 3]] }));
-    Hypotheses { own: Vec::new(), persons: Vec::new(), searched, peaks: Vec::new(), notes: Vec::new() }
+    searched(vec![vec![body]], Vec::new())
 }
 
 /// A frame whose maps no body explains, where a network expects one of these of each person.
 fn unexplained(expected: Vec<Vec<Hypothesis>>) -> Hypotheses {
-    let persons = expected.iter().map(|_| vec![body(9.0, 0.0, 1.0)]).collect();
-    let moved = vec![[0.0; 3]; expected.len()];
-    let searched = Some(Ok(Searched { begun: 1.0, persons, expected, moved }));
-    Hypotheses { own: Vec::new(), persons: Vec::new(), searched, peaks: Vec::new(), notes: Vec::new() }
+    searched(expected.iter().map(|_| vec![body(9.0, 0.0, 1.0)]).collect(), expected)
+}
+
+/// A frame in which a search ended at these bodies of each person, and a network expects those.
+fn searched(persons: Vec<Vec<Hypothesis>>, expected: Vec<Vec<Hypothesis>>) -> Hypotheses {
+    let searched = Searched { begun: 1.0, moved: vec![[0.0; 3]; persons.len()], persons, expected };
+    let found = Some(Ok(searched));
+    Hypotheses { own: Vec::new(), persons: Vec::new(), searched: found, peaks: Vec::new(), notes: Vec::new() }
 }
 
 #[test]
