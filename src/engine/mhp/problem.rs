@@ -3,7 +3,7 @@
 use super::context::{Contexts, Neighbour, Reading, TemporalContext, anchors, range_offsets};
 use super::frame_em::Measured;
 use super::sidelobes::Polar;
-use super::thinned::{Strides, ThinnedCache, ThinnedMaps};
+use super::thinned::{ThinnedCache, ThinnedMaps, Thinnings};
 use super::{FitError, fill_missing};
 use crate::body::{Pppr, Skeleton};
 use crate::config::{Clutter, EmLoss, FitConfig, FramesAround, RangeOffset, Sidelobes};
@@ -248,8 +248,8 @@ impl Problem {
     }
 
     /// Its maps in every so manyth cell, worked out when first asked for; views must not be changed afterwards.
-    pub(super) fn thinned(&self, strides: Strides) -> Arc<ThinnedMaps> {
-        self.derived.thinned.of(self, strides)
+    pub(super) fn thinned(&self, thinnings: Thinnings) -> Arc<ThinnedMaps> {
+        self.derived.thinned.of(self, thinnings)
     }
 
     /// Where the frames around say that the mean of each person's joints is, world frame, m; empty without frames around.

@@ -18,8 +18,17 @@ fn narrowed(psf: &PointSpread) -> PointSpread {
     PointSpread { azimuth_rad: ACROSS * psf.azimuth_rad, elevation_rad: ACROSS * psf.elevation_rad, ..*psf }
 }
 
-/// Of each axis of each view, every so manyth cell.
-pub(super) type Strides = Vec<Vec<usize>>;
+/// What becomes of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Thinning {
+    /// Every so manyth cell is kept.
+    Every(usize),
+    /// Powers along it add, and it is no more.
+    Summed,
+}
+
+/// Of each axis of each view.
+pub(super) type Thinnings = Vec<Vec<Thinning>>;
 
 /// A map's cells that are kept, C order.
 #[derive(Debug)]
@@ -37,7 +46,7 @@ fn noise_power(view: &View, map: &[f64]) -> f64 {
 /// The views of a problem, thinned, and what its frames show in them; each map when it is first asked for.
 #[derive(Debug)]
 pub(super) struct ThinnedMaps {
-    strides: Strides,
+    thinnings: Thinnings,
     pub(super) views: Vec<View>,
     grids: Vec<OnceLock<SpatialGrid>>,
     /// The frame that is fitted, then those around it; one map a view.
@@ -47,19 +56,22 @@ pub(super) struct ThinnedMaps {
 }
 
 impl ThinnedMaps {
-    fn new(problem: &Problem, strides: Strides) -> Self {
-        let thinned = |(view, strides): (&View, &Vec<usize>)| {
-            let axis = |(axis, &stride): (&Axis, &usize)| {
-                let bins = axis.bins.div_ceil(stride);
-                Axis { bins, hi: axis.lo + axis.step() * (bins * stride) as f64, ..axis.clone() }
+    fn new(problem: &Problem, thinnings: Thinnings) -> Self {
+        let thinned = |(view, thinnings): (&View, &Vec<Thinning>)| {
+            let axis = |(axis, thinning): (&Axis, &Thinning)| match *thinning {
+                Thinning::Every(stride) => {
+                    let bins = axis.bins.div_ceil(stride);
+                    Some(Axis { bins, hi: axis.lo + axis.step() * (bins * stride) as f64, ..axis.clone() })
+                }
+                Thinning::Summed => None,
             };
-            let axes = view.axes.iter().zip(strides).map(axis).collect();
+            let axes = view.axes.iter().zip(thinnings).filter_map(axis).collect();
             View { axes, psf: narrowed(&view.psf), ..view.clone() }
         };
-        let views: Vec<View> = problem.views.iter().zip(&strides).map(thinned).collect();
+        let views: Vec<View> = problem.views.iter().zip(&thinnings).map(thinned).collect();
         let each_view = || views.iter().map(|_| OnceLock::new()).collect();
         Self {
-            strides,
+            thinnings,
             grids: views.iter().map(|_| OnceLock::new()).collect(),
             maps: (0..=problem.neighbours().len()).map(|_| each_view()).collect(),
             views,
@@ -71,11 +83,12 @@ impl ThinnedMaps {
     pub(super) fn map(&self, problem: &Problem, frame: Option<usize>, view: usize) -> &ThinnedMap {
         self.maps[frame.map_or(0, |frame| frame + 1)][view].get_or_init(|| {
             let whole = frame.map_or_else(|| problem.map(view), |frame| problem.neighbours()[frame].map(view));
-            let (shape, strides) = (problem.views[view].shape(), &self.strides[view]);
-            let places = shape.iter().zip(strides).fold(vec![0], |places: Vec<usize>, (&bins, &stride)| {
-                places.iter().flat_map(|&at| (0..bins).step_by(stride).map(move |bin| at * bins + bin)).collect()
-            });
-            let cells = places.into_iter().filter_map(|at| whole.get(at).copied()).collect();
+            let view = (&problem.views[view], self.thinnings[view].as_slice());
+            let (places, summed) = (places(view, &Which::Kept), places(view, &Which::Summed));
+            let power = |h: f64| if h.is_nan() { h } else { view.0.quantity.power(h) };
+            let sum = |at: usize| summed.iter().map(|beside| power(whole[at + beside])).sum::<f64>();
+            let cell = |at: usize| if summed.len() == 1 { whole[at] } else { view.0.quantity.stored(sum(at)) };
+            let cells = places.into_iter().map(cell).collect();
             ThinnedMap { cells, noise: OnceLock::new() }
         })
     }
@@ -106,6 +119,25 @@ impl ThinnedMaps {
     }
 }
 
+/// Of which axes places are.
+#[derive(PartialEq, Eq)]
+enum Which {
+    Kept,
+    Summed,
+}
+
+/// The places of the cells along such axes of a view, in C order, where they are the first along the others.
+fn places((view, thinnings): (&View, &[Thinning]), which: &Which) -> Vec<usize> {
+    view.axes.iter().zip(thinnings).fold(vec![0], |places: Vec<usize>, (axis, thinning)| {
+        let stride = match (thinning, which) {
+            (Thinning::Every(stride), Which::Kept) => *stride,
+            (Thinning::Summed, Which::Summed) => 1,
+            _ => axis.bins.max(1),
+        };
+        places.iter().flat_map(|&at| (0..axis.bins).step_by(stride).map(move |bin| at * axis.bins + bin)).collect()
+    })
+}
+
 /// The ways of thinning of a problem that were asked for last, and the noise of its own maps.
 #[derive(Debug, Default)]
 pub(super) struct ThinnedCache {
@@ -115,15 +147,15 @@ pub(super) struct ThinnedCache {
 
 impl ThinnedCache {
     /// Those of `problem`, which must be the same whenever this is asked.
-    pub(super) fn of(&self, problem: &Problem, strides: Strides) -> Arc<ThinnedMaps> {
+    pub(super) fn of(&self, problem: &Problem, thinnings: Thinnings) -> Arc<ThinnedMaps> {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = kept.iter().find(|maps| maps.strides == strides) {
+        if let Some(found) = kept.iter().find(|maps| maps.thinnings == thinnings) {
             return Arc::clone(found);
         }
         if kept.len() >= KEPT {
             kept.remove(0);
         }
-        let maps = Arc::new(ThinnedMaps::new(problem, strides));
+        let maps = Arc::new(ThinnedMaps::new(problem, thinnings));
         kept.push(Arc::clone(&maps));
         maps
     }

@@ -6,7 +6,7 @@ use crate::geometry::norm;
 use crate::mhp::frame_em::{FrameEm, Measured, skin_of};
 use crate::mhp::region::{Region, centres};
 use crate::mhp::skin::Skin;
-use crate::mhp::thinned::ThinnedMaps;
+use crate::mhp::thinned::{ThinnedMaps, Thinning};
 use crate::mhp::{Precision, Problem};
 use crate::radar::{Axis, AxisKind, View};
 use std::sync::Arc;
@@ -27,7 +27,7 @@ pub(in crate::mhp) struct ThinnedViews<'a> {
 impl<'a> ThinnedViews<'a> {
     /// For persons who stand where those of `params` do.
     pub(in crate::mhp) fn new(problem: &'a Problem, config: &FitConfig, params: &Pppr) -> Self {
-        let maps = problem.thinned(problem.views.iter().map(|view| strides(view, params)).collect());
+        let maps = problem.thinned(problem.views.iter().map(|view| thinnings(view, params)).collect());
         let skin = skin_of(config, (&maps.views, &problem.skeleton, &problem.radar));
         Self { problem, by_range: config.clutter == Clutter::Modelled, maps, skin }
     }
@@ -62,7 +62,7 @@ impl<'a> ThinnedViews<'a> {
 }
 
 /// Of each axis of a view, every so manyth cell: where persons stand as those of `params` do, and the others can be spared.
-fn strides(view: &View, params: &Pppr) -> Vec<usize> {
+fn thinnings(view: &View, params: &Pppr) -> Vec<Thinning> {
     let far = centres(params).into_iter().map(|at| norm(view.pose.view_from_world(at))).fold(f64::INFINITY, f64::min);
     let psf = &view.psf;
     let spread = |axis: &Axis| match axis.kind {
@@ -73,6 +73,12 @@ fn strides(view: &View, params: &Pppr) -> Vec<usize> {
         AxisKind::Elevation => psf.elevation_rad,
         AxisKind::Doppler => 0.0,
     };
-    let stride = |axis: &Axis| if view.region.is_none() && spread(axis) > CELLS * axis.step().abs() { 2 } else { 1 };
-    view.axes.iter().map(stride).collect()
+    let spatial = view.axes.iter().filter(|axis| axis.kind != AxisKind::Doppler).count();
+    let thinning = |axis: &Axis| match () {
+        () if view.region.is_some() => Thinning::Every(1),
+        () if axis.kind == AxisKind::Doppler && spatial > 1 => Thinning::Summed,
+        () if spread(axis) > CELLS * axis.step().abs() => Thinning::Every(2),
+        () => Thinning::Every(1),
+    };
+    view.axes.iter().map(thinning).collect()
 }
