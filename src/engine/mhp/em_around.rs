@@ -1,8 +1,8 @@
-//! L_EM of one frame alone, with its EM region wherever that is asked for: as the frame's own fit compares it, so that a fit in a
-//! window looks at every second cell where the point spread covers several (`motion/thinned.rs`).
+//! L_EM of one frame alone, with its EM region wherever that is asked for: as the frame's own fit compares it, which in a window is
+//! in fewer cells (`reduced.rs`).
 
 use super::frame_em::{EmScratch, FrameEm};
-use super::motion::ThinnedViews;
+use super::motion::ReducedViews;
 use super::region;
 use super::{FitError, Precision, Problem};
 use crate::body::Pppr;
@@ -13,7 +13,7 @@ pub struct FrameEmLoss<'a> {
     problem: &'a Problem,
     config: FitConfig,
     precision: Precision,
-    thinned: Option<ThinnedViews<'a>>,
+    reduced: Option<ReducedViews<'a>>,
 }
 
 /// L_EM within the EM region of one place.
@@ -27,8 +27,8 @@ impl<'a> FrameEmLoss<'a> {
     pub fn new(problem: &'a Problem, config: FitConfig, precision: Precision, params: &Pppr) -> Self {
         let problem = problem.under(&config);
         let in_window = config.parameterization == Parameterization::Motion;
-        let thinned = in_window.then(|| ThinnedViews::new(problem, &config, params));
-        Self { problem, config, precision, thinned }
+        let reduced = in_window.then(|| ReducedViews::new(problem, &config, params));
+        Self { problem, config, precision, reduced }
     }
 
     /// Within the EM region around the persons of `params`.
@@ -36,12 +36,12 @@ impl<'a> FrameEmLoss<'a> {
     /// # Errors
     /// Where `params` has the wrong sizes or a position that is not finite.
     pub fn around(&self, params: &Pppr) -> Result<EmAround<'_>, FitError> {
-        let Self { problem, config, precision, thinned } = self;
+        let Self { problem, config, precision, reduced } = self;
         problem.check(params)?;
-        let views = thinned.as_ref().map_or(&problem.views[..], ThinnedViews::views);
+        let views = reduced.as_ref().map_or(&problem.views[..], ReducedViews::views);
         let (regions, _) = region::regions(views, config.em_region, &region::centres(params))?;
-        let em = match thinned {
-            Some(thinned) => thinned.compared(None, &regions, (config, *precision), None),
+        let em = match reduced {
+            Some(reduced) => reduced.compared(None, &regions, (config, *precision), None),
             None => FrameEm::new(&problem.measured(config), &regions, config, *precision),
         };
         Ok(EmAround { frame: self, em })

@@ -13,7 +13,7 @@
 //! 3. cells: `kernel.rs`, `tiles/mod.rs`, `cell_box.rs`; masks and levels over them, `levels.rs`, `em.rs`
 //! 4. what the maps of a frame and those around it show: `region.rs`, `template.rs`, `context/mod.rs`; without the stars of
 //!    echoes, `sidelobes.rs`
-//! 5. a frame: `frame_em.rs`, `problem.rs`, `thinned.rs`, `erased.rs`, `simulate.rs`, `returns.rs`, `signal.rs`
+//! 5. a frame: `frame_em.rs`, `problem.rs`, `reduced.rs`, `erased.rs`, `simulate.rs`, `returns.rs`, `signal.rs`
 //! 6. where a network expects the joints: `pose_network/mod.rs`
 //! 7. the objective: `objective.rs`; a window of frames: `motion/mod.rs`
 //! 8. the fit: `convergence.rs`, `articulation.rs`, `adam.rs`, `fitter.rs`; and the start of one: `init/mod.rs`
@@ -50,6 +50,7 @@ mod objective;
 mod percentile;
 mod pose_network;
 mod problem;
+mod reduced;
 mod region;
 mod returns;
 mod scalar;
@@ -60,7 +61,6 @@ mod skin;
 mod splat;
 mod template;
 mod terms;
-mod thinned;
 mod tiles;
 mod triad;
 mod types;

@@ -2,8 +2,8 @@
 
 use super::context::{Contexts, Neighbour, Reading, TemporalContext, anchors, range_offsets};
 use super::frame_em::Measured;
+use super::reduced::{ReducedCache, ReducedMaps, Reduction};
 use super::sidelobes::Polar;
-use super::thinned::{ThinnedCache, ThinnedMaps, Thinnings};
 use super::{FitError, fill_missing};
 use crate::body::{Pppr, Skeleton};
 use crate::config::{Clutter, EmLoss, FitConfig, FramesAround, RangeOffset, Sidelobes};
@@ -41,7 +41,7 @@ pub struct Problem {
 #[derive(Debug, Default)]
 struct Derived {
     contexts: Contexts,
-    thinned: ThinnedCache,
+    reduced: ReducedCache,
     offsets: Arc<OnceLock<Option<Vec<f64>>>>,
     /// The same problem with its range offsets, if any.
     calibrated: OnceLock<Option<Arc<Problem>>>,
@@ -247,9 +247,9 @@ impl Problem {
         self.derived.contexts.of(&self.views, &self.maps, self.neighbours_in(reading.frames), reading)
     }
 
-    /// Its maps in every so manyth cell, worked out when first asked for; views must not be changed afterwards.
-    pub(super) fn thinned(&self, thinnings: Thinnings) -> Arc<ThinnedMaps> {
-        self.derived.thinned.of(self, thinnings)
+    /// What is left of its maps, worked out when first asked for; views must not be changed afterwards.
+    pub(super) fn reduced(&self, reductions: Vec<Reduction>) -> Arc<ReducedMaps> {
+        self.derived.reduced.of(self, reductions)
     }
 
     /// Where the frames around say that the mean of each person's joints is, world frame, m; empty without frames around.
@@ -294,7 +294,7 @@ impl Problem {
             grids: self.views.grids().filter(|_| by_range).map(AsRef::as_ref).collect(),
             noises: (0..self.views.len())
                 .filter(|_| levels)
-                .map(|view| self.derived.thinned.noise(self, view))
+                .map(|view| self.derived.reduced.noise(self, view))
                 .collect(),
         }
     }

@@ -140,6 +140,17 @@ impl PointSpread {
         }
     }
 
+    /// The same, to be changed.
+    pub fn lobe_mut(&mut self, of: Resolves) -> &mut Option<Lobe> {
+        let Lobes { range, azimuth, elevation, doppler } = &mut self.lobes;
+        match of {
+            Resolves::Range => range,
+            Resolves::Azimuth => azimuth,
+            Resolves::Elevation => elevation,
+            Resolves::Doppler => doppler,
+        }
+    }
+
     /// The width of a quantity.
     pub fn width_mut(&mut self, of: Resolves) -> &mut f64 {
         match of {

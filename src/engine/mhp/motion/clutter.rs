@@ -8,7 +8,7 @@
 //! does not walk stands, nothing is taken for background (`spare`), and the noise is what lies beside at each range alone
 //! (`mhp/frame_em.rs`); and where noise and background explain the maps without anybody ([`HIDDEN`]), none is.
 
-use super::ThinnedViews;
+use super::ReducedViews;
 use crate::config::{Clutter, EmRegion, FitConfig};
 use crate::geometry::Vec3;
 use crate::mhp::percentile::{between, percentile, place};
@@ -38,7 +38,7 @@ const CLUTTERED: f64 = 0.015;
 /// Where a centre is not finite.
 pub(super) fn known<'a>(
     (problem, config): (&Problem, &FitConfig),
-    thinned: &'a ThinnedViews,
+    reduced: &'a ReducedViews,
     regions: &[Region],
     (centres, walk): (&[Vec3], bool),
 ) -> Result<Option<Cow<'a, [Vec<f64>]>>, FitError> {
@@ -48,14 +48,14 @@ pub(super) fn known<'a>(
         return Ok(None);
     }
     let of_view = |view: &View, maps| background(maps, view.quantity);
-    let backgrounds = thinned.maps.backgrounds(problem, config.frames_around, of_view);
-    let mut seen = thinned.views().iter().zip(backgrounds).zip(regions);
+    let backgrounds = reduced.maps.backgrounds(problem, config.frames_around, of_view);
+    let mut seen = reduced.views().iter().zip(backgrounds).zip(regions);
     if !seen.any(|((view, background), region)| is_cluttered(background, &view.shape(), region)) {
         return Ok(None);
     }
     let mut known = Cow::Borrowed(backgrounds);
     if !walk {
-        spare(known.to_mut(), thinned.views(), centres)?;
+        spare(known.to_mut(), reduced.views(), centres)?;
     }
     Ok(Some(known))
 }

@@ -26,18 +26,18 @@ mod decode;
 mod ground;
 mod lbfgs;
 mod proportions;
+mod reduced;
 mod search;
 mod space;
 mod static_echo;
 #[cfg(test)]
 mod tests;
-mod thinned;
 mod tilt;
 mod turn;
 
 pub(super) use decode::{Decoded, Stage, carried, decode, lowest};
+pub(super) use reduced::ReducedViews;
 pub(super) use search::{Hypothesis, Searched, carry_on, search};
-pub(super) use thinned::ThinnedViews;
 pub(super) use tilt::later;
 pub(super) use turn::turn;
 
@@ -231,8 +231,8 @@ impl Window {
             return Ok(Err(Held::Skeleton));
         };
         let (centres, ways) = (region::centres(initial), ways(initial));
-        let thinned = ThinnedViews::new(problem, config, initial);
-        let views = thinned.views();
+        let reduced = ReducedViews::new(problem, config, initial);
+        let views = reduced.views();
         let (own_regions, _) = region::regions(views, config.em_region, &centres)?;
         let walks = !neighbours.is_empty() && ways.iter().all(|way| norm(*way) >= WALKING_MPS);
         let moved = |frame: Option<usize>| -> Vec<Vec3> {
@@ -247,11 +247,11 @@ impl Window {
         let compared = |background: Option<&[Vec<f64>]>| -> Result<Vec<FrameEm>, FitError> {
             let of_frame = |&frame: &Option<usize>| {
                 let (regions, _) = region::regions(views, config.em_region, &moved(frame))?;
-                Ok(thinned.compared(frame, &regions, (config, precision), background))
+                Ok(reduced.compared(frame, &regions, (config, precision), background))
             };
             chosen.iter().map(of_frame).collect()
         };
-        let background = clutter::known((problem, config), &thinned, &own_regions, (&centres, walks))?;
+        let background = clutter::known((problem, config), &reduced, &own_regions, (&centres, walks))?;
         let mut ems = compared(background.as_deref())?;
         if background.is_some() && !walks {
             let empty = ems.iter().map(FrameEm::empty_loss).sum::<f64>() / ems.len().max(1) as f64;

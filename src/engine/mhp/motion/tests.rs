@@ -295,11 +295,11 @@ fn a_background_is_known_but_under_the_trunk_of_who_stands() {
     let mut params = Pppr::zeros(shape);
     params.motion_mut()[0].fill([3.0, 0.2, 0.1]);
     let known = |problem: &Problem, walk: bool| {
-        let thinned = ThinnedViews::new(problem, &config, &params);
+        let reduced = ReducedViews::new(problem, &config, &params);
         let centres = region::centres(&params);
-        let (regions, _) = region::regions(thinned.views(), config.em_region, &centres).unwrap();
-        let found = clutter::known((problem, &config), &thinned, &regions, (&centres, walk)).unwrap();
-        found.map(|maps| (thinned.views().to_vec(), maps.into_owned()))
+        let (regions, _) = region::regions(reduced.views(), config.em_region, &centres).unwrap();
+        let found = clutter::known((problem, &config), &reduced, &regions, (&centres, walk)).unwrap();
+        found.map(|maps| (reduced.views().to_vec(), maps.into_owned()))
     };
     let six = reflectors(6, 1.0, &mut rng);
     let (views, standing) = known(&six, false).unwrap();

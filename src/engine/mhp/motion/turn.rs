@@ -6,8 +6,8 @@
 //! the frames around (Viterbi's algorithm, from both ends to the frame that is fitted). Front and back are told apart by little,
 //! and who stands before a radar is as likely as not to look at it: only a loss that is clearly lower turns somebody's back.
 
+use super::reduced::ReducedViews;
 use super::search::hips_of;
-use super::thinned::ThinnedViews;
 use super::{WALKING_MPS, ways};
 use crate::body::Pppr;
 use crate::config::{EmLoss, EmRegion, FitConfig};
@@ -81,9 +81,9 @@ fn profiles(
     let all = problem.neighbours_in(config.frames_around);
     let near: Vec<usize> = (0..all.len()).filter(|&k| all[k].offset_s.abs() <= NEAR_S).collect();
     let own = near.partition_point(|&k| all[k].offset_s < 0.0);
-    let thinned = ThinnedViews::new(problem, config, params);
+    let reduced = ReducedViews::new(problem, config, params);
     let centre = region::centres(params)[person];
-    let (regions, _) = region::regions(thinned.views(), em_region, &[centre])?;
+    let (regions, _) = region::regions(reduced.views(), em_region, &[centre])?;
     let turned: Vec<Pppr> = (0..HEADINGS)
         .map(|k| {
             let mut turned = params.clone();
@@ -92,7 +92,7 @@ fn profiles(
         })
         .collect();
     let profile = |frame: Option<usize>| -> Headings {
-        let em = thinned.compared(frame, &regions, (config, Precision::F32), None);
+        let em = reduced.compared(frame, &regions, (config, Precision::F32), None);
         std::array::from_fn(|k| em.loss((&problem.radar, config), Precision::F32, &turned[k]))
     };
     let mut frames: Vec<Option<usize>> = near.into_iter().map(Some).collect();
