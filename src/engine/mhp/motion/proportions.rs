@@ -8,7 +8,8 @@
 //! mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)²,  σ_b = 0.12 in a search and 0.05 in a fit,  λ = ℓ/size of the skeleton's reference lengths
 //! ```
 //!
-//! the size of a body being that of the prior (`body::MotionPrior`): of its height, 0.635. Of a skeleton it is the height at which
+//! across the trunk no farther from those of real people than tables of segments may be ([`TRUNK`]), the size of a body being that
+//! of the prior (`body::MotionPrior`): of its height, 0.635. Of a skeleton it is the height at which
 //! the long bones that it has are as long together as Winter's. It asks nothing of s: a larger body has longer bones.
 
 use super::LN_SIZE;
@@ -30,6 +31,9 @@ const SIZES: f64 = 0.635;
 /// The ends of long bones and their length, heights; Winter, *Biomechanics and Motor Control of Human Movement*.
 const LONG: [([&str; 2], f64); 4] =
     [(["shoulder", "elbow"], 0.186), (["elbow", "wrist"], 0.146), (["hip", "knee"], 0.245), (["knee", "ankle"], 0.246)];
+/// How many times longer or shorter than what real people have taught a bone across the trunk may be said to be: tables of segments
+/// have hips and shoulders as wide as the body is there, which is far more than from joint to joint.
+const TRUNK: f64 = 1.15;
 /// Joints between which bones are rigid.
 const RIGID: [&str; 6] = ["shoulder", "elbow", "wrist", "hip", "knee", "ankle"];
 
@@ -42,8 +46,9 @@ pub(super) struct Proportions {
 }
 
 impl Proportions {
-    /// Of the skeleton's reference lengths; no bones where it has no long one.
-    pub(super) fn of(skeleton: &Skeleton, detail: Detail) -> Self {
+    /// Of the skeleton's reference lengths, across the trunk no farther than [`TRUNK`] from those of `mean`, its joints in the prior's
+    /// mean pose, sizes; no bones where it has no long one.
+    pub(super) fn of(skeleton: &Skeleton, mean: &[Vec3], detail: Detail) -> Self {
         let is = |joint: usize, name: &str| is_named(skeleton, joint, &[name]);
         let joins = |[a, b]: [usize; 2], [from, to]: [&str; 2]| is(a, from) && is(b, to) || is(b, from) && is(a, to);
         let all = || skeleton.bones.iter().copied().zip(skeleton.bone_lengths_m.iter().copied());
@@ -55,8 +60,14 @@ impl Proportions {
             return Self { bones: Vec::new(), spread: spread(detail) };
         }
         let rigid = |joint: usize| RIGID.iter().any(|name| is(joint, name));
-        let bones = all().filter(|&([a, b], length_m)| rigid(a) && rigid(b) && length_m > 0.0);
-        Self { bones: bones.map(|(bone, length_m)| (bone, length_m / size_m)).collect(), spread: spread(detail) }
+        let bones =
+            all().filter(|&([a, b], length_m)| rigid(a) && rigid(b) && length_m > 0.0).map(|(bone, length_m)| {
+                let limb = LONG.iter().any(|(ends, _)| joins(bone, *ends));
+                let taught = norm(sub(mean[bone[0]], mean[bone[1]]));
+                let sizes = length_m / size_m;
+                (bone, if limb { sizes } else { sizes.clamp(taught / TRUNK, taught * TRUNK) })
+            });
+        Self { bones: bones.collect(), spread: spread(detail) }
     }
 
     /// How far the bones of `pose` (m) are from those of a body with these coordinates, mean square in standard deviations; adds
@@ -88,13 +99,38 @@ impl Proportions {
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 mod tests {
+    use super::super::space::PoseSpace;
     use super::*;
+    use crate::body::MotionPrior;
+
+    fn of(skeleton: &Skeleton) -> Proportions {
+        let prior = MotionPrior::committed().unwrap();
+        PoseSpace::new(prior, skeleton, &[0.0], None, Detail::Search).unwrap().proportions
+    }
+
+    /// Winter's hips are 0.191 of a height wide, people's 0.11 from joint to joint.
+    #[test]
+    fn no_trunk_is_wider_than_people_are() {
+        for name in ["coco17", "h36m17", "hupr14", "hiber14", "rt_pose15"] {
+            let skeleton = Skeleton::preset(name).unwrap();
+            let proportions = of(&skeleton);
+            let across = |part: &str| {
+                let both = |bone: &[usize; 2]| bone.iter().all(|&joint| is_named(&skeleton, joint, &[part]));
+                proportions.bones.iter().find(|(bone, _)| both(bone)).map(|(_, sizes)| SIZES * sizes)
+            };
+            let within =
+                |heights: Option<f64>, range: std::ops::Range<f64>| heights.is_none_or(|of| range.contains(&of));
+            assert!(within(across("hip"), 0.10..0.14), "{name}: {:?}", across("hip"));
+            assert!(within(across("shoulder"), 0.17..0.24), "{name}: {:?}", across("shoulder"));
+        }
+        assert!(of(&Skeleton::preset("hiber14").unwrap()).bones.len() > 8, "hips are compared");
+    }
 
     #[test]
     fn every_named_skeleton_has_limbs_of_its_size() {
         for name in ["coco17", "h36m17", "hupr14"] {
             let skeleton = Skeleton::preset(name).unwrap();
-            let proportions = Proportions::of(&skeleton, Detail::Search);
+            let proportions = of(&skeleton);
             assert!(proportions.bones.len() >= 8, "{name}: {}", proportions.bones.len());
             let thigh = proportions.bones.iter().find(|(bone, _)| {
                 bone.iter().any(|&j| is_named(&skeleton, j, &["hip"]))
@@ -108,7 +144,7 @@ mod tests {
     #[test]
     fn a_body_of_any_size_with_its_bones_fits_and_one_with_short_limbs_does_not() {
         let skeleton = Skeleton::preset("coco17").unwrap();
-        let proportions = Proportions::of(&skeleton, Detail::Search);
+        let proportions = of(&skeleton);
         // A star in which every bone stands alone has any length that is wanted.
         let misfit = |scale: f64, ln_size: f64| {
             let (bone, sizes) = proportions.bones[0];

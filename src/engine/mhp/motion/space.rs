@@ -107,8 +107,8 @@ fn sources(name: &str) -> Vec<(&'static str, f64)> {
         () if is(&["pelvis", "root"]) => vec![("pelvis", 1.0)],
         () if is(&["neck", "thorax"]) => vec![("neck", 1.0)],
         () if is(&["spine", "torso", "belly", "chest"]) => vec![("pelvis", 0.5), ("neck", 0.5)],
-        () if is(&["top"]) => vec![("head_top", 1.0)],
-        () if is(&["head"]) => vec![("head_top", 0.5), ("left_ear", 0.25), ("right_ear", 0.25)],
+        // The bones that skeletons of data sets have between neck and head reach to its top.
+        () if is(&["head", "top"]) => vec![("head_top", 1.0)],
         () => Vec::new(),
     }
 }
@@ -166,7 +166,7 @@ impl PoseSpace {
             mixture: prior.mixture(),
             ln_size: prior.ln_size(),
             signs: prior.mirror_signs()[..components].to_vec(),
-            proportions: Proportions::of(skeleton, detail),
+            proportions: Proportions::of(skeleton, &at(0.0)[..skeleton.joints.len()], detail),
             ground: floor_z_m.and_then(|floor_z_m| Ground::new(skeleton, floor_z_m)),
             starts: starts.collect(),
         })
