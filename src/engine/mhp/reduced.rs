@@ -110,7 +110,7 @@ impl Reduction {
                 *psf.lobe_mut(resolves) = None;
             }
         }
-        View { axes, psf, ..of.clone() }
+        View { psf, axes, ..of.clone() }
     }
 
     /// What is left of a map of this view, C order.
@@ -254,6 +254,7 @@ impl ReducedCache {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Pose;
     use crate::radar::{Quantity, Spacing};
 
     const NONE: AxisReduction = AxisReduction::Every { stride: 1, blur: Blur::NONE };
@@ -261,7 +262,7 @@ mod tests {
     fn view(axes: &[(AxisKind, usize, f64, f64)], quantity: Quantity) -> View {
         let axis = |&(kind, bins, lo, hi)| Axis { kind, bins, lo, hi, spacing: Spacing::Linear };
         let axes = axes.iter().map(axis).collect();
-        View { array: "v".into(), quantity, psf: PointSpread::default(), pose: Default::default(), axes, region: None }
+        View { array: "v".into(), quantity, psf: PointSpread::default(), pose: Pose::default(), axes, region: None }
     }
 
     #[test]

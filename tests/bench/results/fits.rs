@@ -165,6 +165,8 @@ pub(crate) fn section(bed: &Bed) -> String {
         ("`samples/walk`".to_owned(), vec![Bed::own("samples/walk")]),
         simulated("one", "--preset easy,medium,hard --frames 600 --people 1 --seed 600"),
         simulated("polar", "--layout generic --preset easy,medium,hard --frames 180 --people 1 --seed 811"),
+        simulated("hupr", "--layout hupr --preset easy,medium,hard --frames 180 --people 1 --seed 841 --narrow"),
+        simulated("xrf55", "--layout xrf55 --preset easy,medium,hard --frames 180 --people 1 --seed 851"),
         simulated("modes", "--preset f1,f2,f4 --frames 180 --people 1 --seed 821"),
     ];
     if let Some(second) = Bed::shared("data/second-simulator") {

@@ -100,10 +100,10 @@ fn reduction(view: &View, params: &Pppr) -> Reduction {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 mod tests {
     use super::*;
     use crate::body::{Group, PpprShape};
+    use crate::geometry::Pose;
     use crate::radar::{PointSpread, Quantity, Spacing};
 
     fn somebody(ahead_m: f64) -> Pppr {
@@ -115,7 +115,7 @@ mod tests {
     fn view(psf: PointSpread, axes: &[(AxisKind, usize, f64, f64)]) -> View {
         let axis = |&(kind, bins, lo, hi)| Axis { kind, bins, lo, hi, spacing: Spacing::Linear };
         let axes = axes.iter().map(axis).collect();
-        View { array: "v".into(), quantity: Quantity::Amplitude, psf, pose: Default::default(), axes, region: None }
+        View { array: "v".into(), quantity: Quantity::Amplitude, psf, pose: Pose::default(), axes, region: None }
     }
 
     /// What is blurred along an axis, bins, and what is kept; `None` where powers add.
