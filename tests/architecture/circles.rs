@@ -12,7 +12,7 @@ const STAGES: &[(&str, &[&str])] = &[
     ("a joint in a view", &["triad", "gaussian", "splat", "adjoint", "skin"]),
     ("cells and masks", &["kernel", "tiles", "cell_box", "level_rows", "levels", "em"]),
     ("what maps and frames around show", &["region", "sidelobes", "template", "context"]),
-    ("a frame", &["frame_em", "problem", "thinned", "erased", "simulate", "returns", "signal"]),
+    ("a frame", &["frame_em", "problem", "reduced", "erased", "simulate", "returns", "signal"]),
     ("what a network expects", &["pose_network"]),
     ("the objective", &["objective"]),
     ("a window of frames", &["motion", "em_around"]),

@@ -2,7 +2,8 @@
 //!
 //! With `parameterization = "motion"` a fit's coordinates are, for each person, place (where the floor is known, height above it:
 //! [`ground`]), heading, size and tilt ([`tilt`]) in the middle of the window and the coefficients of `body::MotionPrior` ([`space`]). They place the joints in all frames of the window at once; each
-//! frame compares its own maps (`mhp/frame_em.rs`), and
+//! frame compares its own maps (`mhp/frame_em.rs`), in which powers along a Doppler axis have been added and what is finer across the
+//! sight than a limb has been blurred (`mhp/reduced.rs`), and
 //!
 //! ```text
 //! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior + w_net · L_net
