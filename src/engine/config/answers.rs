@@ -98,7 +98,7 @@ pub(super) const PARAMETERIZATION: &[Answer] = &[
     answer(
         "motion",
         "motion",
-        "Place, heading, size and pose of a window of frames at once, in the space that real motion has taught.",
+        "Place, heading, size and pose of a window of frames at once, in the space that real motion has taught. Powers along a Doppler axis add, and speckle finer than a limb is blurred.",
     ),
 ];
 
