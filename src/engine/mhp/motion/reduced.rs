@@ -13,8 +13,10 @@ use std::sync::Arc;
 
 /// Cells that a standard deviation of the point spread covers at least where every second one is enough.
 const CELLS: f64 = 1.5;
-/// A limb's width, standard deviation, m: across the sight nothing finer is looked at.
+/// A limb's width, standard deviation, m: across the sight nothing finer is looked at, where cells are too wide to show it.
 const LIMB_M: f64 = 0.06;
+/// Cells that a standard deviation covers where they are narrow enough.
+const SHOWN: f64 = 1.2;
 /// A blur by less, bins, is none.
 const LEAST_BLUR: f64 = 0.4;
 
@@ -88,6 +90,7 @@ fn reduction(view: &View, params: &Pppr) -> Reduction {
             return AxisReduction::Summed;
         }
         let ((width, limb), step) = (widths(axis.kind), axis.step().abs());
+        let limb = limb.min(SHOWN * step);
         let missing = (limb * limb - width * width).max(0.0).sqrt() / step;
         let blur = if missing < LEAST_BLUR { Blur::NONE } else { Blur::near(missing) };
         let stride = if width.hypot(blur.bins() * step) > CELLS * step { 2 } else { 1 };
@@ -137,6 +140,7 @@ mod tests {
         let wide = PointSpread { range_m: 0.04, azimuth_rad: 0.052, ..PointSpread::default() };
         let mmvr = view(wide, &[(AxisKind::DepthH, 256, 8.0, 0.0), (AxisKind::Y, 128, 2.5, -2.5)]);
         assert_eq!(of(&mmvr, 3.0), [Some((0.0, 1)), Some((0.0, 2))]);
+        assert_eq!(of(&mmvr, 1.0), [Some((0.0, 1)); 2], "its cells show what its array resolves");
         let [near, far] = [3.0, 4.0].map(|far_m| reduction(&mmvr, &somebody(far_m)));
         assert_eq!(near, far, "what is not blurred is the same for all");
     }
