@@ -1,9 +1,9 @@
 //! A problem's maps as fits in a window see them: in fewer cells, and without what no model of a body tells.
 //!
 //! Powers along a Doppler axis add: limbs spread over it in ways that poses do not tell. Across the sight, where an array resolves
-//! more finely than limbs are wide, powers are blurred: speckle in every cell is no shape. Of cells of which the point spread covers
-//! several every second one is kept: what is left says the same in a quarter of the time. It is made once for all fits of a problem
-//! that look at the same cells.
+//! more finely than limbs are wide and than cells show, powers are blurred: speckle in every cell is no shape. Of cells of which the
+//! point spread covers several every second one is kept: what is left says the same in a quarter of the time. It is made once for
+//! all fits of a problem that look at the same cells.
 
 use super::Problem;
 use super::levels::NOISE_PCT;
