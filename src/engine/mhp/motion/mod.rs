@@ -61,8 +61,15 @@ const REACH_S: f64 = 0.201;
 const BETA_1: f64 = 0.9;
 const BETA_2: f64 = 0.99;
 const EPSILON: f64 = 1e-8;
+/// A slope of L_EM by [`UNITS`] that is added to the root of the second moment in a fit: where a search ended, or the truth is, what is
+/// left of the slopes is faint and changes its sign, and steps as long as any would leave it.
+const FAINT_SLOPE: f64 = 3e-3;
+/// How far t and h, y, s, q, w, ẇ and c may go in a step of a search; slopes are told apart by them.
+const UNITS: [f64; 7] = [0.03, 0.12, 0.03, 1.0, 0.06, 0.3, 0.5];
 /// Steps of t and h, y, s, q, w, ẇ and c at the default learning rate.
 const RATES: [f64; 7] = [0.01, 0.04, 0.006, 0.2, 0.02, 0.1, 0.08];
+/// Which of both the numbers of the pose have.
+const POSE: usize = 6;
 const DEFAULT_RATE: f64 = 1e-3;
 /// From this share of the iterations on steps are shorter, by so much.
 const SLOW_FROM: f64 = 0.6;
@@ -77,6 +84,27 @@ const MOST_BEGUN: [f64; 2] = [0.2, 0.16];
 const OF_PRIOR: f64 = 0.1;
 /// Slower than this nobody leaves the cells that it stands in while the frames around last, m/s.
 const WALKING_MPS: f64 = 0.35;
+
+/// Which of [`RATES`] and [`UNITS`] a person's coordinate `at` has.
+fn kind(at: usize) -> usize {
+    match at {
+        0..YAW => 0,
+        YAW => 1,
+        LN_SIZE => 2,
+        STILL => 3,
+        TILT..BODY => 4 + (at - TILT) / 2,
+        _ => POSE,
+    }
+}
+
+/// How Adam steps: by `share` of [`RATES`], shorter where slopes by [`UNITS`] are not steeper than `faint`, and not at all in the numbers
+/// of a pose that is `held`.
+#[derive(Debug, Clone, Copy)]
+struct Pace {
+    share: f64,
+    faint: f64,
+    held: bool,
+}
 
 /// The coordinates of a fit in a window, and Adam's moments of them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -458,9 +486,8 @@ impl MotionState {
         Self { first: zeros.clone(), second: zeros, coordinates, steps: 0 }
     }
 
-    /// One step of Adam of persons with `stride` numbers each against `gradient`, written over `next`; `pace` scales the steps,
-    /// and a pose that is `held` takes none.
-    fn step_into(&self, stride: usize, gradient: &[f64], pace: f64, held: bool, next: &mut Self) {
+    /// One step of Adam of persons with `stride` numbers each against `gradient`, written over `next`.
+    fn step_into(&self, stride: usize, gradient: &[f64], pace: Pace, next: &mut Self) {
         next.coordinates.clone_from(&self.coordinates);
         next.first.clone_from(&self.first);
         next.second.clone_from(&self.second);
@@ -468,18 +495,11 @@ impl MotionState {
         let unbias = [BETA_1, BETA_2].map(|beta| 1.0 / (1.0 - beta.powf(f64::from(next.steps))));
         let moments = next.first.iter_mut().zip(&mut next.second);
         for (k, ((x, (m, v)), g)) in next.coordinates.iter_mut().zip(moments).zip(gradient).enumerate() {
-            let rate = match k % stride {
-                0..YAW => RATES[0],
-                YAW => RATES[1],
-                LN_SIZE => RATES[2],
-                STILL => RATES[3],
-                at @ TILT..BODY => RATES[4 + (at - TILT) / 2],
-                _ if held => 0.0,
-                _ => RATES[6],
-            };
+            let kind = kind(k % stride);
+            let rate = if pace.held && kind == POSE { 0.0 } else { pace.share * RATES[kind] };
             *m = BETA_1 * *m + (1.0 - BETA_1) * g;
             *v = BETA_2 * *v + (1.0 - BETA_2) * g * g;
-            *x -= pace * rate * *m * unbias[0] / ((*v * unbias[1]).sqrt() + EPSILON);
+            *x -= rate * *m * unbias[0] / ((*v * unbias[1]).sqrt() + EPSILON + pace.faint / UNITS[kind]);
         }
     }
 
@@ -492,8 +512,9 @@ impl MotionState {
         next: &mut Self,
     ) {
         let late = iteration as f64 > SLOW_FROM * config.iterations as f64;
-        let pace = config.learning_rate / DEFAULT_RATE * if late { SLOW } else { 1.0 };
-        self.step_into(window.stride, gradient, pace, false, next);
+        let share = config.learning_rate / DEFAULT_RATE * if late { SLOW } else { 1.0 };
+        let faint = config.w_em * FAINT_SLOPE;
+        self.step_into(window.stride, gradient, Pace { share, faint, held: false }, next);
     }
 }
 

@@ -7,8 +7,8 @@
 
 use super::decode::lowest;
 use super::{
-    BODY, Detail, HEIGHT, Held, LN_SIZE, MotionState, STILL, TILT, WALKING_MPS, Window, WindowLoss, YAW, lbfgs, tilt,
-    ways,
+    BODY, Detail, HEIGHT, Held, LN_SIZE, MotionState, Pace, STILL, TILT, UNITS, WALKING_MPS, Window, WindowLoss, YAW,
+    kind, lbfgs, tilt, ways,
 };
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
@@ -26,8 +26,6 @@ const SIEVES: [Sieve; 3] = [
 ];
 /// Evaluations of what is left, and of each body that is carried on from another frame.
 const FINE: usize = 12;
-/// How far t and h, y, s, q, w, ẇ and c may go in a step of it.
-const UNITS: [f64; 7] = [0.03, 0.12, 0.03, 1.0, 0.06, 0.3, 0.5];
 /// What a search may cost: Gaussians times cells, over all frames and evaluations. A map of 256 × 128 cells as a whole, five frames of
 /// two views, takes all the starts of the recommended settings.
 const MOST_WORK: f64 = 2e10;
@@ -169,8 +167,8 @@ impl<'a> Search<'a> {
             }
             if step < steps {
                 let stride = self.window.stride;
-                let pace = if step as f64 > super::SLOW_FROM * steps as f64 { 0.5 } else { 1.0 };
-                state.step_into(stride, &self.loss.gradient, pace, held, &mut self.next);
+                let share = if step as f64 > super::SLOW_FROM * steps as f64 { 0.5 } else { 1.0 };
+                state.step_into(stride, &self.loss.gradient, Pace { share, faint: 0.0, held }, &mut self.next);
                 std::mem::swap(&mut state, &mut self.next);
             }
         }
@@ -179,16 +177,8 @@ impl<'a> Search<'a> {
 
     /// Lowers the loss of a start by the bend that it meets.
     fn settle(&mut self, tried: &mut Tried, evaluations: usize) {
-        let units: Vec<f64> = (0..tried.state.coordinates.len())
-            .map(|k| match k % self.window.stride {
-                0..=HEIGHT => UNITS[0],
-                YAW => UNITS[1],
-                LN_SIZE => UNITS[2],
-                STILL => UNITS[3],
-                at @ TILT..BODY => UNITS[4 + (at - TILT) / 2],
-                _ => UNITS[6],
-            })
-            .collect();
+        let stride = self.window.stride;
+        let units: Vec<f64> = (0..tried.state.coordinates.len()).map(|k| UNITS[kind(k % stride)]).collect();
         let mut coordinates = std::mem::take(&mut tried.state.coordinates);
         lbfgs::minimise(&mut coordinates, &units, evaluations, |coordinates, gradient| {
             let found = self.evaluate(coordinates);
