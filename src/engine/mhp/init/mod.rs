@@ -47,7 +47,7 @@ use super::template::Template;
 use super::{FitError, Objective, Precision, Problem};
 use crate::body::{Group, Pppr, PpprShape};
 use crate::config::{BodyModel, EmLoss, FitConfig, Height, Parameterization, StartPlace, Summation, Yaw};
-use crate::geometry::{Vec3, add, flat_distance, mean, norm};
+use crate::geometry::{Vec3, add, flat_distance, mean, norm, sub};
 use find::{find_one, middle_of_views};
 use notes::notes_of;
 use pose::Posture;
@@ -289,7 +289,7 @@ impl Hypotheses {
                 notes.push(note.clone());
                 (placed(bodies), Some(Ok(note)))
             }
-            Some(Err(Held::Unlike)) if let Some(body) = self.last_seen(problem.radar.height_m, around) => {
+            Some(Err(Held::Unlike)) if let Some(body) = self.seen_elsewhere(problem.radar.height_m, around) => {
                 notes.push(Held::Seen.note().to_owned());
                 (placed(vec![&body]), Some(Err(Held::Seen.note())))
             }
@@ -308,6 +308,15 @@ impl Hypotheses {
         }
         notes.extend(persons.iter().flat_map(|person| notes_of(person, config)));
         Ok(Initialisation { params, unrefined, peaks: self.peaks.clone(), notes, motion })
+    }
+
+    /// The body that the one person was last seen with ([`seen`]), unless a network expects one there, too: it knows the way that they look
+    /// now.
+    fn seen_elsewhere(&self, radar_height_m: Option<f64>, around: &[(f64, &Self)]) -> Option<Hypothesis> {
+        let seen = self.last_seen(radar_height_m, around)?;
+        let away_m = |other: &Hypothesis| norm(sub(mean(&other.joints), mean(&seen.joints)));
+        let is_expected = self.expected(around).is_some_and(|of| of.iter().all(|body| away_m(body) < ONE_PLACE_M));
+        (!is_expected).then_some(seen)
     }
 
     /// The bodies that a network expects, each on the cheapest path through those that it expects in the frames `around`; `None` where

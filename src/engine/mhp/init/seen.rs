@@ -29,13 +29,14 @@ impl Hypotheses {
     }
 
     /// The body of the one person on the cheapest path through the frames `around`; `None` where it, or those of all these frames, do not
-    /// explain the maps.
+    /// explain the maps, and where none of these frames shows him.
     fn explaining(&self, around: &[(f64, &Self)]) -> Option<&Hypothesis> {
         let own = self.one()?;
         let decoded = motion::decode(own, &stages(around, |found| &found.persons));
         let body = own.get(motion::lowest(&decoded.costs)?)?;
         let unlikeness = body.unlikeness.max(decoded.unlikeness);
-        (!motion::is_unlike(unlikeness, 1)).then_some(body)
+        let is_ghost = decoded.followed == 0 && !around.is_empty();
+        (!is_ghost && !motion::is_unlike(unlikeness, 1)).then_some(body)
     }
 
     /// What the one person may be; `None` of several, and where none was searched for.
@@ -77,6 +78,8 @@ mod tests {
         assert_eq!(at(&[(-0.3, &earlier), (-0.2, &before), (-0.1, &lost)]), Some(3.0));
         // What one frame alone shows, and the others beyond it do not, is a ghost.
         assert_eq!(at(&[(-0.2, &lost), (-0.15, &lost), (-0.1, &ghost)]), None);
+        let far = frame_of(body(9.0, 0.0, 1.0));
+        assert_eq!(at(&[(-0.3, &far), (-0.2, &before), (-0.1, &lost)]), None, "those beyond it are of somebody else");
         assert_eq!(at(&[(-2.0, &before)]), None, "long ago");
     }
 

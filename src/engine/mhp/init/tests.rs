@@ -48,6 +48,18 @@ fn whom_no_body_explains_is_the_one_that_a_network_expects_along_the_sequence() 
 }
 
 #[test]
+fn who_was_seen_last_where_a_network_expects_them_too_looks_as_it_says() {
+    let before = frame_of(Hypothesis { unlikeness: 0.2, ..body(3.0, 0.0, 0.1) });
+    let seen = |x: f64| {
+        let own = unexplained(vec![vec![body(x, 2.0, 1.0)]]);
+        own.seen_elsewhere(None, &[(-0.1, &before)]).map(|body| body.yaw)
+    };
+    assert_eq!((seen(3.2), seen(3.5)), (None, Some(0.0)));
+    let unasked = unexplained(vec![Vec::new()]);
+    assert!(unasked.seen_elsewhere(None, &[(-0.1, &before)]).is_some());
+}
+
+#[test]
 fn several_are_expected_in_as_many_places() {
     let two = |x: f64| unexplained(vec![vec![body(3.0, 0.0, 1.0)], vec![body(x, 0.0, 1.0)]]);
     assert_eq!(two(3.5).expected(&[]).map(|bodies| bodies.len()), Some(2));

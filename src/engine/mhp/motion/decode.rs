@@ -71,6 +71,8 @@ pub(in crate::mhp) struct Decoded {
     pub(in crate::mhp) costs: Vec<f64>,
     /// How little bodies explain the maps, on average over the frames in which the person is followed, the nearest the most.
     pub(in crate::mhp) unlikeness: f64,
+    /// The frames around in which the person is followed.
+    pub(in crate::mhp) followed: usize,
 }
 
 /// Decodes one person of a frame by what is seen in those around it, in any order.
@@ -144,6 +146,7 @@ impl<'a> Trellis<'a> {
         Decoded {
             costs: whole.iter().map(|cost| cost - lowest + 1.0).collect(),
             unlikeness: unlike / weights.max(f64::MIN_POSITIVE),
+            followed: self.sides.iter().map(Vec::len).sum(),
         }
     }
 
