@@ -8,7 +8,9 @@
 use super::{AxisKind, Lobe, Lobes, PointSpread, RadarConfig, SPEED_OF_LIGHT, Window};
 use num_complex::Complex64;
 use rustfft::FftPlanner;
+use std::collections::VecDeque;
 use std::f64::consts::PI;
+use std::sync::{Mutex, PoisonError};
 
 /// Points of the lobe that the least squares sum over.
 const LOBE_POINTS: usize = 400;
@@ -82,17 +84,50 @@ fn main_lobe(window: Window, n: usize) -> (Vec<(f64, f64)>, f64) {
     (lobe, null)
 }
 
+/// What Gaussians come closest to a main lobe.
+#[derive(Debug, Clone, Copy)]
+struct ClosestGaussians {
+    /// Of one, natural bins.
+    sigma: f64,
+    /// The difference of two.
+    shape: Option<Lobe>,
+}
+
+impl ClosestGaussians {
+    /// How many windows are remembered.
+    const REMEMBERED: usize = 64;
+
+    /// Those to the lobe of `window` over `n` samples. A shape takes milliseconds, and every view and file of a data set asks for
+    /// the same few.
+    fn of(window: Window, n: usize) -> Self {
+        static RECENT: Mutex<VecDeque<(Window, usize, ClosestGaussians)>> = Mutex::new(VecDeque::new());
+        let recent = || RECENT.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = recent().iter().find(|of| (of.0, of.1) == (window, n)).map(|of| of.2);
+        known.unwrap_or_else(|| {
+            let (lobe, null) = main_lobe(window, n);
+            let sigma = closest_sigma(&lobe, null);
+            let closest = Self { sigma, shape: (n > 2).then(|| closest_shape(window, &lobe, sigma)).flatten() };
+            let mut recent = recent();
+            recent.truncate(Self::REMEMBERED - 1);
+            recent.push_front((window, n, closest));
+            closest
+        })
+    }
+}
+
 /// Standard deviation, in natural bins, of the unit-peak Gaussian closest to the main lobe of `window` over `n` samples.
 pub fn main_lobe_sigma_bins(window: Window, n: usize) -> f64 {
-    let (lobe, null) = main_lobe(window, n);
-    closest_sigma(&lobe, null)
+    ClosestGaussians::of(window, n).sigma
 }
 
 /// The difference of Gaussians closest to the main lobe of `window` over `n` samples, least squares from the peak to the first
 /// minimum; `None` where two or fewer samples make no lobe, or the difference is no better than one Gaussian.
 pub fn main_lobe_shape(window: Window, n: usize) -> Option<Lobe> {
-    let (lobe, null) = main_lobe(window, n);
-    let sigma = closest_sigma(&lobe, null);
+    ClosestGaussians::of(window, n).shape
+}
+
+/// The same of the points of a lobe, to which one Gaussian of `sigma` is closest.
+fn closest_shape(window: Window, lobe: &[(f64, f64)], sigma: f64) -> Option<Lobe> {
     let [first, second] = Lobe::WEIGHTS;
     let misfit = |ratios: [f64; 2]| -> f64 {
         let falls = ratios.map(|ratio| -0.5 / (ratio * sigma * ratio * sigma));
@@ -110,7 +145,7 @@ pub fn main_lobe_shape(window: Window, n: usize) -> Option<Lobe> {
         [best_of(second), second]
     });
     let ratios = if misfit(narrow) < misfit(wide) { narrow } else { wide };
-    (n > 2 && misfit(ratios) < misfit([1.0, 1.0]))
+    (misfit(ratios) < misfit([1.0, 1.0]))
         .then_some(Lobe { ratios, untapered: (window == Window::Rectangular).then_some(1.0 / sigma) })
 }
 
