@@ -240,7 +240,6 @@ fn every_skeleton_with_known_names_is_moved() {
     assert!(PoseSpace::new(prior, &other, &[0.0], None, Detail::Fit).is_none());
 }
 
-/// Left for right, and y for −y in the body's own frame.
 /// Adam takes steps as long as any from where slopes are next to nothing, which a search or the truth has led to.
 #[test]
 fn steps_are_shorter_where_slopes_are_faint() {
@@ -265,6 +264,7 @@ fn steps_are_shorter_where_slopes_are_faint() {
     assert_eq!(steps(1e-3, Pace { held: true, ..pace })[BODY..], [0.0; 2]);
 }
 
+/// Left for right, and y for −y in the body's own frame.
 #[test]
 fn a_mirrored_body_has_left_and_right_exchanged() {
     let skeleton = Skeleton::preset("coco17").unwrap();
