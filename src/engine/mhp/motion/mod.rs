@@ -61,10 +61,7 @@ const REACH_S: f64 = 0.201;
 const BETA_1: f64 = 0.9;
 const BETA_2: f64 = 0.99;
 const EPSILON: f64 = 1e-8;
-/// A slope of L_EM by [`UNITS`] that is added to the root of the second moment in a fit: where a search ended, or the truth is, what is
-/// left of the slopes is faint and changes its sign, and steps as long as any would leave it.
-const FAINT_SLOPE: f64 = 3e-3;
-/// How far t and h, y, s, q, w, ẇ and c may go in a step of a search; slopes are told apart by them.
+/// How far t and h, y, s, q, w, ẇ and c may go in a step of L-BFGS.
 const UNITS: [f64; 7] = [0.03, 0.12, 0.03, 1.0, 0.06, 0.3, 0.5];
 /// Steps of t and h, y, s, q, w, ẇ and c at the default learning rate.
 const RATES: [f64; 7] = [0.01, 0.04, 0.006, 0.2, 0.02, 0.1, 0.08];
@@ -95,15 +92,6 @@ fn kind(at: usize) -> usize {
         TILT..BODY => 4 + (at - TILT) / 2,
         _ => POSE,
     }
-}
-
-/// How Adam steps: by `share` of [`RATES`], shorter where slopes by [`UNITS`] are not steeper than `faint`, and not at all in the numbers
-/// of a pose that is `held`.
-#[derive(Debug, Clone, Copy)]
-struct Pace {
-    share: f64,
-    faint: f64,
-    held: bool,
 }
 
 /// The coordinates of a fit in a window, and Adam's moments of them.
@@ -486,8 +474,9 @@ impl MotionState {
         Self { first: zeros.clone(), second: zeros, coordinates, steps: 0 }
     }
 
-    /// One step of Adam of persons with `stride` numbers each against `gradient`, written over `next`.
-    fn step_into(&self, stride: usize, gradient: &[f64], pace: Pace, next: &mut Self) {
+    /// One step of Adam of persons with `stride` numbers each against `gradient`, written over `next`; `pace` scales the steps,
+    /// and a pose that is `held` takes none.
+    fn step_into(&self, stride: usize, gradient: &[f64], pace: f64, held: bool, next: &mut Self) {
         next.coordinates.clone_from(&self.coordinates);
         next.first.clone_from(&self.first);
         next.second.clone_from(&self.second);
@@ -496,10 +485,10 @@ impl MotionState {
         let moments = next.first.iter_mut().zip(&mut next.second);
         for (k, ((x, (m, v)), g)) in next.coordinates.iter_mut().zip(moments).zip(gradient).enumerate() {
             let kind = kind(k % stride);
-            let rate = if pace.held && kind == POSE { 0.0 } else { pace.share * RATES[kind] };
+            let rate = if held && kind == POSE { 0.0 } else { RATES[kind] };
             *m = BETA_1 * *m + (1.0 - BETA_1) * g;
             *v = BETA_2 * *v + (1.0 - BETA_2) * g * g;
-            *x -= rate * *m * unbias[0] / ((*v * unbias[1]).sqrt() + EPSILON + pace.faint / UNITS[kind]);
+            *x -= pace * rate * *m * unbias[0] / ((*v * unbias[1]).sqrt() + EPSILON);
         }
     }
 
@@ -512,9 +501,8 @@ impl MotionState {
         next: &mut Self,
     ) {
         let late = iteration as f64 > SLOW_FROM * config.iterations as f64;
-        let share = config.learning_rate / DEFAULT_RATE * if late { SLOW } else { 1.0 };
-        let faint = config.w_em * FAINT_SLOPE;
-        self.step_into(window.stride, gradient, Pace { share, faint, held: false }, next);
+        let pace = config.learning_rate / DEFAULT_RATE * if late { SLOW } else { 1.0 };
+        self.step_into(window.stride, gradient, pace, false, next);
     }
 }
 

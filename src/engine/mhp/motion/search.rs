@@ -7,8 +7,8 @@
 
 use super::decode::lowest;
 use super::{
-    BODY, Detail, HEIGHT, Held, LN_SIZE, MotionState, Pace, STILL, TILT, UNITS, WALKING_MPS, Window, WindowLoss, YAW,
-    kind, lbfgs, tilt, ways,
+    BODY, Detail, HEIGHT, Held, LN_SIZE, MotionState, STILL, TILT, UNITS, WALKING_MPS, Window, WindowLoss, YAW, kind,
+    lbfgs, tilt, ways,
 };
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
@@ -167,8 +167,8 @@ impl<'a> Search<'a> {
             }
             if step < steps {
                 let stride = self.window.stride;
-                let share = if step as f64 > super::SLOW_FROM * steps as f64 { 0.5 } else { 1.0 };
-                state.step_into(stride, &self.loss.gradient, Pace { share, faint: 0.0, held }, &mut self.next);
+                let pace = if step as f64 > super::SLOW_FROM * steps as f64 { 0.5 } else { 1.0 };
+                state.step_into(stride, &self.loss.gradient, pace, held, &mut self.next);
                 std::mem::swap(&mut state, &mut self.next);
             }
         }

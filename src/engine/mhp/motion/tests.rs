@@ -240,30 +240,6 @@ fn every_skeleton_with_known_names_is_moved() {
     assert!(PoseSpace::new(prior, &other, &[0.0], None, Detail::Fit).is_none());
 }
 
-/// Adam takes steps as long as any from where slopes are next to nothing, which a search or the truth has led to.
-#[test]
-fn steps_are_shorter_where_slopes_are_faint() {
-    let stride = BODY + 2;
-    let state = MotionState::at(vec![0.0; stride]);
-    let steps = |slope: f64, pace: Pace| {
-        // The same slope by the units of every coordinate.
-        let gradient: Vec<f64> = (0..stride).map(|k| slope / UNITS[kind(k)]).collect();
-        let mut next = MotionState::default();
-        state.step_into(stride, &gradient, pace, &mut next);
-        zip(next.coordinates, 0..stride).map(|(x, k)| -x / RATES[kind(k)]).collect::<Vec<f64>>()
-    };
-    let near = |got: Vec<f64>, want: f64| {
-        assert_eq!(got.len(), stride);
-        assert!(got.iter().all(|x| (x - want).abs() < 1e-5), "{got:?}: {want}");
-    };
-    let pace = Pace { share: 0.5, faint: 1e-3, held: false };
-    near(steps(1e-3, Pace { faint: 0.0, ..pace }), 0.5);
-    near(steps(1e-3, pace), 0.25);
-    near(steps(1e3, pace), 0.5);
-    near(steps(-1e-3 / 9.0, pace), -0.05);
-    assert_eq!(steps(1e-3, Pace { held: true, ..pace })[BODY..], [0.0; 2]);
-}
-
 /// Left for right, and y for −y in the body's own frame.
 #[test]
 fn a_mirrored_body_has_left_and_right_exchanged() {
