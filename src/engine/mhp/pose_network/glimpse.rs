@@ -37,6 +37,16 @@ pub(super) struct Seen {
     pub(super) about: [f32; 3],
 }
 
+impl Seen {
+    /// With left and right exchanged.
+    pub(super) fn mirrored(&self) -> Self {
+        let mut other = self.clone();
+        other.horizontal.chunks_exact_mut(ACROSS).for_each(<[f32]>::reverse);
+        other.about[1] = -other.about[1];
+        other
+    }
+}
+
 /// The maps about a place.
 #[derive(Debug, Clone)]
 pub(super) struct Glimpse {

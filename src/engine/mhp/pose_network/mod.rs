@@ -10,7 +10,8 @@
 //! ```
 //!
 //! with |·| rounded off where it is smaller than b, and p(μ) what the bodies themselves have. The power is what joints know of each
-//! other. It was taught (`train-pose-network`) with recorded people and the actors of the synthetic source, turned every way, before
+//! other. It looks once more at what it would see in a mirror, and what it says of that is turned back: as likely as the other, for half
+//! of what it errs by in one it does not in the other. It was taught (`train-pose-network`) with recorded people and the actors of the synthetic source, turned every way, before
 //! radars whose widths, sidelobes, noise, clutter and ghosts are drawn anew for each lesson: neither simulator that it is judged
 //! by is among them. It says nothing of which way people usually look: that is the prior's and the path's affair.
 
@@ -41,7 +42,11 @@ const APART: f64 = 0.3;
 /// How often it looks, each time about where it expected the trunk before.
 const LOOKS: usize = 2;
 /// A body that is less likely is no start.
-const LEAST: f64 = 0.1;
+const LEAST: f64 = 0.05;
+/// What it is asked of: as it is, and in a mirror.
+const SIDES: usize = 2;
+/// Joint of the other side.
+const MIRRORED: [usize; JOINTS] = [0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15];
 
 /// The network: weights that `train-pose-network` makes (Bishop 1994 names what it is).
 #[derive(Debug, Clone)]
@@ -50,7 +55,7 @@ pub struct MixtureDensityNetwork(Layers);
 /// Where the joints of a person are expected.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Expected {
-    bodies: SmallVec<[ExpectedBody; BODIES]>,
+    bodies: SmallVec<[ExpectedBody; SIDES * BODIES]>,
     /// −ln of what the bodies themselves have.
     best: f64,
 }
@@ -66,7 +71,7 @@ struct ExpectedBody {
 }
 
 /// ln of how likely each body is, and of each joint where it is and how far off, m.
-type Bodies = SmallVec<[(f64, [(Vec3, f64); JOINTS]); BODIES]>;
+type Bodies = SmallVec<[(f64, [(Vec3, f64); JOINTS]); SIDES * BODIES]>;
 
 impl MixtureDensityNetwork {
     /// The network that comes with the program; `None` where it is damaged.
@@ -94,9 +99,24 @@ impl MixtureDensityNetwork {
         self.0.to_tensors(told)
     }
 
-    /// What it says of what is seen: ln of the chance of each body, and μ (along the sight, to its left, and up from the radar, from the
-    /// place, m) and b of its joints.
+    /// What it says of what is seen, and of that in a mirror: ln of the chance of each body, and μ (along the sight, to its left, and up
+    /// from the radar, from the place, m) and b of its joints.
     fn bodies(&self, seen: &Seen) -> Bodies {
+        let turned_back = |(chance, joints): (f64, [(Vec3, f64); JOINTS])| {
+            let joint = |joint: usize| {
+                let ([along, left, up], b) = joints[joint];
+                ([along, -left, up], b)
+            };
+            (chance, MIRRORED.map(joint))
+        };
+        let mut all = self.said(seen);
+        all.extend(self.said(&seen.mirrored()).into_iter().map(turned_back));
+        all.iter_mut().for_each(|(ln_chance, _)| *ln_chance -= (SIDES as f64).ln());
+        all
+    }
+
+    /// The same of what is seen alone.
+    fn said(&self, seen: &Seen) -> Bodies {
         let said: Vec<f64> = self.0.run(seen).into_iter().map(f64::from).collect();
         let (chances, joints) = said.split_at(BODIES);
         let whole = ln_sum_exp(chances.iter().copied());
@@ -160,7 +180,7 @@ impl Expected {
 
     /// L_net of a person's joints; `gain` times its gradient is added to `bars`.
     pub(super) fn misfit(&self, joints: &[Vec3], gain: f64, bars: &mut [Vec3]) -> f64 {
-        let likely: SmallVec<[f64; BODIES]> = self.bodies.iter().map(|body| body.likely(joints)).collect();
+        let likely: SmallVec<[f64; SIDES * BODIES]> = self.bodies.iter().map(|body| body.likely(joints)).collect();
         let all = ln_sum_exp(likely.iter().copied());
         let known = self.bodies.first().map_or(1.0, |body| body.joints.iter().flatten().count() as f64);
         for (body, likely) in zip(&self.bodies, likely) {

@@ -127,6 +127,23 @@ fn the_gradient_by_the_joints_agrees_with_central_differences() {
 }
 
 #[test]
+fn what_is_seen_in_a_mirror_is_the_same_with_left_and_right_exchanged() {
+    let network = MixtureDensityNetwork::committed().unwrap();
+    let problem = problem(false, [3.0, 0.8, 0.3], 5);
+    let seen = Glimpse::at(&problem, &FitConfig::default(), [2.8, 0.6, 0.0]).unwrap().seen;
+    assert_ne!(seen.mirrored(), seen);
+    assert_eq!(seen.mirrored().mirrored(), seen);
+    let [here, there] = [&seen, &seen.mirrored()].map(|seen| network.bodies(seen));
+    let (left, right) = (5, 6);
+    for (k, (ln_chance, joints)) in here.iter().enumerate() {
+        let other = &there[(k + BODIES) % there.len()];
+        assert_eq!(*ln_chance, other.0);
+        let ([x, y, z], b) = joints[left];
+        assert_eq!(other.1[right], ([x, -y, z], b));
+    }
+}
+
+#[test]
 fn the_committed_network_is_whole_and_a_damaged_one_is_told() {
     assert!(MixtureDensityNetwork::committed().is_some());
     let problem = problem(false, [3.0, 0.8, 0.3], 5);

@@ -1,11 +1,11 @@
 //! What lessons say of the weights, and steps down.
 
+use super::super::MIRRORED;
 use super::super::glimpse::{ACROSS, RANGES, UP};
 use super::super::layers::{
     BODIES, JOINTS, OUT, STRIDES, Shape, TOLD, convolved, flat, product, rectify, shapes, shifted,
 };
 use super::PoseLesson;
-use super::motion::MIRRORED;
 use rand::{Rng, rngs::StdRng};
 use std::ops::Range;
 

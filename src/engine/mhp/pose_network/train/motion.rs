@@ -5,8 +5,8 @@ use crate::geometry::Vec3;
 use rand::{Rng, rngs::StdRng};
 use std::f64::consts::PI;
 
-use super::super::TRUNK;
 use super::super::layers::JOINTS;
+use super::super::{MIRRORED, TRUNK};
 
 /// Samples of a second.
 pub(super) const HZ: f64 = 20.0;
@@ -35,9 +35,6 @@ const AZIMUTH_RAD: f64 = 0.8;
 const HEIGHT_M: [f64; 2] = [0.8, 1.2];
 /// By how much recorded bodies are made smaller or larger.
 const SIZES: [f64; 2] = [0.9, 1.12];
-/// Joint of the other side.
-pub(in crate::mhp::pose_network) const MIRRORED: [usize; JOINTS] =
-    [0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15];
 /// Joints of a stretch, radar's frame, m.
 pub(super) type Stretch = Vec<[Vec3; JOINTS]>;
 
