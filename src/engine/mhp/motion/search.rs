@@ -33,7 +33,7 @@ const MOST_WORK: f64 = 2e10;
 const PLAIN: f64 = 10.0;
 /// Evaluations of a person's search beside those of the first sieve, with those of what is carried on and of what the network
 /// expects, and those of a start in it, in whole windows.
-const LATER: f64 = 293.0;
+const LATER: f64 = 349.0;
 const FIRST: f64 = 5.0 / 4.0;
 /// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start, but for what a network
 /// expects, whose weight says whether it is asked.
