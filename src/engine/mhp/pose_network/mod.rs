@@ -10,10 +10,11 @@
 //! ```
 //!
 //! with |·| rounded off where it is smaller than b, and p(μ) what the bodies themselves have. The power is what joints know of each
-//! other. It looks once more at what it would see in a mirror, and what it says of that is turned back: as likely as the other, for half
-//! of what it errs by in one it does not in the other. It was taught (`train-pose-network`) with recorded people and the actors of the synthetic source, turned every way, before
-//! radars whose widths, sidelobes, noise, clutter and ghosts are drawn anew for each lesson: neither simulator that it is judged
-//! by is among them. It says nothing of which way people usually look: that is the prior's and the path's affair.
+//! other. It is asked of what is seen and of that in a mirror (`Seen::mirrored`), and what it says there is turned back: an ensemble of
+//! two by one set of weights, whose errors are not the same. It was taught (`train-pose-network`) with recorded people and the actors
+//! of the synthetic source, turned every way, before radars whose widths, sidelobes, noise, clutter and ghosts are drawn anew for each
+//! lesson: neither simulator that it is judged by is among them. It says nothing of which way people usually look: that is the prior's
+//! and the path's affair.
 
 mod glimpse;
 mod layers;
@@ -43,7 +44,7 @@ const APART: f64 = 0.3;
 const LOOKS: usize = 2;
 /// A body that is less likely is no start.
 const LEAST: f64 = 0.05;
-/// What it is asked of: as it is, and in a mirror.
+/// How often a look is asked of: as it is, and in a mirror.
 const SIDES: usize = 2;
 /// Joint of the other side.
 const MIRRORED: [usize; JOINTS] = [0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15];
