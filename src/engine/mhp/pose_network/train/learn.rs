@@ -1,12 +1,12 @@
 //! What lessons say of the weights, and steps down.
 
-use super::super::MIRRORED;
 use super::super::glimpse::{ACROSS, RANGES, UP};
 use super::super::layers::{
     BODIES, JOINTS, OUT, STRIDES, Shape, TOLD, convolved, flat, product, rectify, shapes, shifted,
 };
 use super::PoseLesson;
 use rand::{Rng, rngs::StdRng};
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// ln b where training begins, b in m.
@@ -118,23 +118,22 @@ impl Plan {
     /// What lessons say, each mirrored or not and with numbers dropped by chance; as they are without one.
     pub(super) fn learn(&self, numbers: &[f32], lessons: &[&PoseLesson], mut rng: Option<&mut StdRng>) -> Learned {
         let n = lessons.len();
-        let mirrored: Vec<bool> = (0..n).map(|_| rng.as_deref_mut().is_some_and(|rng| rng.random_bool(0.5))).collect();
+        let mut is_mirrored = || rng.as_deref_mut().is_some_and(|rng| rng.random_bool(0.5));
+        let lessons: Vec<Cow<PoseLesson>> = lessons
+            .iter()
+            .map(|&lesson| if is_mirrored() { Cow::Owned(lesson.mirrored()) } else { Cow::Borrowed(lesson) })
+            .collect();
         let mut gradient = vec![0.0; self.numbers];
         // (lessons, numbers) of each dense layer.
         let mut inputs = Vec::with_capacity(n * flat());
         let mut kept: Vec<[Vec<Kept>; 2]> = Vec::with_capacity(n);
-        for (lesson, &mirrored) in lessons.iter().zip(&mirrored) {
-            let seen = &lesson.seen;
-            let turned =
-                |row: &[f32]| -> Vec<f32> { if mirrored { row.iter().rev().copied().collect() } else { row.to_vec() } };
-            let horizontal: Vec<f32> = seen.horizontal.chunks_exact(ACROSS).flat_map(turned).collect();
+        for lesson in &lessons {
             let towers = [
-                forwards(numbers, &self.towers[0], &horizontal, ACROSS),
-                forwards(numbers, &self.towers[1], &seen.vertical, UP),
+                forwards(numbers, &self.towers[0], &lesson.seen.horizontal, ACROSS),
+                forwards(numbers, &self.towers[1], &lesson.seen.vertical, UP),
             ];
             towers.iter().filter_map(|tower| tower.last()).for_each(|last| inputs.extend_from_slice(&last.out));
-            let [distance, sine, height] = seen.about;
-            inputs.extend([distance, if mirrored { -sine } else { sine }, height]);
+            inputs.extend(lesson.seen.about);
             kept.push(towers);
         }
         let mut layers = vec![inputs];
@@ -162,14 +161,8 @@ impl Plan {
         let mut losses = [0.0; 2];
         let mut bars = vec![0.0; n * TOLD];
         let told = layers.pop().unwrap_or_default();
-        for (((said, bars), lesson), &mirrored) in
-            told.chunks_exact(TOLD).zip(bars.chunks_exact_mut(TOLD)).zip(lessons).zip(&mirrored)
-        {
-            let truth: [[f32; 3]; JOINTS] = std::array::from_fn(|joint| {
-                let [x, y, z] = lesson.joints[if mirrored { MIRRORED[joint] } else { joint }];
-                [x, if mirrored { -y } else { y }, z]
-            });
-            losses.iter_mut().zip(unlikely(said, &truth, bars)).for_each(|(sum, x)| *sum += x);
+        for ((said, bars), lesson) in told.chunks_exact(TOLD).zip(bars.chunks_exact_mut(TOLD)).zip(&lessons) {
+            losses.iter_mut().zip(unlikely(said, &lesson.joints, bars)).for_each(|(sum, x)| *sum += x);
         }
         for (k, place) in self.dense.iter().enumerate().rev() {
             let x = &layers[k];

@@ -8,9 +8,9 @@ mod tests;
 
 pub use motion::{Actors, POSE_STRETCH};
 
-use super::MixtureDensityNetwork;
 use super::glimpse::{ACROSS, CHANNELS, RANGES, Seen, UP, about, told};
 use super::layers::{JOINTS, Layers};
+use super::{MIRRORED, MixtureDensityNetwork};
 use crate::geometry::Vec3;
 use echo::{Frame, Radar, Skin, beside};
 use learn::{Adam, Learned, Plan};
@@ -68,6 +68,15 @@ pub(super) struct PoseLesson {
 }
 
 impl PoseLesson {
+    /// With left and right exchanged.
+    fn mirrored(&self) -> Self {
+        let joint = |joint: usize| {
+            let [along, left, up] = self.joints[joint];
+            [along, -left, up]
+        };
+        Self { seen: self.seen.mirrored(), joints: MIRRORED.map(joint) }
+    }
+
     /// Lesson `number` of a seed.
     pub(super) fn draw(actors: &Actors, (acted, seed): (f64, u64), number: u64) -> Self {
         let rng = &mut StdRng::seed_from_u64(seed ^ number.wrapping_mul(0x9E37_79B9_7F4A_7C15));
