@@ -3,7 +3,7 @@
 use crate::config::FitConfig;
 use crate::geometry::{Vec3, flat_distance};
 use crate::mhp::Problem;
-use crate::radar::{AxisKind, Resolves, View};
+use crate::radar::{Resolves, View};
 
 /// Times of the maps, s after the frame that is fitted.
 pub(super) const TIMES_S: [f64; 5] = [-0.2, -0.1, 0.0, 0.1, 0.2];
@@ -56,7 +56,7 @@ pub(super) struct Glimpse {
     pub(super) sight: [f64; 2],
 }
 
-/// What a view resolves about a place.
+/// What is looked at of a view. One that resolves both angles shows both, each summed over what the other one resolves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Plane {
     Horizontal,
@@ -116,7 +116,10 @@ pub(super) fn told(window: &[&[f32]], all: &[&[f32]]) -> Vec<f32> {
 impl Glimpse {
     /// At the maps of `problem` about `place` (world frame, m); `None` where no view has both a range and an angle.
     pub(super) fn at(problem: &Problem, config: &FitConfig, place: Vec3) -> Option<Self> {
-        let of = |plane: Plane| problem.views.iter().position(|view| plane_of(view) == Some(plane));
+        let of = |plane: Plane| {
+            let shown = (0..problem.views.len()).filter(|&k| plane.axes(&problem.views[k]).is_some());
+            shown.min_by_key(|&k| problem.views[k].axes.len())
+        };
         let found = [of(Plane::Horizontal), of(Plane::Vertical)];
         let first = found.iter().flatten().next().map(|&k| &problem.views[k])?;
         let seen = first.pose.view_from_world(place);
@@ -143,6 +146,16 @@ impl Plane {
             Self::Horizontal => ACROSS,
             Self::Vertical => UP,
         }
+    }
+
+    /// The range's axis of a view, and the angle's; `None` where it shows another plane.
+    fn axes(self, view: &View) -> Option<[usize; 2]> {
+        let of = |what: Resolves| view.axes.iter().position(|axis| Resolves::of(axis.kind) == what);
+        let angle = match self {
+            Self::Horizontal => Resolves::Azimuth,
+            Self::Vertical => Resolves::Elevation,
+        };
+        Some([of(Resolves::Range)?, of(angle)?])
     }
 
     /// The points of its cells before a view, C order, world frame, m.
@@ -172,19 +185,11 @@ impl Plane {
     }
 }
 
-fn plane_of(view: &View) -> Option<Plane> {
-    let has = |of: Resolves| view.axes.iter().any(|axis| Resolves::of(axis.kind) == of);
-    match (has(Resolves::Range), has(Resolves::Azimuth), has(Resolves::Elevation)) {
-        (true, true, false) => Some(Plane::Horizontal),
-        (true, false, true) => Some(Plane::Vertical),
-        _ => None,
-    }
-}
-
 /// The levels of a view's maps about a place, ([`CHANNELS`], [`RANGES`], cells), C order.
 fn levels(problem: &Problem, config: &FitConfig, of: usize, (plane, place): (Plane, Vec3)) -> Vec<f32> {
     let view = &problem.views[of];
-    let taps = Taps::new(view, &plane.points(view, place));
+    let Some(axes) = plane.axes(view) else { return nothing(plane.cells()) };
+    let taps = Taps::new(view, axes, &plane.points(view, place));
     let neighbours = problem.neighbours_in(config.frames_around);
     let mut all: Vec<(f64, Vec<f32>)> = Vec::with_capacity(neighbours.len() + 1);
     all.push((0.0, taps.levels(view, problem.map(of))));
@@ -198,20 +203,19 @@ fn levels(problem: &Problem, config: &FitConfig, of: usize, (plane, place): (Pla
 /// The cells of a map that each point is read from, and their weights.
 struct Taps {
     cells: Vec<[(usize, f32); 4]>,
-    /// Bins of the Doppler axis, and how far apart they are.
-    doppler: (usize, usize),
+    /// The cells that are summed, after each of those: along the other axes.
+    along: Vec<usize>,
 }
 
 impl Taps {
-    fn new(view: &View, points: &[Vec3]) -> Self {
+    /// At points before a view, told apart along these two axes.
+    fn new(view: &View, axes: [usize; 2], points: &[Vec3]) -> Self {
         let shape = view.shape();
         let stride = |axis: usize| shape[axis + 1..].iter().product::<usize>();
-        let spatial: Vec<usize> = (0..shape.len()).filter(|&k| view.axes[k].kind != AxisKind::Doppler).collect();
-        let doppler = (0..shape.len()).find(|&k| view.axes[k].kind == AxisKind::Doppler);
         let of_point = |p: &Vec3| {
             let bins = view.bins_of(*p);
             let mut taps = [(0, 1.0_f32); 4];
-            for (nth, &axis) in spatial.iter().take(2).enumerate() {
+            for (nth, axis) in axes.into_iter().enumerate() {
                 let last = shape[axis] - 1;
                 let bin = bins[axis].clamp(0.0, last as f64);
                 let low = bin as usize;
@@ -224,18 +228,18 @@ impl Taps {
             }
             taps
         };
-        Self {
-            cells: points.iter().map(of_point).collect(),
-            doppler: doppler.map_or((1, 0), |axis| (shape[axis], stride(axis))),
+        let mut along = vec![0];
+        for axis in (0..shape.len()).filter(|axis| !axes.contains(axis)) {
+            along = along.iter().flat_map(|at| (0..shape[axis]).map(move |bin| at + bin * stride(axis))).collect();
         }
+        Self { cells: points.iter().map(of_point).collect(), along }
     }
 
     /// dB of the power at each point.
     fn levels(&self, view: &View, map: &[f64]) -> Vec<f32> {
-        let (bins, stride) = self.doppler;
         let power = |cell: usize| -> f64 {
-            let of = |bin: usize| map.get(cell + bin * stride).copied().filter(|h| h.is_finite()).unwrap_or(0.0);
-            (0..bins).map(|bin| view.quantity.power(of(bin))).sum()
+            let of = |at: usize| map.get(cell + at).copied().filter(|h| h.is_finite()).unwrap_or(0.0);
+            self.along.iter().map(|&at| view.quantity.power(of(at))).sum()
         };
         let level = |taps: &[(usize, f32); 4]| {
             let sum: f64 = taps.iter().filter(|tap| tap.1 > 0.0).map(|&(cell, w)| f64::from(w) * power(cell)).sum();

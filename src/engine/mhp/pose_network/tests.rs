@@ -8,15 +8,28 @@ use crate::radar::{Axis, AxisKind, PointSpread, Quantity, RadarConfig, Spacing, 
 use rand::rngs::StdRng;
 use rand::{Rng as _, SeedableRng as _};
 
-/// A map of 20 mm and 0.4° cells, or of 20 mm and 20 mm, with noise of 1 and the echo of a point.
-fn problem(polar: bool, at: Vec3, frames: usize) -> Problem {
+/// What maps are over.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Over {
+    Polar,
+    Cartesian,
+    Cube,
+}
+
+/// A map of 20 mm and 0.4° cells, or of 20 mm and 20 mm, or of 50 mm and 1.2° by 1.2°, with noise of 1 and the echo of a point.
+fn problem(over: Over, at: Vec3, frames: usize) -> Problem {
     let axis = |kind, bins, lo, hi| Axis { kind, bins, lo, hi, spacing: Spacing::Linear };
     let wide = 60_f64.to_radians();
-    let axes = |up: bool| match (polar, up) {
-        (true, false) => vec![axis(AxisKind::Range, 250, 0.0, 5.0), axis(AxisKind::Cone, 300, -wide, wide)],
-        (true, true) => vec![axis(AxisKind::Elevation, 300, wide, -wide), axis(AxisKind::Range, 250, 5.0, 0.0)],
-        (false, false) => vec![axis(AxisKind::DepthH, 250, 5.0, 0.0), axis(AxisKind::Y, 200, 2.0, -2.0)],
-        (false, true) => vec![axis(AxisKind::DepthV, 250, 5.0, 0.0), axis(AxisKind::Z, 200, -2.0, 2.0)],
+    let axes = |up: bool| match (over, up) {
+        (Over::Polar, false) => vec![axis(AxisKind::Range, 250, 0.0, 5.0), axis(AxisKind::Cone, 300, -wide, wide)],
+        (Over::Polar, true) => vec![axis(AxisKind::Elevation, 300, wide, -wide), axis(AxisKind::Range, 250, 5.0, 0.0)],
+        (Over::Cartesian, false) => vec![axis(AxisKind::DepthH, 250, 5.0, 0.0), axis(AxisKind::Y, 200, 2.0, -2.0)],
+        (Over::Cartesian, true) => vec![axis(AxisKind::DepthV, 250, 5.0, 0.0), axis(AxisKind::Z, 200, -2.0, 2.0)],
+        (Over::Cube, _) => vec![
+            axis(AxisKind::Azimuth, 100, -wide, wide),
+            axis(AxisKind::Range, 100, 0.0, 5.0),
+            axis(AxisKind::Elevation, 100, wide, -wide),
+        ],
     };
     let view = |up: bool| View {
         array: if up { "v" } else { "h" }.into(),
@@ -26,7 +39,7 @@ fn problem(polar: bool, at: Vec3, frames: usize) -> Problem {
         axes: axes(up),
         region: None,
     };
-    let views = vec![view(false), view(true)];
+    let views = if over == Over::Cube { vec![view(false)] } else { vec![view(false), view(true)] };
     let map = |view: &View| -> Vec<f64> {
         let bins = view.bins_of(at);
         let shape = view.shape();
@@ -40,9 +53,10 @@ fn problem(polar: bool, at: Vec3, frames: usize) -> Problem {
     };
     let maps: Vec<Vec<f64>> = views.iter().map(map).collect();
     let skeleton = Skeleton::preset("coco17").unwrap();
-    let mut problem = Problem::new(RadarConfig::default(), skeleton, views, &[&maps[0], &maps[1]]).unwrap();
+    let maps: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
+    let mut problem = Problem::new(RadarConfig::default(), skeleton, views, &maps).unwrap();
     for k in 1..frames {
-        problem.add_neighbour(0.1 * k as f64, &[&maps[0], &maps[1]]).unwrap();
+        problem.add_neighbour(0.1 * k as f64, &maps).unwrap();
     }
     problem
 }
@@ -51,20 +65,21 @@ fn problem(polar: bool, at: Vec3, frames: usize) -> Problem {
 #[test]
 fn an_echo_lies_in_its_cell_of_every_layout() {
     let (place, at) = ([2.8, 0.6, 0.0], [3.0, 0.8, 0.3]);
-    for (polar, frames) in [(true, 1), (false, 1), (true, 5), (false, 5)] {
-        let glimpse = Glimpse::at(&problem(polar, at, frames), &FitConfig::default(), place).unwrap();
+    let layouts = [Over::Polar, Over::Cartesian, Over::Cube];
+    for (over, frames) in layouts.into_iter().flat_map(|over| [(over, 1), (over, 5)]) {
+        let glimpse = Glimpse::at(&problem(over, at, frames), &FitConfig::default(), place).unwrap();
         let distance = 2.8_f64.hypot(0.6);
         let loudest = |map: &[f32], columns: usize| {
             let cell = (0..RANGES * columns).max_by(|a, b| map[*a].total_cmp(&map[*b])).unwrap();
             (cell / columns, cell % columns)
         };
         let (row, column) = loudest(&glimpse.seen.horizontal, ACROSS);
-        assert!((distance + range_m(row) - norm(at)).abs() < 0.05, "{polar}: row {row}");
+        assert!((distance + range_m(row) - norm(at)).abs() < 0.05, "{over:?}: row {row}");
         let left = (0.8 / norm(at) - 0.6 / distance) * distance;
-        assert!((across_m(column) - left).abs() < 0.06, "{polar}: column {column}");
+        assert!((across_m(column) - left).abs() < 0.06, "{over:?}: column {column}");
         let (row, column) = loudest(&glimpse.seen.vertical, UP);
-        assert!((distance + range_m(row) - norm(at)).abs() < 0.05, "{polar}: row {row}");
-        assert!((up_m(column) - 0.3 / norm(at) * distance).abs() < 0.06, "{polar}: column {column}");
+        assert!((distance + range_m(row) - norm(at)).abs() < 0.05, "{over:?}: row {row}");
+        assert!((up_m(column) - 0.3 / norm(at) * distance).abs() < 0.06, "{over:?}: column {column}");
         assert_eq!(glimpse.seen.about, about(distance, 0.6 / distance, 1.0));
         // What stands there is known of some frames only, and then the same as in each.
         let cells = RANGES * ACROSS;
@@ -80,7 +95,7 @@ fn an_echo_lies_in_its_cell_of_every_layout() {
 
 #[test]
 fn what_no_view_shows_is_empty_and_a_map_without_angle_says_nothing() {
-    let mut one = problem(false, [3.0, 0.8, 0.3], 1);
+    let mut one = problem(Over::Cartesian, [3.0, 0.8, 0.3], 1);
     let of = |problem: &Problem| Glimpse::at(problem, &FitConfig::default(), [2.8, 0.6, 0.0]);
     one.views = vec![one.views[0].clone()].into();
     assert_eq!(of(&one).unwrap().seen.vertical, glimpse::nothing(UP));
@@ -129,7 +144,7 @@ fn the_gradient_by_the_joints_agrees_with_central_differences() {
 #[test]
 fn what_is_seen_in_a_mirror_is_the_same_with_left_and_right_exchanged() {
     let network = MixtureDensityNetwork::committed().unwrap();
-    let problem = problem(false, [3.0, 0.8, 0.3], 5);
+    let problem = problem(Over::Cartesian, [3.0, 0.8, 0.3], 5);
     let seen = Glimpse::at(&problem, &FitConfig::default(), [2.8, 0.6, 0.0]).unwrap().seen;
     assert_ne!(seen.mirrored(), seen);
     assert_eq!(seen.mirrored().mirrored(), seen);
@@ -146,7 +161,7 @@ fn what_is_seen_in_a_mirror_is_the_same_with_left_and_right_exchanged() {
 #[test]
 fn the_committed_network_is_whole_and_a_damaged_one_is_told() {
     assert!(MixtureDensityNetwork::committed().is_some());
-    let problem = problem(false, [3.0, 0.8, 0.3], 5);
+    let problem = problem(Over::Cartesian, [3.0, 0.8, 0.3], 5);
     let expected = Expected::about(&problem, &FitConfig::default(), [2.8, 0.6, 0.0]).unwrap();
     let chances: f64 = expected.bodies.iter().map(|body| body.ln_chance.exp()).sum();
     assert!((chances - 1.0).abs() < 1e-6);
