@@ -13,7 +13,7 @@ use std::collections::HashMap;
 pub(super) const TOWER: [usize; 5] = [CHANNELS, 24, 48, 48, 32];
 pub(super) const STRIDES: [usize; 4] = [2, 1, 2, 2];
 /// Numbers of the hidden layers.
-const HIDDEN: usize = 192;
+const HIDDEN: usize = 320;
 /// Joints, and numbers of each: place, m, and ln of how far off it may be, m.
 pub(super) const JOINTS: usize = 17;
 pub(super) const OUT: usize = 4;

@@ -1,11 +1,13 @@
 //! What a radar sees of a lesson's scene: echoes of points of skin, coherent, spread by range and angle.
 //!
 //! It is drawn anew for each lesson what a radar is like: widths, sidelobes, noise, how much of what stands still is left, ghosts by
-//! way of walls and floor, furniture and walls, another person. The network is to learn what these have in common.
+//! way of walls and floor, furniture and walls, another person. The network is to learn what these have in common. Parts of bodies
+//! hide what is behind them, their own far side as well as walls.
 
 use super::super::glimpse::{ACROSS, RANGES, UP, across_m, range_m, up_m};
 use super::super::layers::JOINTS;
 use super::motion::{Stretch, trunk};
+use crate::body::Capsule;
 use crate::geometry::{Vec3, add, add_scaled, cross, dot, mean, norm, scale, sub};
 use rand::{Rng, rngs::StdRng};
 use rand_distr::{Distribution as _, StandardNormal};
@@ -20,21 +22,27 @@ const DOPPLERS: usize = 3;
 /// Points of skin of the person, and of somebody beside.
 const POINTS: usize = 150;
 const POINTS_BESIDE: usize = 100;
-/// Limbs: joints at the ends, radius, m, and share of the points.
-const LIMBS: [(usize, usize, f64, f64); 8] = [
-    (5, 7, 0.045, 0.06),
-    (7, 9, 0.038, 0.05),
-    (6, 8, 0.045, 0.06),
-    (8, 10, 0.038, 0.05),
-    (11, 13, 0.075, 0.10),
-    (13, 15, 0.05, 0.08),
-    (12, 14, 0.075, 0.10),
-    (14, 16, 0.05, 0.08),
+/// Limbs: joints at the ends, radius, m, how far they reach beyond the second joint, m (hands), and share of the points.
+const LIMBS: [([usize; 2], f64, f64, f64); 8] = [
+    ([5, 7], 0.045, 0.0, 0.06),
+    ([7, 9], 0.038, 0.12, 0.06),
+    ([6, 8], 0.045, 0.0, 0.06),
+    ([8, 10], 0.038, 0.12, 0.06),
+    ([11, 13], 0.075, 0.0, 0.10),
+    ([13, 15], 0.05, 0.0, 0.08),
+    ([12, 14], 0.075, 0.0, 0.10),
+    ([14, 16], 0.05, 0.0, 0.08),
 ];
 /// Trunk and head: radii to the side and to the front, m, share of the points and gain.
 const TRUNK: ([f64; 2], f64, f64) = ([0.17, 0.115], 0.34, 1.25);
 const HEAD: ([f64; 2], f64, f64) = ([0.075, 0.09], 0.08, 0.9);
-const PARTS: usize = LIMBS.len() + 2;
+/// Feet: knees and ankles, half their width and height, m, how far heel and toe are before the ankle, and the sole below it, m, share of
+/// the points of one, and gain, by the shoe.
+const FEET: [[usize; 2]; 2] = [[13, 15], [14, 16]];
+const FOOT: ([f64; 2], f64, [f64; 2]) = ([0.042, 0.035], 0.03, [0.5, 1.7]);
+const HEEL_TOE_M: [f64; 2] = [-0.05, 0.17];
+const SOLE_M: f64 = 0.035;
+const PARTS: usize = LIMBS.len() + 2 + FEET.len();
 /// Pieces of furniture at most, reflectors of one, and of walls.
 const PIECES: usize = 5;
 const OF_PIECE: usize = 6;
@@ -78,6 +86,11 @@ pub(super) struct Echo {
     sines: [f64; 2],
     amplitude: f64,
     doppler: usize,
+}
+
+/// Share of the amplitude from `at` that what hides it lets through.
+fn passes(hiding: &[Capsule], at: Vec3) -> f64 {
+    hiding.iter().map(|capsule| capsule.lets_through(at)).product()
 }
 
 fn exponential(rng: &mut StdRng) -> f64 {
@@ -137,11 +150,12 @@ impl Radar {
         }
     }
 
-    /// What it sees of nobody: the reflectors.
-    pub(super) fn standing(&self) -> Vec<Echo> {
+    /// What it sees of the reflectors behind somebody.
+    pub(super) fn standing(&self, hiding: &[Capsule]) -> Vec<Echo> {
         let of = |&(at, amplitude): &(Vec3, f64)| {
             let range = norm(at).max(0.1);
-            Echo { range, sines: [at[1] / range, at[2] / range], amplitude: self.still * amplitude, doppler: 0 }
+            let amplitude = self.still * amplitude * passes(hiding, at);
+            Echo { range, sines: [at[1] / range, at[2] / range], amplitude, doppler: 0 }
         };
         self.standing.iter().map(of).collect()
     }
@@ -218,7 +232,9 @@ impl Skin {
             let drawn: f64 = StandardNormal.sample(rng);
             1.0 + (0.15 * drawn).clamp(-0.4, 0.4)
         });
-        let shares: Vec<f64> = LIMBS.iter().map(|limb| limb.3).chain([TRUNK.1, HEAD.1]).collect();
+        let shares: Vec<f64> =
+            LIMBS.iter().map(|limb| limb.3).chain([TRUNK.1, HEAD.1]).chain(FEET.map(|_| FOOT.1)).collect();
+        let shod = rng.random_range(FOOT.2[0]..FOOT.2[1]);
         let sum: f64 = shares.iter().sum();
         let point = |rng: &mut StdRng| {
             let mut drawn = rng.random_range(0.0..sum);
@@ -230,7 +246,8 @@ impl Skin {
             let gain = match part.checked_sub(LIMBS.len()) {
                 None => 1.0,
                 Some(0) => TRUNK.2,
-                Some(_) => HEAD.2,
+                Some(1) => HEAD.2,
+                Some(_) => shod,
             };
             let around = rng.random_range(0.0..TAU).sin_cos();
             let amplitude = gains[part] * gain * exponential(rng).sqrt();
@@ -240,8 +257,21 @@ impl Skin {
         Self { points, girth: rng.random_range(0.85..1.25), cosine: rng.random_range(0.5..1.5) }
     }
 
-    /// Echoes of the skin of a pose with these velocities, m/s.
-    pub(super) fn echoes(&self, radar: &Radar, pose: &[Vec3; JOINTS], velocity: &[Vec3; JOINTS]) -> Vec<Echo> {
+    /// What hides what is behind a pose.
+    pub(super) fn hiding(&self, pose: &[Vec3; JOINTS]) -> impl Iterator<Item = Capsule> {
+        let girth = self.girth;
+        parts(pose, &[[0.0; 3]; JOINTS])
+            .into_iter()
+            .map(move |part| Capsule { ends: part.ends, radius_m: girth * f64::midpoint(part.radii[0], part.radii[1]) })
+    }
+
+    /// Echoes of the skin of a pose with these velocities, m/s, as far as nothing hides them.
+    pub(super) fn echoes(
+        &self,
+        radar: &Radar,
+        (pose, velocity): (&[Vec3; JOINTS], &[Vec3; JOINTS]),
+        hiding: &[Capsule],
+    ) -> Vec<Echo> {
         let parts = parts(pose, velocity);
         let mut echoes = Vec::with_capacity(2 * self.points.len());
         for (k, point) in self.points.iter().enumerate() {
@@ -264,7 +294,8 @@ impl Skin {
             let kept = if turns.abs() < 1e-6 { 1.0 } else { ((PI * turns).sin() / (PI * turns)).powi(2) };
             let heard = (1.0 - kept + radar.still * radar.still * kept).sqrt();
             let near = (radar.unit_m / range).powi(2);
-            let amplitude = point.amplitude * faces.powf(self.cosine) * heard * near;
+            let seen = faces.powf(self.cosine) * passes(hiding, at);
+            let amplitude = point.amplitude * seen * heard * near;
             let bin = (radial / DOPPLER_MPS + radar.doppler_phase).floor() as i64;
             let doppler = bin.rem_euclid(DOPPLERS as i64) as usize;
             echoes.push(Echo { range, sines: [at[1] / range, at[2] / range], amplitude, doppler });
@@ -310,20 +341,29 @@ fn parts(pose: &[Vec3; JOINTS], velocity: &[Vec3; JOINTS]) -> [Part; PARTS] {
     let middle = |of: &[Vec3; JOINTS], a: usize, b: usize| mean(&[of[a], of[b]]);
     std::array::from_fn(|k| match k.checked_sub(LIMBS.len()) {
         None => {
-            let (a, b, radius, _) = LIMBS[k];
-            part([pose[a], pose[b]], [velocity[a], velocity[b]], [radius; 2])
+            let ([a, b], radius, beyond_m, _) = LIMBS[k];
+            let mut end = pose[b];
+            add_scaled(&mut end, unit(sub(pose[b], pose[a])), beyond_m);
+            part([pose[a], end], [velocity[a], velocity[b]], [radius; 2])
         }
         Some(0) => {
             let of = |of: &[Vec3; JOINTS]| [middle(of, 11, 12), middle(of, 5, 6)];
             part(of(pose), of(velocity), TRUNK.0)
         }
-        Some(_) => {
+        Some(1) => {
             let [head, neck] = [middle(pose, 3, 4), middle(pose, 5, 6)];
             let up = unit(sub(head, neck));
             let (mut low, mut top) = (head, head);
             add_scaled(&mut low, up, -0.1);
             add_scaled(&mut top, up, 0.13);
             part([low, top], [middle(velocity, 3, 4); 2], HEAD.0)
+        }
+        Some(foot) => {
+            let [knee, ankle] = FEET[foot - 2];
+            let down = unit(sub(pose[ankle], pose[knee]));
+            let ahead = unit(cross(down, sub(pose[11], pose[12])));
+            let end = |ahead_m: f64| add(pose[ankle], add(scale(ahead, ahead_m), scale(down, SOLE_M)));
+            part(HEEL_TOE_M.map(end), [velocity[ankle]; 2], FOOT.0)
         }
     })
 }
@@ -334,4 +374,48 @@ pub(super) fn beside(stretch: &Stretch, middle: usize, place: [f64; 2], rng: &mu
     let (sin, cos) = rng.random_range(0.0..TAU).sin_cos();
     let apart = rng.random_range(0.45..1.3);
     [place[0] + apart * cos - at[0], place[1] + apart * sin - at[1], 0.0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::MIRRORED;
+    use super::*;
+    use rand::SeedableRng as _;
+
+    /// Somebody who stands at (3, 0) and looks back at the radar, left and right as they are there.
+    fn facing() -> [Vec3; JOINTS] {
+        let mut pose = [[3.0, 0.0, 0.6]; JOINTS];
+        let halves =
+            [(5, 0.19, 0.4), (7, 0.25, 0.12), (9, 0.25, -0.1), (11, 0.1, -0.08), (13, 0.1, -0.5), (15, 0.1, -0.9)];
+        for (joint, aside, up) in halves {
+            pose[joint] = [3.0, -aside, up];
+            pose[MIRRORED[joint]] = [3.0, aside, up];
+        }
+        (pose[3], pose[4]) = ([3.0, -0.07, 0.62], [3.0, 0.07, 0.62]);
+        pose
+    }
+
+    #[test]
+    fn toes_point_where_somebody_looks_and_hands_go_on_from_forearms() {
+        let parts = parts(&facing(), &[[0.0; 3]; JOINTS]);
+        for foot in &parts[LIMBS.len() + 2..] {
+            let [heel, toe] = foot.ends;
+            assert!((heel[0] - 3.05).abs() < 1e-9 && (toe[0] - 2.83).abs() < 1e-9, "{heel:?} {toe:?}");
+            assert!((toe[2] + 0.9 + SOLE_M).abs() < 1e-9);
+        }
+        assert!((parts[1].ends[1][2] + 0.1 + 0.12).abs() < 1e-9, "{:?}", parts[1].ends);
+    }
+
+    #[test]
+    fn a_body_hides_the_wall_behind_it_and_nothing_beside_it() {
+        let rng = &mut StdRng::seed_from_u64(3);
+        let pose = facing();
+        let hiding: Vec<Capsule> = Skin::draw(false, rng).hiding(&pose).collect();
+        assert_eq!(hiding.len(), PARTS);
+        let mut radar = Radar::draw([3.0, 0.0], 1.0, rng);
+        radar.still = 1.0;
+        radar.standing = vec![([4.0, 0.0, 0.2], 1.0), ([4.0, 1.0, 0.2], 1.0), ([2.0, 0.0, 0.2], 1.0)];
+        let [behind, beside, before] = [0, 1, 2].map(|k| radar.standing(&hiding)[k].amplitude);
+        assert!(behind < 0.2 && beside == 1.0 && before == 1.0, "{behind} {beside} {before}");
+    }
 }

@@ -11,6 +11,7 @@ pub use motion::{Actors, POSE_STRETCH};
 use super::glimpse::{ACROSS, CHANNELS, RANGES, Seen, UP, about, told};
 use super::layers::{JOINTS, Layers};
 use super::{MIRRORED, MixtureDensityNetwork};
+use crate::body::Capsule;
 use crate::geometry::Vec3;
 use echo::{Frame, Radar, Skin, beside};
 use learn::{Adam, Learned, Plan};
@@ -55,7 +56,7 @@ pub struct PoseTrainOptions {
 
 impl Default for PoseTrainOptions {
     fn default() -> Self {
-        Self { rounds: 90, lessons: 4096, passes: 2, batch: 64, learning_rate: 6e-4, acted: 0.45, seed: 1 }
+        Self { rounds: 160, lessons: 4096, passes: 2, batch: 64, learning_rate: 6e-4, acted: 0.45, seed: 1 }
     }
 }
 
@@ -155,14 +156,16 @@ fn maps(
         (other.stretch, Skin::draw(true, rng))
     });
     let sine = place[1] / distance;
-    let standing = radar.standing();
     let looks = 10.0_f64.powf(rng.random_range(0.0..1.6)).sqrt() as f32;
     let mut maps: Vec<Frame> = Vec::with_capacity(times.len());
     for &time in &times {
         let mut map = vec![0.0; RANGES * (ACROSS + UP)];
-        let of = |stretch: &Stretch, skin: &Skin| skin.echoes(&radar, &stretch[time], &velocity(stretch, time));
+        let beside = other.iter().flat_map(|(stretch, skin)| skin.hiding(&stretch[time]));
+        let hiding: Vec<Capsule> = person.hiding(&scene.stretch[time]).chain(beside).collect();
+        let of =
+            |stretch: &Stretch, skin: &Skin| skin.echoes(&radar, (&stretch[time], &velocity(stretch, time)), &hiding);
         let mut echoes = of(&scene.stretch, &person);
-        echoes.extend_from_slice(&standing);
+        echoes.extend(radar.standing(&hiding));
         radar.add(&echoes, (distance, sine), &mut map);
         if let Some((stretch, skin)) = &other {
             radar.add(&of(stretch, skin), (distance, sine), &mut map);
