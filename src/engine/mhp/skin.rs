@@ -1,4 +1,4 @@
-//! The skin that faces the radar: points on trunk, limbs and head, from the Gaussians of the joints and back.
+//! The skin that faces the radar: points on trunk, limbs, head and feet, from the Gaussians of the joints and back.
 //!
 //! PPPR stays the representation, a Gaussian a joint. But a radar sees no joints: its echo comes from the side of the body that
 //! faces it, in the middle of limbs as much as at their ends. With `body = "skin"` the forward model's Gaussians are
@@ -9,6 +9,7 @@
 //! trunk   p between shoulders and hips, f its normal, c = k·f:
 //!         point p − 0.1 m tanh(c/0.15) f, area ∝ c² + 0.03       front or back, whichever is seen
 //! head    point 0.08 m before its middle
+//! foot    point 0.07 m before the ankle, along f
 //! ```
 //!
 //! each round, its amplitude the root of its area; `surface_offset_m` moves no point, for it lies on the skin. The joints' own opacities and scales, by those that their part of the body has
@@ -31,6 +32,9 @@ const LIMBS: [([usize; 2], f64, f64); 8] = [
     ([8, 10], 0.075, 0.42),
     ([10, 12], 0.055, 0.42),
 ];
+/// Ankles, and how far before them the middle of a foot is, m: what tells a front from a back.
+const FEET: [usize; 2] = [11, 12];
+const FOOT_AHEAD_M: f64 = 0.07;
 /// Points of a limb, and of the trunk from shoulders to hips and from left to right.
 const ON_LIMB: usize = 3;
 const DOWN: [f64; 4] = [0.125, 0.375, 0.625, 0.875];
@@ -51,6 +55,8 @@ const TRUNK_SCALE_M: f64 = 0.03;
 const TRUNK_AREA_M2: f64 = 0.35 * 0.5 / 12.0 * 2.0;
 const HEAD_SCALE_M: f64 = 0.036;
 const HEAD_AREA_M2: f64 = 0.035;
+const FOOT_SCALE_M: f64 = 0.04;
+const FOOT_AREA_M2: f64 = 0.012;
 const LIMB_SCALE: f64 = 0.3;
 /// ln of how much brighter and larger than at the start a point may be, and how much smaller; it may be as dim as the removal of
 /// static echoes leaves it.
@@ -62,7 +68,7 @@ const MOST_ALPHA: f64 = 0.999;
 const PLAIN: [f64; 2] = [0.5, 0.08];
 
 /// Points a person.
-pub(super) const POINTS: usize = LIMBS.len() * ON_LIMB + DOWN.len() * ACROSS.len() + 1;
+pub(super) const POINTS: usize = LIMBS.len() * ON_LIMB + DOWN.len() * ACROSS.len() + 1 + FEET.len();
 
 /// What a point is made of: parts with their shares.
 type Shares = SmallVec<[(usize, f64); 4]>;
@@ -77,6 +83,7 @@ enum Kind {
     },
     Trunk,
     Head,
+    Foot,
 }
 
 #[derive(Debug, Clone)]
@@ -115,11 +122,20 @@ struct Seen {
 #[derive(Debug, Clone, Copy)]
 enum Facing {
     /// The side of the limb with these ends and this radius.
-    Limb { ends: [usize; 2], radius_m: f64, side: Side },
+    Limb {
+        ends: [usize; 2],
+        radius_m: f64,
+        side: Side,
+    },
     /// The line of sight, its cosine with the trunk's normal, and how far out along that.
-    Trunk { sight: (Vec3, f64), cosine: f64, out: f64 },
+    Trunk {
+        sight: (Vec3, f64),
+        cosine: f64,
+        out: f64,
+    },
     /// The line of sight.
     Head((Vec3, f64)),
+    Foot,
 }
 
 /// The skin of a skeleton, and its Gaussians in the last evaluation.
@@ -246,6 +262,15 @@ impl Skin {
             ln_scale: HEAD_SCALE_M.ln(),
             amplitude: HEAD_AREA_M2.sqrt(),
         });
+        for ankle in FEET {
+            body.push(Point {
+                kind: Kind::Foot,
+                shares: [(ankle, 1.0)].into_iter().collect(),
+                joints: Shares::new(),
+                ln_scale: FOOT_SCALE_M.ln(),
+                amplitude: FOOT_AREA_M2.sqrt(),
+            });
+        }
         for point in &mut body {
             let of_part = |&(part, share): &(usize, f64)| {
                 let joints = parts.joints_of(part);
@@ -427,6 +452,10 @@ impl Point {
                 add_scaled(&mut at, sight.0, -(HEAD_OUT_M));
                 (1.0, Facing::Head(sight))
             }
+            Kind::Foot => {
+                add_scaled(&mut at, normal.front.0, FOOT_AHEAD_M);
+                (1.0, Facing::Foot)
+            }
         };
         Seen { place, at, share, facing }
     }
@@ -472,6 +501,7 @@ impl Seen {
                 sight_bar(sight, scale(front, cosine_bar), &mut place_bar);
             }
             Facing::Head(sight) => sight_bar(sight, scale(bar, -(HEAD_OUT_M)), &mut place_bar),
+            Facing::Foot => add_scaled(normal_bar, bar, FOOT_AHEAD_M),
         }
         place_bar
     }
