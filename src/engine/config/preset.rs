@@ -101,7 +101,7 @@ impl Preset {
                 // What a body can do is what the prior says.
                 w_kine: 0.0,
                 w_prior: 8e-3,
-                w_net: 1.5e-3,
+                w_net: 2e-3,
                 decode_frames: 12,
                 scatterers: Scatterers::BodyParts,
                 place: StartPlace::Counted,

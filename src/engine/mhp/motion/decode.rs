@@ -5,7 +5,7 @@
 //! looks. A path takes one hypothesis of every frame and costs
 //!
 //! ```text
-//! Σ over frames of (L/L_min + w_net L_net/0.015 + 0.25 away + 0.5 averted)
+//! Σ over frames of (L/L_min + w_net L_net/0.008 + 0.25 away + 0.5 averted)
 //!     + Σ over steps of min(apart/0.5 m, 3) + 0.5 max(turned/rad − 0.6, 0)
 //! ```
 //!
@@ -29,8 +29,9 @@ const MOST: f64 = 3.0;
 /// What looking the other way costs of a frame's lowest loss: of who walks, or falls, and of who stands.
 const AWAY: f64 = 0.25;
 const AVERTED: f64 = 0.5;
-/// The loss of a frame whose maps a body explains: there L_net counts a little more than in the fit.
-const CLEAR_LOSS: f64 = 0.015;
+/// The loss of a frame whose maps a body explains: there L_net counts twice as much as in the fit, for
+/// which way somebody looks it knows better than levels do.
+const CLEAR_LOSS: f64 = 0.008;
 /// Who turns as fast as this about himself, on average over the frames, looks anywhere, rad/s.
 const TURNING_RADPS: f64 = 0.2;
 /// What turning costs a radian of a step, beyond so much, rad.
@@ -295,7 +296,7 @@ mod tests {
     fn a_network_decides_where_nothing_explains_the_maps_well() {
         // Of two bodies a tenth apart the network expects the one that explains less.
         let with = |loss: f64| {
-            let unexpected = Hypothesis { network: 6e-3, ..body(3.0, 0.0, loss) };
+            let unexpected = Hypothesis { network: 3.2e-3, ..body(3.0, 0.0, loss) };
             let found = decode(&[unexpected, body(3.2, 0.0, 1.1 * loss)], &[]).costs;
             (found[1] - found[0], lowest(&found))
         };
