@@ -124,6 +124,11 @@ impl Fit {
         self.status == FitStatus::Running
     }
 
+    /// The settings in force at the iteration that is looked at.
+    pub fn shown_config(&self) -> Option<FitConfig> {
+        Some(self.branch()?.config_at(self.shown_iteration()))
+    }
+
     /// Whether the fit moves no more at the iteration that is looked at: over the last ten iterations the loss changed by
     /// less than 0.1 %, no joint moved more than 2 mm, and none by more than a fifth of what the learning rate lets it, so that the
     /// gradient is small too. `None` before there are as many.
@@ -134,7 +139,6 @@ impl Fit {
         let losses = [before, after].map(|row| row.report.loss);
         let (_, then) = branch.state_at(then)?;
         let (_, now) = branch.state_at(now)?;
-        let config = branch.config_at(self.shown_iteration());
-        Some(has_settled(&config, losses, [then.params.positions(), now.params.positions()]))
+        Some(has_settled(&self.shown_config()?, losses, [then.params.positions(), now.params.positions()]))
     }
 }

@@ -4,7 +4,7 @@ use super::{Dock, Pane, PaneState, PaneStates, Shared, ribbon};
 use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Mark, Named as _, chip, icon_button, iou_color, rows, settings, value_row};
-use crate::config::{Convergence, FIELDS, Field, FieldGroup, FitConfig, Preset, difference};
+use crate::config::{Convergence, EmLoss, FIELDS, Field, FieldGroup, FitConfig, Preset, difference};
 use crate::mhp::{Precision, Scope, StopReason, TERMS, TermId, Terms, formula};
 use crate::session::{Command, FitStatus, IterationRow, Live, LiveFrom, RunSpeed, Session};
 use egui::{Key, RichText, Ui};
@@ -211,10 +211,18 @@ fn status(ui: &mut Ui, shared: &mut Shared<'_>) {
 fn judgement(ui: &mut Ui, session: &Session, row: &IterationRow, tokens: &Tokens) {
     if let Some(iou) = row.iou() {
         let least = row.report.iou.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-        let (word, color) = explained(iou, least, tokens);
-        chip(ui, word, color).on_hover_text(format!(
-            "Mean IoU of the masks {iou:.3}: from 0.5 on most of the measured echo is explained by the fit, and little else is simulated; in part, where one view stays below {LITTLE} ({least:.3})."
-        ));
+        // Which settings stepped there: a fit by levels is no worse for masks that it was not asked for.
+        let by_levels = session.fit.shown_config().is_some_and(|config| config.objective == EmLoss::NccDb);
+        let em = row.report.terms.get("em").filter(|_| by_levels);
+        let (word, color) = explained(em, (iou, least), tokens);
+        let told = match em {
+            Some(em) => format!("L_EM {em:.3}: up to {CLEAR} the levels of the measured maps are those of the body"),
+            None => format!(
+                "Mean IoU of the masks {iou:.3}: from 0.5 on most of the measured echo is explained by the fit, and little else is simulated"
+            ),
+        };
+        let part = format!("; in part, where the masks of one view stay below {LITTLE} ({least:.3}).");
+        chip(ui, word, color).on_hover_text(told + &part);
     }
     if let Some(settled) = session.fit.settled() {
         let (word, color) = if settled { ("settled", tokens.dim) } else { ("moving", tokens.warn) };
@@ -240,12 +248,21 @@ const START_LINE: f32 = 18.0;
 /// An IoU below which a view is not explained, whatever the others are.
 const LITTLE: f64 = 0.3;
 
-/// How well masks of a mean and a least IoU agree, in words; good only where no view is bad.
-fn explained(mean: f64, least: f64, tokens: &Tokens) -> (&'static str, egui::Color32) {
-    match (mean >= 0.5, least >= LITTLE) {
+/// L_EM up to which levels are explained, and beyond which they are of something else.
+const CLEAR: f64 = 0.2;
+const UNLIKE: f64 = 0.38;
+
+/// How well a fit explains maps, in words: by L_EM where levels were compared, else by masks of a mean and a least IoU; good only
+/// where no view is bad.
+fn explained(em: Option<f64>, (mean, least): (f64, f64), tokens: &Tokens) -> (&'static str, egui::Color32) {
+    let (explains, poorly) = match em {
+        Some(em) => (em <= CLEAR, if em <= UNLIKE { tokens.warn } else { tokens.bad }),
+        None => (mean >= 0.5, iou_color(tokens, mean)),
+    };
+    match (explains, least >= LITTLE) {
         (true, true) => ("explained", tokens.ok),
         (true, false) => ("part explained", tokens.warn),
-        (false, _) => ("not explained", iou_color(tokens, mean)),
+        (false, _) => ("not explained", poorly),
     }
 }
 
@@ -489,12 +506,23 @@ mod explained_tests {
         let tokens = theme::DARK;
         for (first, second) in (0..=20).flat_map(|a| (0..=20).map(move |b| (f64::from(a) / 20.0, f64::from(b) / 20.0)))
         {
-            let (word, color) = explained(0.5 * (first + second), first.min(second), &tokens);
             let red = [first, second].iter().any(|iou| iou_color(&tokens, *iou) == tokens.bad);
-            assert!(!(red && color == tokens.ok), "{word} with {first} and {second}");
+            for em in [None, Some(0.06)] {
+                let (word, color) = explained(em, (0.5 * (first + second), first.min(second)), &tokens);
+                assert!(!(red && color == tokens.ok), "{word} with {first} and {second}");
+            }
         }
-        assert_eq!(explained(0.51, 0.29, &tokens).0, "part explained");
-        assert_eq!(explained(0.6, 0.5, &tokens), ("explained", tokens.ok));
+        assert_eq!(explained(None, (0.51, 0.29), &tokens).0, "part explained");
+        assert_eq!(explained(None, (0.6, 0.5), &tokens), ("explained", tokens.ok));
+    }
+
+    #[test]
+    fn levels_are_judged_where_levels_were_compared() {
+        let tokens = theme::DARK;
+        let of = |em: f64| explained(Some(em), (0.42, 0.35), &tokens);
+        assert_eq!(of(0.09), ("explained", tokens.ok));
+        assert_eq!((of(0.3), of(0.5)), (("not explained", tokens.warn), ("not explained", tokens.bad)));
+        assert_eq!(explained(None, (0.42, 0.35), &tokens).0, "not explained");
     }
 }
 
