@@ -29,8 +29,8 @@ const MOST: f64 = 3.0;
 /// What looking the other way costs of a frame's lowest loss: of who walks, or falls, and of who stands.
 const AWAY: f64 = 0.25;
 const AVERTED: f64 = 0.5;
-/// The loss of a frame whose maps a body explains: there L_net counts twice as much as in the fit, for
-/// which way somebody looks it knows better than levels do.
+/// Half the loss of a frame whose maps a body explains: there L_net counts twice as much as in the fit, for it knows better than levels
+/// do which way somebody looks.
 const CLEAR_LOSS: f64 = 0.008;
 /// Who turns as fast as this about himself, on average over the frames, looks anywhere, rad/s.
 const TURNING_RADPS: f64 = 0.2;
