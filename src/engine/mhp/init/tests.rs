@@ -29,7 +29,8 @@ fn unexplained(expected: Vec<Vec<Hypothesis>>) -> Hypotheses {
 
 /// A frame in which a search ended at these bodies of each person, and a network expects those.
 fn searched(persons: Vec<Vec<Hypothesis>>, expected: Vec<Vec<Hypothesis>>) -> Hypotheses {
-    let searched = Searched { begun: 1.0, moved: vec![[0.0; 3]; persons.len()], persons, expected };
+    let moved = vec![[0.0; 3]; persons.len()];
+    let searched = Searched { begun: 1.0, moved, persons, expected, network: Vec::new() };
     let found = Some(Ok(searched));
     Hypotheses { own: Vec::new(), persons: Vec::new(), searched: found, peaks: Vec::new(), notes: Vec::new() }
 }

@@ -4,10 +4,11 @@
 //! pair of persons whose hips are nearer than shoulders let them stand side by side,
 //!
 //! ```text
-//! ((D − d)/σ_d)² where d < D,  d = |t_a − t_b| on the floor plan,  D = 0.5 m, σ_d = 0.05 m
+//! ((D − d)/σ_d)² where d < D,  d = |t_a − t_b| on the floor plan,  D = 0.45 m, σ_d = 0.05 m
 //! ```
 //!
-//! with t where the hips are in the middle of the window, and one for every person who is farther from where it began, t₀, than
+//! with t where the hips are in the middle of the window, and the same with t the middle of all joints in the frame that is fitted,
+//! for hips apart under one pair of shoulders are no two people; and one for every person who is farther from where it began, t₀, than
 //! counting is wrong by: who stands where static echoes were removed is not seen, and his body would go to where others are
 //!
 //! ```text
@@ -17,7 +18,7 @@
 //! The search begins where people were counted, the fit where the search ended. One alone goes where he wants.
 
 /// D and σ_d, m.
-const NEAREST_M: f64 = 0.5;
+const NEAREST_M: f64 = 0.45;
 const SPREAD_M: f64 = 0.05;
 /// D₀ and σ₀, m.
 const FREE_M: f64 = 0.35;
@@ -25,28 +26,28 @@ const ASTRAY_M: f64 = 0.1;
 /// The least d, m: two at one point have a slope of zero instead of none.
 const LEAST_M: f64 = 1e-6;
 
-/// The sum over the pairs of persons of `stride` coordinates each; adds `gain` times its gradient to `bars`.
-pub(super) fn overlap(coordinates: &[f64], stride: usize, gain: f64, bars: &mut [f64]) -> f64 {
-    let persons = coordinates.len() / stride.max(1);
+/// The sum over the pairs of persons at these `places`; `pull` is told of persons `gain` times its gradient by where they are.
+pub(super) fn overlap(places: &[[f64; 2]], gain: f64, mut pull: impl FnMut(usize, [f64; 2])) -> f64 {
     let mut sum = 0.0;
-    for a in 0..persons {
+    for a in 0..places.len() {
         for b in 0..a {
-            let (a, b) = (a * stride, b * stride);
-            let way = [0, 1].map(|k| coordinates[a + k] - coordinates[b + k]);
+            let way = [0, 1].map(|k| places[a][k] - places[b][k]);
             let distance = way[0].hypot(way[1]).max(LEAST_M);
-            let off = (NEAREST_M - distance).max(0.0) / SPREAD_M;
+            if distance >= NEAREST_M {
+                continue;
+            }
+            let off = (NEAREST_M - distance) / SPREAD_M;
             sum += off * off;
             let slope = -2.0 * gain * off / (SPREAD_M * distance);
-            for k in 0..2 {
-                bars[a + k] += slope * way[k];
-                bars[b + k] -= slope * way[k];
-            }
+            pull(a, way.map(|x| slope * x));
+            pull(b, way.map(|x| -slope * x));
         }
     }
     sum
 }
 
-/// The sum over the persons of how far each is from its own of `places`, where it began; adds as [`overlap`] does.
+/// The sum over the persons, of `stride` coordinates each, of how far each is from its own of `places`, where it began; adds `gain`
+/// times its gradient to `bars`.
 pub(super) fn astray(coordinates: &[f64], stride: usize, places: &[[f64; 2]], gain: f64, bars: &mut [f64]) -> f64 {
     let mut sum = 0.0;
     for (k, place) in places.iter().enumerate() {
@@ -88,9 +89,15 @@ mod tests {
 
     #[test]
     fn who_stands_in_another_is_pushed_away() {
-        let value = checked(|coordinates, gain, bars| overlap(coordinates, 3, gain, bars));
+        let value = checked(|coordinates, gain, bars| {
+            let places: Vec<[f64; 2]> = coordinates.chunks_exact(3).map(|of| [of[0], of[1]]).collect();
+            overlap(&places, gain, |person, slope| {
+                bars[3 * person] += slope[0];
+                bars[3 * person + 1] += slope[1];
+            })
+        });
         let distance = 0.1f64.hypot(0.15);
-        assert!((value - ((0.5 - distance) / 0.05).powi(2)).abs() < 1e-9);
+        assert!((value - ((0.45 - distance) / 0.05).powi(2)).abs() < 1e-9);
     }
 
     #[test]
@@ -104,9 +111,9 @@ mod tests {
 
     #[test]
     fn one_alone_and_two_at_one_point_are_finite() {
-        let mut bars = [0.0; 6];
-        assert!(overlap(&PERSONS[..3], 3, 1.0, &mut bars) == 0.0);
-        let both = overlap(&[1.0, 2.0, 3.0, 1.0, 2.0, 3.0], 3, 1.0, &mut bars);
-        assert!((both - 100.0).abs() < 1e-3 && bars.iter().all(|bar| *bar == 0.0));
+        let mut pulls = Vec::new();
+        assert!(overlap(&[[1.0, 2.0]], 1.0, |_, slope| pulls.push(slope)) == 0.0 && pulls.is_empty());
+        let both = overlap(&[[1.0, 2.0]; 2], 1.0, |_, slope| pulls.push(slope));
+        assert!((both - 81.0).abs() < 1e-3 && pulls.as_flattened().iter().all(|slope| *slope == 0.0));
     }
 }

@@ -1,9 +1,9 @@
 //! A window of frames fitted as one: the body moves through a space of poses that real people have taught.
 //!
 //! With `parameterization = "motion"` a fit's coordinates are, for each person, place (where the floor is known, height above it:
-//! [`ground`]), heading, size and tilt ([`tilt`]) in the middle of the window and the coefficients of `body::MotionPrior` ([`space`]). They place the joints in all frames of the window at once; each
-//! frame compares its own maps (`mhp/frame_em.rs`), in which powers along a Doppler axis have been added and what is finer across the
-//! sight than a limb has been blurred (`mhp/reduced.rs`), and
+//! [`ground`]), heading, size and tilt ([`tilt`]) in the middle of the window and the coefficients of `body::MotionPrior` ([`space`]).
+//! They place the joints in all frames of the window at once; each frame compares its own maps (`mhp/frame_em.rs`), in which powers
+//! along a Doppler axis have been added and what is finer across the sight than a limb has been blurred (`mhp/reduced.rs`), and
 //!
 //! ```text
 //! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior + w_net · L_net
@@ -50,7 +50,7 @@ use crate::body::{Group, MotionPrior, Pppr};
 use crate::config::{EmLoss, FitConfig, Height};
 use crate::geometry::{Vec3, add_scaled, mean, norm};
 use serde::{Deserialize, Serialize};
-use smallvec::SmallVec;
+use smallvec::{SmallVec, smallvec};
 use space::{BODY, Detail, HEIGHT, LN_SIZE, MOST_JOINTS, PoseSpace, STILL, Stance, TILT, YAW};
 use static_echo::StaticEchoModel;
 use std::iter::zip;
@@ -198,7 +198,7 @@ pub(super) fn is_unlike(unlikeness: f64, persons: usize) -> bool {
 }
 
 impl Window {
-    /// That of a fit: see [`Self::new`].
+    /// That of a fit: see [`Self::new`]; the network is asked.
     ///
     /// # Errors
     /// Where a position is not finite.
@@ -208,7 +208,8 @@ impl Window {
         precision: Precision,
         initial: &Pppr,
     ) -> Result<Result<Self, Held>, FitError> {
-        Self::new(problem, config, (precision, Detail::Fit), initial)
+        let window = Self::new(problem, config, (precision, Detail::Fit), initial)?;
+        Ok(window.map(|window| window.ask(problem, config, initial)))
     }
 
     /// Whether the window's maps are explained by persons with these coordinates.
@@ -225,7 +226,7 @@ impl Window {
     }
 
     /// Around the persons of `initial`, who move as their velocities say; or why they stay where they are. The space of their poses
-    /// has this `detail`.
+    /// has this `detail`, and no network is asked.
     ///
     /// # Errors
     /// Where a position is not finite.
@@ -285,14 +286,20 @@ impl Window {
         let clear = walks || problem.static_removed;
         let mut window =
             Self { space, echo, own, frames, stride, clear, scarcity, places: Vec::new(), expected: Vec::new() };
-        if config.w_net > 0.0 {
-            let about = |person| Expected::about(problem, config, mean(initial.person(person)));
-            window.expected = (0..initial.shape().persons).map(about).collect();
-        }
         if initial.shape().persons > 1 {
             window.places = window.coordinates_of(initial).chunks_exact(stride).map(|of| [of[0], of[1]]).collect();
         }
         Ok(Ok(window))
+    }
+
+    /// Asks the network where the persons of `initial` are expected, where it is to be asked.
+    fn ask(mut self, problem: &Problem, config: &FitConfig, initial: &Pppr) -> Self {
+        if config.w_net > 0.0 {
+            let places: Vec<Vec3> = (0..initial.shape().persons).map(|person| mean(initial.person(person))).collect();
+            let about = |person| Expected::about(problem, config, &places, person);
+            self.expected = (0..places.len()).map(about).collect();
+        }
+        self
     }
 
     /// Where the network expects a person; `None` where it is not asked, or knows nothing.
@@ -378,7 +385,7 @@ impl Window {
         looks: Option<&mut Pppr>,
         loss: &mut WindowLoss,
     ) {
-        let Self { space, echo, frames, stride, scarcity, places, own: own_frame, expected, .. } = self;
+        let Self { space, echo, frames, stride, scarcity, .. } = self;
         let joints = params.shape().joints;
         loss.gradient.clear();
         loss.gradient.resize(coordinates.len(), 0.0);
@@ -438,20 +445,44 @@ impl Window {
         for (own, bars) in coordinates.chunks_exact(*stride).zip(loss.gradient.chunks_exact_mut(*stride)) {
             loss.prior += prior_share * space.unlikeliness(own, prior_gain, bars);
         }
+        self.weigh_joints(config, coordinates, &stances, loss);
+    }
+
+    /// Adds what the network and other persons say of persons with these coordinates and stances.
+    fn weigh_joints(&self, config: &FitConfig, coordinates: &[f64], stances: &[Stance], loss: &mut WindowLoss) {
         loss.network = 0.0;
-        let each = zip(coordinates.chunks_exact(*stride), loss.gradient.chunks_exact_mut(*stride));
-        for (person, ((own, bars), expected)) in zip(each, &*expected).enumerate() {
+        if stances.len() == 1 && self.expected(0).is_none() {
+            return;
+        }
+        let (Self { space, stride, own: own_frame, .. }, persons) = (self, stances.len() as f64);
+        let joints = space.joints;
+        let mut poses: SmallVec<[[Vec3; MOST_JOINTS]; 4]> = smallvec![[[0.0; 3]; MOST_JOINTS]; stances.len()];
+        let mut slopes = poses.clone();
+        for ((own, stance), pose) in zip(zip(coordinates.chunks_exact(*stride), stances), &mut poses) {
+            space.pose(own, stance, *own_frame, &mut pose[..joints]);
+        }
+        for ((pose, bar), expected) in zip(zip(&poses, &mut slopes), &self.expected) {
             let Some(expected) = expected else { continue };
-            let (mut pose, mut bar) = ([[0.0; 3]; MOST_JOINTS], [[0.0; 3]; MOST_JOINTS]);
-            space.pose(own, &stances[person], *own_frame, &mut pose[..joints]);
-            let gain = config.w_net / persons;
-            loss.network += expected.misfit(&pose[..joints], gain, &mut bar[..joints]) / persons;
-            let moved = (&pose[..joints], &bar[..joints]);
-            space.pull_back(own, &stances[person], *own_frame, (moved, None), bars);
+            loss.network += expected.misfit(&pose[..joints], config.w_net / persons, &mut bar[..joints]) / persons;
         }
         // The other parts are means over persons and grow as frames get fewer; nobody stands in another, however many look.
-        loss.prior += apart::overlap(coordinates, *stride, config.w_prior, &mut loss.gradient);
-        loss.prior += apart::astray(coordinates, *stride, places, config.w_prior, &mut loss.gradient);
+        let hips: SmallVec<[[f64; 2]; 4]> = coordinates.chunks_exact(*stride).map(|own| [own[0], own[1]]).collect();
+        loss.prior += apart::overlap(&hips, config.w_prior, |person, slope| {
+            zip(&mut loss.gradient[person * stride..], slope).for_each(|(bar, slope)| *bar += slope);
+        });
+        let middle = |pose: &[Vec3; MOST_JOINTS]| {
+            let [x, y, _] = mean(&pose[..joints]);
+            [x, y]
+        };
+        let middles: SmallVec<[[f64; 2]; 4]> = poses.iter().map(middle).collect();
+        loss.prior += apart::overlap(&middles, config.w_prior, |person, [x, y]| {
+            slopes[person][..joints].iter_mut().for_each(|bar| add_scaled(bar, [x, y, 0.0], 1.0 / joints as f64));
+        });
+        let each = zip(coordinates.chunks_exact(*stride), loss.gradient.chunks_exact_mut(*stride));
+        for ((own, bars), (stance, (pose, bar))) in zip(each, zip(stances, zip(&poses, &slopes))) {
+            space.pull_back(own, stance, *own_frame, ((&pose[..joints], &bar[..joints]), None), bars);
+        }
+        loss.prior += apart::astray(coordinates, *stride, &self.places, config.w_prior, &mut loss.gradient);
     }
 
     /// Adds what a gradient by the joints of the frame that is fitted says of the coordinates.

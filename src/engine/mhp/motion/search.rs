@@ -13,6 +13,7 @@ use super::{
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::geometry::{Vec3, mean, norm, sub};
+use crate::mhp::pose_network::Expected;
 use crate::mhp::skin::radar_place;
 use crate::mhp::{FitError, Precision, Problem, tiles};
 use std::f64::consts::{PI, TAU};
@@ -22,7 +23,7 @@ use std::ops::Range;
 const SIEVES: [Sieve; 3] = [
     Sieve { steps: 4, every: 4, held: true, kept: 6 },
     Sieve { steps: 8, every: 2, held: false, kept: 4 },
-    Sieve { steps: 14, every: 1, held: false, kept: 3 },
+    Sieve { steps: 10, every: 1, held: false, kept: 3 },
 ];
 /// Evaluations of what is left, and of each body that is carried on from another frame.
 const FINE: usize = 12;
@@ -33,7 +34,7 @@ const MOST_WORK: f64 = 2e10;
 const PLAIN: f64 = 10.0;
 /// Evaluations of a person's search beside those of the first sieve, with those of what is carried on and of what the network
 /// expects, and those of a start in it, in whole windows.
-const LATER: f64 = 349.0;
+const LATER: f64 = 261.0;
 const FIRST: f64 = 5.0 / 4.0;
 /// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start, but for what a network
 /// expects, whose weight says whether it is asked.
@@ -103,6 +104,8 @@ pub(in crate::mhp) struct Searched {
     pub(in crate::mhp) persons: Vec<Vec<Hypothesis>>,
     /// The bodies that a network expects each person to be, as it says them; of nobody where it is not asked.
     pub(in crate::mhp) expected: Vec<Vec<Hypothesis>>,
+    /// All that it says of them.
+    pub(in crate::mhp) network: Vec<Option<Expected>>,
     /// How each person is to move, m, where the pose there is not believed.
     pub(in crate::mhp) moved: Vec<Vec3>,
 }
@@ -313,7 +316,7 @@ pub(in crate::mhp) fn search(
 ) -> Result<Result<Searched, Held>, FitError> {
     let config = &weighted(config);
     let mut window = match Window::new(problem, config, (Precision::F32, Detail::Search), params)? {
-        Ok(window) => window,
+        Ok(window) => window.ask(problem, config, params),
         Err(held) => return Ok(Err(held)),
     };
     let Some(most_starts) = affordable(&window, config, params) else { return Ok(Err(Held::Large)) };
@@ -400,10 +403,11 @@ pub(in crate::mhp) fn search(
     // Among reflectors that nothing is known of, another place may be theirs.
     let clearer = window.clear && em < CLEARER * begun_em;
     let moved = (0..persons.len()).map(|k| if clearer { way(problem, params, k, &persons[k]) } else { [0.0; 3] });
-    Ok(Ok(Searched { begun, moved: moved.collect(), persons, expected }))
+    let moved = moved.collect();
+    Ok(Ok(Searched { begun, moved, persons, expected, network: window.expected }))
 }
 
-/// Adds to what a search around the one person of `params` ended at what bodies of other frames become in this one, each with its
+/// Adds to what a search around the one person of these `params` ended at what bodies of other frames become in this one, each with its
 /// time, s after this frame, moved and turned as it goes as a whole.
 ///
 /// # Errors
@@ -418,6 +422,7 @@ pub(in crate::mhp) fn carry_on(
     let Some(found) = searched.persons.first_mut().filter(|_| !others.is_empty()) else { return Ok(()) };
     let config = &weighted(config);
     let Ok(mut window) = Window::new(problem, config, (Precision::F32, Detail::Search), params)? else { return Ok(()) };
+    window.expected.clone_from(&searched.network);
     let mut search = Search::new((problem, config), &mut window, params);
     for (t_s, other) in others {
         let mut moved = params.clone();

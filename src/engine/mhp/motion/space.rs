@@ -60,7 +60,7 @@ const LIES: f64 = 0.1;
 /// Poses of a skeleton at some times.
 #[derive(Debug, Clone)]
 pub(super) struct PoseSpace {
-    joints: usize,
+    pub(super) joints: usize,
     components: usize,
     /// When the frames are, s after the window's middle.
     times_s: Vec<f64>,

@@ -59,15 +59,23 @@ fn problem(rng: &mut StdRng) -> Problem {
 
 /// Somebody who walks, as the prior has him.
 fn person(rng: &mut StdRng, window: Option<&Window>) -> (Vec<f64>, Pppr) {
-    let mut params = Pppr::zeros(PpprShape { persons: 1, joints: 17, doppler_features: 2 });
-    for joint in 0..17 {
-        params.set_vec3(Group::Position, joint, [3.0, 0.1, 0.05 * joint as f64 - 0.4]);
+    people(rng, window, 1)
+}
+
+/// Some who walk, each 0.3 m beside the one before.
+fn people(rng: &mut StdRng, window: Option<&Window>, persons: usize) -> (Vec<f64>, Pppr) {
+    let mut params = Pppr::zeros(PpprShape { persons, joints: 17, doppler_features: 2 });
+    let aside = |person: usize| 0.1 + 0.3 * person as f64;
+    for joint in 0..17 * persons {
+        params.set_vec3(Group::Position, joint, [3.0, aside(joint / 17), 0.05 * (joint % 17) as f64 - 0.4]);
         params.set_vec3(Group::LogScale, joint, [-2.5; 3]);
         params.joint_mut(Group::Rotation, joint)[0] = 1.0;
     }
     let stride = window.map_or(BODY + 1, |window| window.stride);
-    let mut coordinates: Vec<f64> = (0..stride).map(|_| rng.random_range(-0.6..0.6)).collect();
-    coordinates[..BODY].copy_from_slice(&[3.0, 0.1, 0.0, 0.4, 0.08, -1.5, 0.1, -0.3, 0.4, 0.9]);
+    let mut coordinates: Vec<f64> = (0..persons * stride).map(|_| rng.random_range(-0.6..0.6)).collect();
+    for (person, own) in coordinates.chunks_exact_mut(stride).enumerate() {
+        own[..BODY].copy_from_slice(&[3.0, aside(person), 0.0, 0.4, 0.08, -1.5, 0.1, -0.3, 0.4, 0.9]);
+    }
     if let Some(window) = window {
         window.place(&coordinates, &mut params);
     }
@@ -76,28 +84,33 @@ fn person(rng: &mut StdRng, window: Option<&Window>) -> (Vec<f64>, Pppr) {
 
 #[test]
 fn the_gradient_by_the_coordinates_agrees_with_central_differences() {
-    agrees(&config(), None);
+    agrees(&config(), None, 1);
 }
 
 #[test]
 fn so_does_that_of_a_body_on_the_floor() {
-    agrees(&FitConfig { height: Height::Floor, ..config() }, Some(1.0));
+    agrees(&FitConfig { height: Height::Floor, ..config() }, Some(1.0), 1);
 }
 
 #[test]
 fn so_does_that_of_a_body_that_the_network_expects_elsewhere() {
-    agrees(&FitConfig { w_net: 0.02, ..config() }, None);
+    agrees(&FitConfig { w_net: 0.02, ..config() }, None, 1);
 }
 
-fn agrees(config: &FitConfig, height_m: Option<f64>) {
+#[test]
+fn so_do_those_of_two_who_stand_in_each_other() {
+    agrees(&FitConfig { w_net: 0.02, height: Height::Floor, ..config() }, Some(1.0), 2);
+}
+
+fn agrees(config: &FitConfig, height_m: Option<f64>, persons: usize) {
     let rng = &mut StdRng::seed_from_u64(3);
     let mut problem = problem(rng);
     problem.radar.height_m = height_m;
-    let (_, initial) = person(rng, None);
+    let (_, initial) = people(rng, None, persons);
     let mut window = Window::fitted(&problem, config, Precision::F64, &initial).unwrap().unwrap();
     assert_eq!((window.frames.len(), window.own), (4, 1), "the frames are those within reach");
     assert_eq!(window.space.ground.is_some(), height_m.is_some());
-    let (coordinates, params) = person(rng, Some(&window));
+    let (coordinates, params) = people(rng, Some(&window), persons);
     let mut loss = WindowLoss::default();
     let mut value = |coordinates: &[f64], loss: &mut WindowLoss| {
         window.evaluate((&problem, config), Precision::F64, (coordinates, &params), None, loss);

@@ -17,7 +17,7 @@ pub(super) const UP: usize = 40;
 const RANGE_M: [f64; 2] = [-0.9, 0.9];
 const ACROSS_M: [f64; 2] = [-0.85, 0.85];
 const UP_M: [f64; 2] = [-1.3, 1.15];
-/// Of a cell's levels over time: what stands there also while the person is elsewhere; of fewer frames nothing is known.
+/// Of a cell's powers over time: what stands there also while the person is elsewhere; of fewer frames nothing is known.
 const STANDING: f64 = 0.17;
 const FEWEST: usize = 4;
 /// Levels are told from so far below the brightest, and as (level + MIDDLE)/SPREAD, dB.
@@ -51,9 +51,11 @@ impl Seen {
 #[derive(Debug, Clone)]
 pub(super) struct Glimpse {
     pub(super) seen: Seen,
+    /// World frame, m.
+    pub(super) place: Vec3,
     /// Where the radar looks from, and the direction from there to the place on the floor plan: what is seen is told in them.
-    pub(super) origin: Vec3,
-    pub(super) sight: [f64; 2],
+    origin: Vec3,
+    sight: [f64; 2],
 }
 
 /// What is looked at of a view. One that resolves both angles shows both, each summed over what the other one resolves.
@@ -70,7 +72,7 @@ pub(super) fn about(distance_m: f64, sine: f64, height_m: f64) -> [f32; 3] {
 
 /// A plane that no view shows.
 pub(super) fn nothing(cells: usize) -> Vec<f32> {
-    vec![(FLOOR_DB + MIDDLE_DB) / SPREAD_DB; CHANNELS * RANGES * cells]
+    vec![number(FLOOR_DB); CHANNELS * RANGES * cells]
 }
 
 fn at([lo, hi]: [f64; 2], k: usize, of: usize) -> f64 {
@@ -92,25 +94,30 @@ pub(super) fn up_m(column: usize) -> f64 {
     at(UP_M, column, UP)
 }
 
-/// A plane as the network sees it: levels of the window's maps, and what stands there over `all` times, dB; each C order.
+/// A plane as the network sees it, of powers of the window's maps, and over `all` times; each C order.
 pub(super) fn told(window: &[&[f32]], all: &[&[f32]]) -> Vec<f32> {
     let cells = window.first().map_or(0, |map| map.len());
     let mut seen = window.concat();
-    let brightest = seen.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    if all.len() < FEWEST {
-        seen.resize(seen.len() + cells, f32::NEG_INFINITY);
-    } else {
+    let brightest = level_db(seen.iter().copied().fold(0.0, f32::max));
+    if all.len() >= FEWEST {
         let rank = ((all.len() - 1) as f64 * STANDING).round() as usize;
         let mut over_time = vec![0.0; all.len()];
         for cell in 0..cells {
-            over_time.iter_mut().zip(all).for_each(|(level, map)| *level = map[cell]);
+            over_time.iter_mut().zip(all).for_each(|(power, map)| *power = map[cell]);
             seen.push(*over_time.select_nth_unstable_by(rank, f32::total_cmp).1);
         }
     }
-    for level in &mut seen {
-        *level = ((*level - brightest).max(FLOOR_DB) + MIDDLE_DB) / SPREAD_DB;
-    }
+    seen.iter_mut().for_each(|x| *x = number((level_db(*x) - brightest).max(FLOOR_DB)));
+    seen.resize((window.len() + 1) * cells, number(FLOOR_DB));
     seen
+}
+
+fn number(level_db: f32) -> f32 {
+    (level_db + MIDDLE_DB) / SPREAD_DB
+}
+
+fn level_db(power: f32) -> f32 {
+    10.0 * (power + f32::MIN_POSITIVE).log10()
 }
 
 impl Glimpse {
@@ -136,7 +143,13 @@ impl Glimpse {
             vertical: map(found[1], Plane::Vertical),
             about: about(distance, azimuth.sin(), problem.radar.height_m.unwrap_or(USUAL_HEIGHT_M)),
         };
-        Some(Self { seen, origin, sight })
+        Some(Self { seen, place, origin, sight })
+    }
+
+    /// Where something is that is told along the sight, to its left, and up from the radar, from the place, m: world frame, m.
+    pub(super) fn world(&self, [along, left, up]: Vec3) -> Vec3 {
+        let ([cos, sin], [x, y, _]) = (self.sight, self.place);
+        [x + cos * along - sin * left, y + sin * along + cos * left, self.origin[2] + up]
     }
 }
 
@@ -192,12 +205,12 @@ fn levels(problem: &Problem, config: &FitConfig, of: usize, (plane, place): (Pla
     let taps = Taps::new(view, axes, &plane.points(view, place));
     let neighbours = problem.neighbours_in(config.frames_around);
     let mut all: Vec<(f64, Vec<f32>)> = Vec::with_capacity(neighbours.len() + 1);
-    all.push((0.0, taps.levels(view, problem.map(of))));
-    all.extend(neighbours.iter().map(|frame| (frame.offset_s, taps.levels(view, frame.map(of)))));
+    all.push((0.0, taps.powers(view, problem.map(of))));
+    all.extend(neighbours.iter().map(|frame| (frame.offset_s, taps.powers(view, frame.map(of)))));
     let nearest = |t_s: f64| all.iter().min_by(|a, b| (a.0 - t_s).abs().total_cmp(&(b.0 - t_s).abs()));
     let window: Vec<&[f32]> =
-        TIMES_S.iter().filter_map(|&t_s| nearest(t_s)).map(|(_, levels)| levels.as_slice()).collect();
-    told(&window, &all.iter().map(|(_, levels)| levels.as_slice()).collect::<Vec<_>>())
+        TIMES_S.iter().filter_map(|&t_s| nearest(t_s)).map(|(_, powers)| powers.as_slice()).collect();
+    told(&window, &all.iter().map(|(_, powers)| powers.as_slice()).collect::<Vec<_>>())
 }
 
 /// The cells of a map that each point is read from, and their weights.
@@ -235,16 +248,16 @@ impl Taps {
         Self { cells: points.iter().map(of_point).collect(), along }
     }
 
-    /// dB of the power at each point.
-    fn levels(&self, view: &View, map: &[f64]) -> Vec<f32> {
+    /// The power at each point.
+    fn powers(&self, view: &View, map: &[f64]) -> Vec<f32> {
         let power = |cell: usize| -> f64 {
             let of = |at: usize| map.get(cell + at).copied().filter(|h| h.is_finite()).unwrap_or(0.0);
             self.along.iter().map(|&at| view.quantity.power(of(at))).sum()
         };
-        let level = |taps: &[(usize, f32); 4]| {
+        let of_point = |taps: &[(usize, f32); 4]| {
             let sum: f64 = taps.iter().filter(|tap| tap.1 > 0.0).map(|&(cell, w)| f64::from(w) * power(cell)).sum();
-            10.0 * (sum as f32 + f32::MIN_POSITIVE).log10()
+            sum as f32
         };
-        self.cells.iter().map(level).collect()
+        self.cells.iter().map(of_point).collect()
     }
 }

@@ -11,7 +11,8 @@
 //!
 //! with |·| rounded off where it is smaller than b, and p(μ) what the bodies themselves have. The power is what joints know of each
 //! other. It is asked of what is seen and of that in a mirror (`Seen::mirrored`), and what it says there is turned back: an ensemble of
-//! two by one set of weights, whose errors are not the same. It was taught (`train-pose-network`) with recorded people and the actors
+//! two by one set of weights, whose errors are not the same. Of several people it is asked of each, and a body whose trunk is nearer to
+//! where another one is is left out. It was taught (`train-pose-network`) with recorded people and the actors
 //! of the synthetic source, turned every way, before radars whose widths, sidelobes, noise, clutter and ghosts are drawn anew for each
 //! lesson: neither simulator that it is judged by is among them. It says nothing of which way people usually look: that is the prior's
 //! and the path's affair.
@@ -29,7 +30,7 @@ pub use train::{Actors, POSE_STRETCH, PoseTrainOptions, pose_network_reach, trai
 use super::Problem;
 use crate::body::{COCO_JOINTS, Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::{Vec3, add_scaled, mean, norm, sub};
+use crate::geometry::{Vec3, add_scaled, flat_distance, mean, norm, sub};
 use glimpse::{Glimpse, Seen};
 use layers::{BODIES, JOINTS, Layers, OUT};
 use smallvec::SmallVec;
@@ -40,10 +41,12 @@ use std::sync::OnceLock;
 const TRUNK: [usize; 4] = [5, 6, 11, 12];
 /// What the joints of a body say counts as much as that of so many that know nothing of each other, of one.
 const APART: f64 = 0.3;
-/// How often it looks, each time about where it expected the trunk before.
+/// How often it looks, each time about where it expected the trunk before, if that is farther away than this, m.
 const LOOKS: usize = 2;
-/// A body that is less likely is no start.
+const NEAR_M: f64 = 0.05;
+/// A body that is less likely is no start, and there are so many starts at most.
 const LEAST: f64 = 0.05;
+const MOST: usize = 4;
 /// How often a look is asked of: as it is, and in a mirror.
 const SIDES: usize = 2;
 /// Joint of the other side.
@@ -100,23 +103,8 @@ impl MixtureDensityNetwork {
         self.0.to_tensors(told)
     }
 
-    /// What it says of what is seen, and of that in a mirror: ln of the chance of each body, and μ (along the sight, to its left, and up
-    /// from the radar, from the place, m) and b of its joints.
-    fn bodies(&self, seen: &Seen) -> Bodies {
-        let turned_back = |(chance, joints): (f64, [(Vec3, f64); JOINTS])| {
-            let joint = |joint: usize| {
-                let ([along, left, up], b) = joints[joint];
-                ([along, -left, up], b)
-            };
-            (chance, MIRRORED.map(joint))
-        };
-        let mut all = self.said(seen);
-        all.extend(self.said(&seen.mirrored()).into_iter().map(turned_back));
-        all.iter_mut().for_each(|(ln_chance, _)| *ln_chance -= (SIDES as f64).ln());
-        all
-    }
-
-    /// The same of what is seen alone.
+    /// What it says of what is seen: ln of the chance of each body, and μ (along the sight, to its left, and up from the radar, from the
+    /// place, m) and b of its joints.
     fn said(&self, seen: &Seen) -> Bodies {
         let said: Vec<f64> = self.0.run(seen).into_iter().map(f64::from).collect();
         let (chances, joints) = said.split_at(BODIES);
@@ -124,6 +112,18 @@ impl MixtureDensityNetwork {
         let joint = |of: &[f64]| ([of[0], of[1], of[2]], of[3].exp());
         let body = |of: &[f64]| std::array::from_fn(|k| joint(&of[k * OUT..(k + 1) * OUT]));
         zip(chances, joints.chunks_exact(JOINTS * OUT)).map(|(chance, of)| (chance - whole, body(of))).collect()
+    }
+
+    /// What it says of that in a mirror, turned back.
+    fn said_mirrored(&self, seen: &Seen) -> Bodies {
+        let turned_back = |(ln_chance, joints): (f64, [(Vec3, f64); JOINTS])| {
+            let joint = |joint: usize| {
+                let ([along, left, up], b) = joints[joint];
+                ([along, -left, up], b)
+            };
+            (ln_chance, MIRRORED.map(joint))
+        };
+        self.said(&seen.mirrored()).into_iter().map(turned_back).collect()
     }
 }
 
@@ -133,42 +133,62 @@ fn ln_sum_exp(of: impl Iterator<Item = f64> + Clone) -> f64 {
     most + of.map(|x| (x - most).exp()).sum::<f64>().ln()
 }
 
+/// Whether a trunk is as near the place of this person as that of any other, over the floor.
+fn belongs(trunk: Vec3, places: &[Vec3], person: usize) -> bool {
+    let off = |place: &Vec3| flat_distance(*place, trunk);
+    places.get(person).is_some_and(|own| places.iter().all(|other| off(own) <= off(other)))
+}
+
 impl Expected {
-    /// The person about `place`, world frame, m; `None` where no view has a range and an angle, or no joint is known.
-    pub(super) fn about(problem: &Problem, config: &FitConfig, place: Vec3) -> Option<Self> {
+    /// The person about one of `places`, world frame, m, where several may be; `None` where no view has a range and an angle, no joint is
+    /// known, or whoever is expected is most likely another of them: it knows one from those beside by nothing but where they are.
+    pub(super) fn about(problem: &Problem, config: &FitConfig, places: &[Vec3], person: usize) -> Option<Self> {
         let network = MixtureDensityNetwork::committed()?;
         let known: Vec<Option<usize>> =
             problem.skeleton.joints.iter().map(|name| COCO_JOINTS.iter().position(|known| known == name)).collect();
         if known.iter().flatten().count() == 0 {
             return None;
         }
-        let (mut at, mut found) = (place, None);
-        for _ in 0..LOOKS {
-            let glimpse = Glimpse::at(problem, config, at)?;
-            let ([cos, sin], origin) = (glimpse.sight, glimpse.origin);
-            let world = |[along, left, up]: Vec3| {
-                [at[0] + cos * along - sin * left, at[1] + sin * along + cos * left, origin[2] + up]
-            };
-            let bodies = network.bodies(&glimpse.seen);
-            let likeliest = bodies.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-            let trunk = mean(&TRUNK.map(|joint| world(likeliest.1[joint].0)));
-            let body = |(ln_chance, joints): &(f64, [(Vec3, f64); JOINTS])| {
-                let joint = |k: usize| (world(joints[k].0), joints[k].1);
-                ExpectedBody::new(*ln_chance, known.iter().map(|known| known.map(joint)).collect())
-            };
-            found = Some(bodies.iter().map(body).collect::<SmallVec<_>>());
-            at = [trunk[0], trunk[1], at[2]];
+        let place = *places.get(person)?;
+        let trunk = |glimpse: &Glimpse, joints: &[(Vec3, f64); JOINTS]| {
+            glimpse.world(mean(&TRUNK.map(|joint| joints[joint].0)))
+        };
+        let own = |trunk: Vec3| belongs(trunk, places, person);
+        let mut glimpse = Glimpse::at(problem, config, place)?;
+        let mut said = network.said(&glimpse.seen);
+        for _ in 1..LOOKS {
+            let trunks = said.iter().map(|(ln_chance, joints)| (ln_chance, trunk(&glimpse, joints)));
+            let likeliest = trunks.filter(|(_, trunk)| own(*trunk)).max_by(|a, b| a.0.total_cmp(b.0));
+            let Some(there) = likeliest.map(|(_, [x, y, _])| [x, y, place[2]]) else { break };
+            if flat_distance(there, glimpse.place) <= NEAR_M {
+                break;
+            }
+            glimpse = Glimpse::at(problem, config, there)?;
+            said = network.said(&glimpse.seen);
         }
-        let bodies = found?;
+        said.extend(network.said_mirrored(&glimpse.seen));
+        said.retain(|(_, joints)| own(trunk(&glimpse, joints)));
+        let whole = ln_sum_exp(said.iter().map(|(ln_chance, _)| *ln_chance));
+        if whole - (SIDES as f64).ln() < LEAST.ln() {
+            return None;
+        }
+        let body = |(ln_chance, joints): &(f64, [(Vec3, f64); JOINTS])| {
+            let joint = |k: usize| (glimpse.world(joints[k].0), joints[k].1);
+            let joints = known.iter().map(|known| known.map(joint)).collect();
+            ExpectedBody::new(ln_chance - whole, joints)
+        };
+        let bodies: SmallVec<_> = said.iter().map(body).collect();
         let best = -ln_sum_exp(bodies.iter().map(|body: &ExpectedBody| body.ln_chance - APART * body.narrowness));
         best.is_finite().then_some(Self { bodies, best })
     }
 
-    /// The joints of the bodies that are not unlikely, put where those of a person are, each with ln of its chance.
+    /// The joints of the likeliest bodies that are not unlikely, put where those of a person are, each with ln of its chance.
     pub(super) fn starts(&self, person: usize, params: &Pppr) -> impl Iterator<Item = (f64, Pppr)> {
         let joints = params.shape().joints;
-        let likely = self.bodies.iter().filter(|body| body.ln_chance > LEAST.ln());
-        likely.map(move |body| {
+        let mut likely: SmallVec<[&ExpectedBody; SIDES * BODIES]> =
+            self.bodies.iter().filter(|body| body.ln_chance > LEAST.ln()).collect();
+        likely.sort_by(|a, b| b.ln_chance.total_cmp(&a.ln_chance));
+        likely.into_iter().take(MOST).map(move |body| {
             let mut start = params.clone();
             for (k, expected) in body.joints.iter().enumerate() {
                 if let Some((at, _)) = expected {

@@ -94,6 +94,24 @@ fn an_echo_lies_in_its_cell_of_every_layout() {
 }
 
 #[test]
+fn of_several_people_nobody_is_expected_to_be_another() {
+    let places = [[2.8, 0.6, 0.0], [3.2, 0.6, 0.5], [3.0, 4.0, 0.0]];
+    let of = |trunk: Vec3| [0, 1, 2, 3].map(|person| belongs(trunk, &places, person));
+    assert_eq!(of([2.9, 0.9, 0.3]), [true, false, false, false]);
+    assert_eq!(of([3.1, 0.2, -0.3]), [false, true, false, false]);
+    assert!(belongs([9.0, 9.0, 9.0], &places[..1], 0), "who is alone is nobody else");
+    let problem = problem(Over::Cartesian, [3.0, 0.8, 0.3], 5);
+    let trunk = |body: &ExpectedBody| mean(&TRUNK.map(|joint| body.joints[joint].map_or([f64::NAN; 3], |(at, _)| at)));
+    for person in 0..2 {
+        let Some(found) = Expected::about(&problem, &FitConfig::default(), &places, person) else { continue };
+        assert!(found.bodies.iter().all(|body| belongs(trunk(body), &places, person)));
+        let chances: f64 = found.bodies.iter().map(|body| body.ln_chance.exp()).sum();
+        assert!((chances - 1.0).abs() < 1e-6, "those that are left are all");
+    }
+    assert!(Expected::about(&problem, &FitConfig::default(), &places, 3).is_none());
+}
+
+#[test]
 fn what_no_view_shows_is_empty_and_a_map_without_angle_says_nothing() {
     let mut one = problem(Over::Cartesian, [3.0, 0.8, 0.3], 1);
     let of = |problem: &Problem| Glimpse::at(problem, &FitConfig::default(), [2.8, 0.6, 0.0]);
@@ -103,7 +121,7 @@ fn what_no_view_shows_is_empty_and_a_map_without_angle_says_nothing() {
     view.axes[1].kind = AxisKind::Doppler;
     one.views = vec![view].into();
     assert!(of(&one).is_none());
-    assert!(Expected::about(&one, &FitConfig::default(), [2.8, 0.6, 0.0]).is_none());
+    assert!(Expected::about(&one, &FitConfig::default(), &[[2.8, 0.6, 0.0]], 0).is_none());
 }
 
 #[test]
@@ -148,11 +166,10 @@ fn what_is_seen_in_a_mirror_is_the_same_with_left_and_right_exchanged() {
     let seen = Glimpse::at(&problem, &FitConfig::default(), [2.8, 0.6, 0.0]).unwrap().seen;
     assert_ne!(seen.mirrored(), seen);
     assert_eq!(seen.mirrored().mirrored(), seen);
-    let [here, there] = [&seen, &seen.mirrored()].map(|seen| network.bodies(seen));
+    let (here, there) = (network.said(&seen), network.said_mirrored(&seen.mirrored()));
     let (left, right) = (5, 6);
-    for (k, (ln_chance, joints)) in here.iter().enumerate() {
-        let other = &there[(k + BODIES) % there.len()];
-        assert_eq!(*ln_chance, other.0);
+    for ((ln_chance, joints), other) in zip(here, there) {
+        assert_eq!(ln_chance, other.0);
         let ([x, y, z], b) = joints[left];
         assert_eq!(other.1[right], ([x, -y, z], b));
     }
@@ -162,12 +179,13 @@ fn what_is_seen_in_a_mirror_is_the_same_with_left_and_right_exchanged() {
 fn the_committed_network_is_whole_and_a_damaged_one_is_told() {
     assert!(MixtureDensityNetwork::committed().is_some());
     let problem = problem(Over::Cartesian, [3.0, 0.8, 0.3], 5);
-    let expected = Expected::about(&problem, &FitConfig::default(), [2.8, 0.6, 0.0]).unwrap();
+    let expected = Expected::about(&problem, &FitConfig::default(), &[[2.8, 0.6, 0.0]], 0).unwrap();
     let chances: f64 = expected.bodies.iter().map(|body| body.ln_chance.exp()).sum();
     assert!((chances - 1.0).abs() < 1e-6);
     let params = Pppr::zeros(PpprShape { persons: 1, joints: 17, doppler_features: 1 });
     let starts: Vec<(f64, Pppr)> = expected.starts(0, &params).collect();
-    assert!(!starts.is_empty() && starts.iter().all(|(ln_chance, _)| *ln_chance > LEAST.ln()));
+    assert!((1..=MOST).contains(&starts.len()) && starts.iter().all(|(ln_chance, _)| *ln_chance > LEAST.ln()));
+    assert!(starts.is_sorted_by(|a, b| a.0 >= b.0), "the likeliest first");
     for (_, start) in starts {
         assert!(norm(sub(start.position(11), [2.8, 0.6, 0.0])) < 1.5, "{:?}", start.position(11));
     }

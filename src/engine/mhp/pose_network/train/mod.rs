@@ -96,10 +96,7 @@ impl PoseLesson {
         let flat = rng.random_bool(FLAT);
         let of_plane = |columns: std::ops::Range<usize>| -> Vec<Vec<f32>> {
             let of_map = |map: &Frame| -> Vec<f32> {
-                let rows = map.chunks_exact(ACROSS + UP);
-                rows.flat_map(|row| &row[columns.clone()])
-                    .map(|power| 10.0 * (power + f32::MIN_POSITIVE).log10())
-                    .collect()
+                map.chunks_exact(ACROSS + UP).flat_map(|row| &row[columns.clone()]).copied().collect()
             };
             maps.iter().map(of_map).collect()
         };
