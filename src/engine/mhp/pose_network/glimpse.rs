@@ -107,7 +107,9 @@ pub(super) fn told(window: &[&[f32]], all: &[&[f32]]) -> Vec<f32> {
             seen.push(*over_time.select_nth_unstable_by(rank, f32::total_cmp).1);
         }
     }
-    seen.iter_mut().for_each(|x| *x = number((level_db(*x) - brightest).max(FLOOR_DB)));
+    for x in &mut seen {
+        *x = number((level_db(*x) - brightest).max(FLOOR_DB));
+    }
     seen.resize((window.len() + 1) * cells, number(FLOOR_DB));
     seen
 }
