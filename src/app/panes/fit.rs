@@ -5,7 +5,7 @@ use crate::app::commands::CTRL;
 use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Mark, Named as _, chip, icon_button, iou_color, rows, settings, value_row};
 use crate::config::{Convergence, EmLoss, FIELDS, Field, FieldGroup, FitConfig, Preset, difference};
-use crate::mhp::{Precision, Scope, StopReason, TERMS, TermId, Terms, formula};
+use crate::mhp::{MOST_BEGUN, MOST_UNLIKE, Precision, Scope, StopReason, TERMS, TermId, Terms, formula};
 use crate::session::{Command, FitStatus, IterationRow, Live, LiveFrom, RunSpeed, Session};
 use egui::{Key, RichText, Ui};
 
@@ -248,9 +248,9 @@ const START_LINE: f32 = 18.0;
 /// An IoU below which a view is not explained, whatever the others are.
 const LITTLE: f64 = 0.3;
 
-/// L_EM up to which levels are explained, and beyond which they are of something else.
-const CLEAR: f64 = 0.2;
-const UNLIKE: f64 = 0.38;
+/// L_EM up to which levels are explained, and beyond which they are of something else: as the fit itself has it.
+const CLEAR: f64 = MOST_BEGUN[0];
+const UNLIKE: f64 = MOST_UNLIKE[0];
 
 /// How well a fit explains maps, in words: by L_EM where levels were compared, else by masks of a mean and a least IoU; good only
 /// where no view is bad.

@@ -71,12 +71,12 @@ const DEFAULT_RATE: f64 = 1e-3;
 /// From this share of the iterations on steps are shorter, by so much.
 const SLOW_FROM: f64 = 0.6;
 const SLOW: f64 = 0.3;
-/// Maps whose [`unlikeness`] is larger are of something else than a body: of walkers, also among furniture, it is 0.15 at most, of
+/// Maps whose L_EM, and what else speaks against a body, is larger are of something else: of walkers, also among furniture, it is 0.15 at most, of
 /// somebody who stands in a bright room or lies 0.3, of a crowd 0.45. Of one person alone, and of several, who explain more.
-const MOST_UNLIKE: [f64; 2] = [0.38, 0.27];
+pub const MOST_UNLIKE: [f64; 2] = [0.38, 0.27];
 /// A fit goes on where the L_EM that it begins with is smaller: of one person, or where what stands around several is known; and of
 /// several where it is not.
-const MOST_BEGUN: [f64; 2] = [0.2, 0.16];
+pub const MOST_BEGUN: [f64; 2] = [0.2, 0.16];
 /// What a window's L_prior counts of its L_EM there: a pose that nobody takes explains maps, too.
 const OF_PRIOR: f64 = 0.1;
 /// Slower than this nobody leaves the cells that it stands in while the frames around last, m/s.

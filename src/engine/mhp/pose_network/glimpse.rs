@@ -72,7 +72,7 @@ pub(super) fn about(distance_m: f64, sine: f64, height_m: f64) -> [f32; 3] {
 
 /// A plane that no view shows.
 pub(super) fn nothing(cells: usize) -> Vec<f32> {
-    vec![number(FLOOR_DB); CHANNELS * RANGES * cells]
+    vec![normalised(FLOOR_DB); CHANNELS * RANGES * cells]
 }
 
 fn at([lo, hi]: [f64; 2], k: usize, of: usize) -> f64 {
@@ -108,13 +108,13 @@ pub(super) fn told(window: &[&[f32]], all: &[&[f32]]) -> Vec<f32> {
         }
     }
     for x in &mut seen {
-        *x = number((level_db(*x) - brightest).max(FLOOR_DB));
+        *x = normalised((level_db(*x) - brightest).max(FLOOR_DB));
     }
-    seen.resize((window.len() + 1) * cells, number(FLOOR_DB));
+    seen.resize((window.len() + 1) * cells, normalised(FLOOR_DB));
     seen
 }
 
-fn number(level_db: f32) -> f32 {
+fn normalised(level_db: f32) -> f32 {
     (level_db + MIDDLE_DB) / SPREAD_DB
 }
 

@@ -11,8 +11,8 @@
 //!
 //! with |·| rounded off where it is smaller than b, and p(μ) what the bodies themselves have. The power is what joints know of each
 //! other. It is asked of what is seen and of that in a mirror (`Seen::mirrored`), and what it says there is turned back: an ensemble of
-//! two by one set of weights, whose errors are not the same. Of several people it is asked of each, and a body whose trunk is nearer to
-//! where another one is is left out. It was taught (`train-pose-network`) with recorded people and the actors
+//! two by one set of weights, whose errors are not the same. Of several people it is asked of each, and bodies whose trunks are
+//! nearer to another one are left out. It was taught (`train-pose-network`) with recorded people and the actors
 //! of the synthetic source, turned every way, before radars whose widths, sidelobes, noise, clutter and ghosts are drawn anew for each
 //! lesson: neither simulator that it is judged by is among them. It says nothing of which way people usually look: that is the prior's
 //! and the path's affair.
