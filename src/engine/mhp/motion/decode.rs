@@ -11,7 +11,7 @@
 //!
 //! with L the loss but for what a network says, which counts as much where nothing explains the maps well, L_min the lowest of a
 //! frame, `away` from 0 (who walks ahead) to 1 (who walks backwards), `averted` from 0 (who stands and looks at the radar) to 1 (who
-//! looks the other way; less of who turns about in these frames), `turned` the angle between two headings, and `apart` the mean
+//! looks the other way; less of who turns about in these frames, as bodies do or headings go), `turned` the angle between two headings, and `apart` the mean
 //! distance between the joints of two hypotheses, each moved as its velocities say to the middle of the time between them. The
 //! cheapest paths come from dynamic programming (Viterbi 1967) from both ends to the frame that is fitted. Before that the bodies on
 //! such a path are carried on into the frames beside ([`carried`], `search::carry_on`): what one search missed another found.
@@ -21,6 +21,7 @@
 
 use super::search::Hypothesis;
 use crate::geometry::{Vec3, flat_distance, mean, norm};
+use std::f64::consts::PI;
 use std::iter::zip;
 
 /// What a step costs a metre between the joints, and at most.
@@ -34,6 +35,10 @@ const AVERTED: f64 = 0.5;
 const CLEAR_LOSS: f64 = 0.008;
 /// Who turns as fast as this about himself, on average over the frames, looks anywhere, rad/s.
 const TURNING_RADPS: f64 = 0.2;
+/// Headings of so many frames that follow each other err together: their windows share frames.
+const SHARED: f64 = 5.0;
+/// Standard errors that a slope is surely not off by.
+const SURE: f64 = 2.0;
 /// What turning costs a radian of a step, beyond so much, rad.
 const PER_RAD: f64 = 0.5;
 const TURNED_RAD: f64 = 0.6;
@@ -120,10 +125,24 @@ impl<'a> Trellis<'a> {
             followed(own, &side)
         });
         let mut trellis = Self { own, sides, stands: 1.0 };
-        let (count, sum) = trellis.best().fold((0.0, 0.0), |(count, sum), (_, best)| (count + 1.0, sum + best.spin));
-        let turns = sum / (f64::max(count, 1.0) * TURNING_RADPS);
+        let turns = trellis.turning_radps() / TURNING_RADPS;
         trellis.stands = (-turns * turns).exp();
         trellis
+    }
+
+    /// How fast the person turns about himself, rad/s: as the likeliest bodies do on average, or as their headings, a back like a
+    /// front, surely go along the frames, whichever is more.
+    fn turning_radps(&self) -> f64 {
+        let mut best: Vec<(f64, &Hypothesis)> = self.best().collect();
+        best.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let spin = best.iter().map(|(_, body)| body.spin).sum::<f64>() / best.len().max(1) as f64;
+        let mut heading = best.first().map_or(0.0, |(_, first)| first.yaw);
+        let headings = best.iter().map(|(t_s, body)| {
+            let turned = body.yaw - heading;
+            heading += turned - PI * (turned / PI).round();
+            [*t_s, heading]
+        });
+        spin.abs().max(sure_slope(&headings.collect::<Vec<_>>()))
     }
 
     /// The body with the lowest loss of every frame, with its time.
@@ -176,6 +195,23 @@ impl<'a> Trellis<'a> {
             hypothesis.loss / lowest.max(f64::MIN_POSITIVE) + away + hypothesis.network / CLEAR_LOSS
         })
     }
+}
+
+/// By how much points (x, y) surely rise or fall, whichever they do, a unit of x: their slope less [`SURE`] standard errors.
+fn sure_slope(points: &[[f64; 2]]) -> f64 {
+    let count = points.len() as f64;
+    let [x, y] = [0, 1].map(|k| points.iter().map(|point| point[k]).sum::<f64>() / count.max(1.0));
+    let [mut xx, mut xy, mut yy] = [0.0; 3];
+    for point in points {
+        let (x, y) = (point[0] - x, point[1] - y);
+        (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
+    }
+    if count <= SHARED || xx <= 0.0 {
+        return 0.0;
+    }
+    let slope = xy / xx;
+    let error = (SHARED * (yy - slope * xy).max(0.0) / ((count - 2.0) * xx)).sqrt();
+    (slope.abs() - SURE * error).max(0.0)
 }
 
 /// The person of `own` in the frames on one side, the nearest first.
@@ -290,6 +326,37 @@ mod tests {
         assert_eq!((with(0.17, 0.0), with(0.12, 0.0)), (Some(1), Some(0)));
         // Who turns about looks anywhere, whichever way he turns.
         assert_eq!([1.0, -1.0].map(|spin| with(0.17, spin)), [Some(0), Some(0)]);
+    }
+
+    #[test]
+    fn headings_that_go_along_the_frames_are_a_turn_and_those_that_scatter_are_none() {
+        // The back is lower by a tenth; nobody spins by himself.
+        let lowest_with = |heading: fn(f64) -> f64| {
+            let frame = |k: f64| {
+                let away = Hypothesis { averted: 1.0, ..body(3.0, heading(k), 0.18) };
+                vec![vec![away, body(3.0, heading(k) + PI, 0.2)]]
+            };
+            let others: Vec<_> = (1..6).flat_map(|k| [-0.1, 0.1].map(|t_s| f64::from(k) * t_s)).collect();
+            let persons: Vec<_> = others.iter().map(|t_s| frame(10.0 * t_s)).collect();
+            let around: Vec<Stage> =
+                zip(&others, &persons).map(|(t_s, persons)| Stage { t_s: *t_s, persons }).collect();
+            lowest(&decode(&frame(0.0)[0], &around).costs)
+        };
+        assert_eq!(lowest_with(|k| 0.06 * k), Some(0), "a turn");
+        assert_eq!(lowest_with(|k| 0.06 * k + if k < 0.0 { PI } else { 0.0 }), Some(0), "half a back, half a front");
+        assert_eq!(lowest_with(|_| 0.0), Some(1), "somebody stands");
+        assert_eq!(lowest_with(|k| 0.3 * (1.7 * k).sin()), Some(1), "headings scatter");
+    }
+
+    #[test]
+    fn a_slope_is_sure_of_many_points_on_a_line() {
+        let points = |count: usize, off: f64| -> Vec<[f64; 2]> {
+            (0..count).map(|k| [k as f64, 3.0 - 0.5 * k as f64 + if k % 2 == 0 { off } else { -off }]).collect()
+        };
+        assert!((sure_slope(&points(9, 0.0)) - 0.5).abs() < 1e-9);
+        let unsure = sure_slope(&points(20, 0.5));
+        assert!(unsure > 0.2 && unsure < 0.5, "{unsure}");
+        assert_eq!([sure_slope(&points(9, 3.0)), sure_slope(&points(4, 0.0)), sure_slope(&[])], [0.0; 3]);
     }
 
     #[test]
