@@ -17,6 +17,7 @@ use crate::mhp::pose_network::Expected;
 use crate::mhp::skin::radar_place;
 use crate::mhp::{FitError, Precision, Problem, tiles};
 use std::f64::consts::{PI, TAU};
+use std::iter::zip;
 use std::ops::Range;
 
 /// The sieves that starts go through, coarse then fine.
@@ -408,7 +409,7 @@ pub(in crate::mhp) fn search(
 }
 
 /// Adds to what a search around the one person of these `params` ended at what bodies of other frames become in this one, each with its
-/// time, s after this frame, moved and turned as it goes as a whole.
+/// time, s after this frame, moved and turned as it goes as a whole; those that have become one with another are left out.
 ///
 /// # Errors
 /// Where a position is not finite.
@@ -424,9 +425,19 @@ pub(in crate::mhp) fn carry_on(
     let Ok(mut window) = Window::new(problem, config, (Precision::F32, Detail::Search), params)? else { return Ok(()) };
     window.expected.clone_from(&searched.network);
     let mut search = Search::new((problem, config), &mut window, params);
+    // What begins where another body ended, or began, ends with it.
+    let mut begun: Vec<Vec<Vec3>> = found.iter().map(|body| body.joints.clone()).collect();
     for (t_s, other) in others {
         let mut moved = params.clone();
         let joints = tilt::later(&other.joints, &other.velocities, -t_s);
+        let is_one = |of: &Vec<Vec3>| {
+            let apart: f64 = zip(of, &joints).map(|(p, q)| norm(sub(*p, *q))).sum();
+            apart <= ONE_M * joints.len() as f64
+        };
+        if begun.iter().any(is_one) {
+            continue;
+        }
+        begun.push(joints.clone());
         Hypothesis { joints, ..(*other).clone() }.place(0, &mut moved);
         let mut coordinates = search.window.coordinates_of(&moved);
         coordinates[STILL] = other.still;

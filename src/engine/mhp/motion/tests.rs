@@ -190,9 +190,16 @@ fn a_body_is_carried_on_to_where_it_goes() {
     let found = searched.persons[0].clone();
     let best = found[0].clone();
     let way = mean(&best.velocities);
-    let earlier = best.joints.iter().map(|p| sub(*p, way.map(|v| 0.1 * v))).collect();
-    let earlier = Hypothesis { joints: earlier, loss: f64::NAN, ..best.clone() };
-    carry_on(&problem, &config, &params, &mut searched, &[(-0.1, &earlier)]).unwrap();
+    let earlier = |off_m: f64| {
+        let joints = best.joints.iter().map(|p| sub(*p, [0.1 * way[0] - off_m, 0.1 * way[1], 0.1 * way[2]])).collect();
+        Hypothesis { joints, loss: f64::NAN, ..best.clone() }
+    };
+    // What has become one with a body that was found, or is carried on twice, is left out.
+    carry_on(&problem, &config, &params, &mut searched, &[(-0.1, &earlier(0.0))]).unwrap();
+    assert_eq!(searched.persons[0], found);
+    let (earlier, again) = (earlier(0.1), earlier(0.11));
+    let others = [(-0.1, &earlier), (-0.1, &again)];
+    carry_on(&problem, &config, &params, &mut searched, &others).unwrap();
     let all = &searched.persons[0];
     assert_eq!(all.len(), found.len() + 1);
     assert!(all.is_sorted_by(|a, b| a.loss <= b.loss));
