@@ -162,6 +162,12 @@ pub fn mean(points: &[Vec3]) -> Vec3 {
     scale(sum, 1.0 / points.len().max(1) as f64)
 }
 
+/// The mean distance of points from those in the same places of another list, in their unit; 0 where there are none.
+pub fn mean_distance(a: &[Vec3], b: &[Vec3]) -> f64 {
+    let sum: f64 = a.iter().zip(b).map(|(&a, &b)| norm(sub(a, b))).sum();
+    sum / a.len().max(1) as f64
+}
+
 /// ‖a‖
 #[inline(always)]
 pub fn norm<T: Numeric>(a: Vec3<T>) -> T {

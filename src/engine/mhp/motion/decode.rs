@@ -11,10 +11,11 @@
 //!
 //! with L the loss but for what a network says, which counts as much where nothing explains the maps well, L_min the lowest of a
 //! frame, `away` from 0 (who walks ahead) to 1 (who walks backwards), `averted` from 0 (who stands and looks at the radar) to 1 (who
-//! looks the other way; less of who turns about in these frames, as bodies do or headings go), `turned` the angle between two headings, and `apart` the mean
-//! distance between the joints of two hypotheses, each moved as its velocities say to the middle of the time between them. The
-//! cheapest paths come from dynamic programming (Viterbi 1967) from both ends to the frame that is fitted. Before that the bodies on
-//! such a path are carried on into the frames beside ([`carried`], `search::carry_on`): what one search missed another found.
+//! looks the other way; less of who turns about in these frames, as bodies do or headings go), `turned` the angle between two
+//! headings, and `apart` the mean distance between the joints of two hypotheses, each moved as its velocities say to the middle of the
+//! time between them. The cheapest paths come from dynamic programming (Viterbi 1967) from both ends to the frame that is fitted. Before
+//! that the bodies on such a path are carried on into the frames beside ([`carried`], `search::carry_on`): what one search missed
+//! another found.
 //!
 //! Where no body explains the maps of such a path, those that a network expects are decoded likewise, with losses that say how
 //! unlikely it calls them.
@@ -35,10 +36,10 @@ const AVERTED: f64 = 0.5;
 const CLEAR_LOSS: f64 = 0.008;
 /// Who turns as fast as this about himself, on average over the frames, looks anywhere, rad/s.
 const TURNING_RADPS: f64 = 0.2;
-/// Headings of so many frames that follow each other err together: their windows share frames.
-const SHARED: f64 = 5.0;
-/// Standard errors that a slope is surely not off by.
-const SURE: f64 = 2.0;
+/// Headings of so many frames that follow each other have correlated errors: their windows share frames.
+const CORRELATED: f64 = 5.0;
+/// Standard errors between the slope of headings and its lower confidence bound.
+const STANDARD_ERRORS: f64 = 2.0;
 /// What turning costs a radian of a step, beyond so much, rad.
 const PER_RAD: f64 = 0.5;
 const TURNED_RAD: f64 = 0.6;
@@ -142,7 +143,7 @@ impl<'a> Trellis<'a> {
             heading += turned - PI * (turned / PI).round();
             [*t_s, heading]
         });
-        spin.abs().max(sure_slope(&headings.collect::<Vec<_>>()))
+        spin.abs().max(slope_lower_bound(&headings.collect::<Vec<_>>()))
     }
 
     /// The body with the lowest loss of every frame, with its time.
@@ -197,8 +198,8 @@ impl<'a> Trellis<'a> {
     }
 }
 
-/// By how much points (x, y) surely rise or fall, whichever they do, a unit of x: their slope less [`SURE`] standard errors.
-fn sure_slope(points: &[[f64; 2]]) -> f64 {
+/// The lower confidence bound of the magnitude of the least-squares slope through points (x, y), at least 0: the slope less [`STANDARD_ERRORS`].
+fn slope_lower_bound(points: &[[f64; 2]]) -> f64 {
     let count = points.len() as f64;
     let [x, y] = [0, 1].map(|k| points.iter().map(|point| point[k]).sum::<f64>() / count.max(1.0));
     let [mut xx, mut xy, mut yy] = [0.0; 3];
@@ -206,12 +207,12 @@ fn sure_slope(points: &[[f64; 2]]) -> f64 {
         let (x, y) = (point[0] - x, point[1] - y);
         (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
     }
-    if count <= SHARED || xx <= 0.0 {
+    if count <= CORRELATED || xx <= 0.0 {
         return 0.0;
     }
     let slope = xy / xx;
-    let error = (SHARED * (yy - slope * xy).max(0.0) / ((count - 2.0) * xx)).sqrt();
-    (slope.abs() - SURE * error).max(0.0)
+    let error = (CORRELATED * (yy - slope * xy).max(0.0) / ((count - 2.0) * xx)).sqrt();
+    (slope.abs() - STANDARD_ERRORS * error).max(0.0)
 }
 
 /// The person of `own` in the frames on one side, the nearest first.
@@ -353,10 +354,13 @@ mod tests {
         let points = |count: usize, off: f64| -> Vec<[f64; 2]> {
             (0..count).map(|k| [k as f64, 3.0 - 0.5 * k as f64 + if k % 2 == 0 { off } else { -off }]).collect()
         };
-        assert!((sure_slope(&points(9, 0.0)) - 0.5).abs() < 1e-9);
-        let unsure = sure_slope(&points(20, 0.5));
+        assert!((slope_lower_bound(&points(9, 0.0)) - 0.5).abs() < 1e-9);
+        let unsure = slope_lower_bound(&points(20, 0.5));
         assert!(unsure > 0.2 && unsure < 0.5, "{unsure}");
-        assert_eq!([sure_slope(&points(9, 3.0)), sure_slope(&points(4, 0.0)), sure_slope(&[])], [0.0; 3]);
+        assert_eq!(
+            [slope_lower_bound(&points(9, 3.0)), slope_lower_bound(&points(4, 0.0)), slope_lower_bound(&[])],
+            [0.0; 3]
+        );
     }
 
     #[test]

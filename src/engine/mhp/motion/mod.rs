@@ -71,11 +71,12 @@ const DEFAULT_RATE: f64 = 1e-3;
 /// From this share of the iterations on steps are shorter, by so much.
 const SLOW_FROM: f64 = 0.6;
 const SLOW: f64 = 0.3;
-/// Maps whose L_EM, and what else speaks against a body, is larger are of something else: of walkers, also among furniture, it is 0.15 at most, of
-/// somebody who stands in a bright room or lies 0.3, of a crowd 0.45. Of one person alone, and of several, who explain more.
+/// The L_EM of dB maps (1 − their correlation, no unit; SPEC section 8) beyond which, with a share of L_prior and of how far a body is
+/// from the start, they are of something else than bodies: of one person alone, and of several, who explain more. Of walkers it is
+/// 0.15 at most, also among furniture, of somebody who stands in a bright room or lies 0.3, of a crowd 0.45. Measured.
 pub const MOST_UNLIKE: [f64; 2] = [0.38, 0.27];
-/// A fit goes on where the L_EM that it begins with is smaller: of one person, or where what stands around several is known; and of
-/// several where it is not.
+/// The L_EM of dB maps (as in [`MOST_UNLIKE`]) up to which a fit goes on from where it begins: of one person, or where what stands
+/// around several is known; and of several where it is not. Measured.
 pub const MOST_BEGUN: [f64; 2] = [0.2, 0.16];
 /// What a window's L_prior counts of its L_EM there: a pose that nobody takes explains maps, too.
 const OF_PRIOR: f64 = 0.1;

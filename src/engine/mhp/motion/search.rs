@@ -12,12 +12,11 @@ use super::{
 };
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::geometry::{Vec3, mean, norm, sub};
+use crate::geometry::{Vec3, mean, mean_distance, norm, sub};
 use crate::mhp::pose_network::Expected;
 use crate::mhp::skin::radar_place;
 use crate::mhp::{FitError, Precision, Problem, tiles};
 use std::f64::consts::{PI, TAU};
-use std::iter::zip;
 use std::ops::Range;
 
 /// The sieves that starts go through, coarse then fine.
@@ -295,14 +294,14 @@ impl<'a> Search<'a> {
         let joints = self.params.shape().joints;
         let mut poses = [vec![[0.0; 3]; joints], vec![[0.0; 3]; joints]];
         let ends = [0, self.window.frames.len() - 1];
-        let apart = ends.map(|frame| {
+        let apart_m = ends.map(|frame| {
             for (of, pose) in [a, b].into_iter().zip(&mut poses) {
                 let (mine, space) = (&of.state.coordinates[own.clone()], &self.window.space);
                 space.pose(mine, &space.stance(mine), frame, pose);
             }
-            poses[0].iter().zip(&poses[1]).map(|(p, q)| norm(sub(*p, *q))).sum::<f64>()
+            mean_distance(&poses[0], &poses[1])
         });
-        apart.iter().sum::<f64>() / (ends.len() * joints.max(1)) as f64
+        f64::midpoint(apart_m[0], apart_m[1])
     }
 }
 
@@ -409,7 +408,7 @@ pub(in crate::mhp) fn search(
 }
 
 /// Adds to what a search around the one person of these `params` ended at what bodies of other frames become in this one, each with its
-/// time, s after this frame, moved and turned as it goes as a whole; those that have become one with another are left out.
+/// time, s after this frame, moved and turned as it goes as a whole; those that are nearer than [`ONE_M`] to another are left out.
 ///
 /// # Errors
 /// Where a position is not finite.
@@ -420,27 +419,27 @@ pub(in crate::mhp) fn carry_on(
     searched: &mut Searched,
     others: &[(f64, &Hypothesis)],
 ) -> Result<(), FitError> {
-    let Some(found) = searched.persons.first_mut().filter(|_| !others.is_empty()) else { return Ok(()) };
+    let Some(found) = searched.persons.first_mut() else { return Ok(()) };
+    // What begins where another body ended, or begins, ends with it.
+    let mut starts: Vec<Hypothesis> = Vec::with_capacity(others.len());
+    for (t_s, other) in others {
+        let joints = tilt::later(&other.joints, &other.velocities, -t_s);
+        if found.iter().chain(&starts).all(|body| mean_distance(&body.joints, &joints) > ONE_M) {
+            starts.push(Hypothesis { joints, ..(*other).clone() });
+        }
+    }
+    if starts.is_empty() {
+        return Ok(());
+    }
     let config = &weighted(config);
     let Ok(mut window) = Window::new(problem, config, (Precision::F32, Detail::Search), params)? else { return Ok(()) };
     window.expected.clone_from(&searched.network);
     let mut search = Search::new((problem, config), &mut window, params);
-    // What begins where another body ended, or began, ends with it.
-    let mut begun: Vec<Vec<Vec3>> = found.iter().map(|body| body.joints.clone()).collect();
-    for (t_s, other) in others {
+    for start in starts {
         let mut moved = params.clone();
-        let joints = tilt::later(&other.joints, &other.velocities, -t_s);
-        let is_one = |of: &Vec<Vec3>| {
-            let apart: f64 = zip(of, &joints).map(|(p, q)| norm(sub(*p, *q))).sum();
-            apart <= ONE_M * joints.len() as f64
-        };
-        if begun.iter().any(is_one) {
-            continue;
-        }
-        begun.push(joints.clone());
-        Hypothesis { joints, ..(*other).clone() }.place(0, &mut moved);
+        start.place(0, &mut moved);
         let mut coordinates = search.window.coordinates_of(&moved);
-        coordinates[STILL] = other.still;
+        coordinates[STILL] = start.still;
         let mut tried = Tried::at(coordinates);
         search.settle(&mut tried, FINE);
         found.push(search.hypothesis(&tried, 0));
