@@ -4,7 +4,7 @@
 //! a symmetric 4×4 matrix, found by Jacobi rotations. It cannot reflect, so a mirrored skeleton stays wrong.
 
 use super::assign::assign;
-use crate::geometry::{Mat3, Vec3, add, dot, mat_vec, mean, norm, rotation_from_quaternion, scale, sub};
+use crate::geometry::{Mat3, Vec3, add, dot, mat_vec, mean, mean_distance, norm, rotation_from_quaternion, scale, sub};
 
 const MM_PER_M: f64 = 1000.0;
 /// What a person who is missed or invented costs, and the most that one who is found does, mm.
@@ -27,8 +27,7 @@ pub fn majpe_mm(estimate: &[Vec3], truth: &[Vec3]) -> Option<f64> {
     if estimate.is_empty() || estimate.len() != truth.len() {
         return None;
     }
-    let sum: f64 = estimate.iter().zip(truth).map(|(&a, &b)| norm(sub(a, b))).sum();
-    Some(MM_PER_M * sum / estimate.len() as f64)
+    Some(MM_PER_M * mean_distance(estimate, truth))
 }
 
 /// [`majpe_mm`] after the similarity transform of `estimate` that fits `truth` best in least squares.
