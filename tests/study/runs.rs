@@ -107,7 +107,7 @@ const ROBUSTNESS: &[&str] = &["robustness", "--config", "@few.toml", "--iteratio
 #[test]
 fn a_run_killed_at_any_moment_goes_on_to_the_same_bytes() {
     let case = Case::new();
-    let whole: &[&str] = &["robustness", "--all", "--config", "@few.toml", "--iterations", "25", "--threads", "2"];
+    let whole: &[&str] = &["robustness", "--all", "--config", "@few.toml", "--iterations", "12", "--threads", "2"];
     case.done(whole, "whole");
     let rows = case.journaled("whole");
     assert_eq!(rows, 11 * 6);
