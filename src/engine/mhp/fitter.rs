@@ -264,7 +264,8 @@ impl Fitter {
     pub fn restore(&mut self, state: Arc<FitState>) -> Result<(), FitError> {
         self.objective.problem().check(&state.params)?;
         // Of a start nothing is known yet: neither its loss nor its place in a window.
-        if state.losses.is_empty() || self.window.is_some() && state.motion.coordinates.is_empty() {
+        let fits = |window: &Window| state.motion.coordinates.len() == window.numbers();
+        if state.losses.is_empty() || !self.window.as_ref().is_none_or(fits) {
             return self.set_state(FitState::clone(&state));
         }
         let Self { objective, window, evaluation, window_loss: [window_loss, _], .. } = self;

@@ -80,10 +80,12 @@ impl Ground {
         joints: usize,
         hips: f64,
     ) -> Contact {
-        let c = &coordinates[BODY..];
+        let components = poses.first().map_or(0, |row| row.len() / joints - 1);
+        let (c, residual) = coordinates[BODY..].split_at(components);
         let reaches = |row: &[Vec3], tilt: &Tilt, &(joint, below): &(usize, f64)| -> (Vec3, f64) {
             let mut at = row[joint];
             at[2] += hips;
+            residual.iter().skip(3 * joint).zip(&mut at).for_each(|(r, at)| *at += r);
             c.iter().enumerate().for_each(|(k, &c)| add_scaled(&mut at, row[(k + 1) * joints + joint], c));
             (at, dot(tilt.upwards(), at) - hips - below)
         };

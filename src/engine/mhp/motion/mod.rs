@@ -98,7 +98,7 @@ fn kind(at: usize) -> usize {
 /// The coordinates of a fit in a window, and Adam's moments of them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct MotionState {
-    /// A person after the other: t (3, m; the third is the height above the floor where that is known), heading y (rad), ln size s, what is left of static echoes q, tilt w (2, rad) and ẇ (2, rad/s), c in standard deviations.
+    /// A person after the other: t (3, m; the third is the height above the floor where that is known), heading y (rad), ln size s, what is left of static echoes q, tilt w (2, rad) and ẇ (2, rad/s), c in standard deviations, and the residual r (3 a joint, sizes), which stays.
     pub coordinates: Vec<f64>,
     /// Exponential mean of the gradient.
     pub first: Vec<f64>,
@@ -340,6 +340,11 @@ impl Window {
                 self.space.project(self.own, params.person(person), velocities)
             })
             .collect()
+    }
+
+    /// Coordinates of all persons.
+    pub(super) fn numbers(&self) -> usize {
+        self.frames.first().map_or(0, |frame| frame.params.shape().persons * self.stride)
     }
 
     /// Puts the persons of `params` where the coordinates have them in the frame that is fitted.

@@ -1,14 +1,16 @@
 //! The space of poses that a prior of motion spans, on a skeleton, at the times of a window's frames.
 //!
 //! ```text
-//! X_f(c) = μ_f + Σ_k c_k B_fk            (joints, 3), sizes; c in standard deviations
+//! X_f(c) = μ_f + Σ_k c_k B_fk + r        (joints, 3), sizes; c in standard deviations
 //! u_f    = exp([w + ẇ t_f]×) (X_f(c) + η e_z)
 //! p_f    = e^s R_z(y) (u_f − η e_z) + t    world frame, m
 //! ```
 //!
 //! Coordinates of a person are t (3, m), y (rad), s (ln m), q (how bright what stands still is, `static_echo.rs`), the tilt w and ẇ (2
-//! each, `tilt.rs`) and c. Where the floor is known the third is how high the lowest part of the body is above it instead of t_z
-//! (`ground.rs`).
+//! each, `tilt.rs`), c, and of a fit r (3 a joint, sizes). Where the floor is known the third is how high the lowest part of the body
+//! is above it instead of t_z (`ground.rs`). r is the residual: what of the pose that a fit begins at no c can say, some 3 cm a joint
+//! of people that the prior has not seen. It stays as it is: who puts a body by hand finds it where he put it, and a loss at a
+//! start is the loss of that start. A search has none.
 
 mod project;
 
@@ -16,7 +18,7 @@ use super::ground::{self, Contact, Ground};
 use super::proportions::Proportions;
 use super::static_echo;
 use super::tilt::{self, Fallen, Tilt};
-use crate::body::{Mixture, MotionPrior, Skeleton};
+use crate::body::{Mixture, MotionPrior, Parts, Skeleton};
 use crate::geometry::{Vec3, add, cross, scale, sub};
 use smallvec::SmallVec;
 
@@ -62,6 +64,10 @@ const LIES: f64 = 0.1;
 pub(super) struct PoseSpace {
     pub(super) joints: usize,
     components: usize,
+    /// Numbers of r.
+    residual: usize,
+    /// The skeleton's.
+    parts: Option<Parts>,
     /// When the frames are, s after the window's middle.
     times_s: Vec<f64>,
     /// η
@@ -159,6 +165,8 @@ impl PoseSpace {
         Some(Self {
             joints: skeleton.joints.len(),
             components,
+            parts: Parts::of(skeleton),
+            residual: if detail == Detail::Fit { 3 * skeleton.joints.len() } else { 0 },
             times_s: times_s.to_vec(),
             hips: -lowest,
             poses: times_s.iter().map(|&t_s| at(t_s)).collect(),
@@ -179,7 +187,22 @@ impl PoseSpace {
 
     /// Coordinates of a person.
     pub(super) fn coordinates(&self) -> usize {
-        BODY + self.components
+        BODY + self.components + self.residual
+    }
+
+    /// c of a person with these coordinates.
+    fn coefficients<'a>(&self, coordinates: &'a [f64]) -> &'a [f64] {
+        &coordinates[BODY..BODY + self.components]
+    }
+
+    /// r of a person with these coordinates; nothing in a search.
+    fn residual<'a>(&self, coordinates: &'a [f64]) -> &'a [f64] {
+        &coordinates[BODY + self.components..]
+    }
+
+    /// The same, to be filled in.
+    pub(super) fn residual_mut<'a>(&self, coordinates: &'a mut [f64]) -> &'a mut [f64] {
+        &mut coordinates[BODY + self.components..]
     }
 
     /// Σ_k of a row's mean and components times 1 and c.
@@ -195,9 +218,9 @@ impl PoseSpace {
     /// along it as that says; on the floor where the radar's height above that is known, m.
     pub(super) fn lay(&self, coordinates: &mut [f64], fallen: &Fallen, hips: Vec3, radar_height_m: Option<f64>) {
         fallen.place(coordinates);
-        match self.starts.first() {
-            Some((c, _)) => coordinates[BODY..].copy_from_slice(c),
-            None => coordinates[BODY..].fill(0.0),
+        coordinates[BODY..].fill(0.0);
+        if let Some((c, _)) = self.starts.first() {
+            coordinates[BODY..BODY + c.len()].copy_from_slice(c);
         }
         let turn = Turn::of(coordinates);
         let [x, y, z] = Tilt::of(&coordinates[TILT..BODY], 0.0).forwards([0.0, 0.0, self.hips]);
@@ -223,21 +246,21 @@ impl PoseSpace {
 
     /// t of a person with these coordinates, world frame, m.
     fn place(coordinates: &[f64], stance: &Stance) -> Vec3 {
-        let ground_m = stance.contact.as_ref().map_or(0.0, |contact| contact.z_m);
-        [coordinates[0], coordinates[1], coordinates[HEIGHT] + ground_m]
+        [coordinates[0], coordinates[1], coordinates[HEIGHT] + stance.ground_m()]
     }
 
-    /// X or its change, of a frame, as the tilt turns it; `above` is added to its height before.
-    fn turned(&self, row: &[Vec3], c: &[f64], (tilt, above): (&Tilt, f64), out: &mut [Vec3]) {
-        self.mixed(row, c, out);
+    /// u of a frame: X as it is tilted.
+    fn tilted(&self, frame: usize, coordinates: &[f64], tilt: &Tilt, out: &mut [Vec3]) {
+        self.mixed(&self.poses[frame], self.coefficients(coordinates), out);
+        out.as_flattened_mut().iter_mut().zip(self.residual(coordinates)).for_each(|(out, r)| *out += r);
         for p in out {
-            *p = tilt.forwards([p[0], p[1], p[2] + above]);
+            *p = tilt.forwards([p[0], p[1], p[2] + self.hips]);
         }
     }
 
     /// The joints of a person with these coordinates, and this stance, at time `frame`, world frame, m.
     pub(super) fn pose(&self, coordinates: &[f64], stance: &Stance, frame: usize, out: &mut [Vec3]) {
-        self.turned(&self.poses[frame], &coordinates[BODY..], (&stance.tilts[frame], self.hips), out);
+        self.tilted(frame, coordinates, &stance.tilts[frame], out);
         let (turn, place) = (Turn::of(coordinates), Self::place(coordinates, stance));
         for p in out {
             *p = add(turn.forwards([p[0], p[1], p[2] - self.hips]), place);
@@ -253,10 +276,10 @@ impl PoseSpace {
         out: &mut [Vec3],
     ) {
         let tilt = &stance.tilts[frame];
-        self.turned(&self.changes[frame], &coordinates[BODY..], (tilt, 0.0), out);
+        self.mixed(&self.changes[frame], self.coefficients(coordinates), out);
         let (turn, place) = (Turn::of(coordinates), Self::place(coordinates, stance));
         for (v, p) in out.iter_mut().zip(pose) {
-            *v = turn.forwards(tilt.swept(self.before_turn(&turn, place, *p), *v));
+            *v = turn.forwards(tilt.swept(self.before_turn(&turn, place, *p), tilt.forwards(*v)));
         }
     }
 
@@ -266,7 +289,7 @@ impl PoseSpace {
         [x, y, z + self.hips]
     }
 
-    /// Adds to `bars` (a coordinate each) what the adjoints of a frame's joints and velocities imply.
+    /// Adds to `bars` (a coordinate each) what the adjoints of a frame's joints and velocities imply; r, which stays, has none.
     pub(super) fn pull_back(
         &self,
         coordinates: &[f64],
@@ -323,7 +346,7 @@ impl PoseSpace {
 
     /// Adds to the bars of c what the adjoints of [`Self::mixed`] imply.
     fn mixed_back(&self, row: &[Vec3], own: &[Vec3], bars: &mut [f64]) {
-        for (k, bar) in bars[BODY..].iter_mut().enumerate() {
+        for (k, bar) in bars[BODY..BODY + self.components].iter_mut().enumerate() {
             let of = &row[(k + 1) * self.joints..(k + 2) * self.joints];
             let mut sums = [0.0; 3];
             for (of, own) in of.iter().zip(own) {
@@ -343,9 +366,10 @@ impl PoseSpace {
         bars[STILL] += gain * SHARE * by_still;
         let tilted = tilt::unlikeliness(&coordinates[TILT..BODY], gain * SHARE, &mut bars[TILT..BODY]);
         let mut sum = size * size + still + tilted;
-        sum += self.mixture.unlikeliness(&coordinates[BODY..], gain * SHARE, &mut bars[BODY..]);
-        let rest = BODY + self.mixture.coefficients();
-        for (c, bar) in coordinates[rest..].iter().zip(&mut bars[rest..]) {
+        let c = self.coefficients(coordinates);
+        sum += self.mixture.unlikeliness(c, gain * SHARE, &mut bars[BODY..BODY + c.len()]);
+        let rest = self.mixture.coefficients();
+        for (c, bar) in c.iter().zip(&mut bars[BODY..]).skip(rest) {
             sum += c * c;
             *bar += 2.0 * gain * SHARE * c;
         }
@@ -367,6 +391,13 @@ pub(super) struct Stance {
     tilts: SmallVec<[Tilt; FRAMES]>,
     upright: bool,
     contact: Option<Contact>,
+}
+
+impl Stance {
+    /// t_z of a body that is on the floor, m; 0 where that is not known.
+    fn ground_m(&self) -> f64 {
+        self.contact.as_ref().map_or(0.0, |contact| contact.z_m)
+    }
 }
 
 /// Joints of a skeleton at most: those of larger ones are not moved by a prior.

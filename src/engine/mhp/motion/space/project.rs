@@ -1,7 +1,8 @@
 //! The coordinates whose joints and velocities come nearest to given ones.
 
-use super::{BODY, HALF_STEP_S, HEIGHT, LN_SIZE, PoseSpace, STILL, TILT, Turn, YAW};
-use crate::geometry::{Vec3, mean, norm, sub};
+use super::{BODY, HALF_STEP_S, HEIGHT, LN_SIZE, PoseSpace, STILL, Stance, TILT, Turn, YAW};
+use crate::body::Parts;
+use crate::geometry::{Vec3, dot, mean, norm, sub};
 use crate::mhp::motion::static_echo;
 use crate::mhp::motion::tilt::{self, Tilt};
 
@@ -11,6 +12,13 @@ const MISFIT: f64 = 0.05;
 const BENT: f64 = 0.2;
 /// Rounds in which place and pose are found from joints.
 const ROUNDS: usize = 6;
+/// No pose of people is farther from those that c can say, the root of the mean square over joints, sizes: it is 0.019 in the median of
+/// two simulators' people and 0.043 of those who fall. Measured.
+const MOST_RESIDUAL: f64 = 0.045;
+/// What of the mean square of errors of joints no c can say: 0.37 of 3 cm an axis, 0.34 of 6 cm. Measured.
+const UNSAID: f64 = 0.35;
+/// Parts of the body between which bones are as long left as right: the ends of the left one.
+const PAIRED: [[usize; 2]; 5] = [[1, 3], [3, 5], [1, 7], [7, 9], [9, 11]];
 
 impl PoseSpace {
     /// The coordinates whose joints and velocities at time `frame` are nearest to these, in a space that has its mean at 0.
@@ -23,7 +31,40 @@ impl PoseSpace {
             let tilted = self.nearest(frame, joints, velocities, true);
             if tilted.1 < upright.1 { tilted } else { upright }
         };
-        best.0
+        let mut coordinates = best.0;
+        if self.residual > 0 {
+            self.keep(frame, joints, &mut coordinates);
+        }
+        coordinates
+    }
+
+    /// Fills in r: what is left of the way to `joints`, but for what is there by errors of who placed them. Of a residual whose mean
+    /// square is v, errors that leave n in it leave 1 − n/v of it to believe (Wiener); they tell themselves by bones that are not as
+    /// long left as right.
+    fn keep(&self, frame: usize, joints: &[Vec3], coordinates: &mut [f64]) {
+        let mut pose = vec![[0.0; 3]; self.joints];
+        let stance = self.stance(coordinates);
+        self.pose(coordinates, &stance, frame, &mut pose);
+        let turn = Turn::of(coordinates);
+        let left = pose.iter().zip(joints).map(|(p, q)| stance.tilts[frame].backwards(turn.inverse(sub(*q, *p))));
+        let left: Vec<Vec3> = left.collect();
+        let square = left.iter().map(|r| dot(*r, *r)).sum::<f64>() / self.joints as f64;
+        let errors = UNSAID * self.uneven(joints) / (turn.size * turn.size);
+        let share = (1.0 - errors / square).max(0.0) * (MOST_RESIDUAL * MOST_RESIDUAL / square).min(1.0);
+        self.residual_mut(coordinates).iter_mut().zip(left.as_flattened()).for_each(|(r, left)| *r = share * left);
+        // The body stands where it stood, if on other feet.
+        let [before_m, after_m] = [&stance, &self.stance(coordinates)].map(Stance::ground_m);
+        coordinates[HEIGHT] += before_m - after_m;
+    }
+
+    /// The mean square of errors of joints whose bones differ by as much between left and right as those of `joints`, m²; 0 where
+    /// parts of the body have no joint. With errors of variance σ² an axis a bone's length has one of 2 σ².
+    fn uneven(&self, joints: &[Vec3]) -> f64 {
+        let Some(parts) = &self.parts else { return 0.0 };
+        let places = parts.places(joints);
+        let length = |[a, b]: [usize; 2]| norm(sub(places[a], places[b]));
+        let squares = PAIRED.map(|bone| (length(bone) - length(bone.map(Parts::mirrored))).powi(2));
+        3.0 * squares.iter().sum::<f64>() / (4.0 * PAIRED.len() as f64)
     }
 
     /// The same of a body that is upright or tilted, and how far they are from it: squares over all joints, sizes.
@@ -43,11 +84,12 @@ impl PoseSpace {
         self.align(frame, joints, &mut coordinates);
         let mut pose = vec![[0.0; 3]; self.joints];
         let mut stance = self.stance(&coordinates);
-        let ground_m = stance.contact.take().map_or(0.0, |contact| contact.z_m);
+        let ground_m = stance.ground_m();
+        stance.contact = None;
         self.pose(&coordinates, &stance, frame, &mut pose);
         let off: f64 = pose.iter().zip(joints).map(|(p, q)| norm(sub(*p, *q)).powi(2)).sum();
         let size_m = coordinates[LN_SIZE].exp();
-        let unlikely: f64 = coordinates[BODY..].iter().map(|c| c * c).sum::<f64>()
+        let unlikely: f64 = self.coefficients(&coordinates).iter().map(|c| c * c).sum::<f64>()
             + tilt::unlikeliness(&coordinates[TILT..BODY], 0.0, &mut [0.0; tilt::NUMBERS]);
         coordinates[HEIGHT] -= ground_m;
         (coordinates, off / (size_m * size_m) + MISFIT * MISFIT * unlikely)
@@ -56,7 +98,7 @@ impl PoseSpace {
     /// w and ẇ that bring the pose of c nearest to `joints` and what they do.
     fn tilt(&self, frame: usize, (joints, velocities): (&[Vec3], &[Vec3]), coordinates: &mut [f64]) {
         let mut pose = vec![[0.0; 3]; self.joints];
-        self.mixed(&self.poses[frame], &coordinates[BODY..], &mut pose);
+        self.mixed(&self.poses[frame], self.coefficients(coordinates), &mut pose);
         let w = tilt::between(&pose, joints);
         let tilt = Tilt::of(&[w[0], w[1], 0.0, 0.0], 0.0);
         let turned: Vec<Vec3> = pose.iter().map(|&p| tilt.forwards(p)).collect();
@@ -71,7 +113,7 @@ impl PoseSpace {
     fn align(&self, frame: usize, joints: &[Vec3], coordinates: &mut [f64]) {
         let mut pose = vec![[0.0; 3]; self.joints];
         let tilt = Tilt::of(&coordinates[TILT..BODY], self.times_s[frame]);
-        self.turned(&self.poses[frame], &coordinates[BODY..], (&tilt, self.hips), &mut pose);
+        self.tilted(frame, coordinates, &tilt, &mut pose);
         let (a, b) = (mean(&pose), mean(joints));
         let (mut cosine, mut sine, mut square, mut height) = (0.0, 0.0, 0.0, 0.0);
         for (p, q) in pose.iter().zip(joints) {
@@ -125,7 +167,7 @@ impl PoseSpace {
                 normal[l * n + k] = normal[k * n + l];
             }
         }
-        coordinates[BODY..].copy_from_slice(&solved(&mut normal, right));
+        coordinates[BODY..BODY + n].copy_from_slice(&solved(&mut normal, right));
     }
 }
 
