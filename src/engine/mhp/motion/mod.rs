@@ -65,7 +65,7 @@ const EPSILON: f64 = 1e-8;
 const UNITS: [f64; 7] = [0.03, 0.12, 0.03, 1.0, 0.06, 0.3, 0.5];
 /// Steps of t and h, y, s, q, w, ẇ and c at the default learning rate.
 const RATES: [f64; 7] = [0.01, 0.04, 0.006, 0.2, 0.02, 0.1, 0.08];
-/// Which of both the numbers of the pose have.
+/// Which of both the numbers of the pose have; r has no gradient and takes no step.
 const POSE: usize = 6;
 const DEFAULT_RATE: f64 = 1e-3;
 /// From this share of the iterations on steps are shorter, by so much.

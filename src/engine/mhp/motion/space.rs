@@ -8,7 +8,7 @@
 //!
 //! Coordinates of a person are t (3, m), y (rad), s (ln m), q (how bright what stands still is, `static_echo.rs`), the tilt w and ẇ (2
 //! each, `tilt.rs`), c, and of a fit r (3 a joint, sizes). Where the floor is known the third is how high the lowest part of the body
-//! is above it instead of t_z (`ground.rs`). r is the residual: what of the pose that a fit begins at no c can say, some 3 cm a joint
+//! is above it instead of t_z (`ground.rs`). r is the residual: what of the pose that a fit begins at no c can say, some 2 cm a joint
 //! of people that the prior has not seen. It stays as it is: who puts a body by hand finds it where he put it, and a loss at a
 //! start is the loss of that start. A search has none.
 
@@ -66,7 +66,7 @@ pub(super) struct PoseSpace {
     components: usize,
     /// Numbers of r.
     residual: usize,
-    /// The skeleton's.
+    /// Parts of the body, by which r is believed; of a search none.
     parts: Option<Parts>,
     /// When the frames are, s after the window's middle.
     times_s: Vec<f64>,
@@ -165,8 +165,8 @@ impl PoseSpace {
         Some(Self {
             joints: skeleton.joints.len(),
             components,
-            parts: Parts::of(skeleton),
             residual: if detail == Detail::Fit { 3 * skeleton.joints.len() } else { 0 },
+            parts: (detail == Detail::Fit).then(|| Parts::of(skeleton)).flatten(),
             times_s: times_s.to_vec(),
             hips: -lowest,
             poses: times_s.iter().map(|&t_s| at(t_s)).collect(),
