@@ -163,6 +163,7 @@ impl<'a> LoadedFrame<'a> {
             iterations: report.iteration,
             converged: report.converged,
             reason: reason.word().to_owned(),
+            held: fitter.is_held(),
             loss: report.loss,
             terms: report.terms.map(Some),
             iou: report.iou.into_vec(),

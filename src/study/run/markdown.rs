@@ -79,6 +79,7 @@ fn columns<'a>(spec: &'a RunSpec, rows: &[TableRow]) -> Vec<Column<'a>> {
         columns.retain(|column| !column.optional || rows.iter().any(|row| (column.cell)(row).is_some()));
         return columns;
     }
+    add("held at the start", true, Box::new(|row| percent(row.held_share)));
     add("MAJPE, mm", false, Box::new(|row| spread(row.majpe_mm, 1)));
     add("median, mm", true, Box::new(|row| row.median_majpe_mm.map(|x| format!("{x:.1}"))));
     add("PA-MAJPE, mm", false, Box::new(|row| spread(row.pa_majpe_mm, 1)));

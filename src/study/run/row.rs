@@ -34,6 +34,9 @@ pub struct RunNumbers {
     pub init_majpe_mm: Option<f64>,
     /// The same of the start, after alignment.
     pub init_pa_majpe_mm: Option<f64>,
+    /// Whether a fit in a window left the persons where they start ([`crate::mhp::Fitter::is_held`]).
+    #[serde(default)]
+    pub held: bool,
     /// Persons fitted.
     pub persons: usize,
     /// Persons annotated.
@@ -167,6 +170,7 @@ pub(super) fn cells(spec: &RunSpec, row: &RunRow) -> Vec<(String, Cell)> {
     add("fitted_iterations", count(fit.map(|fit| fit.iterations)));
     add("converged", Cell::Flag(fit.map(|fit| fit.converged)));
     add("reason", Cell::Text(Some(reason)));
+    add("held", Cell::Flag(fit.map(|fit| fit.held)));
     add("loss", number(&|fit| Some(fit.loss)));
     for term in TermId::all() {
         add(term.key, number(&|fit| fit.terms[term]));

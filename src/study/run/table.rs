@@ -78,9 +78,12 @@ pub struct TableRow {
     pub failed: usize,
     /// Frames left out because another number of persons was fitted than is annotated.
     pub count_mismatched: usize,
+    /// Share of frames whose persons a fit in a window left where they start, 0..1; where there are such.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_share: Option<f64>,
     /// MAJPE, mm.
     pub majpe_mm: Option<Spread>,
-    /// The median of MAJPE, mm, where starts are compared with the truth.
+    /// The median of MAJPE, mm, where starts are compared with the truth: of the frames in which neither fit was held at its start.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub median_majpe_mm: Option<f64>,
     /// PA-MAJPE, mm.
@@ -95,7 +98,8 @@ pub struct TableRow {
     pub init_pa_majpe_mm: Option<Spread>,
     /// Share of frames whose fit is nearer to truth than its start, 0..1.
     pub share_improved: Option<f64>,
-    /// Share of frames whose loss ends below that of the fit from the truth, 0..1: there the loss prefers another pose.
+    /// Share of these frames whose loss ends below that of the fit from the truth, 0..1: there the loss prefers another pose. What was
+    /// held at its start has the loss of no fit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub share_below_truth: Option<f64>,
     /// The same of those whose loss is lower by more than 3 %: two fits that end in one pose differ by less.
@@ -201,10 +205,17 @@ pub(super) fn by_scene(spec: &RunSpec, all_rows: &Rows) -> Vec<SceneTable> {
     scenes.into_iter().map(of).collect()
 }
 
-/// The row with its median, and with how often its loss ends lower than the one from the truth does.
+/// The row with its median, and with how often its loss ends lower than the one from the truth does: of the frames that both fit.
 fn beside_truth(row: TableRow, spec: &RunSpec, rows: &[&RunRow], all_rows: &Rows) -> TableRow {
-    let matched = |row: &RunRow| row.fit.as_ref().ok().filter(|fit| fit.count_matched()).cloned();
-    let mut errors: Vec<f64> = rows.iter().filter_map(|row| matched(row)?.majpe_mm).collect();
+    let truth = spec.variants.iter().position(|variant| variant.start == StartFrom::Truth);
+    let fitted = |of: &RunRow| of.fit.as_ref().ok().filter(|fit| fit.count_matched() && !fit.held).cloned();
+    let both = |row: &&RunRow| {
+        let here = spec.variants.iter().enumerate().map(|(k, _)| fitted(all_rows.get(&(k, row.frame))?));
+        let of_truth = here.collect::<Option<Vec<_>>>()?.swap_remove(truth?);
+        Some((fitted(row)?, of_truth))
+    };
+    let pairs: Vec<(RunNumbers, RunNumbers)> = rows.iter().filter_map(both).collect();
+    let mut errors: Vec<f64> = pairs.iter().filter_map(|(fit, _)| fit.majpe_mm).collect();
     errors.sort_by(f64::total_cmp);
     let middle = |k: usize| errors.get(k).copied();
     let median = match errors.len() {
@@ -212,15 +223,9 @@ fn beside_truth(row: TableRow, spec: &RunSpec, rows: &[&RunRow], all_rows: &Rows
         n if n % 2 == 1 => middle(n / 2),
         n => middle(n / 2 - 1).zip(middle(n / 2)).map(|(a, b)| f64::midpoint(a, b)),
     };
-    let truth = spec.variants.iter().position(|variant| variant.start == StartFrom::Truth);
-    let by_truth = |row: &&RunRow| {
-        let of_truth = matched(all_rows.get(&(truth?, row.frame))?)?;
-        Some(matched(row)?.loss / of_truth.loss)
-    };
-    let by_truth: Vec<f64> = rows.iter().filter(|row| Some(row.variant) != truth).filter_map(by_truth).collect();
     let share = |most: f64| {
-        let below = by_truth.iter().filter(|&&loss| loss < most).count();
-        (!by_truth.is_empty()).then(|| below as f64 / by_truth.len() as f64)
+        let below = pairs.iter().filter(|(fit, of_truth)| fit.loss < most * of_truth.loss).count();
+        (Some(row.variant) != truth && !pairs.is_empty()).then(|| below as f64 / pairs.len() as f64)
     };
     TableRow {
         median_majpe_mm: median,
@@ -267,6 +272,7 @@ fn summed(labels: Vec<String>, variant: usize, rows: &[&RunRow]) -> TableRow {
         frames: rows.len(),
         failed: rows.len() - fitted.len(),
         count_mismatched: fitted.len() - used.len(),
+        held_share: share(used.iter().map(|fit| fit.held).collect()).filter(|&share| share > 0.0),
         majpe_mm: spread(|fit| fit.majpe_mm),
         median_majpe_mm: None,
         pa_majpe_mm: spread(|fit| fit.pa_majpe_mm),
@@ -351,5 +357,32 @@ mod tests {
         assert_eq!((summed.share_improved, summed.converged_share), (Some(0.5), Some(0.5)));
         assert!((summed.iou.unwrap().mean - 0.4).abs() < 1e-12);
         assert_eq!(summed.reprojection_px, None);
+    }
+
+    /// Of fits that one of both held at its start nobody knows whose loss would be lower.
+    #[test]
+    fn whom_a_fit_held_is_not_compared_with_the_truth() {
+        let text = "id = ''\nstudy = 'truth'\nversion = ''\nprecision = 'f32'\nbase = ''\nseed = 1\ncolumns = ['start']\n\
+            [data]\nname = ''\nroot = ''\nfingerprint = ''\ncontent = ''\narrays = ['hm']\nfirst = 0\nend = 4\n\
+            frames = 4\nsubset = 'all'\n[[variant]]\nlabels = ['own']\n[variant.config]\n\
+            [[variant]]\nlabels = ['truth']\nstart = 'truth'\n[variant.config]\n";
+        let spec: RunSpec = toml::from_str(text).unwrap();
+        let of = |variant, frame, (majpe_mm, loss, held)| {
+            let mut row = RunRow { variant, ..row(frame, majpe_mm, 1) };
+            row.fit = row.fit.map(|fit| RunNumbers { loss, held, ..fit });
+            ((variant, frame), row)
+        };
+        let own = [(60.0, 0.10, false), (90.0, 0.11, false), (300.0, 0.2, true), (80.0, 0.1, false)];
+        let truth = [(40.0, 0.12, false), (30.0, 0.10, false), (0.0, 0.3, true), (0.0, 0.3, true)];
+        let all = [own, truth].into_iter().enumerate();
+        let rows: Rows =
+            all.flat_map(|(k, fits)| fits.into_iter().enumerate().map(move |(n, fit)| of(k, n, fit))).collect();
+        let table = table(&spec, &rows);
+        assert_eq!(table.iter().map(|row| row.median_majpe_mm).collect::<Vec<_>>(), [Some(75.0), Some(35.0)]);
+        assert_eq!(table.iter().map(|row| row.share_below_truth).collect::<Vec<_>>(), [Some(0.5), None]);
+        assert_eq!(table.iter().map(|row| row.held_share).collect::<Vec<_>>(), [Some(0.25), Some(0.5)]);
+        let without: Rows = rows.into_iter().filter(|(key, _)| *key != (1, 0)).collect();
+        let alone = super::table(&spec, &without);
+        assert_eq!((alone[0].median_majpe_mm, alone[0].share_below_truth), (Some(90.0), Some(0.0)), "both or neither");
     }
 }
