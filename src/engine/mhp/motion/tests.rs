@@ -166,6 +166,42 @@ fn placed_again(height_m: Option<f64>, changed: impl Fn(&Window, &mut [f64])) ->
 /// What a pose has that the prior cannot say stays; of errors of joints, which show themselves by bones that differ from left to
 /// right, little does.
 #[test]
+fn who_walks_at_the_end_of_a_window_walks_on_in_it() {
+    let skeleton = Skeleton::preset("coco17").unwrap();
+    let times_s = [-0.2, -0.1, 0.0, 0.1, 0.2];
+    let space = PoseSpace::new(MotionPrior::committed().unwrap(), &skeleton, &times_s, None, Detail::Fit).unwrap();
+    let at = |coordinates: &[f64], frame: usize| {
+        let stance = space.stance(coordinates);
+        let (mut joints, mut velocities) = (vec![[0.0; 3]; 17], vec![[0.0; 3]; 17]);
+        space.pose(coordinates, &stance, frame, &mut joints);
+        space.velocity(coordinates, &stance, (frame, &joints), &mut velocities);
+        (joints, velocities)
+    };
+    let mut walkers = 0;
+    for (c, _) in &space.starts {
+        let mut walks = vec![0.0; space.coordinates()];
+        walks[..BODY].copy_from_slice(&[3.0, 0.2, 0.0, 2.8, 0.08, -1.5, 0.0, 0.0, 0.0, 0.0]);
+        walks[BODY..BODY + c.len()].copy_from_slice(c);
+        let (joints, velocities) = at(&walks, 0);
+        let goes = mean(&velocities);
+        if norm(goes) < 0.7 {
+            continue;
+        }
+        walkers += 1;
+        let found = space.project(0, &joints, &velocities);
+        let (there, moving) = at(&found, 0);
+        let left = norm(mean(&moving)) / norm(goes);
+        let (off_m, far_m) = (
+            crate::geometry::mean_distance(&there, &joints),
+            norm(sub(mean(&at(&found, 4).0), mean(&at(&walks, 4).0))),
+        );
+        let near = left > 0.85 && off_m < 0.02 && far_m < 0.25 * 0.4 * norm(goes);
+        assert!(near, "{left} of its pace of {} m/s, {off_m} m, then {far_m} m off", norm(goes));
+    }
+    assert!(walkers > 0, "the prior begins at walkers");
+}
+
+#[test]
 fn a_pose_stays_where_it_was_put_and_errors_of_its_joints_do_not() {
     let mean_distance = |a: &Pppr, b: &Pppr| crate::geometry::mean_distance(a.positions(), b.positions());
     for height_m in [None, Some(1.0)] {

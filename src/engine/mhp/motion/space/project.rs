@@ -1,13 +1,18 @@
 //! The coordinates whose joints and velocities come nearest to given ones.
 
-use super::{BODY, HALF_STEP_S, HEIGHT, LN_SIZE, PoseSpace, STILL, Stance, TILT, Turn, YAW};
+use super::{BODY, HEIGHT, LN_SIZE, PoseSpace, STILL, Stance, TILT, Turn, YAW};
 use crate::body::Parts;
 use crate::geometry::{Vec3, dot, mean, norm, sub};
 use crate::mhp::motion::static_echo;
 use crate::mhp::motion::tilt::{self, Tilt};
 
-/// How far joints and what they travel in `HALF_STEP_S` may be from the prior's, sizes: those of a start are no measurements.
+/// How far joints and what they travel in [`TRAVEL_S`] may be from the prior's, sizes: those of a start are no measurements.
 const MISFIT: f64 = 0.05;
+/// Half of a window's reach, s: a frame at its end has nothing but velocities to tell the other end by, 0.4 s away. Counted over
+/// a shorter time they shrink towards somebody who stands.
+const TRAVEL_S: f64 = 0.1;
+/// By how much the velocity of a body as a whole may change until another frame of the window, m/s.
+const PACE_MPS: f64 = 0.2;
 /// A body that has to be turned by less than this from the prior's mean is bent, not tilted, rad.
 const BENT: f64 = 0.2;
 /// Rounds in which place and pose are found from joints.
@@ -146,8 +151,7 @@ impl PoseSpace {
         let poses = turned.iter().map(own).collect::<Vec<_>>();
         let swept = velocities.iter().zip(&turned).map(|(&v, &u)| sub(turn.inverse(v), tilt.swept(u, [0.0; 3])));
         let changes = swept.map(|v| tilt.backwards(v)).collect::<Vec<_>>();
-        for (row, wanted, weight) in [(&self.poses[frame], &poses, 1.0), (&self.changes[frame], &changes, HALF_STEP_S)]
-        {
+        for (row, wanted, weight) in [(&self.poses[frame], &poses, 1.0), (&self.changes[frame], &changes, TRAVEL_S)] {
             for (joint, wanted) in wanted.iter().enumerate() {
                 for axis in 0..3 {
                     let rest = weight * (wanted[axis] - row[joint][axis]);
@@ -161,6 +165,7 @@ impl PoseSpace {
                 }
             }
         }
+        self.walk_on(frame, mean(&changes), (&mut normal, &mut right));
         for k in 0..n {
             normal[k * n + k] += MISFIT * MISFIT;
             for l in 0..k {
@@ -168,6 +173,30 @@ impl PoseSpace {
             }
         }
         coordinates[BODY..BODY + n].copy_from_slice(&solved(&mut normal, right));
+    }
+}
+
+impl PoseSpace {
+    /// Adds to the normal equations of c that the middle of a body goes on through the window as it `goes` at time `frame`, sizes/s:
+    /// joints and velocities of one frame leave where a walker is 0.4 s later to the prior, whose mean stands.
+    fn walk_on(&self, frame: usize, goes: Vec3, (normal, right): (&mut [f64], &mut [f64])) {
+        let n = self.components;
+        let middle = |row: &[Vec3], k: usize| mean(&row[k * self.joints..(k + 1) * self.joints]);
+        for other in (0..self.poses.len()).filter(|&other| other != frame) {
+            let later_s = self.times_s[other] - self.times_s[frame];
+            let gain = MISFIT / (PACE_MPS * later_s.abs());
+            let moved = |k: usize| sub(middle(&self.poses[other], k), middle(&self.poses[frame], k)).map(|x| gain * x);
+            let (rest, by) = (moved(0), (1..=n).map(moved).collect::<Vec<_>>());
+            for axis in 0..3 {
+                let rest = gain * later_s * goes[axis] - rest[axis];
+                for k in 0..n {
+                    right[k] += by[k][axis] * rest;
+                    for l in 0..=k {
+                        normal[k * n + l] += by[k][axis] * by[l][axis];
+                    }
+                }
+            }
+        }
     }
 }
 
