@@ -1,7 +1,7 @@
 //! Where a fit in a window begins: clusters of the prior and headings, coarse, then the best of them fine.
 //!
 //! Clusters stand, walk and sit; of one person alone bodies that lie and, where it moves, fall are tried beside them (`tilt.rs`).
-//! Every start is moved a little with its pose held; the few with the lowest loss are fitted with it, and in the end with the
+//! The more promising starts are moved a little with their poses held; the few with the lowest loss are fitted with it, and in the end with the
 //! bodies that a network expects, by the bend of the loss ([`lbfgs`]). What wins is the start; the runner-up with another heading and
 //! how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
 
@@ -21,12 +21,12 @@ use std::ops::Range;
 
 /// The sieves that starts go through, coarse then fine.
 const SIEVES: [Sieve; 3] = [
-    Sieve { steps: 4, every: 4, held: true, kept: 6 },
-    Sieve { steps: 8, every: 2, held: false, kept: 4 },
-    Sieve { steps: 10, every: 1, held: false, kept: 3 },
+    Sieve { moved: 0.4, steps: 4, every: 4, held: true, kept: 6 },
+    Sieve { moved: 1.0, steps: 5, every: 2, held: false, kept: 4 },
+    Sieve { moved: 1.0, steps: 7, every: 1, held: false, kept: 3 },
 ];
 /// Evaluations of what is left, and of each body that is carried on from another frame.
-const FINE: usize = 12;
+const FINE: usize = 9;
 /// What a search may cost: Gaussians times cells, over all frames and evaluations. A map of 256 × 128 cells as a whole, five frames of
 /// two views, takes all the starts of the recommended settings.
 const MOST_WORK: f64 = 2e10;
@@ -34,8 +34,8 @@ const MOST_WORK: f64 = 2e10;
 const PLAIN: f64 = 10.0;
 /// Evaluations of a person's search beside those of the first sieve, with those of what is carried on and of what the network
 /// expects, and those of a start in it, in whole windows.
-const LATER: f64 = 261.0;
-const FIRST: f64 = 5.0 / 4.0;
+const LATER: f64 = 192.0;
+const FIRST: f64 = 3.0 / 4.0;
 /// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start, but for what a network
 /// expects, whose weight says whether it is asked.
 const WEIGHTS: [f64; 2] = [0.5, 8e-3];
@@ -60,6 +60,8 @@ const MOST_MOVED_M: f64 = 0.5;
 
 /// Moves every start by some steps and keeps the few with the lowest loss.
 struct Sieve {
+    /// The share of the starts that are moved: those with the lowest loss where they begin.
+    moved: f64,
     steps: usize,
     /// Every so manyth frame is looked at.
     every: usize,
@@ -270,6 +272,13 @@ impl<'a> Search<'a> {
     /// What a sieve leaves of `all`, the best first; of those that have become one, one.
     fn sift(&mut self, all: &mut Vec<Tried>, sieve: &Sieve, own: &Range<usize>) {
         self.every = sieve.every;
+        if sieve.moved < 1.0 {
+            for tried in &mut *all {
+                tried.loss = self.evaluate(&tried.state.coordinates);
+            }
+            all.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+            all.truncate(((sieve.moved * all.len() as f64).ceil() as usize).max(sieve.kept));
+        }
         for tried in &mut *all {
             // What was seen of fewer frames is no measure any more.
             tried.loss = f64::INFINITY;
