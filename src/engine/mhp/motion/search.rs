@@ -22,7 +22,7 @@ use std::ops::Range;
 /// The sieves that starts go through, coarse then fine.
 const SIEVES: [Sieve; 3] = [
     Sieve { moved: 0.4, steps: 4, every: 4, held: true, kept: 6 },
-    Sieve { moved: 1.0, steps: 5, every: 2, held: false, kept: 4 },
+    Sieve { moved: 1.0, steps: 7, every: 2, held: false, kept: 4 },
     Sieve { moved: 1.0, steps: 7, every: 1, held: false, kept: 3 },
 ];
 /// Evaluations of what is left, and of each body that is carried on from another frame.
@@ -34,7 +34,7 @@ const MOST_WORK: f64 = 2e10;
 const PLAIN: f64 = 10.0;
 /// Evaluations of a person's search beside those of the first sieve, with those of what is carried on and of what the network
 /// expects, and those of a start in it, in whole windows.
-const LATER: f64 = 192.0;
+const LATER: f64 = 198.0;
 const FIRST: f64 = 3.0 / 4.0;
 /// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start, but for what a network
 /// expects, whose weight says whether it is asked.

@@ -6,11 +6,12 @@ use crate::geometry::{Vec3, dot, mean, norm, sub};
 use crate::mhp::motion::static_echo;
 use crate::mhp::motion::tilt::{self, Tilt};
 
-/// How far joints and what they travel in [`TRAVEL_S`] may be from the prior's, sizes: those of a start are no measurements.
+/// How far joints and what they travel in a while ([`PoseSpace::while_s`]) may be from the prior's, sizes: those of a start are no
+/// measurements.
 const MISFIT: f64 = 0.05;
-/// Half of a window's reach, s: a frame at its end has nothing but velocities to tell the other end by, 0.4 s away. Counted over
-/// a shorter time they shrink towards somebody who stands.
-const TRAVEL_S: f64 = 0.1;
+/// That while: this share of the time to the window's farther end, at least and at most so long, s.
+const OF_FARTHEST: f64 = 0.5;
+const WHILE_S: [f64; 2] = [0.05, 0.1];
 /// By how much the velocity of a body as a whole may change until another frame of the window, m/s.
 const PACE_MPS: f64 = 0.2;
 /// A body that has to be turned by less than this from the prior's mean is bent, not tilted, rad.
@@ -151,7 +152,9 @@ impl PoseSpace {
         let poses = turned.iter().map(own).collect::<Vec<_>>();
         let swept = velocities.iter().zip(&turned).map(|(&v, &u)| sub(turn.inverse(v), tilt.swept(u, [0.0; 3])));
         let changes = swept.map(|v| tilt.backwards(v)).collect::<Vec<_>>();
-        for (row, wanted, weight) in [(&self.poses[frame], &poses, 1.0), (&self.changes[frame], &changes, TRAVEL_S)] {
+        for (row, wanted, weight) in
+            [(&self.poses[frame], &poses, 1.0), (&self.changes[frame], &changes, self.while_s(frame))]
+        {
             for (joint, wanted) in wanted.iter().enumerate() {
                 for axis in 0..3 {
                     let rest = weight * (wanted[axis] - row[joint][axis]);
@@ -177,6 +180,13 @@ impl PoseSpace {
 }
 
 impl PoseSpace {
+    /// The time over which velocities at time `frame` count, s. A frame at the end of a window has nothing but them to tell the other end
+    /// by, 0.4 s away: counted over a short time they shrink towards somebody who stands.
+    fn while_s(&self, frame: usize) -> f64 {
+        let away_s = self.times_s.iter().map(|t_s| (t_s - self.times_s[frame]).abs());
+        (OF_FARTHEST * away_s.fold(0.0, f64::max)).clamp(WHILE_S[0], WHILE_S[1])
+    }
+
     /// Adds to the normal equations of c that the middle of a body goes on through the window as it `goes` at time `frame`, sizes/s:
     /// joints and velocities of one frame leave where a walker is 0.4 s later to the prior, whose mean stands.
     fn walk_on(&self, frame: usize, goes: Vec3, (normal, right): (&mut [f64], &mut [f64])) {
