@@ -1,9 +1,9 @@
 //! Where a fit in a window begins: clusters of the prior and headings, coarse, then the best of them fine.
 //!
 //! Clusters stand, walk and sit; of one person alone bodies that lie and, where it moves, fall are tried beside them (`tilt.rs`).
-//! The more promising starts are moved a little with their poses held; the few with the lowest loss are fitted with it, and in the end with the
-//! bodies that a network expects, by the bend of the loss ([`lbfgs`]). What wins is the start; the runner-up with another heading and
-//! how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
+//! The more promising starts are moved a little with their poses held; the few with the lowest loss are fitted with it, and in the
+//! end with the bodies that a network expects, by the bend of the loss ([`lbfgs`]). What wins is the start; the runner-up with another
+//! heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
 
 use super::decode::lowest;
 use super::{
