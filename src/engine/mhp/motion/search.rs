@@ -58,7 +58,7 @@ const OF_WAY: f64 = 0.4;
 const CLEARER: f64 = 0.85;
 const MOST_MOVED_M: f64 = 0.5;
 
-/// Moves every start by some steps and keeps the few with the lowest loss.
+/// Moves starts by some steps and keeps the few with the lowest loss.
 struct Sieve {
     /// The share of the starts that are moved: those with the lowest loss where they begin.
     moved: f64,

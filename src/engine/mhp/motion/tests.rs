@@ -163,8 +163,6 @@ fn placed_again(height_m: Option<f64>, changed: impl Fn(&Window, &mut [f64])) ->
     (window, params, again)
 }
 
-/// What a pose has that the prior cannot say stays; of errors of joints, which show themselves by bones that differ from left to
-/// right, little does.
 #[test]
 fn who_walks_at_the_end_of_a_window_walks_on_in_it() {
     let skeleton = Skeleton::preset("coco17").unwrap();
@@ -201,6 +199,8 @@ fn who_walks_at_the_end_of_a_window_walks_on_in_it() {
     assert!(walkers > 0, "the prior begins at walkers");
 }
 
+/// What a pose has that the prior cannot say stays; of errors of joints, which show themselves by bones that differ from left to
+/// right, little does.
 #[test]
 fn a_pose_stays_where_it_was_put_and_errors_of_its_joints_do_not() {
     let mean_distance = |a: &Pppr, b: &Pppr| crate::geometry::mean_distance(a.positions(), b.positions());

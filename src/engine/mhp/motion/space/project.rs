@@ -177,9 +177,7 @@ impl PoseSpace {
         }
         coordinates[BODY..BODY + n].copy_from_slice(&solved(&mut normal, right));
     }
-}
 
-impl PoseSpace {
     /// The time over which velocities at time `frame` count, s. A frame at the end of a window has nothing but them to tell the other end
     /// by, 0.4 s away: counted over a short time they shrink towards somebody who stands.
     fn while_s(&self, frame: usize) -> f64 {
