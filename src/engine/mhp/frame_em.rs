@@ -6,7 +6,7 @@ use super::gaussian::{WorldGaussianBars, WorldGaussians};
 use super::levels::Levels;
 use super::percentile::percentile;
 use super::region::Region;
-use super::skin::{Skin, radar_place};
+use super::skin::{self, Grain, Skin, radar_place};
 use super::splat::ViewModel;
 use super::{Ious, Precision};
 use crate::body::{Pppr, Skeleton};
@@ -27,6 +27,8 @@ pub(super) struct FrameEm {
     bars: WorldGaussianBars,
     /// Where the body is one of skin.
     skin: Option<Skin>,
+    /// The same of another grain.
+    other_skin: Option<Skin>,
 }
 
 /// The maps of a frame with what is the same in all views: one map a view, C order, missing cells filled and erased ones NaN; a
@@ -76,17 +78,18 @@ pub(super) fn forward_config(config: &FitConfig, skin: bool) -> FitConfig {
 pub(super) fn skin_of(
     config: &FitConfig,
     (views, skeleton, radar): (&[View], &Skeleton, &RadarConfig),
+    grain: Grain,
 ) -> Option<Skin> {
     // Along a Doppler axis every feature counts, elsewhere their mean.
     let spectral = views.iter().any(|view| view.axes.iter().any(|axis| axis.kind == AxisKind::Doppler));
     let features = if spectral { radar.doppler_features } else { 1 };
-    (config.body == BodyModel::Skin).then(|| Skin::new(skeleton, radar_place(views), features)).flatten()
+    (config.body == BodyModel::Skin).then(|| Skin::new(skeleton, radar_place(views), features, grain)).flatten()
 }
 
 impl FrameEm {
     /// Of what is measured in `regions`, one a view.
     pub(super) fn new(measured: &Measured<'_>, regions: &[Region], config: &FitConfig, precision: Precision) -> Self {
-        let skin = skin_of(config, (measured.views, measured.skeleton, measured.radar));
+        let skin = skin_of(config, (measured.views, measured.skeleton, measured.radar), skin::FINE);
         Self::with_skin(measured, regions, (config, precision), skin)
     }
 
@@ -140,6 +143,19 @@ impl FrameEm {
             gaussians: WorldGaussians::default(),
             bars: WorldGaussianBars::default(),
             skin,
+            other_skin: None,
+        }
+    }
+
+    /// With a skin of another grain beside its own.
+    pub(super) fn beside(self, other_skin: Option<Skin>) -> Self {
+        Self { other_skin, ..self }
+    }
+
+    /// Evaluates with the other skin from now on, where there are two.
+    pub(super) fn change_skin(&mut self) {
+        if self.other_skin.is_some() {
+            std::mem::swap(&mut self.skin, &mut self.other_skin);
         }
     }
 
@@ -178,7 +194,7 @@ impl FrameEm {
         gradient: &mut Pppr,
         mut iou: Option<&mut Ious>,
     ) -> f64 {
-        let Self { targets, workspaces, gaussians, bars, skin } = self;
+        let Self { targets, workspaces, gaussians, bars, skin, .. } = self;
         let config = &forward_config(config, skin.is_some());
         if let Some(skin) = skin.as_mut() {
             skin.fill(params);

@@ -35,10 +35,21 @@ const LIMBS: [([usize; 2], f64, f64); 8] = [
 /// Ankles, and how far before them the middle of a foot is, m: what tells a front from a back.
 const FEET: [usize; 2] = [11, 12];
 const FOOT_AHEAD_M: f64 = 0.07;
-/// Points of a limb, and of the trunk from shoulders to hips and from left to right.
-const ON_LIMB: usize = 3;
-const DOWN: [f64; 4] = [0.125, 0.375, 0.625, 0.875];
-const ACROSS: [f64; 3] = [0.15, 0.5, 0.85];
+/// How many points stand for a body.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grain {
+    /// Of a limb, and of the trunk from shoulders to hips and from left to right.
+    on_limb: usize,
+    down: &'static [f64],
+    across: &'static [f64],
+    /// Standard deviation of those of the trunk, m.
+    trunk_scale_m: f64,
+}
+
+pub(super) const FINE: Grain =
+    Grain { on_limb: 3, down: &[0.125, 0.375, 0.625, 0.875], across: &[0.15, 0.5, 0.85], trunk_scale_m: 0.03 };
+/// As many as tell one start from another.
+pub(super) const COARSE: Grain = Grain { on_limb: 1, down: &[0.25, 0.75], across: &[0.2, 0.8], trunk_scale_m: 0.052 };
 /// Left and right shoulder and hip.
 const CORNERS: [usize; 4] = [1, 2, 7, 8];
 /// How far out a limb's skin lies, of its radius; the trunk's and the head's, m.
@@ -51,8 +62,7 @@ const TRUNK_EDGE: f64 = 0.15;
 const LIMB_END: f64 = 0.02;
 const TRUNK_SIDE: f64 = 0.03;
 /// Standard deviations, m, areas, m², and a limb's standard deviation by the length of its share.
-const TRUNK_SCALE_M: f64 = 0.03;
-const TRUNK_AREA_M2: f64 = 0.35 * 0.5 / 12.0 * 2.0;
+const TRUNK_AREA_M2: f64 = 0.35 * 0.5;
 const HEAD_SCALE_M: f64 = 0.036;
 const HEAD_AREA_M2: f64 = 0.035;
 const FOOT_SCALE_M: f64 = 0.04;
@@ -66,9 +76,6 @@ const LEAST_LN_ALPHA: f64 = -5.0;
 const MOST_ALPHA: f64 = 0.999;
 /// α and standard deviation, m, of a joint of which nothing is known.
 const PLAIN: [f64; 2] = [0.5, 0.08];
-
-/// Points a person.
-pub(super) const POINTS: usize = LIMBS.len() * ON_LIMB + DOWN.len() * ACROSS.len() + 1 + FEET.len();
 
 /// What a point is made of: parts with their shares.
 type Shares = SmallVec<[(usize, f64); 4]>;
@@ -151,7 +158,7 @@ pub(super) struct Skin {
     seen: Vec<(Seen, Look)>,
     /// Where the radar is, world frame, m.
     radar: Vec3,
-    /// The Gaussians, `POINTS` a person, as the forward model takes them.
+    /// The Gaussians, those of a person after the other, as the forward model takes them.
     pub(super) points: Pppr,
     /// The gradient with respect to them, to be filled in.
     pub(super) gradient: Pppr,
@@ -226,13 +233,14 @@ impl Side {
 impl Skin {
     /// Of a skeleton seen by `radar` (world frame, m); `features` Doppler features a point. `None` where a part of the body has
     /// no joint.
-    pub(super) fn new(skeleton: &Skeleton, radar: Vec3, features: usize) -> Option<Self> {
+    pub(super) fn new(skeleton: &Skeleton, radar: Vec3, features: usize, grain: Grain) -> Option<Self> {
         let parts = Parts::of(skeleton)?;
-        let mut body = Vec::with_capacity(POINTS);
+        let Grain { on_limb, down, across, trunk_scale_m } = grain;
+        let mut body = Vec::new();
         for (ends, radius_m, length_m) in LIMBS {
-            let share_m = length_m / ON_LIMB as f64;
-            for k in 0..ON_LIMB {
-                let u = (k as f64 + 0.5) / ON_LIMB as f64;
+            let share_m = length_m / on_limb as f64;
+            for k in 0..on_limb {
+                let u = (k as f64 + 0.5) / on_limb as f64;
                 body.push(Point {
                     kind: Kind::Limb { ends, radius_m },
                     shares: [(ends[0], 1.0 - u), (ends[1], u)].into_iter().collect(),
@@ -242,16 +250,17 @@ impl Skin {
                 });
             }
         }
-        for down in DOWN {
-            for across in ACROSS {
+        let on_trunk = (down.len() * across.len()) as f64;
+        for &down in down {
+            for &across in across {
                 let shares =
                     [(1.0 - across) * (1.0 - down), across * (1.0 - down), (1.0 - across) * down, across * down];
                 body.push(Point {
                     kind: Kind::Trunk,
                     shares: CORNERS.into_iter().zip(shares).collect(),
                     joints: Shares::new(),
-                    ln_scale: TRUNK_SCALE_M.ln(),
-                    amplitude: TRUNK_AREA_M2.sqrt(),
+                    ln_scale: trunk_scale_m.ln(),
+                    amplitude: (TRUNK_AREA_M2 / on_trunk * 2.0).sqrt(),
                 });
             }
         }
@@ -282,7 +291,7 @@ impl Skin {
             Some(part) => [part.alpha.ln(), (part.along_m.ln() + 2.0 * part.across_m.ln()) / 3.0],
             None => PLAIN.map(f64::ln),
         });
-        let empty = Pppr::zeros(PpprShape { persons: 0, joints: POINTS, doppler_features: features });
+        let empty = Pppr::zeros(PpprShape { persons: 0, joints: body.len(), doppler_features: features });
         Some(Self {
             parts,
             body,
@@ -304,7 +313,8 @@ impl Skin {
     pub(super) fn fill(&mut self, params: &Pppr) {
         let shape = params.shape();
         let features = self.points.shape().doppler_features;
-        self.points.reset(PpprShape { persons: shape.persons, joints: POINTS, doppler_features: features });
+        let points = self.body.len();
+        self.points.reset(PpprShape { persons: shape.persons, joints: points, doppler_features: features });
         self.look(params);
         self.seen.clear();
         for person in 0..shape.persons {
@@ -312,7 +322,7 @@ impl Skin {
             let normal = Normal::of(&places);
             let first = person * shape.joints;
             for (k, of) in self.body.iter().enumerate() {
-                let joint = person * POINTS + k;
+                let joint = person * points + k;
                 let mut place = [0.0; 3];
                 of.shares.iter().for_each(|&(part, share)| add_scaled(&mut place, places[part], share));
                 let seen = of.seen(place, &places, &normal);
@@ -356,7 +366,7 @@ impl Skin {
             let first = person * shape.joints;
             let (mut bars, mut normal_bar) = ([[0.0; 3]; PARTS], [0.0; 3]);
             for (k, of) in self.body.iter().enumerate() {
-                let joint = person * POINTS + k;
+                let joint = person * self.body.len() + k;
                 let (seen, Look { ln_alpha, ln_scale, opacity }) = self.seen[joint];
                 // By ln α of the point; where it is as bright as can be it has no slope.
                 let by_ln = if opacity < MOST_ALPHA {
@@ -522,10 +532,11 @@ mod tests {
     use rand::rngs::StdRng;
     use rand::{Rng as _, SeedableRng as _};
 
-    fn scene() -> (Skin, Pppr, Pppr) {
+    fn scene(grain: Grain) -> (Skin, Pppr, Pppr) {
         let rng = &mut StdRng::seed_from_u64(4);
         let skeleton = Skeleton::preset("coco17").unwrap_or_else(|| unreachable!("it is one of them"));
-        let mut skin = Skin::new(&skeleton, [0.1, -0.2, 0.3], 3).unwrap_or_else(|| unreachable!("COCO has all parts"));
+        let mut skin =
+            Skin::new(&skeleton, [0.1, -0.2, 0.3], 3, grain).unwrap_or_else(|| unreachable!("COCO has all parts"));
         let mut params = Pppr::zeros(PpprShape { persons: 2, joints: 17, doppler_features: 3 });
         let standing = crate::mhp::template::Template::new(&skeleton).facing([3.0, 0.4, 0.1], [-0.8, 0.6]);
         for joint in 0..34 {
@@ -549,7 +560,11 @@ mod tests {
 
     #[test]
     fn the_way_back_agrees_with_central_differences() {
-        let (mut skin, params, wanted) = scene();
+        [FINE, COARSE].into_iter().for_each(differences);
+    }
+
+    fn differences(grain: Grain) {
+        let (mut skin, params, wanted) = scene(grain);
         let mut loss = |params: &Pppr| -> f64 {
             skin.fill(params);
             Group::ALL
@@ -580,12 +595,17 @@ mod tests {
     }
 
     #[test]
-    fn points_face_the_radar() {
-        let (skin, params, _) = scene();
-        let towards = |p: Vec3| norm(sub(p, skin.radar));
-        let chest = skin.points.position(LIMBS.len() * ON_LIMB + 7);
-        let behind = crate::geometry::mean(&[5, 6, 11, 12].map(|joint| params.position(joint)));
-        assert!(towards(chest) < towards(behind) - 0.02, "{chest:?} {behind:?}");
-        assert_eq!(skin.points.shape().total_joints(), 2 * POINTS);
+    fn points_face_the_radar_and_a_body_has_the_same_area_of_few_and_of_many() {
+        let areas = [FINE, COARSE].map(|grain| {
+            let (skin, params, _) = scene(grain);
+            let towards = |p: Vec3| norm(sub(p, skin.radar));
+            let trunk: Vec<usize> = (0..skin.body.len()).filter(|&k| skin.body[k].kind == Kind::Trunk).collect();
+            let middle = crate::geometry::mean(&[5, 6, 11, 12].map(|joint| params.position(joint)));
+            let chest = crate::geometry::mean(&trunk.iter().map(|&k| skin.points.position(k)).collect::<Vec<_>>());
+            assert!(towards(chest) < towards(middle) - 0.02, "{chest:?} {middle:?}");
+            assert_eq!(skin.points.shape().total_joints(), 2 * skin.body.len());
+            skin.body.iter().map(|point| point.amplitude * point.amplitude).sum::<f64>()
+        });
+        assert!((areas[0] - areas[1]).abs() < 1e-9, "{areas:?}");
     }
 }

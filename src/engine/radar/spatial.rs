@@ -92,10 +92,14 @@ impl SpatialGrid {
         self.ring_m.map(|[first, step]| first + step * ring as f64)
     }
 
+    /// How many rings there are.
+    pub(crate) fn rings(&self) -> usize {
+        self.rings.len().saturating_sub(1)
+    }
+
     /// The power of each ring's cells, of all Doppler bins, and how many they are. Cells that are no number count for nothing.
     pub(crate) fn power_by_ring(&self, map: &[f64], quantity: Quantity) -> (Vec<f64>, Vec<f64>) {
-        let count = self.rings.len().saturating_sub(1);
-        let (mut powers, mut cells) = (vec![0.0; count], vec![0.0; count]);
+        let (mut powers, mut cells) = (vec![0.0; self.rings()], vec![0.0; self.rings()]);
         let mut add = |ring: u32, h: f64| {
             if h.is_finite() {
                 powers[ring as usize] += quantity.power(h);

@@ -89,7 +89,7 @@ pub(crate) fn section(bed: &Bed) -> String {
          {ROUNDS} rounds, the least of all.{said}\n\n{}\nA start takes {:.2} ms, both simulated maps {:.2} ms, a whole frame (start and \
          80 iterations) {:.2} ms, each on a problem of which nothing was worked out before; an iteration in f32 allocates {} bytes; \
          instructions: {}. Of `samples/walk` one thread fits {:.0} frames a second, two {:.0}. With \
-         `--preset recommended` a window of five frames of it with all its starts takes {:.1} ms, and with 80 iterations \
+         `--preset recommended` a window of five frames of it with all its starts takes {:.1} ms, and with its iterations \
          {:.1} ms, on one thread.",
         table(&rows),
         whole["init_ms"].as_f64().unwrap_or(f64::NAN),

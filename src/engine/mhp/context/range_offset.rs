@@ -19,6 +19,7 @@ const NEAREST_M: f64 = 0.6;
 const FARTHEST_M: f64 = 6.0;
 /// Offsets that are tried, m.
 const MOST_M: f64 = 0.5;
+const STEPS: usize = ((FARTHEST_M + MOST_M) / STEP_M + 0.5) as usize;
 /// Standard deviations of the smoothing of a profile, and of the course that is taken away, m; at least of a ring's width.
 const SMOOTH_M: f64 = 0.04;
 const COURSE_M: f64 = 0.8;
@@ -54,9 +55,10 @@ pub(in crate::mhp) fn range_offsets<'a>(
     let lags = (MOST_M / STEP_M).round() as isize;
     let mut likeness = vec![vec![0.0; 2 * lags as usize + 1]; alike.len()];
     let mut count = 0.0;
+    let mut ranges = alike.iter().map(|&view| Ranges::new(views, view)).collect::<Option<Vec<_>>>()?;
     for maps in frames {
-        let profile = |&k: &usize| profile(views, k, maps.get(k)?);
-        let Some(profiles) = alike.iter().map(profile).collect::<Option<Vec<_>>>() else { continue };
+        let profile = |of: &mut Ranges| of.profile(views, maps.get(of.view)?);
+        let Some(profiles) = ranges.iter_mut().map(profile).collect::<Option<Vec<_>>>() else { continue };
         for (sums, of) in likeness.iter_mut().zip(&profiles).skip(1) {
             for (sum, lag) in sums.iter_mut().zip(-lags..=lags) {
                 *sum += correlation(&profiles[0], of, lag);
@@ -87,46 +89,102 @@ fn best(likeness: &[f64], lags: usize, count: f64) -> Option<f64> {
     (says && offset_m.abs() >= LEAST_M).then_some(offset_m)
 }
 
-/// Powers over all angles by range, ln less their course, `None` at ranges that the map has not; none at all of a dark map.
-fn profile(views: &ViewSet, view: usize, map: &[f64]) -> Option<Vec<Option<f64>>> {
-    let (grid, of) = (views.grid(view)?, views.get(view)?);
-    let (sums, cells) = grid.power_by_ring(map, of.quantity);
-    let steps = ((FARTHEST_M + MOST_M) / STEP_M).round() as usize;
-    let (mut power, mut weight) = (vec![0.0; steps], vec![0.0; steps]);
-    for (ring, (sum, cells)) in sums.iter().zip(&cells).enumerate() {
-        // What is stated is taken away before anything is measured.
-        let at = ((grid.ring_m(ring)? - of.psf.range_offset_m) / STEP_M).round();
-        if at >= 0.0 && (at as usize) < steps {
-            power[at as usize] += sum;
-            weight[at as usize] += cells;
-        }
-    }
-    let sigma = SMOOTH_M.max(0.6 * (grid.ring_m(1)? - grid.ring_m(0)?)) / STEP_M;
-    let (power, seen) = (smoothed(&power, sigma), smoothed(&weight, sigma));
-    let mean: Vec<Option<f64>> = power.iter().zip(&seen).map(|(p, w)| (*w > 1e-9).then(|| p / w)).collect();
-    let largest = mean.iter().flatten().copied().fold(0.0, f64::max);
-    if largest <= 0.0 || !largest.is_finite() {
-        return None;
-    }
-    let levels: Vec<Option<f64>> = mean.iter().map(|p| p.map(|p| (p / largest).max(FAINTEST).ln())).collect();
-    // The course is that of the ranges that the map has.
-    let filled: Vec<f64> = levels.iter().map(|level| level.unwrap_or(0.0)).collect();
-    let there: Vec<f64> = levels.iter().map(|level| f64::from(u8::from(level.is_some()))).collect();
-    let (course, known) = (smoothed(&filled, COURSE_M / STEP_M), smoothed(&there, COURSE_M / STEP_M));
-    let less = |(level, (course, known)): (&Option<f64>, (f64, f64))| level.map(|level| level - course / known);
-    Some(levels.iter().zip(course.into_iter().zip(known)).map(less).collect())
+/// The ranges that a view has, in steps, and what smooths along them.
+struct Ranges {
+    view: usize,
+    /// The step of each ring, if it is looked at.
+    steps: Vec<Option<usize>>,
+    fine: Smoothing,
+    course: Smoothing,
+    /// How many cells the rings of the last map had that are numbers, and what follows from that: it hardly ever changes.
+    counted: Vec<f64>,
+    cells: Vec<f64>,
+    known: Vec<f64>,
 }
 
-/// Convolved with a Gaussian of `sigma` steps.
-fn smoothed(values: &[f64], sigma: f64) -> Vec<f64> {
-    let reach = (3.0 * sigma).ceil() as isize;
-    let kernel: Vec<f64> = (-reach..=reach).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
-    let total: f64 = kernel.iter().sum();
-    let at = |k: usize| {
-        let weighed = kernel.iter().zip(-reach..=reach);
-        weighed.filter_map(|(w, by)| Some(w * values.get(k.checked_add_signed(by)?)?)).sum::<f64>() / total
-    };
-    (0..values.len()).map(at).collect()
+impl Ranges {
+    fn new(views: &ViewSet, view: usize) -> Option<Self> {
+        let (grid, of) = (views.grid(view)?, views.get(view)?);
+        // What is stated is taken away before anything is measured.
+        let step = |ring: usize| ((grid.ring_m(ring).unwrap_or(f64::NAN) - of.psf.range_offset_m) / STEP_M).round();
+        let steps = (0..grid.rings()).map(step).map(|at| (0.0..STEPS as f64).contains(&at).then_some(at as usize));
+        let sigma = SMOOTH_M.max(0.6 * (grid.ring_m(1)? - grid.ring_m(0)?)) / STEP_M;
+        Some(Self {
+            view,
+            steps: steps.collect(),
+            fine: Smoothing::new(sigma),
+            course: Smoothing::new(COURSE_M / STEP_M),
+            counted: Vec::new(),
+            cells: Vec::new(),
+            known: Vec::new(),
+        })
+    }
+
+    /// Powers over all angles by range, ln less their course, `None` at ranges that the map has not; none at all of a dark map.
+    fn profile(&mut self, views: &ViewSet, map: &[f64]) -> Option<Vec<Option<f64>>> {
+        let (sums, counted) = views.grid(self.view)?.power_by_ring(map, views.get(self.view)?.quantity);
+        if self.counted != counted {
+            self.cells = self.fine.of(&self.by_step(&counted));
+            let there: Vec<f64> = self.cells.iter().map(|&cells| f64::from(u8::from(is_known(cells)))).collect();
+            self.known = self.course.of(&there);
+            self.counted = counted;
+        }
+        let power = self.fine.of(&self.by_step(&sums));
+        let mean: Vec<Option<f64>> =
+            power.iter().zip(&self.cells).map(|(p, cells)| is_known(*cells).then(|| p / cells)).collect();
+        let largest = mean.iter().flatten().copied().fold(0.0, f64::max);
+        if largest <= 0.0 || !largest.is_finite() {
+            return None;
+        }
+        let levels: Vec<Option<f64>> = mean.iter().map(|p| p.map(|p| (p / largest).max(FAINTEST).ln())).collect();
+        // The course is that of the ranges that the map has.
+        let filled: Vec<f64> = levels.iter().map(|level| level.unwrap_or(0.0)).collect();
+        let course = self.course.of(&filled);
+        let less = |(level, (course, known)): (&Option<f64>, (f64, &f64))| level.map(|level| level - course / known);
+        Some(levels.iter().zip(course.into_iter().zip(&self.known)).map(less).collect())
+    }
+
+    /// The sum of what the rings of each step have.
+    fn by_step(&self, of_rings: &[f64]) -> Vec<f64> {
+        let mut sums = vec![0.0; STEPS];
+        for (step, of_ring) in self.steps.iter().zip(of_rings) {
+            if let Some(at) = *step {
+                sums[at] += of_ring;
+            }
+        }
+        sums
+    }
+}
+
+/// Whether so many cells, smoothed, tell a power.
+fn is_known(cells: f64) -> bool {
+    cells > 1e-9
+}
+
+/// The convolution with a Gaussian of so many steps.
+struct Smoothing {
+    reach: usize,
+    kernel: Vec<f64>,
+}
+
+impl Smoothing {
+    fn new(sigma: f64) -> Self {
+        let reach = (3.0 * sigma).ceil() as usize;
+        let kernel: Vec<f64> =
+            (0..=2 * reach).map(|k| (-0.5 * ((k as f64 - reach as f64) / sigma).powi(2)).exp()).collect();
+        let total: f64 = kernel.iter().sum();
+        Self { reach, kernel: kernel.into_iter().map(|w| w / total).collect() }
+    }
+
+    fn of(&self, values: &[f64]) -> Vec<f64> {
+        let mut padded = vec![0.0; values.len() + 2 * self.reach];
+        padded[self.reach..][..values.len()].copy_from_slice(values);
+        let mut smoothed = vec![0.0; values.len()];
+        for (k, weight) in self.kernel.iter().enumerate() {
+            smoothed.iter_mut().zip(&padded[k..]).for_each(|(sum, value)| *sum += weight * value);
+        }
+        smoothed
+    }
 }
 
 /// Of the first profile's compared ranges with those of the other, `lag` steps farther; 0 where both have too few in common.

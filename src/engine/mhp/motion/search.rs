@@ -1,9 +1,10 @@
 //! Where a fit in a window begins: clusters of the prior and headings, coarse, then the best of them fine.
 //!
 //! Clusters stand, walk and sit; of one person alone bodies that lie and, where it moves, fall are tried beside them (`tilt.rs`).
-//! The more promising starts are moved a little with their poses held; the few with the lowest loss are fitted with it, and in the
-//! end with the bodies that a network expects, by the bend of the loss ([`lbfgs`]). What wins is the start; the runner-up with another
-//! heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
+//! The more promising starts are moved a little with their poses held, and the few with the lowest loss are fitted with it, by few points
+//! of skin; what is left and the bodies that a network expects are fitted by all of them, by the bend of the loss ([`lbfgs`]). What wins
+//! is the start; the runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not
+//! an error.
 
 use super::decode::lowest;
 use super::{
@@ -21,9 +22,9 @@ use std::ops::Range;
 
 /// The sieves that starts go through, coarse then fine.
 const SIEVES: [Sieve; 3] = [
-    Sieve { moved: 0.4, steps: 4, every: 4, held: true, kept: 6 },
-    Sieve { moved: 1.0, steps: 7, every: 2, held: false, kept: 4 },
-    Sieve { moved: 1.0, steps: 7, every: 1, held: false, kept: 3 },
+    Sieve { moved: 0.3, steps: 4, every: 4, coarse: true, held: true, kept: 5 },
+    Sieve { moved: 1.0, steps: 7, every: 2, coarse: true, held: false, kept: 4 },
+    Sieve { moved: 1.0, steps: 7, every: 1, coarse: false, held: false, kept: 3 },
 ];
 /// Evaluations of what is left, and of each body that is carried on from another frame.
 const FINE: usize = 9;
@@ -65,6 +66,8 @@ struct Sieve {
     steps: usize,
     /// Every so manyth frame is looked at.
     every: usize,
+    /// Whether the body has few points of skin.
+    coarse: bool,
     /// Whether poses are held, so that place, heading and size alone move.
     held: bool,
     kept: usize,
@@ -147,12 +150,31 @@ struct Search<'a> {
     next: MotionState,
     /// Every so manyth frame is looked at.
     every: usize,
+    coarse: bool,
 }
 
 impl<'a> Search<'a> {
     /// Among the poses of `window`, as settings with [`WEIGHTS`] compare them.
     fn new((problem, config): (&'a Problem, &'a FitConfig), window: &'a mut Window, params: &'a Pppr) -> Self {
-        Self { problem, config, window, params, loss: WindowLoss::default(), next: MotionState::default(), every: 1 }
+        Self {
+            problem,
+            config,
+            window,
+            params,
+            loss: WindowLoss::default(),
+            next: MotionState::default(),
+            every: 1,
+            coarse: false,
+        }
+    }
+
+    /// Looks at every so manyth frame from now on, at a body with few points or many.
+    fn look(&mut self, every: usize, coarse: bool) {
+        self.every = every;
+        if coarse != self.coarse {
+            self.window.frames.iter_mut().for_each(|frame| frame.em.change_skin());
+            self.coarse = coarse;
+        }
     }
 
     fn evaluate(&mut self, coordinates: &[f64]) -> f64 {
@@ -233,7 +255,7 @@ impl<'a> Search<'a> {
         own: Range<usize>,
         (hips, radar_height_m, way): (Vec3, Option<f64>, Vec3),
     ) -> Vec<Tried> {
-        self.every = SIEVES[0].every;
+        self.look(SIEVES[0].every, SIEVES[0].coarse);
         let mut all: Vec<(f64, Tried)> = tilt::fallen(way)
             .map(|fallen| {
                 let mut of = coordinates.to_vec();
@@ -271,7 +293,7 @@ impl<'a> Search<'a> {
 
     /// What a sieve leaves of `all`, the best first; of those that have become one, one.
     fn sift(&mut self, all: &mut Vec<Tried>, sieve: &Sieve, own: &Range<usize>) {
-        self.every = sieve.every;
+        self.look(sieve.every, sieve.coarse);
         if sieve.moved < 1.0 {
             for tried in &mut *all {
                 tried.loss = self.evaluate(&tried.state.coordinates);
@@ -406,7 +428,7 @@ pub(in crate::mhp) fn search(
         }
         persons.push(all.iter().map(|tried| search.hypothesis(tried, person)).collect());
     }
-    search.every = 1;
+    search.look(1, false);
     search.evaluate(&coordinates);
     let em = search.loss.em;
     // Among reflectors that nothing is known of, another place may be theirs.
