@@ -1,10 +1,9 @@
 //! Where a fit in a window begins: clusters of the prior and headings, coarse, then the best of them fine.
 //!
 //! Clusters stand, walk and sit; of one person alone bodies that lie and, where it moves, fall are tried beside them (`tilt.rs`).
-//! The more promising starts are moved a little with their poses held, and the few with the lowest loss are fitted with it, by few points
-//! of skin; what is left and the bodies that a network expects are fitted by all of them, by the bend of the loss ([`lbfgs`]). What wins
-//! is the start; the runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not
-//! an error.
+//! The more promising starts are moved a little with their poses held, by few points of skin; the few with the lowest loss are fitted
+//! with it, and in the end with the bodies that a network expects, by the bend of the loss ([`lbfgs`]). What wins is the start; the
+//! runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
 
 use super::decode::lowest;
 use super::{
@@ -23,7 +22,7 @@ use std::ops::Range;
 /// The sieves that starts go through, coarse then fine.
 const SIEVES: [Sieve; 3] = [
     Sieve { moved: 0.3, steps: 4, every: 4, coarse: true, held: true, kept: 5 },
-    Sieve { moved: 1.0, steps: 7, every: 2, coarse: true, held: false, kept: 4 },
+    Sieve { moved: 1.0, steps: 7, every: 2, coarse: false, held: false, kept: 4 },
     Sieve { moved: 1.0, steps: 7, every: 1, coarse: false, held: false, kept: 3 },
 ];
 /// Evaluations of what is left, and of each body that is carried on from another frame.
