@@ -6,7 +6,7 @@ use super::gaussian::{WorldGaussianBars, WorldGaussians};
 use super::levels::Levels;
 use super::percentile::percentile;
 use super::region::Region;
-use super::skin::{self, Grain, Skin, radar_place};
+use super::skin::{Skin, radar_place};
 use super::splat::ViewModel;
 use super::{Ious, Precision};
 use crate::body::{Pppr, Skeleton};
@@ -27,8 +27,6 @@ pub(super) struct FrameEm {
     bars: WorldGaussianBars,
     /// Where the body is one of skin.
     skin: Option<Skin>,
-    /// The same of another grain.
-    other_skin: Option<Skin>,
 }
 
 /// The maps of a frame with what is the same in all views: one map a view, C order, missing cells filled and erased ones NaN; a
@@ -78,18 +76,17 @@ pub(super) fn forward_config(config: &FitConfig, skin: bool) -> FitConfig {
 pub(super) fn skin_of(
     config: &FitConfig,
     (views, skeleton, radar): (&[View], &Skeleton, &RadarConfig),
-    grain: Grain,
 ) -> Option<Skin> {
     // Along a Doppler axis every feature counts, elsewhere their mean.
     let spectral = views.iter().any(|view| view.axes.iter().any(|axis| axis.kind == AxisKind::Doppler));
     let features = if spectral { radar.doppler_features } else { 1 };
-    (config.body == BodyModel::Skin).then(|| Skin::new(skeleton, radar_place(views), features, grain)).flatten()
+    (config.body == BodyModel::Skin).then(|| Skin::new(skeleton, radar_place(views), features)).flatten()
 }
 
 impl FrameEm {
     /// Of what is measured in `regions`, one a view.
     pub(super) fn new(measured: &Measured<'_>, regions: &[Region], config: &FitConfig, precision: Precision) -> Self {
-        let skin = skin_of(config, (measured.views, measured.skeleton, measured.radar), skin::FINE);
+        let skin = skin_of(config, (measured.views, measured.skeleton, measured.radar));
         Self::with_skin(measured, regions, (config, precision), skin)
     }
 
@@ -143,19 +140,18 @@ impl FrameEm {
             gaussians: WorldGaussians::default(),
             bars: WorldGaussianBars::default(),
             skin,
-            other_skin: None,
         }
     }
 
-    /// With a skin of another grain beside its own.
-    pub(super) fn beside(self, other_skin: Option<Skin>) -> Self {
-        Self { other_skin, ..self }
+    /// Its skin of few points, where its body is one of skin.
+    pub(super) fn coarse_skin(&self, skeleton: &Skeleton) -> Option<Skin> {
+        self.skin.as_ref()?.coarse(skeleton)
     }
 
-    /// Evaluates with the other skin from now on, where there are two.
-    pub(super) fn change_skin(&mut self) {
-        if self.other_skin.is_some() {
-            std::mem::swap(&mut self.skin, &mut self.other_skin);
+    /// Evaluates with another skin from now on, if there is one, and puts its own there.
+    pub(super) fn change_skin(&mut self, other: &mut Option<Skin>) {
+        if other.is_some() {
+            std::mem::swap(&mut self.skin, other);
         }
     }
 

@@ -14,7 +14,6 @@
 use super::floors::EPSILON;
 use super::frame_em::{forward_config, skin_of};
 use super::gaussian::WorldGaussians;
-use super::skin;
 use super::splat::{Splat, Splats, ViewModel};
 use super::{Precision, Problem};
 use crate::body::Pppr;
@@ -67,7 +66,7 @@ impl JointReturns {
     pub fn new(problem: &Problem, config: &FitConfig, params: &Pppr) -> Self {
         let problem = problem.under(config);
         let joints = params.shape().total_joints();
-        let skin = skin_of(config, (&problem.views, &problem.skeleton, &problem.radar), skin::FINE).map(|mut skin| {
+        let skin = skin_of(config, (&problem.views, &problem.skeleton, &problem.radar)).map(|mut skin| {
             skin.fill(params);
             skin
         });

@@ -38,7 +38,6 @@
 
 use super::frame_em::{forward_config, skin_of};
 use super::gaussian::{WorldGaussian, WorldGaussians};
-use super::skin;
 use super::splat::{ViewModel, spectrum_of};
 use super::{FitError, Precision, Problem};
 use crate::body::{Group, Pppr};
@@ -81,7 +80,7 @@ pub fn simulate_signal(
     cells: CellValue,
 ) -> Result<Vec<Vec<f64>>, FitError> {
     let problem = problem.under(config);
-    let skin = skin_of(config, (&problem.views, &problem.skeleton, &problem.radar), skin::FINE).map(|mut skin| {
+    let skin = skin_of(config, (&problem.views, &problem.skeleton, &problem.radar)).map(|mut skin| {
         skin.fill(params);
         skin
     });

@@ -7,7 +7,6 @@ use super::gaussian::WorldGaussians;
 use super::kernel::Kernel;
 use super::region::Region;
 use super::scalar::Real;
-use super::skin;
 use super::splat::{Splats, ViewModel};
 use super::tiles::Tiles;
 use super::{Precision, Problem};
@@ -19,7 +18,7 @@ use crate::radar::View;
 pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, params: &Pppr) -> Vec<Vec<f64>> {
     let problem = problem.under(config);
     let mut gaussians = WorldGaussians::default();
-    let skin = skin_of(config, (&problem.views, &problem.skeleton, &problem.radar), skin::FINE).map(|mut skin| {
+    let skin = skin_of(config, (&problem.views, &problem.skeleton, &problem.radar)).map(|mut skin| {
         skin.fill(params);
         skin
     });

@@ -37,7 +37,7 @@ const FEET: [usize; 2] = [11, 12];
 const FOOT_AHEAD_M: f64 = 0.07;
 /// How many points stand for a body.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Grain {
+struct Grain {
     /// Of a limb, and of the trunk from shoulders to hips and from left to right.
     on_limb: usize,
     down: &'static [f64],
@@ -46,10 +46,9 @@ pub(super) struct Grain {
     trunk_scale_m: f64,
 }
 
-pub(super) const FINE: Grain =
+const FINE: Grain =
     Grain { on_limb: 3, down: &[0.125, 0.375, 0.625, 0.875], across: &[0.15, 0.5, 0.85], trunk_scale_m: 0.03 };
-/// As many as tell one start from another.
-pub(super) const COARSE: Grain = Grain { on_limb: 1, down: &[0.25, 0.75], across: &[0.2, 0.8], trunk_scale_m: 0.052 };
+const COARSE: Grain = Grain { on_limb: 1, down: &[0.25, 0.75], across: &[0.2, 0.8], trunk_scale_m: 0.052 };
 /// Left and right shoulder and hip.
 const CORNERS: [usize; 4] = [1, 2, 7, 8];
 /// How far out a limb's skin lies, of its radius; the trunk's and the head's, m.
@@ -233,7 +232,16 @@ impl Side {
 impl Skin {
     /// Of a skeleton seen by `radar` (world frame, m); `features` Doppler features a point. `None` where a part of the body has
     /// no joint.
-    pub(super) fn new(skeleton: &Skeleton, radar: Vec3, features: usize, grain: Grain) -> Option<Self> {
+    pub(super) fn new(skeleton: &Skeleton, radar: Vec3, features: usize) -> Option<Self> {
+        Self::of_grain(skeleton, radar, features, FINE)
+    }
+
+    /// The same of few points: as many as tell one start from another.
+    pub(super) fn coarse(&self, skeleton: &Skeleton) -> Option<Self> {
+        Self::of_grain(skeleton, self.radar, self.points.shape().doppler_features, COARSE)
+    }
+
+    fn of_grain(skeleton: &Skeleton, radar: Vec3, features: usize, grain: Grain) -> Option<Self> {
         let parts = Parts::of(skeleton)?;
         let Grain { on_limb, down, across, trunk_scale_m } = grain;
         let mut body = Vec::new();
@@ -536,7 +544,7 @@ mod tests {
         let rng = &mut StdRng::seed_from_u64(4);
         let skeleton = Skeleton::preset("coco17").unwrap_or_else(|| unreachable!("it is one of them"));
         let mut skin =
-            Skin::new(&skeleton, [0.1, -0.2, 0.3], 3, grain).unwrap_or_else(|| unreachable!("COCO has all parts"));
+            Skin::of_grain(&skeleton, [0.1, -0.2, 0.3], 3, grain).unwrap_or_else(|| unreachable!("COCO has all parts"));
         let mut params = Pppr::zeros(PpprShape { persons: 2, joints: 17, doppler_features: 3 });
         let standing = crate::mhp::template::Template::new(&skeleton).facing([3.0, 0.4, 0.1], [-0.8, 0.6]);
         for joint in 0..34 {

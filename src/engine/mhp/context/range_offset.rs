@@ -19,6 +19,7 @@ const NEAREST_M: f64 = 0.6;
 const FARTHEST_M: f64 = 6.0;
 /// Offsets that are tried, m.
 const MOST_M: f64 = 0.5;
+/// Steps of a profile.
 const STEPS: usize = ((FARTHEST_M + MOST_M) / STEP_M + 0.5) as usize;
 /// Standard deviations of the smoothing of a profile, and of the course that is taken away, m; at least of a ring's width.
 const SMOOTH_M: f64 = 0.04;

@@ -6,7 +6,7 @@ use crate::geometry::norm;
 use crate::mhp::frame_em::{FrameEm, Measured, skin_of};
 use crate::mhp::reduced::{AxisReduction, Blur, Distance, ReducedMaps, Reduction};
 use crate::mhp::region::{Region, centres};
-use crate::mhp::skin::{self, Skin};
+use crate::mhp::skin::Skin;
 use crate::mhp::{Precision, Problem};
 use crate::radar::{Axis, AxisKind, View};
 use std::sync::Arc;
@@ -26,18 +26,16 @@ pub(in crate::mhp) struct ReducedViews<'a> {
     pub(super) maps: Arc<ReducedMaps>,
     /// Whether clutter is modelled by range.
     by_range: bool,
-    /// The skins that every frame is given: the one that a fit has, and the one that a search begins with.
+    /// The skin that every frame is given.
     skin: Option<Skin>,
-    coarse: Option<Skin>,
 }
 
 impl<'a> ReducedViews<'a> {
     /// For persons who stand where those of `params` do.
     pub(in crate::mhp) fn new(problem: &'a Problem, config: &FitConfig, params: &Pppr) -> Self {
         let maps = problem.reduced(problem.views.iter().map(|view| reduction(view, params)).collect());
-        let skin = |grain| skin_of(config, (&maps.views, &problem.skeleton, &problem.radar), grain);
-        let (skin, coarse) = (skin(skin::FINE), skin(skin::COARSE));
-        Self { problem, by_range: config.clutter == Clutter::Modelled, maps, skin, coarse }
+        let skin = skin_of(config, (&maps.views, &problem.skeleton, &problem.radar));
+        Self { problem, by_range: config.clutter == Clutter::Modelled, maps, skin }
     }
 
     /// The views.
@@ -54,7 +52,7 @@ impl<'a> ReducedViews<'a> {
         (config, precision): (&FitConfig, Precision),
         background: Option<&[Vec<f64>]>,
     ) -> FrameEm {
-        let Self { problem, maps, by_range, skin, coarse } = self;
+        let Self { problem, maps, by_range, skin } = self;
         let (views, levels) = (0..maps.views.len(), config.objective != EmLoss::Iou);
         let measured = Measured {
             views: &maps.views,
@@ -65,7 +63,7 @@ impl<'a> ReducedViews<'a> {
             grids: views.clone().filter(|_| *by_range).map(|view| maps.grid(view)).collect(),
             noises: views.filter(|_| levels).map(|view| maps.noise(problem, frame, view)).collect(),
         };
-        FrameEm::with_skin(&measured, regions, (config, precision), skin.clone()).beside(coarse.clone())
+        FrameEm::with_skin(&measured, regions, (config, precision), skin.clone())
     }
 }
 

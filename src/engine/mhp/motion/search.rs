@@ -14,9 +14,10 @@ use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::geometry::{Vec3, mean, mean_distance, norm, sub};
 use crate::mhp::pose_network::Expected;
-use crate::mhp::skin::radar_place;
+use crate::mhp::skin::{Skin, radar_place};
 use crate::mhp::{FitError, Precision, Problem, tiles};
 use std::f64::consts::{PI, TAU};
+use std::iter::zip;
 use std::ops::Range;
 
 /// The sieves that starts go through, coarse then fine.
@@ -149,7 +150,9 @@ struct Search<'a> {
     next: MotionState,
     /// Every so manyth frame is looked at.
     every: usize,
+    /// Whether frames are given bodies with few points of skin, and the skin that each has not now, once it was asked for.
     coarse: bool,
+    other_skins: Vec<Option<Skin>>,
 }
 
 impl<'a> Search<'a> {
@@ -164,6 +167,7 @@ impl<'a> Search<'a> {
             next: MotionState::default(),
             every: 1,
             coarse: false,
+            other_skins: Vec::new(),
         }
     }
 
@@ -171,7 +175,11 @@ impl<'a> Search<'a> {
     fn look(&mut self, every: usize, coarse: bool) {
         self.every = every;
         if coarse != self.coarse {
-            self.window.frames.iter_mut().for_each(|frame| frame.em.change_skin());
+            let Self { window, other_skins, problem, .. } = self;
+            if other_skins.is_empty() {
+                other_skins.extend(window.frames.iter().map(|frame| frame.em.coarse_skin(&problem.skeleton)));
+            }
+            zip(&mut window.frames, other_skins).for_each(|(frame, other)| frame.em.change_skin(other));
             self.coarse = coarse;
         }
     }
