@@ -15,6 +15,10 @@ const ROUND_TO_EXPONENT: f32 = 12_583_039.0;
 /// 2ᶠ on |f| ≤ ½, relative error 3e-6 (least squares at Chebyshev points).
 const EXP2_SERIES: [f32; 5] = [0.999_999_2, 0.693_121_97, 0.240_249_81, 0.055_917_04, 0.009_560_51];
 
+/// The same, relative error 1e-7.
+const EXP2_LONG_SERIES: [f32; 7] =
+    [1.0, 0.693_147_2, 0.240_226_51, 0.055_504_11, 0.009_618_129, 0.001_333_355_8, 0.000_154_035_3];
+
 /// 1.5 · 2²³: adding it rounds to a whole number.
 const ROUND_TO_INTEGER: f32 = 12_582_912.0;
 /// Series of cos πt and sin(πt)/t by t².
@@ -132,12 +136,23 @@ impl<S: Simd> Lanes<S> {
     /// 2ˣ for x in −126 ..= 127.
     #[inline(always)]
     pub(super) fn exp2(self) -> Self {
+        self.exp2_by(EXP2_SERIES)
+    }
+
+    /// The same to the last digits, to be raised to powers.
+    #[inline(always)]
+    pub(super) fn exp2_precise(self) -> Self {
+        self.exp2_by(EXP2_LONG_SERIES)
+    }
+
+    #[inline(always)]
+    fn exp2_by<const N: usize>(self, series: [f32; N]) -> Self {
         let simd = self.simd;
         let rounded = self + splat(simd, ROUND_TO_EXPONENT);
         let f = self - (rounded - splat(simd, ROUND_TO_EXPONENT));
-        let mut power = splat(simd, EXP2_SERIES[4]);
-        for k in (0..4).rev() {
-            power = power.mul_add(f, splat(simd, EXP2_SERIES[k]));
+        let mut power = splat(simd, series[N - 1]);
+        for k in (0..N - 1).rev() {
+            power = power.mul_add(f, splat(simd, series[k]));
         }
         let bits = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(rounded.value), simd.splat_u32s(23));
         power * Self::new(simd, simd.transmute_f32s_u32s(bits))
@@ -212,22 +227,23 @@ mod tests {
     /// Sixteen numbers, of which every register holds a part.
     type F32x16 = [f32; 16];
 
-    /// 2ˣ, log₂ x, cosine and sine of turns, |x|, 5 − 3x, and 2 where x > 1, else 3.
+    /// 2ˣ, log₂ x, cosine and sine of turns, |x|, 5 − 3x, 2 where x > 1, else 3, and 2ˣ by the long series.
     struct Functions<'a>(&'a [F32x16]);
 
     impl WithSimd for Functions<'_> {
-        type Output = Vec<[F32x16; 7]>;
+        type Output = Vec<[F32x16; 8]>;
 
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
             let of = |x: f32| splat(simd, x);
-            let mut found = vec![[[0.0; 16]; 7]; self.0.len()];
+            let mut found = vec![[[0.0; 16]; 8]; self.0.len()];
             for (x, found) in self.0.iter().zip(&mut found) {
                 for part in 0..16 / S::F32_LANES {
                     let x = Lanes::new(simd, S::as_simd_f32s(x).0[part]);
                     let [cos, sin] = x.cos_sin_turns();
                     let chosen = x.select_gt(of(1.0), of(2.0), of(3.0));
-                    let all = [x.exp2(), x.log2(), cos, sin, x.abs(), x.neg_mul_add(of(3.0), of(5.0)), chosen];
+                    let plane = x.neg_mul_add(of(3.0), of(5.0));
+                    let all = [x.exp2(), x.log2(), cos, sin, x.abs(), plane, chosen, x.exp2_precise()];
                     for (found, y) in found.iter_mut().zip(all) {
                         S::as_mut_simd_f32s(found).0[part] = y.value;
                     }
@@ -238,7 +254,7 @@ mod tests {
     }
 
     /// Each number with what is found of it.
-    fn functions(of: impl Iterator<Item = f32>) -> Vec<(f64, [f64; 7])> {
+    fn functions(of: impl Iterator<Item = f32>) -> Vec<(f64, [f64; 8])> {
         let of: Vec<f32> = of.collect();
         let rows: Vec<F32x16> = of.chunks_exact(16).map(|row| std::array::from_fn(|k| row[k])).collect();
         let found = Arch::new().dispatch(Functions(&rows));
@@ -248,7 +264,10 @@ mod tests {
 
     #[test]
     fn powers_turns_and_choices_are_those_of_double_precision() {
-        for (x, [exp2, _, cos, sin, abs, plane, chosen]) in functions((-16 * 63..16 * 63).map(|k| 0.123 * k as f32)) {
+        for (x, [exp2, _, cos, sin, abs, plane, chosen, precise]) in
+            functions((-16 * 63..16 * 63).map(|k| 0.123 * k as f32))
+        {
+            assert!((precise / x.exp2() - 1.0).abs() < 2e-7, "2^{x}: {precise}");
             assert!((exp2 / x.exp2() - 1.0).abs() < 4e-6, "2^{x}: {exp2}");
             let (wanted_sin, wanted_cos) = (std::f64::consts::TAU * x).sin_cos();
             assert!((cos - wanted_cos).abs() < 1e-6 && (sin - wanted_sin).abs() < 1e-6, "{x} turns: {cos}, {sin}");

@@ -9,23 +9,25 @@
     reason = "all of it belongs into the one function that is compiled for an instruction set"
 )]
 
-use super::adjoint::{Moments, Sums};
+mod point;
+
+use super::adjoint::Moments;
 use super::floors::ViewLoss;
 use super::lanes::{Lanes, splat};
 use super::levels::{LevelTotals, REGULARISER};
 use super::percentile::place;
 use super::splat::Splats;
 use crate::config::EmLoss;
+use point::{LOWERED, Reach, RowPoint};
 use pulp::{Arch, Simd, WithSimd};
 use std::f32::consts::LN_2;
 use std::f64::consts::{LOG2_E, PI};
+use std::iter::zip;
 
 /// Cells of the widest register: rows are padded to whole ones.
 const LANES: usize = 16;
 /// log₂ below which a power is nothing in single precision.
 const FAINTEST_LOG2: f64 = -52.0;
-/// 2 to less than this is 0: denormal numbers, also of products, cost a hundred cycles.
-const FAINTEST_EXPONENT: f32 = -64.0;
 /// How much larger the gain may be than was guessed, and how often it is guessed.
 const GAIN_STEP: f64 = 2.0;
 const GAIN_GUESSES: usize = 24;
@@ -49,22 +51,14 @@ pub(super) struct LevelRows {
 #[derive(Debug, Default)]
 pub(super) struct RowScratch {
     points: Vec<RowPoint>,
-    /// Where each point reaches, and what it returns there: a register of columns after the other, row by row.
+    /// Where each point reaches, and what it returns there.
     reaches: Vec<Reach>,
     returns: Vec<f32>,
+    ridge: Vec<f32>,
     power: Vec<f32>,
     /// ∂L/∂(g S), and then what a joint's return is to be multiplied by.
     slopes: Vec<f32>,
     ranked: Vec<u32>,
-}
-
-/// A joint: its bins, 1/D, skew, and ln of its largest power, in powers of two relative to the strongest.
-#[derive(Debug, Clone, Copy, Default)]
-struct RowPoint {
-    bin: [f64; 2],
-    weight: [f64; 2],
-    skew: f64,
-    top: f64,
 }
 
 /// One evaluation, as it is asked for.
@@ -142,11 +136,13 @@ impl WithSimd for Evaluate<'_> {
         let Some(unit_log2) = scratch.fill(query.splats) else {
             return (ViewLoss { loss: f64::NAN, iou: None }, true);
         };
-        let unit = unit_log2.exp2();
         // Σ over a plane without bounds, the points apart from each other, is the guess.
         let everywhere =
             scratch.points.iter().map(|of| of.top.exp2() / (of.weight[0] * of.weight[1]).sqrt()).sum::<f64>();
-        let mut gain = totals.gain(everywhere * PI * unit);
+        let strongest = unit_log2.exp2();
+        let mut gain = totals.gain(everywhere * PI * strongest);
+        // Of powers as they are summed.
+        let unit = strongest * LOWERED;
         let mut tries = 0..GAIN_GUESSES;
         let sum = loop {
             let cut = ((totals.noise * query.least / gain).log2() - unit_log2).max(FAINTEST_LOG2);
@@ -173,23 +169,15 @@ impl WithSimd for Evaluate<'_> {
         let (iou, among) = query.tau_pct.map_or((None, true), |tau_pct| scratch.iou(rows, tau_pct));
         if let (Some(factor), false) = (query.factor, nobody) {
             let by_sum = 1.0 / (sum + REGULARISER / unit);
-            scratch.weigh(simd, rows, [(2.0 * factor * gain * unit) as f32, (through_gain * by_sum) as f32]);
-            for joint in 0..scratch.points.len() {
-                let sums = scratch.collect(simd, rows, joint);
-                moments.add(joint, &sums);
+            scratch.weigh(simd, rows, [(2.0 * factor * gain * strongest) as f32, (through_gain * by_sum) as f32]);
+            let (returns, _) = S::as_simd_f32s(&scratch.returns);
+            let (slopes, _) = S::as_simd_f32s(&scratch.slopes);
+            for (joint, (point, reach)) in zip(&scratch.points, &scratch.reaches).enumerate() {
+                moments.add(joint, &point.collect(simd, (rows, reach), (returns, slopes)));
             }
         }
         (ViewLoss { loss, iou }, among)
     }
-}
-
-/// The rows that a point reaches above a level, `height` above it at most.
-#[inline(always)]
-fn reached(middle: f64, height: f64, weight: f64, lo: usize, size: usize) -> (usize, usize) {
-    let half = (height / weight).max(0.0).sqrt();
-    let from = (middle - half - lo as f64).ceil().max(0.0);
-    let to = (middle + half - lo as f64).floor() + 1.0;
-    (from.min(size as f64) as usize, to.clamp(0.0, size as f64) as usize)
 }
 
 impl RowScratch {
@@ -221,44 +209,20 @@ impl RowScratch {
     fn sum<S: Simd>(&mut self, simd: S, rows: &LevelRows, cut: f64) {
         self.power.clear();
         self.power.resize(rows.size[0] * rows.stride, 0.0);
-        let Self { points, reaches, returns, power, .. } = self;
+        let Self { points, reaches, returns, ridge, power, .. } = self;
         reaches.clear();
         let mut kept = 0;
         for point in points.iter() {
             let reach = point.reach(rows, cut, kept);
-            kept += (reach.rows.1 - reach.rows.0) * reach.registers::<S>().len() * S::F32_LANES;
+            kept += reach.returns::<S>();
             reaches.push(reach);
         }
-        if returns.len() < kept {
-            returns.resize(kept, 0.0);
+        if returns.len() < kept * S::F32_LANES {
+            returns.resize(kept * S::F32_LANES, 0.0);
         }
-        let (stride, lo) = (rows.stride, rows.lo);
-        let (steps, faintest, zero) = (steps(simd), splat(simd, FAINTEST_EXPONENT), splat(simd, 0.0));
-        for (point, reach) in points.iter().zip(reaches.iter()) {
-            let numbers = [point.skew, point.weight[0], point.weight[1], point.top].map(|x| x as f32);
-            let [skew, w0] = [numbers[0], numbers[1]];
-            let (w1, top) = (splat(simd, -numbers[2]), numbers[3]);
-            let first = ((lo[0] + reach.rows.0) as f64 - point.bin[0]) as f32;
-            let count = reach.rows.1 - reach.rows.0;
-            let mut at = reach.kept;
-            for register in reach.registers::<S>() {
-                let column = register * S::F32_LANES;
-                let x = steps + splat(simd, ((lo[1] + column) as f64 - point.bin[1]) as f32);
-                let mut y = first;
-                let kept = returns[at..at + count * S::F32_LANES].chunks_exact_mut(S::F32_LANES);
-                let cells = power[reach.rows.0 * stride..reach.rows.1 * stride].chunks_exact_mut(stride);
-                for (to, row) in kept.zip(cells) {
-                    let beside = x + splat(simd, skew * y);
-                    let ln = (beside * beside).mul_add(w1, splat(simd, top - w0 * y * y));
-                    let returned = ln.select_gt(faintest, ln.max(faintest).exp2(), zero);
-                    let (to, _) = S::as_mut_simd_f32s(to);
-                    to[0] = returned.value;
-                    let (cells, _) = S::as_mut_simd_f32s(&mut row[column..column + S::F32_LANES]);
-                    cells[0] = (Lanes::new(simd, cells[0]) + returned).value;
-                    y += 1.0;
-                }
-                at += count * S::F32_LANES;
-            }
+        let ((returns, _), (power, _)) = (S::as_mut_simd_f32s(returns), S::as_mut_simd_f32s(power));
+        for (point, reach) in zip(points, reaches) {
+            point.spread(simd, (rows, reach), ridge, (&mut *returns, &mut *power));
         }
         rows.blank(&mut self.power);
     }
@@ -367,50 +331,6 @@ impl RowScratch {
         rows.blank(&mut self.slopes);
     }
 
-    /// What the cells want of a joint.
-    #[inline(always)]
-    fn collect<S: Simd>(&self, simd: S, rows: &LevelRows, joint: usize) -> Sums {
-        let (point, reach) = (&self.points[joint], &self.reaches[joint]);
-        let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
-        let steps = steps(simd);
-        let mut sums = [zero; 6];
-        let first = splat(simd, ((rows.lo[0] + reach.rows.0) as f64 - point.bin[0]) as f32);
-        let (mut at, count) = (reach.kept, reach.rows.1 - reach.rows.0);
-        for register in reach.registers::<S>() {
-            // Σ r, Σ r Δ and Σ r Δ² over the rows, a number a column.
-            let [mut r, mut r_d, mut r_d_d] = [zero; 3];
-            let mut delta = first;
-            let column = register * S::F32_LANES;
-            let kept = self.returns[at..at + count * S::F32_LANES].chunks_exact(S::F32_LANES);
-            let cells = self.slopes[reach.rows.0 * rows.stride..reach.rows.1 * rows.stride].chunks_exact(rows.stride);
-            for (returned, row) in kept.zip(cells) {
-                let (slopes, _) = S::as_simd_f32s(&row[column..column + S::F32_LANES]);
-                let (returned, _) = S::as_simd_f32s(returned);
-                let wanted = Lanes::new(simd, returned[0]) * Lanes::new(simd, slopes[0]);
-                let by_delta = wanted * delta;
-                r += wanted;
-                r_d += by_delta;
-                r_d_d = by_delta.mul_add(delta, r_d_d);
-                delta += one;
-            }
-            at += count * S::F32_LANES;
-            let x = steps + splat(simd, ((rows.lo[1] + column) as f64 - point.bin[1]) as f32);
-            let r_x = r * x;
-            sums[0] += r;
-            sums[1] += r_x;
-            sums[2] = r_x.mul_add(x, sums[2]);
-            sums[3] += r_d;
-            sums[4] = r_d.mul_add(x, sums[4]);
-            sums[5] += r_d_d;
-        }
-        let mut totals = [0.0; 6];
-        for k in 0..6 {
-            totals[k] = f64::from(sums[k].reduce_sum());
-        }
-        let [r, rx, rxx, ry, rxy, ryy] = totals;
-        Sums { r, q: 0.0, r_delta: [0.0, ry, rx], q_delta: [0.0; 3], r_delta_delta: [0.0, 0.0, ryy, 0.0, rxy, rxx] }
-    }
-
     /// The IoU of the hard masks, and whether something was summed in the cells that their threshold lies among; elsewhere it is
     /// not known.
     fn iou(&mut self, rows: &LevelRows, tau_pct: f64) -> (Option<f64>, bool) {
@@ -439,51 +359,6 @@ impl RowScratch {
         }
         (super::floors::share(both, either), true)
     }
-}
-
-/// The rows and columns of a region in which a point is above a level, `[from, to)`; none of somebody who is not.
-#[derive(Debug, Clone, Copy, Default)]
-struct Reach {
-    rows: (usize, usize),
-    columns: (usize, usize),
-    /// Where what it returns begins.
-    kept: usize,
-}
-
-impl Reach {
-    /// The registers of a row.
-    #[inline(always)]
-    fn registers<S: Simd>(&self) -> std::ops::Range<usize> {
-        self.columns.0 / S::F32_LANES..self.columns.1.div_ceil(S::F32_LANES)
-    }
-}
-
-impl RowPoint {
-    #[inline(always)]
-    fn reach(&self, rows: &LevelRows, cut: f64, kept: usize) -> Reach {
-        let height = self.top - cut;
-        if height <= 0.0 {
-            return Reach { kept, ..Reach::default() };
-        }
-        let across = reached(self.bin[0], height, self.weight[0], rows.lo[0], rows.size[0]);
-        // The ridge leans by the skew.
-        let half = (height / self.weight[0]).sqrt() * self.skew.abs() + (height / self.weight[1]).sqrt();
-        let from = (self.bin[1] - half - rows.lo[1] as f64).ceil().clamp(0.0, rows.size[1] as f64);
-        let to = ((self.bin[1] + half - rows.lo[1] as f64).floor() + 1.0).clamp(0.0, rows.size[1] as f64);
-        let columns = (from as usize, to as usize);
-        if across.0 < across.1 && columns.0 < columns.1 {
-            Reach { rows: across, columns, kept }
-        } else {
-            Reach { kept, ..Reach::default() }
-        }
-    }
-}
-
-/// 0, 1, 2, … of a register.
-#[inline(always)]
-fn steps<S: Simd>(simd: S) -> Lanes<S> {
-    const STEPS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
-    Lanes::new(simd, S::as_simd_f32s(&STEPS).0[0])
 }
 
 /// ln(1 + x) of x ≥ 0; of small x with all its digits, for a correlation of faint levels is made of them.

@@ -1,0 +1,336 @@
+//! A joint or point of skin in its rows: what it returns in each cell, and what the cells want of it.
+//!
+//! A point returns 2^(t − w₀ y² − w₁ (x + s y)²), y rows and x columns from its middle. That is
+//!
+//! ```text
+//! 2^(t − (w₀ + w₁ s²) y²) · 2^(−w₁ x²) · q(x)^y,  q = 2^(−2 w₁ s x)
+//! ```
+//!
+//! a number a row, and one a column that is multiplied by q from row to row: two products a cell instead of a power. It begins in the
+//! row of the middle and goes up and down from there, for that is where no column that the point reaches is far below its largest
+//! return. Both numbers are lifted, so that what falls from there stays above the smallest of single precision: denormal numbers cost
+//! a hundred cycles. Of a point that leans so far that this does not hold each cell is a power by itself.
+#![expect(
+    clippy::inline_always,
+    reason = "all of it belongs into the one function that is compiled for an instruction set"
+)]
+
+use super::{LANES, LevelRows};
+use crate::mhp::adjoint::Sums;
+use crate::mhp::lanes::{Lanes, splat};
+use pulp::Simd;
+use std::iter::zip;
+use std::ops::Range;
+
+/// log₂ of what a return is multiplied by: of its row's share, and of its column's.
+const LIFTS: [f64; 2] = [40.0, 60.0];
+/// log₂ of both, and one by both.
+const LIFT: f64 = LIFTS[0] + LIFTS[1];
+pub(super) const LOWERED: f64 = 1.0 / (1_u128 << LIFT as u32) as f64;
+/// A column's share may fall to 2 to less than this, lifted, and no return may.
+const LOWEST: f64 = -122.0;
+/// 2 to this and less is 0 where each cell is a power by itself, lifted.
+const FAINTEST: f32 = 36.0;
+/// log₂ of what a column's share changes by from row to row, at most: of those that are reached it is less.
+const STEEPEST: f32 = 60.0;
+/// Registers of a row that are summed side by side: each waits for its own product only.
+const ABREAST: usize = 4;
+
+/// A joint: its bins, 1/D, skew, and log₂ of its largest power relative to the strongest.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct RowPoint {
+    pub(super) bin: [f64; 2],
+    pub(super) weight: [f64; 2],
+    pub(super) skew: f64,
+    pub(super) top: f64,
+}
+
+/// The rows and columns of a region in which a point is above a level, `[from, to)`; none of somebody who is not.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Reach {
+    rows: (usize, usize),
+    columns: (usize, usize),
+    /// In which register what it returns begins: those of a block of columns, row by row, then those of the next.
+    kept: usize,
+    /// Where returns are products: the row that they begin in, from the first one, and log₂ of the share of a column below which the
+    /// point does not reach it.
+    from: Option<(usize, f32)>,
+}
+
+/// The rows that a point reaches above a level, `height` above it at most.
+#[inline(always)]
+fn reached(middle: f64, height: f64, weight: f64, lo: usize, size: usize) -> (usize, usize) {
+    let half = (height / weight).max(0.0).sqrt();
+    let from = (middle - half - lo as f64).ceil().max(0.0);
+    let to = (middle + half - lo as f64).floor() + 1.0;
+    (from.min(size as f64) as usize, to.clamp(0.0, size as f64) as usize)
+}
+
+impl Reach {
+    /// The registers of a row.
+    #[inline(always)]
+    fn registers<S: Simd>(&self) -> Range<usize> {
+        self.columns.0 / S::F32_LANES..self.columns.1.div_ceil(S::F32_LANES)
+    }
+
+    /// How many rows.
+    fn count(&self) -> usize {
+        self.rows.1 - self.rows.0
+    }
+
+    /// Registers of what is returned there.
+    #[inline(always)]
+    pub(super) fn returns<S: Simd>(&self) -> usize {
+        self.count() * self.registers::<S>().len()
+    }
+
+    /// Blocks of registers that are summed side by side, each with where what is returned there lies.
+    #[inline(always)]
+    fn blocks<S: Simd>(&self) -> impl Iterator<Item = (Range<usize>, Range<usize>)> + use<S> {
+        let (registers, count, kept) = (self.registers::<S>(), self.count(), self.kept);
+        registers.clone().step_by(ABREAST).map(move |from| {
+            let (to, at) = ((from + ABREAST).min(registers.end), kept + (from - registers.start) * count);
+            (from..to, at..at + (to - from) * count)
+        })
+    }
+}
+
+impl RowPoint {
+    /// Where the point is above a level, its returns kept from this register on.
+    #[inline(always)]
+    pub(super) fn reach(&self, rows: &LevelRows, cut: f64, kept: usize) -> Reach {
+        let height = self.top - cut;
+        if height <= 0.0 {
+            return Reach { kept, ..Reach::default() };
+        }
+        let across = reached(self.bin[0], height, self.weight[0], rows.lo[0], rows.size[0]);
+        // The ridge leans by the skew.
+        let half = (height / self.weight[0]).sqrt() * self.skew.abs() + (height / self.weight[1]).sqrt();
+        let from = (self.bin[1] - half - rows.lo[1] as f64).ceil().clamp(0.0, rows.size[1] as f64);
+        let to = ((self.bin[1] + half - rows.lo[1] as f64).floor() + 1.0).clamp(0.0, rows.size[1] as f64);
+        let columns = (from as usize, to as usize);
+        if across.0 < across.1 && columns.0 < columns.1 {
+            Reach { rows: across, columns, kept, from: self.products_from(across, rows.lo[0], height) }
+        } else {
+            Reach { kept, ..Reach::default() }
+        }
+    }
+
+    /// [`Reach::from`] of a point that reaches these rows, so far above its level.
+    #[inline(always)]
+    fn products_from(&self, (first, end): (usize, usize), lo: usize, height: f64) -> Option<(usize, f32)> {
+        let middle = (self.bin[0] - lo as f64).round();
+        if middle < first as f64 || middle >= end as f64 {
+            return None;
+        }
+        // Half a row from the middle a column that is reached has at least 2^−deepest of it.
+        let [w0, w1] = self.weight;
+        let lean = self.skew.abs();
+        let deepest = height * (1.0 + w1 * lean * lean / w0) + lean * (w1 * height).sqrt();
+        let columns = 0.5 * lean + (deepest / w1).sqrt();
+        let falls = 2.0 * w1 * lean * columns * ((height / w0).sqrt() + 1.0);
+        (LIFTS[1] - deepest - falls > LOWEST && LIFT + self.top - 2.0 * deepest - falls > LOWEST)
+            .then(|| (middle as usize - first, -deepest as f32))
+    }
+
+    /// Adds what the point returns to `power`, and keeps it; `ridge` is scratch.
+    #[inline(always)]
+    pub(super) fn spread<S: Simd>(
+        &self,
+        simd: S,
+        (rows, reach): (&LevelRows, &Reach),
+        ridge: &mut Vec<f32>,
+        (returns, power): (&mut [S::f32s], &mut [S::f32s]),
+    ) {
+        let stride = rows.stride / S::F32_LANES;
+        let power = &mut power[reach.rows.0 * stride..reach.rows.1 * stride];
+        if reach.from.is_some() {
+            self.fill_ridge(simd, (rows, reach), ridge);
+        }
+        for (block, kept) in reach.blocks::<S>() {
+            let (kept, at) = (&mut returns[kept], (rows, reach, block.start));
+            match block.len() {
+                1 => self.spread_block::<S, 1>(simd, at, ridge, (kept, power)),
+                2 => self.spread_block::<S, 2>(simd, at, ridge, (kept, power)),
+                3 => self.spread_block::<S, 3>(simd, at, ridge, (kept, power)),
+                _ => self.spread_block::<S, ABREAST>(simd, at, ridge, (kept, power)),
+            }
+        }
+    }
+
+    /// How far the first row is from the middle.
+    #[inline(always)]
+    fn first_row(&self, rows: &LevelRows, reach: &Reach) -> f32 {
+        ((rows.lo[0] + reach.rows.0) as f64 - self.bin[0]) as f32
+    }
+
+    /// How far the columns of a register are.
+    #[inline(always)]
+    fn columns<S: Simd>(&self, simd: S, rows: &LevelRows, register: usize) -> Lanes<S> {
+        steps(simd) + splat(simd, ((rows.lo[1] + register * S::F32_LANES) as f64 - self.bin[1]) as f32)
+    }
+
+    /// The share of each row.
+    #[inline(always)]
+    fn fill_ridge<S: Simd>(&self, simd: S, (rows, reach): (&LevelRows, &Reach), ridge: &mut Vec<f32>) {
+        let whole = reach.count().div_ceil(S::F32_LANES) * S::F32_LANES;
+        if ridge.len() < whole {
+            ridge.resize(whole, 0.0);
+        }
+        let [w0, w1] = self.weight;
+        let falls = splat(simd, -(w0 + w1 * self.skew * self.skew) as f32);
+        let top = splat(simd, (self.top + LIFTS[0]) as f32);
+        // Beyond the last row nothing is asked.
+        let lowest = splat(simd, LOWEST as f32);
+        let mut y = steps(simd) + splat(simd, self.first_row(rows, reach));
+        for share in S::as_mut_simd_f32s(&mut ridge[..whole]).0 {
+            *share = (y * y).mul_add(falls, top).max(lowest).exp2().value;
+            y += splat(simd, S::F32_LANES as f32);
+        }
+    }
+
+    #[inline(always)]
+    fn spread_block<S: Simd, const N: usize>(
+        &self,
+        simd: S,
+        (rows, reach, register): (&LevelRows, &Reach, usize),
+        ridge: &[f32],
+        (kept, power): (&mut [S::f32s], &mut [S::f32s]),
+    ) {
+        let stride = rows.stride / S::F32_LANES;
+        let [skew, w0, w1, top] = [self.skew, self.weight[0], self.weight[1], self.top + LIFT].map(|x| x as f32);
+        let mut columns = [splat(simd, 0.0); N];
+        for k in 0..N {
+            columns[k] = self.columns(simd, rows, register + k);
+        }
+        let first = self.first_row(rows, reach);
+        let Some((from, deepest)) = reach.from else {
+            let (falls, faintest) = (splat(simd, -w1), splat(simd, FAINTEST));
+            let mut y = first;
+            for (kept, row) in zip(kept.chunks_exact_mut(N), power.chunks_exact_mut(stride)) {
+                let at_row = splat(simd, top - w0 * y * y);
+                for k in 0..N {
+                    let beside = columns[k] + splat(simd, skew * y);
+                    let log2 = (beside * beside).mul_add(falls, at_row);
+                    let returned = log2.select_gt(faintest, log2.max(faintest).exp2(), splat(simd, 0.0));
+                    add(simd, returned, (&mut kept[k], &mut row[register + k]));
+                }
+                y += 1.0;
+            }
+            return;
+        };
+        let [mut start, mut up, mut down] = [[splat(simd, 0.0); N]; 3];
+        let (deepest, lift, zero) = (splat(simd, deepest), splat(simd, LIFTS[1] as f32), splat(simd, 0.0));
+        let steepest = splat(simd, STEEPEST);
+        for k in 0..N {
+            let by_row = columns[k] * splat(simd, -2.0 * w1 * skew);
+            let log2 = (columns[k] * columns[k]).mul_add(splat(simd, -w1), by_row * splat(simd, first + from as f32));
+            start[k] = log2.select_gt(deepest, (log2.max(deepest) + lift).exp2(), zero);
+            up[k] = by_row.min(steepest).max(zero - steepest).exp2_precise();
+            down[k] = splat(simd, 1.0) / up[k];
+        }
+        let (before, after) = kept.split_at_mut(from * N);
+        let (power_before, power_after) = power.split_at_mut(from * stride);
+        let (ridge_before, ridge_after) = ridge[..reach.count()].split_at(from);
+        let mut share = start;
+        for ((kept, row), at_row) in
+            zip(zip(after.chunks_exact_mut(N), power_after.chunks_exact_mut(stride)), ridge_after)
+        {
+            let (Some(kept), Some(row)) = (kept.first_chunk_mut::<N>(), row[register..].first_chunk_mut::<N>()) else {
+                break;
+            };
+            for k in 0..N {
+                add(simd, share[k] * splat(simd, *at_row), (&mut kept[k], &mut row[k]));
+                share[k] = share[k] * up[k];
+            }
+        }
+        let mut share = start;
+        let rows_before = zip(before.chunks_exact_mut(N).rev(), power_before.chunks_exact_mut(stride).rev());
+        for ((kept, row), at_row) in zip(rows_before, ridge_before.iter().rev()) {
+            let (Some(kept), Some(row)) = (kept.first_chunk_mut::<N>(), row[register..].first_chunk_mut::<N>()) else {
+                break;
+            };
+            for k in 0..N {
+                share[k] = share[k] * down[k];
+                add(simd, share[k] * splat(simd, *at_row), (&mut kept[k], &mut row[k]));
+            }
+        }
+    }
+
+    /// What the cells want of the point.
+    #[inline(always)]
+    pub(super) fn collect<S: Simd>(
+        &self,
+        simd: S,
+        (rows, reach): (&LevelRows, &Reach),
+        (returns, slopes): (&[S::f32s], &[S::f32s]),
+    ) -> Sums {
+        let stride = rows.stride / S::F32_LANES;
+        let slopes = &slopes[reach.rows.0 * stride..reach.rows.1 * stride];
+        let mut sums = [splat(simd, 0.0); 6];
+        for (block, kept) in reach.blocks::<S>() {
+            let (kept, at) = (&returns[kept], (rows, reach, block.start));
+            match block.len() {
+                1 => self.collect_block::<S, 1>(simd, at, (kept, slopes), &mut sums),
+                2 => self.collect_block::<S, 2>(simd, at, (kept, slopes), &mut sums),
+                3 => self.collect_block::<S, 3>(simd, at, (kept, slopes), &mut sums),
+                _ => self.collect_block::<S, ABREAST>(simd, at, (kept, slopes), &mut sums),
+            }
+        }
+        let mut totals = [0.0; 6];
+        for k in 0..6 {
+            totals[k] = f64::from(sums[k].reduce_sum()) * LOWERED;
+        }
+        let [r, rx, rxx, ry, rxy, ryy] = totals;
+        Sums { r, q: 0.0, r_delta: [0.0, ry, rx], q_delta: [0.0; 3], r_delta_delta: [0.0, 0.0, ryy, 0.0, rxy, rxx] }
+    }
+
+    /// Adds Σ r, r x, r x², r y, r x y and r y² of a block.
+    #[inline(always)]
+    fn collect_block<S: Simd, const N: usize>(
+        &self,
+        simd: S,
+        (rows, reach, register): (&LevelRows, &Reach, usize),
+        (kept, slopes): (&[S::f32s], &[S::f32s]),
+        sums: &mut [Lanes<S>; 6],
+    ) {
+        // Σ r, r y and r y² over the rows, a number a column.
+        let [mut r, mut r_y, mut r_yy] = [[splat(simd, 0.0); N]; 3];
+        let mut y = splat(simd, self.first_row(rows, reach));
+        for (kept, row) in zip(kept.chunks_exact(N), slopes.chunks_exact(rows.stride / S::F32_LANES)) {
+            let (Some(kept), Some(row)) = (kept.first_chunk::<N>(), row[register..].first_chunk::<N>()) else { break };
+            let y_y = y * y;
+            for k in 0..N {
+                let wanted = Lanes::new(simd, kept[k]) * Lanes::new(simd, row[k]);
+                r[k] += wanted;
+                r_y[k] = wanted.mul_add(y, r_y[k]);
+                r_yy[k] = wanted.mul_add(y_y, r_yy[k]);
+            }
+            y += splat(simd, 1.0);
+        }
+        for k in 0..N {
+            let x = self.columns(simd, rows, register + k);
+            let r_x = r[k] * x;
+            sums[0] += r[k];
+            sums[1] += r_x;
+            sums[2] = r_x.mul_add(x, sums[2]);
+            sums[3] += r_y[k];
+            sums[4] = r_y[k].mul_add(x, sums[4]);
+            sums[5] += r_yy[k];
+        }
+    }
+}
+
+/// Keeps what a point returns in a register of cells, and adds it to them.
+#[inline(always)]
+fn add<S: Simd>(simd: S, returned: Lanes<S>, (kept, cells): (&mut S::f32s, &mut S::f32s)) {
+    *kept = returned.value;
+    *cells = (Lanes::new(simd, *cells) + returned).value;
+}
+
+/// 0, 1, 2, … of a register.
+#[inline(always)]
+fn steps<S: Simd>(simd: S) -> Lanes<S> {
+    const STEPS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
+    Lanes::new(simd, S::as_simd_f32s(&STEPS).0[0])
+}
