@@ -9,6 +9,82 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
+/// Adds `weights` times the rows of as many numbers to `out`, all but the first `but` of them; in the widest registers that the machine
+/// has, and to the last digit as plain code would.
+pub fn add_rows<T: Summed>(out: &mut [T], rows: &[T], weights: &[T], but: usize) {
+    pulp::Arch::new().dispatch(AddRows { out, rows, weights, but });
+}
+
+/// Adds to each of `out` the product of its row, as long as `by`, and `by`; of many sums side by side, in the widest registers that the
+/// machine has.
+pub fn add_products<T: Summed>(out: &mut [T], rows: &[T], by: &[T]) {
+    pulp::Arch::new().dispatch(AddProducts { out, rows, by });
+}
+
+/// Σ a b over the numbers of the shorter one, so many sums side by side.
+#[inline(always)]
+pub fn summed_products<const SUMS: usize, T: Summed>(a: &[T], b: &[T]) -> T {
+    let (of_a, of_b) = (a.chunks_exact(SUMS), b.chunks_exact(SUMS));
+    let whole = SUMS * of_a.len().min(of_b.len());
+    let mut sums = [T::default(); SUMS];
+    for (a, b) in of_a.zip(of_b) {
+        for k in 0..SUMS {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    let mut total = T::default();
+    for (a, b) in a[whole..].iter().zip(&b[whole..]) {
+        total += *a * *b;
+    }
+    for sum in sums {
+        total += sum;
+    }
+    total
+}
+
+/// Numbers whose products are summed.
+pub trait Summed: Copy + Default + Mul<Output = Self> + AddAssign {}
+
+impl<T: Copy + Default + Mul<Output = Self> + AddAssign> Summed for T {}
+
+struct AddRows<'a, T> {
+    out: &'a mut [T],
+    rows: &'a [T],
+    weights: &'a [T],
+    but: usize,
+}
+
+impl<T: Summed> pulp::WithSimd for AddRows<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { out, rows, weights, but } = self;
+        for (row, &weight) in rows.chunks_exact(out.len()).zip(weights) {
+            for (out, of) in out[but..].iter_mut().zip(&row[but..]) {
+                *out += weight * *of;
+            }
+        }
+    }
+}
+
+struct AddProducts<'a, T> {
+    out: &'a mut [T],
+    rows: &'a [T],
+    by: &'a [T],
+}
+
+impl<T: Summed> pulp::WithSimd for AddProducts<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        for (out, row) in self.out.iter_mut().zip(self.rows.chunks_exact(self.by.len())) {
+            *out += summed_products::<16, T>(row, self.by);
+        }
+    }
+}
+
 /// A vector in metres (or a direction, unitless): x forward, y left, z up.
 pub type Vec3<T = f64> = [T; 3];
 /// A 3×3 matrix in rows.

@@ -16,6 +16,7 @@ use super::gaussian::{WorldGaussian, WorldGaussianBars, WorldGaussians};
 use super::splat::{AxisJacobian, JointInView, ViewModel, Widths, feature_at};
 use super::triad::splat_matrix;
 use crate::body::{Group, Pppr};
+use crate::config::Summation;
 use crate::geometry::{Numeric, Vec3, add_scaled, dot, mat_t_vec, mat_vec, scale};
 use crate::radar::{Axis, AxisKind};
 use geometry::Geometry;
@@ -151,9 +152,12 @@ impl<const D: usize> JointTask for PullBack<'_, D> {
         let in_view = model.joint_in_view(&gaussian);
         let jacobians: [AxisJacobian<B::Number>; D] = model.jacobians(&in_view.triad);
         let widths = model.widths(&gaussian, &in_view, &jacobians);
-        let kappa = model.kappa(&gaussian, &in_view, &jacobians);
+        // Where powers add nothing wants a phase.
+        let coherent = model.config.summation == Summation::Coherent;
+        let zero = batch.splat(0.0);
+        let kappa = if coherent { model.kappa(&gaussian, &in_view, &jacobians) } else { [zero; D] };
         let (squares, _) = model.squares(&in_view, &widths);
-        let mut geometry = Geometry::nothing(batch.splat(0.0));
+        let mut geometry = Geometry::nothing(zero);
         let (c_bar, b_bar) = covariance_and_bin_bars(&squares.precision(), kappa, &sums);
         let covariance_bar = spread_bars(&mut geometry, model, &gaussian, (&in_view, &jacobians, &widths), &c_bar);
         for k in 0..D {
@@ -162,8 +166,11 @@ impl<const D: usize> JointTask for PullBack<'_, D> {
                 geometry.coordinate(&in_view, axis, b_bar[k] * model.by_step[k]);
             }
         }
-        let omega_mean_bar = ramp(&mut geometry, model, (&gaussian, &in_view, &jacobians), &sums);
-        phases(&mut geometry, model, &in_view, sums.q);
+        let mut omega_mean_bar = zero;
+        if coherent {
+            omega_mean_bar = ramp(&mut geometry, model, (&gaussian, &in_view, &jacobians), &sums);
+            phases(&mut geometry, model, &in_view, sums.q);
+        }
         if model.config.operators.attenuation {
             geometry.d -= sums.r * 4.0 / in_view.triad.d.value;
         }

@@ -17,7 +17,7 @@ use crate::config::FitConfig;
 
 /// Returns below this share of the noise are left out of levels: of those that are shown, and of those of a search or a window.
 const LEAST_SHOWN: f64 = 1e-9;
-const LEAST_SEARCHED: f64 = 1e-5;
+const LEAST_SEARCHED: f64 = 1e-3;
 
 /// What one evaluation of a view needs besides its answer; kept, so that the next one allocates nothing.
 #[derive(Default)]

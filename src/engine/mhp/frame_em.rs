@@ -193,10 +193,14 @@ impl FrameEm {
         let Self { targets, workspaces, gaussians, bars, skin, .. } = self;
         let config = &forward_config(config, skin.is_some());
         if let Some(skin) = skin.as_mut() {
-            skin.fill(params);
+            skin.fill(params, precision);
         }
         let seen = skin.as_ref().map_or(params, |skin| &skin.points);
-        gaussians.fill(seen, precision);
+        if skin.is_some() {
+            gaussians.fill_round(seen, precision);
+        } else {
+            gaussians.fill(seen, precision);
+        }
         bars.reset(gaussians.joints());
         let share = 1.0 / targets.len() as f64;
         // Stage by stage rather than view by view: each stage's instructions then stay at hand.
@@ -241,7 +245,7 @@ impl FrameEm {
             skin.clone_from(&self.skin);
         }
         let skin = skin.as_mut().filter(|_| self.skin.is_some()).map(|skin| {
-            skin.fill(params);
+            skin.fill(params, precision);
             &*skin
         });
         let seen = skin.map_or(params, |skin| &skin.points);

@@ -28,6 +28,14 @@ pub(super) fn mean(omega: &[f64]) -> f64 {
     omega.iter().sum::<f64>() / omega.len().max(1) as f64
 }
 
+/// α = σ(β) and ln α.
+#[inline(always)]
+pub(super) fn opacity_and_ln<T: Numeric>(beta: T) -> [T; 2] {
+    // Of e^−|β| alone: exact for large |β|.
+    let (one, fading) = (beta.splat(1.0), (-beta.max(0.0) + beta.min(0.0)).exp());
+    [beta.select_lt(0.0, fading, one) / (one + fading), beta.min(0.0) - fading.ln_1p()]
+}
+
 /// Adjoints of [`WorldGaussians`]: ∂L by what they say, summed over the views.
 #[derive(Debug, Default)]
 pub(super) struct WorldGaussianBars {
@@ -71,6 +79,8 @@ impl WorldGaussianBars {
 #[derive(Debug, Default)]
 pub(super) struct WorldGaussians {
     joints: usize,
+    /// Whether all are round, and nobody asks how they are turned.
+    round: bool,
     position: Columns<3>,
     velocity: Columns<3>,
     spread: Columns<9>,
@@ -84,8 +94,17 @@ pub(super) struct WorldGaussians {
 impl WorldGaussians {
     /// Of every joint of `params`, over what was there.
     pub(super) fn fill(&mut self, params: &Pppr, precision: Precision) {
+        self.fill_those(params, false, precision);
+    }
+
+    /// The same of points of skin, which are round: the way back has no adjoint of their rotations.
+    pub(super) fn fill_round(&mut self, points: &Pppr, precision: Precision) {
+        self.fill_those(points, true, precision);
+    }
+
+    fn fill_those(&mut self, params: &Pppr, round: bool, precision: Precision) {
         let joints = params.shape().total_joints();
-        self.joints = joints;
+        (self.joints, self.round) = (joints, round);
         for columns in [&mut self.position, &mut self.velocity, &mut self.strength, &mut self.scale] {
             columns.hold(joints);
         }
@@ -131,30 +150,36 @@ impl JointTask for Fill<'_> {
             move |joint: usize| of[width * joint + k]
         };
         let beta = batch.gather(numbers(Group::Beta, 1, 0));
-        // Of e^−|β| alone: exact for large |β|.
-        let (one, fading) = (beta.splat(1.0), (-beta.max(0.0) + beta.min(0.0)).exp());
+        let ([opacity, ln_opacity], one) = (opacity_and_ln(beta), beta.splat(1.0));
         let omega_mean = batch.gather(|joint| mean(params.joint(Group::Omega, joint)));
-        let opacity = beta.select_lt(0.0, fading, one) / (one + fading);
-        let ln_opacity = beta.min(0.0) - fading.ln_1p();
-        let (mut position, mut velocity, mut scale, mut quaternion) = ([one; 3], [one; 3], [one; 3], [one; 4]);
+        let (mut position, mut velocity, mut scale) = ([one; 3], [one; 3], [one; 3]);
         for k in 0..3 {
             position[k] = batch.gather(numbers(Group::Position, 3, k));
             velocity[k] = batch.gather(numbers(Group::Velocity, 3, k));
-            scale[k] = batch.gather(numbers(Group::LogScale, 3, k)).exp();
         }
-        for k in 0..4 {
-            quaternion[k] = batch.gather(numbers(Group::Rotation, 4, k));
-        }
-        let mut spread = rotation_from_quaternion(quaternion);
-        for row in &mut spread {
+        let mut spread = [[one.splat(0.0); 3]; 3];
+        if gaussians.round {
+            scale = [batch.gather(numbers(Group::LogScale, 3, 0)).exp(); 3];
             for k in 0..3 {
-                row[k] = row[k] * scale[k];
+                spread[k][k] = scale[k];
             }
+        } else {
+            let mut quaternion = [one; 4];
+            for k in 0..4 {
+                quaternion[k] = batch.gather(numbers(Group::Rotation, 4, k));
+            }
+            spread = rotation_from_quaternion(quaternion);
+            for k in 0..3 {
+                scale[k] = batch.gather(numbers(Group::LogScale, 3, k)).exp();
+                for row in &mut spread {
+                    row[k] = row[k] * scale[k];
+                }
+            }
+            batch.store(quaternion, &mut gaussians.quaternion);
         }
         batch.store(position, &mut gaussians.position);
         batch.store(velocity, &mut gaussians.velocity);
         batch.store(scale, &mut gaussians.scale);
-        batch.store(quaternion, &mut gaussians.quaternion);
         batch.store([opacity, ln_opacity, omega_mean], &mut gaussians.strength);
         gaussians.spread.set_matrix(batch, spread);
     }
@@ -189,9 +214,17 @@ impl JointTask for PullBack<'_> {
             }
         });
 
-        let (quaternion, widths) = (batch.load(&gaussians.quaternion), batch.load(&gaussians.scale));
-        let rotation = rotation_from_quaternion(quaternion);
+        let widths = batch.load(&gaussians.scale);
         let [xx, xy, xz, yy, yz, zz] = batch.load(&bars.covariance);
+        if gaussians.round {
+            let log_scale = gradient.group_mut(Group::LogScale);
+            for (k, bar) in [xx, yy, zz].into_iter().enumerate() {
+                batch.scatter(bar * widths[k] * widths[k] * 2.0, |joint, x| log_scale[3 * joint + k] += x);
+            }
+            return;
+        }
+        let quaternion = batch.load(&gaussians.quaternion);
+        let rotation = rotation_from_quaternion(quaternion);
         let covariance_bar = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
         let mut bar = mat_mul(&covariance_bar, &gaussians.spread.matrix(batch));
         for row in &mut bar {

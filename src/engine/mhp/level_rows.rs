@@ -23,6 +23,7 @@ use pulp::{Arch, Simd, WithSimd};
 use std::f32::consts::LN_2;
 use std::f64::consts::{LOG2_E, PI};
 use std::iter::zip;
+use std::ops::Range;
 
 /// Cells of the widest register: rows are padded to whole ones.
 const LANES: usize = 16;
@@ -55,6 +56,8 @@ pub(super) struct RowScratch {
     reaches: Vec<Reach>,
     returns: Vec<f32>,
     ridge: Vec<f32>,
+    /// The cells of the rows that something reaches: whole registers.
+    lit: Range<usize>,
     power: Vec<f32>,
     /// ∂L/∂(g S), and then what a joint's return is to be multiplied by.
     slopes: Vec<f32>,
@@ -101,10 +104,11 @@ impl LevelRows {
         Some(Self { lo, size, stride, measured, by_noise, base, marked, erased })
     }
 
-    /// Nothing is in what lies beyond the region, or is erased.
-    fn blank(&self, cells: &mut [f32]) {
-        for row in cells.chunks_exact_mut(self.stride.max(1)) {
-            row[self.size[1]..].fill(0.0);
+    /// Nothing is in what of these whole rows lies beyond the region, or is erased.
+    #[inline(always)]
+    fn blank(&self, cells: &mut [f32], rows: &Range<usize>) {
+        for row in cells[rows.clone()].chunks_exact_mut(self.stride.max(1)) {
+            row[self.size[1]..].iter_mut().for_each(|cell| *cell = 0.0);
         }
         for &cell in &self.erased {
             cells[cell as usize] = 0.0;
@@ -209,14 +213,19 @@ impl RowScratch {
     fn sum<S: Simd>(&mut self, simd: S, rows: &LevelRows, cut: f64) {
         self.power.clear();
         self.power.resize(rows.size[0] * rows.stride, 0.0);
-        let Self { points, reaches, returns, ridge, power, .. } = self;
+        let Self { points, reaches, returns, ridge, lit, power, .. } = self;
         reaches.clear();
         let mut kept = 0;
+        let mut reached = (rows.size[0], 0);
         for point in points.iter() {
             let reach = point.reach(rows, cut, kept);
             kept += reach.returns::<S>();
+            if !reach.is_empty() {
+                reached = (reached.0.min(reach.rows.0), reached.1.max(reach.rows.1));
+            }
             reaches.push(reach);
         }
+        *lit = reached.0.min(reached.1) * rows.stride..reached.1 * rows.stride;
         if returns.len() < kept * S::F32_LANES {
             returns.resize(kept * S::F32_LANES, 0.0);
         }
@@ -224,14 +233,14 @@ impl RowScratch {
         for (point, reach) in zip(points, reaches) {
             point.spread(simd, (rows, reach), ridge, (&mut *returns, &mut *power));
         }
-        rows.blank(&mut self.power);
+        rows.blank(&mut self.power, &self.lit);
     }
 
     /// Σ of all powers.
     #[inline(always)]
     fn total<S: Simd>(&self, simd: S) -> f64 {
         let mut total = 0.0;
-        for few in self.power.chunks(32 * LANES) {
+        for few in self.power[self.lit.clone()].chunks(32 * LANES) {
             let (cells, _) = S::as_simd_f32s(few);
             let mut sum = splat(simd, 0.0);
             for &cell in cells {
@@ -249,8 +258,8 @@ impl RowScratch {
         let (gain, one) = (splat(simd, gain), splat(simd, 1.0));
         let mut sums = [0.0; 3];
         let chunk = 32 * LANES;
-        for at in (0..self.power.len()).step_by(chunk) {
-            let end = (at + chunk).min(self.power.len());
+        for at in self.lit.clone().step_by(chunk) {
+            let end = (at + chunk).min(self.lit.end);
             let [power, by_noise] = [&self.power[at..end], &rows.by_noise[at..end]].map(|x| S::as_simd_f32s(x).0);
             let [measured, base] = [&rows.measured[at..end], &rows.base[at..end]].map(|x| S::as_simd_f32s(x).0);
             let (levels, _) = S::as_mut_simd_f32s(&mut self.slopes[at..end]);
@@ -272,8 +281,8 @@ impl RowScratch {
         let by_measured = splat(simd, found.by_measured as f32);
         let (by_level, mean) = (splat(simd, found.by_level as f32), splat(simd, found.mean as f32));
         let mut product = 0.0;
-        for at in (0..self.power.len()).step_by(chunk) {
-            let end = (at + chunk).min(self.power.len());
+        for at in self.lit.clone().step_by(chunk) {
+            let end = (at + chunk).min(self.lit.end);
             let [power, by_noise] = [&self.power[at..end], &rows.by_noise[at..end]].map(|x| S::as_simd_f32s(x).0);
             let [measured, base] = [&rows.measured[at..end], &rows.base[at..end]].map(|x| S::as_simd_f32s(x).0);
             let (slopes, _) = S::as_mut_simd_f32s(&mut self.slopes[at..end]);
@@ -299,8 +308,8 @@ impl RowScratch {
         let by_count = splat(simd, (1.0 / totals.count) as f32);
         let (mut loss, mut product) = (0.0, 0.0);
         let chunk = 32 * LANES;
-        for at in (0..self.power.len()).step_by(chunk) {
-            let end = (at + chunk).min(self.power.len());
+        for at in self.lit.clone().step_by(chunk) {
+            let end = (at + chunk).min(self.lit.end);
             let [power, by_noise] = [&self.power[at..end], &rows.by_noise[at..end]].map(|x| S::as_simd_f32s(x).0);
             let (measured, _) = S::as_simd_f32s(&rows.measured[at..end]);
             let (slopes, _) = S::as_mut_simd_f32s(&mut self.slopes[at..end]);
@@ -324,11 +333,11 @@ impl RowScratch {
     #[inline(always)]
     fn weigh<S: Simd>(&mut self, simd: S, rows: &LevelRows, [factor, through_gain]: [f32; 2]) {
         let (factor, through_gain) = (splat(simd, factor), splat(simd, through_gain));
-        let (slopes, _) = S::as_mut_simd_f32s(&mut self.slopes);
+        let (slopes, _) = S::as_mut_simd_f32s(&mut self.slopes[self.lit.clone()]);
         for slope in slopes {
             *slope = ((Lanes::new(simd, *slope) - through_gain) * factor).value;
         }
-        rows.blank(&mut self.slopes);
+        rows.blank(&mut self.slopes, &self.lit);
     }
 
     /// The IoU of the hard masks, and whether something was summed in the cells that their threshold lies among; elsewhere it is

@@ -67,7 +67,7 @@ impl JointReturns {
         let problem = problem.under(config);
         let joints = params.shape().total_joints();
         let skin = skin_of(config, (&problem.views, &problem.skeleton, &problem.radar)).map(|mut skin| {
-            skin.fill(params);
+            skin.fill(params, Precision::F64);
             skin
         });
         let shares = match &skin {

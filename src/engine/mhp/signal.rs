@@ -81,7 +81,7 @@ pub fn simulate_signal(
 ) -> Result<Vec<Vec<f64>>, FitError> {
     let problem = problem.under(config);
     let skin = skin_of(config, (&problem.views, &problem.skeleton, &problem.radar)).map(|mut skin| {
-        skin.fill(params);
+        skin.fill(params, Precision::F64);
         skin
     });
     let config = &forward_config(config, skin.is_some());

@@ -19,7 +19,7 @@ pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, par
     let problem = problem.under(config);
     let mut gaussians = WorldGaussians::default();
     let skin = skin_of(config, (&problem.views, &problem.skeleton, &problem.radar)).map(|mut skin| {
-        skin.fill(params);
+        skin.fill(params, precision);
         skin
     });
     let config = &forward_config(config, skin.is_some());

@@ -17,8 +17,16 @@
 //! nothing. Velocities and Doppler features are those between the joints. The line of sight is that of the radar, the mean of the
 //! views' places.
 
+#![expect(
+    clippy::inline_always,
+    reason = "all of it belongs into the function that is compiled for an instruction set"
+)]
+
+use super::Precision;
+use super::batch::{Batch, JointTask, each_joint};
+use super::gaussian::{self, opacity_and_ln};
 use crate::body::{Group, HEAD, PARTS, Parts, Pppr, PpprShape, Skeleton, scatterer};
-use crate::geometry::{Vec3, add, add_scaled, cross, dot, norm, scale, sub};
+use crate::geometry::{Numeric, Vec3, add, add_scaled, cross, dot, norm, scale, sub};
 use smallvec::SmallVec;
 
 /// Limbs by their parts: upper arms, forearms, thighs, shanks, left and right; radius and length, m.
@@ -104,12 +112,13 @@ struct Point {
     amplitude: f64,
 }
 
-/// ln of how much brighter and larger a joint or point is than at the start, and how opaque it is.
+/// ln of how much brighter and larger a joint or point is than at the start, how opaque it is, and ω̄.
 #[derive(Debug, Clone, Copy, Default)]
 struct Look {
     ln_alpha: f64,
     ln_scale: f64,
     opacity: f64,
+    omega_mean: f64,
 }
 
 /// A point as the radar sees it.
@@ -318,12 +327,12 @@ impl Skin {
     }
 
     /// Fills in the points of all persons of `params`.
-    pub(super) fn fill(&mut self, params: &Pppr) {
+    pub(super) fn fill(&mut self, params: &Pppr, precision: Precision) {
         let shape = params.shape();
         let features = self.points.shape().doppler_features;
         let points = self.body.len();
         self.points.reset(PpprShape { persons: shape.persons, joints: points, doppler_features: features });
-        self.look(params);
+        self.look(params, precision);
         self.seen.clear();
         for person in 0..shape.persons {
             let places = self.places(params.person(person));
@@ -334,33 +343,34 @@ impl Skin {
                 let mut place = [0.0; 3];
                 of.shares.iter().for_each(|&(part, share)| add_scaled(&mut place, places[part], share));
                 let seen = of.seen(place, &places, &normal);
-                let [ln_alpha, ln_scale] = self.looks(first, of);
-                let alpha = of.amplitude * seen.share.sqrt() * ln_alpha.clamp(LEAST_LN_ALPHA, MOST_LN).exp();
-                let alpha = alpha.min(MOST_ALPHA);
-                self.seen.push((seen, Look { ln_alpha, ln_scale, opacity: alpha }));
-                self.points.set_vec3(Group::Position, joint, add(seen.at, self.radar));
-                self.points.set_vec3(Group::LogScale, joint, [of.ln_scale + ln_scale.clamp(-MOST_LN, MOST_LN); 3]);
-                self.points.joint_mut(Group::Rotation, joint)[0] = 1.0;
-                self.points.joint_mut(Group::Beta, joint)[0] = (alpha / (1.0 - alpha)).ln();
+                let mut look = Look { opacity: of.amplitude * seen.share.sqrt(), ..Look::default() };
                 let mut velocity = [0.0; 3];
                 for &(own, share) in &of.joints {
+                    let of_joint = &self.looks[first + own];
+                    look.ln_alpha += share * of_joint.ln_alpha;
+                    look.ln_scale += share * of_joint.ln_scale;
+                    look.omega_mean += share * of_joint.omega_mean;
                     add_scaled(&mut velocity, params.velocity(first + own), share);
                 }
+                let ln_scale = of.ln_scale + look.ln_scale.clamp(-MOST_LN, MOST_LN);
+                self.points.set_vec3(Group::Position, joint, add(seen.at, self.radar));
+                self.points.set_vec3(Group::LogScale, joint, [ln_scale; 3]);
+                self.points.joint_mut(Group::Rotation, joint)[0] = 1.0;
                 self.points.set_vec3(Group::Velocity, joint, velocity);
                 let omega = self.points.joint_mut(Group::Omega, joint);
-                for &(own, share) in &of.joints {
-                    let from = params.joint(Group::Omega, first + own);
-                    if features == from.len() {
+                if features == shape.doppler_features {
+                    for &(own, share) in &of.joints {
+                        let from = params.joint(Group::Omega, first + own);
                         omega.iter_mut().zip(from).for_each(|(to, from)| *to += share * from);
-                    } else {
-                        let mean = from.iter().sum::<f64>() / from.len().max(1) as f64;
-                        for to in omega.iter_mut() {
-                            *to += share * mean;
-                        }
                     }
+                } else {
+                    omega.fill(look.omega_mean);
                 }
+                self.seen.push((seen, look));
             }
         }
+        let beta = self.points.group_mut(Group::Beta);
+        each_joint(precision, self.seen.len(), &mut Brighten { seen: &mut self.seen, beta });
         self.gradient.reset(self.points.shape());
     }
 
@@ -373,9 +383,11 @@ impl Skin {
             let normal = Normal::of(&places);
             let first = person * shape.joints;
             let (mut bars, mut normal_bar) = ([[0.0; 3]; PARTS], [0.0; 3]);
+            // Of ω̄ of the joints, where points have no more of it.
+            let mut means: SmallVec<[f64; 32]> = SmallVec::from_elem(0.0, shape.joints);
             for (k, of) in self.body.iter().enumerate() {
                 let joint = person * self.body.len() + k;
-                let (seen, Look { ln_alpha, ln_scale, opacity }) = self.seen[joint];
+                let (seen, Look { ln_alpha, ln_scale, opacity, .. }) = self.seen[joint];
                 // By ln α of the point; where it is as bright as can be it has no slope.
                 let by_ln = if opacity < MOST_ALPHA {
                     self.gradient.joint(Group::Beta, joint)[0] / (1.0 - opacity)
@@ -391,20 +403,26 @@ impl Skin {
                     (pass(ln_alpha, LEAST_LN_ALPHA, by_ln), pass(ln_scale, -MOST_LN, scale_bar));
                 let velocity_bar = self.gradient.vec3(Group::Velocity, joint);
                 let omega_bar = self.gradient.joint(Group::Omega, joint);
+                let mean_bar = omega_bar.iter().sum::<f64>();
                 for &(own, share) in &of.joints {
+                    means[own] += share * mean_bar;
                     let own = first + own;
                     gradient.joint_mut(Group::Beta, own)[0] += share * alpha_bar * (1.0 - self.looks[own].opacity);
                     gradient.joint_mut(Group::LogScale, own).iter_mut().for_each(|x| *x += share * scale_bar / 3.0);
                     let velocity = gradient.joint_mut(Group::Velocity, own);
                     velocity.iter_mut().zip(velocity_bar).for_each(|(x, bar)| *x += share * bar);
-                    let omega = gradient.joint_mut(Group::Omega, own);
-                    if features == omega.len() {
+                    if features == shape.doppler_features {
+                        let omega = gradient.joint_mut(Group::Omega, own);
                         omega.iter_mut().zip(omega_bar).for_each(|(x, bar)| *x += share * bar);
-                    } else {
-                        let mean = share * omega_bar.iter().sum::<f64>() / omega.len().max(1) as f64;
-                        for x in omega.iter_mut() {
-                            *x += mean;
-                        }
+                    }
+                }
+            }
+            if features != shape.doppler_features {
+                for (own, mean) in means.iter().enumerate() {
+                    let omega = gradient.joint_mut(Group::Omega, first + own);
+                    let each = mean / omega.len().max(1) as f64;
+                    for x in omega {
+                        *x += each;
                     }
                 }
             }
@@ -425,26 +443,52 @@ impl Skin {
     }
 
     /// Takes in how the joints look.
-    fn look(&mut self, params: &Pppr) {
-        let of_joint = |joint: usize, [ln_alpha, ln_scale]: [f64; 2]| {
-            let opacity = params.opacity(joint);
-            let scales = params.vec3(Group::LogScale, joint);
-            Look { ln_alpha: opacity.ln() - ln_alpha, ln_scale: scales.iter().sum::<f64>() / 3.0 - ln_scale, opacity }
-        };
-        let all = 0..params.shape().total_joints();
+    fn look(&mut self, params: &Pppr, precision: Precision) {
+        let joints = params.shape().total_joints();
         self.looks.clear();
-        self.looks.extend(all.zip(self.plain.iter().cycle()).map(|(joint, &plain)| of_joint(joint, plain)));
+        self.looks.resize(joints, Look::default());
+        each_joint(precision, joints, &mut TakeIn { params, plain: &self.plain, looks: &mut self.looks });
     }
+}
 
-    /// ln of how much brighter and larger a point is than at the start.
-    fn looks(&self, first: usize, of: &Point) -> [f64; 2] {
-        let mut looks = [0.0; 2];
-        for &(own, share) in &of.joints {
-            let look = &self.looks[first + own];
-            looks[0] += share * look.ln_alpha;
-            looks[1] += share * look.ln_scale;
-        }
-        looks
+/// How each joint looks.
+struct TakeIn<'a> {
+    params: &'a Pppr,
+    plain: &'a [[f64; 2]],
+    looks: &'a mut [Look],
+}
+
+impl JointTask for TakeIn<'_> {
+    #[inline(always)]
+    fn run<B: Batch>(&mut self, batch: B) {
+        let Self { params, plain, looks } = self;
+        let beta = batch.gather(|joint| params.group(Group::Beta)[joint]);
+        let [opacity, ln_opacity] = opacity_and_ln(beta);
+        batch.scatter(opacity, |joint, x| looks[joint].opacity = x);
+        batch.scatter(ln_opacity, |joint, x| {
+            let [ln_alpha, ln_scale] = plain[joint % plain.len()];
+            let scales = params.vec3(Group::LogScale, joint);
+            looks[joint].ln_alpha = x - ln_alpha;
+            looks[joint].ln_scale = scales.iter().sum::<f64>() / 3.0 - ln_scale;
+            looks[joint].omega_mean = gaussian::mean(params.joint(Group::Omega, joint));
+        });
+    }
+}
+
+/// From the amplitude that a point has at the start, as its opacity, to how opaque it is.
+struct Brighten<'a> {
+    seen: &'a mut [(Seen, Look)],
+    beta: &'a mut [f64],
+}
+
+impl JointTask for Brighten<'_> {
+    #[inline(always)]
+    fn run<B: Batch>(&mut self, batch: B) {
+        let Self { seen, beta } = self;
+        let ln_alpha = batch.gather(|point| seen[point].1.ln_alpha).max(LEAST_LN_ALPHA).min(MOST_LN);
+        let opacity = (batch.gather(|point| seen[point].1.opacity) * ln_alpha.exp()).min(MOST_ALPHA);
+        batch.scatter(opacity, |point, x| seen[point].1.opacity = x);
+        batch.scatter((opacity / (-opacity + 1.0)).ln(), |point, x| beta[point] = x);
     }
 }
 
@@ -556,7 +600,7 @@ mod tests {
             params.joint_mut(Group::Beta, joint)[0] = rng.random_range(-1.0..0.2);
             params.joint_mut(Group::Omega, joint).iter_mut().for_each(|x| *x = rng.random_range(-1.0..1.0));
         }
-        skin.fill(&params);
+        skin.fill(&params, Precision::F64);
         let mut wanted = Pppr::zeros(skin.points.shape());
         for group in Group::ALL {
             wanted.group_mut(group).iter_mut().for_each(|x| *x = rng.random_range(-1.0..1.0));
@@ -574,7 +618,7 @@ mod tests {
     fn differences(grain: Grain) {
         let (mut skin, params, wanted) = scene(grain);
         let mut loss = |params: &Pppr| -> f64 {
-            skin.fill(params);
+            skin.fill(params, Precision::F64);
             Group::ALL
                 .map(|group| skin.points.group(group).iter().zip(wanted.group(group)).map(|(a, b)| a * b).sum::<f64>())
                 .iter()
@@ -593,7 +637,7 @@ mod tests {
                 quotients.push((group, i, (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h)));
             }
         }
-        skin.fill(&params);
+        skin.fill(&params, Precision::F64);
         skin.gradient = wanted.clone();
         skin.pull_back(&params, &mut gradient);
         for (group, i, quotient) in quotients {

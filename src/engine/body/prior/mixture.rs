@@ -9,6 +9,12 @@
 //! the middle of one of them or of all: who stands, walks or sits does so in their own way, and one Gaussian about all of them
 //! calls likely what lies in between. The part with π₀ is for what nobody was recorded doing.
 
+#![expect(
+    clippy::inline_always,
+    reason = "all of it belongs into the function that is compiled for an instruction set"
+)]
+
+use crate::geometry::summed_products;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
@@ -41,6 +47,7 @@ impl MixtureComponent {
     }
 
     /// W (σ∘c − μ), and its square; `None` where that is more than `most`.
+    #[inline(always)]
     fn white(&self, c: &[f64], most: f64, sign: impl Fn(usize) -> f64) -> Option<(Point, f64)> {
         let mut off = [0.0; MIXTURE_COEFFICIENTS];
         for (k, (off, (c, mean))) in off.iter_mut().zip(c.iter().zip(&self.mean)).enumerate() {
@@ -51,7 +58,7 @@ impl MixtureComponent {
         let mut rest = self.whitening.as_slice();
         for (row, white) in white.iter_mut().enumerate().take(self.mean.len()) {
             let (own, after) = rest.split_at(row + 1);
-            *white = product(own, &off);
+            *white = summed_products::<4, f64>(own, &off);
             square += *white * *white;
             if square > most {
                 return None;
@@ -62,6 +69,7 @@ impl MixtureComponent {
     }
 
     /// Wᵀ `white`.
+    #[inline(always)]
     fn back(&self, white: &Point) -> Point {
         let mut bars = [0.0; MIXTURE_COEFFICIENTS];
         let mut rest = self.whitening.as_slice();
@@ -97,17 +105,6 @@ pub(super) fn fault(components: &[MixtureComponent], coefficients: usize) -> Opt
             () => None,
         }
     })
-}
-
-/// Σ a b over the numbers of `a`, four at a time.
-fn product(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (of_a, of_b) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = of_a.remainder().iter().zip(&b[a.len() / 4 * 4..]).map(|(a, b)| a * b).sum();
-    for (a, b) in of_a.zip(of_b) {
-        sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += a * b);
-    }
-    sums.iter().sum::<f64>() + rest
 }
 
 /// A number a coefficient; those beyond a mixture's are 0.
@@ -162,6 +159,11 @@ impl Mixture {
 
     /// ρ of the first of these coefficients (standard deviations); adds `gain` times its gradient to `bars`.
     pub fn unlikeliness(&self, coefficients: &[f64], gain: f64, bars: &mut [f64]) -> f64 {
+        pulp::Arch::new().dispatch(Weigh { mixture: self, coefficients, gain, bars })
+    }
+
+    #[inline(always)]
+    fn weighed(&self, coefficients: &[f64], gain: f64, bars: &mut [f64]) -> f64 {
         let c = &coefficients[..self.coefficients()];
         let mut white = [0.0; MIXTURE_COEFFICIENTS];
         white[..c.len()].copy_from_slice(c);
@@ -191,6 +193,23 @@ impl Mixture {
             }
         }
         nearest - 2.0 * total.ln() - self.least
+    }
+}
+
+/// [`Mixture::unlikeliness`], compiled for the widest registers that the machine has.
+struct Weigh<'a> {
+    mixture: &'a Mixture,
+    coefficients: &'a [f64],
+    gain: f64,
+    bars: &'a mut [f64],
+}
+
+impl pulp::WithSimd for Weigh<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> f64 {
+        self.mixture.weighed(self.coefficients, self.gain, self.bars)
     }
 }
 

@@ -165,9 +165,9 @@ impl SaliencyMap {
         let place = |q: f64| (last as f64 * q / 100.0).ceil() as usize;
         // What lies under the laxest level is of no interest.
         let laxest = place(PERCENTILES[PERCENTILES.len() - 1]).min(last);
-        if !bits.is_empty() {
-            bits.select_nth_unstable(laxest);
-        }
+        let least = if bits.is_empty() { 0 } else { *bits.select_nth_unstable(laxest).1 };
+        let bright = (0..self.value.len()).filter(|&cell| self.value[cell].to_bits() >= least);
+        let mut bright: Vec<(u32, usize)> = bright.map(|cell| (self.value[cell].to_bits(), cell)).collect();
         let mut rest = bits.get_mut(laxest..).unwrap_or_default();
         let mut kept: Vec<(f64, usize)> = Vec::new();
         for q in PERCENTILES {
@@ -177,8 +177,13 @@ impl SaliencyMap {
             }
             let (below, &mut level, _) = rest.select_nth_unstable(at);
             rest = below;
-            let high = (0..self.value.len()).filter(|&cell| self.value[cell].to_bits() >= level);
-            kept = high.filter(|&cell| self.is_maximum(cell)).map(|cell| (self.excess(cell), cell)).collect();
+            // Those of the stricter levels have been asked.
+            bright.retain(|&(bits, cell)| {
+                if bits >= level && self.is_maximum(cell) {
+                    kept.push((self.excess(cell), cell));
+                }
+                bits < level
+            });
             if kept.len() >= ENOUGH_PEAKS {
                 break;
             }

@@ -48,7 +48,7 @@ pub(super) struct RowPoint {
 /// The rows and columns of a region in which a point is above a level, `[from, to)`; none of somebody who is not.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Reach {
-    rows: (usize, usize),
+    pub(super) rows: (usize, usize),
     columns: (usize, usize),
     /// In which register what it returns begins: those of a block of columns, row by row, then those of the next.
     kept: usize,
@@ -71,6 +71,11 @@ impl Reach {
     #[inline(always)]
     fn registers<S: Simd>(&self) -> Range<usize> {
         self.columns.0 / S::F32_LANES..self.columns.1.div_ceil(S::F32_LANES)
+    }
+
+    /// Whether it is none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.count() == 0
     }
 
     /// How many rows.
@@ -333,4 +338,70 @@ fn add<S: Simd>(simd: S, returned: Lanes<S>, (kept, cells): (&mut S::f32s, &mut 
 fn steps<S: Simd>(simd: S) -> Lanes<S> {
     const STEPS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
     Lanes::new(simd, S::as_simd_f32s(&STEPS).0[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pulp::{Arch, WithSimd};
+
+    /// What a point returns in each cell of a region, and what it collects of slopes there.
+    struct Once<'a>(&'a RowPoint, &'a LevelRows, &'a [f32]);
+
+    impl WithSimd for Once<'_> {
+        type Output = (bool, Vec<f32>, Sums);
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+            let Self(point, rows, slopes) = self;
+            let reach = point.reach(rows, -30.0, 0);
+            let mut returns = vec![0.0; reach.returns::<S>() * S::F32_LANES];
+            let mut power = vec![0.0; rows.size[0] * rows.stride];
+            let ((kept, _), (cells, _)) = (S::as_mut_simd_f32s(&mut returns), S::as_mut_simd_f32s(&mut power));
+            point.spread(simd, (rows, &reach), &mut Vec::new(), (&mut *kept, cells));
+            let sums = point.collect(simd, (rows, &reach), (kept, S::as_simd_f32s(slopes).0));
+            (reach.from.is_some(), power, sums)
+        }
+    }
+
+    /// Upright and leaning points, in the middle of a region, at its edge and beyond it: products where they hold, and else powers, are
+    /// what the formula says, and so are the sums over them.
+    #[test]
+    fn products_and_powers_are_what_the_formula_says() {
+        let rows = LevelRows { lo: [100, 7], size: [40, 45], stride: 48, ..LevelRows::default() };
+        let slopes: Vec<f32> =
+            (0..40 * 48).map(|k| if k % 48 < 45 { (k * 7919 % 101) as f32 / 50.0 } else { 0.0 }).collect();
+        let mut ways = [0; 2];
+        for (skew, bin) in [0.0, 0.3, -0.5, 1.1, 4.0]
+            .into_iter()
+            .flat_map(|skew| [[118.3, 28.6], [101.2, 9.1], [96.0, 30.0], [139.4, 50.0]].map(|bin| (skew, bin)))
+        {
+            let point = RowPoint { bin, weight: [0.3, 0.9], skew, top: -2.0 };
+            let (products, power, sums) = Arch::new().dispatch(Once(&point, &rows, &slopes));
+            ways[usize::from(products)] += 1;
+            let mut wanted = [0.0; 6];
+            for (row, column) in (0..40).flat_map(|row| (0..45).map(move |column| (row, column))) {
+                let (y, x) = ((100 + row) as f64 - bin[0], (7 + column) as f64 - bin[1]);
+                let log2 = point.top - 0.3 * y * y - 0.9 * (x + skew * y).powi(2);
+                let found = f64::from(power[row * 48 + column]) * LOWERED;
+                assert!((found - log2.exp2()).abs() < 2e-5 * log2.exp2() + 2e-9, "{skew} {bin:?}: {found}, 2^{log2}");
+                let each = log2.exp2() * f64::from(slopes[row * 48 + column]);
+                for (sum, by) in wanted.iter_mut().zip([1.0, y, x, y * y, x * y, x * x]) {
+                    *sum += each * by;
+                }
+            }
+            let found = [
+                sums.r,
+                sums.r_delta[1],
+                sums.r_delta[2],
+                sums.r_delta_delta[2],
+                sums.r_delta_delta[4],
+                sums.r_delta_delta[5],
+            ];
+            for (found, wanted) in zip(found, wanted) {
+                assert!((found - wanted).abs() < 2e-4 * (1.0 + wanted.abs()), "{skew} {bin:?}: {found}, {wanted}");
+            }
+        }
+        assert!(ways[0] >= 8 && ways[1] >= 8, "{ways:?}");
+    }
 }

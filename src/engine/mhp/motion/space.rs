@@ -19,8 +19,10 @@ use super::proportions::Proportions;
 use super::static_echo;
 use super::tilt::{self, Fallen, Tilt};
 use crate::body::{Mixture, MotionPrior, Parts, Skeleton};
-use crate::geometry::{Vec3, add, cross, scale, sub};
+use crate::geometry::{Vec3, add, add_products, add_rows, cross, scale, sub};
+use project::Equations;
 use smallvec::SmallVec;
+use std::sync::OnceLock;
 
 /// Components of the prior that a pose has at most.
 pub(super) const MOST_COMPONENTS: usize = 64;
@@ -76,6 +78,8 @@ pub(super) struct PoseSpace {
     poses: Vec<Vec<Vec3>>,
     /// What these change in a second at each time.
     changes: Vec<Vec<Vec3>>,
+    /// What the nearest c at each time are found by, once it was asked for.
+    equations: Vec<OnceLock<Equations>>,
     /// How likely c is.
     mixture: &'static Mixture,
     /// Mean and standard deviation of s.
@@ -162,6 +166,8 @@ impl PoseSpace {
         };
         let starts = prior.starts().iter().map(|start| (start.coefficients[..components].to_vec(), start.hip_height));
         let lowest = at(0.0)[..skeleton.joints.len()].iter().map(|p| p[HEIGHT]).fold(f64::INFINITY, f64::min);
+        let poses: Vec<Vec<Vec3>> = times_s.iter().map(|&t_s| at(t_s)).collect();
+        let ground = floor_z_m.and_then(|floor_z_m| Ground::new(skeleton, floor_z_m, (&poses, -lowest)));
         Some(Self {
             joints: skeleton.joints.len(),
             components,
@@ -169,13 +175,14 @@ impl PoseSpace {
             parts: (detail == Detail::Fit).then(|| Parts::of(skeleton)).flatten(),
             times_s: times_s.to_vec(),
             hips: -lowest,
-            poses: times_s.iter().map(|&t_s| at(t_s)).collect(),
+            poses,
             changes: times_s.iter().map(change).collect(),
+            equations: vec![OnceLock::new(); times_s.len()],
             mixture: prior.mixture(),
             ln_size: prior.ln_size(),
             signs: prior.mirror_signs()[..components].to_vec(),
             proportions: Proportions::of(skeleton, &at(0.0)[..skeleton.joints.len()], detail),
-            ground: floor_z_m.and_then(|floor_z_m| Ground::new(skeleton, floor_z_m)),
+            ground,
             starts: starts.collect(),
         })
     }
@@ -207,11 +214,9 @@ impl PoseSpace {
 
     /// Σ_k of a row's mean and components times 1 and c.
     fn mixed(&self, row: &[Vec3], c: &[f64], out: &mut [Vec3]) {
-        out.copy_from_slice(&row[..self.joints]);
-        for (k, c) in c.iter().enumerate() {
-            let of = &row[(k + 1) * self.joints..(k + 2) * self.joints];
-            out.as_flattened_mut().iter_mut().zip(of.as_flattened()).for_each(|(out, of)| *out += c * of);
-        }
+        let (mean, components) = row.split_at(self.joints);
+        out.copy_from_slice(mean);
+        add_rows(out.as_flattened_mut(), components.as_flattened(), c, 0);
     }
 
     /// Gives a person of these coordinates this body, in the pose that people have most often, with its hips (world frame, m) as far
@@ -237,10 +242,7 @@ impl PoseSpace {
         let tilts: SmallVec<[Tilt; FRAMES]> =
             self.times_s.iter().map(|&t_s| Tilt::of(&coordinates[TILT..BODY], t_s)).collect();
         let upright = coordinates[TILT..BODY].iter().all(|&x| x == 0.0);
-        let contact = self
-            .ground
-            .as_ref()
-            .map(|ground| ground.contact(coordinates, (&self.poses, &tilts), self.joints, self.hips));
+        let contact = self.ground.as_ref().map(|ground| ground.contact(coordinates, &tilts, upright));
         Stance { tilts, upright, contact }
     }
 
@@ -346,14 +348,7 @@ impl PoseSpace {
 
     /// Adds to the bars of c what the adjoints of [`Self::mixed`] imply.
     fn mixed_back(&self, row: &[Vec3], own: &[Vec3], bars: &mut [f64]) {
-        for (k, bar) in bars[BODY..BODY + self.components].iter_mut().enumerate() {
-            let of = &row[(k + 1) * self.joints..(k + 2) * self.joints];
-            let mut sums = [0.0; 3];
-            for (of, own) in of.iter().zip(own) {
-                sums.iter_mut().zip(of.iter().zip(own)).for_each(|(sum, (of, own))| *sum += of * own);
-            }
-            *bar += sums.iter().sum::<f64>();
-        }
+        add_products(&mut bars[BODY..], row[self.joints..].as_flattened(), own[..self.joints].as_flattened());
     }
 
     /// How unlikely the coordinates are: [`SHARE`] of how unlikely the mixture has c, of the squares of what it is not of, of s and q, in

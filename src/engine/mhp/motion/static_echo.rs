@@ -37,8 +37,8 @@ pub(super) struct StaticEchoModel {
     width_mps: f64,
     /// Where the radar is, world frame, m.
     radar: Vec3,
-    /// ln α of each joint of a body.
-    ln_opacities: Vec<f64>,
+    /// α of each joint of a body.
+    opacities: Vec<f64>,
 }
 
 /// v₀ of a radar, m/s.
@@ -59,8 +59,9 @@ fn sinc_sq(x: f64) -> (f64, f64) {
     if y.abs() < 1e-4 {
         return (1.0 - y * y / 3.0, -2.0 * PI * y / 3.0);
     }
-    let sinc = y.sin() / y;
-    (sinc * sinc, 2.0 * PI * sinc * (y.cos() - sinc) / y)
+    let (sine, cosine) = y.sin_cos();
+    let sinc = sine / y;
+    (sinc * sinc, 2.0 * PI * sinc * (cosine - sinc) / y)
 }
 
 /// How unlikely q is, and its derivative.
@@ -79,7 +80,7 @@ impl StaticEchoModel {
         (config.static_echo == StaticEcho::Fitted).then(|| Self {
             width_mps: width_mps(&problem.radar),
             radar: radar_place(&problem.views),
-            ln_opacities: problem.skeleton.joints.iter().map(|name| opacity(name).ln()).collect(),
+            opacities: problem.skeleton.joints.iter().map(opacity).collect(),
         })
     }
 
@@ -93,12 +94,12 @@ impl StaticEchoModel {
 
     /// Gives person `person` of `params` the opacities that q, its positions and its velocities leave.
     pub(super) fn dim(&self, q: f64, person: usize, params: &mut Pppr) {
-        let joints = self.ln_opacities.len();
+        let joints = self.opacities.len();
         let gone = 1.0 - kept(q).0;
-        for (own, ln_opacity) in self.ln_opacities.iter().enumerate() {
+        for (own, opacity) in self.opacities.iter().enumerate() {
             let joint = person * joints + own;
             let (_, _, x) = self.radial(params.position(joint), params.velocity(joint));
-            let alpha = (ln_opacity + 0.5 * (1.0 - gone * sinc_sq(x).0).max(f64::MIN_POSITIVE).ln()).exp();
+            let alpha = opacity * (1.0 - gone * sinc_sq(x).0).max(f64::MIN_POSITIVE).sqrt();
             params.joint_mut(Group::Beta, joint)[0] = (alpha / (1.0 - alpha)).ln();
         }
     }
@@ -113,17 +114,17 @@ impl StaticEchoModel {
         beta_bar: &[f64],
         (position_bar, velocity_bar): (&mut [Vec3], &mut [Vec3]),
     ) -> f64 {
-        let joints = self.ln_opacities.len();
+        let joints = self.opacities.len();
         let (share, by_q) = kept(q);
         let mut q_bar = 0.0;
-        for own in 0..joints {
+        for (own, opacity) in self.opacities.iter().enumerate() {
             let joint = person * joints + own;
             let velocity = params.velocity(joint);
             let (sight, distance, x) = self.radial(params.position(joint), velocity);
             let (power, slope) = sinc_sq(x);
-            let left = 1.0 - (1.0 - share) * power;
+            let left = (1.0 - (1.0 - share) * power).max(f64::MIN_POSITIVE);
             // By κ²: ln α has half its logarithm, and β has 1/(1 − α) of that.
-            let bar = 0.5 * beta_bar[own] / ((1.0 - params.opacity(joint)) * left.max(f64::MIN_POSITIVE));
+            let bar = 0.5 * beta_bar[own] / ((1.0 - opacity * left.sqrt()) * left);
             q_bar += bar * power * by_q;
             let x_bar = -bar * (1.0 - share) * slope / self.width_mps;
             add_scaled(&mut velocity_bar[own], sight, x_bar);

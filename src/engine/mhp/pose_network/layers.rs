@@ -1,6 +1,7 @@
 //! The network: two towers of convolutions, one a plane, and dense layers over both.
 
 use super::glimpse::{ACROSS, CHANNELS, RANGES, Seen, UP};
+use crate::geometry::add_products;
 use ndarray::linalg::general_mat_mul;
 use ndarray::{ArrayView2, ArrayViewMut2};
 #[cfg(feature = "train")]
@@ -28,6 +29,15 @@ pub(super) const TOLD: usize = BODIES * (1 + JOINTS * OUT);
 struct Layer {
     weights: Vec<f32>,
     bias: Vec<f32>,
+}
+
+impl Layer {
+    /// What a dense one makes of `x`. Each weight is read once: a product of matrices would copy them all before.
+    fn of(&self, x: &[f32]) -> Vec<f32> {
+        let mut out = self.bias.clone();
+        add_products(&mut out, &self.weights, x);
+        out
+    }
 }
 
 /// Towers of convolutions of 3 × 3 cells, and dense layers, each with max(x, 0) behind it but the last.
@@ -109,9 +119,7 @@ impl Layers {
         x.extend(tower(&self.towers[1], &seen.vertical, UP));
         x.extend(seen.about);
         for (k, layer) in self.dense.iter().enumerate() {
-            let mut out = layer.bias.clone();
-            product(&mut out, [layer.bias.len(), 1], (&layer.weights, false), (&x, false), 1.0);
-            x = out;
+            x = layer.of(&x);
             if k + 1 < self.dense.len() {
                 rectify(&mut x);
             }
@@ -203,9 +211,12 @@ pub(super) fn shifted(x: &[f32], [rows, columns]: [usize; 2], stride: usize) -> 
         for (i, of_row) in of_tap.chunks_exact_mut(wide).enumerate() {
             let Some(row) = (i * stride + dy).checked_sub(1).filter(|&row| row < rows) else { continue };
             let map = &map[row * columns..(row + 1) * columns];
-            for (j, y) in of_row.iter_mut().enumerate() {
-                if let Some(value) = (j * stride + dx).checked_sub(1).and_then(|column| map.get(column)) {
-                    *y = *value;
+            // The first tap of a row lies beyond its edge.
+            let (to, from) = if dx == 0 { (1, stride - 1) } else { (0, dx - 1) };
+            if let (Some(of_row), Some(map)) = (of_row.get_mut(to..), map.get(from..)) {
+                match stride {
+                    1 => of_row.iter_mut().zip(map).for_each(|(y, x)| *y = *x),
+                    _ => of_row.iter_mut().zip(map.iter().step_by(stride)).for_each(|(y, x)| *y = *x),
                 }
             }
         }

@@ -1,10 +1,11 @@
 //! The coordinates whose joints and velocities come nearest to given ones.
 
-use super::{BODY, HEIGHT, LN_SIZE, PoseSpace, STILL, Stance, TILT, Turn, YAW};
+use super::{BODY, HEIGHT, LN_SIZE, MOST_COMPONENTS, PoseSpace, STILL, Stance, TILT, Turn, YAW};
 use crate::body::Parts;
-use crate::geometry::{Vec3, dot, mean, norm, sub};
+use crate::geometry::{Vec3, dot, mean, norm, scale, sub};
 use crate::mhp::motion::static_echo;
 use crate::mhp::motion::tilt::{self, Tilt};
+use smallvec::SmallVec;
 
 /// How far joints and what they travel in a while ([`PoseSpace::while_s`]) may be from the prior's, sizes: those of a start are no
 /// measurements.
@@ -80,12 +81,13 @@ impl PoseSpace {
         coordinates[STILL] = static_echo::USUAL;
         coordinates[YAW] = yaw_of(joints, &self.poses[frame][..self.joints]);
         // Tilt, place and size, and pose in turn: a few rounds settle.
+        let equations = self.equations[frame].get_or_init(|| self.equations(frame));
         for _ in 0..ROUNDS {
             if tilted {
                 self.tilt(frame, (joints, velocities), &mut coordinates);
             }
             self.align(frame, joints, &mut coordinates);
-            self.solve(frame, joints, velocities, &mut coordinates);
+            self.solve(equations, (joints, velocities), &mut coordinates);
         }
         self.align(frame, joints, &mut coordinates);
         let mut pose = vec![[0.0; 3]; self.joints];
@@ -138,10 +140,9 @@ impl PoseSpace {
     }
 
     /// c by least squares with the prior, for the t, y and s that are there.
-    fn solve(&self, frame: usize, joints: &[Vec3], velocities: &[Vec3], coordinates: &mut [f64]) {
-        let n = self.components;
+    fn solve(&self, equations: &Equations, (joints, velocities): (&[Vec3], &[Vec3]), coordinates: &mut [f64]) {
+        let (n, frame) = (self.components, equations.frame);
         let turn = Turn::of(coordinates);
-        let (mut normal, mut right) = (vec![0.0; n * n], vec![0.0; n]);
         let place = [coordinates[0], coordinates[1], coordinates[2]];
         let tilt = Tilt::of(&coordinates[TILT..BODY], self.times_s[frame]);
         let turned: Vec<Vec3> = joints.iter().map(|&p| self.before_turn(&turn, place, p)).collect();
@@ -152,30 +153,51 @@ impl PoseSpace {
         let poses = turned.iter().map(own).collect::<Vec<_>>();
         let swept = velocities.iter().zip(&turned).map(|(&v, &u)| sub(turn.inverse(v), tilt.swept(u, [0.0; 3])));
         let changes = swept.map(|v| tilt.backwards(v)).collect::<Vec<_>>();
+        let goes = mean(&changes);
+        let c = &mut coordinates[..BODY + n];
+        c[BODY..].fill(0.0);
         for (row, wanted, weight) in
-            [(&self.poses[frame], &poses, 1.0), (&self.changes[frame], &changes, self.while_s(frame))]
+            [(&self.poses[frame], poses, 1.0), (&self.changes[frame], changes, self.while_s(frame))]
         {
-            for (joint, wanted) in wanted.iter().enumerate() {
+            let rest = wanted.iter().zip(row).map(|(wanted, mean)| scale(sub(*wanted, *mean), weight * weight));
+            self.mixed_back(row, &rest.collect::<Vec<_>>(), c);
+        }
+        for WalksOn { later, mean, by } in &equations.others {
+            let rest: Vec3 = std::array::from_fn(|axis| later * goes[axis] - mean[axis]);
+            c[BODY..].iter_mut().zip(by).for_each(|(right, by)| *right += dot(*by, rest));
+        }
+        substitute(&equations.factor, &mut c[BODY..]);
+    }
+
+    /// What [`Self::solve`] has in common whatever is asked of time `frame`.
+    fn equations(&self, frame: usize) -> Equations {
+        let n = self.components;
+        let others: Vec<WalksOn> =
+            (0..self.poses.len()).filter(|&other| other != frame).map(|other| self.walks_on(frame, other)).collect();
+        let mut normal = vec![0.0; n * n];
+        let mut add = |of: &dyn Fn(usize) -> f64| {
+            let each: SmallVec<[f64; MOST_COMPONENTS]> = (0..n).map(of).collect();
+            for (k, row) in normal.chunks_exact_mut(n.max(1)).enumerate() {
+                row[..=k].iter_mut().zip(&each).for_each(|(sum, by_l)| *sum += each[k] * by_l);
+            }
+        };
+        for (row, weight) in [(&self.poses[frame], 1.0), (&self.changes[frame], self.while_s(frame))] {
+            for joint in 0..self.joints {
                 for axis in 0..3 {
-                    let rest = weight * (wanted[axis] - row[joint][axis]);
-                    for k in 0..n {
-                        let by_k = weight * row[(k + 1) * self.joints + joint][axis];
-                        right[k] += by_k * rest;
-                        for l in 0..=k {
-                            normal[k * n + l] += by_k * weight * row[(l + 1) * self.joints + joint][axis];
-                        }
-                    }
+                    add(&|k| weight * row[(k + 1) * self.joints + joint][axis]);
                 }
             }
         }
-        self.walk_on(frame, mean(&changes), (&mut normal, &mut right));
-        for k in 0..n {
-            normal[k * n + k] += MISFIT * MISFIT;
-            for l in 0..k {
-                normal[l * n + k] = normal[k * n + l];
+        for other in &others {
+            for axis in 0..3 {
+                add(&|k| other.by[k][axis]);
             }
         }
-        coordinates[BODY..BODY + n].copy_from_slice(&solved(&mut normal, right));
+        for k in 0..n {
+            normal[k * n + k] += MISFIT * MISFIT;
+        }
+        factorise(&mut normal, n);
+        Equations { frame, factor: normal, others }
     }
 
     /// The time over which velocities at time `frame` count, s. A frame at the end of a window has nothing but them to tell the other end
@@ -185,27 +207,34 @@ impl PoseSpace {
         (OF_FARTHEST * away_s.fold(0.0, f64::max)).clamp(WHILE_S[0], WHILE_S[1])
     }
 
-    /// Adds to the normal equations of c that the middle of a body goes on through the window as it `goes` at time `frame`, sizes/s:
-    /// joints and velocities of one frame leave where a walker is 0.4 s later to the prior, whose mean stands.
-    fn walk_on(&self, frame: usize, goes: Vec3, (normal, right): (&mut [f64], &mut [f64])) {
-        let n = self.components;
+    /// What ties the middle of a body at time `other` to where it goes at time `frame`: joints and velocities of one frame leave where
+    /// a walker is 0.4 s later to the prior, whose mean stands.
+    fn walks_on(&self, frame: usize, other: usize) -> WalksOn {
         let middle = |row: &[Vec3], k: usize| mean(&row[k * self.joints..(k + 1) * self.joints]);
-        for other in (0..self.poses.len()).filter(|&other| other != frame) {
-            let later_s = self.times_s[other] - self.times_s[frame];
-            let gain = MISFIT / (PACE_MPS * later_s.abs());
-            let moved = |k: usize| sub(middle(&self.poses[other], k), middle(&self.poses[frame], k)).map(|x| gain * x);
-            let (rest, by) = (moved(0), (1..=n).map(moved).collect::<Vec<_>>());
-            for axis in 0..3 {
-                let rest = gain * later_s * goes[axis] - rest[axis];
-                for k in 0..n {
-                    right[k] += by[k][axis] * rest;
-                    for l in 0..=k {
-                        normal[k * n + l] += by[k][axis] * by[l][axis];
-                    }
-                }
-            }
-        }
+        let later_s = self.times_s[other] - self.times_s[frame];
+        let gain = MISFIT / (PACE_MPS * later_s.abs());
+        let moved = |k: usize| scale(sub(middle(&self.poses[other], k), middle(&self.poses[frame], k)), gain);
+        WalksOn { later: gain * later_s, mean: moved(0), by: (1..=self.components).map(moved).collect() }
     }
+}
+
+/// The least squares for c at a frame, but for what is asked.
+#[derive(Debug, Clone)]
+pub(super) struct Equations {
+    frame: usize,
+    /// L of the normal equations L Lᵀ, C order.
+    factor: Vec<f64>,
+    others: Vec<WalksOn>,
+}
+
+/// Equations for the middle of a body at another time, weighted.
+#[derive(Debug, Clone)]
+struct WalksOn {
+    /// How much later that is, s.
+    later: f64,
+    /// How far the middle is then in the mean, and in each component, sizes.
+    mean: Vec3,
+    by: Vec<Vec3>,
 }
 
 /// The yaw that turns `from` onto `joints`, by their horizontal extent.
@@ -220,24 +249,31 @@ fn yaw_of(joints: &[Vec3], from: &[Vec3]) -> f64 {
     sine.atan2(cosine)
 }
 
-/// Solves a symmetric positive definite system, C order.
-fn solved(a: &mut [f64], mut b: Vec<f64>) -> Vec<f64> {
-    let n = b.len();
+/// L of a symmetric positive definite matrix L Lᵀ of n rows, C order, over its lower half.
+fn factorise(a: &mut [f64], n: usize) {
     for k in 0..n {
+        let (above, rest) = a.split_at_mut(k * n);
+        let row = &mut rest[..n];
         for l in 0..k {
-            let sum: f64 = (0..l).map(|m| a[k * n + m] * a[l * n + m]).sum();
-            a[k * n + l] = (a[k * n + l] - sum) / a[l * n + l];
+            let other = &above[l * n..=l * n + l];
+            let sum: f64 = row.iter().zip(&other[..l]).map(|(a, b)| a * b).sum();
+            row[l] = (row[l] - sum) / other[l];
         }
-        let sum: f64 = (0..k).map(|m| a[k * n + m] * a[k * n + m]).sum();
-        a[k * n + k] = (a[k * n + k] - sum).max(f64::MIN_POSITIVE).sqrt();
+        let sum: f64 = row[..k].iter().map(|a| a * a).sum();
+        row[k] = (row[k] - sum).max(f64::MIN_POSITIVE).sqrt();
     }
+}
+
+/// Solves L Lᵀ x = b, over b.
+fn substitute(a: &[f64], b: &mut [f64]) {
+    let n = b.len();
     for k in 0..n {
         let sum: f64 = (0..k).map(|m| a[k * n + m] * b[m]).sum();
         b[k] = (b[k] - sum) / a[k * n + k];
     }
     for k in (0..n).rev() {
-        let sum: f64 = (k + 1..n).map(|m| a[m * n + k] * b[m]).sum();
-        b[k] = (b[k] - sum) / a[k * n + k];
+        b[k] /= a[k * n + k];
+        let x = b[k];
+        b[..k].iter_mut().zip(&a[k * n..k * n + k]).for_each(|(b, a)| *b -= a * x);
     }
-    b
 }
