@@ -14,7 +14,6 @@
     reason = "all of it belongs into the function that is compiled for an instruction set"
 )]
 
-use crate::geometry::summed_products;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
@@ -22,6 +21,8 @@ use smallvec::SmallVec;
 pub(super) const MIXTURE_COEFFICIENTS: usize = 28;
 /// Members of a mixture of which nothing has to be allocated, mirror images and what nobody does among them.
 const MEMBERS: usize = 24;
+/// Rows of W whose products are summed side by side.
+const ABREAST: usize = 4;
 /// π₀
 const UNSEEN: f64 = 0.05;
 /// A member that is farther than the nearest by this has a chance of less than 1e-9: it is left out.
@@ -46,23 +47,49 @@ impl MixtureComponent {
         -2.0 * ((0.5 * (1.0 - UNSEEN) * self.weight).ln() + diagonal.map(f64::ln).sum::<f64>())
     }
 
-    /// W (σ∘c − μ), and its square; `None` where that is more than `most`.
+    /// W in blocks of [`ABREAST`] rows: of each column up to the last row's a number a row.
+    fn blocks(&self) -> Vec<[f64; ABREAST]> {
+        let number = |row: usize, column: usize| {
+            let within = row < self.mean.len() && column <= row;
+            if within { self.whitening[row * (row + 1) / 2 + column] } else { 0.0 }
+        };
+        let block = |first: usize| {
+            let columns = 0..(first + ABREAST).min(self.mean.len());
+            columns.map(move |column| std::array::from_fn(|k| number(first + k, column)))
+        };
+        (0..self.mean.len()).step_by(ABREAST).flat_map(block).collect()
+    }
+
+    /// W (σ∘c − μ), and its square; `None` where that is more than `most`. `blocks` are those of W.
     #[inline(always)]
-    fn white(&self, c: &[f64], most: f64, sign: impl Fn(usize) -> f64) -> Option<(Point, f64)> {
+    fn white(
+        &self,
+        blocks: &[[f64; ABREAST]],
+        c: &[f64],
+        most: f64,
+        sign: impl Fn(usize) -> f64,
+    ) -> Option<(Point, f64)> {
         let mut off = [0.0; MIXTURE_COEFFICIENTS];
         for (k, (off, (c, mean))) in off.iter_mut().zip(c.iter().zip(&self.mean)).enumerate() {
             *off = sign(k) * c - mean;
         }
+        let off = &off[..self.mean.len()];
         let mut white = [0.0; MIXTURE_COEFFICIENTS];
-        let mut square = 0.0;
-        let mut rest = self.whitening.as_slice();
-        for (row, white) in white.iter_mut().enumerate().take(self.mean.len()) {
-            let (own, after) = rest.split_at(row + 1);
-            *white = summed_products::<4, f64>(own, &off);
-            square += *white * *white;
+        let (mut square, mut rest) = (0.0, blocks);
+        for (block, white) in white.chunks_mut(ABREAST).enumerate() {
+            let columns = ((block + 1) * ABREAST).min(off.len());
+            let (own, after) = rest.split_at(columns.min(rest.len()));
+            let mut sums = [0.0; ABREAST];
+            for (numbers, off) in own.iter().zip(off) {
+                for k in 0..ABREAST {
+                    sums[k] += numbers[k] * off;
+                }
+            }
+            square += sums.iter().map(|x| x * x).sum::<f64>();
             if square > most {
                 return None;
             }
+            white.copy_from_slice(&sums[..white.len()]);
             rest = after;
         }
         Some((white, square))
@@ -121,8 +148,8 @@ struct Member<'a> {
 /// A Gaussian mixture of the first coefficients, ready to be asked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mixture {
-    /// With −2 ln of the density in its middle, of itself alone.
-    components: Vec<(MixtureComponent, f64)>,
+    /// With −2 ln of the density in its middle, of itself alone, and W in blocks.
+    components: Vec<(MixtureComponent, f64, Vec<[f64; ABREAST]>)>,
     /// σ, one a coefficient.
     signs: Vec<f64>,
     /// −2 ln p̂
@@ -133,7 +160,7 @@ impl Mixture {
     /// Of components whose lists fit together, before a mirror that gives coefficients these signs.
     pub(super) fn new(components: &[MixtureComponent], signs: &[f64]) -> Self {
         let coefficients = components.first().map_or(0, |component| component.mean.len());
-        let with_offset = |component: &MixtureComponent| (component.clone(), component.offset());
+        let with_offset = |component: &MixtureComponent| (component.clone(), component.offset(), component.blocks());
         let mut mixture = Self {
             components: components.iter().map(with_offset).collect(),
             signs: signs[..coefficients.min(signs.len())].to_vec(),
@@ -170,10 +197,10 @@ impl Mixture {
         let mut nearest = c.iter().map(|c| c * c).sum::<f64>() - 2.0 * UNSEEN.ln();
         let mut members: SmallVec<[Member; MEMBERS]> = SmallVec::new();
         members.push(Member { far: nearest, of: None, white });
-        for (component, offset) in &self.components {
+        for (component, offset, blocks) in &self.components {
             for mirrored in [false, true] {
                 let sign = |k: usize| if mirrored { self.signs[k] } else { 1.0 };
-                if let Some((white, square)) = component.white(c, nearest + NONE - offset, sign) {
+                if let Some((white, square)) = component.white(blocks, c, nearest + NONE - offset, sign) {
                     nearest = nearest.min(offset + square);
                     members.push(Member { far: offset + square, of: Some((component, mirrored)), white });
                 }

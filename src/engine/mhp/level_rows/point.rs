@@ -6,10 +6,9 @@
 //! 2^(t − (w₀ + w₁ s²) y²) · 2^(−w₁ x²) · q(x)^y,  q = 2^(−2 w₁ s x)
 //! ```
 //!
-//! a number a row, and one a column that is multiplied by q from row to row: two products a cell instead of a power. It begins in the
-//! row of the middle and goes up and down from there, for that is where no column that the point reaches is far below its largest
-//! return. Both numbers are lifted, so that what falls from there stays above the smallest of single precision: denormal numbers cost
-//! a hundred cycles. Of a point that leans so far that this does not hold each cell is a power by itself.
+//! a number a row, and one a column that is multiplied by q from row to row: two products a cell instead of a power. Both numbers
+//! are lifted, so that where the point is faint, too, they stay above the smallest of single precision: denormal numbers cost a
+//! hundred cycles. Of a point that leans so far that this does not hold each cell is a power by itself.
 #![expect(
     clippy::inline_always,
     reason = "all of it belongs into the one function that is compiled for an instruction set"
@@ -23,16 +22,16 @@ use std::iter::zip;
 use std::ops::Range;
 
 /// log₂ of what a return is multiplied by: of its row's share, and of its column's.
-const LIFTS: [f64; 2] = [40.0, 60.0];
+const LIFTS: [f64; 2] = [20.0, 85.0];
 /// log₂ of both, and one by both.
 const LIFT: f64 = LIFTS[0] + LIFTS[1];
 pub(super) const LOWERED: f64 = 1.0 / (1_u128 << LIFT as u32) as f64;
-/// A column's share may fall to 2 to less than this, lifted, and no return may.
+/// 2 to less than this is no number for a column's share, or for a return.
 const LOWEST: f64 = -122.0;
+/// Nor is 2 to more than this for a column's share.
+const HIGHEST: f64 = 120.0;
 /// 2 to this and less is 0 where each cell is a power by itself, lifted.
-const FAINTEST: f32 = 36.0;
-/// log₂ of what a column's share changes by from row to row, at most: of those that are reached it is less.
-const STEEPEST: f32 = 60.0;
+const FAINTEST: f32 = 41.0;
 /// Registers of a row that are summed side by side: each waits for its own product only.
 const ABREAST: usize = 4;
 
@@ -52,9 +51,8 @@ pub(super) struct Reach {
     columns: (usize, usize),
     /// In which register what it returns begins: those of a block of columns, row by row, then those of the next.
     kept: usize,
-    /// Where returns are products: the row that they begin in, from the first one, and log₂ of the share of a column below which the
-    /// point does not reach it.
-    from: Option<(usize, f32)>,
+    /// Where returns are products: how far the point reaches to either side.
+    aside: Option<f32>,
 }
 
 /// The rows that a point reaches above a level, `height` above it at most.
@@ -115,27 +113,22 @@ impl RowPoint {
         let to = ((self.bin[1] + half - rows.lo[1] as f64).floor() + 1.0).clamp(0.0, rows.size[1] as f64);
         let columns = (from as usize, to as usize);
         if across.0 < across.1 && columns.0 < columns.1 {
-            Reach { rows: across, columns, kept, from: self.products_from(across, rows.lo[0], height) }
+            Reach { rows: across, columns, kept, aside: self.aside(half, height) }
         } else {
             Reach { kept, ..Reach::default() }
         }
     }
 
-    /// [`Reach::from`] of a point that reaches these rows, so far above its level.
+    /// [`Reach::aside`] of a point that reaches `half` columns to either side, so far above its level.
     #[inline(always)]
-    fn products_from(&self, (first, end): (usize, usize), lo: usize, height: f64) -> Option<(usize, f32)> {
-        let middle = (self.bin[0] - lo as f64).round();
-        if middle < first as f64 || middle >= end as f64 {
-            return None;
-        }
-        // Half a row from the middle a column that is reached has at least 2^−deepest of it.
+    fn aside(&self, half: f64, height: f64) -> Option<f32> {
+        // Of a column log₂ is −w₁ x² − 2 w₁ s x y, of the row that is highest there at most r times the height, r = w₁ s²/w₀.
         let [w0, w1] = self.weight;
-        let lean = self.skew.abs();
-        let deepest = height * (1.0 + w1 * lean * lean / w0) + lean * (w1 * height).sqrt();
-        let columns = 0.5 * lean + (deepest / w1).sqrt();
-        let falls = 2.0 * w1 * lean * columns * ((height / w0).sqrt() + 1.0);
-        (LIFTS[1] - deepest - falls > LOWEST && LIFT + self.top - 2.0 * deepest - falls > LOWEST)
-            .then(|| (middle as usize - first, -deepest as f32))
+        let lean = w1 * self.skew * self.skew / w0;
+        let falls = w1 * half * (half + 2.0 * self.skew.abs() * (height / w0).sqrt());
+        let faintest = self.top - height * (1.0 + lean) - falls;
+        let holds = LIFTS[1] + height * lean < HIGHEST && LIFTS[1] - falls > LOWEST && LIFT + faintest > LOWEST;
+        holds.then_some(half as f32)
     }
 
     /// Adds what the point returns to `power`, and keeps it; `ridge` is scratch.
@@ -149,7 +142,7 @@ impl RowPoint {
     ) {
         let stride = rows.stride / S::F32_LANES;
         let power = &mut power[reach.rows.0 * stride..reach.rows.1 * stride];
-        if reach.from.is_some() {
+        if reach.aside.is_some() {
             self.fill_ridge(simd, (rows, reach), ridge);
         }
         for (block, kept) in reach.blocks::<S>() {
@@ -209,7 +202,7 @@ impl RowPoint {
             columns[k] = self.columns(simd, rows, register + k);
         }
         let first = self.first_row(rows, reach);
-        let Some((from, deepest)) = reach.from else {
+        let Some(aside) = reach.aside else {
             let (falls, faintest) = (splat(simd, -w1), splat(simd, FAINTEST));
             let mut y = first;
             for (kept, row) in zip(kept.chunks_exact_mut(N), power.chunks_exact_mut(stride)) {
@@ -224,40 +217,24 @@ impl RowPoint {
             }
             return;
         };
-        let [mut start, mut up, mut down] = [[splat(simd, 0.0); N]; 3];
-        let (deepest, lift, zero) = (splat(simd, deepest), splat(simd, LIFTS[1] as f32), splat(simd, 0.0));
-        let steepest = splat(simd, STEEPEST);
+        let [mut share, mut by_row] = [[splat(simd, 0.0); N]; 2];
+        let (aside, lift, zero) = (splat(simd, aside), splat(simd, LIFTS[1] as f32), splat(simd, 0.0));
         for k in 0..N {
-            let by_row = columns[k] * splat(simd, -2.0 * w1 * skew);
-            let log2 = (columns[k] * columns[k]).mul_add(splat(simd, -w1), by_row * splat(simd, first + from as f32));
-            start[k] = log2.select_gt(deepest, (log2.max(deepest) + lift).exp2(), zero);
-            up[k] = by_row.min(steepest).max(zero - steepest).exp2_precise();
-            down[k] = splat(simd, 1.0) / up[k];
+            let x = columns[k];
+            let by_row_log2 = x * splat(simd, -2.0 * w1 * skew);
+            let log2 = (x * x).mul_add(splat(simd, -w1), by_row_log2.mul_add(splat(simd, first), lift));
+            // Beyond where the point reaches any number would do, as long as it is one.
+            let beyond = x.abs();
+            share[k] = beyond.select_gt(aside, zero, log2.exp2());
+            by_row[k] = beyond.select_gt(aside, zero, by_row_log2).exp2_precise();
         }
-        let (before, after) = kept.split_at_mut(from * N);
-        let (power_before, power_after) = power.split_at_mut(from * stride);
-        let (ridge_before, ridge_after) = ridge[..reach.count()].split_at(from);
-        let mut share = start;
-        for ((kept, row), at_row) in
-            zip(zip(after.chunks_exact_mut(N), power_after.chunks_exact_mut(stride)), ridge_after)
-        {
+        for ((kept, row), at_row) in zip(zip(kept.chunks_exact_mut(N), power.chunks_exact_mut(stride)), ridge) {
             let (Some(kept), Some(row)) = (kept.first_chunk_mut::<N>(), row[register..].first_chunk_mut::<N>()) else {
                 break;
             };
             for k in 0..N {
                 add(simd, share[k] * splat(simd, *at_row), (&mut kept[k], &mut row[k]));
-                share[k] = share[k] * up[k];
-            }
-        }
-        let mut share = start;
-        let rows_before = zip(before.chunks_exact_mut(N).rev(), power_before.chunks_exact_mut(stride).rev());
-        for ((kept, row), at_row) in zip(rows_before, ridge_before.iter().rev()) {
-            let (Some(kept), Some(row)) = (kept.first_chunk_mut::<N>(), row[register..].first_chunk_mut::<N>()) else {
-                break;
-            };
-            for k in 0..N {
-                share[k] = share[k] * down[k];
-                add(simd, share[k] * splat(simd, *at_row), (&mut kept[k], &mut row[k]));
+                share[k] = share[k] * by_row[k];
             }
         }
     }
@@ -360,7 +337,7 @@ mod tests {
             let ((kept, _), (cells, _)) = (S::as_mut_simd_f32s(&mut returns), S::as_mut_simd_f32s(&mut power));
             point.spread(simd, (rows, &reach), &mut Vec::new(), (&mut *kept, cells));
             let sums = point.collect(simd, (rows, &reach), (kept, S::as_simd_f32s(slopes).0));
-            (reach.from.is_some(), power, sums)
+            (reach.aside.is_some(), power, sums)
         }
     }
 
