@@ -22,9 +22,9 @@ use std::ops::Range;
 
 /// The sieves that starts go through, coarse then fine.
 const SIEVES: [Sieve; 3] = [
-    Sieve { moved: 0.3, steps: 4, every: 4, coarse: true, way: Way::Held, kept: 5 },
-    Sieve { moved: 1.0, steps: 7, every: 2, coarse: false, way: Way::Free, kept: 4 },
-    Sieve { moved: 1.0, steps: 7, every: 2, coarse: false, way: Way::Bent, kept: 2 },
+    Sieve { moved: 0.3, steps: 4, every: 4, coarse: true, held: true, kept: 5 },
+    Sieve { moved: 1.0, steps: 7, every: 2, coarse: false, held: false, kept: 4 },
+    Sieve { moved: 1.0, steps: 7, every: 1, coarse: false, held: false, kept: 3 },
 ];
 /// Evaluations of what is left, and of each body that is carried on from another frame.
 const FINE: usize = 9;
@@ -35,7 +35,7 @@ const MOST_WORK: f64 = 2e10;
 const PLAIN: f64 = 10.0;
 /// Evaluations of a person's search beside those of the first sieve, with those of what is carried on and of what the network
 /// expects, and those of a start in it, in whole windows.
-const LATER: f64 = 163.0;
+const LATER: f64 = 198.0;
 const FIRST: f64 = 3.0 / 4.0;
 /// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start, but for what a network
 /// expects, whose weight says whether it is asked.
@@ -68,19 +68,9 @@ struct Sieve {
     every: usize,
     /// Whether the body has few points of skin.
     coarse: bool,
-    way: Way,
+    /// Whether poses are held, so that place, heading and size alone move.
+    held: bool,
     kept: usize,
-}
-
-/// How a sieve moves starts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Way {
-    /// By steps of Adam, with poses held, so that place, heading and size alone move.
-    Held,
-    /// By steps of Adam.
-    Free,
-    /// By the bend of the loss.
-    Bent,
 }
 
 /// A body that a search ended at, in the frame that is fitted.
@@ -321,9 +311,10 @@ impl<'a> Search<'a> {
         for tried in &mut *all {
             // What was seen of fewer frames is no measure any more.
             tried.loss = f64::INFINITY;
-            match sieve.way {
-                Way::Bent => self.settle(tried, sieve.steps),
-                way => self.descend(tried, sieve.steps, way == Way::Held),
+            if sieve.every == 1 {
+                self.settle(tried, sieve.steps);
+            } else {
+                self.descend(tried, sieve.steps, sieve.held);
             }
         }
         all.sort_by(|a, b| a.loss.total_cmp(&b.loss));
@@ -406,16 +397,14 @@ pub(in crate::mhp) fn search(
         }
         let of_network = search.expected(&coordinates, person);
         expected.push(search.said(&of_network, person));
-        let [coarse @ .., last] = &SIEVES;
+        let [coarse @ .., whole] = &SIEVES;
         for sieve in coarse {
             search.sift(&mut all, sieve, &own);
         }
         // What the network expects needs no way there.
         all.extend(of_network.into_iter().map(|(_, tried)| tried));
-        search.sift(&mut all, last, &own);
-        search.look(1, false);
+        search.sift(&mut all, whole, &own);
         for tried in &mut all {
-            tried.loss = f64::INFINITY;
             search.settle(tried, FINE);
         }
         // A stride with the other leg in front looks much the same from afar, and so does a back.
