@@ -1,22 +1,94 @@
-//! A dense layer of a network: compiled here, where numbers are optimised in every profile.
+//! Products of matrices and vectors in the widest registers that the machine has; compiled here, where numbers are optimised in every
+//! profile.
+#![expect(
+    clippy::inline_always,
+    reason = "all of it belongs into the one function that is compiled for an instruction set"
+)]
 
-/// bias + W x, W row by row: a row of `inputs` weights for each of `bias`.
-pub fn dense(weight: &[f32], inputs: usize, bias: &[f32], x: &[f32]) -> Vec<f32> {
-    weight.chunks_exact(inputs.max(1)).zip(bias).map(|(row, bias)| bias + product(row, x)).collect()
+use pulp::{Arch, Simd, WithSimd};
+use std::ops::{AddAssign, Mul};
+
+/// Sums side by side: registers hold as many while others are loaded.
+const SUMS: usize = 16;
+
+/// bias + W x, W row by row: a row of as many weights as `x` has for each of `bias`.
+pub fn dense(weight: &[f32], bias: &[f32], x: &[f32]) -> Vec<f32> {
+    let mut out = bias.to_vec();
+    add_products(&mut out, weight, x);
+    out
 }
 
-/// Sixteen sums side by side: the compiler makes a few instructions of them.
-fn product(a: &[f32], b: &[f32]) -> f32 {
-    let mut sums = [0.0f32; 16];
-    let (a16, a_rest) = a.as_chunks::<16>();
-    let (b16, b_rest) = b.as_chunks::<16>();
-    for (a, b) in a16.iter().zip(b16) {
-        for k in 0..16 {
+/// Adds to each of `out` the product of its row, as long as `x`, and `x`.
+pub fn add_products<T: Number>(out: &mut [T], rows: &[T], x: &[T]) {
+    Arch::new().dispatch(AddProducts { out, rows, x });
+}
+
+/// Adds each row, as long as `out`, times its own of `weights` to `out`; what stands before the place `from` stays as it is.
+pub fn add_rows<T: Number>(out: &mut [T], rows: &[T], weights: &[T], from: usize) {
+    Arch::new().dispatch(AddRows { out, rows, weights, from });
+}
+
+/// What sums of products are made of.
+pub trait Number: Copy + Default + Mul<Output = Self> + AddAssign {}
+
+impl<T: Copy + Default + Mul<Output = Self> + AddAssign> Number for T {}
+
+struct AddProducts<'a, T> {
+    out: &'a mut [T],
+    rows: &'a [T],
+    x: &'a [T],
+}
+
+impl<T: Number> WithSimd for AddProducts<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (out, row) in self.out.iter_mut().zip(self.rows.chunks_exact(self.x.len().max(1))) {
+            *out += product(row, self.x);
+        }
+    }
+}
+
+struct AddRows<'a, T> {
+    out: &'a mut [T],
+    rows: &'a [T],
+    weights: &'a [T],
+    from: usize,
+}
+
+impl<T: Number> WithSimd for AddRows<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { out, rows, weights, from } = self;
+        for (row, &weight) in rows.chunks_exact(out.len().max(1)).zip(weights) {
+            for (out, of) in out[from..].iter_mut().zip(&row[from..]) {
+                *out += weight * *of;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn product<T: Number>(a: &[T], b: &[T]) -> T {
+    let (a_whole, a_rest) = a.as_chunks::<SUMS>();
+    let (b_whole, b_rest) = b.as_chunks::<SUMS>();
+    let mut sums = [T::default(); SUMS];
+    for (a, b) in a_whole.iter().zip(b_whole) {
+        for k in 0..SUMS {
             sums[k] += a[k] * b[k];
         }
     }
-    let rest: f32 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    rest + sums.iter().sum::<f32>()
+    let mut total = T::default();
+    for (a, b) in a_rest.iter().zip(b_rest) {
+        total += *a * *b;
+    }
+    for sum in sums {
+        total += sum;
+    }
+    total
 }
 
 #[cfg(test)]
@@ -28,10 +100,23 @@ mod tests {
         let inputs = 37;
         let x: Vec<f32> = (0..inputs).map(|k| (k as f32 * 0.7).sin()).collect();
         let weight: Vec<f32> = (0..3 * inputs).map(|k| (k as f32 * 0.3).cos()).collect();
-        let out = dense(&weight, inputs, &[1.0, -2.0, 0.5], &x);
+        let out = dense(&weight, &[1.0, -2.0, 0.5], &x);
         for (row, bias) in [1.0, -2.0, 0.5].into_iter().enumerate() {
             let plain: f64 = (0..inputs).map(|k| f64::from(weight[row * inputs + k]) * f64::from(x[k])).sum();
             assert!((f64::from(out[row]) - plain - bias).abs() < 1e-5, "{row}");
         }
+    }
+
+    #[test]
+    fn rows_are_added_from_a_place_on() {
+        let rows: Vec<f64> = (0..40).map(f64::from).collect();
+        let mut out = vec![1.0; 20];
+        add_rows(&mut out, &rows, &[2.0, -0.5], 3);
+        for (k, found) in out.into_iter().enumerate() {
+            let added = if k < 3 { 0.0 } else { 2.0 * rows[k] - 0.5 * rows[20 + k] };
+            assert!((found - 1.0 - added).abs() < 1e-12, "{k}: {found}");
+        }
+        add_rows::<f64>(&mut [], &rows, &[1.0], 0);
+        add_products(&mut [0.0], &rows, &[]);
     }
 }

@@ -93,7 +93,7 @@ pub struct DenseLayer {
 
 impl DenseLayer {
     fn apply(&self, x: &[f32]) -> Vec<f32> {
-        dense(&self.weight, self.inputs, &self.bias, x)
+        dense(&self.weight, &self.bias, x)
     }
 }
 

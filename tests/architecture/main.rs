@@ -25,7 +25,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("simulate", &["geometry", "config", "radar", "body"]),
     // The synthetic source is used by the training of the counter alone.
     ("people", &["geometry", "config", "radar", "simulate"]),
-    ("mhp", &["geometry", "config", "radar", "body"]),
+    ("mhp", &["dense", "geometry", "config", "radar", "body"]),
     // Diagnoses count people: two who stand close are a failure mode.
     ("diagnose", &["geometry", "config", "radar", "body", "mhp", "people", "labels"]),
     ("dataset", &["digest", "input", "task", "geometry", "folders", "output", "config", "radar", "body"]),

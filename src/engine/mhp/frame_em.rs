@@ -196,11 +196,7 @@ impl FrameEm {
             skin.fill(params, precision);
         }
         let seen = skin.as_ref().map_or(params, |skin| &skin.points);
-        if skin.is_some() {
-            gaussians.fill_round(seen, precision);
-        } else {
-            gaussians.fill(seen, precision);
-        }
+        gaussians.fill(seen, skin.is_some(), precision);
         bars.reset(gaussians.joints());
         let share = 1.0 / targets.len() as f64;
         // Stage by stage rather than view by view: each stage's instructions then stay at hand.
@@ -250,7 +246,7 @@ impl FrameEm {
         });
         let seen = skin.map_or(params, |skin| &skin.points);
         let config = &forward_config(config, skin.is_some());
-        gaussians.fill(seen, precision);
+        gaussians.fill(seen, skin.is_some(), precision);
         let losses = self.targets.iter().map(|target| {
             let model = ViewModel::new(radar, &target.cell_box.view, config);
             workspace.project(&model, (seen, &*gaussians), precision);

@@ -92,17 +92,9 @@ pub(super) struct WorldGaussians {
 }
 
 impl WorldGaussians {
-    /// Of every joint of `params`, over what was there.
-    pub(super) fn fill(&mut self, params: &Pppr, precision: Precision) {
-        self.fill_those(params, false, precision);
-    }
-
-    /// The same of points of skin, which are round: the way back has no adjoint of their rotations.
-    pub(super) fn fill_round(&mut self, points: &Pppr, precision: Precision) {
-        self.fill_those(points, true, precision);
-    }
-
-    fn fill_those(&mut self, params: &Pppr, round: bool, precision: Precision) {
+    /// Of every joint of `params`, over what was there. Where all are `round`, as points of skin are, nobody asks how they are turned:
+    /// the way back has no adjoint of rotations.
+    pub(super) fn fill(&mut self, params: &Pppr, round: bool, precision: Precision) {
         let joints = params.shape().total_joints();
         (self.joints, self.round) = (joints, round);
         for columns in [&mut self.position, &mut self.velocity, &mut self.strength, &mut self.scale] {

@@ -18,7 +18,7 @@ use super::levels::{LevelTotals, REGULARISER};
 use super::percentile::place;
 use super::splat::Splats;
 use crate::config::EmLoss;
-use point::{LOWERED, Reach, RowPoint};
+use point::{LOWERED, Reach, RowPoint, SLOPE_UNIT};
 use pulp::{Arch, Simd, WithSimd};
 use std::f32::consts::LN_2;
 use std::f64::consts::{LOG2_E, PI};
@@ -104,10 +104,10 @@ impl LevelRows {
         Some(Self { lo, size, stride, measured, by_noise, base, marked, erased })
     }
 
-    /// Nothing is in what of these whole rows lies beyond the region, or is erased.
+    /// Nothing is in what is erased, nor in what of these cells, whole rows, lies beyond the region.
     #[inline(always)]
-    fn blank(&self, cells: &mut [f32], rows: &Range<usize>) {
-        for row in cells[rows.clone()].chunks_exact_mut(self.stride.max(1)) {
+    fn blank(&self, cells: &mut [f32], lit: &Range<usize>) {
+        for row in cells[lit.clone()].chunks_exact_mut(self.stride.max(1)) {
             row[self.size[1]..].iter_mut().for_each(|cell| *cell = 0.0);
         }
         for &cell in &self.erased {
@@ -172,8 +172,9 @@ impl WithSimd for Evaluate<'_> {
         };
         let (iou, among) = query.tau_pct.map_or((None, true), |tau_pct| scratch.iou(rows, tau_pct));
         if let (Some(factor), false) = (query.factor, nobody) {
-            let by_sum = 1.0 / (sum + REGULARISER / unit);
-            scratch.weigh(simd, rows, [(2.0 * factor * gain * strongest) as f32, (through_gain * by_sum) as f32]);
+            let by_power = 1.0 / (gain * (sum * unit + REGULARISER));
+            let factor = 2.0 * factor * gain * strongest * SLOPE_UNIT;
+            scratch.weigh(simd, rows, [factor as f32, (through_gain * by_power) as f32]);
             let (returns, _) = S::as_simd_f32s(&scratch.returns);
             let (slopes, _) = S::as_simd_f32s(&scratch.slopes);
             for (joint, (point, reach)) in zip(&scratch.points, &scratch.reaches).enumerate() {
@@ -216,16 +217,16 @@ impl RowScratch {
         let Self { points, reaches, returns, ridge, lit, power, .. } = self;
         reaches.clear();
         let mut kept = 0;
-        let mut reached = (rows.size[0], 0);
+        let mut lit_rows = (rows.size[0], 0);
         for point in points.iter() {
             let reach = point.reach(rows, cut, kept);
             kept += reach.returns::<S>();
             if !reach.is_empty() {
-                reached = (reached.0.min(reach.rows.0), reached.1.max(reach.rows.1));
+                lit_rows = (lit_rows.0.min(reach.rows.0), lit_rows.1.max(reach.rows.1));
             }
             reaches.push(reach);
         }
-        *lit = reached.0.min(reached.1) * rows.stride..reached.1 * rows.stride;
+        *lit = lit_rows.0.min(lit_rows.1) * rows.stride..lit_rows.1 * rows.stride;
         if returns.len() < kept * S::F32_LANES {
             returns.resize(kept * S::F32_LANES, 0.0);
         }
@@ -251,7 +252,7 @@ impl RowScratch {
         total
     }
 
-    /// `ncc_db`, ∂L/∂(g S) of each cell into `slopes`, and Σ of its product with S.
+    /// `ncc_db`, ∂L/∂(g S) of each cell into `slopes`, and Σ of its product with g S.
     #[inline(always)]
     fn correlations<S: Simd>(&mut self, simd: S, (rows, totals): (&LevelRows, &LevelTotals), gain: f32) -> (f64, f64) {
         self.slopes.resize(self.power.len(), 0.0);
@@ -288,10 +289,10 @@ impl RowScratch {
             let (slopes, _) = S::as_mut_simd_f32s(&mut self.slopes[at..end]);
             let mut sum = splat(simd, 0.0);
             for k in 0..power.len() {
-                let (power, by_noise) = (Lanes::new(simd, power[k]), Lanes::new(simd, by_noise[k]));
+                let (power, by_noise) = (Lanes::new(simd, power[k]) * gain, Lanes::new(simd, by_noise[k]));
                 let level = Lanes::new(simd, base[k]) + Lanes::new(simd, slopes[k]) - mean;
                 let by_d = Lanes::new(simd, measured[k]).mul_add(by_measured, level * by_level);
-                let slope = by_d * by_noise / (power * gain).mul_add(by_noise, one);
+                let slope = by_d * by_noise / power.mul_add(by_noise, one);
                 slopes[k] = slope.value;
                 sum = slope.mul_add(power, sum);
             }
@@ -315,8 +316,8 @@ impl RowScratch {
             let (slopes, _) = S::as_mut_simd_f32s(&mut self.slopes[at..end]);
             let [mut sum, mut product_sum] = [splat(simd, 0.0); 2];
             for k in 0..power.len() {
-                let (power, by_noise) = (Lanes::new(simd, power[k]), Lanes::new(simd, by_noise[k]));
-                let (y, i) = (power * gain * by_noise, Lanes::new(simd, measured[k]));
+                let (power, by_noise) = (Lanes::new(simd, power[k]) * gain, Lanes::new(simd, by_noise[k]));
+                let (y, i) = (power * by_noise, Lanes::new(simd, measured[k]));
                 let m = one / (y + one);
                 let slope = by_noise * m * i.neg_mul_add(m, one) * by_count;
                 slopes[k] = slope.value;

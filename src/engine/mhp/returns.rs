@@ -82,7 +82,7 @@ impl JointReturns {
         let config = &forward_config(config, skin.is_some());
         let seen = skin.as_ref().map_or(params, |skin| &skin.points);
         let mut gaussians = WorldGaussians::default();
-        gaussians.fill(seen, Precision::F64);
+        gaussians.fill(seen, skin.is_some(), Precision::F64);
         let views = problem.views.iter().map(|view| {
             let mut splats = Splats::default();
             let (model, scratch) = (ViewModel::new(&problem.radar, view, config), &mut Splats::default());

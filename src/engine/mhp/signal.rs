@@ -87,7 +87,7 @@ pub fn simulate_signal(
     let config = &forward_config(config, skin.is_some());
     let params = skin.as_ref().map_or(params, |skin| &skin.points);
     let mut gaussians = WorldGaussians::default();
-    gaussians.fill(params, Precision::F64);
+    gaussians.fill(params, skin.is_some(), Precision::F64);
     let of_view = |(k, view): (usize, &View)| {
         let wrong = |reason: String| FitError::WrongView { array: view.array.clone(), reason };
         let unknown = "its FFT configuration is not known, only widths; expected [view.fft] in a manifest";

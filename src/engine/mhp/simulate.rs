@@ -24,7 +24,7 @@ pub fn simulate(problem: &Problem, config: &FitConfig, precision: Precision, par
     });
     let config = &forward_config(config, skin.is_some());
     let params = skin.as_ref().map_or(params, |skin| &skin.points);
-    gaussians.fill(params, precision);
+    gaussians.fill(params, skin.is_some(), precision);
     let (mut splats, mut scratch) = (Splats::default(), Splats::default());
     let of_view = |view: &View| {
         let region = Region::whole(view);

@@ -343,6 +343,7 @@ impl Skin {
                 let mut place = [0.0; 3];
                 of.shares.iter().for_each(|&(part, share)| add_scaled(&mut place, places[part], share));
                 let seen = of.seen(place, &places, &normal);
+                // Its amplitude at the start, until all are as bright as they look.
                 let mut look = Look { opacity: of.amplitude * seen.share.sqrt(), ..Look::default() };
                 let mut velocity = [0.0; 3];
                 for &(own, share) in &of.joints {
@@ -383,8 +384,8 @@ impl Skin {
             let normal = Normal::of(&places);
             let first = person * shape.joints;
             let (mut bars, mut normal_bar) = ([[0.0; 3]; PARTS], [0.0; 3]);
-            // Of ω̄ of the joints, where points have no more of it.
-            let mut means: SmallVec<[f64; 32]> = SmallVec::from_elem(0.0, shape.joints);
+            // Of ω̄ of each joint, where points have no more than that.
+            let mut mean_bars: SmallVec<[f64; 32]> = SmallVec::from_elem(0.0, shape.joints);
             for (k, of) in self.body.iter().enumerate() {
                 let joint = person * self.body.len() + k;
                 let (seen, Look { ln_alpha, ln_scale, opacity, .. }) = self.seen[joint];
@@ -405,7 +406,7 @@ impl Skin {
                 let omega_bar = self.gradient.joint(Group::Omega, joint);
                 let mean_bar = omega_bar.iter().sum::<f64>();
                 for &(own, share) in &of.joints {
-                    means[own] += share * mean_bar;
+                    mean_bars[own] += share * mean_bar;
                     let own = first + own;
                     gradient.joint_mut(Group::Beta, own)[0] += share * alpha_bar * (1.0 - self.looks[own].opacity);
                     gradient.joint_mut(Group::LogScale, own).iter_mut().for_each(|x| *x += share * scale_bar / 3.0);
@@ -418,7 +419,7 @@ impl Skin {
                 }
             }
             if features != shape.doppler_features {
-                for (own, mean) in means.iter().enumerate() {
+                for (own, mean) in mean_bars.iter().enumerate() {
                     let omega = gradient.joint_mut(Group::Omega, first + own);
                     let each = mean / omega.len().max(1) as f64;
                     for x in omega {

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! a number a row, and one a column that is multiplied by q from row to row: two products a cell instead of a power. Both numbers
-//! are lifted, so that where the point is faint, too, they stay above the smallest of single precision: denormal numbers cost a
+//! are lifted, so that where the point is faint, too, returns stay above the smallest of single precision: denormal numbers cost a
 //! hundred cycles. Of a point that leans so far that this does not hold each cell is a power by itself.
 #![expect(
     clippy::inline_always,
@@ -23,12 +23,15 @@ use std::ops::Range;
 
 /// log₂ of what a return is multiplied by: of its row's share, and of its column's.
 const LIFTS: [f64; 2] = [20.0, 85.0];
-/// log₂ of both, and one by both.
+/// log₂ of both: whole numbers.
 const LIFT: f64 = LIFTS[0] + LIFTS[1];
+/// What a sum of lifted returns is to be multiplied by.
 pub(super) const LOWERED: f64 = 1.0 / (1_u128 << LIFT as u32) as f64;
-/// 2 to less than this is no number for a column's share, or for a return.
+/// What slopes are multiplied by before they meet returns: their products stay below the largest of single precision.
+pub(super) const SLOPE_UNIT: f64 = 1.0 / (1_u32 << 30) as f64;
+/// log₂ of the least and the most that a column's share, what it is multiplied by and a return may be: normal numbers end at −126
+/// and 127.
 const LOWEST: f64 = -122.0;
-/// Nor is 2 to more than this for a column's share.
 const HIGHEST: f64 = 120.0;
 /// 2 to this and less is 0 where each cell is a power by itself, lifted.
 const FAINTEST: f32 = 41.0;
@@ -127,7 +130,8 @@ impl RowPoint {
         let lean = w1 * self.skew * self.skew / w0;
         let falls = w1 * half * (half + 2.0 * self.skew.abs() * (height / w0).sqrt());
         let faintest = self.top - height * (1.0 + lean) - falls;
-        let holds = LIFTS[1] + height * lean < HIGHEST && LIFTS[1] - falls > LOWEST && LIFT + faintest > LOWEST;
+        let share = LIFTS[1] + height * lean < HIGHEST && LIFTS[1] - falls > LOWEST;
+        let holds = share && 2.0 * w1 * self.skew.abs() * half < HIGHEST && LIFT + faintest > LOWEST;
         holds.then_some(half as f32)
     }
 
@@ -223,7 +227,7 @@ impl RowPoint {
             let x = columns[k];
             let by_row_log2 = x * splat(simd, -2.0 * w1 * skew);
             let log2 = (x * x).mul_add(splat(simd, -w1), by_row_log2.mul_add(splat(simd, first), lift));
-            // Beyond where the point reaches any number would do, as long as it is one.
+            // Beyond where the point reaches it returns nothing, whatever that is multiplied by.
             let beyond = x.abs();
             share[k] = beyond.select_gt(aside, zero, log2.exp2());
             by_row[k] = beyond.select_gt(aside, zero, by_row_log2).exp2_precise();
@@ -261,7 +265,7 @@ impl RowPoint {
         }
         let mut totals = [0.0; 6];
         for k in 0..6 {
-            totals[k] = f64::from(sums[k].reduce_sum()) * LOWERED;
+            totals[k] = f64::from(sums[k].reduce_sum()) * (LOWERED / SLOPE_UNIT);
         }
         let [r, rx, rxx, ry, rxy, ryy] = totals;
         Sums { r, q: 0.0, r_delta: [0.0, ry, rx], q_delta: [0.0; 3], r_delta_delta: [0.0, 0.0, ryy, 0.0, rxy, rxx] }
@@ -323,15 +327,15 @@ mod tests {
     use pulp::{Arch, WithSimd};
 
     /// What a point returns in each cell of a region, and what it collects of slopes there.
-    struct Once<'a>(&'a RowPoint, &'a LevelRows, &'a [f32]);
+    struct Once<'a>(&'a RowPoint, &'a LevelRows, &'a [f32], f64);
 
     impl WithSimd for Once<'_> {
         type Output = (bool, Vec<f32>, Sums);
 
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-            let Self(point, rows, slopes) = self;
-            let reach = point.reach(rows, -30.0, 0);
+            let Self(point, rows, slopes, cut) = self;
+            let reach = point.reach(rows, cut, 0);
             let mut returns = vec![0.0; reach.returns::<S>() * S::F32_LANES];
             let mut power = vec![0.0; rows.size[0] * rows.stride];
             let ((kept, _), (cells, _)) = (S::as_mut_simd_f32s(&mut returns), S::as_mut_simd_f32s(&mut power));
@@ -341,44 +345,56 @@ mod tests {
         }
     }
 
-    /// Upright and leaning points, in the middle of a region, at its edge and beyond it: products where they hold, and else powers, are
-    /// what the formula says, and so are the sums over them.
+    /// Compares returns and sums of a point with the formula, above this cut; whether they are products.
+    fn check(point: &RowPoint, cut: f64) -> bool {
+        let rows = LevelRows { lo: [100, 7], size: [40, 45], stride: 48, ..LevelRows::default() };
+        let slope = |k: usize| if k % 48 < 45 { (k * 7919 % 101) as f32 / 50.0 } else { 0.0 };
+        let slopes: Vec<f32> = (0..40 * 48).map(slope).collect();
+        let handed: Vec<f32> = slopes.iter().map(|slope| slope * SLOPE_UNIT as f32).collect();
+        let (products, power, sums) = Arch::new().dispatch(Once(point, &rows, &handed, cut));
+        let mut wanted = [0.0; 6];
+        for (row, column) in (0..40).flat_map(|row| (0..45).map(move |column| (row, column))) {
+            let (y, x) = ((100 + row) as f64 - point.bin[0], (7 + column) as f64 - point.bin[1]);
+            let log2 = point.top - point.weight[0] * y * y - point.weight[1] * (x + point.skew * y).powi(2);
+            let found = f64::from(power[row * 48 + column]) * LOWERED;
+            let off = (found - log2.exp2()).abs();
+            assert!(off < 3e-5 * log2.exp2() + 2.0 * cut.exp2(), "{point:?}: {found}, 2^{log2}");
+            let each = log2.exp2() * f64::from(slopes[row * 48 + column]);
+            for (sum, by) in wanted.iter_mut().zip([1.0, y, x, y * y, x * y, x * x]) {
+                *sum += each * by;
+            }
+        }
+        let Sums { r, r_delta: [_, y, x], r_delta_delta: [_, _, yy, _, xy, xx], .. } = sums;
+        for (found, wanted) in zip([r, y, x, yy, xy, xx], wanted) {
+            assert!(
+                (found - wanted).abs() < (2e-4 + 2e3 * cut.exp2()) * (1.0 + wanted.abs()),
+                "{point:?}: {found}, {wanted}"
+            );
+        }
+        products
+    }
+
+    /// Upright and leaning points, in the middle of a region, at its edge and beyond it.
     #[test]
     fn products_and_powers_are_what_the_formula_says() {
-        let rows = LevelRows { lo: [100, 7], size: [40, 45], stride: 48, ..LevelRows::default() };
-        let slopes: Vec<f32> =
-            (0..40 * 48).map(|k| if k % 48 < 45 { (k * 7919 % 101) as f32 / 50.0 } else { 0.0 }).collect();
         let mut ways = [0; 2];
-        for (skew, bin) in [0.0, 0.3, -0.5, 1.1, 4.0]
-            .into_iter()
-            .flat_map(|skew| [[118.3, 28.6], [101.2, 9.1], [96.0, 30.0], [139.4, 50.0]].map(|bin| (skew, bin)))
-        {
-            let point = RowPoint { bin, weight: [0.3, 0.9], skew, top: -2.0 };
-            let (products, power, sums) = Arch::new().dispatch(Once(&point, &rows, &slopes));
-            ways[usize::from(products)] += 1;
-            let mut wanted = [0.0; 6];
-            for (row, column) in (0..40).flat_map(|row| (0..45).map(move |column| (row, column))) {
-                let (y, x) = ((100 + row) as f64 - bin[0], (7 + column) as f64 - bin[1]);
-                let log2 = point.top - 0.3 * y * y - 0.9 * (x + skew * y).powi(2);
-                let found = f64::from(power[row * 48 + column]) * LOWERED;
-                assert!((found - log2.exp2()).abs() < 2e-5 * log2.exp2() + 2e-9, "{skew} {bin:?}: {found}, 2^{log2}");
-                let each = log2.exp2() * f64::from(slopes[row * 48 + column]);
-                for (sum, by) in wanted.iter_mut().zip([1.0, y, x, y * y, x * y, x * x]) {
-                    *sum += each * by;
-                }
-            }
-            let found = [
-                sums.r,
-                sums.r_delta[1],
-                sums.r_delta[2],
-                sums.r_delta_delta[2],
-                sums.r_delta_delta[4],
-                sums.r_delta_delta[5],
-            ];
-            for (found, wanted) in zip(found, wanted) {
-                assert!((found - wanted).abs() < 2e-4 * (1.0 + wanted.abs()), "{skew} {bin:?}: {found}, {wanted}");
+        for skew in [0.0, 0.3, -0.5, 1.1, 4.0] {
+            for bin in [[118.3, 28.6], [101.2, 9.1], [96.0, 30.0], [139.4, 50.0]] {
+                let point = RowPoint { bin, weight: [0.3, 0.9], skew, top: -2.0 };
+                ways[usize::from(check(&point, -30.0))] += 1;
             }
         }
         assert!(ways[0] >= 8 && ways[1] >= 8, "{ways:?}");
+    }
+
+    /// From one of its few rows to the next what such a point returns in a column changes by more than single precision holds.
+    #[test]
+    fn a_narrow_point_that_leans_far_is_no_product() {
+        for (weight, skew, height) in [([10.0, 1.0], 10.0, 3.0), ([2.0, 5.0], 5.0, 0.5), ([35.0, 0.5], 12.0, 14.0)] {
+            for bin in [[118.5, 28.6], [118.0, 28.0]] {
+                let point = RowPoint { bin, weight, skew, top: -2.0 };
+                assert!(!check(&point, -2.0 - height), "{point:?}");
+            }
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! The network: two towers of convolutions, one a plane, and dense layers over both.
 
 use super::glimpse::{ACROSS, CHANNELS, RANGES, Seen, UP};
-use crate::geometry::add_products;
+use crate::dense::dense;
 use ndarray::linalg::general_mat_mul;
 use ndarray::{ArrayView2, ArrayViewMut2};
 #[cfg(feature = "train")]
@@ -29,15 +29,6 @@ pub(super) const TOLD: usize = BODIES * (1 + JOINTS * OUT);
 struct Layer {
     weights: Vec<f32>,
     bias: Vec<f32>,
-}
-
-impl Layer {
-    /// What a dense one makes of `x`. Each weight is read once: a product of matrices would copy them all before.
-    fn of(&self, x: &[f32]) -> Vec<f32> {
-        let mut out = self.bias.clone();
-        add_products(&mut out, &self.weights, x);
-        out
-    }
 }
 
 /// Towers of convolutions of 3 × 3 cells, and dense layers, each with max(x, 0) behind it but the last.
@@ -119,7 +110,7 @@ impl Layers {
         x.extend(tower(&self.towers[1], &seen.vertical, UP));
         x.extend(seen.about);
         for (k, layer) in self.dense.iter().enumerate() {
-            x = layer.of(&x);
+            x = dense(&layer.weights, &layer.bias, &x);
             if k + 1 < self.dense.len() {
                 rectify(&mut x);
             }

@@ -169,7 +169,7 @@ impl PoseSpace {
         substitute(&equations.factor, &mut c[BODY..]);
     }
 
-    /// What [`Self::solve`] has in common whatever is asked of time `frame`.
+    /// What [`Self::solve`] needs of time `frame`, whatever joints are asked for.
     fn equations(&self, frame: usize) -> Equations {
         let n = self.components;
         let others: Vec<WalksOn> =
@@ -218,7 +218,7 @@ impl PoseSpace {
     }
 }
 
-/// The least squares for c at a frame, but for what is asked.
+/// The least squares for c at a frame: all but the right-hand side.
 #[derive(Debug, Clone)]
 pub(super) struct Equations {
     frame: usize,
@@ -230,7 +230,7 @@ pub(super) struct Equations {
 /// Equations for the middle of a body at another time, weighted.
 #[derive(Debug, Clone)]
 struct WalksOn {
-    /// How much later that is, s.
+    /// How much later that is, s, weighted as all here.
     later: f64,
     /// How far the middle is then in the mean, and in each component, sizes.
     mean: Vec3,
