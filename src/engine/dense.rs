@@ -19,19 +19,19 @@ pub fn dense(weight: &[f32], bias: &[f32], x: &[f32]) -> Vec<f32> {
 }
 
 /// Adds to each of `out` the product of its row, as long as `x`, and `x`.
-pub fn add_products<T: Number>(out: &mut [T], rows: &[T], x: &[T]) {
+pub fn add_products<T: Summand>(out: &mut [T], rows: &[T], x: &[T]) {
     Arch::new().dispatch(AddProducts { out, rows, x });
 }
 
 /// Adds each row, as long as `out`, times its own of `weights` to `out`; what stands before the place `from` stays as it is.
-pub fn add_rows<T: Number>(out: &mut [T], rows: &[T], weights: &[T], from: usize) {
+pub fn add_rows<T: Summand>(out: &mut [T], rows: &[T], weights: &[T], from: usize) {
     Arch::new().dispatch(AddRows { out, rows, weights, from });
 }
 
 /// What sums of products are made of.
-pub trait Number: Copy + Default + Mul<Output = Self> + AddAssign {}
+pub trait Summand: Copy + Default + Mul<Output = Self> + AddAssign {}
 
-impl<T: Copy + Default + Mul<Output = Self> + AddAssign> Number for T {}
+impl<T: Copy + Default + Mul<Output = Self> + AddAssign> Summand for T {}
 
 struct AddProducts<'a, T> {
     out: &'a mut [T],
@@ -39,7 +39,7 @@ struct AddProducts<'a, T> {
     x: &'a [T],
 }
 
-impl<T: Number> WithSimd for AddProducts<'_, T> {
+impl<T: Summand> WithSimd for AddProducts<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -57,7 +57,7 @@ struct AddRows<'a, T> {
     from: usize,
 }
 
-impl<T: Number> WithSimd for AddRows<'_, T> {
+impl<T: Summand> WithSimd for AddRows<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -72,7 +72,7 @@ impl<T: Number> WithSimd for AddRows<'_, T> {
 }
 
 #[inline(always)]
-fn product<T: Number>(a: &[T], b: &[T]) -> T {
+fn product<T: Summand>(a: &[T], b: &[T]) -> T {
     let (a_whole, a_rest) = a.as_chunks::<SUMS>();
     let (b_whole, b_rest) = b.as_chunks::<SUMS>();
     let mut sums = [T::default(); SUMS];
