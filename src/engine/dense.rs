@@ -11,19 +11,19 @@ use std::ops::{AddAssign, Mul};
 /// Sums side by side: registers hold as many while others are loaded.
 const SUMS: usize = 16;
 
-/// bias + W x, W row by row: a row of as many weights as `x` has for each of `bias`.
+/// bias + W x: `weight` (outputs, inputs) in C order, `bias` (outputs), `x` (inputs), of one unit; returns (outputs).
 pub fn dense(weight: &[f32], bias: &[f32], x: &[f32]) -> Vec<f32> {
     let mut out = bias.to_vec();
     add_products(&mut out, weight, x);
     out
 }
 
-/// Adds to each of `out` the product of its row, as long as `x`, and `x`.
+/// Adds A x to `out` (rows): `rows` is A, (rows, columns) in C order, `x` (columns).
 pub fn add_products<T: Summand>(out: &mut [T], rows: &[T], x: &[T]) {
     Arch::new().dispatch(AddProducts { out, rows, x });
 }
 
-/// Adds each row, as long as `out`, times its own of `weights` to `out`; what stands before the place `from` stays as it is.
+/// Adds Aᵀ w to `out` (columns): `rows` is A, (rows, columns) in C order, `weights` w (rows). The columns before `from` stay as they are.
 pub fn add_rows<T: Summand>(out: &mut [T], rows: &[T], weights: &[T], from: usize) {
     Arch::new().dispatch(AddRows { out, rows, weights, from });
 }

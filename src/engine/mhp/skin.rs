@@ -17,16 +17,13 @@
 //! nothing. Velocities and Doppler features are those between the joints. The line of sight is that of the radar, the mean of the
 //! views' places.
 
-#![expect(
-    clippy::inline_always,
-    reason = "all of it belongs into the function that is compiled for an instruction set"
-)]
+mod look;
 
 use super::Precision;
-use super::batch::{Batch, JointTask, each_joint};
-use super::gaussian::{self, opacity_and_ln};
+use super::batch::each_joint;
 use crate::body::{Group, HEAD, PARTS, Parts, Pppr, PpprShape, Skeleton, scatterer};
-use crate::geometry::{Numeric, Vec3, add, add_scaled, cross, dot, norm, scale, sub};
+use crate::geometry::{Vec3, add, add_scaled, cross, dot, norm, scale, sub};
+use look::{Brighten, TakeIn};
 use smallvec::SmallVec;
 
 /// Limbs by their parts: upper arms, forearms, thighs, shanks, left and right; radius and length, m.
@@ -449,47 +446,6 @@ impl Skin {
         self.looks.clear();
         self.looks.resize(joints, Look::default());
         each_joint(precision, joints, &mut TakeIn { params, plain: &self.plain, looks: &mut self.looks });
-    }
-}
-
-/// How each joint looks.
-struct TakeIn<'a> {
-    params: &'a Pppr,
-    plain: &'a [[f64; 2]],
-    looks: &'a mut [Look],
-}
-
-impl JointTask for TakeIn<'_> {
-    #[inline(always)]
-    fn run<B: Batch>(&mut self, batch: B) {
-        let Self { params, plain, looks } = self;
-        let beta = batch.gather(|joint| params.group(Group::Beta)[joint]);
-        let [opacity, ln_opacity] = opacity_and_ln(beta);
-        batch.scatter(opacity, |joint, x| looks[joint].opacity = x);
-        batch.scatter(ln_opacity, |joint, x| {
-            let [ln_alpha, ln_scale] = plain[joint % plain.len()];
-            let scales = params.vec3(Group::LogScale, joint);
-            looks[joint].ln_alpha = x - ln_alpha;
-            looks[joint].ln_scale = scales.iter().sum::<f64>() / 3.0 - ln_scale;
-            looks[joint].omega_mean = gaussian::mean(params.joint(Group::Omega, joint));
-        });
-    }
-}
-
-/// From the amplitude that a point has at the start, as its opacity, to how opaque it is.
-struct Brighten<'a> {
-    seen: &'a mut [(Seen, Look)],
-    beta: &'a mut [f64],
-}
-
-impl JointTask for Brighten<'_> {
-    #[inline(always)]
-    fn run<B: Batch>(&mut self, batch: B) {
-        let Self { seen, beta } = self;
-        let ln_alpha = batch.gather(|point| seen[point].1.ln_alpha).max(LEAST_LN_ALPHA).min(MOST_LN);
-        let opacity = (batch.gather(|point| seen[point].1.opacity) * ln_alpha.exp()).min(MOST_ALPHA);
-        batch.scatter(opacity, |point, x| seen[point].1.opacity = x);
-        batch.scatter((opacity / (-opacity + 1.0)).ln(), |point, x| beta[point] = x);
     }
 }
 
