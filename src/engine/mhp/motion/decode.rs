@@ -15,7 +15,8 @@
 //! headings, and `apart` the mean distance between the joints of two hypotheses, each moved as its velocities say to the middle of the
 //! time between them. The cheapest paths come from dynamic programming (Viterbi 1967) from both ends to the frame that is fitted. Before
 //! that the bodies on such a path are carried on into the frames beside ([`carried`], `search::carry_on`): what one search missed
-//! another found.
+//! another found. What a network expects is among the bodies of each frame, as it says it: where none explains the maps, a search
+//! ends anywhere, and a path that had to go through there would turn about.
 //!
 //! Where no body explains the maps of such a path, those that a network expects are decoded likewise, with losses that say how
 //! unlikely it calls them.

@@ -3,7 +3,8 @@
 //! Clusters stand, walk and sit; of one person alone bodies that lie and, where it moves, fall are tried beside them (`tilt.rs`).
 //! The more promising starts are moved a little with their poses held, by few points of skin; the few with the lowest loss are fitted
 //! with it, and in the end with the bodies that a network expects, by the bend of the loss ([`lbfgs`]). What wins is the start; the
-//! runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error.
+//! runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error. So is
+//! what the network expects, as it says it.
 
 use super::decode::lowest;
 use super::{
@@ -22,9 +23,9 @@ use std::ops::Range;
 
 /// The sieves that starts go through, coarse then fine.
 const SIEVES: [Sieve; 3] = [
-    Sieve { moved: 0.3, steps: 4, every: 4, coarse: true, held: true, kept: 5 },
-    Sieve { moved: 1.0, steps: 7, every: 2, coarse: false, held: false, kept: 4 },
-    Sieve { moved: 1.0, steps: 7, every: 1, coarse: false, held: false, kept: 3 },
+    Sieve { moved: 0.3, steps: 4, every: 4, coarse: true, way: Way::Held, kept: 5 },
+    Sieve { moved: 1.0, steps: 7, every: 2, coarse: false, way: Way::Free, kept: 4 },
+    Sieve { moved: 1.0, steps: 7, every: 2, coarse: false, way: Way::Bent, kept: 3 },
 ];
 /// Evaluations of what is left, and of each body that is carried on from another frame.
 const FINE: usize = 9;
@@ -35,7 +36,7 @@ const MOST_WORK: f64 = 2e10;
 const PLAIN: f64 = 10.0;
 /// Evaluations of a person's search beside those of the first sieve, with those of what is carried on and of what the network
 /// expects, and those of a start in it, in whole windows.
-const LATER: f64 = 198.0;
+const LATER: f64 = 176.0;
 const FIRST: f64 = 3.0 / 4.0;
 /// w_EM and w_prior of a search, whatever those of the fit are: settings that weigh terms share their start, but for what a network
 /// expects, whose weight says whether it is asked.
@@ -68,9 +69,19 @@ struct Sieve {
     every: usize,
     /// Whether the body has few points of skin.
     coarse: bool,
-    /// Whether poses are held, so that place, heading and size alone move.
-    held: bool,
+    way: Way,
     kept: usize,
+}
+
+/// How a sieve moves starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    /// By steps of Adam, with poses held, so that place, heading and size alone move.
+    Held,
+    /// By steps of Adam.
+    Free,
+    /// By the bend of the loss.
+    Bent,
 }
 
 /// A body that a search ended at, in the frame that is fitted.
@@ -105,7 +116,7 @@ pub(in crate::mhp) struct Hypothesis {
 pub(in crate::mhp) struct Searched {
     /// The start's own loss.
     pub(in crate::mhp) begun: f64,
-    /// What the search ended at, a list a person, the lowest loss first; none is empty.
+    /// What the search ended at, and what a network expects as it says it, a list a person, the lowest loss first; none is empty.
     pub(in crate::mhp) persons: Vec<Vec<Hypothesis>>,
     /// The bodies that a network expects each person to be, as it says them; of nobody where it is not asked.
     pub(in crate::mhp) expected: Vec<Vec<Hypothesis>>,
@@ -311,10 +322,9 @@ impl<'a> Search<'a> {
         for tried in &mut *all {
             // What was seen of fewer frames is no measure any more.
             tried.loss = f64::INFINITY;
-            if sieve.every == 1 {
-                self.settle(tried, sieve.steps);
-            } else {
-                self.descend(tried, sieve.steps, sieve.held);
+            match sieve.way {
+                Way::Bent => self.settle(tried, sieve.steps),
+                way => self.descend(tried, sieve.steps, way == Way::Held),
             }
         }
         all.sort_by(|a, b| a.loss.total_cmp(&b.loss));
@@ -397,14 +407,16 @@ pub(in crate::mhp) fn search(
         }
         let of_network = search.expected(&coordinates, person);
         expected.push(search.said(&of_network, person));
-        let [coarse @ .., whole] = &SIEVES;
+        let [coarse @ .., last] = &SIEVES;
         for sieve in coarse {
             search.sift(&mut all, sieve, &own);
         }
         // What the network expects needs no way there.
-        all.extend(of_network.into_iter().map(|(_, tried)| tried));
-        search.sift(&mut all, whole, &own);
+        all.extend(of_network.iter().map(|(_, tried)| tried.clone()));
+        search.sift(&mut all, last, &own);
+        search.look(1, false);
         for tried in &mut all {
+            tried.loss = f64::INFINITY;
             search.settle(tried, FINE);
         }
         // A stride with the other leg in front looks much the same from afar, and so does a back.
@@ -433,7 +445,14 @@ pub(in crate::mhp) fn search(
         if let Some(best) = all.first() {
             coordinates.clone_from(&best.state.coordinates);
         }
-        persons.push(all.iter().map(|tried| search.hypothesis(tried, person)).collect());
+        let mut ends: Vec<Hypothesis> = all.iter().map(|tried| search.hypothesis(tried, person)).collect();
+        // Of maps that no body explains the search ends anywhere; a path can go through what the network expects there.
+        for (_, mut tried) in of_network {
+            search.settle(&mut tried, 0);
+            ends.push(search.hypothesis(&tried, person));
+        }
+        sort_by_loss(&mut ends);
+        persons.push(ends);
     }
     search.look(1, false);
     search.evaluate(&coordinates);
@@ -482,8 +501,13 @@ pub(in crate::mhp) fn carry_on(
         search.settle(&mut tried, FINE);
         found.push(search.hypothesis(&tried, 0));
     }
-    found.sort_by(|a, b| (a.loss + a.network).total_cmp(&(b.loss + b.network)));
+    sort_by_loss(found);
     Ok(())
+}
+
+/// The lowest loss of the search first, the network's share with it.
+fn sort_by_loss(found: &mut [Hypothesis]) {
+    found.sort_by(|a, b| (a.loss + a.network).total_cmp(&(b.loss + b.network)));
 }
 
 /// The settings, with a search's weights.
