@@ -206,6 +206,7 @@ impl Tokens {
             Hue::Rose => self.pick(0xF2B0D5, 0xB4608A),
             Hue::Teal => self.pick(0x6BCACA, 0x208182),
             Hue::Orchid => self.pick(0xC46BC4, 0x861A86),
+            Hue::Slate => self.pick(0xAEB6C6, 0x4C566B),
         }
     }
 }

@@ -50,7 +50,7 @@ Examples:
   mhp-inspector fit data/walk --frames 3 --erase reflector.json
       As if nothing had been measured in those cells.
   mhp-inspector fit data/walk --init retr.npz --out refined
-      Each frame begins at what a network predicted of it.
+      Each frame begins at what a network predicted of it, and keeps to it as w_given says.
   mhp-inspector fit data/d1s1 --shard 2/8 --out shards/2
       The second of eight parts, for as many machines; `mhp-inspector merge shards/* --out results` makes the whole.";
 

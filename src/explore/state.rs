@@ -42,7 +42,7 @@ impl ExploredState {
         without(&self.problem, &self.erased).map_err(Halt::failed)
     }
 
-    /// The loss of `seen`, with the EM region of the fit.
+    /// The loss of `seen`, with the EM region of the fit. What maps say is explored: joints that were given hold nothing here.
     pub(super) fn objective(&self, seen: &Arc<Problem>) -> Result<Objective, Halt> {
         Objective::new(Arc::clone(seen), self.config, self.precision, &self.initial).map_err(Halt::failed)
     }

@@ -2,12 +2,11 @@
 //! turned and moved onto the ones that it has.
 
 use super::source::{PredictedFrame, Predictions};
-use crate::body::Pppr;
 use crate::config::FitConfig;
 use crate::dataset::Dataset;
 use crate::diagnose::Similarity;
 use crate::geometry::{Vec3, mean, norm, scale, sub};
-use crate::mhp::{Problem, standing_joints, start_at};
+use crate::mhp::{GivenStart, Problem, standing_joints, start_at};
 
 /// Frames a second where a data set does not say.
 const USUAL_RATE_HZ: f64 = 10.0;
@@ -42,7 +41,7 @@ fn nearest<'a>(person: &'a [Vec3], others: &'a [Vec3]) -> &'a [Vec3] {
     near.filter(|other| apart(other) < MOST_APART_M).unwrap_or(person)
 }
 
-/// The parameters at which a fit of frame `index` begins: the predicted joints with the Gaussians of a start; velocities by the frames
+/// What a fit of frame `index` begins at: the predicted joints with the Gaussians of a start; velocities by the frames
 /// of the source before and after, where they show as many people. `None` where the source shows nobody there.
 pub fn start_of(
     source: &Predictions,
@@ -50,7 +49,7 @@ pub fn start_of(
     index: usize,
     problem: &Problem,
     config: &FitConfig,
-) -> Option<Pppr> {
+) -> Option<GivenStart> {
     let frame = source.frame(index).filter(|frame| frame.persons > 0)?;
     let joints = complete_bodies(source, frame, problem);
     let rate_hz = dataset.info().frame_rate_hz.filter(|rate| *rate > 0.0).unwrap_or(USUAL_RATE_HZ);
@@ -71,5 +70,8 @@ pub fn start_of(
         let moved = |(a, b): (&Vec3, &Vec3)| if span_s > 0.0 { scale(sub(*b, *a), 1.0 / span_s) } else { [0.0; 3] };
         velocities.extend(a.iter().zip(b).map(moved));
     }
-    Some(start_at(problem, config, &joints, &velocities))
+    let params = start_at(problem, config, &joints, &velocities);
+    let is_known = |joint: usize| source.map.known.contains(&(joint % of_person));
+    let given = params.positions().iter().enumerate().map(|(joint, &at)| is_known(joint).then_some(at)).collect();
+    Some(GivenStart { params, given })
 }

@@ -12,7 +12,7 @@ use crate::config::FitConfig;
 use crate::dataset::{Dataset, Truth, write_pppr};
 use crate::diagnose::{JointErrors, joint_errors};
 use crate::geometry::{Vec3, mean};
-use crate::mhp::{ErasedCells, Fitter, Precision, StepReport, predict, without};
+use crate::mhp::{ErasedCells, FitState, Fitter, GivenStart, Precision, StepReport, predict, without};
 use crate::output::{FileNames, Inputs};
 use crate::people::Tracker;
 use crate::predictions::{Predictions, start_of};
@@ -78,20 +78,22 @@ fn fit_watched(
         let found = start_of(source, dataset, index, &problem, &options.config);
         found.ok_or_else(|| format!("{}: nothing is predicted of {}", source.path.display(), dataset.frame_name(index)))
     };
-    let (initial, init_ms) = if let Some(source) = &options.init {
-        (predicted(source)?, None)
+    let (initial, given, init_ms) = if let Some(source) = &options.init {
+        let GivenStart { params, given } = predicted(source)?;
+        (params, given, None)
     } else if let Some(params) = start {
-        (predict(&problem, &options.config, &params), None)
+        (predict(&problem, &options.config, &params), Vec::new(), None)
     } else {
         let found = find_start_along(dataset, index, &problem, &options.config)
             .map_err(|error| in_file(&error))?
             .initialisation;
-        (found.params, Some(milliseconds(began)))
+        (found.params, Vec::new(), Some(milliseconds(began)))
     };
     let began = Instant::now();
     let seen = without(&problem, &options.erased).map_err(|error| in_file(&error))?;
+    let state = FitState::given(initial.clone(), given);
     let mut fitter =
-        Fitter::new(seen, options.config, options.precision, initial.clone()).map_err(|error| in_file(&error))?;
+        Fitter::starting_at(seen, options.config, options.precision, state).map_err(|error| in_file(&error))?;
     let errors = |params: &Pppr| errors(params, frame.truth.as_ref()?, info.skeleton.joints.len());
     let (mut breaks, mut broke, mut first) = (Watch::new(options.breakpoints.clone()), None, true);
     let unwatched = watch.is_none() && options.breakpoints.is_empty();

@@ -5,7 +5,7 @@ use crate::condition::Breakpoint;
 use crate::config::FitConfig;
 use crate::dataset::{Dataset, Frame};
 use crate::geometry::Vec3;
-use crate::mhp::{ErasedCells, Evaluation, FitState, Masks, Precision, Problem, StepReport, StopReason};
+use crate::mhp::{ErasedCells, Evaluation, FitState, GivenStart, Masks, Precision, Problem, StepReport, StopReason};
 use crate::start::FoundStart;
 use std::sync::Arc;
 
@@ -21,8 +21,8 @@ pub enum Start {
     Along,
     /// From these parameters (the previous frame's).
     Warm(Pppr),
-    /// From these parameters, which are of this frame: what somebody predicts of it.
-    Given(Pppr),
+    /// From these parameters, which are of this frame: what somebody predicts of it. The fit is held to the joints that are given.
+    Given(GivenStart),
     /// From a state of an earlier session with the same frame; `initial` fixes the EM region.
     Resume {
         /// The initial pose of that fit.

@@ -340,6 +340,7 @@ impl Job {
         let Prepare { job, branch, dataset, frame, config, precision, start, erased, around } = prepare;
         let problem = Arc::new(problem_of(&dataset, &frame)?);
         let began = Instant::now();
+        let mut given = Vec::new();
         let (mut found_start, initial, state) = match start {
             Start::Initialise | Start::Along => {
                 let find = if matches!(start, Start::Along) { find_start_along } else { find_start_in };
@@ -348,13 +349,17 @@ impl Job {
                 (Some(found), initial, None)
             }
             Start::Warm(params) => (None, predict(&problem, &config, &params), None),
-            Start::Given(params) => (None, params, None),
+            Start::Given(start) => {
+                given = start.given;
+                (None, start.params, None)
+            }
             Start::Resume { initial, state } => (None, initial, Some(state)),
         };
         let init_ms = milliseconds(began);
         let seen = without(&problem, &erased)?;
         let region = around.as_deref().unwrap_or(&initial);
-        let mut fitter = Fitter::new(Arc::clone(&seen), config, precision, region.clone())?;
+        let state_there = FitState::given(region.clone(), given);
+        let mut fitter = Fitter::starting_at(Arc::clone(&seen), config, precision, state_there)?;
         if let Some(found) = found_start.as_mut().filter(|_| fitter.is_held()) {
             found.initialisation.tell_held();
         }
@@ -617,6 +622,7 @@ impl Job {
 
     fn inspect(&mut self, branch: u32, state: &FitState, config: &FitConfig) -> Snapshot {
         self.viewer.set_config(*config);
+        self.viewer.hold_to(&state.given);
         let evaluation = self.viewer.evaluate(&state.params);
         let h_sim = simulate(&self.problem, config, Precision::F32, &state.params);
         let masks = (0..h_sim.len()).map(|view| masks(&self.viewer, view, &h_sim[view])).collect();

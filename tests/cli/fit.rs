@@ -36,7 +36,7 @@ psf = { range_m = 0.06, azimuth_rad = 0.0, elevation_rad = 0.03, doppler_mps = 0
 axes = [ { kind = "depth_v", bins = 64, lo = 5.0, hi = 1.0 }, { kind = "z", bins = 48, lo = -1.5, hi = 1.5 } ]
 "#;
 
-const COLUMNS: &str = "frame,iterations,converged,reason,people,annotated,loss,em,bone,rigid,joint,sep,coll,time,prior,net,iou_hm_hori,iou_hm_vert,\
+const COLUMNS: &str = "frame,iterations,converged,reason,people,annotated,loss,em,bone,rigid,joint,sep,coll,time,prior,net,given,iou_hm_hori,iou_hm_vert,\
                        majpe_mm,pa_majpe_mm,init_ms,fit_ms";
 
 /// A standing body in front of the radar, coco17, by (forward, to the left, up) of each joint.

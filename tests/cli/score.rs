@@ -64,11 +64,11 @@ fn writes_what_the_reference_holds() {
         assert!(worst(&folder, &out, &SCALARS) < limit * 0.1, "{precision} losses");
 
         let json: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
-        for key in SCALARS.into_iter().chain(["time", "prior", "net", "iou_rd", "iou_ra"]) {
+        for key in SCALARS.into_iter().chain(["time", "prior", "net", "given", "iou_rd", "iou_ra"]) {
             let (printed, written) = (json[key].as_f64().unwrap(), read(&out, key)[0]);
             assert!((printed - written).abs() <= 1e-15 * written.abs(), "{key}: {printed}, {written}");
         }
-        assert_eq!(json.as_object().unwrap().len(), 12);
+        assert_eq!(json.as_object().unwrap().len(), 13);
     }
 }
 

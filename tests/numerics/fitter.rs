@@ -5,7 +5,8 @@ use crate::cases::Case;
 use crate::reading::case_folders;
 use mhp_inspector::body::Group;
 use mhp_inspector::config::{EmRegion, FitConfig};
-use mhp_inspector::mhp::{FitError, Fitter, Objective, Precision, Problem, Region, TermId, masks, simulate};
+use mhp_inspector::geometry::{norm, sub};
+use mhp_inspector::mhp::{FitError, FitState, Fitter, Objective, Precision, Problem, Region, TermId, masks, simulate};
 use mhp_inspector::radar::View;
 use std::sync::Arc;
 
@@ -116,6 +117,49 @@ fn edited_parameters_start_new_moments() {
     assert_eq!((fitter.iteration(), fitter.params()), (1, &edited));
     assert_eq!(fitter.state().adam.steps, 0);
     assert!(fitter.state().adam.first.group(Group::Position).iter().all(|&m| m == 0.0));
+}
+
+#[test]
+fn joints_that_were_given_are_held_there_and_what_the_program_found_is_not() {
+    let begun = |given: bool, w_given: f64| {
+        let Case { problem, config, params } = case("polar-two-views");
+        let there = if given { params.positions().iter().copied().map(Some).collect() } else { Vec::new() };
+        let (config, state) = (FitConfig { w_given, ..config }, FitState::given(params, there));
+        Fitter::starting_at(Arc::new(problem), config, Precision::F64, state).unwrap()
+    };
+    let given = TermId::of("given").unwrap();
+    let went_m = |fitter: &mut Fitter| {
+        let before = fitter.params().positions().to_vec();
+        (0..40).for_each(|_| drop(fitter.step().unwrap()));
+        before.iter().zip(fitter.params().positions()).map(|(a, b)| norm(sub(*a, *b))).sum::<f64>()
+    };
+    let (mut free, mut unweighed, mut held) = (begun(false, 10.0), begun(true, 0.0), begun(true, 10.0));
+    assert_eq!(
+        (held.report().terms[given], held.report().loss),
+        (0.0, free.report().loss),
+        "it begins where it was given"
+    );
+    let [free_m, unweighed_m, held_m] = [&mut free, &mut unweighed, &mut held].map(went_m);
+    assert_eq!((free.report().terms[given], unweighed_m), (0.0, free_m));
+    assert!(held.report().terms[given] > 0.0 && held_m < 0.5 * free_m, "{held_m} m, {free_m} m without");
+
+    // Kept with the state: as a session keeps it, the fit goes on bit for bit.
+    let kept = serde_json::to_string(&*held.state()).unwrap();
+    held.step().unwrap();
+    let mut again = begun(false, 10.0);
+    again.restore(Arc::new(serde_json::from_str(&kept).unwrap())).unwrap();
+    again.step().unwrap();
+    assert_eq!(again.state(), held.state());
+
+    // Whom a hand moves is given; how bright somebody is says nothing of it.
+    let mut edited = free.params().clone();
+    edited.group_mut(Group::Beta)[0] += 0.1;
+    free.set_params(edited.clone()).unwrap();
+    assert!(free.state().given.iter().all(Option::is_none));
+    edited.group_mut(Group::Position)[3] += 0.1;
+    free.set_params(edited.clone()).unwrap();
+    let there: Vec<_> = edited.positions().iter().copied().map(Some).collect();
+    assert_eq!(free.state().given, there);
 }
 
 #[test]

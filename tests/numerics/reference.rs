@@ -46,11 +46,11 @@ fn check_case(folder: &Path, precision: Precision, tolerance: &Tolerance) {
         close(&format!("{name}: sim_{array}"), map, &want(&format!("sim_{array}")), tolerance.map, 0.0);
         check_iou(&name, &objective, view, map, &evaluation, want(&format!("iou_{array}"))[0], tolerance);
     }
-    // The cases know no frames around, and their weights of L_time and L_prior are 0.
+    // The cases know no frames around, and their weights of L_time, L_prior, L_net and L_given are 0.
     let terms = evaluation
         .terms
         .iter()
-        .filter(|(term, _)| !["time", "prior", "net"].contains(&term.key))
+        .filter(|(term, _)| !["time", "prior", "net", "given"].contains(&term.key))
         .map(|(term, value)| (term.key, value));
     for (key, got) in terms.chain([("loss", evaluation.loss)]) {
         close(&format!("{name}: {key}"), &[got], &want(key), tolerance.loss.0, tolerance.loss.1);

@@ -96,7 +96,8 @@ impl Bench {
         let problem = Arc::new(problem_alone(&dataset, &frame).unwrap());
         let (initial, resumed) = match start {
             Start::Initialise | Start::Along => (self.params.clone(), false),
-            Start::Warm(params) | Start::Given(params) => (params, false),
+            Start::Warm(params) => (params, false),
+            Start::Given(start) => (start.params, false),
             Start::Resume { initial, .. } => (initial, true),
         };
         if !resumed {
@@ -117,6 +118,7 @@ impl Bench {
             params,
             adam,
             motion: mhp_inspector::mhp::MotionState::default(),
+            given: Vec::new(),
             losses: vec![loss(iteration)].into(),
         })
     }

@@ -145,7 +145,7 @@ fn curves_read_back_exactly() {
     ];
     let table = curves_csv(&arrays, rows).unwrap();
     let mut reader = csv::Reader::from_reader(table.as_slice());
-    let terms = ["em", "bone", "rigid", "joint", "sep", "coll", "time", "prior", "net"];
+    let terms = ["em", "bone", "rigid", "joint", "sep", "coll", "time", "prior", "net", "given"];
     let last = ["iou_hori", "iou_a, \"b\"", "majpe_mm", "converged", "flag"];
     let head: Vec<&str> = ["iteration", "branch", "loss"].into_iter().chain(terms).chain(last).collect();
     assert_eq!(reader.headers().unwrap().iter().collect::<Vec<_>>(), head);
@@ -153,9 +153,9 @@ fn curves_read_back_exactly() {
     assert_eq!(read.len(), 2);
     assert_eq!(read[0][2].parse(), Ok(1.0 / 3.0));
     assert_eq!([3, 4, 9].map(|k| read[0][k].parse()), [Ok(0.1 + 0.2), Ok(1e-17), Ok(6.0)]);
-    assert_eq!(read[0].iter().skip(12).collect::<Vec<_>>(), ["0.25", "", "", "false", ""]);
+    assert_eq!(read[0].iter().skip(13).collect::<Vec<_>>(), ["0.25", "", "", "false", ""]);
     assert_eq!((&read[1][0], &read[1][1], &read[1][2]), ("1", "2", ""), "what is not finite is empty");
-    assert_eq!(read[1].iter().skip(12).collect::<Vec<_>>(), ["0.5", "1", "81.5", "true", "τ 10 → 5 %, \"w_em\"\n0.7"]);
+    assert_eq!(read[1].iter().skip(13).collect::<Vec<_>>(), ["0.5", "1", "81.5", "true", "τ 10 → 5 %, \"w_em\"\n0.7"]);
     let empty = curves_csv(&arrays, []).unwrap();
     assert_eq!(String::from_utf8(empty).unwrap().lines().count(), 1, "a head and nothing else");
 }

@@ -536,7 +536,11 @@ mod tests {
         let shown: Vec<(&str, f64)> = shown_terms(&terms).map(|(term, value)| (term.label, value)).collect();
         assert!(shown.contains(&("L_dummy", 0.7)) && shown.contains(&("L_joint", 0.0)), "{shown:?}");
         assert!(shown.iter().all(|(label, _)| !["L_sep", "L_coll"].contains(label)), "{shown:?}");
-        assert!(formula().ends_with(" + w_prior·L_prior + w_net·L_net + w_dummy·L_dummy"), "{}", formula());
+        assert!(
+            formula().ends_with(" + w_prior·L_prior + w_net·L_net + w_given·L_given + w_dummy·L_dummy"),
+            "{}",
+            formula()
+        );
         let said: Vec<String> = TERMS.iter().map(crate::mhp::Term::tooltip).collect();
         assert!(
             said.contains(&"L_dummy = ½ Σ ‖p‖², m². How far the joints are from the radar.".to_owned()),

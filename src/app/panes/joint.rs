@@ -7,7 +7,7 @@ use crate::app::theme::{self, Tokens};
 use crate::app::widgets::{Mark, Named as _};
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
-use crate::mhp::{Scope, TermGroup, Weight};
+use crate::mhp::{Scope, TermGroup, TermId, Terms, Weight};
 use crate::session::{Command, Session};
 use egui::{Key, RichText, Ui};
 
@@ -81,7 +81,7 @@ fn show(ui: &mut Ui, shared: &mut Shared<'_>, state: &mut State) {
     }
     let Some((.., edited)) = &mut state.edit else { return };
     let evaluation = &snapshot.evaluation;
-    let parts = parts(&snapshot.config);
+    let parts = parts(&snapshot.config, &evaluation.terms);
     let tokens = Tokens::of(ui);
     let editable = session.fit.is_ready() && !session.fit.is_running();
     let mut committed = false;
@@ -143,11 +143,16 @@ struct Part {
     words: String,
 }
 
-/// The parts that a gradient under these settings has: the temporal one only where something of it is weighed.
-fn parts(config: &FitConfig) -> Vec<Part> {
+/// The parts that a gradient under these settings has, of terms with these values: the temporal one only where something of it is
+/// weighed.
+fn parts(config: &FitConfig, values: &Terms) -> Vec<Part> {
+    let is_there = |term: TermId| match term.scope {
+        Scope::Always | Scope::People => true,
+        Scope::Weighed => term.weight.of(config) > 0.0,
+        Scope::Given => values[term] > 0.0,
+    };
     let of_group = |group: TermGroup| {
-        let weights: Vec<Weight> =
-            group.weights().filter(|w| w.terms().any(|t| t.scope != Scope::Weighed) || w.of(config) > 0.0).collect();
+        let weights: Vec<Weight> = group.weights().filter(|weight| weight.terms().any(is_there)).collect();
         let labels: Vec<String> = weights.iter().map(|w| format!("{}·{}", w.label(), w.sum_label())).collect();
         let count = weights.iter().map(|w| w.terms().count()).sum::<usize>();
         let words = format!("{} term{}", group.word(), if count == 1 { "" } else { "s" });
@@ -257,7 +262,9 @@ mod tests {
 
     #[test]
     fn the_dummy_term_is_part_of_the_temporal_gradient() {
-        let labels = |config: FitConfig| parts(&config).into_iter().map(|part| part.label).collect::<Vec<_>>();
+        let labels = |config: FitConfig| {
+            parts(&config, &Terms::default()).into_iter().map(|part| part.label).collect::<Vec<_>>()
+        };
         assert_eq!(labels(FitConfig::default()), ["w_EM·L_EM", "w_kine·L_kine"]);
         let config = FitConfig { w_time: 8.0, w_dummy: 2.0, ..FitConfig::default() };
         assert_eq!(labels(config), ["w_EM·L_EM", "w_kine·L_kine", "w_time·L_time + w_dummy·L_dummy"]);

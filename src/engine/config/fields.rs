@@ -132,6 +132,12 @@ pub const FIELDS: &[Field] = &[
             .row("network")
     },
     Field {
+        help: "Weight of where joints were given, by a prediction, an annotation or your hand: they may be off by some 5 cm. A start that the program finds gives none.",
+        ..number(Weights, "w_given", "w_given", Steps, (0.0, 1000.0), number_at!(w_given))
+            .logarithmic()
+            .row("given start")
+    },
+    Field {
         help: "Frames that are fitted together where the parameterization is motion.",
         ..number(Model, "window", "Window", StepsAndStart, (1.0, 9.0), count_at!(window)).whole().row("motion")
     },

@@ -266,6 +266,8 @@ pub struct FitConfig {
     pub w_prior: f64,
     /// Weight of what a network expects.
     pub w_net: f64,
+    /// Weight of joints that were given.
+    pub w_given: f64,
     /// Frames that are fitted together in a space of motion.
     pub window: usize,
     /// Frames on each side whose hypotheses decide with this frame's which is fitted, and whose bodies are tried in it; 0: a frame
@@ -322,6 +324,7 @@ impl Default for FitConfig {
             w_time: 0.0,
             w_prior: 0.0,
             w_net: 0.0,
+            w_given: 0.0,
             window: 5,
             decode_frames: 0,
             #[cfg(any(test, feature = "dummies"))]

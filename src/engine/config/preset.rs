@@ -102,6 +102,7 @@ impl Preset {
                 w_kine: 0.0,
                 w_prior: 8e-3,
                 w_net: 2e-3,
+                w_given: 1.6e-3,
                 decode_frames: 12,
                 scatterers: Scatterers::BodyParts,
                 place: StartPlace::Counted,

@@ -7,6 +7,7 @@ use super::motion::{MotionState, Window, WindowLoss};
 use super::{Evaluation, FitError, Objective, Precision, Problem, StepReport, StopReason, Weight};
 use crate::body::{Group, Pppr};
 use crate::config::{FitConfig, Parameterization};
+use crate::geometry::Vec3;
 use serde::{Deserialize, Serialize};
 use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
@@ -23,6 +24,9 @@ pub struct FitState {
     /// Where the window stands, while the parameterization is motion; empty otherwise.
     #[serde(default)]
     pub motion: MotionState,
+    /// Where joints were given, m, in the order of the parameters, for L_given holds them there; empty where none was.
+    #[serde(default)]
+    pub given: Vec<Option<Vec3>>,
     /// Losses of the last iterations (up to six), the current one last: the convergence criterion looks back five.
     pub losses: SmallVec<[f64; LOOK_BACK + 2]>,
 }
@@ -31,7 +35,13 @@ impl FitState {
     /// Where a fit that begins at `params` stands before its first step.
     pub fn at_start(params: Pppr) -> Self {
         let adam = Adam::new(params.shape());
-        Self { iteration: 0, params, adam, motion: MotionState::default(), losses: SmallVec::new() }
+        let (motion, given, losses) = (MotionState::default(), Vec::new(), SmallVec::new());
+        Self { iteration: 0, params, adam, motion, given, losses }
+    }
+
+    /// The same where these joints were given, and not found in the maps, m, in the order of the parameters.
+    pub fn given(params: Pppr, given: Vec<Option<Vec3>>) -> Self {
+        Self { given, ..Self::at_start(params) }
     }
 }
 
@@ -53,6 +63,8 @@ pub struct Fitter {
     window_loss: [WindowLoss; 2],
     /// Whether the current evaluation lacks what a window's step does not need.
     unseen: bool,
+    /// Joints as a hand left them since the last step, m; a window puts them a little elsewhere. Empty where no hand did.
+    handed: Vec<Vec3>,
 }
 
 impl Fitter {
@@ -66,10 +78,22 @@ impl Fitter {
         precision: Precision,
         initial: Pppr,
     ) -> Result<Self, FitError> {
+        Self::starting_at(problem, config, precision, FitState::at_start(initial))
+    }
+
+    /// As [`Self::new`], at the parameters of a state and where it says that joints were given.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn starting_at(
+        problem: Arc<Problem>,
+        config: FitConfig,
+        precision: Precision,
+        state: FitState,
+    ) -> Result<Self, FitError> {
         let body = Articulation::new(&problem.skeleton);
-        let objective = Objective::new(problem, config, precision, &initial)?;
-        let evaluation = Evaluation::zeros(initial.shape());
-        let state = FitState::at_start(initial);
+        let objective = Objective::new(problem, config, precision, &state.params)?;
+        let evaluation = Evaluation::zeros(state.params.shape());
         let (next, next_evaluation) = (Arc::new(state.clone()), evaluation.clone());
         let mut fitter = Self {
             objective,
@@ -82,6 +106,7 @@ impl Fitter {
             window: None,
             window_loss: Default::default(),
             unseen: false,
+            handed: Vec::new(),
         };
         fitter.begin()?;
         Ok(fitter)
@@ -185,8 +210,10 @@ impl Fitter {
     }
 
     fn advance(&mut self, seen: bool) -> Result<(), FitError> {
-        let Self { objective, body, state, evaluation, next, next_evaluation, turns, window, window_loss, unseen } =
-            self;
+        self.handed.clear();
+        let Self {
+            objective, body, state, evaluation, next, next_evaluation, turns, window, window_loss, unseen, ..
+        } = self;
         // What somebody keeps stays as it is.
         if Arc::get_mut(next).is_none() {
             *next = Arc::new(FitState::clone(state));
@@ -194,6 +221,7 @@ impl Fitter {
         let next_state = Arc::make_mut(next);
         next_state.iteration = state.iteration + 1;
         next_state.losses.clone_from(&state.losses);
+        next_state.given.clone_from(&state.given);
         let how = (objective.config(), objective.precision());
         let moved = (&mut next_state.adam, &mut next_state.params);
         state.adam.update(&state.params, &evaluation.gradient, how, body, turns, moved);
@@ -263,6 +291,7 @@ impl Fitter {
     /// Where the state's parameters have the wrong sizes or are not finite; the fitter then stays where it was.
     pub fn restore(&mut self, state: Arc<FitState>) -> Result<(), FitError> {
         self.objective.problem().check(&state.params)?;
+        self.handed.clear();
         // Of a start nothing is known yet: neither its loss nor its place in a window.
         let fits = |window: &Window| state.motion.coordinates.len() == window.numbers();
         if state.losses.is_empty() || !self.window.as_ref().is_none_or(fits) {
@@ -349,7 +378,8 @@ impl Fitter {
         evaluate_state(objective, window.as_mut(), state, true, (evaluation, window_loss))
     }
 
-    /// Takes parameters edited by hand at the current iteration; Adam's moments start anew.
+    /// Takes parameters edited by hand at the current iteration; Adam's moments start anew. Whoever was moved is
+    /// where the hand put all of the joints: what it left in place was seen, too.
     ///
     /// # Errors
     /// Where `params` has the wrong sizes, or it or its loss is not finite; the fitter then stays where it was.
@@ -357,9 +387,20 @@ impl Fitter {
         self.objective.problem().check(&params)?;
         let mut state = FitState::clone(&self.state);
         state.adam = Adam::new(params.shape());
+        let (joints, positions) = (params.shape().joints.max(1), params.positions().to_vec());
+        state.given.resize(positions.len(), None);
+        let before = if self.handed.is_empty() { self.state.params.positions() } else { &self.handed };
+        let of_persons = positions.chunks(joints).zip(before.chunks(joints));
+        for ((person, before), given) in of_persons.zip(state.given.chunks_mut(joints)) {
+            if person != before {
+                given.iter_mut().zip(person).for_each(|(given, joint)| *given = Some(*joint));
+            }
+        }
         state.params = params;
         state.losses.clear();
-        self.set_state(state)
+        self.set_state(state)?;
+        self.handed = positions;
+        Ok(())
     }
 
     /// The configuration in force.
@@ -395,6 +436,7 @@ fn evaluate_state(
     seen: bool,
     (evaluation, loss): (&mut Evaluation, &mut WindowLoss),
 ) -> Result<(), FitError> {
+    objective.hold_to(&state.given);
     evaluate_into(objective, &state.params, state.iteration, seen || window.is_none(), evaluation)?;
     let Some(window) = window else { return Ok(()) };
     let (config, precision) = (*objective.config(), objective.precision());

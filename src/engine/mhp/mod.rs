@@ -75,7 +75,9 @@ pub use fill::fill_missing;
 pub use fill::for_neighbours;
 pub use fitter::{FitState, Fitter};
 pub use frame_em::EmScratch;
-pub use init::{Hypotheses, Initialisation, initialise, initialise_people, predict, standing_joints, start_at};
+pub use init::{
+    GivenStart, Hypotheses, Initialisation, initialise, initialise_people, perturb, predict, standing_joints, start_at,
+};
 pub use motion::{MOST_BEGUN, MOST_UNLIKE, MotionState};
 pub use objective::{Masks, Objective, masks};
 pub use percentile::{percentile, percentiles};

@@ -24,6 +24,8 @@ pub struct Objective {
     initial: Pppr,
     /// Where the frames around say that each person's middle is, m; empty where they say nothing.
     anchors: Vec<Vec3>,
+    /// Where joints were given, m; empty where none was.
+    given: Vec<Option<Vec3>>,
     warnings: Vec<String>,
 }
 
@@ -71,6 +73,7 @@ impl Objective {
             em,
             initial: initial.clone(),
             anchors: Vec::new(),
+            given: Vec::new(),
             warnings,
         };
         objective.anchor();
@@ -105,6 +108,14 @@ impl Objective {
             self.em = FrameEm::new(&self.problem.measured(&config), &self.regions, &config, self.precision);
         }
         self.anchor();
+    }
+
+    /// Holds joints, in the order of the parameters, to where they were given, m; to nothing where that is empty.
+    pub fn hold_to(&mut self, given: &[Option<Vec3>]) {
+        if self.given != given {
+            self.given.clear();
+            self.given.extend_from_slice(given);
+        }
     }
 
     /// The configuration in force.
@@ -157,8 +168,8 @@ impl Objective {
         if term.is_of_maps() {
             self.evaluate_gained(params, &term.alone(), true, &mut evaluation);
         } else {
-            let Self { problem, config, anchors, .. } = &*self;
-            let inputs = Inputs { skeleton: &problem.skeleton, config, params, anchors };
+            let Self { problem, config, anchors, given, .. } = &*self;
+            let inputs = Inputs { skeleton: &problem.skeleton, config, params, anchors, given };
             terms::evaluate(&inputs, 0.0, &term.alone(), &mut evaluation.gradients);
         }
         evaluation.gradients[term.weight as usize].clone()
@@ -178,11 +189,11 @@ impl Objective {
         }
         let em_gradient = &mut gradients[Weight::Em as usize];
         iou.clear();
-        let Self { problem, config, precision, em, anchors, .. } = self;
+        let Self { problem, config, precision, em, anchors, given, .. } = self;
         let config = &*config;
         let mut of_maps = || em.evaluate((&problem.radar, config), *precision, params, em_gradient, Some(iou));
         let em = if with_maps { of_maps() } else { 0.0 };
-        let inputs = Inputs { skeleton: &problem.skeleton, config, params, anchors };
+        let inputs = Inputs { skeleton: &problem.skeleton, config, params, anchors, given };
         *terms = terms::evaluate(&inputs, em, gains, gradients);
         *loss = terms.loss(config);
         terms::weighted_sum_into(config, gradients, gradient);

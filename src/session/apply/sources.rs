@@ -169,7 +169,7 @@ impl Session {
         };
         self.fits.remove(&index);
         self.forget_summary(index);
-        let people = start.shape().persons;
+        let people = start.params.shape().persons;
         let word = if people == 1 { "person" } else { "people" };
         self.hint(format!("the fit begins at what {name} predicts: {people} {word}"));
         self.begin_fit_at(index, Some(Start::Given(start)))

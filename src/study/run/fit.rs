@@ -5,11 +5,11 @@
 
 use super::row::RunNumbers;
 use crate::body::Pppr;
-use crate::config::{FitConfig, Parameterization};
+use crate::config::{FitConfig, InitConfig, Parameterization};
 use crate::dataset::{Dataset, Frame};
 use crate::diagnose::{Reprojection, joint_errors, map_box_coverage, reprojection};
 use crate::geometry::Vec3;
-use crate::mhp::{ErasedCells, Fitter, Precision, Problem, StopReason, predict, without};
+use crate::mhp::{ErasedCells, FitState, Fitter, Precision, Problem, StopReason, perturb, predict, without};
 use crate::start::{find_start_along, problem_of};
 use crate::study::row::annotated;
 use crate::task::milliseconds;
@@ -41,6 +41,8 @@ pub(super) struct TimedStart {
     pub(super) params: Pppr,
     /// What the frame alone says, without the switches that refine a start.
     pub(super) unrefined: Pppr,
+    /// Whether its joints were given, and not found in the maps.
+    pub(super) given: bool,
     pub(super) init_ms: Option<f64>,
 }
 
@@ -73,11 +75,16 @@ impl<'a> LoadedFrame<'a> {
         let found = find_start_along(self.dataset, self.frame.index, &self.problem, config)
             .map_err(|error| self.told(&error))?
             .initialisation;
-        Ok(TimedStart { params: found.params, unrefined: found.unrefined, init_ms: Some(milliseconds(began)) })
+        Ok(TimedStart {
+            params: found.params,
+            unrefined: found.unrefined,
+            given: false,
+            init_ms: Some(milliseconds(began)),
+        })
     }
 
     /// A start at the annotated joints: as many persons as are annotated, who look as those of a cold start and move as the
-    /// truth says, or as a cold start says where it tells positions alone.
+    /// truth says, or as a cold start says where it tells positions alone; perturbed where the settings ask for it.
     ///
     /// # Errors
     /// Where the frame has no joints in 3-D, or one of them is not finite.
@@ -87,7 +94,9 @@ impl<'a> LoadedFrame<'a> {
         if !truth.joints.iter().flatten().all(|x| x.is_finite()) {
             return Err(self.told(&"an annotated joint is not finite"));
         }
-        let mut params = self.cold(&FitConfig { people: truth.persons, ..*config })?.params;
+        // One search serves the truth and all that is off it.
+        let init = InitConfig { position_noise_m: 0.0, ..config.init };
+        let mut params = self.cold(&FitConfig { people: truth.persons, init, ..*config })?.params;
         let [positions, velocities] = params.motion_mut();
         if positions.len() != truth.joints.len() {
             return Err(self.told(&format!("{} joints are annotated, {} fitted", truth.joints.len(), positions.len())));
@@ -96,13 +105,14 @@ impl<'a> LoadedFrame<'a> {
         if let Some(known) = &truth.velocities {
             velocities.copy_from_slice(known);
         }
-        Ok(TimedStart { unrefined: params.clone(), params, init_ms: None })
+        perturb(&self.problem, &config.init, &mut params);
+        Ok(TimedStart { unrefined: params.clone(), params, given: true, init_ms: None })
     }
 
     /// A start from what the frame before ended with, moved as its people moved and perturbed as a cold one is.
     pub(super) fn warm(&self, config: &FitConfig, before: &Pppr) -> TimedStart {
         let params = predict(&self.problem, config, before);
-        TimedStart { unrefined: params.clone(), params, init_ms: None }
+        TimedStart { unrefined: params.clone(), params, given: false, init_ms: None }
     }
 
     /// Fits from `start` and looks at it after each of `stops` steps, ascending. What fails from some step on fails there
@@ -130,7 +140,9 @@ impl<'a> LoadedFrame<'a> {
         mut go_on: impl FnMut(&Fitter) -> bool,
     ) -> Vec<Result<Stop, String>> {
         let began = Instant::now();
-        let begun = Fitter::new(Arc::clone(&self.seen), *config, precision, start.params.clone());
+        let given = if start.given { start.params.positions().iter().copied().map(Some).collect() } else { Vec::new() };
+        let state = FitState::given(start.params.clone(), given);
+        let begun = Fitter::starting_at(Arc::clone(&self.seen), *config, precision, state);
         *fitter = begun.map_err(|error| self.told(&error));
         let mut ended = false;
         let mut answers = Vec::with_capacity(stops.len());

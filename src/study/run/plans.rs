@@ -13,6 +13,8 @@ use crate::radar::View;
 const ROBUSTNESS_ITERATIONS: usize = 80;
 /// Budgets of the study `budget`, ascending.
 const BUDGETS: [usize; 8] = [5, 10, 20, 25, 40, 60, 80, 100];
+/// What joints that are given are off on purpose, in each direction, m.
+const GIVEN_OFF_M: [f64; 2] = [0.03, 0.06];
 
 /// Label columns and variants.
 pub(super) struct Compared {
@@ -157,7 +159,16 @@ fn counting(base: &FitConfig, set: Option<PaperSet>) -> Vec<Variant> {
 
 /// Every row from the truth follows the one from the program's own start that it is compared with ([`super::table`]).
 fn truth(base: &FitConfig) -> Vec<Variant> {
-    vec![Variant::cold(["own"], base), Variant::cold(["truth"], base).started_at_truth()]
+    let exact = InitConfig { position_noise_m: 0.0, position_bias_m: 0.0, velocity_noise_mps: 0.0, ..base.init };
+    let given = |label: String, config: &FitConfig| Variant::cold([label], config).started_at_truth();
+    let whole = [Variant::cold(["own"], base), given("truth".into(), &FitConfig { init: exact, ..*base })];
+    let base = &FitConfig { init: exact, ..*base };
+    let free = (base.w_given > 0.0).then(|| given("truth, w_given = 0".into(), &FitConfig { w_given: 0.0, ..*base }));
+    let off = GIVEN_OFF_M.map(|noise_m| {
+        let init = InitConfig { position_noise_m: noise_m, ..exact };
+        given(format!("truth ± {:.0} mm", 1e3 * noise_m), &FitConfig { init, ..*base })
+    });
+    whole.into_iter().chain(free).chain(off).collect()
 }
 
 fn budget(base: &FitConfig) -> Vec<Variant> {
@@ -189,7 +200,7 @@ mod tests {
             (StudyKind::Init, 3, 3),
             (StudyKind::Budget, 16, 0),
             (StudyKind::Counting, 3, 3),
-            (StudyKind::Truth, 2, 0),
+            (StudyKind::Truth, 4, 0),
         ];
         for (kind, all, of_paper) in counts {
             let rows = rows(kind);

@@ -98,8 +98,8 @@ pub struct TableRow {
     pub init_pa_majpe_mm: Option<Spread>,
     /// Share of frames whose fit is nearer to truth than its start, 0..1.
     pub share_improved: Option<f64>,
-    /// Share of these frames whose loss ends below that of the fit from the truth, 0..1: there the loss prefers another pose. What was
-    /// held at its start has the loss of no fit.
+    /// Share of these frames whose loss ends below that of the fit from the truth, 0..1, L_given left out: there the loss prefers another
+    /// pose. What was held at its start has the loss of no fit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub share_below_truth: Option<f64>,
     /// The same of those whose loss is lower by more than 3 %: two fits that end in one pose differ by less.
@@ -205,14 +205,17 @@ pub(super) fn by_scene(spec: &RunSpec, all_rows: &Rows) -> Vec<SceneTable> {
     scenes.into_iter().map(of).collect()
 }
 
-/// The row with its median, and with how often its loss ends lower than the one from the truth does: of the frames that both fit.
+/// The row with its median, and with how often its loss ends lower than the one from the truth does: of the frames that both fit. No
+/// loss has L_given in it.
 fn beside_truth(row: TableRow, spec: &RunSpec, rows: &[&RunRow], all_rows: &Rows) -> TableRow {
     let truth = spec.variants.iter().position(|variant| variant.start == StartFrom::Truth);
     let fitted = |of: &RunRow| of.fit.as_ref().ok().filter(|fit| fit.count_matched() && !fit.held).cloned();
+    let own = spec.variants.iter().position(|variant| variant.start == StartFrom::Cold);
+    let is_own = Some(row.variant) == own;
     let both = |row: &&RunRow| {
-        let here = spec.variants.iter().enumerate().map(|(k, _)| fitted(all_rows.get(&(k, row.frame))?));
-        let of_truth = here.collect::<Option<Vec<_>>>()?.swap_remove(truth?);
-        Some((fitted(row)?, of_truth))
+        let of = |variant: Option<usize>| fitted(all_rows.get(&(variant?, row.frame))?);
+        of(own)?;
+        Some((fitted(row)?, of(truth)?))
     };
     let pairs: Vec<(RunNumbers, RunNumbers)> = rows.iter().filter_map(both).collect();
     let mut errors: Vec<f64> = pairs.iter().filter_map(|(fit, _)| fit.majpe_mm).collect();
@@ -223,11 +226,21 @@ fn beside_truth(row: TableRow, spec: &RunSpec, rows: &[&RunRow], all_rows: &Rows
         n if n % 2 == 1 => middle(n / 2),
         n => middle(n / 2 - 1).zip(middle(n / 2)).map(|(a, b)| f64::midpoint(a, b)),
     };
-    let share = |most: f64| {
-        let below = pairs.iter().filter(|(fit, of_truth)| fit.loss < most * of_truth.loss).count();
-        (Some(row.variant) != truth && !pairs.is_empty()).then(|| below as f64 / pairs.len() as f64)
+    // What holds a fit to the truth is no part of what the two are compared by.
+    let found = |fit: &RunNumbers, variant: usize| {
+        let given = fit.terms.get("given").flatten().unwrap_or_default();
+        fit.loss - spec.variants.get(variant).map_or(0.0, |variant| variant.config.w_given) * given
     };
+    let is_below = |fit: &RunNumbers, of_truth: &RunNumbers, most: f64| {
+        truth.is_some_and(|truth| found(fit, row.variant) < most * found(of_truth, truth))
+    };
+    let share = |most: f64| {
+        let below = pairs.iter().filter(|(fit, of_truth)| is_below(fit, of_truth, most)).count();
+        (is_own && !pairs.is_empty()).then(|| below as f64 / pairs.len() as f64)
+    };
+    let used = rows.iter().filter_map(|row| row.fit.as_ref().ok()).filter(|fit| fit.count_matched());
     TableRow {
+        loss: Spread::of(used.map(|fit| found(fit, row.variant))),
         median_majpe_mm: median,
         share_below_truth: share(1.0),
         share_clearly_below_truth: share(1.0 - SAME_POSE),

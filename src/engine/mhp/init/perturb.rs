@@ -48,8 +48,8 @@ pub(super) fn missed<T>(problem: &Problem, init: &InitConfig, items: Vec<T>) -> 
     (items(kept), items(missed))
 }
 
-/// Adds bias and noise to positions and velocities.
-pub(super) fn perturb(problem: &Problem, init: &InitConfig, params: &mut Pppr) {
+/// Adds bias and noise to positions and velocities, as the settings of a start ask for it.
+pub fn perturb(problem: &Problem, init: &InitConfig, params: &mut Pppr) {
     if init.position_bias_m > 0.0 {
         let mut rng = generator(problem, init.seed, Purpose::Bias);
         let joints = params.shape().joints.max(1);

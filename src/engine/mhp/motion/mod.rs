@@ -6,7 +6,7 @@
 //! along a Doppler axis have been added and what is finer across the sight than a limb has been blurred (`mhp/reduced.rs`), and
 //!
 //! ```text
-//! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior + w_net · L_net
+//! L = w_EM · mean over frames of L_EM + w_kine · (…) + w_prior · L_prior + w_net · L_net + w_given · L_given
 //! L_prior = W/F · ((ρ(c) + ((s − s₀)/σ_s)² + ((q − q₀)/σ_q)² + ρ_w(w, ẇ))/30 + mean over frames and bones of ((l/(e^s λ) − 1)/σ_b)² + ρ_h(h/σ_h))
 //! ```
 //!
@@ -14,7 +14,7 @@
 //! F are the frames there are and W those that are asked for (`window`), for fewer frames are less evidence against a prior that
 //! stays, but not against a network, which has seen no more of them. The parts behind it are those of the body's proportions
 //! (`proportions.rs`) and of the floor (`ground.rs`); for several persons there is one for bodies that stand in one another or go
-//! far from where they were counted (`apart.rs`). The kinematic terms are those of the frame that is fitted.
+//! far from where they were counted (`apart.rs`). The kinematic terms, and L_given, are those of the frame that is fitted.
 //! q says how bright what stands still is (`static_echo.rs`). PPPR stays the state that is shown, kept and exported: positions and
 //! velocities follow the coordinates, and opacities do where the settings ask for it; scales and the rest move by themselves and
 //! are the same in all frames of the window. The frame stands as near the window's middle as its

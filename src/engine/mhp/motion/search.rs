@@ -477,7 +477,7 @@ pub(in crate::mhp) fn carry_on(
     others: &[(f64, &Hypothesis)],
 ) -> Result<(), FitError> {
     let Some(found) = searched.persons.first_mut() else { return Ok(()) };
-    // What begins where another body ended, or begins, ends with it.
+    // What begins where another body is already is left to it.
     let mut starts: Vec<Hypothesis> = Vec::with_capacity(others.len());
     for (t_s, other) in others {
         let joints = tilt::later(&other.joints, &other.velocities, -t_s);

@@ -91,7 +91,7 @@ mod tests {
         let (skeleton, params) = two_joints(length_m);
         let mut gradient = Pppr::zeros(params.shape());
         let config = FitConfig { bone_tolerance_m, ..FitConfig::default() };
-        let inputs = Inputs { skeleton: &skeleton, config: &config, params: &params, anchors: &[] };
+        let inputs = Inputs { skeleton: &skeleton, config: &config, params: &params, anchors: &[], given: &[] };
         let [bone, _] = evaluate(&inputs, [1.0; 2], &mut gradient);
         (bone, *gradient.joint(Group::Position, 1).first().unwrap())
     }

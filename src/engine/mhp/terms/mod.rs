@@ -13,6 +13,7 @@
 //! | `separation.rs` | L_sep |
 //! | `collision.rs` | L_coll |
 //! | `time.rs` | L_time |
+//! | `given.rs` | L_given |
 //! | `prior.rs` | L_prior: only its row, for the fit of a window computes it |
 //! | `network.rs` | L_net: only its row, for the fit of a window computes it |
 //! | `penalties.rs` | what they share: ψ, lengths that have a slope everywhere, repulsion |
@@ -23,6 +24,7 @@ mod collision;
 #[cfg(any(test, feature = "dummies"))]
 mod dummy;
 mod electromagnetic;
+mod given;
 mod network;
 mod penalties;
 mod prior;
@@ -54,6 +56,7 @@ pub const TERMS: &[Term] = &[
     time::TIME,
     prior::PRIOR,
     network::NET,
+    given::GIVEN,
     #[cfg(any(test, feature = "dummies"))]
     dummy::DUMMY,
 ];
@@ -89,6 +92,8 @@ pub enum Scope {
     People,
     /// Where its weight is above 0: elsewhere it is not evaluated.
     Weighed,
+    /// The same, where joints were given ([`crate::mhp::FitState::given`]).
+    Given,
 }
 
 /// A colour by its role; the theme says which shade it is.
@@ -112,6 +117,8 @@ pub enum Hue {
     Teal,
     /// Of what a network expects.
     Orchid,
+    /// Of what was given.
+    Slate,
 }
 
 /// How a term is evaluated: its value, and `gain` times its gradient on top of what is there.
@@ -136,6 +143,8 @@ pub(super) struct Inputs<'a> {
     pub(super) params: &'a Pppr,
     /// Where the frames around say that each person's middle is, m; empty where they say nothing.
     pub(super) anchors: &'a [Vec3],
+    /// Where joints were given, m; empty where none was.
+    pub(super) given: &'a [Option<Vec3>],
 }
 
 impl Term {
@@ -213,7 +222,7 @@ pub(super) fn evaluate(
 ) -> Terms {
     let mut values = Terms::default();
     for (place, term) in TERMS.iter().enumerate() {
-        if term.scope == Scope::Weighed && term.weight.of(inputs.config) <= 0.0 {
+        if matches!(term.scope, Scope::Weighed | Scope::Given) && term.weight.of(inputs.config) <= 0.0 {
             continue;
         }
         let gradient = &mut gradients[term.weight as usize];

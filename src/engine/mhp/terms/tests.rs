@@ -51,15 +51,26 @@ fn params() -> Pppr {
 }
 
 const ANCHORS: [Vec3; 2] = [[2.4, 0.1, 0.5], [2.6, 0.0, 0.4]];
+/// Two joints of the first person and one of the second.
+const GIVEN: [Option<Vec3>; 6] =
+    [Some([2.4, 0.1, 0.1]), None, Some([2.6, 0.0, 0.7]), None, None, Some([2.5, 0.2, 0.2])];
 
 fn config() -> FitConfig {
-    FitConfig { w_em: 0.3, w_kine: 0.7, w_time: 3.0, w_dummy: 0.2, theta_max_deg: 120.0, ..FitConfig::default() }
+    FitConfig {
+        w_em: 0.3,
+        w_kine: 0.7,
+        w_time: 3.0,
+        w_given: 0.4,
+        w_dummy: 0.2,
+        theta_max_deg: 120.0,
+        ..FitConfig::default()
+    }
 }
 
 /// Values and gradients of the terms; that of L_EM is 0.25 and 0.
 fn evaluated(params: &Pppr, config: &FitConfig, gains: &[f64; TERMS.len()]) -> (Terms, [Pppr; Weight::COUNT]) {
     let mut gradients = std::array::from_fn(|_| Pppr::zeros(SHAPE));
-    let inputs = Inputs { skeleton: &skeleton(), config, params, anchors: &ANCHORS };
+    let inputs = Inputs { skeleton: &skeleton(), config, params, anchors: &ANCHORS, given: &GIVEN };
     (evaluate(&inputs, 0.25, gains, &mut gradients), gradients)
 }
 
@@ -125,11 +136,13 @@ fn a_line_of_the_table_says_all_there_is_to_say() {
         field.set(&mut config, Value::Number(0.375));
         assert_eq!(weight.of(&config), 0.375, "{}", weight.key());
         assert!(weight.terms().next().is_some(), "{} weighs nothing", weight.key());
-        assert!(weight.terms().all(|term| term.scope != Scope::Weighed || weight.of(&FitConfig::default()) == 0.0));
+        assert!(weight.terms().all(
+            |term| !matches!(term.scope, Scope::Weighed | Scope::Given) || weight.of(&FitConfig::default()) == 0.0
+        ));
     }
     let grouped: usize = TermGroup::ALL.iter().map(|group| group.terms().count()).sum();
     assert_eq!(grouped, TERMS.len());
-    let known = "L = w_EM·L_EM + w_kine·(L_bone + L_rigid + L_joint + L_sep + L_coll) + w_time·L_time + w_prior·L_prior + w_net·L_net + w_dummy·L_dummy";
+    let known = "L = w_EM·L_EM + w_kine·(L_bone + L_rigid + L_joint + L_sep + L_coll) + w_time·L_time + w_prior·L_prior + w_net·L_net + w_given·L_given + w_dummy·L_dummy";
     assert_eq!(formula(), known);
 }
 

@@ -17,6 +17,8 @@ pub enum Weight {
     Prior,
     /// w_net, of L_net.
     Network,
+    /// w_given, of L_given.
+    Given,
     /// Of the term that unit tests have.
     #[cfg(any(test, feature = "dummies"))]
     Dummy,
@@ -65,6 +67,7 @@ impl Weight {
         Self::Time,
         Self::Prior,
         Self::Network,
+        Self::Given,
         #[cfg(any(test, feature = "dummies"))]
         Self::Dummy,
     ];
@@ -79,6 +82,7 @@ impl Weight {
             Self::Time => ("w_time", TermGroup::Temporal),
             Self::Prior => ("w_prior", TermGroup::Temporal),
             Self::Network => ("w_net", TermGroup::Electromagnetic),
+            Self::Given => ("w_given", TermGroup::Kinematic),
             #[cfg(any(test, feature = "dummies"))]
             Self::Dummy => ("w_dummy", TermGroup::Temporal),
         }
@@ -92,6 +96,7 @@ impl Weight {
             Self::Time => config.w_time,
             Self::Prior => config.w_prior,
             Self::Network => config.w_net,
+            Self::Given => config.w_given,
             #[cfg(any(test, feature = "dummies"))]
             Self::Dummy => config.w_dummy,
         }
