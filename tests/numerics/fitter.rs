@@ -4,7 +4,7 @@
 use crate::cases::Case;
 use crate::reading::case_folders;
 use mhp_inspector::body::Group;
-use mhp_inspector::config::{EmRegion, FitConfig};
+use mhp_inspector::config::{EmRegion, FitConfig, Parameterization};
 use mhp_inspector::geometry::{norm, sub};
 use mhp_inspector::mhp::{FitError, FitState, Fitter, Objective, Precision, Problem, Region, TermId, masks, simulate};
 use mhp_inspector::radar::View;
@@ -160,6 +160,28 @@ fn joints_that_were_given_are_held_there_and_what_the_program_found_is_not() {
     free.set_params(edited.clone()).unwrap();
     let there: Vec<_> = edited.positions().iter().copied().map(Some).collect();
     assert_eq!(free.state().given, there);
+}
+
+#[test]
+fn whom_a_hand_leaves_in_place_is_not_given() {
+    let Case { problem, config, params } = case("cartesian-two-persons");
+    // Masks are explained by anybody: the fit is in a window.
+    let config = FitConfig { parameterization: Parameterization::Motion, ..config };
+    let mut fitter = Fitter::new(Arc::new(problem), config, Precision::F64, params).unwrap();
+    let (base, joints) = (fitter.params().clone(), fitter.params().shape().joints);
+    // A finger goes on from where it went down, and the window puts both a little elsewhere each time.
+    for by_m in [0.02, 0.04] {
+        let mut moved = base.clone();
+        for joint in 0..joints {
+            let [x, y, z] = base.position(joint);
+            moved.set_vec3(Group::Position, joint, [x, y - by_m, z]);
+        }
+        fitter.set_params(moved).unwrap();
+    }
+    assert!(!fitter.is_held() && fitter.params().person(1) != base.person(1));
+    let state = fitter.state();
+    let (one, other) = state.given.split_at(joints);
+    assert!(one.iter().all(Option::is_some) && other.iter().all(Option::is_none));
 }
 
 #[test]
