@@ -378,7 +378,9 @@ fn loss_curves(persons: usize, branches: &[Branch]) -> Vec<Curve> {
         Scope::Always => true,
         Scope::People => persons > 1,
         Scope::Weighed => weighed(term.weight),
-        Scope::Given => branches.iter().flat_map(|b| &b.rows).any(|row| row.report.terms[*term] > 0.0),
+        Scope::Given => {
+            weighed(term.weight) && branches.iter().flat_map(|b| &b.rows).any(|row| row.report.terms[*term] > 0.0)
+        }
     });
     let terms = shown.map(|term| curve(term.key, term.label, 1.5, move |r: &IterationRow| Some(r.report.terms[term])));
     [curve("total", "L", 2.0, |r| Some(r.report.loss))].into_iter().chain(terms).collect()
