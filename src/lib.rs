@@ -17,7 +17,7 @@
 //! H_sim = |Σ_j A_j K_j e^{i(φ_j + κ_j·Δ)}|                           (coherent; or the root of the summed powers)
 //! m     = σ((ln H_sim − ln P_{100−τ}(H_sim))/T)                      soft mask
 //! L_EM  = 1 − Σ m B_ori / Σ (m + B_ori − m B_ori)                    one minus the soft IoU with H_ori's mask
-//! L     = w_EM L_EM + w_kine (L_bone + L_rigid + L_joint + L_sep + L_coll) + w_time L_time
+//! L     = w_EM L_EM + w_kine (L_bone + L_rigid + L_joint + L_sep + L_coll) + w_time L_time + w_given L_given
 //! ```
 //!
 //! Every gradient is written by hand, [`mhp`] holds them; the forward model and its derivatives are checked against

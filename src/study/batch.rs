@@ -12,7 +12,7 @@ use crate::config::FitConfig;
 use crate::dataset::{Dataset, Truth, write_pppr};
 use crate::diagnose::{JointErrors, joint_errors};
 use crate::geometry::{Vec3, mean};
-use crate::mhp::{ErasedCells, FitState, Fitter, GivenStart, Precision, StepReport, predict, without};
+use crate::mhp::{ErasedCells, FitState, Fitter, Precision, StepReport, predict, without};
 use crate::output::{FileNames, Inputs};
 use crate::people::Tracker;
 use crate::predictions::{Predictions, start_of};
@@ -78,20 +78,19 @@ fn fit_watched(
         let found = start_of(source, dataset, index, &problem, &options.config);
         found.ok_or_else(|| format!("{}: nothing is predicted of {}", source.path.display(), dataset.frame_name(index)))
     };
-    let (initial, given, init_ms) = if let Some(source) = &options.init {
-        let GivenStart { params, given } = predicted(source)?;
-        (params, given, None)
+    let (state, init_ms) = if let Some(source) = &options.init {
+        (FitState::given(predicted(source)?), None)
     } else if let Some(params) = start {
-        (predict(&problem, &options.config, &params), Vec::new(), None)
+        (FitState::at_start(predict(&problem, &options.config, &params)), None)
     } else {
         let found = find_start_along(dataset, index, &problem, &options.config)
             .map_err(|error| in_file(&error))?
             .initialisation;
-        (found.params, Vec::new(), Some(milliseconds(began)))
+        (FitState::at_start(found.params), Some(milliseconds(began)))
     };
     let began = Instant::now();
     let seen = without(&problem, &options.erased).map_err(|error| in_file(&error))?;
-    let state = FitState::given(initial.clone(), given);
+    let initial = state.params.clone();
     let mut fitter =
         Fitter::starting_at(seen, options.config, options.precision, state).map_err(|error| in_file(&error))?;
     let errors = |params: &Pppr| errors(params, frame.truth.as_ref()?, info.skeleton.joints.len());

@@ -10,8 +10,8 @@ use crate::config::{FitConfig, Parameterization};
 use crate::dataset::Truth;
 use crate::diagnose::joint_errors;
 use crate::mhp::{
-    ErasedCells, FitError, FitState, Fitter, Objective, Precision, Problem, StepReport, StopReason, masks, predict,
-    simulate, without,
+    ErasedCells, FitError, FitState, Fitter, GivenStart, Objective, Precision, Problem, StepReport, StopReason, masks,
+    predict, simulate, without,
 };
 use crate::start::{find_start_along, find_start_in, problem_of};
 use crate::task::{catch_panic, milliseconds};
@@ -358,8 +358,8 @@ impl Job {
         let init_ms = milliseconds(began);
         let seen = without(&problem, &erased)?;
         let region = around.as_deref().unwrap_or(&initial);
-        let state_there = FitState::given(region.clone(), given);
-        let mut fitter = Fitter::starting_at(Arc::clone(&seen), config, precision, state_there)?;
+        let begun = FitState::given(GivenStart { params: region.clone(), given });
+        let mut fitter = Fitter::starting_at(Arc::clone(&seen), config, precision, begun)?;
         if let Some(found) = found_start.as_mut().filter(|_| fitter.is_held()) {
             found.initialisation.tell_held();
         }

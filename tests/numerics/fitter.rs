@@ -6,7 +6,9 @@ use crate::reading::case_folders;
 use mhp_inspector::body::Group;
 use mhp_inspector::config::{EmRegion, FitConfig, Parameterization};
 use mhp_inspector::geometry::{norm, sub};
-use mhp_inspector::mhp::{FitError, FitState, Fitter, Objective, Precision, Problem, Region, TermId, masks, simulate};
+use mhp_inspector::mhp::{
+    FitError, FitState, Fitter, GivenStart, Objective, Precision, Problem, Region, TermId, masks, simulate,
+};
 use mhp_inspector::radar::View;
 use std::sync::Arc;
 
@@ -123,8 +125,8 @@ fn edited_parameters_start_new_moments() {
 fn joints_that_were_given_are_held_there_and_what_the_program_found_is_not() {
     let begun = |given: bool, w_given: f64| {
         let Case { problem, config, params } = case("polar-two-views");
-        let there = if given { params.positions().iter().copied().map(Some).collect() } else { Vec::new() };
-        let (config, state) = (FitConfig { w_given, ..config }, FitState::given(params, there));
+        let state = if given { FitState::given(GivenStart::whole(params)) } else { FitState::at_start(params) };
+        let config = FitConfig { w_given, ..config };
         Fitter::starting_at(Arc::new(problem), config, Precision::F64, state).unwrap()
     };
     let given = TermId::of("given").unwrap();
@@ -179,6 +181,10 @@ fn whom_a_hand_leaves_in_place_is_not_given() {
         fitter.set_params(moved).unwrap();
     }
     assert!(!fitter.is_held() && fitter.params().person(1) != base.person(1));
+    // What is on screen now is edited otherwise.
+    let mut brighter = fitter.params().clone();
+    brighter.group_mut(Group::Beta)[0] += 0.1;
+    fitter.set_params(brighter).unwrap();
     let state = fitter.state();
     let (one, other) = state.given.split_at(joints);
     assert!(one.iter().all(Option::is_some) && other.iter().all(Option::is_none));

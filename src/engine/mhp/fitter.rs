@@ -12,6 +12,22 @@ use serde::{Deserialize, Serialize};
 use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
 
+/// Where a fit begins that is given, and not found in the maps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GivenStart {
+    /// All of the persons.
+    pub params: Pppr,
+    /// Where their joints were given, world frame, m, in the order of the parameters; `None` for one that is only assumed.
+    pub given: Vec<Option<Vec3>>,
+}
+
+impl GivenStart {
+    /// All joints of these persons were given.
+    pub fn whole(params: Pppr) -> Self {
+        Self { given: params.positions().iter().copied().map(Some).collect(), params }
+    }
+}
+
 /// Everything that another step needs: restoring it continues the run bit for bit under the same configuration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitState {
@@ -24,7 +40,8 @@ pub struct FitState {
     /// Where the window stands, while the parameterization is motion; empty otherwise.
     #[serde(default)]
     pub motion: MotionState,
-    /// Where joints were given, m, in the order of the parameters, for L_given holds them there; empty where none was.
+    /// Where joints were given, world frame, m, in the order of the parameters: L_given holds them there (`mhp/terms/given.rs`). Empty
+    /// where none was.
     #[serde(default)]
     pub given: Vec<Option<Vec3>>,
     /// Losses of the last iterations (up to six), the current one last: the convergence criterion looks back five.
@@ -39,8 +56,8 @@ impl FitState {
         Self { iteration: 0, params, adam, motion, given, losses }
     }
 
-    /// The same where these joints were given, and not found in the maps, m, in the order of the parameters.
-    pub fn given(params: Pppr, given: Vec<Option<Vec3>>) -> Self {
+    /// The same where the joints were given, and not found in the maps.
+    pub fn given(GivenStart { params, given }: GivenStart) -> Self {
         Self { given, ..Self::at_start(params) }
     }
 }
@@ -389,10 +406,11 @@ impl Fitter {
         state.adam = Adam::new(params.shape());
         let (joints, positions) = (params.shape().joints.max(1), params.positions().to_vec());
         state.given.resize(positions.len(), None);
-        let before = if self.handed.is_empty() { self.state.params.positions() } else { &self.handed };
-        let of_persons = positions.chunks(joints).zip(before.chunks(joints));
-        for ((person, before), given) in of_persons.zip(state.given.chunks_mut(joints)) {
-            if person != before {
+        let is_at = |places: &[Vec3], k: usize, person: &[Vec3]| places.chunks(joints).nth(k) == Some(person);
+        let persons = positions.chunks(joints).zip(state.given.chunks_mut(joints));
+        for (k, (person, given)) in persons.enumerate() {
+            // A hand goes on from where it left the body, or from where the window put it.
+            if !is_at(self.state.params.positions(), k, person) && !is_at(&self.handed, k, person) {
                 given.iter_mut().zip(person).for_each(|(given, joint)| *given = Some(*joint));
             }
         }

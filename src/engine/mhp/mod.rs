@@ -73,10 +73,10 @@ pub use em_around::{EmAround, FrameEmLoss};
 pub use erased::{ErasedCells, connected_echo, erased_marks, leaves_any, without};
 pub use fill::fill_missing;
 pub use fill::for_neighbours;
-pub use fitter::{FitState, Fitter};
+pub use fitter::{FitState, Fitter, GivenStart};
 pub use frame_em::EmScratch;
 pub use init::{
-    GivenStart, Hypotheses, Initialisation, initialise, initialise_people, perturb, predict, standing_joints, start_at,
+    Hypotheses, Initialisation, initialise, initialise_people, perturb, predict, standing_joints, start_at,
 };
 pub use motion::{MOST_BEGUN, MOST_UNLIKE, MotionState};
 pub use objective::{Masks, Objective, masks};

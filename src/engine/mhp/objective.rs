@@ -110,7 +110,7 @@ impl Objective {
         self.anchor();
     }
 
-    /// Holds joints, in the order of the parameters, to where they were given, m; to nothing where that is empty.
+    /// Holds joints, in the order of the parameters, to where they were given, world frame, m (L_given); to nothing where that is empty.
     pub fn hold_to(&mut self, given: &[Option<Vec3>]) {
         if self.given != given {
             self.given.clear();

@@ -9,7 +9,9 @@ use crate::config::{FitConfig, InitConfig, Parameterization};
 use crate::dataset::{Dataset, Frame};
 use crate::diagnose::{Reprojection, joint_errors, map_box_coverage, reprojection};
 use crate::geometry::Vec3;
-use crate::mhp::{ErasedCells, FitState, Fitter, Precision, Problem, StopReason, perturb, predict, without};
+use crate::mhp::{
+    ErasedCells, FitState, Fitter, GivenStart, Precision, Problem, StopReason, perturb, predict, without,
+};
 use crate::start::{find_start_along, problem_of};
 use crate::study::row::annotated;
 use crate::task::milliseconds;
@@ -140,8 +142,8 @@ impl<'a> LoadedFrame<'a> {
         mut go_on: impl FnMut(&Fitter) -> bool,
     ) -> Vec<Result<Stop, String>> {
         let began = Instant::now();
-        let given = if start.given { start.params.positions().iter().copied().map(Some).collect() } else { Vec::new() };
-        let state = FitState::given(start.params.clone(), given);
+        let params = start.params.clone();
+        let state = if start.given { FitState::given(GivenStart::whole(params)) } else { FitState::at_start(params) };
         let begun = Fitter::starting_at(Arc::clone(&self.seen), *config, precision, state);
         *fitter = begun.map_err(|error| self.told(&error));
         let mut ended = false;

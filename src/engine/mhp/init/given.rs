@@ -8,15 +8,6 @@ use crate::geometry::Vec3;
 use crate::mhp::Problem;
 use crate::mhp::template::Template;
 
-/// Where a fit begins that is given, and not found in the maps.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GivenStart {
-    /// All of the persons.
-    pub params: Pppr,
-    /// Those of their joints that were given, m, world frame; `None` for one that is only assumed.
-    pub given: Vec<Option<Vec3>>,
-}
-
 /// The joints of a standing body of this skeleton: x forward, y to its left, z up from the floor, m.
 pub fn standing_joints(skeleton: &Skeleton) -> Vec<Vec3> {
     Template::new(skeleton).joints

@@ -36,7 +36,7 @@ mod tests;
 mod velocity;
 mod warm;
 
-pub use given::{GivenStart, standing_joints, start_at};
+pub use given::{standing_joints, start_at};
 pub use perturb::perturb;
 pub use warm::predict;
 

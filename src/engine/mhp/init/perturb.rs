@@ -48,7 +48,7 @@ pub(super) fn missed<T>(problem: &Problem, init: &InitConfig, items: Vec<T>) -> 
     (items(kept), items(missed))
 }
 
-/// Adds bias and noise to positions and velocities, as the settings of a start ask for it.
+/// Adds the bias and noise that settings ask for to positions (m) and velocities (m/s) of a start; paper section 5.5.3.
 pub fn perturb(problem: &Problem, init: &InitConfig, params: &mut Pppr) {
     if init.position_bias_m > 0.0 {
         let mut rng = generator(problem, init.seed, Purpose::Bias);

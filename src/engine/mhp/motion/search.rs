@@ -448,7 +448,8 @@ pub(in crate::mhp) fn search(
         let mut ends: Vec<Hypothesis> = all.iter().map(|tried| search.hypothesis(tried, person)).collect();
         // Of maps that no body explains the search ends anywhere; a path can go through what the network expects there.
         for (_, mut tried) in of_network {
-            search.settle(&mut tried, 0);
+            let loss = search.evaluate(&tried.state.coordinates);
+            tried.take(loss, &search.loss);
             ends.push(search.hypothesis(&tried, person));
         }
         sort_by_loss(&mut ends);

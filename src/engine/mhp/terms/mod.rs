@@ -96,6 +96,13 @@ pub enum Scope {
     Given,
 }
 
+impl Scope {
+    /// Whether a term is evaluated where its weight is above 0 alone.
+    pub(super) fn needs_weight(self) -> bool {
+        matches!(self, Self::Weighed | Self::Given)
+    }
+}
+
 /// A colour by its role; the theme says which shade it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hue {
@@ -222,7 +229,7 @@ pub(super) fn evaluate(
 ) -> Terms {
     let mut values = Terms::default();
     for (place, term) in TERMS.iter().enumerate() {
-        if matches!(term.scope, Scope::Weighed | Scope::Given) && term.weight.of(inputs.config) <= 0.0 {
+        if term.scope.needs_weight() && term.weight.of(inputs.config) <= 0.0 {
             continue;
         }
         let gradient = &mut gradients[term.weight as usize];

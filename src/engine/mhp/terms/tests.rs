@@ -1,7 +1,7 @@
 //! What every line of the table keeps, the term that only unit tests have among them.
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
-use super::{Inputs, Scope, TERMS, TermGroup, TermId, Terms, WHOLE, Weight, evaluate, formula, weighted_sum_into};
+use super::{Inputs, TERMS, TermGroup, TermId, Terms, WHOLE, Weight, evaluate, formula, weighted_sum_into};
 use crate::body::{Group, Pppr, PpprShape, Skeleton};
 use crate::config::{Field, FitConfig, Value};
 use crate::geometry::Vec3;
@@ -136,9 +136,7 @@ fn a_line_of_the_table_says_all_there_is_to_say() {
         field.set(&mut config, Value::Number(0.375));
         assert_eq!(weight.of(&config), 0.375, "{}", weight.key());
         assert!(weight.terms().next().is_some(), "{} weighs nothing", weight.key());
-        assert!(weight.terms().all(
-            |term| !matches!(term.scope, Scope::Weighed | Scope::Given) || weight.of(&FitConfig::default()) == 0.0
-        ));
+        assert!(weight.terms().all(|term| !term.scope.needs_weight() || weight.of(&FitConfig::default()) == 0.0));
     }
     let grouped: usize = TermGroup::ALL.iter().map(|group| group.terms().count()).sum();
     assert_eq!(grouped, TERMS.len());
