@@ -21,7 +21,7 @@
 //! Where no body explains the maps of such a path, those that a network expects are decoded likewise, with losses that say how
 //! unlikely it calls them.
 
-use super::search::Hypothesis;
+use super::hypothesis::Hypothesis;
 use crate::geometry::{Vec3, flat_distance, mean, norm};
 use std::f64::consts::PI;
 use std::iter::zip;

@@ -25,6 +25,7 @@ mod apart;
 mod clutter;
 mod decode;
 mod ground;
+mod hypothesis;
 mod lbfgs;
 mod proportions;
 mod reduced;
@@ -37,8 +38,9 @@ mod tilt;
 mod turn;
 
 pub(super) use decode::{Decoded, Stage, carried, decode, lowest};
+pub(super) use hypothesis::{Hypothesis, Searched};
 pub(super) use reduced::ReducedViews;
-pub(super) use search::{Hypothesis, Searched, carry_on, search};
+pub(super) use search::{carry_on, search};
 pub(super) use tilt::later;
 pub(super) use turn::turn;
 

@@ -6,18 +6,17 @@
 //! runner-up with another heading and how far it is behind are told, for a body seen from behind is a hypothesis, not an error. So is
 //! what the network expects, as it says it.
 
-use super::decode::lowest;
+use super::hypothesis::{Hypothesis, Searched, away, sort_by_loss, spin};
 use super::{
-    BODY, Detail, HEIGHT, Held, LN_SIZE, MotionState, STILL, TILT, UNITS, WALKING_MPS, Window, WindowLoss, YAW, kind,
-    lbfgs, tilt, ways,
+    BODY, Detail, HEIGHT, Held, LN_SIZE, MotionState, STILL, TILT, UNITS, Window, WindowLoss, YAW, kind, lbfgs, tilt,
+    ways,
 };
 use crate::body::{Group, Pppr};
 use crate::config::FitConfig;
 use crate::geometry::{Vec3, mean, mean_distance, norm, sub};
-use crate::mhp::pose_network::Expected;
 use crate::mhp::skin::{Skin, radar_place};
 use crate::mhp::{FitError, Precision, Problem, tiles};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 use std::iter::zip;
 use std::ops::Range;
 
@@ -49,10 +48,6 @@ const FALLEN: usize = 4;
 const LIES_RAD: f64 = 0.3;
 /// What a body that a network calls e times less likely than another has more than its loss of 1.
 const UNLIKELIER: f64 = 0.25;
-/// A heading whose loss is larger by a smaller share than this is as good.
-const AMBIGUOUS: f64 = 0.1;
-/// Headings farther apart than this are different ones.
-const ANOTHER_HEADING: f64 = PI / 3.0;
 /// What a metre between the middle of a body and that of the start counts of L_EM: echo shows where somebody is to a few
 /// centimetres, and a body that has to be elsewhere explains something else.
 const OF_WAY: f64 = 0.4;
@@ -82,48 +77,6 @@ enum Way {
     Free,
     /// By the bend of the loss.
     Bent,
-}
-
-/// A body that a search ended at, in the frame that is fitted.
-#[derive(Debug, Clone, PartialEq)]
-pub(in crate::mhp) struct Hypothesis {
-    /// L of the window, by the search's weights, with this body in it, but for the network's share.
-    pub(in crate::mhp) loss: f64,
-    /// That share, w_net · L_net.
-    pub(in crate::mhp) network: f64,
-    /// How little it explains the maps ([`super::unlikeness`]), and how far it is from the start.
-    pub(in crate::mhp) unlikeness: f64,
-    /// Where it looks, rad.
-    pub(in crate::mhp) yaw: f64,
-    /// How unusual it is to look there: of who walks 0 ahead, 1 back; who lies is as unusual, 1.
-    pub(in crate::mhp) away: f64,
-    /// Of who stands 0 at the radar, 1 the other way: unusual of who does not turn about.
-    pub(in crate::mhp) averted: f64,
-    /// How fast it turns about itself, rad/s.
-    pub(in crate::mhp) spin: f64,
-    /// Its joints, world frame, m.
-    pub(in crate::mhp) joints: Vec<Vec3>,
-    /// Their velocities, m/s.
-    pub(in crate::mhp) velocities: Vec<Vec3>,
-    /// How opaque they are: what static echoes leave.
-    pub(in crate::mhp) beta: Vec<f64>,
-    /// q.
-    pub(in crate::mhp) still: f64,
-}
-
-/// What a search found.
-#[derive(Debug, Clone, PartialEq)]
-pub(in crate::mhp) struct Searched {
-    /// The start's own loss.
-    pub(in crate::mhp) begun: f64,
-    /// What the search ended at, and what a network expects as it says it, a list a person, the lowest loss first; none is empty.
-    pub(in crate::mhp) persons: Vec<Vec<Hypothesis>>,
-    /// The bodies that a network expects each person to be, as it says them; of nobody where it is not asked.
-    pub(in crate::mhp) expected: Vec<Vec<Hypothesis>>,
-    /// All that it says of them.
-    pub(in crate::mhp) network: Vec<Option<Expected>>,
-    /// How each person is to move, m, where the pose there is not believed.
-    pub(in crate::mhp) moved: Vec<Vec3>,
 }
 
 /// A start on its way.
@@ -506,11 +459,6 @@ pub(in crate::mhp) fn carry_on(
     Ok(())
 }
 
-/// The lowest loss of the search first, the network's share with it.
-fn sort_by_loss(found: &mut [Hypothesis]) {
-    found.sort_by(|a, b| (a.loss + a.network).total_cmp(&(b.loss + b.network)));
-}
-
 /// The settings, with a search's weights.
 fn weighted(config: &FitConfig) -> FitConfig {
     let [w_em, w_prior] = WEIGHTS;
@@ -537,95 +485,9 @@ fn way(problem: &Problem, params: &Pppr, person: usize, found: &[Hypothesis]) ->
     if norm(way) <= MOST_MOVED_M { way } else { [0.0; 3] }
 }
 
-/// How unusual it is to look along `yaw` with these velocities, m/s, before a radar that lies in this direction: of who walks, and of
-/// who stands.
-fn away(yaw: f64, velocities: &[Vec3], to_radar: Vec3) -> [f64; 2] {
-    let opposed = |[x, y, _]: Vec3| 0.5 - 0.5 * (yaw - y.atan2(x)).cos();
-    let goes = mean(velocities);
-    if norm(goes) >= WALKING_MPS { [opposed(goes), 0.0] } else { [0.0, opposed(to_radar)] }
-}
-
-/// How fast joints turn about the vertical axis through their middle, rad/s.
-fn spin(joints: &[Vec3], velocities: &[Vec3]) -> f64 {
-    let (middle, goes) = (mean(joints), mean(velocities));
-    let (mut momentum, mut inertia) = (0.0, 0.0);
-    for (joint, velocity) in joints.iter().zip(velocities) {
-        let (at, v) = (sub(*joint, middle), sub(*velocity, goes));
-        momentum += at[0] * v[1] - at[1] * v[0];
-        inertia += at[0] * at[0] + at[1] * at[1];
-    }
-    momentum / inertia.max(1e-9)
-}
-
 /// The middle of a person's hips, or of all its joints where it has none, world frame, m.
 pub(super) fn hips_of(problem: &Problem, params: &Pppr, person: usize, joints: usize) -> [f64; 3] {
     let named = (0..joints).filter(|&joint| crate::body::is_named(&problem.skeleton, joint, &["hip", "pelvis"]));
     let hips: Vec<_> = named.map(|joint| params.position(person * joints + joint)).collect();
     if hips.is_empty() { crate::geometry::mean(params.person(person)) } else { crate::geometry::mean(&hips) }
-}
-
-impl Hypothesis {
-    /// Makes a person of `params` this body.
-    pub(in crate::mhp) fn place(&self, person: usize, params: &mut Pppr) {
-        let joints = params.shape().joints;
-        let own = person * joints..(person + 1) * joints;
-        let [positions, velocities] = params.motion_mut();
-        positions[own.clone()].copy_from_slice(&self.joints);
-        velocities[own.clone()].copy_from_slice(&self.velocities);
-        params.group_mut(Group::Beta)[own].copy_from_slice(&self.beta);
-    }
-
-    /// By how much it is turned against another, rad, at most π.
-    pub(super) fn turned(&self, other: &Self) -> f64 {
-        let turn = (self.yaw - other.yaw).rem_euclid(TAU);
-        turn.min(TAU - turn)
-    }
-}
-
-impl Searched {
-    /// In words, where `costs` of the last person's hypotheses decided.
-    pub(in crate::mhp) fn note(&self, costs: &[f64]) -> String {
-        let Some(last) = self.persons.last() else { return String::new() };
-        let Some(best) = lowest(costs).and_then(|k| last.get(k).map(|found| (k, found))) else { return String::new() };
-        let (k, found) = best;
-        let others = last.iter().zip(costs).filter(|(other, _)| other.turned(found) > ANOTHER_HEADING);
-        let other = match others.min_by(|a, b| a.1.total_cmp(b.1)) {
-            Some((other, cost)) => {
-                let behind = cost / costs[k] - 1.0;
-                let doubt = if behind < AMBIGUOUS { "; heading ambiguous: " } else { "; " };
-                format!("{doubt}turned by {:.0}° it is {:.1} % worse", other.turned(found).to_degrees(), 100.0 * behind)
-            }
-            None => String::new(),
-        };
-        format!("motion: loss {:.3} → {:.3}{other}", self.begun, found.loss)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn who_stands_looks_at_the_radar_and_who_walks_ahead() {
-        let to_radar = [-3.0, 0.0, 0.2];
-        let of = |yaw: f64, goes: Vec3| away(yaw, &[goes; 4], to_radar);
-        let near = |found: [f64; 2], expected: [f64; 2]| {
-            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}, {expected:?}");
-        };
-        let (still, left) = ([0.1, 0.0, 0.0], [0.0, 1.0, 0.0]);
-        near(of(PI, still), [0.0, 0.0]);
-        near(of(0.0, still), [0.0, 1.0]);
-        near(of(0.5 * PI, left), [0.0, 0.0]);
-        near(of(-0.5 * PI, left), [1.0, 0.0]);
-    }
-
-    #[test]
-    fn a_body_that_turns_about_itself_while_it_goes_is_seen_to() {
-        let joints = [[3.0, 0.2, 0.0], [3.0, -0.2, 0.0], [3.2, 0.0, 0.5], [2.8, 0.0, 0.5]];
-        for rate in [-1.5, 0.0, 0.3] {
-            let velocities = joints.map(|[x, y, _]| [0.4 - rate * y, 0.1 + rate * (x - 3.0), 0.2]);
-            assert!((spin(&joints, &velocities) - rate).abs() < 1e-12);
-        }
-        assert_eq!(spin(&[[1.0, 2.0, 0.0]], &[[3.0, 0.0, 0.0]]), 0.0, "a point turns about nothing");
-    }
 }
