@@ -9,6 +9,7 @@
     reason = "all of it belongs into the one function that is compiled for an instruction set"
 )]
 
+mod aligned;
 mod point;
 
 use super::adjoint::Moments;
@@ -18,6 +19,7 @@ use super::levels::{LevelTotals, REGULARISER};
 use super::percentile::place;
 use super::splat::Splats;
 use crate::config::EmLoss;
+use aligned::AlignedF32s;
 use point::{LOWERED, Reach, RowPoint, SLOPE_UNIT};
 use pulp::{Arch, Simd, WithSimd};
 use std::f32::consts::LN_2;
@@ -39,11 +41,11 @@ pub(super) struct LevelRows {
     lo: [usize; 2],
     size: [usize; 2],
     stride: usize,
-    measured: Vec<f32>,
-    by_noise: Vec<f32>,
-    base: Vec<f32>,
+    measured: AlignedF32s,
+    by_noise: AlignedF32s,
+    base: AlignedF32s,
     /// B_ori, 1 or 0.
-    marked: Vec<f32>,
+    marked: AlignedF32s,
     /// Where cells are erased, ascending: they are as those beyond the region.
     erased: Vec<u32>,
 }
@@ -52,15 +54,14 @@ pub(super) struct LevelRows {
 #[derive(Debug, Default)]
 pub(super) struct RowScratch {
     points: Vec<RowPoint>,
-    /// Where each point reaches, and what it returns there.
+    /// Where each point reaches, and what is kept of what it returns there.
     reaches: Vec<Reach>,
-    returns: Vec<f32>,
-    ridge: Vec<f32>,
+    kept: AlignedF32s,
     /// The cells of the rows that something reaches: whole registers.
     lit: Range<usize>,
-    power: Vec<f32>,
+    power: AlignedF32s,
     /// ∂L/∂(g S), and then what a joint's return is to be multiplied by.
-    slopes: Vec<f32>,
+    slopes: AlignedF32s,
     ranked: Vec<u32>,
 }
 
@@ -88,8 +89,8 @@ impl LevelRows {
         let [rows, columns] = bins else { return None };
         let (lo, size) = ([rows[0], columns[0]], [rows[1] - rows[0], columns[1] - columns[0]]);
         let stride = size[1].div_ceil(LANES) * LANES;
-        let padded = |of: &dyn Fn(usize) -> f32| -> Vec<f32> {
-            let mut padded = vec![0.0; size[0] * stride];
+        let padded = |of: &dyn Fn(usize) -> f32| {
+            let mut padded = AlignedF32s::zeros(size[0] * stride);
             for (row, to) in padded.chunks_exact_mut(stride.max(1)).enumerate() {
                 for (column, to) in to[..size[1]].iter_mut().enumerate() {
                     *to = of(row * size[1] + column);
@@ -175,10 +176,10 @@ impl WithSimd for Evaluate<'_> {
             let by_power = 1.0 / (gain * (sum * unit + REGULARISER));
             let factor = 2.0 * factor * gain * strongest * SLOPE_UNIT;
             scratch.weigh(simd, rows, [factor as f32, (through_gain * by_power) as f32]);
-            let (returns, _) = S::as_simd_f32s(&scratch.returns);
+            let (kept, _) = S::as_simd_f32s(&scratch.kept);
             let (slopes, _) = S::as_simd_f32s(&scratch.slopes);
             for (joint, (point, reach)) in zip(&scratch.points, &scratch.reaches).enumerate() {
-                moments.add(joint, &point.collect(simd, (rows, reach), (returns, slopes)));
+                moments.add(joint, &point.collect(simd, (rows, reach), (kept, slopes)));
             }
         }
         (ViewLoss { loss, iou }, among)
@@ -212,27 +213,26 @@ impl RowScratch {
     /// Σ (AK)² of every cell.
     #[inline(always)]
     fn sum<S: Simd>(&mut self, simd: S, rows: &LevelRows, cut: f64) {
-        self.power.clear();
-        self.power.resize(rows.size[0] * rows.stride, 0.0);
-        let Self { points, reaches, returns, ridge, lit, power, .. } = self;
+        self.power.reset(rows.size[0] * rows.stride);
+        let Self { points, reaches, kept, lit, power, .. } = self;
         reaches.clear();
-        let mut kept = 0;
+        let mut registers = 0;
         let mut lit_rows = (rows.size[0], 0);
         for point in points.iter() {
-            let reach = point.reach(rows, cut, kept);
-            kept += reach.returns::<S>();
+            let reach = point.reach(rows, cut, registers);
+            registers += reach.registers_kept::<S>();
             if !reach.is_empty() {
                 lit_rows = (lit_rows.0.min(reach.rows.0), lit_rows.1.max(reach.rows.1));
             }
             reaches.push(reach);
         }
         *lit = lit_rows.0.min(lit_rows.1) * rows.stride..lit_rows.1 * rows.stride;
-        if returns.len() < kept * S::F32_LANES {
-            returns.resize(kept * S::F32_LANES, 0.0);
+        if kept.len() < registers * S::F32_LANES {
+            kept.hold(registers * S::F32_LANES);
         }
-        let ((returns, _), (power, _)) = (S::as_mut_simd_f32s(returns), S::as_mut_simd_f32s(power));
+        let ((kept, _), (power, _)) = (S::as_mut_simd_f32s(kept), S::as_mut_simd_f32s(power));
         for (point, reach) in zip(points, reaches) {
-            point.spread(simd, (rows, reach), ridge, (&mut *returns, &mut *power));
+            point.spread(simd, (rows, reach), (&mut *kept, &mut *power));
         }
         rows.blank(&mut self.power, &self.lit);
     }
@@ -255,7 +255,7 @@ impl RowScratch {
     /// `ncc_db`, ∂L/∂(g S) of each cell into `slopes`, and Σ of its product with g S.
     #[inline(always)]
     fn correlations<S: Simd>(&mut self, simd: S, (rows, totals): (&LevelRows, &LevelTotals), gain: f32) -> (f64, f64) {
-        self.slopes.resize(self.power.len(), 0.0);
+        self.slopes.hold(self.power.len());
         let (gain, one) = (splat(simd, gain), splat(simd, 1.0));
         let mut sums = [0.0; 3];
         let chunk = 32 * LANES;
@@ -304,7 +304,7 @@ impl RowScratch {
     /// `gamma`, and the same of it.
     #[inline(always)]
     fn divergences<S: Simd>(&mut self, simd: S, (rows, totals): (&LevelRows, &LevelTotals), gain: f32) -> (f64, f64) {
-        self.slopes.resize(self.power.len(), 0.0);
+        self.slopes.hold(self.power.len());
         let (gain, one) = (splat(simd, gain), splat(simd, 1.0));
         let by_count = splat(simd, (1.0 / totals.count) as f32);
         let (mut loss, mut product) = (0.0, 0.0);

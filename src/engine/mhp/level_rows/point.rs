@@ -52,7 +52,8 @@ pub(super) struct RowPoint {
 pub(super) struct Reach {
     pub(super) rows: (usize, usize),
     columns: (usize, usize),
-    /// In which register what it returns begins: those of a block of columns, row by row, then those of the next.
+    /// In which register what is kept of it begins. Where returns are products: a share a row, and then of each block of columns what
+    /// its first row has and what that is multiplied by from row to row; else what it returns, a block after the other, row by row.
     kept: usize,
     /// Where returns are products: how far the point reaches to either side.
     aside: Option<f32>,
@@ -84,25 +85,32 @@ impl Reach {
         self.rows.1 - self.rows.0
     }
 
-    /// Registers of what is returned there.
+    /// Registers of the shares of rows, and those that are kept of each register of a row.
     #[inline(always)]
-    pub(super) fn returns<S: Simd>(&self) -> usize {
-        self.count() * self.registers::<S>().len()
+    fn each<S: Simd>(&self) -> (usize, usize) {
+        if self.aside.is_some() { (self.count().div_ceil(S::F32_LANES), 2) } else { (0, self.count()) }
     }
 
-    /// Blocks of registers that are summed side by side, each with where what is returned there lies.
+    /// Registers that are kept.
+    #[inline(always)]
+    pub(super) fn registers_kept<S: Simd>(&self) -> usize {
+        let (of_rows, each) = self.each::<S>();
+        of_rows + each * self.registers::<S>().len()
+    }
+
+    /// Blocks of registers that are summed side by side, each with where, behind the shares of rows, lies what is kept of it.
     #[inline(always)]
     fn blocks<S: Simd>(&self) -> impl Iterator<Item = (Range<usize>, Range<usize>)> + use<S> {
-        let (registers, count, kept) = (self.registers::<S>(), self.count(), self.kept);
+        let (registers, (_, each)) = (self.registers::<S>(), self.each::<S>());
         registers.clone().step_by(ABREAST).map(move |from| {
-            let (to, at) = ((from + ABREAST).min(registers.end), kept + (from - registers.start) * count);
-            (from..to, at..at + (to - from) * count)
+            let (to, at) = ((from + ABREAST).min(registers.end), (from - registers.start) * each);
+            (from..to, at..at + (to - from) * each)
         })
     }
 }
 
 impl RowPoint {
-    /// Where the point is above a level, its returns kept from this register on.
+    /// Where the point is above a level; what is kept of it begins in this register.
     #[inline(always)]
     pub(super) fn reach(&self, rows: &LevelRows, cut: f64, kept: usize) -> Reach {
         let height = self.top - cut;
@@ -135,22 +143,21 @@ impl RowPoint {
         holds.then_some(half as f32)
     }
 
-    /// Adds what the point returns to `power`, and keeps it; `ridge` is scratch.
+    /// Adds what the point returns to `power`, and keeps what tells it.
     #[inline(always)]
     pub(super) fn spread<S: Simd>(
         &self,
         simd: S,
         (rows, reach): (&LevelRows, &Reach),
-        ridge: &mut Vec<f32>,
-        (returns, power): (&mut [S::f32s], &mut [S::f32s]),
+        (kept, power): (&mut [S::f32s], &mut [S::f32s]),
     ) {
         let stride = rows.stride / S::F32_LANES;
         let power = &mut power[reach.rows.0 * stride..reach.rows.1 * stride];
-        if reach.aside.is_some() {
-            self.fill_ridge(simd, (rows, reach), ridge);
-        }
-        for (block, kept) in reach.blocks::<S>() {
-            let (kept, at) = (&mut returns[kept], (rows, reach, block.start));
+        let (ridge, kept) = kept[reach.kept..].split_at_mut(reach.each::<S>().0);
+        self.fill_ridge(simd, (rows, reach), ridge);
+        let ridge: &[f32] = bytemuck::cast_slice(ridge);
+        for (block, at) in reach.blocks::<S>() {
+            let (kept, at) = (&mut kept[at], (rows, reach, block.start));
             match block.len() {
                 1 => self.spread_block::<S, 1>(simd, at, ridge, (kept, power)),
                 2 => self.spread_block::<S, 2>(simd, at, ridge, (kept, power)),
@@ -174,18 +181,14 @@ impl RowPoint {
 
     /// The share of each row.
     #[inline(always)]
-    fn fill_ridge<S: Simd>(&self, simd: S, (rows, reach): (&LevelRows, &Reach), ridge: &mut Vec<f32>) {
-        let whole = reach.count().div_ceil(S::F32_LANES) * S::F32_LANES;
-        if ridge.len() < whole {
-            ridge.resize(whole, 0.0);
-        }
+    fn fill_ridge<S: Simd>(&self, simd: S, (rows, reach): (&LevelRows, &Reach), ridge: &mut [S::f32s]) {
         let [w0, w1] = self.weight;
         let falls = splat(simd, -(w0 + w1 * self.skew * self.skew) as f32);
         let top = splat(simd, (self.top + LIFTS[0]) as f32);
         // Beyond the last row nothing is asked.
         let lowest = splat(simd, LOWEST as f32);
         let mut y = steps(simd) + splat(simd, self.first_row(rows, reach));
-        for share in S::as_mut_simd_f32s(&mut ridge[..whole]).0 {
+        for share in ridge {
             *share = (y * y).mul_add(falls, top).max(lowest).exp2().value;
             y += splat(simd, S::F32_LANES as f32);
         }
@@ -215,13 +218,16 @@ impl RowPoint {
                     let beside = columns[k] + splat(simd, skew * y);
                     let log2 = (beside * beside).mul_add(falls, at_row);
                     let returned = log2.select_gt(faintest, log2.max(faintest).exp2(), splat(simd, 0.0));
-                    add(simd, returned, (&mut kept[k], &mut row[register + k]));
+                    kept[k] = returned.value;
+                    row[register + k] = (Lanes::new(simd, row[register + k]) + returned).value;
                 }
                 y += 1.0;
             }
             return;
         };
-        let [mut share, mut by_row] = [[splat(simd, 0.0); N]; 2];
+        let Some([shares, by_rows]) = halves_mut::<_, N>(kept) else { return };
+        let mut share = [splat(simd, 0.0); N];
+        let mut by_row = share;
         let (aside, lift, zero) = (splat(simd, aside), splat(simd, LIFTS[1] as f32), splat(simd, 0.0));
         for k in 0..N {
             let x = columns[k];
@@ -231,13 +237,12 @@ impl RowPoint {
             let beyond = x.abs();
             share[k] = beyond.select_gt(aside, zero, log2.exp2());
             by_row[k] = beyond.select_gt(aside, zero, by_row_log2).exp2_precise();
+            (shares[k], by_rows[k]) = (share[k].value, by_row[k].value);
         }
-        for ((kept, row), at_row) in zip(zip(kept.chunks_exact_mut(N), power.chunks_exact_mut(stride)), ridge) {
-            let (Some(kept), Some(row)) = (kept.first_chunk_mut::<N>(), row[register..].first_chunk_mut::<N>()) else {
-                break;
-            };
+        for (row, at_row) in zip(power.chunks_exact_mut(stride), ridge) {
+            let Some(row) = row[register..].first_chunk_mut::<N>() else { break };
             for k in 0..N {
-                add(simd, share[k] * splat(simd, *at_row), (&mut kept[k], &mut row[k]));
+                row[k] = share[k].mul_add(splat(simd, *at_row), Lanes::new(simd, row[k])).value;
                 share[k] = share[k] * by_row[k];
             }
         }
@@ -249,18 +254,20 @@ impl RowPoint {
         &self,
         simd: S,
         (rows, reach): (&LevelRows, &Reach),
-        (returns, slopes): (&[S::f32s], &[S::f32s]),
+        (kept, slopes): (&[S::f32s], &[S::f32s]),
     ) -> Sums {
         let stride = rows.stride / S::F32_LANES;
         let slopes = &slopes[reach.rows.0 * stride..reach.rows.1 * stride];
         let mut sums = [splat(simd, 0.0); 6];
-        for (block, kept) in reach.blocks::<S>() {
-            let (kept, at) = (&returns[kept], (rows, reach, block.start));
+        let (ridge, kept) = kept[reach.kept..].split_at(reach.each::<S>().0);
+        let ridge: &[f32] = bytemuck::cast_slice(ridge);
+        for (block, at) in reach.blocks::<S>() {
+            let (kept, at) = (&kept[at], (rows, reach, block.start));
             match block.len() {
-                1 => self.collect_block::<S, 1>(simd, at, (kept, slopes), &mut sums),
-                2 => self.collect_block::<S, 2>(simd, at, (kept, slopes), &mut sums),
-                3 => self.collect_block::<S, 3>(simd, at, (kept, slopes), &mut sums),
-                _ => self.collect_block::<S, ABREAST>(simd, at, (kept, slopes), &mut sums),
+                1 => self.collect_block::<S, 1>(simd, at, ridge, (kept, slopes), &mut sums),
+                2 => self.collect_block::<S, 2>(simd, at, ridge, (kept, slopes), &mut sums),
+                3 => self.collect_block::<S, 3>(simd, at, ridge, (kept, slopes), &mut sums),
+                _ => self.collect_block::<S, ABREAST>(simd, at, ridge, (kept, slopes), &mut sums),
             }
         }
         let mut totals = [0.0; 6];
@@ -277,23 +284,32 @@ impl RowPoint {
         &self,
         simd: S,
         (rows, reach, register): (&LevelRows, &Reach, usize),
+        ridge: &[f32],
         (kept, slopes): (&[S::f32s], &[S::f32s]),
         sums: &mut [Lanes<S>; 6],
     ) {
-        // Σ r, r y and r y² over the rows, a number a column.
-        let [mut r, mut r_y, mut r_yy] = [[splat(simd, 0.0); N]; 3];
-        let mut y = splat(simd, self.first_row(rows, reach));
-        for (kept, row) in zip(kept.chunks_exact(N), slopes.chunks_exact(rows.stride / S::F32_LANES)) {
-            let (Some(kept), Some(row)) = (kept.first_chunk::<N>(), row[register..].first_chunk::<N>()) else { break };
-            let y_y = y * y;
-            for k in 0..N {
-                let wanted = Lanes::new(simd, kept[k]) * Lanes::new(simd, row[k]);
-                r[k] += wanted;
-                r_y[k] = wanted.mul_add(y, r_y[k]);
-                r_yy[k] = wanted.mul_add(y_y, r_yy[k]);
+        let slopes = slopes.chunks_exact(rows.stride / S::F32_LANES);
+        let mut of = Columns::<S, N>::from_row(splat(simd, self.first_row(rows, reach)));
+        if reach.aside.is_some() {
+            let Some([shares, by_rows]) = halves::<_, N>(kept) else { return };
+            let mut share = shares.map(|share| Lanes::new(simd, share));
+            for (row, at_row) in zip(slopes, ridge) {
+                let Some(row) = row[register..].first_chunk::<N>() else { break };
+                let at_row = splat(simd, *at_row);
+                of.add(simd, |k| share[k] * at_row * Lanes::new(simd, row[k]));
+                for k in 0..N {
+                    share[k] = share[k] * Lanes::new(simd, by_rows[k]);
+                }
             }
-            y += splat(simd, 1.0);
+        } else {
+            for (row, kept) in zip(slopes, kept.chunks_exact(N)) {
+                let (Some(kept), Some(row)) = (kept.first_chunk::<N>(), row[register..].first_chunk::<N>()) else {
+                    break;
+                };
+                of.add(simd, |k| Lanes::new(simd, kept[k]) * Lanes::new(simd, row[k]));
+            }
         }
+        let Columns { r, r_y, r_yy, .. } = of;
         for k in 0..N {
             let x = self.columns(simd, rows, register + k);
             let r_x = r[k] * x;
@@ -307,11 +323,48 @@ impl RowPoint {
     }
 }
 
-/// Keeps what a point returns in a register of cells, and adds it to them.
+/// Σ r, r y and r y² over rows, a number a column.
+struct Columns<S: Simd, const N: usize> {
+    y: Lanes<S>,
+    r: [Lanes<S>; N],
+    r_y: [Lanes<S>; N],
+    r_yy: [Lanes<S>; N],
+}
+
+impl<S: Simd, const N: usize> Columns<S, N> {
+    /// Nothing yet; the first row is `y` from the middle.
+    #[inline(always)]
+    fn from_row(y: Lanes<S>) -> Self {
+        let nothing = [y - y; N];
+        Self { y, r: nothing, r_y: nothing, r_yy: nothing }
+    }
+
+    /// Adds a row.
+    #[inline(always)]
+    fn add(&mut self, simd: S, wanted: impl Fn(usize) -> Lanes<S>) {
+        let y_y = self.y * self.y;
+        for k in 0..N {
+            let wanted = wanted(k);
+            self.r[k] += wanted;
+            self.r_y[k] = wanted.mul_add(self.y, self.r_y[k]);
+            self.r_yy[k] = wanted.mul_add(y_y, self.r_yy[k]);
+        }
+        self.y += splat(simd, 1.0);
+    }
+}
+
+/// What is kept of a block whose returns are products.
 #[inline(always)]
-fn add<S: Simd>(simd: S, returned: Lanes<S>, (kept, cells): (&mut S::f32s, &mut S::f32s)) {
-    *kept = returned.value;
-    *cells = (Lanes::new(simd, *cells) + returned).value;
+fn halves<T, const N: usize>(kept: &[T]) -> Option<[&[T; N]; 2]> {
+    let (first, rest) = kept.split_first_chunk()?;
+    Some([first, rest.first_chunk()?])
+}
+
+/// The same, to be filled in.
+#[inline(always)]
+fn halves_mut<T, const N: usize>(kept: &mut [T]) -> Option<[&mut [T; N]; 2]> {
+    let (first, rest) = kept.split_first_chunk_mut()?;
+    Some([first, rest.first_chunk_mut()?])
 }
 
 /// 0, 1, 2, … of a register.
@@ -336,10 +389,10 @@ mod tests {
         fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
             let Self(point, rows, slopes, cut) = self;
             let reach = point.reach(rows, cut, 0);
-            let mut returns = vec![0.0; reach.returns::<S>() * S::F32_LANES];
+            let mut kept = vec![0.0; reach.registers_kept::<S>() * S::F32_LANES];
             let mut power = vec![0.0; rows.size[0] * rows.stride];
-            let ((kept, _), (cells, _)) = (S::as_mut_simd_f32s(&mut returns), S::as_mut_simd_f32s(&mut power));
-            point.spread(simd, (rows, &reach), &mut Vec::new(), (&mut *kept, cells));
+            let ((kept, _), (cells, _)) = (S::as_mut_simd_f32s(&mut kept), S::as_mut_simd_f32s(&mut power));
+            point.spread(simd, (rows, &reach), (&mut *kept, cells));
             let sums = point.collect(simd, (rows, &reach), (kept, S::as_simd_f32s(slopes).0));
             (reach.aside.is_some(), power, sums)
         }
