@@ -10,6 +10,8 @@ use std::ops::{AddAssign, Mul};
 
 /// Sums side by side: registers hold as many while others are loaded.
 const SUMS: usize = 16;
+/// Rows that are added before what they are added to is written again.
+const ROWS: usize = 4;
 
 /// bias + W x: `weight` (outputs, inputs) in C order, `bias` (outputs), `x` (inputs), of one unit; returns (outputs).
 pub fn dense(weight: &[f32], bias: &[f32], x: &[f32]) -> Vec<f32> {
@@ -63,8 +65,22 @@ impl<T: Summand> WithSimd for AddRows<'_, T> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let Self { out, rows, weights, from } = self;
-        for (row, &weight) in rows.chunks_exact(out.len().max(1)).zip(weights) {
-            for (out, of) in out[from..].iter_mut().zip(&row[from..]) {
+        let columns = out.len();
+        let out = &mut out[from..];
+        let (few, rest) = weights.as_chunks::<ROWS>();
+        let (of_few, of_rest) = rows.split_at((few.len() * ROWS * columns).min(rows.len()));
+        for (rows, weights) in of_few.chunks_exact((ROWS * columns).max(1)).zip(few) {
+            let of: [&[T]; ROWS] = std::array::from_fn(|k| &rows[k * columns + from..(k + 1) * columns][..out.len()]);
+            for (column, out) in out.iter_mut().enumerate() {
+                let mut sum = *out;
+                for k in 0..ROWS {
+                    sum += weights[k] * of[k][column];
+                }
+                *out = sum;
+            }
+        }
+        for (row, &weight) in of_rest.chunks_exact(columns.max(1)).zip(rest) {
+            for (out, of) in out.iter_mut().zip(&row[from..]) {
                 *out += weight * *of;
             }
         }
@@ -85,9 +101,16 @@ fn product<T: Summand>(a: &[T], b: &[T]) -> T {
     for (a, b) in a_rest.iter().zip(b_rest) {
         total += *a * *b;
     }
-    for sum in sums {
-        total += sum;
+    // Halves onto each other: a sum one after the other would wait for each.
+    let mut width = SUMS / 2;
+    while width > 0 {
+        for k in 0..width {
+            let other = sums[k + width];
+            sums[k] += other;
+        }
+        width /= 2;
     }
+    total += sums[0];
     total
 }
 

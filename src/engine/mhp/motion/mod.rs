@@ -54,7 +54,7 @@ use crate::geometry::{Vec3, add_scaled, mean, norm};
 use serde::{Deserialize, Serialize};
 use smallvec::{SmallVec, smallvec};
 use space::{BODY, Detail, HEIGHT, LN_SIZE, MOST_JOINTS, PoseSpace, STILL, Stance, TILT, YAW};
-use static_echo::StaticEchoModel;
+use static_echo::{Echo, StaticEchoModel};
 use std::iter::zip;
 
 /// Frames of a window lie no farther from its middle, s: the prior reaches no farther.
@@ -173,6 +173,8 @@ struct WindowFrame {
     /// The persons as they are in this frame, and what the frame says of them.
     params: Pppr,
     gradient: Pppr,
+    /// What their joints do along the line of sight, where that is modelled.
+    echoes: Vec<Echo>,
 }
 
 /// What a window says of its coordinates.
@@ -280,7 +282,12 @@ impl Window {
                 ems = compared(None)?;
             }
         }
-        let frame = |em| WindowFrame { em, params: initial.clone(), gradient: Pppr::zeros(initial.shape()) };
+        let frame = |em| WindowFrame {
+            em,
+            params: initial.clone(),
+            gradient: Pppr::zeros(initial.shape()),
+            echoes: Vec::new(),
+        };
         let frames = ems.into_iter().map(frame).collect();
         let own = chosen.iter().position(Option::is_none).unwrap_or(0);
         let stride = space.coordinates();
@@ -366,7 +373,7 @@ impl Window {
     fn dim(&self, coordinates: &[f64], params: &mut Pppr) {
         let Some(echo) = &self.echo else { return };
         for (person, of) in coordinates.chunks_exact(self.stride).enumerate() {
-            echo.dim(of[STILL], person, params);
+            echo.dim(of[STILL], person, params, |_| ());
         }
     }
 
@@ -415,8 +422,10 @@ impl Window {
                 space.velocity(own, &stances[person], (frame, &positions[joints.clone()]), &mut velocities[joints]);
             }
             if let Some(echo) = echo {
-                let each = coordinates.chunks_exact(*stride).enumerate();
-                each.for_each(|(person, own)| echo.dim(own[STILL], person, &mut of.params));
+                of.echoes.clear();
+                for (person, own) in coordinates.chunks_exact(*stride).enumerate() {
+                    echo.dim(own[STILL], person, &mut of.params, |joint| of.echoes.push(joint));
+                }
             }
             of.gradient.reset(params.shape());
             let em = of.em.evaluate((&problem.radar, config), precision, &of.params, &mut of.gradient, None);
@@ -438,7 +447,7 @@ impl Window {
                     let em = &of.gradient.group(Group::Beta)[of_person];
                     beta_bar.iter_mut().zip(em).for_each(|(bar, em)| *bar = em_gain * em);
                     let onto = (&mut pose_bar[..], &mut velocity_bar[..]);
-                    bars[STILL] += echo.pull_back(own[STILL], person, &of.params, &beta_bar, onto);
+                    bars[STILL] += echo.pull_back(own[STILL], person, (&of.params, &of.echoes), &beta_bar, onto);
                 }
                 let gain = share * prior_gain;
                 let misfit = space.proportions.misfit(own, pose, gain, (&mut pose_bar, &mut *bars));

@@ -18,6 +18,7 @@ use crate::mhp::Problem;
 use crate::mhp::skin::radar_place;
 use crate::radar::RadarConfig;
 use std::f64::consts::PI;
+use std::iter::zip;
 
 /// Mean and standard deviation of q: from −30 dB to nothing removed.
 pub(super) const USUAL: f64 = -1.0;
@@ -39,6 +40,19 @@ pub(super) struct StaticEchoModel {
     radar: Vec3,
     /// α of each joint of a body.
     opacities: Vec<f64>,
+}
+
+/// What a joint does along the line of sight.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Echo {
+    sight: Vec3,
+    /// m
+    distance: f64,
+    /// v_r, m/s.
+    radial_mps: f64,
+    /// sinc²(v_r/v₀), and its derivative.
+    power: f64,
+    slope: f64,
 }
 
 /// v₀ of a radar, m/s.
@@ -84,53 +98,52 @@ impl StaticEchoModel {
         })
     }
 
-    /// The line of sight to a joint, its distance, and x = v_r/v₀.
-    fn radial(&self, position: Vec3, velocity: Vec3) -> (Vec3, f64, f64) {
+    fn echo(&self, position: Vec3, velocity: Vec3) -> Echo {
         let from = sub(position, self.radar);
         let distance = norm(from).max(1e-3);
         let sight = scale(from, 1.0 / distance);
-        (sight, distance, dot(velocity, sight) / self.width_mps)
+        let radial_mps = dot(velocity, sight);
+        let (power, slope) = sinc_sq(radial_mps / self.width_mps);
+        Echo { sight, distance, radial_mps, power, slope }
     }
 
-    /// Gives person `person` of `params` the opacities that q, its positions and its velocities leave.
-    pub(super) fn dim(&self, q: f64, person: usize, params: &mut Pppr) {
+    /// Gives person `person` of `params` the opacities that q, its positions and its velocities leave; `told` is what each joint does.
+    pub(super) fn dim(&self, q: f64, person: usize, params: &mut Pppr, mut told: impl FnMut(Echo)) {
         let joints = self.opacities.len();
         let gone = 1.0 - kept(q).0;
         for (own, opacity) in self.opacities.iter().enumerate() {
             let joint = person * joints + own;
-            let (_, _, x) = self.radial(params.position(joint), params.velocity(joint));
-            let alpha = opacity * (1.0 - gone * sinc_sq(x).0).max(f64::MIN_POSITIVE).sqrt();
+            let echo = self.echo(params.position(joint), params.velocity(joint));
+            let alpha = opacity * (1.0 - gone * echo.power).max(f64::MIN_POSITIVE).sqrt();
             params.joint_mut(Group::Beta, joint)[0] = (alpha / (1.0 - alpha)).ln();
+            told(echo);
         }
     }
 
-    /// ∂L/∂q, where `params` are dimmed and `beta_bar` is ∂L/∂β of a person's joints; what positions and velocities want is added
-    /// to theirs.
+    /// ∂L/∂q, where `params` are dimmed, `echoes` are what their joints do and `beta_bar` is ∂L/∂β of a person's joints; what positions
+    /// and velocities want is added to theirs.
     pub(super) fn pull_back(
         &self,
         q: f64,
         person: usize,
-        params: &Pppr,
+        (params, echoes): (&Pppr, &[Echo]),
         beta_bar: &[f64],
         (position_bar, velocity_bar): (&mut [Vec3], &mut [Vec3]),
     ) -> f64 {
-        let joints = self.opacities.len();
+        let first = person * self.opacities.len();
         let (share, by_q) = kept(q);
         let mut q_bar = 0.0;
-        for (own, opacity) in self.opacities.iter().enumerate() {
-            let joint = person * joints + own;
-            let velocity = params.velocity(joint);
-            let (sight, distance, x) = self.radial(params.position(joint), velocity);
-            let (power, slope) = sinc_sq(x);
+        for (own, (opacity, echo)) in zip(&self.opacities, &echoes[first..]).enumerate() {
+            let Echo { sight, distance, radial_mps, power, slope } = *echo;
+            let velocity = params.velocity(first + own);
             let left = (1.0 - (1.0 - share) * power).max(f64::MIN_POSITIVE);
             // By κ²: ln α has half its logarithm, and β has 1/(1 − α) of that.
             let bar = 0.5 * beta_bar[own] / ((1.0 - opacity * left.sqrt()) * left);
             q_bar += bar * power * by_q;
             let x_bar = -bar * (1.0 - share) * slope / self.width_mps;
             add_scaled(&mut velocity_bar[own], sight, x_bar);
-            let radial = dot(velocity, sight);
             for k in 0..3 {
-                position_bar[own][k] += x_bar * (velocity[k] - radial * sight[k]) / distance;
+                position_bar[own][k] += x_bar * (velocity[k] - radial_mps * sight[k]) / distance;
             }
         }
         q_bar
