@@ -44,26 +44,25 @@ pub(super) struct Measured<'a> {
 }
 
 impl Measured<'_> {
-    /// What joins the noise in a view with this region: a power a cell of the whole map, of the unit of the map's power, if
-    /// anything does. Sidelobes of a body, walls and leakage are arcs about the radar: of each range it is the median of the cells
+    /// What joins the noise in a view's region, whose cells these are: a power a cell, of the unit of the map's power, if anything
+    /// does. Sidelobes of a body, walls and leakage are arcs about the radar: of each range it is the median of the cells
     /// beside the region, so far as it rises over the noise's, and at least what stands there over time.
-    fn clutter(&self, view: usize, region: &Region, noise: f64) -> Option<Vec<f64>> {
+    fn clutter(&self, view: usize, cells: &[usize], noise: f64) -> Option<Vec<f64>> {
         let standing = self.background.map(|maps| maps[view].as_slice());
-        let Some(grid) = self.grids.get(view) else { return standing.map(<[f64]>::to_vec) };
-        let power: Vec<f64> = self.maps[view].iter().map(|&h| self.views[view].quantity.power(h)).collect();
-        let mut inside = vec![false; power.len()];
-        region.indices(&self.views[view].shape()).into_iter().for_each(|cell| inside[cell] = true);
+        let Some(grid) = self.grids.get(view) else {
+            return standing.map(|standing| cells.iter().map(|&cell| standing[cell]).collect());
+        };
+        let (map, quantity) = (self.maps[view], self.views[view].quantity);
         // Cells that were erased say nothing of what lies beside.
-        inside.iter_mut().zip(self.maps[view]).for_each(|(inside, h)| *inside |= h.is_nan());
-        let mut clutter = grid.beside(&power, &inside);
+        let mut inside: Vec<bool> = map.iter().map(|h| h.is_nan()).collect();
+        cells.iter().for_each(|&cell| inside[cell] = true);
+        let beside = grid.beside(|cell| quantity.power(map[cell]), &inside);
         let speckle = MEDIAN_OF_NOISE * noise;
-        for beside in &mut clutter {
-            *beside = (*beside - speckle).max(0.0);
-        }
-        for (clutter, standing) in clutter.iter_mut().zip(standing.into_iter().flatten()) {
-            *clutter = clutter.max(*standing);
-        }
-        Some(clutter)
+        let of_cell = |&cell: &usize| {
+            let rises = (beside[cell] - speckle).max(0.0);
+            standing.map_or(rises, |standing| rises.max(standing[cell]))
+        };
+        Some(cells.iter().map(of_cell).collect())
     }
 }
 
@@ -118,7 +117,7 @@ impl FrameEm {
             });
             let levels = (config.objective != EmLoss::Iou).then(|| {
                 let noise = measured.noises[k];
-                let background = measured.clutter(k, region, noise).map(|power| inside(&power));
+                let background = measured.clutter(k, &indices, noise);
                 // Powers that add, without a spectrum along an axis.
                 let spectral = view.axes.iter().any(|axis| axis.kind == AxisKind::Doppler);
                 let in_rows = precision == Precision::F32 && config.summation == Summation::Incoherent && !spectral;

@@ -147,7 +147,7 @@ impl SpatialGrid {
     /// The median of `power` over those cells of each cell's ring that are not `inside`, both a cell of the view in C order; 0 where
     /// they are too few, and where the ring has nothing inside, of which nobody asks. A ring is one of each Doppler bin: what moves
     /// smears along its own.
-    pub(crate) fn beside(&self, power: &[f64], inside: &[bool]) -> Vec<f64> {
+    pub(crate) fn beside(&self, power: impl Fn(usize) -> f64, inside: &[bool]) -> Vec<f64> {
         let shape = self.view.shape();
         // The cells of a spatial cell: one a Doppler bin.
         let strides: Vec<usize> = (0..shape.len()).map(|k| shape[k + 1..].iter().product()).collect();
@@ -165,15 +165,18 @@ impl SpatialGrid {
         let plain = self.axes.len() == shape.len();
         let firsts: Vec<usize> = if plain { Vec::new() } else { (0..self.cells.len()).map(first).collect() };
         let full = |spatial: u32| if plain { spatial as usize } else { firsts[spatial as usize] };
-        let mut levels = vec![0.0; power.len()];
+        let mut levels = vec![0.0; inside.len()];
         let mut beside = Vec::new();
         for ring in self.rings.windows(2) {
             let cells = &self.cells[ring[0]..ring[1]];
             for offset in &offsets {
+                if !cells.iter().any(|&cell| inside[full(cell) + offset]) {
+                    continue;
+                }
                 beside.clear();
                 let outside = cells.iter().map(|&cell| full(cell) + offset).filter(|&cell| !inside[cell]);
-                beside.extend(outside.map(|cell| (power[cell] as f32).to_bits()));
-                if beside.len() >= SMALLEST_RING && beside.len() < cells.len() {
+                beside.extend(outside.map(|cell| (power(cell) as f32).to_bits()));
+                if beside.len() >= SMALLEST_RING {
                     let level = f64::from(median(&mut beside));
                     for &cell in cells {
                         levels[full(cell) + offset] = level;
@@ -273,10 +276,10 @@ mod tests {
         let of = |cell: usize| unravel(cell, &view.shape());
         let inside: Vec<bool> = (0..view.cells()).map(|cell| (8..12).contains(&of(cell)[2])).collect();
         let level = |cell: usize| (1 + of(cell)[0] * 10 + of(cell)[1]) as f64;
-        let power: Vec<f64> = (0..view.cells()).map(|cell| if inside[cell] { 1e6 } else { level(cell) }).collect();
-        let beside = grid.beside(&power, &inside);
+        let power = |cell: usize| if inside[cell] { 1e6 } else { level(cell) };
+        let beside = grid.beside(power, &inside);
         assert!((0..view.cells()).all(|cell| beside[cell] == level(cell)));
-        assert!(grid.beside(&power, &vec![true; view.cells()]).iter().all(|&level| level == 0.0));
+        assert!(grid.beside(power, &vec![true; view.cells()]).iter().all(|&level| level == 0.0));
     }
 
     #[test]
