@@ -169,6 +169,46 @@ fn nothing_clips_and_maps_show_the_person_where_the_truth_says() {
 }
 
 #[test]
+fn shadows_lie_behind_people_and_nowhere_else() {
+    let made = |shadows: bool| {
+        let (presets, actions) = (vec![ScenePreset::Medium], vec![Action::Stand]);
+        let (still_share, multipath) = (Some(1.0), Some(false));
+        recording(&Options {
+            presets,
+            actions,
+            still_share,
+            multipath,
+            shadows,
+            frames: 6,
+            seed: 5,
+            ..Options::default()
+        })
+    };
+    let [plain, shadowed] = [false, true].map(made);
+    let view = &plain.views()[0];
+    let (mut behind, mut beside) = ([0.0; 2], [0.0; 2]);
+    for number in 0..6 {
+        let [lit, dim] = [&plain, &shadowed].map(|made| made.sequence(0).frame(number));
+        assert_eq!(lit.joints, dim.joints);
+        let hips = lit.joints[0][11];
+        for k in 0..lit.maps[0].len() {
+            let [depth, lateral] = [view.axes[0].at((k / 128) as f64), view.axes[1].at((k % 128) as f64)];
+            let (range, off_rad) = (depth.hypot(lateral), (lateral.atan2(depth) - hips[1].atan2(hips[0])).abs());
+            let sum = match () {
+                () if range > norm(hips) + 1.0 && off_rad < 0.03 => &mut behind,
+                () if range > norm(hips) + 1.0 && off_rad > 0.4 => &mut beside,
+                () => continue,
+            };
+            for (sum, made) in sum.iter_mut().zip([&lit, &dim]) {
+                *sum += f64::from(made.maps[0][k]).powi(2);
+            }
+        }
+    }
+    assert!(behind[1] < 0.5 * behind[0], "{behind:?}");
+    assert!((beside[1] / beside[0] - 1.0).abs() < 0.05, "{beside:?}");
+}
+
+#[test]
 fn leftover_frames_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let home = folder.path().join("frames/s007");

@@ -61,6 +61,9 @@ pub struct SimulateArgs {
     /// Echoes by way of walls and floor; without it, as the preset has them.
     #[arg(long, value_name = "BOOL")]
     pub multipath: Option<bool>,
+    /// People hide what stands still behind them.
+    #[arg(long)]
+    pub shadows: bool,
     /// Name of the data set; without it, layout and presets.
     #[arg(long)]
     pub name: Option<String>,
@@ -210,6 +213,7 @@ impl SimulateArgs {
             bits: self.bits,
             still_share: self.still_share,
             multipath: self.multipath,
+            shadows: self.shadows,
             noise_db: self.noise_db,
             room_seed: self.room_seed,
             radar_height_m: self.radar_height.0,
@@ -240,6 +244,9 @@ impl SimulateArgs {
         }
         if let Some(multipath) = self.multipath {
             let _ = write!(text, " --multipath {multipath}");
+        }
+        if self.shadows {
+            text.push_str(" --shadows");
         }
         if self.noise_db != 0.0 {
             let _ = write!(text, " --noise-db {}", self.noise_db);

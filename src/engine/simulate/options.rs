@@ -145,6 +145,8 @@ pub struct Options {
     pub still_share: Option<f64>,
     /// Echoes by way of walls and floor; `None` is the preset's own.
     pub multipath: Option<bool>,
+    /// Whether people hide what stands still behind them.
+    pub shadows: bool,
     /// More thermal noise than the preset has, dB.
     pub noise_db: f64,
     /// One room for all sequences of a preset, drawn from this; without it each sequence has a room of its own.
@@ -167,6 +169,7 @@ impl Default for Options {
             bits: 12,
             still_share: None,
             multipath: None,
+            shadows: false,
             noise_db: 0.0,
             room_seed: None,
             radar_height_m: None,

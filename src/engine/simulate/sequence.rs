@@ -39,6 +39,7 @@ pub struct Sequence {
     /// A loop of what stands still, for each radar.
     backgrounds: Vec<Vec<Complex64>>,
     still_share: f64,
+    shadows: bool,
     rate_hz: f64,
     seed: u64,
 }
@@ -128,7 +129,8 @@ impl Sequence {
             .collect();
         let still_share = options.still_share.unwrap_or(recipe.still_share);
         let device = Arc::clone(device);
-        Self { index, preset, people, room, device, receivers, backgrounds, still_share, rate_hz, seed: options.seed }
+        let Options { shadows, seed, .. } = *options;
+        Self { index, preset, people, room, device, receivers, backgrounds, still_share, shadows, rate_hz, seed }
     }
 
     /// Number of the sequence in its recording.
@@ -192,13 +194,20 @@ impl Sequence {
         RawFrame { cubes, clipped: clipped as f64 / values.max(1) as f64 }
     }
 
-    /// The echoes of all that moves about time `t`.
+    /// The echoes of all that moves about time `t`; what people hide of what stands still counts against it.
     fn echoes(&self, t: f64, half_s: f64) -> Vec<Echo> {
         let poses: Vec<[BodyPose; 3]> =
             self.performers().map(|performer| [t - half_s, t, t + half_s].map(|t| performer.pose(t))).collect();
         let capsules: Vec<Capsule> =
             self.people.iter().zip(&poses).flat_map(|((_, skin), poses)| skin.capsules(&poses[1])).collect();
         let mut echoes = self.room.moving(t, half_s);
+        if self.shadows {
+            let hidden = |still: &Echo| {
+                let passes = capsules.iter().map(|capsule| capsule.lets_through(still.out.position)).product::<f64>();
+                (passes < 1.0).then(|| Echo { reflectivity: still.reflectivity * (passes - 1.0), ..*still })
+            };
+            echoes.extend(self.room.still.iter().filter_map(hidden));
+        }
         for ((_, skin), [before, now, after]) in self.people.iter().zip(&poses) {
             for (count, (point, position, strength)) in skin.seen(now, &capsules).enumerate() {
                 let place = |pose: &BodyPose| pose.segments[point.segment as usize].place(point.position);

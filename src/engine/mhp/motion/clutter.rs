@@ -7,6 +7,9 @@
 //! joins the noise under the person (`mhp/levels.rs`). A trunk that stands still does not fluctuate either: where somebody who
 //! does not walk stands, nothing is taken for background (`spare`), and the noise is what lies beside at each range alone
 //! (`mhp/frame_em.rs`); and where noise and background explain the maps without anybody ([`HIDDEN`]), none is.
+//!
+//! What a person hides of what stands behind is left in: of the same scenes with shadows and without (`simulate --shadows`) fits are
+//! as far off.
 
 use super::ReducedViews;
 use crate::config::{Clutter, EmRegion, FitConfig};
