@@ -55,7 +55,9 @@ impl Measured<'_> {
         let (map, quantity) = (self.maps[view], self.views[view].quantity);
         // Cells that were erased say nothing of what lies beside.
         let mut inside: Vec<bool> = map.iter().map(|h| h.is_nan()).collect();
-        cells.iter().for_each(|&cell| inside[cell] = true);
+        for &cell in cells {
+            inside[cell] = true;
+        }
         let beside = grid.beside(|cell| quantity.power(map[cell]), &inside);
         let speckle = MEDIAN_OF_NOISE * noise;
         let of_cell = |&cell: &usize| {

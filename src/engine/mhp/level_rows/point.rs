@@ -289,14 +289,14 @@ impl RowPoint {
         sums: &mut [Lanes<S>; 6],
     ) {
         let slopes = slopes.chunks_exact(rows.stride / S::F32_LANES);
-        let mut of = Columns::<S, N>::from_row(splat(simd, self.first_row(rows, reach)));
+        let mut of = Columns::<S, N>::from_row(simd, self.first_row(rows, reach));
         if reach.aside.is_some() {
             let Some([shares, by_rows]) = halves::<_, N>(kept) else { return };
             let mut share = shares.map(|share| Lanes::new(simd, share));
             for (row, at_row) in zip(slopes, ridge) {
                 let Some(row) = row[register..].first_chunk::<N>() else { break };
                 let at_row = splat(simd, *at_row);
-                of.add(simd, |k| share[k] * at_row * Lanes::new(simd, row[k]));
+                of.add(|k| share[k] * at_row * Lanes::new(simd, row[k]));
                 for k in 0..N {
                     share[k] = share[k] * Lanes::new(simd, by_rows[k]);
                 }
@@ -306,7 +306,7 @@ impl RowPoint {
                 let (Some(kept), Some(row)) = (kept.first_chunk::<N>(), row[register..].first_chunk::<N>()) else {
                     break;
                 };
-                of.add(simd, |k| Lanes::new(simd, kept[k]) * Lanes::new(simd, row[k]));
+                of.add(|k| Lanes::new(simd, kept[k]) * Lanes::new(simd, row[k]));
             }
         }
         let Columns { r, r_y, r_yy, .. } = of;
@@ -325,6 +325,7 @@ impl RowPoint {
 
 /// Σ r, r y and r y² over rows, a number a column.
 struct Columns<S: Simd, const N: usize> {
+    simd: S,
     y: Lanes<S>,
     r: [Lanes<S>; N],
     r_y: [Lanes<S>; N],
@@ -334,14 +335,14 @@ struct Columns<S: Simd, const N: usize> {
 impl<S: Simd, const N: usize> Columns<S, N> {
     /// Nothing yet; the first row is `y` from the middle.
     #[inline(always)]
-    fn from_row(y: Lanes<S>) -> Self {
-        let nothing = [y - y; N];
-        Self { y, r: nothing, r_y: nothing, r_yy: nothing }
+    fn from_row(simd: S, y: f32) -> Self {
+        let [r, r_y, r_yy] = [[splat(simd, 0.0); N]; 3];
+        Self { simd, y: splat(simd, y), r, r_y, r_yy }
     }
 
     /// Adds a row.
     #[inline(always)]
-    fn add(&mut self, simd: S, wanted: impl Fn(usize) -> Lanes<S>) {
+    fn add(&mut self, wanted: impl Fn(usize) -> Lanes<S>) {
         let y_y = self.y * self.y;
         for k in 0..N {
             let wanted = wanted(k);
@@ -349,7 +350,7 @@ impl<S: Simd, const N: usize> Columns<S, N> {
             self.r_y[k] = wanted.mul_add(self.y, self.r_y[k]);
             self.r_yy[k] = wanted.mul_add(y_y, self.r_yy[k]);
         }
-        self.y += splat(simd, 1.0);
+        self.y += splat(self.simd, 1.0);
     }
 }
 
